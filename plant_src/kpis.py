@@ -319,6 +319,28 @@ def motors(result: Result, rotor_speed: Prefix, threshold: float = 1.0) -> dict[
     }
 
 
+@better(crashed="lower", ditched="lower")
+@units(time="s")
+def failures(result: Result, vehicle: Prefix) -> dict[str, Number]:
+    """Evaluate whether a vehicle of a world crashed or ditched.
+
+    Args:
+        result: Recorded mission.
+        vehicle: Signal prefix of the vehicle ("plant.uav").
+
+    Returns:
+        Values by name:
+
+        - `crashed`: true after a collision above the crash speed, or after a capsize
+        - `ditched`: true if the centre of mass of a multirotor was below the water
+        - `time`: time of the first of both (s); NaN without a failure
+    """
+    crashed, ditched = (result[f"{vehicle}.{failure}"].astype(bool) for failure in ("crashed", "ditched"))
+    rows = np.flatnonzero(crashed | ditched)
+    time = float(result.time[rows[0]]) if rows.size else math.nan
+    return {"crashed": bool(crashed.any()), "ditched": bool(ditched.any()), "time": time}
+
+
 @units(value="{signal}")
 def final(result: Result, signal: Signal) -> dict[str, float]:
     """Return `value`, the last value of a signal in its own unit."""

@@ -18,12 +18,14 @@ class VehiclePlacement:
         model: Model of the vehicle.
         parameters: Values of the model's scalar parameters in order; the initial state is among them.
         body: Rigid body in Bullet, with the mass and inertia of these parameters.
+        crash_speed: Change of velocity by a collision above which the vehicle has crashed (m/s).
     """
 
     name: str
     model: Model
     parameters: Numbers
     body: Body
+    crash_speed: float
 
     def parameter(self, name: str) -> float:
         """Return the value of a scalar parameter."""

@@ -6,6 +6,7 @@ import ctypes
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -21,6 +22,7 @@ from .physics.body import ContactBody, InvalidStateError, create_platform
 from .physics.client import connect, preconnect, pybullet
 from .physics.compiled_equations import library_path
 from .physics.contacts import overlap_depths
+from .physics.failures import FLAG_COUNT
 from .physics.fleet import Fleet, FleetState
 from .scene import replay
 from .variable_views import variable_views
@@ -54,7 +56,8 @@ class World(Component):
         instance_name: Name of the component.
         vehicles: Name to object with the keys "model" (in `catalogue.VEHICLE_MODELS`), "position" of the centre of mass
             ([x, y, z], of vessels [x, y], m) and, optionally, "motion" ("planar" or "6dof"), "yaw" (rad), "velocity_body"
-            ([u, v, w], m/s), "rates" ([p, q, r], rad/s) and "parameters" (name to value).
+            ([u, v, w], m/s), "rates" ([p, q, r], rad/s), "parameters" (name to value) and "crash_speed" (m/s), the change of
+            velocity by a collision above which the vehicle has crashed.
         platforms: Name to object with the keys "size" (edges [x, y, z], m) and "position" (centre [x, y, z], m).
         environment: Object that `environment/settings.py` describes; waves and gusts start with the run.
 
@@ -76,8 +79,10 @@ class World(Component):
             vehicles, {} if platforms is None else platforms, {} if environment is None else environment
         )
         self._name = instance_name
-        self._bullet_step, self._step_size, self._step_count, self._start_time = np.zeros(1), math.nan, 1, 0.0
-        self._flags = np.zeros((len(settings.vehicles), 2), _FLAG)
+        self._bullet_step, self._step_size, self._start_time = np.zeros(1), math.nan, 0.0
+        self._step_fractions: Sequence[float] = ()
+        self._highest_water = np.full(1, settings.sea.highest_elevation)
+        self._flags = np.zeros((len(settings.vehicles), FLAG_COUNT), _FLAG)
         self._flags_data = self._flags.reshape(-1).data
         self._bound_inputs: dict[str, np.ndarray] = {}
         self._client, self._disconnect = connect(self)
@@ -109,12 +114,19 @@ class World(Component):
         return frames(result, camera, times, size)
 
     def _populate(self, settings: WorldSettings) -> None:
-        names = {create_platform(self._client, platform): f"platforms.{platform.name}" for platform in settings.platforms}
-        self._fleet = Fleet(self._client, settings.vehicles, settings.platforms, self._bullet_step, self._flags)
-        names |= {body.body_id: f"vehicles.{body.name}" for body in self._fleet.bodies}
-        self._check_overlaps(names)
+        platforms = {create_platform(self._client, platform): platform.name for platform in settings.platforms}
+        shared = {"step_size": self._bullet_step, "highest_water": self._highest_water}
+        self._fleet = Fleet(self._client, settings.vehicles, settings.platforms, shared, self._flags, platforms)
+        self._advance, self._contacts, self._failures = self._fleet.advance, self._fleet.contacts, self._fleet.failures
+        paths = {number: f"platforms.{name}" for number, name in platforms.items()}
+        self._check_overlaps(paths | {body.body_id: f"vehicles.{body.name}" for body in self._fleet.bodies})
         self._environment = EnvironmentModel(
-            settings.environment, settings.sea, settings.vehicles, settings.platforms, self._fleet.bodies
+            settings.environment,
+            settings.sea,
+            settings.vehicles,
+            settings.platforms,
+            self._fleet.bodies,
+            self._highest_water,
         )
         self._has_environment = bool(self._environment.update_functions)
         for name in self._environment.vessels_without_wave_motion:
@@ -208,30 +220,39 @@ class World(Component):
         """Advance from `time` (s) by `step_size` (s), in equal Bullet steps of at most MAX_BULLET_STEP."""
         if step_size != self._step_size:
             self._set_step_size(time, step_size)
-        if self._fleet.contacts.has_contacts:
-            self._fleet.contacts.clear()
+        if self._contacts.has_contacts:
+            self._contacts.clear()
         try:
             if self._has_environment:
                 self._advance_with_environment(time - self._start_time)
             else:
-                for _ in range(self._step_count):
-                    self._fleet.advance(1 / self._step_count)
+                for fraction in self._step_fractions:
+                    self._advance(fraction)
         except InvalidStateError as error:
             raise ComponentError(self._name, "do_step", str(error), time) from None
+        if self._failures.alarm:
+            self._report_failures(time + step_size)
+
+    def _report_failures(self, time: float) -> None:
+        """Find and log the vehicles that have failed until `time` (s)."""
+        level = partial(self._environment.water_level, time=time - self._start_time)
+        for message in self._failures.examine(level):
+            component_log.log_message(self._name, component_log.WARNING, f"t = {time:g} s: {message}")
 
     def _advance_with_environment(self, time: float) -> None:
         """Make the Bullet steps with environment, from a time since the start (s)."""
-        for k in range(self._step_count):
+        for k, fraction in enumerate(self._step_fractions):
             self._environment.update(time + k * self._bullet_step[0])
-            self._fleet.advance(1 / self._step_count)
+            self._advance(fraction)
         self._environment.publish(time + self._step_size)
 
     def _set_step_size(self, time: float, step_size: float) -> None:
         """Split the component's step into equal Bullet steps."""
         if not 0 < step_size < math.inf:
             raise ComponentError(self._name, "do_step", f"found step size {step_size}, expected a positive number", time)
-        self._step_count = max(1, math.ceil(step_size / MAX_BULLET_STEP - 1e-9))
-        self._bullet_step[0] = step_size / self._step_count
+        step_count = max(1, math.ceil(step_size / MAX_BULLET_STEP - 1e-9))
+        self._step_fractions = (1 / step_count,) * step_count
+        self._bullet_step[0] = step_size / step_count
         pybullet.setPhysicsEngineParameter(fixedTimeStep=self._bullet_step[0], physicsClientId=self._client)
         self._step_size = step_size
 

@@ -23,6 +23,9 @@ from .vehicles.model import Model
 #: prefixes of the parameters of waves and of the initial state
 WAVE_PREFIX, INITIAL_PREFIX = "wave.", "initial."
 
+#: keys of a vehicle besides "model" and "position"
+OPTIONAL_KEYS = ("motion", "yaw", "velocity_body", "rates", "parameters", "crash_speed")
+
 
 @dataclass(frozen=True)
 class WorldSettings:
@@ -61,7 +64,7 @@ class _WorldSettingsReader(JsonReader):
     def read_vehicle(self, name: str, spec: Any) -> VehiclePlacement | None:
         """Read one vehicle; return None if its model is unknown."""
         path = ("vehicles", name)
-        spec = self.read_object(spec, path, ("model", "position"), ("motion", "yaw", "velocity_body", "rates", "parameters"))
+        spec = self.read_object(spec, path, ("model", "position"), OPTIONAL_KEYS)
         model = self.find_model(spec, path)
         if model is None:
             return None
@@ -72,7 +75,8 @@ class _WorldSettingsReader(JsonReader):
         parameters = {slot: (initial | given).get(slot, start) for slot, start in starts}
         valid = len(self.problems) == problem_count
         body = self.collision_body(model, parameters, (*path, "parameters")) if valid else model.body
-        return VehiclePlacement(name, model, tuple(parameters.values()), body)
+        crash_speed = self.number(spec.get("crash_speed", model.crash_speed), (*path, "crash_speed"), 0.0)
+        return VehiclePlacement(name, model, tuple(parameters.values()), body, crash_speed)
 
     def read_initial_state(self, model: Model, spec: Mapping[str, Any], path: JsonPath) -> dict[str, float]:
         """Read position, yaw, velocity and rates; return the parameters `initial.*`."""

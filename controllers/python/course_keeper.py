@@ -15,6 +15,11 @@ class CourseKeeper(Fmi2Slave):
     """
 
     description = "Keeps a course and a speed"
+    units = {
+        **{"vehicle.attitude.yaw": "rad", "vehicle.velocity_body.u": "m/s", "vehicle.rates.r": "rad/s"},
+        **{"course_command": "rad", "speed_command": "m/s", "course_P": "1", "course_D": "s", "rudder_limit": "rad"},
+        **{"speed_P": "N.s/m", "thrust_limit": "N", "thrust": "N", "rudder_angle": "rad"},
+    }
 
     def __init__(self, **arguments: object):
         super().__init__(**arguments)

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..core.errors import CosimError, InputError, Problem
+from ..engine import Termination
 from ..engine.plan_run import SimulationOutcome
 from ..process.float_mode import default_float_mode
 from ..results import Kpis, Result
@@ -105,9 +106,18 @@ def _outcome_metadata(prepared: PreparedRun, outcome: SimulationOutcome) -> dict
         "macro_steps": outcome.macro_steps,
         "real_time": outcome.real_time,
         "non_finite": {} if prepared.spec.non_finite == "allow" else warn_non_finite(outcome.recording),
-        "terminated_by": {"component": termination.component, "time": termination.time} if termination else None,
+        "terminated_by": _describe_termination(termination),
         "failure": "interrupted" if isinstance(outcome.failure, KeyboardInterrupt) else _failure_text(outcome.failure),
     }
+
+
+def _describe_termination(termination: Termination | None) -> dict[str, Any] | None:
+    """Return the component or the condition that ended the run before the stop time."""
+    if termination is None:
+        return None
+    if termination.condition:
+        return termination.condition._asdict()
+    return {"component": termination.component, "time": termination.time}
 
 
 def _failure_text(failure: BaseException | None) -> str | None:

@@ -9,7 +9,7 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass
 from importlib import import_module
-from typing import Any
+from typing import Any, TextIO
 
 import click
 
@@ -36,6 +36,7 @@ COMMANDS = {
     "build": ("build", "Export controllers and plants to fmus/."),
     "init": ("init", "Create a project with a controller, a scenario, its reference, tests and CI."),
     "new": ("new", "Create a controller with a scenario in which it runs."),
+    "list": ("list", "List the shipped scenarios, sweeps, vehicle models, roles of controllers and KPIs."),
     "schema": ("schema", "Print the JSON Schema of scenarios, sweeps or tunings."),
     "doctor": ("doctor", "Print which packages, tools and sandboxes are available on this machine."),
 }
@@ -57,6 +58,7 @@ class _LazyGroup(click.Group):
         if name not in COMMANDS:
             return None
         command: click.Command = import_module(f".commands.{COMMANDS[name][0]}", __name__).command
+        import_module(".output_options", __name__).add_verbosity_options(command)
         return command
 
     def format_commands(self, _ctx: click.Context, formatter: click.HelpFormatter) -> None:
@@ -67,15 +69,25 @@ class _LazyGroup(click.Group):
 
 @dataclass
 class CommandLine:
-    """Arguments of this call of `cosim`, and its option --debug once click has parsed it."""
+    """Arguments of this call of `cosim`, and its options once click has parsed them.
+
+    Attributes:
+        arguments: words after the program's name.
+        debug: --debug was given.
+        verbosity: -1 with --quiet, 1 with --verbose.
+        data: stream for the text of --json; None: standard output.
+    """
 
     arguments: tuple[str, ...] = ()
     debug: bool = False
+    verbosity: int = 0
+    data: TextIO | None = None
 
 
 def current_command_line() -> CommandLine:
-    """Return the command line of the running command; an empty one if the command was called without the group `cosim`."""
-    return click.get_current_context().find_root().ensure_object(CommandLine)
+    """Return the command line of the running command; an empty one if it was called without the group `cosim`."""
+    context = click.get_current_context(silent=True)
+    return context.find_root().ensure_object(CommandLine) if context else CommandLine()
 
 
 @click.command(cls=_LazyGroup, context_settings={"help_option_names": ["-h", "--help"]})
@@ -122,22 +134,33 @@ def run_guarded(command: Callable[[], int], command_line: CommandLine) -> int:
 
 def report_error(error: BaseException, command_line: CommandLine) -> int:
     """Print an error to standard error, with its traceback after --debug, and return the exit code for it."""
-    if isinstance(error, KeyboardInterrupt | click.exceptions.Abort):
-        click.echo("interrupted", err=True)
-        return 130
     if isinstance(error, click.ClickException):
         error.show()
         return error.exit_code
-    if command_line.debug:
+    interrupted = isinstance(error, KeyboardInterrupt | click.exceptions.Abort)
+    if command_line.debug and not interrupted:
         traceback.print_exception(error)
-    if isinstance(error, CosimError):
-        click.echo(str(error), err=True)
+    if interrupted:
+        text = "interrupted"
+    elif isinstance(error, CosimError):
+        text = str(error)
+    elif isinstance(error, OSError):
+        text = f"operating system error: {error}"
+    elif isinstance(error, MemoryError):
+        text = "the memory of the process is used up"
+    else:
+        text = f"internal error: {type(error).__name__}: {error}  (`cosim --debug ...` prints the traceback)"
+    click.echo(text, err=True)
+    return exit_code_of(error)
+
+
+def exit_code_of(error: BaseException) -> int:
+    """Return the exit code for an error."""
+    if isinstance(error, KeyboardInterrupt | click.exceptions.Abort):
+        return 130
+    if isinstance(error, click.ClickException | CosimError):
         return error.exit_code
-    if isinstance(error, OSError):
-        click.echo(f"operating system error: {error}", err=True)
-        return 1
-    click.echo(f"internal error: {type(error).__name__}: {error}  (`cosim --debug ...` prints the traceback)", err=True)
-    return 70
+    return 1 if isinstance(error, OSError | MemoryError) else 70
 
 
 def _exit_code(value: Any) -> int:

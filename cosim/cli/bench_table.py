@@ -5,13 +5,37 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
+import click
+
+from ..core.text import count_noun
 from ..report.tables import cell_text, format_number, table_console
 
 if TYPE_CHECKING:
     from ..results.checks import Number
+    from ..studies.controller_bench.ranking import Ranking
     from ..studies.controller_bench.score import KpiComparison
 
 _COLOURS = {"better": "[green]better[/]", "worse": "[red]worse[/]", "": ""}
+
+
+def print_ranking(ranking: Ranking, candidate: str) -> None:
+    """Print the achievements of a candidate and of the shipped controller, the better one first."""
+    standings = {candidate: ranking.candidate, "shipped": ranking.shipped}
+    names = list(standings) if ranking.verdict == "above" else list(standings)[::-1]
+    width = max(map(len, names))
+    click.echo()
+    for place, name in enumerate(names, 1):
+        found = standings[name]
+        checks = f"{found.met} of {count_noun(found.checks, 'check')} met"
+        place = 1 if ranking.verdict == "equal" else place
+        click.echo(f"{place}. {name:{width}}  {found.passed} of {count_noun(found.scenarios, 'scenario')} passed, {checks}")
+    goals = [
+        f"{goal} {counts['better']} better, {counts['worse']} worse"
+        for goal, counts in ranking.goals.items()
+        if any(counts.values())
+    ]
+    words = {"above": "is better than", "equal": "equals", "below": "is worse than"}
+    click.echo(f"{candidate} {words[ranking.verdict]} the shipped controller" + (f" ({'; '.join(goals)})" if goals else ""))
 
 
 def print_comparison(rows: Sequence[KpiComparison], candidate: str) -> None:
@@ -38,7 +62,7 @@ def print_comparison(rows: Sequence[KpiComparison], candidate: str) -> None:
         *(("check",) if with_checks else ()),
     ):
         table.add_column(
-            cell_text(header), justify="right" if header in (candidate, "shipped", "last run") else "left", no_wrap=True
+            cell_text(header), justify="right" if header in (candidate, "shipped", "last run") else "left", overflow="fold"
         )
     for row in rows:
         cells = [row.name, row.unit, _format_value(row.candidate), _format_value(row.shipped)]

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -12,6 +13,7 @@ from ..studies.regression import Regression, RegressionOutcome
 from ..studies.regression_runs import run_in_parallel
 
 if TYPE_CHECKING:
+    from ..studies.controller_bench.ranking import ScenarioKpis
     from ..studies.controller_bench.score import KpiComparison, RunKpis
 
 
@@ -52,13 +54,22 @@ class TrialResult:
         """Name of the scenario."""
         return self.trial.file.stem
 
+    @cached_property
+    def kpis(self) -> ScenarioKpis:
+        """KPIs of the candidate and of the shipped controller, with the checks of the scenario."""
+        from ..studies.controller_bench.ranking import ScenarioKpis
+        from ..studies.controller_bench.score import RunKpis
+
+        candidate = RunKpis.read(self.trial.candidate_folder) if self.outcome.code in (0, 3) else None
+        checks = json.loads(self.trial.file.read_text(encoding="utf-8-sig"))["checks"]
+        return ScenarioKpis(candidate, RunKpis.read(self.trial.shipped_folder), checks)
+
     def rows(self) -> list[KpiComparison]:
         """Return the compared KPIs; none if the run did not reach its end."""
-        from ..studies.controller_bench.score import RunKpis, compare_kpis
+        from ..studies.controller_bench.score import compare_kpis
 
-        kpis = RunKpis.read(self.trial.candidate_folder) if self.outcome.code in (0, 3) else None
-        checks = json.loads(self.trial.file.read_text(encoding="utf-8-sig"))["checks"]
-        return compare_kpis(kpis, RunKpis.read(self.trial.shipped_folder), self.previous, checks) if kpis else []
+        candidate, shipped, checks = self.kpis.candidate, self.kpis.shipped, list(self.kpis.checks)
+        return compare_kpis(candidate, shipped, self.previous, checks) if candidate else []
 
 
 def run_trials(trials: Sequence[ControllerTrial], jobs: int) -> Iterator[TrialResult]:

@@ -2,16 +2,21 @@
 
 from __future__ import annotations
 
+import json
 import logging
 import sys
 from collections.abc import Iterable
+from typing import Any
 
 import click
 
 from ..core.errors import Problem
 from ..core.text import SPACES, escape_control_characters
 from ..process.standard_streams import unescaped
+from . import current_command_line
 
+#: lowest level of printed messages, by `CommandLine.verbosity`
+_LEVELS = {-1: logging.WARNING, 0: logging.INFO, 1: logging.DEBUG}
 #: number of warnings collected for the report
 MAX_WARNINGS = 200
 
@@ -24,24 +29,37 @@ class _WarningCollector(logging.Handler):
         self.texts: list[str] = []
 
     def emit(self, record: logging.LogRecord) -> None:
-        """Collect a message unless there are too many."""
+        """Collect a message; the last one says that more were only printed."""
         if len(self.texts) < MAX_WARNINGS:
             self.texts.append(f"{record.levelname} {record.getMessage()}")
+        elif len(self.texts) == MAX_WARNINGS:
+            self.texts.append("more warnings were printed and are not listed here")
 
 
-def print_log(level: int = logging.INFO) -> list[str]:
-    """Print all following messages of the logger "cosim"; return the list that collects the texts of warnings and errors."""
+def print_log() -> list[str]:
+    """Print the following messages of the logger "cosim" as --quiet or --verbose demand.
+
+    Returns:
+        The list that collects the texts of warnings and errors.
+    """
     handler, collector = logging.StreamHandler(sys.stderr), _WarningCollector()
     handler.setFormatter(logging.Formatter("%(levelname)s %(message)s"))
     logger = logging.getLogger("cosim")
     logger.handlers[:] = [handler, collector]
-    logger.setLevel(level)
+    logger.setLevel(_LEVELS[current_command_line().verbosity])
     return collector.texts
 
 
 def print_line(text: str) -> None:
     """Print a text that may contain foreign text as one line of standard output; line breaks in it are escaped."""
     click.echo(escape_control_characters(text, keep=SPACES))
+
+
+def print_json(value: Any) -> None:
+    """Print a value as JSON; NumPy values become numbers, and NaN and infinity become null."""
+    from ..results.files import to_json_types
+
+    click.echo(json.dumps(to_json_types(value), indent=2, ensure_ascii=False), file=current_command_line().data)
 
 
 def print_verdict(passed: bool) -> None:

@@ -6,11 +6,13 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 
+from . import current_command_line
+
 
 @contextmanager
 def progress_bar(description: str) -> Iterator[Callable[[int, int], None] | None]:
     """Show a progress bar and yield the function that updates it with (finished, total); None without a terminal."""
-    if not sys.stderr.isatty():
+    if not sys.stderr.isatty() or current_command_line().verbosity < 0:
         yield None
         return
     from rich.console import Console

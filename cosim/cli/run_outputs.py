@@ -12,7 +12,11 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from ..core.errors import CosimError, OutputError
-from . import current_command_line, report_error
+from ..core.text import count_noun
+from . import current_command_line, exit_code_of, report_error
+from .failed_runs import report_failed_run, write_partial_result
+from .messages import print_json
+from .run_summary import summarize_run
 from .unfinished_runs import writing_results
 
 if TYPE_CHECKING:
@@ -40,6 +44,7 @@ class RunOptions:
     parquet: bool
     mcap: bool
     no_report: bool
+    as_json: bool
     isolation: Literal["fmu", "none"]
     sandbox: bool
 
@@ -94,32 +99,28 @@ class RunOutcome:
 def write_outputs(outcome: RunOutcome) -> int:
     """Write, print and draw all outputs of a run, and return the exit code of the command."""
     if outcome.execution.failure:
-        code = _report_failed_run(outcome, outcome.execution.failure)
+        code = _end_failed_run(outcome, outcome.execution.failure)
     else:
         for write in _COMPLETE_RUN_WRITERS:
             write(outcome)
-        code = 0 if all(check.passed for check in outcome.checks) else 3
+        passed = not outcome.result.crashed and all(check.passed for check in outcome.checks)
+        code = 0 if passed else 3
     for write in _EVERY_RUN_WRITERS:
         write(outcome)
+    if outcome.options.as_json and not outcome.execution.failure:
+        print_json(summarize_run(outcome.result, outcome.checks, outcome.shown_folder, outcome.files, code))
     return code
 
 
-def write_partial_result(partial: Result, folder: Path, shown_folder: Path, unfinished: Path | None) -> None:
-    """Write the rows recorded before a failure, if there are any; see `writing_results`."""
-    from ..results.result import write_run
-
-    if len(partial.time):
-        with writing_results(partial, unfinished, shown_folder):
-            write_run(partial, folder)
-        click.echo(f"{len(partial.time)} rows until t = {partial.time[-1]:g} s kept in {shown_folder}", err=True)
-
-
-def _report_failed_run(outcome: RunOutcome, failure: BaseException) -> int:
+def _end_failed_run(outcome: RunOutcome, failure: BaseException) -> int:
     from ..process.run_files.folder import remove_run_files, run_folder
 
+    outcome.result.metadata["failure"] = outcome.result.metadata["failure"] or str(failure)  # a KPI may have failed
     try:
         write_partial_result(outcome.result, outcome.folder, outcome.shown_folder, run_folder())
         remove_run_files()
+        if not isinstance(failure, KeyboardInterrupt):
+            report_failed_run(outcome.result, outcome.folder, outcome.options, exit_code_of(failure))
     except CosimError as error:
         if isinstance(failure, OSError | OutputError):  # most likely the same cause
             raise
@@ -144,6 +145,13 @@ def _write_result_files(outcome: RunOutcome) -> None:
 
 
 def _print_kpis(outcome: RunOutcome) -> None:
+    """Print the table of KPIs; with --quiet, print only the checks that are not met."""
+    if outcome.options.as_json:
+        return
+    if current_command_line().verbosity < 0:
+        for check in outcome.checks:
+            if not check.passed:
+                click.echo(f"check not met: {check}", err=True)
     from ..report.tables import print_kpis
     from ..results.kpi import kpi_units
 
@@ -181,6 +189,8 @@ def _draw_figure(outcome: RunOutcome, i: int) -> str:
 
 
 def _print_summary(outcome: RunOutcome) -> None:
+    if outcome.options.as_json:
+        return
     result = outcome.result
     loop, simulated = result.timing["loop_seconds"], float(result.time[-1] - result.time[0])
     seconds = time.perf_counter() - outcome.began
@@ -189,20 +199,23 @@ def _print_summary(outcome: RunOutcome) -> None:
     if pacing := result.metadata["real_time"]:
         click.echo(_format_pacing(pacing))
     if events := result.metadata.get("live_events"):
-        times = "1 time" if len(events) == 1 else f"{len(events)} times"
+        times = count_noun(len(events), "time")
         click.echo(
             f"values were set {times} while it ran: copy live_events of run.json into the scenario's events to repeat the run"
         )
+    if current_command_line().verbosity > 0:
+        for name, value in result.timing.items():
+            click.echo(f"{name:24} {value:.3f}")
 
 
 def _print_termination(outcome: RunOutcome) -> None:
-    if outcome.result.termination:
+    if outcome.result.termination and not outcome.options.as_json:
         click.echo(outcome.result.termination)
 
 
 def _format_pacing(pacing: Mapping[str, Any]) -> str:
     lateness = ", ".join(f"{label} {1e3 * pacing[key]:.3g} ms" for label, key in _LATENESS_LABELS.items())
-    late = f"{pacing['late_steps']} of {pacing['steps']} steps late"
+    late = f"{pacing['late_steps']} of {count_noun(pacing['steps'], 'step')} late"
     return f"paced to {pacing['factor']:g} times real time: {late}; lateness {lateness}"
 
 

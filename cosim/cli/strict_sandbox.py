@@ -81,7 +81,11 @@ def rerun_in_bubblewrap(files: Iterable[Path], output: Path | None) -> int:
             kept = {name: os.environ[name] for name in (*KEPT_VARIABLES, *_COMMAND_VARIABLES) if name in os.environ}
             homes = dict.fromkeys(_HOME_VARIABLES, str(temporary))
             process = subprocess.Popen(  # noqa: S603
-                words, pass_fds=[writer], env={**kept, **homes, _INSIDE_VARIABLE: "1"}, start_new_session=True
+                words,
+                pass_fds=[writer],
+                env={**kept, **homes, _INSIDE_VARIABLE: "1"},
+                stdout=current_command_line().data,
+                start_new_session=True,
             )
         report = _wait_for_exit(process, status)
     if "exit-code" not in report:

@@ -13,6 +13,8 @@ import click
 
 from ..core.processors import available_processors
 from ..core.size_limits import MAX_RUNS
+from ..core.text import count_noun
+from . import current_command_line
 from .csv_options import csv_options
 
 if TYPE_CHECKING:
@@ -59,8 +61,7 @@ def open_run_store(folder: Path, retry: bool) -> RunStore:
     check_writable(folder)
     run_store = RunStore(folder, retry)
     if count := run_store.unreadable_lines:
-        lines = "1 unreadable line" if count == 1 else f"{count} unreadable lines"
-        click.echo(f"{run_store.path}: {lines}; the missing runs are repeated", err=True)
+        click.echo(f"{run_store.path}: {count_noun(count, 'unreadable line')}; the missing runs are repeated", err=True)
     return run_store
 
 
@@ -106,7 +107,7 @@ class StudyProgress:
         rate = self.finished / max(seconds, 1e-9)
         left = format_duration((self._total - done) / rate) if rate else "?"
         failed = f", {self.failed} failed" if self.failed else ""
-        return f"{done} of {self._total} runs{failed}, {rate:.3g} per second, {left} left"
+        return f"{done} of {count_noun(self._total, 'run')}{failed}, {rate:.3g} per second, {left} left"
 
 
 def format_duration(seconds: float) -> str:
@@ -119,6 +120,9 @@ def format_duration(seconds: float) -> str:
 @contextmanager
 def show_progress(total: int) -> Iterator[StudyProgress]:
     """Show the progress of `total` runs: as a bar on a terminal, else as lines."""
+    if current_command_line().verbosity < 0:
+        yield StudyProgress(total, lambda _text, _done: None)
+        return
     if not sys.stderr.isatty():
         yield StudyProgress(total, _ProgressLines())
         return

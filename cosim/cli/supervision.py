@@ -18,7 +18,6 @@ if TYPE_CHECKING:
     from ..core.recording import Recording
     from ..process.journal import Journal
     from ..process.supervisor import SupervisedOutcome
-    from ..scenario.schema import DeadlinesSpec
 
 _isolation = click.option(
     "--isolation",
@@ -79,10 +78,10 @@ def run_supervised_command(
 
 
 def _save_partial(outcome: SupervisedOutcome, save_partial: Callable[[SupervisedOutcome], None], folder: Path) -> None:
-    """Save the rows of an unfinished run and remove its folder, unless writing fails or the child kept the rows itself."""
+    """Save the rows of an unfinished run and remove its folder, unless writing fails or the child kept the rows and said so."""
     from ..process.run_files.folder import find_kept_rows
 
-    if find_kept_rows(folder):
+    if find_kept_rows(folder) and not outcome.failure:
         return
     try:
         save_partial(outcome)
@@ -102,16 +101,10 @@ def results_written(code: int) -> int:
     return code
 
 
-def set_deadlines(deadlines: DeadlinesSpec) -> None:
-    """Announce the deadlines of a scenario to the supervisor."""
-    from ..process.journal import Deadlines, current_journal
-
-    if journal := current_journal():
-        journal.deadlines = Deadlines(deadlines.load, deadlines.initialization, deadlines.step, deadlines.end)
-
-
 def recover_outcome_recording(outcome: SupervisedOutcome) -> Recording:
     """Return the rows that a crashed or interrupted child recorded."""
-    from ..process.run_files.folder import recover_recording
+    from ..process.run_files.folder import find_kept_rows, recover_recording
 
-    return recover_recording(outcome.journal.folder, outcome.row_count)
+    folder = outcome.journal.folder
+    file, rows = (folder and find_kept_rows(folder)) or (None, outcome.row_count)
+    return recover_recording(folder, rows, file)

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from ..core.csv_text import BYTES_PER_NUMBER
 from ..core.errors import CosimError, InputError, OutputError
+from ..core.text import count_noun
 from ..process.output_lock import LOCK_FILE
 
 if TYPE_CHECKING:
@@ -70,8 +71,8 @@ def writing_results(result: Result, folder: Path | None, shown: Path) -> Iterato
             keep_rows(folder, len(result.time), to_json_types(about))
         except OSError:
             raise error from None
-        rows = "1 row is" if len(result.time) == 1 else f"{len(result.time)} rows are"
-        raise type(error)(f"{error}; {rows} kept: {how_to_recover(result, folder, shown, error)}") from None
+        rows = count_noun(len(result.time), "row")
+        raise type(error)(f"{error}; kept {rows}: {how_to_recover(result, folder, shown, error)}") from None
 
 
 def how_to_recover(result: Result, folder: Path, shown: Path, error: CosimError) -> str:

@@ -7,6 +7,7 @@ communication point n, and every other component reads the profile at n in its s
 from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
+from itertools import islice
 from pathlib import Path
 from typing import Any, Literal
 
@@ -117,19 +118,33 @@ def read_input_table(path: Path, columns: Sequence[str], interpolation: Interpol
     """
     header, rows = read_rows(path)
     problems = [Problem(f'profile "{path}" {text}', where) for text in _header_violations(header, columns)]
-    try:
-        values = np.array([[float(cell) for cell in row] for row in rows]).reshape(len(rows), len(header))
-    except ValueError:
-        text = f'profile "{path}" has rows that are not {len(header)} numbers'
-        raise InputError([*problems, Problem(text, where)]) from None
-    if not rows or not np.isfinite(values).all() or (np.diff(values[:, 0]) <= 0).any():
-        problems.append(Problem(f'profile "{path}" needs rows of finite numbers with increasing time', where))
+    if not problems:
+        values = np.empty((sum(map(bool, rows)), len(header)))
+        problems = [Problem(f'profile "{path}":{text}', where) for text in islice(_read_values(rows, values), 1)]
     if problems:
         raise InputError(problems)
     return InputTable(values[:, 0], {name: values[:, header.index(name)] for name in columns}, interpolation)
 
 
+def _read_values(rows: Sequence[Sequence[str]], values: np.ndarray) -> Iterator[str]:
+    """Convert the rows that are not empty; yield line and description of each one that is not valid."""
+    filled = [(line, row) for line, row in enumerate(rows, start=2) if row]
+    for (line, row), target in zip(filled, values, strict=True):
+        try:
+            target[:] = [float(cell) for cell in row]
+        except ValueError:
+            yield f"{line}: found {','.join(row)[:80]!r}, expected {len(target)} numbers"
+    if not filled:
+        yield "2: found no rows, expected at least one"
+    valid = np.isfinite(values).all(axis=1) & (np.diff(values[:, 0], prepend=-np.inf) > 0)
+    for line in (line for (line, _), ok in zip(filled, valid, strict=True) if not ok):
+        yield f"{line}: expected finite numbers, and a time above that of the row before"
+
+
 def _header_violations(header: Sequence[str], columns: Sequence[str]) -> Iterator[str]:
+    if header[:1] != ["time"]:
+        yield f'has the first column "{(header or [""])[0]}", expected "time" and columns separated by commas'
+        return
     names = header[1:]
     for name in columns:
         if name not in names:
@@ -137,5 +152,3 @@ def _header_violations(header: Sequence[str], columns: Sequence[str]) -> Iterato
     for name in columns:
         if (count := names.count(name)) > 1:
             yield f'has {count} columns "{name}", expected one'
-    if header[:1] != ["time"]:
-        yield f'has the first column "{(header or [""])[0]}", expected "time"'

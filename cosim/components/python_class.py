@@ -47,7 +47,7 @@ def create_python_component(source: Any, reference: str, instance_name: str, arg
         if _is_pythonfmu_class(source) and "instance_name" in arguments:
             raise InputError(f'{reference} receives its "instance_name" from the scenario; remove it from the arguments')
         if _is_pythonfmu_class(source):
-            source = _construct(source, reference, instance_name=instance_name, **arguments)
+            source = _construct(source, reference, instance_name=instance_name, **_resources(source), **arguments)
         else:
             source = _construct(source, reference, instance_name, **arguments)
     elif arguments:
@@ -70,6 +70,14 @@ def _is_pythonfmu_class(factory: object) -> bool:
     """
     package = sys.modules.get("pythonfmu")
     return package is not None and inspect.isclass(factory) and issubclass(factory, package.Fmi2Slave)
+
+
+def _resources(factory: type) -> dict[str, str]:
+    """Return the argument `resources` for a PythonFMU class that accepts it: the folder of its file, as in an exported FMU."""
+    parameters = inspect.signature(factory).parameters
+    accepted = "resources" in parameters or any(one.kind is one.VAR_KEYWORD for one in parameters.values())
+    file = getattr(sys.modules.get(factory.__module__), "__file__", None)
+    return {"resources": str(Path(file).parent)} if accepted and file else {}
 
 
 def _construct(factory: Callable[..., Any], reference: str, /, *positional: Any, **named: Any) -> Any:

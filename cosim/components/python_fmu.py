@@ -17,6 +17,7 @@ from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, describe_exce
 from ..core.text import shorten, text_problem
 from ..core.units import named_unit
 from .object_state import snapshot
+from .python_units import checked_units
 
 _TYPES = {Real: "Float64", Integer: "Int32", Boolean: "Boolean", String: "String"}
 _CASTS: Mapping[str, Callable[[Any], Any]] = {"Float64": float, "Int32": int, "Boolean": bool, "String": str}
@@ -66,7 +67,8 @@ class PythonFmuComponent(Component):
     def __init__(self, slave: Fmi2Slave, instance_name: str):
         self._slave, self._name, self._time = slave, instance_name, 0.0
         self._pythonfmu_variables: dict[str, ScalarVariable] = {v.name: v for v in slave.vars.values()}
-        self.variables = [_to_variable(v) for v in slave.vars.values()]
+        units = checked_units(getattr(type(slave), "units", {}), {v.name: _fmi_type(v) for v in slave.vars.values()})
+        self.variables = [_to_variable(v, units.get(v.name)) for v in slave.vars.values()]
         self._setters: list[tuple[Callable[[Any], None], np.ndarray, int]] = []
         self._getters: list[tuple[str, Callable[[], Any], type, Callable[[Any], Any], np.ndarray, int]] = []
         self._types = {variable.name: variable.type for variable in self.variables}
@@ -172,8 +174,8 @@ def _fmi_type(registered: ScalarVariable) -> str:
     return next(name for kind, name in _TYPES.items() if isinstance(registered, kind))
 
 
-def _to_variable(registered: ScalarVariable) -> Variable:
-    unit = getattr(registered, "unit", None)
+def _to_variable(registered: ScalarVariable, unit: str | None) -> Variable:
+    unit = unit or getattr(registered, "unit", None)
     causality: Any = registered.causality.name if registered.causality else "local"
     return Variable(
         registered.name,

@@ -1,17 +1,27 @@
-"""Import of users' Python files, as members of their package where they have one."""
+"""Import of users' Python files, as members of their package where they have one.
+
+A file without a package can import the files beside it as a script does (see `sibling_imports`).
+"""
 
 from __future__ import annotations
 
 import importlib
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
+from contextlib import suppress
 from hashlib import sha256
+from importlib.abc import MetaPathFinder
+from importlib.machinery import FileFinder, ModuleSpec, SourceFileLoader
 from pathlib import Path
-from types import ModuleType
+from types import CodeType, ModuleType
 from typing import Any
 
-from ..core.errors import PASS_THROUGH_EXCEPTIONS, InputError, Problem, did_you_mean
+from ..core.errors import PASS_THROUGH_EXCEPTIONS, InputError, Problem, describe_exception, did_you_mean
 from ..core.paths import is_file, resolve_path
+from .sibling_imports import read_with_relative_imports, with_imported_siblings
+
+#: beginning of the names of the namespace packages below which users' files are imported
+_NAMESPACE_PREFIX = "_cosim_"
 
 
 def load_object(reference: str, folder: Path) -> Any:
@@ -46,24 +56,56 @@ def package_root(path: Path) -> Path:
 
 
 def package_files(paths: Iterable[Path]) -> set[Path]:
-    """Return Python files and all modules that they can import relatively: the modules of their outermost packages."""
+    """Return Python files and all modules that they can import from their folder or their outermost package."""
     files = {path.resolve() for path in paths}
     packages = {root / path.relative_to(root).parts[0] for path in files if (root := package_root(path)) != path.parent}
-    return files.union(*(package.rglob("*.py") for package in packages))
+    siblings = (_imported_siblings(path) for path in files if package_root(path) == path.parent)
+    return files.union(*siblings, *(package.rglob("*.py") for package in packages))
+
+
+def _imported_siblings(path: Path) -> list[Path]:
+    """Return the files beside a file that it imports; none if it cannot be read, which its import reports."""
+    with suppress(OSError, ValueError, SyntaxError):
+        return with_imported_siblings(path)
+    return []
 
 
 def _import_file(path: Path) -> ModuleType:
     """Import a file below a namespace package whose name is derived from the path of its root folder."""
     root = package_root(path)
-    unique = f"_cosim_{sha256(str(root).encode()).hexdigest()[:12]}"
+    unique = f"{_NAMESPACE_PREFIX}{sha256(str(root).encode()).hexdigest()[:12]}"
     if unique not in sys.modules:
         namespace = ModuleType(unique)
         namespace.__path__ = [str(root)]
         sys.modules[unique] = namespace
+    if not any(isinstance(finder, _FolderFinder) for finder in sys.meta_path):
+        sys.meta_path.insert(0, _FolderFinder())
     name = ".".join((unique, *path.relative_to(root).with_suffix("").parts))
     try:
         return importlib.import_module(name)
     except PASS_THROUGH_EXCEPTIONS:
         raise
     except BaseException as error:
-        raise InputError(f'"{path.name}" cannot be imported: {type(error).__name__}: {error}') from error
+        raise InputError(f'"{path.name}" cannot be imported: {describe_exception(error)}') from error
+
+
+class _FolderFinder(MetaPathFinder):
+    """Finder of files in folders that are no packages, below the namespace packages of `_import_file`."""
+
+    def find_spec(self, name: str, path: Sequence[str] | None, _target: object = None) -> ModuleSpec | None:
+        """Return the spec of a file; None for packages and files in packages, which Python's own finder finds."""
+        if not name.startswith(_NAMESPACE_PREFIX) or not path or (Path(path[0]) / "__init__.py").is_file():
+            return None
+        spec = FileFinder(path[0], (_SiblingLoader, [".py"])).find_spec(name)
+        return None if spec is None or spec.loader is None or spec.submodule_search_locations else spec
+
+
+class _SiblingLoader(SourceFileLoader):
+    """Loader that makes imports of files beside the loaded one relative; it uses no compiled files, which do not have this."""
+
+    def get_code(self, fullname: str) -> CodeType:
+        """Compile the file."""
+        namespace = sys.modules[fullname.partition(".")[0]]
+        text = read_with_relative_imports(Path(self.path), Path(namespace.__path__[0]))
+        code: CodeType = compile(text, self.path, "exec", dont_inherit=True)
+        return code

@@ -7,6 +7,8 @@ import time
 
 from .text import SPACES, escape_control_characters, shorten
 
+#: logger of the messages of components
+LOGGER_NAME = "cosim.component"
 INFO, WARNING, ERROR = logging.INFO, logging.WARNING, logging.ERROR
 
 #: maximum number of messages per second, and of characters per message
@@ -26,7 +28,7 @@ def log_message(component: str, level: int, text: str) -> None:
     if not _is_within_rate_limit():
         return
     text = escape_control_characters(shorten(text, MAX_MESSAGE_LENGTH).rstrip(), keep=SPACES)
-    logging.getLogger("cosim.component").log(level, "%s: %s", component, text)
+    logging.getLogger(LOGGER_NAME).log(level, "%s: %s", component, text)
 
 
 def _is_within_rate_limit() -> bool:
@@ -47,5 +49,5 @@ def report_dropped_messages() -> None:
     """Warn of the number of messages that were dropped since the last report."""
     global _dropped_count
     if _dropped_count:
-        logging.getLogger("cosim.component").warning("%d messages of components were not shown", _dropped_count)
+        logging.getLogger(LOGGER_NAME).warning("%d messages of components were not shown", _dropped_count)
         _dropped_count = 0

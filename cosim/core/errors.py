@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from .text import MAX_QUOTATION_LENGTH, escape_control_characters, shorten
+from .user_code import innermost_user_line
 
 #: exceptions that are not a failure of the foreign code they pass through; all others are, even if not derived from Exception
 PASS_THROUGH_EXCEPTIONS = (KeyboardInterrupt, GeneratorExit)
@@ -127,6 +128,8 @@ def write_error(text: str, error: OSError) -> CosimError:
 def describe_exception(error: BaseException) -> str:
     """Return class, text, file and line of an exception that foreign code raised.
 
+    The line is the innermost one in the user's code, or the innermost one of all if libraries alone were running.
+
     >>> describe_exception(ValueError("no such mode"))
     'ValueError: no such mode'
     """
@@ -134,9 +137,10 @@ def describe_exception(error: BaseException) -> str:
         text = str(error)
     except Exception:
         text = "(its text cannot be made)"
-    frames = traceback.extract_tb(error.__traceback__)
-    where = f" ({Path(frames[-1].filename).name}:{frames[-1].lineno})" if frames else ""
-    return f"{type(error).__name__}: {shorten(text, _MAX_EXCEPTION_LENGTH)}{where}"
+    frames = [] if isinstance(error, SyntaxError) else traceback.extract_tb(error.__traceback__)[::-1]  # its text has a line
+    where = innermost_user_line((frame.filename, frame.lineno) for frame in frames)
+    where = where or next((f"{Path(frame.filename).name}:{frame.lineno}" for frame in frames), "")
+    return f"{type(error).__name__}: {shorten(text, _MAX_EXCEPTION_LENGTH)}" + (f" ({where})" if where else "")
 
 
 def abbreviate_names(names: Iterable[str], limit: int = 8) -> str:

@@ -17,6 +17,11 @@ def root() -> Path:
     return bundle if bundle.is_dir() else package_folder().parent
 
 
+def shipped_names(pattern: str) -> list[str]:
+    """Return the names of the shipped files that match a pattern such as "scenarios/*.json", without suffixes."""
+    return sorted(path.stem for path in root().glob(pattern))
+
+
 def cache_directory() -> Path:
     """Return the cache folder of the user: XDG_CACHE_HOME/cosim, else ~/.cache/cosim."""
     base = os.environ.get("XDG_CACHE_HOME")

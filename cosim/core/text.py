@@ -34,6 +34,15 @@ def acceptable_text(text: str) -> str:
     return _FORBIDDEN_CHARACTERS.sub(REPLACEMENT, text if len(text) <= MAX_TEXT_LENGTH else shorten(text))
 
 
+def count_noun(count: int, noun: str) -> str:
+    """Return a count with its noun in singular or plural.
+
+    >>> count_noun(1, "row"), count_noun(0, "row")
+    ('1 row', '0 rows')
+    """
+    return f"{count} {noun}" if count == 1 else f"{count} {noun}s"
+
+
 def shorten(text: str, length: int = MAX_QUOTATION_LENGTH) -> str:
     """Return the first `length` characters of a text, and the number of the others.
 
@@ -41,7 +50,7 @@ def shorten(text: str, length: int = MAX_QUOTATION_LENGTH) -> str:
     ('abcd ... and 2 characters more', 'abcd')
     """
     rest = len(text) - length
-    return text if rest <= 0 else f"{text[:length]} ... and {rest} character{'' if rest == 1 else 's'} more"
+    return text if rest <= 0 else f"{text[:length]} ... and {count_noun(rest, 'character')} more"
 
 
 def escape_control_characters(text: str, keep: str = "") -> str:

@@ -28,12 +28,13 @@ static unsigned x87_control(void) {
     return word;
 }
 
-enum { INTERFACE = 3 };                              /* also in native_executor.py, where it is described */
+enum { INTERFACE = 4 };                              /* also in native_executor.py, where it is described */
 enum { WARNING = 1, DISCARD = 2 };                   /* FMI statuses; 0 is OK, everything but OK and WARNING is bad */
 /* Codes passed to `on_status` like an FMI status. They exceed 32 bits, so no FMU can return them. */
 #define FLOAT_MODE_CHANGED (INT64_C(1) << 33)
 #define FLOAT_TRAPS_ENABLED (INT64_C(1) << 34)
 #define NOT_FINITE (INT64_C(1) << 35)
+#define VALUES_CHANGED (INT64_C(1) << 36)
 #define PYTHON_EXCEPTION INT64_MIN
 enum { CONTINUE = 0, END_AFTER_STEP = 1, END_BEFORE_STEP = 2 }; /* answers of `on_status`; the last one discards the macro step */
 enum { MARKER_CALL = 0, MARKER_STEPS = 1, MARKER_ROWS = 2 };    /* marker: number of the current call, completed steps, rows */
@@ -104,6 +105,9 @@ typedef struct {
 
 typedef struct { const char *source; const Py_ssize_t *indices; Py_ssize_t count, item_size, position; } RowPart;
 
+/* A value on which a stop condition depends, and its bytes at the last recorded point. */
+typedef struct { const char *source; size_t size; char last[8]; } WatchedValue;
+
 typedef struct {
     PyObject_HEAD
     Operation *operations;
@@ -122,6 +126,9 @@ typedef struct {
     RowPart *row_parts;
     Py_ssize_t row_part_count;
     char *row;                  /* address of the next row */
+    WatchedValue *watched_values;
+    Py_ssize_t watched_value_count;
+    int64_t wake_point;         /* from here on VALUES_CHANGED is reported even if no value has changed */
     PackedStep *packed_steps;
     StepCalls *step_calls;
     uint32_t *references;       /* value references of the step calls */
@@ -424,6 +431,18 @@ static int record_row(Program *p, int64_t n) {
     return 0;
 }
 
+/* Report to `on_status` that the stop conditions may have changed at the recorded point n. */
+static int report_changed_values(Program *p, int64_t n) {
+    if (!p->watched_value_count || n % p->record_every) return 0;
+    bool changed = n >= p->wake_point;
+    for (WatchedValue *value = p->watched_values; value < p->watched_values + p->watched_value_count; value++)
+        if (memcmp(value->last, value->source, value->size)) {
+            memcpy(value->last, value->source, value->size);
+            changed = true;
+        }
+    return changed ? report_status(p, -1, VALUES_CHANGED) : 0;
+}
+
 /* ---- packing steps, after their durations have been measured --------------------------------------------------------- */
 
 /* The get operation of a packable step that begins at `op`. */
@@ -552,6 +571,7 @@ static int run_macro_steps(Program *p, int64_t first, int64_t count, double orig
         if (!all_finite(p) && report_status(p, -1, NOT_FINITE) < 0) return -1;
         if (record_row(p, n + 1) < 0) return -1;
         p->marker[MARKER_STEPS] = n + 1;
+        if (report_changed_values(p, n + 1) < 0) return -1;
         if (--left < 0) {
             left = steps_per_check;
             if (check_signals(p) < 0) return -1;
@@ -735,6 +755,26 @@ static PyObject *add_row_part(Program *p, PyObject *arguments) {
     Py_RETURN_NONE;
 }
 
+static PyObject *add_watched_value(Program *p, PyObject *arguments) {
+    unsigned long long source, size;
+    if (!PyArg_ParseTuple(arguments, "KK", &source, &size)) return NULL;
+    WatchedValue value = {.source = pointer(source), .size = (size_t)size};
+    if (value.size > sizeof value.last) return PyErr_SetString(PyExc_ValueError, "a watched value has at most 8 bytes"), NULL;
+    memcpy(value.last, value.source, value.size);
+    WatchedValue *values = PyMem_Realloc(p->watched_values, (size_t)(p->watched_value_count + 1) * sizeof value);
+    if (!values) return PyErr_NoMemory();
+    p->watched_values = values;
+    p->watched_values[p->watched_value_count++] = value;
+    Py_RETURN_NONE;
+}
+
+static PyObject *set_wake_point(Program *p, PyObject *arguments) {
+    long long point;
+    if (!PyArg_ParseTuple(arguments, "L", &point)) return NULL;
+    p->wake_point = point;
+    Py_RETURN_NONE;
+}
+
 static PyObject *set_row_address(Program *p, PyObject *arguments) {
     unsigned long long row;
     if (!PyArg_ParseTuple(arguments, "K", &row)) return NULL;
@@ -797,6 +837,7 @@ static void deallocate(Program *p) {
     clear(p);
     PyMem_Free(p->operations);
     PyMem_Free(p->row_parts);
+    PyMem_Free(p->watched_values);
     PyMem_Free(p->packed_steps);
     PyMem_Free(p->step_calls);
     PyMem_Free(p->references);
@@ -821,6 +862,9 @@ static PyMethodDef methods[] = {
     {"set_recording", (PyCFunction)set_recording, METH_VARARGS,
      "Set the recording interval (macro steps) and the content of a row."},
     {"add_row_part", (PyCFunction)add_row_part, METH_VARARGS, "Add indexed values of one type to each row."},
+    {"add_watched_value", (PyCFunction)add_watched_value, METH_VARARGS, "Add a value that a stop condition depends on."},
+    {"set_wake_point", (PyCFunction)set_wake_point, METH_VARARGS,
+     "Set the point from which on changed values are reported even without a change."},
     {"set_row_address", (PyCFunction)set_row_address, METH_VARARGS, "Set the address at which the next row is written."},
     {"step_durations", (PyCFunction)step_durations, METH_NOARGS,
      "Return (call number, shortest duration in ns) of all doStep calls."},
@@ -842,7 +886,7 @@ static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, "_native", "The nativ
 
 static const struct { const char *name; int64_t value; } constants[] = {
     {"INTERFACE", INTERFACE}, {"FLOAT_MODE_CHANGED", FLOAT_MODE_CHANGED}, {"FLOAT_TRAPS_ENABLED", FLOAT_TRAPS_ENABLED},
-    {"NOT_FINITE", NOT_FINITE}, {"CONTINUE", CONTINUE}, {"END_AFTER_STEP", END_AFTER_STEP},
+    {"NOT_FINITE", NOT_FINITE}, {"VALUES_CHANGED", VALUES_CHANGED}, {"CONTINUE", CONTINUE}, {"END_AFTER_STEP", END_AFTER_STEP},
     {"END_BEFORE_STEP", END_BEFORE_STEP}, {"MARKER_CALL", MARKER_CALL},
     {"MARKER_STEPS", MARKER_STEPS}, {"MARKER_ROWS", MARKER_ROWS}, {"MEASURED_STEPS", MEASURED_STEPS},
 };

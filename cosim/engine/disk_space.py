@@ -7,6 +7,7 @@ from pathlib import Path
 
 from ..core.csv_text import BYTES_PER_NUMBER
 from ..core.errors import Problem
+from ..core.text import count_noun
 from .plan import Plan
 
 #: size of a number in the rows (bytes), approximately
@@ -28,6 +29,6 @@ def find_space_problems(plan: Plan, folder: Path, csv: bool, replaced: int = 0) 
     size = rows * (columns + 1) * (_BYTES_PER_VALUE + csv * BYTES_PER_NUMBER)
     if size < _SIZE_CHECK_THRESHOLD or size <= (free := shutil.disk_usage(folder).free + replaced):
         return []
-    signals = f"{columns} signal{'' if columns == 1 else 's'}"
-    text = f"{rows} rows of {signals} take about {size / 1e9:.3g} GB, {free / 1e9:.3g} GB are free in {folder}"
+    amount = f"{count_noun(rows, 'row')} of {count_noun(columns, 'signal')}"
+    text = f"{amount} take about {size / 1e9:.3g} GB, {free / 1e9:.3g} GB are free in {folder}"
     return [Problem(f'{text}; make the step longer, or set "record": {{"interval": ...}}', subject=("step_size",))]

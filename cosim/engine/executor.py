@@ -18,6 +18,7 @@ from .plan import Plan
 from .recorder import Recorder
 from .schedule import Schedule
 from .step_runner import StepRunner, Termination
+from .stop_conditions import StopConditions
 from .transfer_calls import DelayLine, TransferCall, compile_transfer
 from .transfer_plan import Transfer
 
@@ -32,6 +33,8 @@ class ExecutorState(NamedTuple):
     outputs: Sequence[np.ndarray]
     #: values in the delays, the oldest ones first
     rings: Sequence[np.ndarray]
+    #: since when each stop condition has been met
+    condition_begins: Sequence[int | None]
 
 
 class Executor(ABC):
@@ -52,6 +55,8 @@ class Executor(ABC):
         self._delay_lines = {t: DelayLine(t) for phase in plan.all_phases for t in phase.transfers if t.delay}
         self._schedule = Schedule(plan, self._runner, self._delay_lines)
         self._parallel_steps = ParallelSteps(self._runner)
+        #: conditions that end the simulation, and their state
+        self.stop_conditions = StopConditions(plan)
 
     @property
     def completed_steps(self) -> int:
@@ -65,7 +70,7 @@ class Executor(ABC):
 
     @property
     def termination(self) -> Termination | None:
-        """A component's request to end the simulation, if there was one."""
+        """End of the simulation before the stop time, requested by a component or by a condition, if there was one."""
         return self._runner.termination
 
     @property
@@ -95,9 +100,16 @@ class Executor(ABC):
         self.recorder.write_header(self._schedule.call_names)
         self.recorder.record(0)
         self.marker[ROW_COUNT] = self.recorder.row_count
+        self._check_stop_conditions(0)
+
+    def _check_stop_conditions(self, n: int) -> None:
+        """End the simulation at the recorded communication point `n` if a condition requires it and no component has done so."""
+        met = self.stop_conditions.check(n)
+        if met and not self._runner.termination:
+            self._runner.termination = Termination("", met.time, condition=met)
 
     def run(self, end: int) -> None:
-        """Run macro steps until communication point `end` is reached or a component requests termination.
+        """Run macro steps until communication point `end` is reached, or a component or a condition ends the simulation.
 
         Raises:
             ComponentError: a component failed, or a checked output is not finite.
@@ -129,7 +141,8 @@ class Executor(ABC):
         self._rebuild()
         rings = [line.ring.copy() for line in self._delay_lines.values()]
         inputs, outputs = self.plan.inputs.copy_values(), self.plan.outputs.copy_values()
-        return ExecutorState(self.completed_steps, self.recorder.row_count, self.termination, inputs, outputs, rings)
+        begins = list(self.stop_conditions.begins)
+        return ExecutorState(self.completed_steps, self.recorder.row_count, self.termination, inputs, outputs, rings, begins)
 
     def restore(self, state: ExecutorState) -> None:
         """Restore a state that `save` returned; the components are restored separately."""
@@ -139,6 +152,7 @@ class Executor(ABC):
         self.plan.outputs.restore_values(state.outputs)
         self.recorder.rewind(state.row_count)
         self._runner.termination = state.termination
+        self.stop_conditions.restore(state.condition_begins)
         self._runner.current_time.value = self.plan.grid.time_at(state.completed_steps)
         self.marker[STEP_COUNT], self.marker[ROW_COUNT] = state.completed_steps, state.row_count
         self._prepare()

@@ -23,7 +23,7 @@ except ImportError:  # installed without a C compiler
     _native = None  # type: ignore[assignment]  # a module cannot be declared optional
 
 #: number of the interface of `_native.c`; raised with every change of a function, an argument, a code or the marker
-INTERFACE = 3
+INTERFACE = 4
 #: average number of values in contiguous runs from which a run is copied as a block of memory
 MIN_BLOCK_VALUES = 8
 #: most macro steps per call; the first call is shorter, because it measures the durations of the steps
@@ -67,6 +67,8 @@ class NativeExecutor(Executor):
         doubles, singles = (_address_and_length(by_item_size.get(size, np.zeros(0))) for size in (8, 4))
         self._program.set_monitored_floats(*doubles, *singles)
         self._add_recording()
+        for values in self.stop_conditions.monitored_values():
+            self._program.add_watched_value(_address(values), values.itemsize)
 
     def _native_transfers(self, transfer: Transfer) -> int:
         in_loop = all(transfer not in phase.transfers for phase in self.plan.phases)
@@ -139,6 +141,7 @@ class NativeExecutor(Executor):
         coefficients = self._time_coefficients or grid.float_coefficients(end)
         count = min(end - first, self._steps_per_call(first)) if coefficients else 1
         self._program.set_row_address(self.recorder.next_row_address)
+        self._program.set_wake_point(self.stop_conditions.wake_point)
         self._program.run(first, count, *(coefficients or (grid.time_at(first), 0.0, 1.0)))
 
     def _steps_per_call(self, first: int) -> int:
@@ -165,7 +168,11 @@ class NativeExecutor(Executor):
         if status == _native.FLOAT_TRAPS_ENABLED:
             self._restore_float_traps(self.completed_steps + 1)
             return _native.CONTINUE
-        self._runner.handle_status(*self._schedule.find_call(number), status)
+        if status == _native.VALUES_CHANGED:
+            self._check_stop_conditions(self.completed_steps)
+            self._program.set_wake_point(self.stop_conditions.wake_point)
+        else:
+            self._runner.handle_status(*self._schedule.find_call(number), status)
         if self.termination is None:
             return _native.CONTINUE
         return _native.END_AFTER_STEP if self.termination.complete else _native.END_BEFORE_STEP

@@ -94,6 +94,7 @@ class PythonExecutor(Executor):
         current_time, find_call = runner.current_time, self._schedule.find_call
         row_writers, row, every = self.recorder.row_writers, self.recorder.row_count, self.recorder.every
         one, little, least = float_mode.PROBE_VALUES
+        stops = bool(self.stop_conditions)
         origin, stride, denominator = self.plan.grid.integer_coefficients.values()
         for n in range(first, end):
             current_time.value = (origin + n * stride) / denominator
@@ -118,6 +119,9 @@ class PythonExecutor(Executor):
                     write(row)
                 row += 1
                 marker[ROW_COUNT] = row
+                if stops:
+                    self._check_stop_conditions(n + 1)
+                    termination = runner.termination
             marker[STEP_COUNT] = n + 1
             if termination:
                 return

@@ -8,11 +8,13 @@ from fractions import Fraction
 from pathlib import Path
 from typing import Any, Literal
 
+from ..core.expressions import Expression
 from ..core.system import Endpoint
 from .pacer import LatePolicy
 
 ExecutorKind = Literal["auto", "native", "python"]
 NonFinitePolicy = Literal["error", "allow", "fail"]
+StopOutcome = Literal["crash", "decided"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +32,23 @@ class Event:
     where: str = ""
 
 
+@dataclass(frozen=True, slots=True)
+class StopCondition:
+    """Condition that ends the simulation.
+
+    Attributes:
+        name: name for messages.
+        expression: condition on recorded signals.
+        hold: time for which the condition must be met without interruption (s, exact).
+        outcome: meaning of the end.
+    """
+
+    name: str
+    expression: Expression
+    hold: Fraction = Fraction(0)
+    outcome: StopOutcome = "decided"
+
+
 @dataclass(frozen=True)
 class Settings:
     """Time span, step size and further settings of a simulation.
@@ -41,6 +60,7 @@ class Settings:
         columns: recorded name -> output.
         record_interval: time between recorded points (s, exact); None: every macro step.
         events: values to set during the run.
+        stop_conditions: conditions that end the simulation before the stop time; their signals are recorded.
         executor: kind of the executor.
         non_finite: treatment of NaN and infinity; "error": a connected output ends the run; "fail": a recorded output ends it
             too; "allow": no output ends it.
@@ -55,6 +75,7 @@ class Settings:
     columns: Mapping[str, Endpoint] = field(default_factory=dict)
     record_interval: Fraction | None = None
     events: Sequence[Event] = ()
+    stop_conditions: Sequence[StopCondition] = ()
     executor: ExecutorKind = "auto"
     non_finite: NonFinitePolicy = "error"
     real_time: float | None = None

@@ -15,20 +15,26 @@ from ..process.journal import CALL_NUMBER, ROW_COUNT, STEP_COUNT
 from .component_step import ScheduledStep
 from .iteration import FixedPointIteration
 from .plan import Step
+from .stop_conditions import MetCondition
 
 #: status of a call into Python during which a component requested termination; no FMU can return it
 _STATUS_TERMINATION = 1 << 32
 
 
 class Termination(NamedTuple):
-    """A component's request to end the simulation at `time` (s).
+    """End of the simulation at `time` (s), before the stop time.
 
-    `complete`: the component reached the end of its step, so the macro step counts.
+    Attributes:
+        component: component that requested the end; "" if a condition ended the simulation.
+        time: time (s).
+        complete: the component reached the end of its step, so the macro step counts.
+        condition: condition that ended the simulation.
     """
 
     component: str
     time: float
     complete: bool = True
+    condition: MetCondition | None = None
 
 
 class StepRunner:
@@ -36,7 +42,7 @@ class StepRunner:
 
     Attributes:
         current_time: start of the current macro step (s), at an address that the calls share.
-        termination: the request to end the simulation, if any.
+        termination: the end of the simulation before the stop time, if any.
     """
 
     def __init__(self, marker: np.ndarray):

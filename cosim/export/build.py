@@ -13,6 +13,7 @@ from ..core.errors import InputError, Problem, did_you_mean
 from ..core.json_values import parse_object
 from ..results.files import writing_atomically
 from .cache import cached_file, file_hash
+from .foreign.python_class import write_python_fmu
 from .sources import SOURCE_KINDS, Source, classify_source, export_source, find_sources, resolve_source_path, tool_versions
 
 #: FMI version -> folder of the FMUs
@@ -66,7 +67,7 @@ def _remove_orphans(manifest: dict[str, Any], sources: Sequence[Source], root: P
             (root / fmu).unlink(missing_ok=True)
 
 
-def build_to(source: Path, model: str | None, target: Path, fmi_version: int = 2) -> Path:
+def build_to(source: Path, model: str | None, target: Path, fmi_version: int = 2, include: Sequence[Path] = ()) -> Path:
     """Export one source file to one FMU.
 
     Args:
@@ -74,17 +75,23 @@ def build_to(source: Path, model: str | None, target: Path, fmi_version: int = 2
         model: Name of the Modelica model. None selects the model with the name of the file.
         target: The FMU to write.
         fmi_version: 2 or 3.
+        include: Further files of the FMU of a Python source, see `write_python_fmu`.
 
     Returns:
         `target`.
 
     Raises:
-        InputError: The file cannot be exported, or not for this FMI version.
+        InputError: The file cannot be exported, or not for this FMI version, or files are included in another kind of FMU.
     """
     classified = classify_source(source, model)
     if fmi_version not in classified.fmi_versions:
         raise InputError(Problem(f"a {classified.kind.name} cannot be exported as FMI {fmi_version}.0", str(source)))
-    export_source(classified, {fmi_version: target}, model)
+    if not include:
+        export_source(classified, {fmi_version: target}, model)
+    elif classified.kind.package == "pythonfmu":
+        write_python_fmu(classified.path, target, include)
+    else:
+        raise InputError(Problem("only the FMU of a Python class can include files", str(source)))
     return target
 
 

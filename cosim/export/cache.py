@@ -37,7 +37,7 @@ def cached_file(key: str, name: str, build: Callable[[Path], object]) -> Path:
 def _is_intact(file: Path) -> bool:
     """Return whether a cached file exists and has the digest with which it was written."""
     try:
-        return file_hash(file).encode() == _digest_file(file).read_bytes()
+        return file.is_file() and file_hash(file).encode() == _digest_file(file).read_bytes()
     except OSError:
         return False
 

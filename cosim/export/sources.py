@@ -9,14 +9,14 @@ from importlib.metadata import PackageNotFoundError, version
 from itertools import pairwise
 from pathlib import Path
 
+from ..components.sibling_imports import with_imported_siblings
 from ..core.errors import CosimError, InputError, Problem
 from .fmu.block import Block
 from .fmu.compiler import compiler_version, find_compiler
 from .fmu.package import write_fmu
 from .fmu.validation import DESCRIPTION_FILE
 from .foreign.c_sources import write_c_fmu
-from .foreign.python_class import files_of_python_fmu, write_python_fmu
-from .foreign.relative_imports import with_relative_imports
+from .foreign.python_class import write_python_fmu
 
 
 @dataclass(frozen=True, slots=True)
@@ -75,16 +75,11 @@ def _load_equations(path: Path, _model: str | None) -> Block:
         raise InputError(Problem(f"block() failed: {type(error).__name__}: {error}", str(path))) from error
 
 
-def _write_python(path: Path, target: Path) -> list[Path]:
-    write_python_fmu(path, target)
-    return files_of_python_fmu(path)
-
-
 SOURCE_KINDS = (
     SourceKind("Modelica model", "controllers/modelica/*.mo", "rumoca", _load_modelica),
-    SourceKind("PythonFMU class", "controllers/python/*.py", "pythonfmu", None, "python", _write_python, compiled=False),
+    SourceKind("PythonFMU class", "controllers/python/*.py", "pythonfmu", None, "python", write_python_fmu, compiled=False),
     SourceKind("equations", "plant_src/**/equations.py", "casadi", _load_equations),
-    SourceKind("PythonFMU class", "plant_src/*_fmu.py", "pythonfmu", None, "python", _write_python, compiled=False),
+    SourceKind("PythonFMU class", "plant_src/*_fmu.py", "pythonfmu", None, "python", write_python_fmu, compiled=False),
     SourceKind("C controller", f"controllers/c/*/{DESCRIPTION_FILE}", "fmpy", None, "c", write_c_fmu),
 )
 
@@ -166,7 +161,7 @@ def export_source(source: Source, targets: Mapping[int, Path], model: str | None
     block = replace(source.kind.load_block(source.path, model), identifier=source.name)
     for fmi_version, target in targets.items():
         write_fmu(block, fmi_version, target)
-    return [*with_relative_imports(source.path), *block.resources.values()]
+    return [*with_imported_siblings(source.path), *block.resources.values()]
 
 
 def tool_version(package: str) -> str:

@@ -29,6 +29,8 @@ MARKER_SIZE = 3
 #: offsets of a float64 and of four texts; a text is its length (uint32) followed by UTF-8
 _TIME_OFFSET, _COMPONENT_OFFSET, _FUNCTION_OFFSET, _FOLDER_OFFSET, _CSV_PATH_OFFSET = 64, 4096, 8192, 12288, 16384
 _MAX_TEXT_SIZE = 4092
+#: reason of a failure after which the journal is not valid
+OVERWRITTEN = "it wrote over memory of the process that is not its own"
 
 
 class Phase(IntEnum):

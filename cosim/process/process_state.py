@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import errno
 import os
 import sys
 import threading
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, suppress
 from functools import cache
+from pathlib import Path
 from typing import Any
 
 from ..core import component_log
@@ -42,12 +44,16 @@ class _StateCache:
         return encoding, self._state
 
 
+#: device and inode of the files behind the standard streams, see `_output_files`; root folder and permission, see `_file_access`
+_Files = tuple[list[tuple[int, int]], tuple[int, bool]]
+
+
 @contextmanager
 def restoring_process_state(component: str) -> Iterator[None]:
     """Restore the process state at the end of the block and warn of each change; other threads wait before such a block.
 
-    A supervised process whose standard output or standard error was closed ends here: only its supervisor can still report the
-    component and save the rows.
+    A supervised process that lost its standard output, its standard error or the access to the files of the run ends here: only
+    its supervisor can still report the component and save the rows.
 
     Args:
         component: Name of the component or components that may change the state, for messages.
@@ -70,18 +76,19 @@ def call_restoring_process_state(component: str, function: Callable[..., object]
             _restore_state(component, *saved)
 
 
-def _save_state() -> tuple[bytes, ProcessState, list[tuple[int, int]]]:
-    """Return the present state, its encoding, and the files behind the standard streams of a supervised process."""
+def _save_state() -> tuple[bytes, ProcessState, _Files | None]:
+    """Return the present state, its encoding, and the accessible files of a supervised process."""
     encoding, state = _state_cache().read()
     _saved_states.append(state)
-    return encoding, state, _output_files() if current_journal() else []
+    return encoding, state, (_output_files(), _file_access()) if current_journal() else None
 
 
-def _restore_state(component: str, encoding: bytes, state: ProcessState, output_files: list[tuple[int, int]]) -> None:
+def _restore_state(component: str, encoding: bytes, state: ProcessState, files: _Files | None) -> None:
     _saved_states.pop()
     journal = current_journal()
-    if journal and output_files != _output_files():
-        journal.record_call(component, "a call that closed the files of the process")
+    if journal and files and files != (now := (_output_files(), _file_access())):
+        activity = "closed the files of the process" if files[0] != now[0] else "gave up the access to the files of the run"
+        journal.record_call(component, f"a call that {activity}")
         journal.enter_phase(journal.phase if journal.phase == Phase.RESULTS_WRITTEN else Phase.CALLING)
         os._exit(70)
     if not encoding or _encode() != encoding:
@@ -128,3 +135,14 @@ def _output_files() -> list[tuple[int, int]]:
             status = os.fstat(stream.fileno())
             files.append((status.st_dev, status.st_ino))
     return files
+
+
+def _file_access() -> tuple[int, bool]:
+    """Return the inode of the root folder, and whether files can be created in the folder of the run."""
+    journal, root = current_journal(), Path("/").stat().st_ino
+    try:
+        if journal and journal.folder and hasattr(os, "O_TMPFILE"):
+            os.close(os.open(journal.folder, os.O_TMPFILE | os.O_RDWR))  # a file without a name
+    except OSError as error:
+        return root, error.errno not in (errno.EACCES, errno.EPERM)
+    return root, True

@@ -1,7 +1,8 @@
-"""Standard streams that survive a closed pipe (`cosim run ... | head`) and escape control characters."""
+"""Standard streams that survive a closed pipe (`cosim run ... | head`) or a full disk, and escape control characters."""
 
 from __future__ import annotations
 
+import errno
 import io
 import os
 import sys
@@ -9,14 +10,29 @@ from typing import Any, TextIO
 
 from ..core.text import SPACES, escape_control_characters
 
+#: errors of a full or defective disk
+_DISK_ERRORS = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO)
 
-class _BrokenPipeIgnoringFile(io.FileIO):
-    """File that drops output after the reader closed the pipe."""
+
+class _StandardFile(io.FileIO):
+    """File that drops output after the reader closed the pipe, and after a disk error that was raised once.
+
+    Disk errors of standard error are never raised, because they cannot be reported.
+    """
+
+    def __init__(self, descriptor: int, closefd: bool, ignore_disk_errors: bool):
+        super().__init__(descriptor, "w", closefd=closefd)
+        self._ignore_disk_errors = ignore_disk_errors
 
     def write(self, data: Any) -> int:
         try:
             return super().write(data)
         except BrokenPipeError:
+            return memoryview(data).nbytes
+        except OSError as error:
+            if error.errno not in _DISK_ERRORS or not self._ignore_disk_errors:
+                self._ignore_disk_errors = True  # the buffer is flushed again when the process ends
+                raise
             return memoryview(data).nbytes
 
 
@@ -62,7 +78,7 @@ def protected_stream(stream: TextIO, duplicate: bool = False) -> TextIO:
         descriptor = stream.fileno()
     except (OSError, AttributeError):
         return stream
-    raw = _BrokenPipeIgnoringFile(os.dup(descriptor) if duplicate else descriptor, "w", closefd=duplicate)
+    raw = _StandardFile(os.dup(descriptor) if duplicate else descriptor, closefd=duplicate, ignore_disk_errors=descriptor == 2)
     return _EscapingStream(io.BufferedWriter(raw), stream.encoding)
 
 

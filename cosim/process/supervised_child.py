@@ -14,25 +14,30 @@ from .forks import watch_forks
 from .journal import EXIT_CODE, Journal, Phase
 from .limits import detach, lower_limit
 from .process_attributes import reserve_descriptors
+from .python_stack import write_stack_on_signals
 from .standard_streams import protected_stream
 
 #: limit of the private memory of a supervised run (bytes); mapped files of rows do not count
 MEMORY_LIMIT = 4 << 30
 
 
-def run_child(entry: Callable[[], int], journal: Journal, output: int, temporary_folder: str, supervisor: int) -> NoReturn:
+def run_child(
+    entry: Callable[[], int], journal: Journal, output: int, stack: int, temporary_folder: str, supervisor: int
+) -> NoReturn:
     """Run `entry` in this process, which was just forked, and end the process.
 
     Args:
         entry: Returns the exit code.
         journal: Journal in memory that the supervisor reads.
         output: Descriptor of the pipe for the output of foreign code.
+        stack: Descriptor of the file for the Python stack (see `python_stack`).
         temporary_folder: Folder for temporary files.
         supervisor: Process id of the supervisor.
     """
     code = 70
     try:
         _isolate(output, supervisor)
+        write_stack_on_signals(stack)
         tempfile.tempdir = os.environ["TMPDIR"] = temporary_folder
         journal.exclude_from_forks()
         watch_forks()

@@ -18,11 +18,13 @@ from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryFile
 
 from ..core.errors import ComponentError
 from .failure_attribution import attribute_failure, describe_exit_status, unattributed_failure
 from .foreign_output import ForeignOutput
-from .journal import CALL_NUMBER, CHANGE_COUNT, EXIT_CODE, JOURNAL_SIZE, ROW_COUNT, STEP_COUNT, Journal, Phase
+from .journal import CALL_NUMBER, CHANGE_COUNT, EXIT_CODE, JOURNAL_SIZE, OVERWRITTEN, ROW_COUNT, STEP_COUNT, Journal, Phase
+from .python_stack import innermost_line, request_stack
 from .run_files.live_csv_writer import LiveCsvWriter
 from .supervised_child import run_child
 from .temporary_folders import temporary_run_folder
@@ -86,7 +88,7 @@ def run_supervised(
     """
     journal = Journal(mmap.mmap(-1, JOURNAL_SIZE))
     _adopt_orphans()
-    with temporary_run_folder() as folder, interrupt_on_termination():
+    with temporary_run_folder() as folder, TemporaryFile(dir=folder) as stack, interrupt_on_termination():
         sys.stdout.flush()
         sys.stderr.flush()
         reader, writer = os.pipe()
@@ -94,10 +96,10 @@ def run_supervised(
         child = os.fork()
         if child == 0:
             os.close(reader)
-            run_child(entry, journal, writer, folder, supervisor)
+            run_child(entry, journal, writer, stack.fileno(), folder, supervisor)
         os.close(writer)
         with alongside(journal):
-            return _Supervisor(child, journal, reader).wait_for_child()
+            return _Supervisor(child, journal, reader, stack.fileno()).wait_for_child()
 
 
 @contextmanager
@@ -122,11 +124,19 @@ def _adopt_orphans() -> None:
 
 @dataclass
 class _Supervisor:
-    """Supervision of the process `child` with its journal; `reader` is the pipe with the output of foreign code."""
+    """Supervision of a child process.
+
+    Attributes:
+        child: Process id.
+        journal: Journal of the child.
+        reader: Pipe with the output of foreign code.
+        stack: File for the Python stack of the child (see `python_stack`).
+    """
 
     child: int
     journal: Journal
     reader: int
+    stack: int
     _output: ForeignOutput = field(init=False)
     _progress: tuple[int, ...] = ()
     _progress_time: float = field(default_factory=time.monotonic)
@@ -188,6 +198,7 @@ class _Supervisor:
             self._progress, self._progress_time = progress, now
         elif now - self._progress_time > deadline:
             self._timeout_reason = f"did not return within {deadline:g} s"
+            request_stack(self.child, self.stack)
             os.kill(self.child, signal.SIGKILL)
         if self._stop_time and now - self._stop_time > STOP_TIMEOUT:
             self._stop_failure = ComponentError(
@@ -223,14 +234,15 @@ class _Supervisor:
         journal = self.journal
         if not journal.is_valid:
             journal.restore(self._last_contents)
-            failure = unattributed_failure(journal, "it wrote over memory of the process that is not its own")
+            failure = unattributed_failure(journal, OVERWRITTEN)
             return SupervisedOutcome(1, journal[ROW_COUNT], journal, failure)
         code, rows, phase = journal[EXIT_CODE], journal[ROW_COUNT], journal.phase
         if phase == Phase.DONE:
             return SupervisedOutcome(code, rows, journal)
         if self._interrupt_time:
             return SupervisedOutcome(130, rows, journal, interrupted=True)
-        failure = self._stop_failure or attribute_failure(journal, self._timeout_reason or describe_exit_status(status))
+        reason = (self._timeout_reason or describe_exit_status(status)) + innermost_line(self.stack)
+        failure = self._stop_failure or attribute_failure(journal, reason)
         if phase == Phase.RESULTS_WRITTEN:
             return SupervisedOutcome(code, rows, journal, warning=f"{failure}; all results were written before")
         return SupervisedOutcome(1, rows, journal, failure)

@@ -7,6 +7,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
+from ..core.text import count_noun
+
 WIDTH, HEIGHT, GAP_X, GAP_Y, MARGIN, LANE = 152.0, 52.0, 70.0, 34.0, 44.0, 14.0  # px
 FRAME_GAP = 12.0  # px between a frame and its components
 FRAME_ROWS = 0.2  # rows above and below a nested system, for its frame
@@ -116,7 +118,7 @@ def _build_box(component: Mapping[str, Any], column: float, row: float) -> Box:
     position = (MARGIN + column * (WIDTH + GAP_X), MARGIN + row * (HEIGHT + GAP_Y))
     name, origin = component["name"], component["origin"]
     every = f", every {component['period']:g} s" if component["period"] else ""
-    tooltip = f"{name}\n{origin}\n{component['inputs']} inputs, {component['outputs']} outputs{every}"
+    tooltip = f"{name}\n{origin}\n{count_noun(component['inputs'], 'input')}, {count_noun(component['outputs'], 'output')}{every}"
     file = origin.rpartition("/")[2]
     return Box(name, *position, _truncate(name, MAX_TITLE_LENGTH), _truncate(file, MAX_ORIGIN_LENGTH), tooltip)
 

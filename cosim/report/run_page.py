@@ -8,6 +8,8 @@ from itertools import islice
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ..core.errors import InputError
+from ..core.text import count_noun
 from ..results import Result
 from ..results.checks import CheckOutcome, Number
 from ..results.files import to_json_types, writing_atomically
@@ -64,10 +66,13 @@ def render_report(result: Result, outcomes: Sequence[CheckOutcome], figures: Ite
     Raises:
         InputError: The result has no rows.
     """
+    if not len(result.time):
+        raise InputError(f"the result {result.metadata.get('name', '')} has no rows, so there is nothing to report")
     about, units = _metadata_with_defaults(result), result.metadata.get("kpi_units", {})
     return render_page(
         "report.html",
         about=about,
+        crash=result.termination if result.crashed else "",
         checks=len(outcomes),
         failed=sum(not outcome.passed for outcome in outcomes),
         facts=list(_facts(result)),
@@ -96,7 +101,8 @@ def _metadata_with_defaults(result: Result) -> dict[str, Any]:
         "sha256": {},
     }
     about = to_json_types({**missing, **result.metadata})
-    return {**about, "sha256": dict(islice(about["sha256"].items(), MAX_HASHES))}
+    hashes = about["sha256"]
+    return {**about, "sha256": dict(islice(hashes.items(), MAX_HASHES)), "file_count": len(hashes)}
 
 
 def _facts(result: Result) -> Iterator[tuple[str, str]]:
@@ -107,9 +113,9 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
     yield "signals", str(len(result))
     yield "rows", str(len(result.time))
     if events := result.metadata.get("live_events"):
-        yield "set by hand", f"{len(events)} time{'s' * (len(events) != 1)}"
-    if termination := result.metadata.get("terminated_by"):
-        yield "ended by", f"{termination['component']} at {termination['time']:g} s"
+        yield "set by hand", count_noun(len(events), "time")
+    if result.termination:
+        yield "end", result.termination
 
 
 def _kpi_row(name: str, value: Number, units: Mapping[str, str]) -> KpiRow:
@@ -135,7 +141,7 @@ def _timings(result: Result) -> Iterator[tuple[str, str]]:
         if key in result.timing:
             yield label, f"{1e3 * result.timing[key]:.0f} ms"
     if pace := result.metadata.get("real_time"):
-        yield "real time", f"{pace['late_steps']} of {pace['steps']} steps late"
+        yield "real time", f"{pace['late_steps']} of {count_noun(pace['steps'], 'step')} late"
 
 
 def _figure_element(name: str, svg: str) -> dict[str, Any]:

@@ -79,8 +79,12 @@ def _member_names(stages: list[list[str | _Group]]) -> list[str]:
 
 
 class _Termination(_Part):
-    component: str
     time: float
+    component: str = ""
+    condition: str = ""
+    outcome: str = ""
+    cause: str = ""
+    since: float = 0.0
 
 
 class _Pacing(_Part):

@@ -13,6 +13,7 @@ is JSON as well, with any of these keys (m, rad; world frame east-north-up; colo
 - `water`, at z = 0: {"waves": [{"amplitude", "frequency", "number", "direction", "phase"}], "gain": signal or number}
 - `markers`: {"position", "radius", "label"}; `views`: {"name", "on": a body, "eye", "target"} in axes that turn with its yaw
 - `spans`: {"signal", "label", "colour"} for a Boolean signal; `plots`: lists of patterns of signals
+- `marks`: {"signal", "label", "colour", "on": a body}: the moment at which a Boolean signal first becomes true, such as a crash
 """
 
 from __future__ import annotations
@@ -29,7 +30,7 @@ from ..results.files import to_json_types
 from ..scenario.extension import read_system_document
 from ..scenario.named_functions import load_function
 
-LIST_KEYS = ("bodies", "fixed", "markers", "views", "spans", "plots")
+LIST_KEYS = ("bodies", "fixed", "markers", "views", "spans", "marks", "plots")
 
 #: number of elements of the size of each shape
 SHAPE_SIZES: Mapping[str, int] = {"box": 3, "cylinder": 2, "cone": 3, "sphere": 1, "ring": 2}

@@ -12,6 +12,7 @@ import numpy as np
 
 from ..core.errors import InputError, did_you_mean
 from ..core.recording import Recording
+from ..core.text import count_noun
 from .csv_files import read_csv, write_csv
 from .files import write_json
 
@@ -113,13 +114,18 @@ class Result:
 
     @property
     def termination(self) -> str:
-        """Sentence that names the component that ended the run and the time; "" if none did."""
+        """Sentence that names the component or the condition that ended the run before the stop time; "" if none did."""
         terminated_by = self.metadata.get("terminated_by")
         return describe_termination(**terminated_by) if terminated_by else ""
 
+    @property
+    def crashed(self) -> bool:
+        """True if a condition with the outcome "crash" ended the run."""
+        return (self.metadata.get("terminated_by") or {}).get("outcome") == "crash"
+
     def __repr__(self) -> str:
         """Return name, size, failure, termination, failed checks and KPIs, in several lines."""
-        rows = f"{len(self.time)} rows of {len(self)} signals"
+        rows = f"{count_noun(len(self.time), 'row')} of {count_noun(len(self), 'signal')}"
         span = f", {self.time[0]:g} s to {self.time[-1]:g} s" if len(self.time) else ""
         failure, units = self.metadata.get("failure"), self.metadata.get("kpi_units", {})
         lines = [f"{self.metadata.get('name', 'Result')}: {rows}{span}", *([f"ended early: {failure}"] if failure else [])]
@@ -135,7 +141,10 @@ class Result:
         if not self.checks:
             return []
         failed = [f"  {outcome}" for outcome in self.checks if not outcome.passed]
-        return [f"{len(self.checks) - len(failed)} of {len(self.checks)} checks passed{':' * bool(failed)}", *failed]
+        return [
+            f"{len(self.checks) - len(failed)} of {count_noun(len(self.checks), 'check')} passed{':' * bool(failed)}",
+            *failed,
+        ]
 
     def signals(self, pattern: str = "*") -> list[str]:
         """Return the names of signals that match a pattern, in recorded order.
@@ -231,9 +240,14 @@ class Result:
         return cls(read_csv(path))
 
 
-def describe_termination(component: str, time: float) -> str:
-    """Return a sentence that says that a component ended the run at `time` (s)."""
-    return f"{component} requested the end of the simulation at t = {time:.12g} s"
+def describe_termination(
+    time: float, component: str = "", condition: str = "", outcome: str = "", cause: str = "", since: float = 0.0
+) -> str:
+    """Return a sentence that says what ended the run at `time` (s): a component, or a condition met since `since` (s)."""
+    if component:
+        return f"{component} requested the end of the simulation at t = {time:.12g} s"
+    end = "crashed" if outcome == "crash" else "decided"
+    return f"{end} at t = {since:.12g} s, ended at t = {time:.12g} s: {condition} ({cause})"
 
 
 def write_run(result: Result, directory: str | Path) -> None:

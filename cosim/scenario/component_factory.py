@@ -11,6 +11,7 @@ from ..core.component import Component
 from ..core.errors import InputError
 from ..core.paths import is_file, resolve_path
 from ..export.foreign.source_fmus import usable_fmu
+from ..process.journal import calling_component
 from .nested_systems import Node
 from .schema import ComponentSpec
 
@@ -66,10 +67,11 @@ class ComponentFactory:
         from ..components.python_class import create_python_component, load_component
 
         assert spec.python is not None
-        if name in node.document.objects:
-            return create_python_component(node.document.objects[name], spec.python, full_name, spec.arguments)
-        self.python_files.append(node.folder / spec.python.rpartition(":")[0])
-        return load_component(spec.python, node.folder, full_name, spec.arguments)
+        with calling_component(full_name, "loading the class", "load"):
+            if name in node.document.objects:
+                return create_python_component(node.document.objects[name], spec.python, full_name, spec.arguments)
+            self.python_files.append(node.folder / spec.python.rpartition(":")[0])
+            return load_component(spec.python, node.folder, full_name, spec.arguments)
 
     def _build_modelica(self, folder: Path, reference: str) -> Path:
         """Return the FMU of "file.mo:Model", from the user's cache if source and tools are unchanged."""

@@ -24,16 +24,17 @@ def find_scenario(scenario: str | Path) -> Path:
     """Return the path of a scenario file that is given by its path or by the name of a shipped scenario.
 
     Raises:
-        InputError: There is neither such a file nor a shipped scenario of this name.
+        InputError: There is neither such a file nor a shipped scenario of this name, or it is an FMU.
     """
     path = Path(scenario)
+    if path.suffix == ".fmu":
+        raise InputError(f"{scenario} is an FMU, expected a scenario; `cosim simulate {scenario}` simulates a single FMU")
     if path.suffix == ".json" or paths.is_file(path):
         return path
-    shipped = resources.root() / "scenarios"
-    names = sorted(file.stem for file in shipped.glob("*.json"))
+    names = resources.shipped_names("scenarios/*.json")
     if str(scenario) not in names:
         raise InputError(f'no scenario file and no shipped scenario "{scenario}"{did_you_mean(str(scenario), names)}')
-    return shipped / f"{scenario}.json"
+    return resources.root() / "scenarios" / f"{scenario}.json"
 
 
 def relocating(old_folder: Path, new_folder: Path | None) -> PathChange:

@@ -15,11 +15,12 @@ from typing import Any, TypeVar
 
 from ..core.component import Component, Variable
 from ..core.errors import Problem, did_you_mean
+from .evaluation_schema import CallSpec, FunctionSpec
 from .json_pointer import find_value, pointer_keys
 from .name_resolution import Target, UnknownNameError, resolve_name
 from .named_functions import declared_arguments, definition_problem, unknown_signals
 from .nested_systems import Node
-from .schema import CallSpec, FunctionSpec, ScenarioSpec
+from .schema import ScenarioSpec
 from .schema_types import INVALID, accepted
 
 C = TypeVar("C", bound=CallSpec)

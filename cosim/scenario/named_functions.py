@@ -14,8 +14,9 @@ from typing import Any
 from ..components.python_import import load_object
 from ..core.errors import Problem, did_you_mean
 from ..core.paths import is_file
+from .evaluation_schema import CallSpec, FunctionSpec
 from .nested_systems import Node
-from .schema import CallSpec, FunctionSpec, ScenarioSpec
+from .schema import ScenarioSpec
 from .schema_types import accepted
 
 
@@ -35,9 +36,11 @@ def find_function_problems(
         for i, function in functions:
             if text := function_problem(function, root.folder):
                 yield Problem(text, root.where(kind, i))
-        for n, (i, function) in enumerate(functions):
-            if any(function.name == other.name for _, other in functions[:n]):
+        names: set[str] = set()
+        for i, function in functions:
+            if function.name in names:
                 yield Problem(f'the name "{function.name}" is used more than once', root.where(kind, i, "name"))
+            names.add(function.name)
     if spec.scene and (text := function_problem(spec.scene, root.folder)):
         yield Problem(text, root.where("scene"))
     if signals is not None:
@@ -159,6 +162,7 @@ def _signal_prefixes(signals: Collection[str]) -> list[str]:
     return list(dict.fromkeys(name[: match.start()] for name in signals for match in re.finditer(r"[.\[]", name)))
 
 
+@lru_cache(64)  # definitions are cached, so that equal ones are identical
 def _kpi_value_names(function: ast.FunctionDef) -> list[str]:
     """Return the names of a KPI's values without indices, or nothing if its last `return` does not write them as literals.
 

@@ -18,11 +18,12 @@ from ..core.size_limits import MAX_LEVELS
 from ..core.text import acceptable_text, shorten, text_problem
 from . import json_pointer
 from .dict_document import document_of_dict
+from .evaluation_schema import CallSpec
 from .expanded_size import SystemFile, check_expanded_size
 from .extension import expand_document, read_system_document
 from .file_paths import change_paths, change_pointed, find_scenario, relocating
 from .json_document import Document
-from .schema import CallSpec, NestedSpec, PortsSpec, ScenarioSpec, SystemSpec, ports_of
+from .schema import NestedSpec, PortsSpec, ScenarioSpec, SystemSpec, ports_of
 from .schema_types import accepted
 from .validation import validate_document
 
@@ -144,13 +145,16 @@ def open_scenario(scenario: str | Path | Mapping[str, Any]) -> Document:
     return read_system_document(find_scenario(scenario))
 
 
-def load_scenario(scenario: str | Path | Mapping[str, Any], settings: Mapping[str, Any] | None = None) -> Scenario:
+def load_scenario(
+    scenario: str | Path | Mapping[str, Any], settings: Mapping[str, Any] | None = None, folder: Path | None = None
+) -> Scenario:
     """Read a scenario and its nested systems.
 
     Args:
         scenario: A path, the name of a shipped scenario, or the content of a scenario file.
         settings: Values that the caller changes. A name that starts with "/" is a JSON pointer into the scenario file; any
             other name is that of a variable.
+        folder: The folder that paths in the values of JSON pointers start from; None: the working directory.
 
     Raises:
         InputError: The file does not exist or is not JSON, or the expanded scenario is too large. Other problems are collected in
@@ -159,11 +163,12 @@ def load_scenario(scenario: str | Path | Mapping[str, Any], settings: Mapping[st
     document = open_scenario(scenario)
     problems: list[Problem] = []
     variables: dict[str, Any] = {}
+    change = relocating(Path(), None) if folder is None else relocating(folder, document.file.parent)
     for name, value in (settings or {}).items():
         if text := next(_text_problems([name, value]), ""):
             problems.append(Problem(text, f'setting "{shorten(acceptable_text(name))}"'))
         elif name.startswith("/"):
-            if text := json_pointer.set_value(document.value, name, value):
+            if text := json_pointer.set_value(document.value, name, change_pointed(name, value, change)):
                 problems.append(Problem(text, f'setting "{name}"'))
         else:
             variables[name] = value
@@ -250,8 +255,6 @@ def _text_problems(value: Any) -> Iterator[str]:
 def parse_settings(settings: Sequence[str]) -> dict[str, Any]:
     """Return the values of `NAME=value` texts by name. A value that is not JSON is taken as text.
 
-    Paths in the values of JSON pointers start from the working directory.
-
     Raises:
         InputError: A text has no name or no "=", or a number is not finite.
     """
@@ -266,8 +269,6 @@ def parse_settings(settings: Sequence[str]) -> dict[str, Any]:
             parsed[name] = _parse_json_or_text(value)
             if not _is_finite(parsed[name]):
                 problems.append(Problem(f"expected finite numbers, found {shorten(value)}", name))
-            elif name.startswith("/"):
-                parsed[name] = change_pointed(name, parsed[name], relocating(Path(), None))
         except RecursionError:
             problems.append(Problem("nested too deeply", name))
     if problems:

@@ -9,6 +9,7 @@ from ..core.component import Variable
 from ..core.errors import Problem
 from ..core.paths import is_file
 from ..core.system import Endpoint, System, incompatibility
+from ..core.text import count_noun
 
 if TYPE_CHECKING:
     from .prepared_run import PreparedRun
@@ -39,7 +40,7 @@ def _missing_connections(prepared: PreparedRun) -> Iterator[Problem]:
     sources = {end: source for end, variable in inputs.items() if (source := _matching_output(end, variable, outputs))}
     if sources:
         (end, source), more = next(iter(sources.items())), len(sources) - 1
-        others = f" and {more} more input{'s' * (more > 1)}" if more else ""
+        others = f" and {count_noun(more, 'more input')}" if more else ""
         shown_source = next((port for port, inner in system.aliases.items() if inner == source), source)
         text = f"nothing feeds or sets {end}{others}, but there is an output {shown_source}: is a connection missing?"
         yield Problem(text, prepared.root.where("connections"))

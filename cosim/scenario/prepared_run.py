@@ -5,18 +5,23 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from decimal import Decimal
+from fractions import Fraction
 from functools import cached_property
 from hashlib import sha256
 from os.path import relpath
 from pathlib import Path
 from types import MappingProxyType
-from typing import Any, Literal
+from typing import Any, Literal, get_args
+
+import numpy as np
 
 from ..components.fmi import FmuFile
 from ..components.python_import import package_files
-from ..core.errors import Problem
+from ..core.errors import InputError, Problem
 from ..core.stopwatch import Stopwatch
 from ..core.system import System
+from ..core.text import count_noun
 from ..engine.pacer import LatePolicy
 from ..engine.plan import Plan
 from ..engine.plan_run import free_components
@@ -24,15 +29,18 @@ from ..engine.settings import Settings
 from ..process.float_mode import default_float_mode
 from ..process.process_state import exclusive_process_state
 from .component_factory import ComponentFactory
+from .evaluation_schema import FunctionSpec
 from .json_document import Document
 from .named_functions import load_function, signal_problems
 from .nested_systems import Node, load_scenario
 from .overview import describe_software, describe_system
-from .schema import FunctionSpec, ScenarioSpec
+from .schema import ScenarioSpec
 from .schema_types import accepted
 from .system_builder import PROFILE_PREFIX, SystemBuilder
 
 IsolationMode = Literal["fmu", "none"]
+#: time (s) in Python
+TimeValue = float | str | Fraction | Decimal
 
 #: name, function and keyword arguments of a KPI or figure
 NamedCall = tuple[str, Callable[..., Any], Mapping[str, Any]]
@@ -54,7 +62,7 @@ class PreparedRun:
     def __repr__(self) -> str:
         system, settings = self.system, self.settings
         times = f"{float(settings.start_time):g} s to {float(settings.stop_time):g} s in steps of {float(settings.step_size):g} s"
-        return f"{self.spec.name}: {', '.join(system.components)}; {len(system.connections)} connections; {times}"
+        return f"{self.spec.name}: {', '.join(system.components)}; {count_noun(len(system.connections), 'connection')}; {times}"
 
     @property
     def system(self) -> System:
@@ -157,12 +165,13 @@ def load(
     scenario: str | Path | Mapping[str, Any],
     parameters: Mapping[str, Any] | None = None,
     *,
-    stop_time: float | str | None = None,
-    step_size: float | str | None = None,
+    stop_time: TimeValue | None = None,
+    step_size: TimeValue | None = None,
     real_time: float | None = None,
     late: LatePolicy = "warn",
     isolation: IsolationMode = "none",
     sandbox: bool = False,
+    settings_folder: Path | None = None,
     loaded_fmus: Mapping[Path, FmuFile] = MappingProxyType({}),
 ) -> PreparedRun:
     """Read, connect and check a scenario.
@@ -171,14 +180,15 @@ def load(
         scenario: Path of a scenario file, the name of a shipped scenario, or the content of a scenario file.
         parameters: Values that replace those of the file. A key is the name of a variable ("uav.vtol.landing_time") or the JSON
             pointer of any entry ("/components/plant/arguments/environment/seed").
-        stop_time: End of the simulation (s), a number or a fraction such as "1/3"; None: as in the file.
-        step_size: Macro step (s), a number or a fraction such as "1/60"; None: as in the file.
+        stop_time: End of the simulation (s), a number or a fraction, also as text ("1/3"); None: as in the file.
+        step_size: Macro step (s), a number or a fraction, also as text ("1/60"); None: as in the file.
         real_time: Simulated seconds per second of wall time; None: as fast as possible.
         late: Reaction to a real-time run that falls more than one step behind: "warn", or "fail" for a LateError.
         isolation: "fmu" runs every FMU in a separate process; "none" does so only where the scenario sets `isolation`, or where
             an FMU that allows one instance per process is used again.
         sandbox: Run every FMU in a separate process that reads and writes only its own files, has no network and starts no
             programs.
+        settings_folder: Folder that paths in `parameters` start from; None: the working directory.
         loaded_fmus: FMU files that have already been read, by resolved path.
 
     Returns:
@@ -187,12 +197,15 @@ def load(
     Raises:
         InputError: The scenario cannot be run; `problems` lists all reasons, each with file, line and JSON path.
     """
+    _check_choices(isolation=(isolation, IsolationMode), late=(late, LatePolicy))
+    if not isinstance(sandbox, bool):
+        raise InputError(f"sandbox: expected True or False, found {sandbox!r}; only the command line has the strict sandbox")
     times = {"/stop_time": stop_time, "/step_size": step_size}
-    settings = {**{key: value for key, value in times.items() if value is not None}, **(parameters or {})}
+    settings = {**{key: _json_time(value) for key, value in times.items() if value is not None}, **(parameters or {})}
     watch = Stopwatch()
     with watch.measure("load_seconds"):
         with watch.measure("parse_seconds"):
-            loaded = load_scenario(scenario, settings)
+            loaded = load_scenario(scenario, settings, settings_folder)
         if isolation == "fmu" or sandbox:
             reason = 'expected a file, because Python objects exist in this process only; set "isolation" of single FMUs instead'
             loaded.root.document.refuse_objects(reason, classes=True)
@@ -206,6 +219,21 @@ def load(
             free_components(builder.components)
             raise
     return PreparedRun(loaded.root, builder.spec, plan, builder.component_factory, builder.left_out, watch.seconds)
+
+
+def _check_choices(**options: tuple[object, Any]) -> None:
+    """Check that each option, given with the Literal of its values, has one of them."""
+    for name, (value, kind) in options.items():
+        if value not in get_args(kind):
+            raise InputError(f"{name}: expected one of {', '.join(map(repr, get_args(kind)))}; found {value!r}")
+
+
+def _json_time(value: TimeValue) -> float | str:
+    """Return a time as JSON has it: a fraction or a decimal number as text, a number of NumPy as a number."""
+    if isinstance(value, Fraction | Decimal):
+        return str(value)
+    plain: float | str = value.item() if isinstance(value, np.generic) else value
+    return plain
 
 
 def import_figures(scenario: str | Path, parameters: Mapping[str, Any] | None = None) -> list[NamedCall]:

@@ -8,11 +8,25 @@ from __future__ import annotations
 from fractions import Fraction
 from typing import Annotated, Any, Literal
 
-from pydantic import ConfigDict, Field, StringConstraints, model_validator
+from pydantic import ConfigDict, StringConstraints, model_validator
 
 from ..components.fmi.instance_settings import Method
-from ..engine.settings import NonFinitePolicy
-from .schema_types import INVALID, AutoOrBool, BoolOrNumber, Integer, Name, NameList, Period, Seconds, Spec, Value
+from ..engine.settings import NonFinitePolicy, StopOutcome
+from .evaluation_schema import CallSpec, CheckSpec, FunctionSpec, ReferenceSpec
+from .schema_types import (
+    INVALID,
+    AutoOrBool,
+    Duration,
+    Integer,
+    Name,
+    NameList,
+    Period,
+    Seconds,
+    Spec,
+    Value,
+    key,
+    schema_of,
+)
 
 #: pattern of the names of scenarios
 SCENARIO_NAME = r"^[A-Za-z0-9_][A-Za-z0-9_. -]*$"
@@ -21,7 +35,13 @@ SOURCES = ("fmu", "python", "modelica", "system")
 
 
 #: lists whose elements can be changed by an object in a file with "extends", and the key that names their elements
-KEYED_LISTS = {("connections",): "to", ("kpis",): "name", ("figures",): "name", ("checks",): "kpi"}
+KEYED_LISTS = {
+    ("connections",): "to",
+    ("kpis",): "name",
+    ("figures",): "name",
+    ("checks",): "kpi",
+    ("stop_when",): "name",
+}
 #: keys that a file with "extends" does not inherit
 NOT_INHERITED = ("$schema", "name", "description", "reference")
 
@@ -54,21 +74,20 @@ _CONNECTION_RULES: dict[str, Any] = {
         {"properties": {end: {"pattern": pattern} for end in ("from", "to")}} for pattern in (r"^[^*]*$", r"^[^*]*\*[^*]*$")
     ]
 }
-_CHECK_RULES: dict[str, Any] = {
-    "anyOf": [{"required": [bound], "properties": {bound: {"not": {"type": "null"}}}} for bound in ("min", "max", "equals")]
-}
 
 
 class SolverSpec(Spec):
     """Integration of a Model Exchange FMU."""
 
-    method: Method = Field(
-        description='"euler", "rk4": explicit methods with fixed step size; "cvode": BDF with variable step size and root finding'
+    method: Method = key(
+        '"euler", "rk4": explicit methods with fixed step size; "cvode": BDF with variable step size and root finding', "euler"
     )
-    step_size: Period | None = Field(
-        default=None,
-        description="largest step size of a method with fixed step size (s); default: that of the FMU's default experiment, "
+    step_size: Period | None = key(
+        "largest step size of a method with fixed step size; default: that of the FMU's default experiment, "
         "or else the time between two steps of the component",
+        0.001,
+        unit="s",
+        default=None,
     )
 
     @model_validator(mode="after")
@@ -83,23 +102,35 @@ class ComponentSpec(Spec):
 
     model_config = ConfigDict(json_schema_extra=_COMPONENT_RULES)
 
-    fmu: str | None = Field(default=None, description="path of an FMU")
-    python: str | None = Field(default=None, description='"file.py:Class": a PythonFMU class or a component class of cosim')
-    modelica: str | None = Field(default=None, description='"file.mo:Model"; built when needed (requires the extra "build")')
-    system: str | None = Field(default=None, description="path of the JSON file of a nested system")
-    arguments: dict[str, Any] = Field(default={}, description="arguments of the constructor; only for Python components")
-    parameters: dict[str, Value] = Field(default={}, description="values of parameters and start values, by variable name")
-    period: Period | None = Field(default=None, description="time between two steps (s); default: every macro step")
-    isolation: Literal["fmu"] | None = Field(default=None, description="run the FMU in a separate process")
-    solver: SolverSpec | None = Field(
-        default=None,
-        description="simulate by Model Exchange with this solver; default: by Co-Simulation if the FMU has it, else cvode",
+    fmu: str | None = key("path of an FMU", "../fmus/strider_autopilot.fmu", default=None)
+    python: str | None = key(
+        '"file.py:Class": a PythonFMU class or a component class of cosim', "my_autopilot.py:Autopilot", default=None
     )
-    tolerance: float | None = Field(
+    modelica: str | None = key(
+        '"file.mo:Model"; built when needed (requires the extra "build")', "MyAutopilot.mo:MyAutopilot", default=None
+    )
+    system: str | None = key("path of the JSON file of a nested system", "systems/strider_autopilot.json", default=None)
+    arguments: dict[str, Any] = key(
+        "arguments of the constructor; only for Python components", {"environment": {"seed": 1}}, default={}
+    )
+    parameters: dict[str, Value] = key(
+        "values of parameters and start values, by variable name; a list sets an array",
+        {"speed_command": 1.0, "waypoint_x": [3.0, 3.0, -3.0]},
+        default={},
+    )
+    period: Period | None = key("time between two steps; default: every macro step", 0.02, unit="s", default=None)
+    isolation: Literal["fmu"] | None = key("run the FMU in a separate process", "fmu", default=None)
+    solver: SolverSpec | None = key(
+        "simulate by Model Exchange with this solver; default: by Co-Simulation if the FMU has it, else cvode",
+        {"method": "euler", "step_size": 0.001},
+        default=None,
+    )
+    tolerance: float | None = key(
+        "relative tolerance of the FMU and of its solver; default: that of the FMU's default experiment",
+        1e-6,
         default=None,
         gt=0,
         allow_inf_nan=False,
-        description="relative tolerance of the FMU and of its solver; default: that of the FMU's default experiment",
     )
 
     @model_validator(mode="after")
@@ -111,9 +142,9 @@ class ComponentSpec(Spec):
             raise ValueError('"arguments" are for components with "python"; variables are set with "parameters"')
         if self.isolation and self.fmu is None and self.modelica is None:
             raise ValueError('"isolation" is for components with "fmu" or "modelica"')
-        for key in ("solver", "tolerance"):
-            if getattr(self, key) is not None and self.fmu is None:
-                raise ValueError(f'"{key}" is for components with "fmu"')
+        for name in ("solver", "tolerance"):
+            if getattr(self, name) is not None and self.fmu is None:
+                raise ValueError(f'"{name}" is for components with "fmu"')
         return self
 
 
@@ -125,12 +156,12 @@ class ConnectionSpec(Spec):
 
     model_config = ConfigDict(json_schema_extra=_CONNECTION_RULES)
 
-    source: str = Field(alias="from", description='output "component.variable", a prefix of outputs, or a pattern')
-    target: str = Field(alias="to", description='input "component.variable", a prefix of inputs, or a pattern')
-    gain: float = Field(default=1.0, description="factor that is applied after the conversion of units")
-    offset: float = Field(default=0.0, description="value that is added after the gain, in the unit of the input")
-    delay: Integer = Field(
-        default=0, ge=0, le=1_000_000, description="delay in macro steps; the input keeps the initial output until then"
+    source: str = key('output "component.variable", a prefix of outputs, or a pattern', "plant.uav", alias="from")
+    target: str = key('input "component.variable", a prefix of inputs, or a pattern', "uav.vehicle", alias="to")
+    gain: float = key("factor that is applied after the conversion of units", -1.0, default=1.0)
+    offset: float = key("value that is added after the gain", 0.5, unit="that of the input", default=0.0)
+    delay: Integer = key(
+        "delay; the input keeps the initial output until then", 1, unit="macro steps", default=0, ge=0, le=1_000_000
     )
 
     @model_validator(mode="after")
@@ -143,10 +174,8 @@ class ConnectionSpec(Spec):
 class IterationSpec(Spec):
     """Fixed-point iteration: every macro step is repeated from the same state until the connected outputs converge."""
 
-    tolerance: float = Field(
-        default=1e-9, gt=0, description="an output y has converged if it changes by at most tolerance * (1 + |y|)"
-    )
-    limit: Integer = Field(default=50, ge=2, description="largest number of iterations in a macro step; more are an error")
+    tolerance: float = key("an output y has converged if it changes by at most tolerance * (1 + |y|)", 1e-6, default=1e-9, gt=0)
+    limit: Integer = key("largest number of iterations in a macro step; more are an error", 20, default=50, ge=2)
 
 
 class AlgorithmSpec(Spec):
@@ -155,173 +184,170 @@ class AlgorithmSpec(Spec):
     Stages step one after the other (Gauss-Seidel). The components of a stage step side by side (Jacobi).
     """
 
-    kind: Literal["staged"] = "staged"
-    stages: list[list[Name]] = Field(description="names of components, each in exactly one stage")
-    parallel: AutoOrBool = Field(
-        default="auto",
-        description="run the FMUs of a stage in parallel threads, with identical results. true: always; false: never; auto: if "
+    kind: Literal["staged"] = key("the stages step one after the other", "staged", default="staged")
+    stages: list[list[Name]] = key("names of components, each in exactly one stage", [["usv", "uav"], ["plant"]])
+    parallel: AutoOrBool = key(
+        "run the FMUs of a stage in parallel threads, with identical results. true: always; false: never; auto: if "
         'their measured steps are long enough. With "auto", instances of the same FMU file never run in parallel',
+        False,
+        default="auto",
     )
-    iteration: IterationSpec | None = Field(
+    iteration: IterationSpec | None = key(
+        "repeat the stages in every macro step until they converge; all components must save and restore states",
+        {"tolerance": 1e-9, "limit": 50},
         default=None,
-        description="repeat the stages in every macro step until they converge; all components must save and restore states",
     )
 
 
 class RecordSpec(Spec):
     """The signals that are recorded, and the recording interval."""
 
-    signals: list[str] = Field(default=["*"], description='patterns of signal names; "*" matches any characters, including dots')
-    interval: Period | None = Field(default=None, description="time between two rows (s); default: the step size")
+    signals: list[str] = key(
+        'patterns of signal names; "*" matches any characters, including dots', ["plant.*", "usv.rudder_angle"], default=["*"]
+    )
+    interval: Period | None = key("time between two rows; default: the step size", 0.1, unit="s", default=None)
 
 
 class EventSpec(Spec):
     """Values that variables are set to at a communication point, before the step that starts there."""
 
-    time: Seconds = Field(description="a communication point (s)")
-    values: dict[str, Value] = Field(alias="set", description="values of tunable parameters and unconnected inputs, by name")
+    time: Seconds = key("a communication point", 20.0, unit="s")
+    values: dict[str, Value] = key(
+        "values of tunable parameters and unconnected inputs, by name", {"plant.usv.external_force.y": 2.0}, alias="set"
+    )
+
+
+class StopSpec(Spec):
+    """A condition that ends the run before the stop time.
+
+    The run ends at the first recorded point at which the condition has been met for its hold time without interruption.
+    """
+
+    name: Name = key("unique name for messages", "landed")
+    when: str = key("condition on recorded signals", "plant.uav.crashed or plant.uav.position.z < 0 and uav.mode >= 2")
+    for_: Duration = key("hold time", 3.0, unit="s", default=Fraction(0), alias="for")
+    outcome: StopOutcome = key(
+        "decided: nothing that matters follows; crash: a failure, exit code 3 of `cosim run`", "crash", default="decided"
+    )
 
 
 class InputSpec(Spec):
     """An input profile over time from a CSV file."""
 
-    file: str = Field(description='path of the CSV file; its first column is "time" (s)')
-    to: dict[str, NameList] = Field(description="the inputs that each column is connected to")
-    interpolation: Literal["linear", "hold"] = Field(
-        default="linear", description="value between two rows; hold: that of the last row"
-    )
-
-
-class CallSpec(Spec):
-    """A Python function that is called with the scenario as its first argument."""
-
-    python: str = Field(description='"file.py:function" or "package.module:function"')
-    arguments: dict[str, Any] = Field(
-        default={},
-        description='keyword arguments of the function; {"from": "usv.waypoint_x"} is the value of a parameter, and '
-        '{"from": "/components/plant/arguments/platforms"} that of an entry of the scenario',
-    )
-    sources: NameList = Field(
-        default=[],
-        alias="from",
-        description='components ("usv"), prefixes of variables ("plant.uav") or JSON pointers of objects, from which arguments '
-        "that are not given are taken by name",
-    )
-
-
-class FunctionSpec(CallSpec):
-    """A Python function that is called with the result: a KPI returns numbers, a figure returns a matplotlib Figure."""
-
-    name: Name = Field(description="unique name; that of a KPI is the prefix of its values, that of a figure the file name")
-    optional: bool = Field(
-        default=False, description="leave it out with a warning if an argument names a signal or parameter that does not exist"
-    )
-
-
-class CheckSpec(Spec):
-    """A requirement on a KPI value; a run passes if it meets all checks."""
-
-    model_config = ConfigDict(json_schema_extra=_CHECK_RULES)
-
-    kpi: str = Field(description='name of a KPI value, such as "landing.lateral_error"')
-    min: float | None = Field(default=None, description="smallest value that passes")
-    max: float | None = Field(default=None, description="largest value that passes")
-    equals: BoolOrNumber | None = Field(default=None, description="the only value that passes")
-
-    @model_validator(mode="after")
-    def _bounded(self) -> CheckSpec:
-        if self is not INVALID:
-            self._check_bounds()
-        return self
-
-    def _check_bounds(self) -> None:
-        if self.min is not None and self.max is not None and self.min > self.max:
-            raise ValueError('expected "min" to be at most "max"')
-        if self.min is None and self.max is None and self.equals is None:
-            raise ValueError('expected at least one of "min", "max", "equals"')
-
-
-class ToleranceSpec(Spec):
-    """Half width of the tolerance tube around a reference signal."""
-
-    absolute: float = Field(default=0.0, ge=0, description="in the unit of the signal")
-    relative: float = Field(default=0.0, ge=0, description="fraction of the range (maximum - minimum) of the reference signal")
-    time: float = Field(default=0.0, ge=0, description="along the time axis (s)")
-
-
-class ReferenceSpec(Spec):
-    """A recorded reference trajectory that `cosim compare` and `cosim regress` compare the result with."""
-
-    file: str = Field(description="path of a CSV file with recorded signals")
-    tolerances: dict[str, ToleranceSpec] = Field(description="tolerances by pattern; only matching signals are compared")
+    file: str = key('path of the CSV file; its first column is "time" (s)', "profiles/accelerations.csv")
+    to: dict[str, NameList] = key("the inputs that each column is connected to", {"ax": "uav.ax"})
+    interpolation: Literal["linear", "hold"] = key("value between two rows; hold: that of the last row", "hold", default="linear")
 
 
 class PortsSpec(Spec):
     """The ports of a nested system: names for inner variables or prefixes that outer systems can connect and set."""
 
-    inputs: dict[Name, NameList] = Field(default={}, description="one or more inner inputs or prefixes of inputs for each port")
-    outputs: dict[Name, str] = Field(default={}, description="an inner output or prefix of outputs for each port")
-    parameters: dict[Name, NameList] = Field(default={}, description="one or more inner parameters or prefixes for each port")
+    inputs: dict[Name, NameList] = key(
+        "one or more inner inputs or prefixes of inputs for each port",
+        {"vehicle": ["guidance.vehicle", "speed.vehicle"]},
+        default={},
+    )
+    outputs: dict[Name, str] = key("an inner output or prefix of outputs for each port", {"thrust": "speed.thrust"}, default={})
+    parameters: dict[Name, NameList] = key(
+        "one or more inner parameters or prefixes for each port", {"gain": "speed.gain"}, default={}
+    )
 
 
 class DeadlinesSpec(Spec):
-    """The longest time that one call of a component may take in a supervised run (s, wall time)."""
+    """The longest time that one call of a component may take in a supervised run (wall time)."""
 
-    load: float = Field(default=10.0, gt=0, description="to load and instantiate")
-    initialization: float = Field(default=10.0, gt=0, description="until the end of initialization mode")
-    step: float = Field(default=5.0, gt=0, description="while stepping")
-    end: float = Field(default=5.0, gt=0, description="to terminate and free")
+    load: float = key("to load and instantiate", 60.0, unit="s", default=10.0, gt=0)
+    initialization: float = key("until the end of initialization mode", 30.0, unit="s", default=10.0, gt=0)
+    step: float = key("while stepping", 1.0, unit="s", default=5.0, gt=0)
+    end: float = key("to terminate and free", 10.0, unit="s", default=5.0, gt=0)
 
 
 class SystemSpec(Spec):
     """Components and their connections."""
 
-    schema_: str | None = Field(default=None, alias="$schema", description="path of the JSON Schema, for editors")
-    name: str = Field(default="", description="name of the system")
-    description: str = Field(default="", description="text for reports and people")
-    components: dict[Name, ComponentSpec] = Field(description="components by name")
-    connections: list[ConnectionSpec] = Field(default=[], description="connections of outputs to inputs")
-    algorithm: AlgorithmSpec | None = Field(
-        default=None, description="order of execution; default: the components step one after the other in the order of this file"
+    schema_: str | None = key("path of the JSON Schema, for editors", "scenario.schema.json", default=None, alias="$schema")
+    name: str = key("name of the system", "strider_autopilot", default="")
+    description: str = key("text for reports and people", "The vessel keeps its course.", default="")
+    components: dict[Name, ComponentSpec] = key("components by name", {"usv": {"fmu": "../fmus/strider_autopilot.fmu"}})
+    connections: list[ConnectionSpec] = key(
+        "connections of outputs to inputs", [{"from": "plant.usv", "to": "usv.vehicle"}], default=[]
+    )
+    algorithm: AlgorithmSpec | None = key(
+        "order of execution; default: the components step one after the other in the order of this file",
+        {"kind": "staged", "stages": [["usv", "uav"], ["plant"]]},
+        default=None,
     )
 
 
 class NestedSpec(SystemSpec):
     """A nested system: components and connections without times, used by a scenario or another nested system."""
 
-    ports: PortsSpec = Field(default=PortsSpec(), description="inner variables that outer systems can connect and set")
+    ports: PortsSpec = key(
+        "inner variables that outer systems can connect and set",
+        {"inputs": {"vehicle": "speed.vehicle"}, "outputs": {"thrust": "speed.thrust"}},
+        default=PortsSpec(),
+    )
 
 
 class ScenarioSpec(SystemSpec):
     """A scenario: a system of components, its times, recorded signals, events, KPIs, checks and figures."""
 
-    name: Annotated[str, StringConstraints(pattern=SCENARIO_NAME)] = Field(
-        description="name of the scenario and of its results folder"
+    name: Annotated[str, StringConstraints(pattern=SCENARIO_NAME)] = key(
+        "name of the scenario and of its results folder", "demo1_box"
     )
-    start_time: Seconds = Field(default=Fraction(0), description="s")
-    stop_time: Seconds = Field(
-        description="s; the run ends at the last whole multiple of the step size and of all periods at or before it"
+    start_time: Seconds = key("time at the start of the run", 0.0, unit="s", default=Fraction(0))
+    stop_time: Seconds = key(
+        "stop time; the run ends at the last whole multiple of the step size and of all periods until then", 40.0, unit="s"
     )
-    step_size: Period = Field(description="macro step: time between two communication points (s)")
-    record: RecordSpec = Field(
-        default=RecordSpec(), description="recorded signals; default: all outputs at every communication point"
+    step_size: Period = key(
+        'macro step: time between two communication points, as a number or a fraction such as "1/60"', 0.01, unit="s"
     )
-    events: list[EventSpec] = Field(default=[], description="values that are set during the run")
-    inputs: list[InputSpec] = Field(default=[], description="input profiles from CSV files")
-    kpis: list[FunctionSpec] = Field(default=[], description="functions that compute numbers from the result")
-    checks: list[CheckSpec] = Field(default=[], description="requirements on KPI values")
-    figures: list[FunctionSpec] = Field(default=[], description="functions that draw figures from the result")
-    scene: CallSpec | None = Field(default=None, description="function that returns the scene of the 3-D replay")
-    reference: ReferenceSpec | None = Field(default=None, description="recorded trajectory for comparisons")
-    seeds: list[str] = Field(
+    record: RecordSpec = key(
+        "recorded signals; default: all outputs at every communication point",
+        {"signals": ["plant.*"], "interval": 0.1},
+        default=RecordSpec(),
+    )
+    events: list[EventSpec] = key(
+        "values that are set during the run", [{"time": 20.0, "set": {"plant.usv.external_force.y": 2.0}}], default=[]
+    )
+    inputs: list[InputSpec] = key(
+        "input profiles from CSV files", [{"file": "profiles/accelerations.csv", "to": {"ax": "uav.ax"}}], default=[]
+    )
+    kpis: list[FunctionSpec] = key(
+        "functions that compute numbers from the result",
+        [{"name": "altitude", "python": "cosim.kpis:rms", "arguments": {"signal": "plant.uav.position.z"}}],
         default=[],
-        description='JSON pointers of the entries that a seed sets, such as "/components/plant/arguments/environment/seed"',
     )
-    deadlines: DeadlinesSpec = Field(default=DeadlinesSpec(), description="time limits of calls in supervised runs")
-    non_finite: NonFinitePolicy = Field(
-        default="error",
-        description="treatment of NaN and infinity. error: on a connected output they end the run, on a recorded one they give a "
+    checks: list[CheckSpec] = key("requirements on KPI values", [{"kpi": "altitude.value", "max": 0.1}], default=[])
+    figures: list[FunctionSpec] = key(
+        "functions that draw figures from the result",
+        [{"name": "course", "python": "my_figures.py:course", "arguments": {"vehicle": "plant.usv"}}],
+        default=[],
+    )
+    scene: CallSpec | None = key(
+        "function that returns the scene of the 3-D replay; default: what the components describe",
+        {"python": "my_figures.py:scene"},
+        default=None,
+    )
+    reference: ReferenceSpec | None = key(
+        "recorded trajectory for comparisons",
+        {"file": "references/demo1_box.csv", "tolerances": {"plant.*": {"absolute": 0.01}}},
+        default=None,
+    )
+    seeds: list[str] = key(
+        "JSON pointers of the entries that a seed sets", ["/components/plant/arguments/environment/seed"], default=[]
+    )
+    deadlines: DeadlinesSpec = key("time limits of calls in supervised runs", {"load": 60.0}, default=DeadlinesSpec())
+    stop_when: list[StopSpec] = key(
+        "conditions that end the run before the stop time",
+        [{"name": "crash", "when": "plant.uav.crashed", "outcome": "crash"}],
+        default=[],
+    )
+    non_finite: NonFinitePolicy = key(
+        "treatment of NaN and infinity. error: on a connected output they end the run, on a recorded one they give a "
         "warning; fail: on a connected or recorded output they end the run; allow: neither",
+        "fail",
+        default="error",
     )
 
 
@@ -332,22 +358,4 @@ def ports_of(spec: SystemSpec) -> PortsSpec:
 
 def json_schema(nested: bool = False) -> dict[str, Any]:
     """Return the JSON Schema (2020-12) of scenario files, or of nested-system files."""
-    schema = (NestedSpec if nested else ScenarioSpec).model_json_schema(by_alias=True)
-    return complete_schema(schema)
-
-
-def complete_schema(schema: dict[str, Any]) -> dict[str, Any]:
-    """Add the version to a JSON Schema, and refuse names that do not match the patterns of names."""
-    _refuse_other_names(schema)
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
-
-
-def _refuse_other_names(schema: Any) -> None:
-    if isinstance(schema, dict):
-        if "patternProperties" in schema:
-            schema["additionalProperties"] = False
-        for value in schema.values():
-            _refuse_other_names(value)
-    elif isinstance(schema, list):
-        for value in schema:
-            _refuse_other_names(value)
+    return schema_of(NestedSpec if nested else ScenarioSpec)

@@ -7,7 +7,16 @@ from collections.abc import Iterable, Iterator
 from fractions import Fraction
 from typing import Annotated, Any, Literal, TypeVar
 
-from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, StringConstraints, WithJsonSchema, model_validator
+from pydantic import (
+    AfterValidator,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    StringConstraints,
+    WithJsonSchema,
+    model_validator,
+)
 
 from ..core.time_grid import MAX_TIME, exact_fraction
 
@@ -32,6 +41,12 @@ def _parse_time(value: Any) -> Fraction:
 def _check_positive(value: Fraction) -> Fraction:
     if value <= 0:
         raise ValueError("expected a positive number of seconds")
+    return value
+
+
+def _check_not_negative(value: Fraction) -> Fraction:
+    if value < 0:
+        raise ValueError("expected 0 s or more")
     return value
 
 
@@ -83,6 +98,18 @@ Period = Annotated[
         }
     ),
 ]
+Duration = Annotated[
+    Seconds,
+    AfterValidator(_check_not_negative),
+    WithJsonSchema(
+        {
+            "anyOf": [
+                {"type": "number", "minimum": 0, "maximum": MAX_TIME},
+                {"type": "string", "pattern": rf"^\+?{_UNSIGNED_TIME}"},
+            ]
+        }
+    ),
+]
 Integer = Annotated[int, BeforeValidator(_as_integer)]
 BoolOrNumber = Annotated[
     bool | int | float, BeforeValidator(_check_bool_or_number), WithJsonSchema({"type": ["number", "boolean"]})
@@ -110,6 +137,18 @@ class InvalidElement:
 INVALID: Any = InvalidElement()
 
 
+def key(description: str, example: Any, *, unit: str = "", **rules: Any) -> Any:
+    """Return the field of a key with its documentation in the JSON Schema.
+
+    Args:
+        description: Meaning of the value.
+        example: A valid value.
+        unit: Unit of the value.
+        **rules: Default, alias and limits, as of `pydantic.Field`.
+    """
+    return Field(description=description, examples=[example], json_schema_extra={"unit": unit} if unit else None, **rules)
+
+
 class Spec(BaseModel):
     """Base of all parts of a scenario; unknown keys and implicit type conversions are errors."""
 
@@ -124,3 +163,27 @@ class Spec(BaseModel):
 def accepted(specs: Iterable[S]) -> Iterator[tuple[int, S]]:
     """Yield (index, specification) of the valid elements of a list."""
     return ((i, spec) for i, spec in enumerate(specs) if spec is not INVALID)
+
+
+def schema_of(model: type[BaseModel]) -> dict[str, Any]:
+    """Return the JSON Schema (2020-12) of a model: entries in the order of the code, names only as their patterns allow."""
+    from pydantic.json_schema import GenerateJsonSchema
+
+    class InOrder(GenerateJsonSchema):
+        def sort(self, value: Any, parent_key: str | None = None) -> Any:  # noqa: ARG002
+            return value
+
+    schema = model.model_json_schema(by_alias=True, schema_generator=InOrder)
+    _refuse_other_names(schema)
+    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+
+
+def _refuse_other_names(schema: Any) -> None:
+    if isinstance(schema, dict):
+        if "patternProperties" in schema:
+            schema["additionalProperties"] = False
+        for value in schema.values():
+            _refuse_other_names(value)
+    elif isinstance(schema, list):
+        for value in schema:
+            _refuse_other_names(value)

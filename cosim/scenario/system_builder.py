@@ -14,19 +14,20 @@ from ..components.input_table import read_input_table
 from ..core.component import Component, Variable, count_scalars
 from ..core.errors import InputError, Problem
 from ..core.size_limits import MAX_SCALARS, require_at_most
-from ..core.system import Connection, Endpoint, Group, Iteration, Parallel, Stage, System
+from ..core.system import Connection, Endpoint, System
 from ..engine.pacer import LatePolicy
 from ..engine.plan import Plan, compile_plan
 from ..engine.settings import Event, Settings
-from ..process.journal import Deadlines
+from ..process.journal import Deadlines, current_journal
 from .component_factory import ComponentFactory
 from .function_arguments import FunctionResolver, without_placeholders
 from .name_resolution import SlotIndex, UnknownNameError, check_assignment, resolve_name
 from .named_functions import find_function_problems
 from .nested_systems import Node, Scenario
 from .recorded_signals import SignalSelector
-from .schema import SystemSpec
 from .schema_types import accepted
+from .stages import parallel_mode, root_stages
+from .stop_conditions import StopConditionReader
 from .wiring import Wiring
 
 #: prefix of the components made from input profiles: inputs.0, inputs.1, ...
@@ -43,6 +44,8 @@ class SystemBuilder:
         self.root, self.spec, self.assignments = scenario.root, scenario.spec, scenario.assignments
         self.problems: list[Problem] = list(scenario.problems)
         deadlines = Deadlines(**self.spec.deadlines.model_dump())
+        if journal := current_journal():
+            journal.deadlines = deadlines
         self.component_factory = ComponentFactory(Isolation(deadlines, sandbox), isolate_fmus or sandbox, loaded_fmus)
         self.components: dict[str, Component] = {}
         self._variables_by_component: dict[str, Mapping[str, Variable]] = {}
@@ -70,23 +73,13 @@ class SystemBuilder:
         system = System(
             self.components,
             connections,
-            (*self._root_stages(), *([tuple(self.profiles)] if self.profiles else [])),
+            (*root_stages(self.root, self.spec), *([tuple(self.profiles)] if self.profiles else [])),
             dict(self._periods(self.root)),
             self.start_values,
             aliases,
-            _parallel_mode(self.spec),
+            parallel_mode(self.spec),
         )
-        settings = Settings(
-            self.spec.start_time,
-            self.spec.stop_time,
-            self.spec.step_size,
-            self._columns(aliases),
-            self.spec.record.interval,
-            list(self._events()),
-            non_finite=self.spec.non_finite,
-            real_time=real_time,
-            late=late,
-        )
+        settings = self._settings(aliases, real_time, late)
         try:
             plan = compile_plan(system, settings)
         except InputError as error:
@@ -100,6 +93,23 @@ class SystemBuilder:
         if self.problems:
             raise InputError(dict.fromkeys(self.problems))
         return plan
+
+    def _settings(self, aliases: Mapping[str, Endpoint], real_time: float | None, late: LatePolicy) -> Settings:
+        columns = self._columns(aliases)
+        stops = StopConditionReader(self.root, self.spec, self.components, columns, not self._has_missing_signals)
+        self.problems += stops.problems
+        return Settings(
+            self.spec.start_time,
+            self.spec.stop_time,
+            self.spec.step_size,
+            columns,
+            self.spec.record.interval,
+            list(self._events()),
+            stops.conditions,
+            non_finite=self.spec.non_finite,
+            real_time=real_time,
+            late=late,
+        )
 
     def make_components(self) -> None:
         """Create the components of the scenario and its nested systems, and the tables of its input profiles.
@@ -179,29 +189,6 @@ class SystemBuilder:
             wiring.excuse(node, name)
         yield from wiring.connections()
         self.problems += wiring.problems
-
-    def _stages(self, node: Node) -> tuple[Stage, ...]:
-        """Return the stages of a system. Unknown, repeated and missing names are reported by `System.problems`."""
-        if "components" in node.invalid_keys:
-            return ()
-        listed = node.spec.algorithm.stages if node.spec.algorithm and not node.has_wrong_names else None
-        stages = [[name] for name in node.spec.components] if listed is None else listed
-        return tuple(
-            tuple(self._stage_member(node, name) for name in stage if name not in node.invalid_components)
-            for stage in stages
-            if stage
-        )
-
-    def _root_stages(self) -> tuple[Stage, ...]:
-        """Return the root's stages; with iteration they form one group, which excludes the input profiles."""
-        stages, iteration = self._stages(self.root), _iteration_settings(self.spec)
-        return ((Group(self.spec.name, stages, _parallel_mode(self.spec), iteration),),) if iteration else stages
-
-    def _stage_member(self, node: Node, name: str) -> str | Group:
-        if name in node.children:
-            child = node.children[name]
-            return Group(node.full_name(name), self._stages(child), _parallel_mode(child.spec), _iteration_settings(child.spec))
-        return node.full_name(name)
 
     def _periods(self, node: Node, inherited: Fraction | None = None) -> Iterator[tuple[str, Fraction]]:
         """Yield (full name, period in s) of all components that have a period themselves or through an enclosing system."""
@@ -289,12 +276,3 @@ class SystemBuilder:
             node, name = found
             return replace(problem, where=node.where("components", name, *rest[1:]), subject=())
         return replace(problem, where=self.root.where(*problem.subject), subject=())
-
-
-def _parallel_mode(spec: SystemSpec) -> Parallel:
-    return spec.algorithm.parallel if spec.algorithm else "auto"
-
-
-def _iteration_settings(spec: SystemSpec) -> Iteration | None:
-    settings = spec.algorithm.iteration if spec.algorithm else None
-    return Iteration(settings.tolerance, settings.limit) if settings else None

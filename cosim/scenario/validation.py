@@ -16,7 +16,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from ..core.errors import Problem, did_you_mean
-from ..core.text import REPLACEMENT
+from ..core.text import REPLACEMENT, count_noun
 from .json_document import Document
 from .schema import SystemSpec
 from .schema_types import INVALID
@@ -140,7 +140,7 @@ def _group_problem(kind: type[BaseModel], document: Document, group: Sequence[tu
     if detail["type"] == "missing":
         names = ", ".join(f'"{each[-1]}"' for each, _ in group)
         return Problem(f"the keys {names} are missing", document.where(path[:-1]))
-    count = f"{len(others)} more element{'s' * (len(others) > 1)}"
+    count = count_noun(len(others), "more element")
     return Problem(f"{_error_message(kind, path, detail)}, and {count} likewise", document.where(path))
 
 

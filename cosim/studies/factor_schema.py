@@ -8,7 +8,7 @@ from typing import Annotated, Any, Literal
 from pydantic import AfterValidator, Field, StringConstraints, model_validator
 
 from ..core.errors import did_you_mean
-from ..scenario.schema_types import Integer, NameList, Spec
+from ..scenario.schema_types import Integer, NameList, Spec, key
 
 #: arguments of each distribution; `min` and `max` of truncated_normal are optional
 DISTRIBUTIONS = {
@@ -68,10 +68,10 @@ def check_log_scale(scale: Scale, low: float) -> None:
 class RangeSpec(Spec):
     """Evenly spaced values from `min` to `max`; `count` of them in a full factorial design."""
 
-    min: float
-    max: float
-    count: Integer | None = Field(None, ge=2)
-    scale: Scale = "linear"
+    min: float = key("first value", 0.5)
+    max: float = key("last value", 1.5)
+    count: Integer | None = key("number of values; required in a full factorial design", 5, default=None, ge=2)
+    scale: Scale = key("spacing of the values", "log", default="linear")
 
     @model_validator(mode="after")
     def _possible(self) -> RangeSpec:
@@ -83,17 +83,19 @@ class RangeSpec(Spec):
 class DistributionSpec(Spec):
     """A probability distribution; a full factorial design takes the medians of `count` equally likely parts."""
 
-    kind: Literal["uniform", "normal", "truncated_normal", "lognormal", "triangular", "exponential", "weibull"]
-    min: float | None = None
-    max: float | None = None
-    mean: float | None = None
-    std: float | None = None
-    median: float | None = None
-    sigma: float | None = Field(None, description="standard deviation of the logarithm")
-    mode: float | None = None
-    shape: float | None = None
-    scale: float | None = None
-    count: Integer | None = Field(None, ge=1)
+    kind: Literal["uniform", "normal", "truncated_normal", "lognormal", "triangular", "exponential", "weibull"] = key(
+        "family of distributions", "normal"
+    )
+    min: float | None = key("lower bound (uniform, truncated_normal, triangular)", 0.0, default=None)
+    max: float | None = key("upper bound (uniform, truncated_normal, triangular)", 2.0, default=None)
+    mean: float | None = key("mean (normal, truncated_normal: before truncation; exponential)", 1.0, default=None)
+    std: float | None = key("standard deviation (normal, truncated_normal: before truncation)", 0.1, default=None)
+    median: float | None = key("median (lognormal)", 1.0, default=None)
+    sigma: float | None = key("standard deviation of the logarithm (lognormal)", 0.2, default=None)
+    mode: float | None = key("most probable value (triangular)", 1.0, default=None)
+    shape: float | None = key("shape parameter k (weibull)", 2.0, default=None)
+    scale: float | None = key("scale parameter lambda (weibull)", 5.0, default=None)
+    count: Integer | None = key("number of values; required in a full factorial design", 5, default=None, ge=1)
 
     @model_validator(mode="after")
     def _complete(self) -> DistributionSpec:
@@ -120,13 +122,17 @@ class DistributionSpec(Spec):
 class FactorSpec(Spec):
     """A factor that varies: variables or JSON pointers with their values, or named levels with several settings each."""
 
-    name: FactorName
-    set: SettingPaths | None = Field(None, description="variable or JSON pointer; of several, all get the same value")
-    values: list[Any] | None = Field(None, min_length=1)
-    range: RangeSpec | None = None
-    distribution: DistributionSpec | None = None
-    levels: dict[str, dict[str, Any]] | None = Field(None, min_length=1, description="label -> settings")
-    integer: bool = Field(False, description="values of a range or distribution are rounded")
+    name: FactorName = key("name of the factor and of its column in the tables", "speed")
+    set: SettingPaths | None = key(
+        "variable or JSON pointer; of several, all get the same value", "usv.speed_command", default=None
+    )
+    values: list[Any] | None = key("listed values", [0.4, 0.8, 1.2], default=None, min_length=1)
+    range: RangeSpec | None = key("evenly spaced values", {"min": 0.5, "max": 1.5, "count": 5}, default=None)
+    distribution: DistributionSpec | None = key("random values", {"kind": "normal", "mean": 1.0, "std": 0.1}, default=None)
+    levels: dict[str, dict[str, Any]] | None = key(
+        "settings by the label of a level", {"calm": {"uav.gain": 1.0}, "rough": {"uav.gain": 2.0}}, default=None, min_length=1
+    )
+    integer: bool = key("round the values of a range or distribution", True, default=False)
 
     @model_validator(mode="after")
     def _one_source(self) -> FactorSpec:

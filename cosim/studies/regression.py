@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Any
 from ..core.errors import CosimError, InputError
 from ..core.json_values import parse_object
 from ..core.paths import open_text
+from ..core.text import count_noun
 
 if TYPE_CHECKING:
     from ..results import Result
@@ -92,10 +93,10 @@ class Regression:
         return replace(outcome, summary="; ".join(filter(None, (outcome.summary, run.result.termination))))
 
     def _compare(self, run: _FinishedRun) -> RegressionOutcome:
-        failed, summary = run.failed_checks(), f"{len(run.checks)} checks"
+        failed, summary = run.failed_checks(), count_noun(len(run.checks), "check")
         if run.scenario.get("reference"):
             comparison = run.compare()
-            summary += f", {len(comparison.verdicts)} signals"
+            summary += f", {count_noun(len(comparison.verdicts), 'signal')}"
             if not comparison.passed:
                 failed += [
                     *str(comparison).splitlines(),
@@ -111,9 +112,8 @@ class Regression:
             return RegressionOutcome(self.file.stem, 3, "a failed run becomes no reference", tuple(failed))
         written = write_reference(run.result, run.reference_path, run.tolerances)
         size = run.reference_path.stat().st_size / 1000
-        return RegressionOutcome(
-            self.file.stem, 0, f"{len(written)} signals, {len(written.time)} rows, {size:.0f} kB in {run.reference_path}"
-        )
+        amount = f"{count_noun(len(written), 'signal')}, {count_noun(len(written.time), 'row')}"
+        return RegressionOutcome(self.file.stem, 0, f"{amount}, {size:.0f} kB in {run.reference_path}")
 
 
 @dataclass(frozen=True)
@@ -140,7 +140,8 @@ class _FinishedRun:
         from ..results.checks import evaluate_all_checks
 
         kpis = {name: math.nan if value is None else value for name, value in self.result.kpis.items()}
-        return [str(outcome) for outcome in evaluate_all_checks(kpis, self.checks) if not outcome.passed]
+        crash = [self.result.termination] if self.result.crashed else []
+        return crash + [str(outcome) for outcome in evaluate_all_checks(kpis, self.checks) if not outcome.passed]
 
     @property
     def reference_path(self) -> Path:

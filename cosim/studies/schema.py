@@ -6,11 +6,11 @@ import math
 from collections.abc import Iterable
 from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field, StringConstraints, model_validator
+from pydantic import BaseModel, StringConstraints, model_validator
 
 from ..core.errors import did_you_mean
-from ..scenario.schema import CheckSpec, complete_schema
-from ..scenario.schema_types import Integer, NameList, Spec
+from ..scenario.evaluation_schema import CheckSpec
+from ..scenario.schema_types import Integer, NameList, Spec, key, schema_of
 from .factor_schema import TRIAL_COLUMNS, FactorSpec, Scale, SettingPaths, check_log_scale, check_order, reject_column_names
 from .setting_conflicts import check_conflicts
 
@@ -18,19 +18,23 @@ from .setting_conflicts import check_conflicts
 class SeedsSpec(Spec):
     """Replications: every point is run with the same `count` seeds."""
 
-    set: SettingPaths = Field([], description='default: "seeds" of the scenario')
-    first: Integer = 1
-    count: Integer = Field(ge=1)
+    set: SettingPaths = key(
+        'JSON pointers or variables that get the seed; default: "seeds" of the scenario',
+        ["/components/plant/arguments/environment/seed"],
+        default=[],
+    )
+    first: Integer = key("first seed; the others follow", 100, default=1)
+    count: Integer = key("number of seeds", 20, ge=1)
 
 
 class MapSpec(Spec):
     """A map of the success rate over two factors; two more factors may select the columns and rows of panels."""
 
-    x: str
-    y: str
-    columns: str | None = None
-    rows: str | None = None
-    titles: dict[str, str] = Field({}, description='factor -> title, such as "wind (m/s)"; empty: no title')
+    x: str = key("factor along the horizontal axis", "wind")
+    y: str = key("factor along the vertical axis", "wave_height")
+    columns: str | None = key("factor whose levels have a column of panels each", "controller", default=None)
+    rows: str | None = key("factor whose levels have a row of panels each", "speed", default=None)
+    titles: dict[str, str] = key("title by factor; empty: no title", {"wind": "wind (m/s)"}, default={})
 
     @property
     def factors(self) -> list[str]:
@@ -46,9 +50,11 @@ class MapSpec(Spec):
 class DesignSpec(Spec):
     """Choice of the points: all combinations of levels, or `runs` samples."""
 
-    kind: Literal["full_factorial", "latin_hypercube", "sobol"] = "full_factorial"
-    runs: Integer | None = Field(None, ge=1)
-    seed: Integer = Field(1, ge=0)
+    kind: Literal["full_factorial", "latin_hypercube", "sobol"] = key(
+        "all combinations of levels, or samples", "sobol", default="full_factorial"
+    )
+    runs: Integer | None = key("number of samples; for sobol a power of two", 256, default=None, ge=1)
+    seed: Integer = key("seed of the samples", 7, default=1, ge=0)
 
     @model_validator(mode="after")
     def _sized(self) -> DesignSpec:
@@ -67,12 +73,14 @@ CountPath = tuple["str | int", ...]
 class StudySpec(Spec):
     """Common part of sweeps and tunings: a scenario, settings that all runs share, and the deadline of a run."""
 
-    schema_: str | None = Field(None, alias="$schema")
-    name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_. -]*$")]
-    description: str = ""
-    scenario: str = Field(description="path relative to this file, or the name of a shipped scenario")
-    settings: dict[str, Any] = Field({}, description="settings of all runs, as of `--set`")
-    deadline: float | None = Field(None, gt=0, description="wall time that a run may take (s)")
+    schema_: str | None = key("path of the JSON Schema, for editors", "sweep.schema.json", default=None, alias="$schema")
+    name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_. -]*$")] = key(
+        "name of the study and of its results folder", "landing_speeds"
+    )
+    description: str = key("text for reports and people", "Landings at three speeds.", default="")
+    scenario: str = key("path relative to this file, or the name of a shipped scenario", "demo1_box")
+    settings: dict[str, Any] = key("settings of all runs, as of `--set`", {"uav.vtol.landing_time": 8.0}, default={})
+    deadline: float | None = key("wall time that a run may take", 60.0, unit="s", default=None, gt=0)
 
     def run_counts(self) -> dict[CountPath, int]:
         """Return the factors of the largest number of runs, by the paths of the entries that determine them."""
@@ -91,14 +99,24 @@ class StudySpec(Spec):
 class SweepSpec(StudySpec):
     """A sweep: factors, a design, seeds and criteria of success."""
 
-    factors: list[FactorSpec] = []
-    design: DesignSpec = DesignSpec(kind="full_factorial", runs=None, seed=1)
-    seeds: SeedsSpec | None = None
-    success: list[CheckSpec] | None = Field(None, description="limits on KPIs; default: the checks of the scenario")
-    by: list[NameList] = Field(
-        [], description="factors, or lists of factors, by whose levels the runs are grouped in the aggregates"
+    factors: list[FactorSpec] = key(
+        "what varies", [{"name": "speed", "set": "usv.speed_command", "values": [0.4, 0.8, 1.2]}], default=[]
     )
-    maps: list[MapSpec] = Field([], description="maps of the success rate, as figures and in sweep.html")
+    design: DesignSpec = key(
+        "choice of the points", {"kind": "sobol", "runs": 256}, default=DesignSpec(kind="full_factorial", runs=None, seed=1)
+    )
+    seeds: SeedsSpec | None = key(
+        "replications of every point", {"set": "/components/plant/arguments/environment/seed", "count": 20}, default=None
+    )
+    success: list[CheckSpec] | None = key(
+        "limits on KPIs; default: the checks of the scenario", [{"kpi": "landing.lateral_error", "max": 0.2}], default=None
+    )
+    by: list[NameList] = key(
+        "factors, or lists of factors, by whose levels the runs are grouped in the aggregates", ["speed"], default=[]
+    )
+    maps: list[MapSpec] = key(
+        "maps of the success rate, as figures and in sweep.html", [{"x": "wind", "y": "wave_height"}], default=[]
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> SweepSpec:
@@ -137,12 +155,14 @@ class SweepSpec(StudySpec):
 class ParameterSpec(Spec):
     """A parameter of a tuning, with its bounds."""
 
-    name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$"), reject_column_names(*TRIAL_COLUMNS)]
-    set: SettingPaths
-    min: float
-    max: float
-    start: float | None = None
-    scale: Scale = "linear"
+    name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$"), reject_column_names(*TRIAL_COLUMNS)] = key(
+        "name in expressions and tables", "gain"
+    )
+    set: SettingPaths = key("variable or JSON pointer; of several, all get the same value", "usv.heading.gain")
+    min: float = key("lower bound", 0.1)
+    max: float = key("upper bound", 10.0)
+    start: float | None = key("first value; default: the middle of the bounds", 1.5, default=None)
+    scale: Scale = key("scale on which the method searches", "log", default="linear")
 
     @model_validator(mode="after")
     def _possible(self) -> ParameterSpec:
@@ -156,22 +176,35 @@ class ParameterSpec(Spec):
 class MethodSpec(Spec):
     """An optimization method and its limits."""
 
-    kind: Literal["differential_evolution", "nelder_mead", "powell"] = "differential_evolution"
-    population: Integer = Field(16, ge=5, description="points per generation (differential_evolution)")
-    generations: Integer = Field(20, ge=1, description="generations after the first (differential_evolution)")
-    evaluations: Integer = Field(200, ge=1, description="points at most (nelder_mead, powell)")
-    seed: Integer = Field(1, ge=0)
+    kind: Literal["differential_evolution", "nelder_mead", "powell"] = key(
+        "optimization method", "nelder_mead", default="differential_evolution"
+    )
+    population: Integer = key("points per generation (differential_evolution)", 24, default=16, ge=5)
+    generations: Integer = key("generations after the first (differential_evolution)", 40, default=20, ge=1)
+    evaluations: Integer = key("points at most (nelder_mead, powell)", 100, default=200, ge=1)
+    seed: Integer = key("seed of the method", 7, default=1, ge=0)
 
 
 class TuneSpec(StudySpec):
     """A tuning: the expression of KPIs to be minimised, the parameters and the constraints."""
 
-    parameters: list[ParameterSpec] = Field(min_length=1)
-    minimize: str = Field(description='arithmetic over KPIs and parameters, such as "landing.lateral_error + 0.1 * gain"')
-    constraints: list[str] = Field([], description='comparisons of such expressions, such as "heading.overshoot <= 0.1"')
-    cases: list[dict[str, Any]] = Field([{}], min_length=1, description="each point is run with each of these settings")
-    over_cases: Literal["mean", "max"] = "mean"
-    method: MethodSpec = MethodSpec(population=16, generations=20, evaluations=200, seed=1)
+    parameters: list[ParameterSpec] = key(
+        "what is tuned", [{"name": "gain", "set": "usv.heading.gain", "min": 0.1, "max": 10.0}], min_length=1
+    )
+    minimize: str = key("arithmetic over KPIs and parameters", "landing.lateral_error + 0.1 * gain")
+    constraints: list[str] = key("comparisons of such expressions", ["heading.overshoot <= 0.1"], default=[])
+    cases: list[dict[str, Any]] = key(
+        "each point is run with each of these settings",
+        [{"usv.speed_command": 0.5}, {"usv.speed_command": 1.0}],
+        default=[{}],
+        min_length=1,
+    )
+    over_cases: Literal["mean", "max"] = key("combination of the cases", "max", default="mean")
+    method: MethodSpec = key(
+        "optimization method and its limits",
+        {"kind": "nelder_mead"},
+        default=MethodSpec(population=16, generations=20, evaluations=200, seed=1),
+    )
 
     @model_validator(mode="after")
     def _consistent(self) -> TuneSpec:
@@ -214,4 +247,4 @@ def _has_labels(factor: FactorSpec, sampled: bool) -> bool:
 
 def study_json_schema(kind: type[BaseModel]) -> dict[str, Any]:
     """Return the JSON Schema (2020-12) of a sweep or tuning file."""
-    return complete_schema(kind.model_json_schema(by_alias=True))
+    return schema_of(kind)

@@ -60,7 +60,8 @@ class Study:
     @cached_property
     def checks(self) -> list[dict[str, Any]]:
         """Checks of the scenario with the common settings."""
-        spec = load_scenario(self.study_file.scenario, {k: v for k, v in self.spec.settings.items() if k.startswith("/")}).spec
+        file = self.study_file.scenario
+        spec = load_scenario(file, {k: v for k, v in self.spec.settings.items() if k.startswith("/")}, file.parent).spec
         return [check.model_dump(exclude_none=True) for check in spec.checks]
 
     def check_jobs(self, runner: CheckingRunner, jobs: Iterable[Job]) -> None:

@@ -24,12 +24,13 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import InputError, Problem
+from ..core.expressions import Expression, parse_expression
 from ..core.size_limits import MAX_RUNS
 from .design import interpolate
 from .document import StudyFile, read_study
 from .execution.job import Job
 from .execution.run_store import RunStore
-from .objective import Constraint, Expression, parse_constraint, parse_expression
+from .objective import Constraint, parse_constraint
 from .optimizers import INFEASIBLE_RANK, METHODS
 from .schema import ParameterSpec, TuneSpec
 from .study import CheckingRunner, ObservedKpis, RecordObserver, Study, run_pending

@@ -45,6 +45,7 @@ class EnvironmentModel:
         vehicles: All vehicles.
         platforms: All platforms.
         bodies: Contact body of each vehicle.
+        highest_water: Output: height that no crest exceeds (m), shape (1,).
 
     Attributes:
         values: Inputs and outputs, which are the whole state: everything else is a function of time and seed.
@@ -63,6 +64,7 @@ class EnvironmentModel:
         vehicles: Sequence[VehiclePlacement],
         platforms: Sequence[Platform],
         bodies: Sequence[ContactBody],
+        highest_water: np.ndarray,
     ):
         self._wind_vehicles = _bodies_with_input(bodies, "wind.x") if environment.wind else []
         self._wave_vessels = [body for body in bodies if isinstance(body, FloatingBody)] if environment.waves else []
@@ -77,6 +79,9 @@ class EnvironmentModel:
             body.name for body in bodies if environment.waves and body.model.is_vessel and body not in self._wave_vessels
         ]
         self._wave_gain: Any = self._input_view("wave_gain") if environment.waves else np.ones(1).data
+        self._elevation = sea.elevation_function()
+        self._highest_water: Any = highest_water.data
+        self._highest_elevation = sea.highest_elevation
         self.update_functions = list(self._create_updates(environment, bodies))
         if affected := _multirotors_in_ground_effect(vehicles, bodies):
             vessels = [body for body in bodies if body.model.is_vessel]
@@ -101,9 +106,18 @@ class EnvironmentModel:
             yield _WindUpdate(wind, seed, self._input_view("wind.x"), self._wind_vehicles, self.outputs.data).update
         if current:
             yield _CurrentUpdate(current, seed, self._input_view("current.x"), _bodies_with_input(bodies, "current.x")).update
+        if environment.waves:
+            yield self._update_highest_water
         if self._wave_vessels:
             gains = [_input_data(body, "wave_gain") for body in self._wave_vessels]
             yield lambda _time: _set_all(gains, self._wave_gain[0])
+
+    def _update_highest_water(self, _time: float) -> None:
+        self._highest_water[0] = abs(self._wave_gain[0]) * self._highest_elevation
+
+    def water_level(self, x: float, y: float, time: float) -> float:
+        """Return the height of the water surface (m) at a position (m) and a time since the start (s)."""
+        return float(self._wave_gain[0] * self._elevation(x, y, time))
 
     def update(self, time: float) -> None:
         """Write the environment inputs of all vehicles for a time since the start (s)."""

@@ -50,6 +50,11 @@ class Sea(NamedTuple):
     direction: np.ndarray
     phase: np.ndarray
 
+    @property
+    def highest_elevation(self) -> float:
+        """Sum of all amplitudes (m), which no crest exceeds."""
+        return float(self.amplitude.sum())
+
     def elevation(self, x: float, y: float, time: float) -> float:
         """Return the elevation of the water (m) at a position in the world frame (m) and a time (s)."""
         return self.elevation_function()(x, y, time)

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import math
+import struct
 from collections.abc import Sequence
 from itertools import accumulate
 from typing import Any, NamedTuple
@@ -10,8 +12,13 @@ import numpy as np
 
 from .body import ContactBody
 from .client import pybullet
+from .failures import FLAG_COUNT, ON_VESSEL, TOUCHING, Failures
+from .vessel_bodies import PlanarBody
 
-_BODY_A, _BODY_B, _DISTANCE, _NORMAL_FORCE = 1, 2, 8, 9  # indices in Bullet's contact points
+_NO_MOTION: Any = np.zeros(3).data  # of a platform
+_ALL_BODIES = -1, -1, -2, -2  # Bullet's defaults for two bodies and their links
+_BODY_A, _BODY_END, _DISTANCE, _NORMAL_FORCE = 1, 3, 8, 9  # indices in Bullet's contact points
+_unpack_vector = struct.Struct("3d").unpack_from
 
 
 def overlap_depths(client: int) -> dict[tuple[int, int], float]:
@@ -19,16 +26,31 @@ def overlap_depths(client: int) -> dict[tuple[int, int], float]:
     pybullet.performCollisionDetection(client)
     depths: dict[tuple[int, int], float] = {}
     for point in pybullet.getContactPoints(physicsClientId=client):
-        pair = point[_BODY_A], point[_BODY_B]
+        pair = point[_BODY_A:_BODY_END]
         depths[pair] = max(depths.get(pair, 0.0), -point[_DISTANCE])
     return depths
 
 
-class _ContactOutputs(NamedTuple):
-    """Outputs that contact between two bodies changes: indices of forces and of flags."""
+class _Pair(NamedTuple):
+    """Two bodies in contact.
+
+    Attributes:
+        forces: Indices of the forces among the outputs.
+        flags: Indices of the flags.
+        velocity_a: Velocity of one body before the contact (m/s).
+        velocity_b: Velocity of the other one.
+        vertical_a: Factor on the vertical velocity of one body; 0 for a planar vessel, whose lift is no motion.
+        vertical_b: Factor on the vertical velocity of the other one.
+        squared_limit: Square of the relative speed above which a collision is a crash.
+    """
 
     forces: Sequence[int]
     flags: Sequence[int]
+    velocity_a: Any
+    velocity_b: Any
+    vertical_a: float
+    vertical_b: float
+    squared_limit: float
 
 
 class Contacts:
@@ -38,28 +60,30 @@ class Contacts:
         client: Number of the Bullet client.
         bodies: All vehicles.
         outputs: Real outputs of all vehicles in order; the last one of each vehicle is the contact force.
-        flags: Contact with anything, contact with a vessel; shape (vehicles, 2).
+        flags: Flags of each vehicle (`failures.py`), shape (vehicles, FLAG_COUNT).
+        failures: Failures, to which crashes are added.
 
     Attributes:
         has_contacts: Whether the outputs may contain contacts that `clear` would remove.
     """
 
-    def __init__(self, client: int, bodies: Sequence[ContactBody], outputs: np.ndarray, flags: np.ndarray):
-        self._client = client
+    def __init__(self, client: int, bodies: Sequence[ContactBody], outputs: np.ndarray, flags: np.ndarray, failures: Failures):
+        self._query, self._failures = (*_ALL_BODIES, client), failures
         self.has_contacts = False
         # memoryviews: setting an element takes half as long as with NumPy
         self._outputs: Any = outputs.data
         self._flags: Any = flags.reshape(-1).data
-        self._no_flags, self._touching = np.zeros(flags.size, flags.dtype).data, flags[:, 0].data
+        self._permanent_flags, self._touching = failures.permanent_flags.reshape(-1).data, flags[:, TOUCHING].data
         self._force_ends = list(accumulate(len(body.outputs) for body in bodies))
+        self._bodies = {body.body_id: body for body in bodies}
         self._vehicle_indices = {body.body_id: k for k, body in enumerate(bodies)}
         self._vessels = {body.body_id for body in bodies if body.model.is_vessel}
-        self._contact_outputs: dict[tuple[int, int], _ContactOutputs] = {}
+        self._pairs: dict[tuple[int, int], _Pair] = {}
 
     def clear(self) -> None:
-        """Set all contact forces to 0 and all flags to false."""
+        """Set all contact forces to 0 and all flags but those of failures to false."""
         self.has_contacts = False
-        self._flags[:] = self._no_flags
+        self._flags[:] = self._permanent_flags
         for end in self._force_ends:
             self._outputs[end - 1] = 0.0
 
@@ -74,24 +98,40 @@ class Contacts:
         """
         self.has_contacts = True
         forces: dict[tuple[int, int], float] = {}
-        for point in pybullet.getContactPoints(physicsClientId=self._client):
-            pair = point[_BODY_A], point[_BODY_B]
+        for point in pybullet.getContactPoints(*self._query):  # keyword arguments take longer
+            pair = point[_BODY_A:_BODY_END]
             forces[pair] = forces.get(pair, 0.0) + point[_NORMAL_FORCE]
         for pair, force in forces.items():
             if force:
-                changed = self._contact_outputs.get(pair) or self._find_outputs(pair)
-                for index in changed.forces:
+                outputs, flags, velocity_a, velocity_b, vertical_a, vertical_b, limit = self._pairs.get(pair) or self._find_pair(
+                    pair
+                )
+                for index in outputs:
                     self._outputs[index] += force * step_fraction
-                for index in changed.flags:
+                for index in flags:
                     self._flags[index] = True
+                xa, ya, za = _unpack_vector(velocity_a)
+                xb, yb, zb = _unpack_vector(velocity_b)
+                x, y, z = xa - xb, ya - yb, za * vertical_a - zb * vertical_b
+                if (squared_speed := x * x + y * y + z * z) > limit:  # faster than powers
+                    self._failures.add_collision(pair, math.sqrt(squared_speed))
         return sum(self._touching)
 
-    def _find_outputs(self, pair: tuple[int, int]) -> _ContactOutputs:
+    def _find_pair(self, pair: tuple[int, int]) -> _Pair:
         vehicles = [self._vehicle_indices[body] for body in pair if body in self._vehicle_indices]  # platforms have no outputs
         on_vessels = [
             self._vehicle_indices[a] for a, b in (pair, pair[::-1]) if a in self._vehicle_indices and b in self._vessels
         ]
-        flags = [2 * vehicle for vehicle in vehicles] + [2 * vehicle + 1 for vehicle in on_vessels]
-        return self._contact_outputs.setdefault(
-            pair, _ContactOutputs([self._force_ends[vehicle] - 1 for vehicle in vehicles], flags)
+        flags = [FLAG_COUNT * vehicle + TOUCHING for vehicle in vehicles]
+        flags += [FLAG_COUNT * vehicle + ON_VESSEL for vehicle in on_vessels]
+        a, b = (self._bodies.get(number) for number in pair)
+        self._pairs[pair] = _Pair(
+            [self._force_ends[vehicle] - 1 for vehicle in vehicles],
+            flags,
+            a.commanded_twist if a else _NO_MOTION,
+            b.commanded_twist if b else _NO_MOTION,
+            0.0 if isinstance(a, PlanarBody) else 1.0,
+            0.0 if isinstance(b, PlanarBody) else 1.0,
+            self._failures.largest_harmless_speed(pair) ** 2,
         )
+        return self._pairs[pair]

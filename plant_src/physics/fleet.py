@@ -4,18 +4,19 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from ..placement import Platform, VehiclePlacement
-from ..vehicles.common.step_status import INVALID_STATE
+from ..vehicles.common.step_status import INVALID_STATE, LEAVES_SAFE_BOX, MAY_FAIL
 from .body import ContactBody, InvalidStateError
 from .clearance import BoundingBox, Clearance
 from .client import pybullet
 from .contacts import Contacts
+from .failures import Failures
 from .vehicle_arrays import VehicleArrays
 from .vessel_bodies import PlanarBody, body_class
 
@@ -34,7 +35,7 @@ class FleetState:
     Attributes:
         bullet: Number of the state that Bullet holds.
         memory: Copy of the arrays of all vehicles.
-        flags: Copy of the contact flags.
+        flags: Copy of the flags.
         is_near: For each vehicle whether Bullet steps its body.
     """
 
@@ -51,14 +52,17 @@ class Fleet:
         client: Number of the Bullet client.
         vehicles: Vehicles to create.
         platforms: Platforms, which exist in Bullet already.
-        step_size: Duration of a step (s), shape (1,); the owner may change it between steps.
-        flags: Contact with anything, contact with a vessel; shape (vehicles, 2).
+        shared: Arrays of shape (1,) that the owner may change between steps: "step_size", the duration of a step (s), and
+            "highest_water", the height of the highest possible water surface (m).
+        flags: Flags of each vehicle (`failures.py`), shape (vehicles, FLAG_COUNT).
+        platform_names: Name of each platform by its number in Bullet.
 
     Attributes:
         bodies: Contact body of each vehicle.
         inputs: Real inputs of all vehicles in order.
         outputs: Real outputs of all vehicles in order.
         contacts: Contact outputs.
+        failures: Crashed and ditched vehicles.
         clearance: Detection of near vehicles.
     """
 
@@ -67,21 +71,23 @@ class Fleet:
         client: int,
         vehicles: Sequence[VehiclePlacement],
         platforms: Sequence[Platform],
-        step_size: np.ndarray,
+        shared: Mapping[str, np.ndarray],
         flags: np.ndarray,
+        platform_names: Mapping[int, str],
     ):
         self._client, self._flags = client, flags
         self._memory = memory = VehicleArrays([body_class(vehicle.model).array_sizes(vehicle.model) for vehicle in vehicles])
         self.bodies: list[ContactBody] = [
-            body_class(vehicle.model)(client, vehicle, arrays | {"step_size": step_size})
+            body_class(vehicle.model)(client, vehicle, {**arrays, **shared})
             for vehicle, arrays in zip(vehicles, memory.of_vehicle, strict=True)
         ]
         self.inputs, self.outputs = memory.of_all_vehicles["inputs"], memory.of_all_vehicles["outputs"]
-        self.contacts = Contacts(client, self.bodies, self.outputs, flags)
+        self.failures = Failures(self.bodies, vehicles, flags, memory.of_all_vehicles["step_status"], platform_names)
+        self.contacts = Contacts(client, self.bodies, self.outputs, flags, self.failures)
         movable = [body.bounding_box(vehicle.body) for body, vehicle in zip(self.bodies, vehicles, strict=True)]
         fixed = [_platform_bounding_box(platform) for platform in platforms]
-        shared = (memory.of_all_vehicles[name] for name in ("endpoints", "reference_position", "safe_distance"))
-        self.clearance = Clearance(movable, fixed, *shared)
+        distances = (memory.of_all_vehicles[name] for name in ("endpoints", "reference_position", "safe_distance"))
+        self.clearance = Clearance(movable, fixed, *distances)
         self._predict, self._correct = [body.predict for body in self.bodies], [body.correct for body in self.bodies]
         # memoryviews: access to a few numbers is faster than with NumPy
         self._step_status: Any = memory.of_all_vehicles["step_status"].data
@@ -111,7 +117,7 @@ class Fleet:
         for predict in self._predict:
             predict()
         if self._near_vehicles_outdated or any(self._step_status):
-            self._update_near_vehicles()
+            self._handle_step_status()
         if self._active_bodies:
             self._solve_contacts()
         for correct in self._correct:
@@ -119,13 +125,20 @@ class Fleet:
         if self._active_bodies:
             self._publish_contacts(step_fraction)
 
+    def _handle_step_status(self) -> None:
+        """Refuse an invalid state, report possible failures, and find the vehicles that are near something if necessary."""
+        statuses = self._step_status.tolist()
+        if INVALID_STATE in statuses:
+            raise InvalidStateError(self.bodies[statuses.index(INVALID_STATE)].describe_invalid_state())
+        if max(statuses) >= MAY_FAIL:
+            self.failures.alarm = True
+        leaves_safe_box = LEAVES_SAFE_BOX in statuses or LEAVES_SAFE_BOX + MAY_FAIL in statuses
+        if leaves_safe_box or (self._near_vehicles_outdated and not self.clearance.is_valid()):
+            self._update_near_vehicles()
+        self._near_vehicles_outdated = False
+
     def _update_near_vehicles(self) -> None:
         """Activate the bodies of the vehicles that are near something, and deactivate the others."""
-        if INVALID_STATE in self._step_status:
-            raise InvalidStateError(self.bodies[self._step_status.tolist().index(INVALID_STATE)].describe_invalid_state())
-        self._near_vehicles_outdated = False
-        if not any(self._step_status) and self.clearance.is_valid():
-            return
         near = self.clearance.find_near_vehicles()
         if near != self._is_near:
             for body, is_near, was_near in zip(self.bodies, near, self._is_near, strict=True):
@@ -168,7 +181,7 @@ class Fleet:
     def _publish_contacts(self, step_fraction: float) -> None:
         touching = 0
         if total := sum(self._impulse_magnitudes):
-            if math.isnan(total):
+            if total != total:  # faster than `math.isnan`
                 magnitudes = zip(self.bodies, self._impulse_magnitudes, strict=True)
                 invalid = next(body for body, magnitude in magnitudes if math.isnan(magnitude))
                 raise InvalidStateError(f"{invalid.name}: the contact forces are not finite")
@@ -183,6 +196,7 @@ class Fleet:
         """Restore a state."""
         pybullet.restoreState(state.bullet, physicsClientId=self._client)
         self._memory.buffer[:], self._flags[:] = state.memory, state.flags
+        self.failures.restore(state.flags)
         self._set_active_bodies(state.is_near)
         self.clearance.invalidate()
         self._near_vehicles_outdated = True

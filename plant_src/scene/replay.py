@@ -22,6 +22,9 @@ Scene = dict[str, Any]
 #: colours of the paths of multirotors and vessels; the first of each is that of the figures
 MULTIROTOR_COLOURS, VESSEL_COLOURS = ("#0072b2", "#56b4e9", "#cc79a7", "#7a5fb5"), ("#d55e00", "#e69f00", "#009e73", "#b8860b")
 
+#: colour of crashes and ditchings
+FAILURE_COLOUR = "#c62828"
+
 #: largest number of vessels with an onboard camera
 MAX_VIEWS = 3
 
@@ -95,8 +98,14 @@ def _scene(vehicles: Mapping[str, str], scenario: Mapping[str, Any]) -> Scene:
             {"signal": f"{name}.contact.touching", "label": f"{_short_name(name)} touches", "colour": colour_of[name]}
             for name in flying
         ],
+        "marks": [mark for name in vehicles for mark in _failure_marks(name)],
         "plots": _plot_patterns(flying[:1], vessels[:1]),
     }
+
+
+def _failure_marks(name: str) -> Iterator[Scene]:
+    for failure in ("crashed", "ditched"):
+        yield {"signal": f"{name}.{failure}", "label": f"{_short_name(name)} {failure}", "colour": FAILURE_COLOUR, "on": name}
 
 
 def _is_vessel(vehicle: str) -> bool:

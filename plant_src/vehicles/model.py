@@ -28,6 +28,7 @@ class Model:
         interface: Variables of the FMU, in the order of the equations.
         states: Names of the states, in the order of the equations.
         body: Rigid body in Bullet for the start values of the parameters.
+        crash_speed: Change of velocity (m/s) by a collision above which the vehicle has crashed; a scenario may replace it.
         is_vessel: Whether the vehicle floats and has a landing deck.
         vehicle: Name of the vehicle in scenarios if it differs from `name`.
         motion: "planar" or "6dof"; distinguishes models of the same vehicle.
@@ -40,6 +41,7 @@ class Model:
     interface: Sequence[Variable]
     states: Sequence[str]
     body: Body
+    crash_speed: float
     is_vessel: bool = False
     vehicle: str = ""
     motion: str = "6dof"

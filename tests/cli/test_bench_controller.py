@@ -114,7 +114,7 @@ def test_another_build_of_the_shipped_controller_is_neither_better_nor_worse(fol
 
 def test_worse_and_better_controllers_are_marked(folder):
     path = lazy(folder)
-    worse = bench(folder, path)
+    worse = bench(folder, path, "--verbose")
     assert worse.returncode == 3
     assert "FAILED  sail" in worse.stdout
     assert "waypoints.all_reached is false, expected equals true" in worse.stdout
@@ -123,11 +123,26 @@ def test_worse_and_better_controllers_are_marked(folder):
     assert "last run" not in worse.stdout
     path.write_text(path.read_text().replace("0.02", "0.7"))
     shipped = (folder / "runs/bench/shipped/sail/run.json").stat().st_mtime_ns
-    better = bench(folder, path)
+    better = bench(folder, path, "--verbose")
     assert (folder / "runs/bench/shipped/sail/run.json").stat().st_mtime_ns == shipped  # nothing has changed there
     assert better.returncode == 0
     assert words(better, "waypoints.reached")[1:] == ["2", "2", "1", "better"]
     assert "last run" in better.stdout
+
+
+def test_a_controller_that_fails_checks_ranks_below_however_many_kpis_are_better(folder):
+    path = lazy(folder)
+    worse = bench(folder, path)
+    assert worse.stdout.splitlines()[-3:-1] == [
+        "1. shipped  1 of 1 scenario passed, 2 of 2 checks met",
+        "2. lazy     0 of 1 scenario passed, 0 of 2 checks met",
+    ]
+    assert worse.stdout.splitlines()[-1].startswith(
+        "lazy is worse than the shipped controller (waypoints.reached 0 better, 1 worse;"
+    )
+    assert len(worse.stdout.splitlines()) < 10  # the tables of all KPIs are left out
+    ranking = json.loads(bench(folder, path, "--json").stdout)["ranking"]
+    assert (ranking["verdict"], ranking["candidate"]["met"]) == ("below", 0)
 
 
 def test_all_problems_of_an_unsuitable_controller_are_reported(folder):

@@ -3,9 +3,11 @@
 from __future__ import annotations
 
 import json
+import re
 import shlex
 import shutil
 import subprocess
+import sys
 from contextlib import chdir, redirect_stderr, redirect_stdout
 from functools import cache
 from io import StringIO
@@ -21,10 +23,12 @@ from cosim.report.scene import build_scene
 from cosim.results import Result
 
 MADE = {
-    "python": ["my_keeper.json", "my_keeper.py", "pictures.py"],
-    "modelica": ["MyKeeper.mo", "my_keeper.json", "pictures.py"],
-    "c": ["modelDescription.xml", "my_keeper.c", "my_keeper.json", "pictures.py"],
+    "python": ["my_pilot.py"],
+    "modelica": ["MyPilot.mo"],
+    "c": ["fmi2_block.h", "modelDescription.xml", "my_pilot.c"],
 }
+COMMON = ["my_pilot.json", "pictures.py", "test_my_pilot.py"]
+ROLES = ("vessel_autopilot", "uav_controller")
 
 
 def cosim(*arguments, cwd):
@@ -44,47 +48,71 @@ def next_commands(done):
 
 
 @pytest.fixture(scope="module")
-def sailed(tmp_path_factory):
-    """Function that creates a controller in a language, runs all proposed commands and returns the folder."""
+def moved(tmp_path_factory):
+    """Function that creates a controller of a role in a language, runs all proposed commands and returns the folder."""
 
     @cache
-    def sail(language):
+    def move(role, language):
         folder = tmp_path_factory.mktemp(language)
-        made = new(folder, "my_keeper", language)
+        made = new(folder, "my_pilot", language, "--role", role)
         assert made.returncode == 0, made.stderr
-        assert sorted(path.name for path in (folder / "my_keeper").iterdir()) == sorted([*MADE[language], "fmus"])
+        assert sorted(path.name for path in (folder / "my_pilot").iterdir()) == sorted([*MADE[language], *COMMON, "fmus"])
         for command in next_commands(made):
             done = cosim(*command, cwd=folder)
             assert done.returncode == 0, done.stdout + done.stderr
         return folder
 
-    return sail
+    return move
+
+
+@pytest.fixture(params=ROLES)
+def role(request):
+    return request.param
 
 
 @pytest.mark.parametrize("language", MADE)
-def test_a_new_controller_holds_speed_and_course(sailed, language):
-    result = Result.from_csv(sailed(language) / "runs/my_keeper/result.csv")
-    assert result["vessel.velocity_body.u"][-1] == pytest.approx(1.0, abs=1e-3)
-    assert result["vessel.attitude.yaw"][-1] == pytest.approx(1.0, abs=1e-3)
+def test_a_new_controller_declares_the_variables_of_its_role(moved, role, language):
+    """It replaces a shipped controller in `demo1_box` without a change of the wiring."""
+    component, system = {"vessel_autopilot": ("usv", "fmu"), "uav_controller": ("uav", "system")}[role]
+    fmu = moved(role, language) / "my_pilot/my_pilot.fmu"
+    settings = [f"/components/{component}/{system}=null", f"/components/{component}/fmu={json.dumps(str(fmu))}"]
+    parameters = {"altitude_command": 2.0, "yaw_command": 0.0}
+    if component == "uav":
+        # the KPIs and figures of the scenario read signals that only the shipped controller has
+        settings += [f"/components/uav/parameters={json.dumps(parameters)}", "/kpis=[]", "/checks=[]", "/figures=[]"]
+    done = cosim("check", "demo1_box", *(word for text in settings for word in ("--set", text)), cwd=moved(role, language))
+    assert done.returncode == 0, done.stderr
 
 
-@pytest.mark.parametrize("language", ["modelica", "c"])
-def test_all_languages_give_the_same_trajectory(sailed, language):
-    ours, theirs = (Result.from_csv(sailed(one) / "runs/my_keeper/result.csv") for one in (language, "python"))
-    for name in ("vessel.position.x", "vessel.position.y", "vessel.attitude.yaw", "vessel.velocity_body.u"):
-        assert np.abs(ours[name] - theirs[name]).max() < 1e-12, name
+def test_all_languages_give_the_same_trajectory(moved, role):
+    ours, theirs, reference = (
+        Result.from_csv(moved(role, one) / "runs/my_pilot/result.csv") for one in ("modelica", "c", "python")
+    )
+    names = [name for name in reference if name.startswith(("vessel.", "quadcopter."))]
+    assert len(names) > 20
+    for name in names:
+        for other in (ours, theirs):
+            assert np.abs(other[name].astype(float) - reference[name].astype(float)).max() < 1e-9, name
 
 
 @pytest.mark.parametrize("language", MADE)
-def test_the_exported_fmu_gives_the_same_trajectory(sailed, language):
+def test_the_exported_fmu_gives_the_same_trajectory(moved, role, language):
     """The FMU exported by the proposed command replaces the source in the scenario."""
-    folder = sailed(language)
-    scenario = json.loads((folder / "my_keeper/my_keeper.json").read_text())
-    scenario["components"]["usv"] = {"fmu": "my_keeper.fmu", "parameters": scenario["components"]["usv"]["parameters"]}
-    (folder / "my_keeper/exported.json").write_text(json.dumps(scenario))
-    assert cosim("run", "my_keeper/exported.json", "--no-report", "--output-dir", "out", cwd=folder).returncode == 0
-    first, second = (Result.from_csv(file / "result.csv") for file in (folder / "runs/my_keeper", folder / "out"))
+    folder = moved(role, language)
+    scenario = json.loads((folder / "my_pilot/my_pilot.json").read_text())
+    name = "usv" if role == "vessel_autopilot" else "uav"
+    scenario["components"][name] = {"fmu": "my_pilot.fmu", "parameters": scenario["components"][name]["parameters"]}
+    (folder / "my_pilot/exported.json").write_text(json.dumps(scenario))
+    assert cosim("run", "my_pilot/exported.json", "--no-report", "--output-dir", "out", cwd=folder).returncode == 0
+    first, second = (Result.from_csv(file / "result.csv") for file in (folder / "runs/my_pilot", folder / "out"))
     assert np.array_equal(first["vessel.position.x"], second["vessel.position.x"])
+
+
+@pytest.mark.parametrize("language", ["python", "c"])
+def test_the_test_of_a_new_controller_passes(moved, role, language):
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "my_pilot"]
+    done = subprocess.run(command, cwd=moved(role, language), capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout
 
 
 @pytest.mark.parametrize(("name", "expected"), [("PIDKeeper", "pid_keeper/PidKeeper.mo"), ("k2_slow", "k2_slow/K2Slow.mo")])
@@ -97,9 +125,9 @@ def test_names_take_the_form_of_the_language(tmp_path, name, expected):
 
 
 @pytest.mark.parametrize("language", MADE)
-def test_the_templates_name_is_replaced_everywhere(sailed, language):
-    texts = [(sailed(language) / "my_keeper" / name).read_text() for name in MADE[language]]
-    assert not [text for text in texts if "speed_keeper" in text or "SpeedKeeper" in text]
+def test_the_templates_name_is_replaced_everywhere(moved, role, language):
+    texts = [(moved(role, language) / "my_pilot" / name).read_text() for name in (*MADE[language], *COMMON)]
+    assert not [text for text in texts if re.search("waypoint_follower|deck_follower|Follower|CONTROLLER", text)]
 
 
 def test_a_binary_of_another_c_controller_is_refused(tmp_path):
@@ -123,11 +151,12 @@ def test_the_folder_can_be_moved(tmp_path):
     assert done.returncode == 0, done.stderr
 
 
-def test_a_run_writes_a_figure_and_a_replay(sailed):
-    runs = sailed("python") / "runs/my_keeper"
+def test_a_run_writes_a_figure_and_a_replay(moved):
+    folder = moved("vessel_autopilot", "python")
+    runs = folder / "runs/my_pilot"
     assert (runs / "course.png").is_file()
     assert build_scene(json.loads((runs / "run.json").read_text()))["bodies"][0]["name"] == "vessel"
-    done = cosim("replay", runs, cwd=sailed("python"))
+    done = cosim("replay", runs, cwd=folder)
     assert (done.returncode, done.stderr) == (0, "")
 
 
@@ -140,7 +169,7 @@ def test_files_are_overwritten_only_with_force(tmp_path):
     assert refused.returncode == 2
     assert refused.stderr.splitlines() == [
         f"keeper/{file}: exists; --force overwrites it"
-        for file in ("keeper.py", "keeper.json", "pictures.py", "fmus/strider.fmu")
+        for file in ("keeper.py", "keeper.json", "test_keeper.py", "pictures.py", "fmus/strider.fmu")
     ]
     assert source.read_text() == "mine"
     assert new(tmp_path, "keeper", "python", "--force").returncode == 0

@@ -60,7 +60,7 @@ def test_a_reference_is_written_and_met(folder):
     scenario(folder, reference=REFERENCE)
     updated = regress(folder, "--update")
     assert updated.returncode == 0, updated.stdout + updated.stderr
-    assert "1 signals, " in updated.stdout
+    assert "1 signal, " in updated.stdout
     assert json.loads((folder / "scenarios/references/cooling.json").read_text())["versions"]["numpy"]
     again = regress(folder)
     assert (again.returncode, again.stdout.splitlines()[-1]) == (0, "1 scenario, all passed")

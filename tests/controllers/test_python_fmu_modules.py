@@ -10,7 +10,7 @@ from controller_fmu import ControllerFmu
 from fmpy import extract
 
 from cosim.core.errors import InputError
-from cosim.export.foreign.python_class import write_python_fmu
+from cosim.export.build import build_to
 
 SOURCE = '''"""Answers with what its helper knows."""
 
@@ -47,7 +47,7 @@ def test_modules_with_equal_names_are_independent(tmp_path: Path) -> None:
     instances = []
     for number in (1.0, 2.0):
         folder = tmp_path / str(number)
-        fmu = write_python_fmu(oracle(folder, number), folder / "oracle.fmu")
+        fmu = build_to(oracle(folder, number), None, folder / "oracle.fmu")
         instances.append(ControllerFmu(str(extract(str(fmu), str(folder / "unpacked"))), {}))
     assert [instance.step({})["y"] for instance in instances] == [1.5, 2.5]
     assert [instance.step({})["y"] for instance in instances] == [1.5, 2.5]
@@ -56,7 +56,7 @@ def test_modules_with_equal_names_are_independent(tmp_path: Path) -> None:
 
 
 def test_an_fmu_contains_exactly_the_imported_modules(tmp_path: Path) -> None:
-    with ZipFile(write_python_fmu(oracle(tmp_path, 1.0), tmp_path / "oracle.fmu")) as archive:
+    with ZipFile(build_to(oracle(tmp_path, 1.0), None, tmp_path / "oracle.fmu")) as archive:
         names = {name.removeprefix("resources/") for name in archive.namelist()}
     assert {"oracle.py", "parts/helper.py", "parts/numbers.py"} <= names
     assert "parts/unused.py" not in names
@@ -66,7 +66,7 @@ def test_a_changed_imported_module_changes_the_guid(tmp_path: Path) -> None:
     guids = set()
     for number in (1.0, 2.0):
         folder = tmp_path / str(number)
-        with ZipFile(write_python_fmu(oracle(folder, number), folder / "oracle.fmu")) as archive:
+        with ZipFile(build_to(oracle(folder, number), None, folder / "oracle.fmu")) as archive:
             guids.add(archive.read("modelDescription.xml").partition(b'guid="')[2][:38])
     assert len(guids) == 2
 
@@ -76,11 +76,11 @@ def test_imports_from_above_the_source_are_rejected(tmp_path: Path) -> None:
     (tmp_path / "outer.py").write_text("answer = None\n")
     source.write_text(SOURCE.replace(".parts.helper", "..outer"))
     with pytest.raises(InputError, match=r"outer\.py: is imported, but an FMU can only contain"):
-        write_python_fmu(source, tmp_path / "oracle.fmu")
+        build_to(source, None, tmp_path / "oracle.fmu")
 
 
 def test_a_source_with_a_syntax_error_is_rejected(tmp_path: Path) -> None:
     source = tmp_path / "broken.py"
     source.write_text("class Broken(:\n")
     with pytest.raises(InputError, match=r"broken\.py: cannot be exported: invalid syntax"):
-        write_python_fmu(source, tmp_path / "broken.fmu")
+        build_to(source, None, tmp_path / "broken.fmu")

@@ -116,7 +116,7 @@ def test_a_component_may_request_termination():
         return StepResult(t + h, terminate_requested=True) if t >= 1 else None
 
     outcome = simulate(make_system({"a": FakeComponent(outputs("y"), step), "b": counter()}), settings(5, record=["b.y"]))
-    assert outcome.termination == ("a", 2.0, True)
+    assert outcome.termination == ("a", 2.0, True, None)
     assert outcome.recording.columns["b.y"].tolist() == [0, 1, 2]
 
 

@@ -9,9 +9,10 @@ from fmpy import read_model_description, simulate_fmu
 from fmpy.validation import validate_fmu
 
 from cosim.components.fmi import FmuFile, create_component
+from cosim.components.python_class import load_component
 from cosim.core.component import Ports
-from cosim.core.errors import InputError
-from cosim.export.foreign.python_class import write_python_fmu
+from cosim.core.errors import ComponentError, InputError
+from cosim.export.build import build_to
 
 SOURCE = '''
 from types import SimpleNamespace
@@ -50,7 +51,7 @@ def source(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def python_fmu(source):
-    return write_python_fmu(source, source.with_suffix(".fmu"))
+    return build_to(source, None, source.with_suffix(".fmu"))
 
 
 def test_it_validates_without_problems(python_fmu):
@@ -67,13 +68,14 @@ def test_it_computes_what_the_class_computes(python_fmu):
 
 
 def test_the_same_source_gives_the_same_bytes(source, python_fmu, tmp_path):
-    assert write_python_fmu(source, tmp_path / "again.fmu").read_bytes() == python_fmu.read_bytes()
+    assert build_to(source, None, tmp_path / "again.fmu").read_bytes() == python_fmu.read_bytes()
 
 
 def test_another_source_has_another_guid(python_fmu, tmp_path):
     other = tmp_path / "leaky_integrator.py"
     other.write_text(SOURCE.replace("!= 0", "> 0"))
-    assert read_model_description(write_python_fmu(other, tmp_path / "o.fmu")).guid != read_model_description(python_fmu).guid
+    changed = build_to(other, None, tmp_path / "o.fmu")
+    assert read_model_description(changed).guid != read_model_description(python_fmu).guid
 
 
 def test_the_description_is_completed(python_fmu):
@@ -125,4 +127,98 @@ def test_a_class_that_cannot_be_exported_is_refused(tmp_path, text, message):
     path = tmp_path / "empty.py"
     path.write_text(text)
     with pytest.raises(InputError, match=message):
-        write_python_fmu(path, tmp_path / "empty.fmu")
+        build_to(path, None, tmp_path / "empty.fmu")
+
+
+READER = """
+from pathlib import Path
+
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+
+from gains import GAIN
+
+
+class Reader(Fmi2Slave):
+    def __init__(self, **arguments):
+        super().__init__(**arguments)
+        self.u = 0.0
+        self.y = GAIN * float((Path(self.resources) / "offset.txt").read_text())
+        self.z = 2 * float((Path(__file__).parent / "tables/offset.txt").read_text())
+        self.register_variable(Real("u", causality=Fmi2Causality.input))
+        self.register_variable(Real("y", causality=Fmi2Causality.output))
+        self.register_variable(Real("z", causality=Fmi2Causality.output))
+
+    def do_step(self, time, step_size):
+        self.y = self.y / (1 - self.u)
+        return True
+"""
+
+
+@pytest.fixture(scope="module")
+def reader_fmu(tmp_path_factory):
+    folder, other = tmp_path_factory.mktemp("own"), tmp_path_factory.mktemp("other")
+    (folder / "reader.py").write_text(READER)
+    (folder / "gains.py").write_text("GAIN = 3.0\n")
+    (folder / "unused.py").write_text("")
+    (folder / "tables").mkdir()
+    for file in (folder / "tables/offset.txt", other / "offset.txt"):
+        file.write_text("2.0")
+    return build_to(folder / "reader.py", None, folder / "r.fmu", include=[folder / "tables", other / "offset.txt"])
+
+
+def test_imported_modules_and_included_files_travel_with_the_fmu(reader_fmu):
+    result = simulate_fmu(str(reader_fmu), stop_time=1.0, output=["y", "z"])
+    assert (result["y"][-1], result["z"][-1]) == (6.0, 4.0)
+    with ZipFile(reader_fmu) as archive:
+        names = {name.removeprefix("resources/") for name in archive.namelist()}
+    assert {"reader.py", "gains.py", "offset.txt", "tables/offset.txt"} <= names
+    assert "unused.py" not in names
+
+
+def test_the_class_finds_its_files_in_process_too(tmp_path):
+    (tmp_path / "tables").mkdir()
+    for name in ("offset.txt", "tables/offset.txt"):
+        (tmp_path / name).write_text("2.0")
+    (tmp_path / "gains.py").write_text("GAIN = 3.0\n")
+    (tmp_path / "reader.py").write_text(READER)
+    component = load_component("reader.py:Reader", tmp_path, "reader", {})
+    assert (component.get("y"), component.get("z")) == (6.0, 4.0)
+
+
+def test_an_exception_in_an_fmu_is_told_with_text_and_line(reader_fmu):
+    component = create_component(FmuFile(reader_fmu), "one")
+    component.bind(Ports((), {}), Ports((), {}))
+    component.instantiate()
+    component.enter_initialization_mode(0.0, 1.0)
+    component.set("u", 1.0)
+    component.exit_initialization_mode()
+    message = (
+        r"one: fmi2DoStep failed at t = 0 s: status 4 \(fatal\): ZeroDivisionError: float division by zero \(reader\.py:20\)"
+    )
+    with pytest.raises(ComponentError, match=message):
+        component.do_step(0.0, 0.1)
+
+
+def test_an_exception_in_the_constructor_is_told_with_text_and_line(tmp_path):
+    source = tmp_path / "reader.py"
+    guarded = 'self.u = 1.0 / (kwargs["instance_name"] != "one")'
+    source.write_text(SOURCE.replace("self.gain, ", f"{guarded}\n        self.gain, "))
+    component = create_component(FmuFile(build_to(source, None, tmp_path / "r.fmu")), "one")
+    component.bind(Ports((), {}), Ports((), {}))
+    with pytest.raises(ComponentError, match=r"one: fmi2Instantiate failed: .*ZeroDivisionError.*\(reader\.py:12\)"):
+        component.instantiate()
+
+
+def test_an_fmu_can_be_instantiated_many_times(reader_fmu):
+    """The wrapper of PythonFMU releases the globals of the FMU's entry once too often at each instantiation."""
+    for _ in range(20):
+        component = create_component(FmuFile(reader_fmu), "one")
+        component.bind(Ports((), {}), Ports((), {}))
+        component.instantiate()
+        component.free()
+
+
+def test_only_python_classes_include_files(tmp_path):
+    (tmp_path / "modelDescription.xml").touch()
+    with pytest.raises(InputError, match="only the FMU of a Python class can include files"):
+        build_to(tmp_path / "modelDescription.xml", None, tmp_path / "x.fmu", include=[tmp_path])

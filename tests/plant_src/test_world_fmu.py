@@ -16,7 +16,7 @@ from plant_validation import MeasurementCheck
 from world_harness import WorldHarness
 
 import cosim
-from cosim.export.foreign.python_class import write_python_fmu
+from cosim.export.build import build_to
 
 ROOT = Path(__file__).parents[2]
 DEMO = ROOT / "scenarios/demo1_box.json"
@@ -29,7 +29,7 @@ FLIGHT = ((10, 0.0), (40, 1.1 * HOVER), (30, HOVER), (100, 0.9 * HOVER), (60, 0.
 
 @pytest.fixture(scope="module")
 def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return write_python_fmu(ROOT / "plant_src/world_fmu.py", tmp_path_factory.mktemp("world") / "world.fmu")
+    return build_to(ROOT / "plant_src/world_fmu.py", None, tmp_path_factory.mktemp("world") / "world.fmu")
 
 
 class Importer:
@@ -141,7 +141,7 @@ def test_another_world_can_be_chosen(tmp_path: Path) -> None:
     shutil.copytree(ROOT / "plant_src", tmp_path / "plant_src", ignore=shutil.ignore_patterns("__pycache__"))
     other = {"vehicles": {"boat": {"model": "strider", "position": [0, 0]}}, "environment": {"wind": {"speed": 2.0}}}
     (tmp_path / "plant_src/world_fmu.json").write_text(json.dumps(other))
-    target = write_python_fmu(tmp_path / "plant_src/world_fmu.py", tmp_path / "boat.fmu")
+    target = build_to(tmp_path / "plant_src/world_fmu.py", None, tmp_path / "boat.fmu")
     names = {v.name: v for v in read_model_description(target).modelVariables}
     assert float(names["environment.wind.x"].start) == 2.0
     assert names["boat.thrust"].unit == "N"

@@ -8,6 +8,7 @@ import signal
 import subprocess
 import sys
 import time
+from tempfile import TemporaryFile
 
 import pytest
 
@@ -18,8 +19,10 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
 
 @pytest.fixture(autouse=True)
-def short_timeout(monkeypatch):
+def settings(monkeypatch):
+    """A short timeout; and no search for orphans, which would end other children of this process, such as servers of tests."""
     monkeypatch.setattr("cosim.process.supervisor.STOP_TIMEOUT", 0.2)
+    monkeypatch.setattr("cosim.process.supervisor._child_processes", list)
 
 
 def supervise(work, journal: Journal):
@@ -34,7 +37,8 @@ def supervise(work, journal: Journal):
         finally:
             os._exit(0)
     os.close(writer)
-    return _Supervisor(child, journal, reader).wait_for_child()
+    with TemporaryFile() as stack:
+        return _Supervisor(child, journal, reader, stack.fileno()).wait_for_child()
 
 
 @pytest.fixture

@@ -84,7 +84,8 @@ def test_a_module_that_cannot_be_imported_is_refused_once(tmp_path, mode):
     (tmp_path / "small.json").write_text(json.dumps(scenario))
     done = run_cosim("run", "small.json", "--isolation", mode, cwd=tmp_path)
     assert done.returncode == 2
-    assert done.stderr == "\"broken.py\" cannot be imported: ModuleNotFoundError: No module named 'no_such_module'\n"
+    reason = "ModuleNotFoundError: No module named 'no_such_module' (broken.py:1)"
+    assert done.stderr == f'"broken.py" cannot be imported: {reason}\n'
 
 
 def test_a_run_that_fails_draws_nothing(tmp_path):

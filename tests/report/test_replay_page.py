@@ -219,3 +219,30 @@ def test_a_result_without_a_scene_shows_its_signals(open_page, flight_result, tm
     opened.page.locator(".add input").fill("plant.usv.position.*")
     opened.page.keyboard.press("Enter")
     assert opened.page.locator(".plot").nth(6).locator("figcaption span").count() == 3
+
+
+@pytest.fixture(scope="module")
+def fallen(open_page, flight_result, tmp_path_factory):
+    """The replay of the flight of which the quadcopter falls through the sea, from t = 10 s on."""
+    time, columns = flight_result.time, dict(flight_result.recording.columns)
+    late = time >= 10
+    columns["plant.uav.position.z"] = np.where(late, -4664.0 * (time - 10) / (time[-1] - 10), columns["plant.uav.position.z"])
+    columns["plant.uav.ditched"] = late
+    fall = replace(flight_result, recording=replace(flight_result.recording, columns=columns))
+    file = tmp_path_factory.mktemp("fall") / "replay.html"
+    write_replay([fall], file)
+    return open_page(file)
+
+
+def test_a_failure_is_a_mark_on_the_slider_in_the_plots_and_in_the_scene(fallen):
+    assert [mark.get_attribute("title") for mark in fallen.page.locator(".spans b").all()] == ["uav ditched at 10.00 s"]
+    assert fallen.page.locator(".plot").first.locator(".mark").get_attribute("title") == "uav ditched at 10.00 s"
+    crosses = "cosimReplay.view.actors.flatMap((actor) => actor.crosses.map((cross) => cross.object.visible))"
+    fallen.seek(9.9)
+    assert fallen(crosses) == [False]
+    fallen.seek(10.1)
+    assert fallen(crosses) == [True]
+
+
+def test_the_camera_shows_the_mission_whatever_falls(fallen, opened):
+    assert fallen("cosimReplay.view.cameras.size") == pytest.approx(opened("cosimReplay.view.cameras.size"), rel=0.3)

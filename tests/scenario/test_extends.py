@@ -175,3 +175,15 @@ def test_the_editor_schema_accepts_extending_files(extend):
     for wrong in ({"colour": 1}, {"components": {"a": {"fmu": 3}}}, {"checks": {"end.value": {"most": 2}}}, {"stop_time": "x"}):
         assert not validator.is_valid(json.loads(extend(**wrong).read_text()))
     assert not validator.is_valid({"extends": "base.json"})
+
+
+def test_paths_in_settings_start_from_the_working_directory(folder, extend, monkeypatch):
+    (folder.path / "here").mkdir()
+    nested = {"components": {"g": folder.block("Gain")}, "ports": {"inputs": {"u": "g.u"}, "outputs": {"y": "g.y"}}}
+    folder.write(nested, "here/mine.json")
+    file = extend(checks=None)
+    monkeypatch.chdir(folder.path / "here")
+    result = cosim.run(file, parameters={"/components/b": {"system": "mine.json"}})
+    assert result["b.y"].tolist() == [0, 4, 4, 4]
+    done = run_cosim("check", str(file), "--set", '/components/b={"system": "mine.json"}', cwd=folder.path / "here")
+    assert done.returncode == 0, done.stderr

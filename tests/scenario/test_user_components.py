@@ -1,5 +1,6 @@
 """Component classes of users are checked when they are loaded, so that mistakes are reported before the run."""
 
+import json
 import subprocess
 import sys
 
@@ -104,3 +105,16 @@ def test_all_mistakes_in_the_class_are_reported_together(folder, own):
 def test_do_step_must_return_none_or_a_step_result(folder, own):
     with pytest.raises(ComponentError, match="a: do_step failed at t = 0 s: returned True, expected None or a StepResult"):
         cosim.run(folder.scenario(own("return None", "return True")))
+
+
+@pytest.mark.parametrize("place", ["module", "constructor"])
+def test_a_class_that_hangs_while_it_is_loaded_ends_at_its_deadline(tmp_path, place):
+    sleep = "import time\ntime.sleep(60)\n"
+    constructor = "class Slow:\n    def __init__(self, instance_name):\n        import time\n        time.sleep(60)\n"
+    (tmp_path / "slow.py").write_text(sleep if place == "module" else constructor)
+    components = {"slow": {"python": "slow.py:Slow"}}
+    content = {"name": "slow", "stop_time": 1, "step_size": 0.1, "components": components, "deadlines": {"load": 0.2}}
+    (tmp_path / "slow.json").write_text(json.dumps(content))
+    command = [sys.executable, "-m", "cosim", "run", "slow.json", "--no-report"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=30)
+    assert (done.returncode, done.stderr) == (1, "slow: loading the class failed: did not return within 0.2 s\n")

@@ -22,6 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.cli import main
+from cosim.components.fmi import file_cache
 from cosim.engine import ExecutorKind, executor_class, plan_run
 
 PRELOADED = (
@@ -144,6 +145,7 @@ def run_observed(arguments: list[str]) -> None:
     try:
         main(arguments)
     finally:
+        file_cache.remove_idle_folders()
         after = process_state()
         report.write_text("\n".join(f"{name}: {before[name]} -> {after[name]}" for name in before if before[name] != after[name]))
 

@@ -14,12 +14,16 @@ import click
 from ...core.errors import InputError, Problem
 from ...core.processors import available_processors
 from ...studies.regression_runs import check_unique_names, default_folder, find_scenario_files
-from .. import supervision
+from .. import current_command_line, supervision
+from ..bench_table import print_comparison, print_ranking
 from ..bench_trial import ControllerTrial, TrialResult, run_trials
-from ..messages import print_verdict
-from .regress import EXIT_CODE_SEVERITY
+from ..completion import complete_role, complete_scenario
+from ..messages import print_json
+from ..output_options import json_option
+from .regress import EXIT_CODE_SEVERITY, print_outcome
 
 if TYPE_CHECKING:
+    from ...studies.controller_bench.ranking import Ranking
     from ...studies.controller_bench.score import KpiComparison
 
 #: file in which the child process that examines the candidate returns its results
@@ -29,7 +33,10 @@ _PREPARED_FILE = "bench.json"
 @click.command()
 @click.argument("controller")
 @click.option(
-    "--role", required=True, help="Role of the controller: usv_autopilot, uav_position, ..., or the path of a role's JSON file."
+    "--role",
+    required=True,
+    shell_complete=complete_role,
+    help="Role of the controller (see `cosim list roles`), or the path of a role's JSON file.",
 )
 @click.option("--set", "settings", multiple=True, metavar="NAME=value", help="Set a parameter of the controller.")
 @click.option(
@@ -37,13 +44,14 @@ _PREPARED_FILE = "bench.json"
     multiple=True,
     metavar="DIR|SCENARIO",
     type=click.Path(path_type=Path),
+    shell_complete=complete_scenario,
     help="Scenarios to run; default: the folder scenarios/ here, else the shipped ones.",
 )
 @click.option(
     "--output-dir", type=click.Path(path_type=Path), default=Path("runs/bench"), show_default=True, help="Folder for the results."
 )
 @click.option("--jobs", type=click.IntRange(min=1), help="Number of scenarios at a time; default: one per processor.")
-@click.option("--json", "as_json", is_flag=True, help="Print the results as JSON.")
+@json_option("an object with candidate, role, ranking, scenarios (name, code, seconds, problems, kpis) and notes")
 def command(
     controller: str,
     role: str,
@@ -56,11 +64,13 @@ def command(
     """Benchmark CONTROLLER in every scenario with its role.
 
     CONTROLLER is an FMU, my.py:Class, my.mo:Model or the JSON file of a nested system. It replaces the shipped controller. The
-    tables compare its KPIs with those of the shipped controller and of its last run here. Exit code 0: all checks passed; 1: a
+    summary ranks both: the one that meets more checks is above; then the goals of the role decide. --verbose prints tables that
+    compare all KPIs with those of the shipped controller and of the candidate's last run. Exit code 0: all checks passed; 1: a
     component failed; 2: the controller's variables do not fit the role; 3: a check failed.
     """
     from ...scenario.nested_systems import parse_settings
     from ...studies.controller_bench.candidate import parse_source
+    from ...studies.controller_bench.ranking import rank
 
     candidate = parse_source(controller)
     files = list(find_scenario_files(scenarios or [default_folder()]))
@@ -73,16 +83,20 @@ def command(
     )
     if code:
         return code
-    trials, notes = _read_trials(candidate_folder, output_dir / "shipped")
+    prepared = json.loads((candidate_folder / _PREPARED_FILE).read_text(encoding="utf-8"))
+    trials = _make_trials(prepared["scenarios"], candidate_folder, output_dir / "shipped")
     results = []
     for result in run_trials(trials, jobs or available_processors()):
         results.append(result)
         if not as_json:
             _print_trial(result, candidate.name)
+    ranking = rank([result.kpis for result in results], prepared["goals"])
     if as_json:
-        _print_json(candidate.name, role, results, notes)
+        _print_json(candidate.name, role, results, prepared["notes"], ranking)
     else:
-        _print_summary(results, notes)
+        for note in prepared["notes"]:
+            click.echo(f"note: {note}")
+        print_ranking(ranking, candidate.name)
     return min((result.outcome.code for result in results), key=EXIT_CODE_SEVERITY.index)
 
 
@@ -106,46 +120,28 @@ def _write_scenarios(controller: str, role_name: str, files: Sequence[Path], fol
             notes += [f"{file.stem}: {note}" for note in dict.fromkeys(substitution.notes)]
     if not written:
         raise InputError(f'no scenario has a component with the role "{role.name}": {role.description}')
-    write_json({"scenarios": written, "notes": notes}, folder / _PREPARED_FILE)
+    write_json({"scenarios": written, "notes": notes, "goals": role.goals}, folder / _PREPARED_FILE)
     return 0
 
 
-def _read_trials(folder: Path, shipped: Path) -> tuple[list[ControllerTrial], list[str]]:
-    """Return the trials of the written scenarios, and the notes on entries removed from these."""
-    prepared = json.loads((folder / _PREPARED_FILE).read_text(encoding="utf-8"))
-    trials = [
+def _make_trials(written: Sequence[Mapping[str, str]], folder: Path, shipped: Path) -> list[ControllerTrial]:
+    """Return the trials of the written scenarios."""
+    return [
         ControllerTrial(
             Path(each["file"]), Path(each["original"]), folder / Path(each["file"]).stem, shipped / Path(each["file"]).stem
         )
-        for each in prepared["scenarios"]
+        for each in written
     ]
-    return trials, prepared["notes"]
 
 
 def _print_trial(result: TrialResult, candidate: str) -> None:
-    from ..bench_table import print_comparison
-
-    click.echo()
-    print_verdict(result.outcome.code == 0)
-    click.echo(f"  {result.name}  {result.outcome.seconds:.1f} s")
-    for line in result.outcome.details:
-        click.echo(f"        {line}")
-    print_comparison(result.rows(), candidate)
+    """Print a line about a scenario and its problems; with --verbose also all KPIs."""
+    print_outcome(result.outcome)
+    if current_command_line().verbosity > 0:
+        print_comparison(result.rows(), candidate)
 
 
-def _print_summary(results: Sequence[TrialResult], notes: Sequence[str]) -> None:
-    for note in notes:
-        click.echo(f"note: {note}")
-    better, worse = (sum(row.against_shipped == word for each in results for row in each.rows()) for word in ("better", "worse"))
-    failed = sum(result.outcome.code != 0 for result in results)
-    click.echo(
-        f"\n{len(results)} scenarios, {failed} failed; {better} KPIs better and {worse} worse than with the shipped controller"
-    )
-
-
-def _print_json(candidate: str, role: str, results: Sequence[TrialResult], notes: Sequence[str]) -> None:
-    from ...results.files import to_json_types
-
+def _print_json(candidate: str, role: str, results: Sequence[TrialResult], notes: Sequence[str], ranking: Ranking) -> None:
     scenarios = [
         {
             "name": result.name,
@@ -156,8 +152,8 @@ def _print_json(candidate: str, role: str, results: Sequence[TrialResult], notes
         }
         for result in results
     ]
-    content = {"candidate": candidate, "role": role, "scenarios": scenarios, "notes": notes}
-    click.echo(json.dumps(to_json_types(content), indent=2))
+    summary = {**asdict(ranking), "verdict": ranking.verdict}
+    print_json({"candidate": candidate, "role": role, "ranking": summary, "scenarios": scenarios, "notes": notes})
 
 
 def _row_as_json(row: KpiComparison) -> dict[str, Any]:

@@ -2,28 +2,41 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import click
 
-from ...core.errors import InputError
+from ...core.errors import InputError, Problem
 from ...core.system import Group, Stage
+from ...core.text import count_noun
 from .. import strict_sandbox, supervision
+from ..completion import complete_scenario
+from ..messages import print_json
+from ..output_options import json_option
 
 if TYPE_CHECKING:
     from ...scenario import PreparedRun
 
 
 @click.command(cls=strict_sandbox.SandboxCommand)
-@click.argument("scenario")
+@click.argument("scenario", shell_complete=complete_scenario)
 @click.option("--set", "settings", multiple=True, metavar="NAME=value", help="As for `cosim run`.")
 @click.option("--connections/--no-connections", default=True, help="List every connection.")
 @click.option("--expanded", is_flag=True, help="Print the scenario as JSON instead, with what it extends and --set applied.")
+@json_option(
+    "an object with name, start_time, stop_time and step_size (s), steps, signals, components, stages, connections (source, "
+    "target, unit, notes), unconnected_inputs and warnings; with --expanded the scenario"
+)
 @supervision.supervision_options
 def command(
-    scenario: str, settings: tuple[str, ...], connections: bool, expanded: bool, isolation: str, sandbox: str | None
+    scenario: str,
+    settings: tuple[str, ...],
+    connections: bool,
+    expanded: bool,
+    as_json: bool,
+    isolation: str,
+    sandbox: str | None,
 ) -> None:
     """Check SCENARIO without running it and print the expanded system.
 
@@ -42,7 +55,10 @@ def command(
         if problems := prepared.figure_problems():
             raise InputError(problems)
         if expanded:
-            click.echo(json.dumps(load_scenario(scenario, parse_settings(settings)).expanded(), indent=2, ensure_ascii=False))
+            print_json(load_scenario(scenario, parse_settings(settings)).expanded())
+            return
+        if as_json:
+            print_json(_describe(prepared, find_warnings(prepared)))
             return
         _print_components(prepared)
         _print_processes(prepared, isolation, sandbox)
@@ -50,17 +66,35 @@ def command(
         if connections:
             _print_connections(prepared)
             _print_unconnected_inputs(prepared)
-        warnings = find_warnings(prepared)
-        for problem in warnings:
-            click.echo(f"WARNING {problem}", err=True)
-        verdict = f"{len(warnings)} warning{'s' * (len(warnings) > 1)}." if warnings else "No warnings."
-        times, grid = prepared.settings, prepared.plan.grid
-        click.echo(
-            f"\n{prepared.spec.name}: {float(grid.start):g} s ... {float(grid.end):g} s in {grid.count} steps of "
-            f"{float(times.step_size):g} s, {len(times.columns)} signals recorded. {verdict}"
-        )
+        _print_verdict(prepared, find_warnings(prepared))
     finally:
         prepared.free()
+
+
+def _describe(prepared: PreparedRun, warnings: Sequence[Problem]) -> dict[str, Any]:
+    """Return the expanded system as JSON."""
+    times = prepared.settings
+    return {
+        "name": prepared.spec.name,
+        **{name: float(getattr(times, name)) for name in ("start_time", "stop_time", "step_size")},
+        "steps": prepared.plan.grid.count,
+        "signals": list(times.columns),
+        **prepared.metadata["system"],
+        "unconnected_inputs": _unconnected_inputs(prepared),
+        "warnings": list(map(str, warnings)),
+    }
+
+
+def _print_verdict(prepared: PreparedRun, warnings: Sequence[Problem]) -> None:
+    """Print the warnings, and the times of the scenario in one line."""
+    for problem in warnings:
+        click.echo(f"WARNING {problem}", err=True)
+    verdict = f"{count_noun(len(warnings), 'warning')}." if warnings else "No warnings."
+    times, grid = prepared.settings, prepared.plan.grid
+    click.echo(
+        f"\n{prepared.spec.name}: {float(grid.start):g} s ... {float(grid.end):g} s in {count_noun(grid.count, 'step')} of "
+        f"{float(times.step_size):g} s, {count_noun(len(times.columns), 'signal')} recorded. {verdict}"
+    )
 
 
 def _print_components(prepared: PreparedRun) -> None:
@@ -72,7 +106,8 @@ def _print_components(prepared: PreparedRun) -> None:
         }
         period = prepared.system.periods.get(name)
         every = f", every {float(period):g} s" if period else ""
-        click.echo(f"  {name:{width}}  {sources[name]}, {counts['input']} inputs, {counts['output']} outputs{every}")
+        sizes = ", ".join(count_noun(counts[kind], kind) for kind in ("input", "output"))
+        click.echo(f"  {name:{width}}  {sources[name]}, {sizes}{every}")
 
 
 def _print_processes(prepared: PreparedRun, isolation: str, sandbox: str | None) -> None:
@@ -114,10 +149,15 @@ def _print_connections(prepared: PreparedRun) -> None:
 
 def _print_unconnected_inputs(prepared: PreparedRun) -> None:
     """Print the inputs that keep their start values."""
+    for name, slots in _unconnected_inputs(prepared).items():
+        click.echo(f"\nunconnected inputs of {name}\n  {', '.join(slots)}")
+
+
+def _unconnected_inputs(prepared: PreparedRun) -> dict[str, list[str]]:
+    """Return the unconnected inputs of each component that has some."""
     from ...scenario.plausibility import unconnected_inputs
 
     unconnected: dict[str, list[str]] = {}
     for end in unconnected_inputs(prepared):
         unconnected.setdefault(end.component, []).append(end.scalar)
-    for name, slots in unconnected.items():
-        click.echo(f"\nunconnected inputs of {name}\n  {', '.join(slots)}")
+    return unconnected

@@ -7,6 +7,10 @@ from typing import TYPE_CHECKING
 
 import click
 
+from ..completion import complete_scenario
+from ..messages import print_json
+from ..output_options import json_option
+
 if TYPE_CHECKING:
     from ...api.comparison import ComparisonTask
     from ...results.comparison import Comparison
@@ -14,7 +18,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("result", type=click.Path(path_type=Path))
-@click.argument("reference", type=click.Path(path_type=Path))
+@click.argument("reference", type=click.Path(path_type=Path), shell_complete=complete_scenario)
 @click.option("--absolute", default=0.0, help="Tolerance of values, in the unit of each signal.")
 @click.option("--relative", default=0.0, help="Tolerance of values, relative to the range of each signal in the reference.")
 @click.option("--time", default=0.0, help="Tolerance of time (s).")
@@ -24,8 +28,16 @@ if TYPE_CHECKING:
 @click.option(
     "--plot", type=click.Path(path_type=Path), metavar="FILE", help="Draw the worst signals in their tubes (PNG or SVG)."
 )
+@json_option("an object with passed and signals, a list of signal, passed, problem, time (s) and excess")
 def command(
-    result: Path, reference: Path, absolute: float, relative: float, time: float, signals: tuple[str, ...], plot: Path | None
+    result: Path,
+    reference: Path,
+    absolute: float,
+    relative: float,
+    time: float,
+    signals: tuple[str, ...],
+    plot: Path | None,
+    as_json: bool,
 ) -> int:
     """Compare RESULT with REFERENCE, signal by signal.
 
@@ -43,7 +55,11 @@ def command(
     comparison = task.compare()
     if plot:
         _draw_tubes(task, comparison, plot)
-    click.echo(str(comparison), err=not comparison.passed)
+    if as_json:
+        verdicts = [{**verdict._asdict(), "passed": verdict.passed} for verdict in comparison.verdicts]
+        print_json({"passed": comparison.passed, "signals": verdicts})
+    else:
+        click.echo(str(comparison), err=not comparison.passed)
     return 0 if comparison.passed else 3
 
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import os
 import platform
 import shutil
@@ -16,6 +15,8 @@ import click
 
 from ...core.errors import InputError
 from ...core.processors import available_processors
+from ..messages import print_json
+from ..output_options import json_option
 
 if TYPE_CHECKING:
     from packaging.requirements import Requirement
@@ -34,7 +35,7 @@ class Finding:
 
 
 @click.command()
-@click.option("--json", "as_json", is_flag=True, help="Print a JSON list of findings.")
+@json_option("a list of findings with section, name, found and state (ok, missing or broken)")
 def command(as_json: bool) -> int:
     """Print which packages, tools and sandboxes are available on this machine.
 
@@ -42,7 +43,7 @@ def command(as_json: bool) -> int:
     """
     findings = [*_host_findings(), *_package_findings(), *_tool_findings(), *_sandbox_findings()]
     if as_json:
-        click.echo(json.dumps([asdict(finding) for finding in findings], indent=2))
+        print_json([asdict(finding) for finding in findings])
     else:
         _print_findings(findings)
     return 1 if any(finding.state == "broken" for finding in findings) else 0

@@ -4,11 +4,22 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from pathlib import Path
+from typing import TYPE_CHECKING, Any
 
 import click
 
 from ...core.component import Variable
-from ..messages import print_line
+from ...core.text import shorten
+from .. import current_command_line
+from ..messages import print_json, print_line
+from ..output_options import json_option
+
+if TYPE_CHECKING:
+    from ...components.fmi import FmuFile
+
+
+#: length to which start values are shortened in the table (characters)
+_MAX_START_LENGTH = 40
 
 _INTERFACE_NAMES: Mapping[str, str] = {"co-simulation": "Co-Simulation", "model-exchange": "Model Exchange"}
 
@@ -16,11 +27,29 @@ _INTERFACE_NAMES: Mapping[str, str] = {"co-simulation": "Co-Simulation", "model-
 @click.command()
 @click.argument("fmu", type=click.Path(path_type=Path))
 @click.option("--locals", "with_locals", is_flag=True, help="Also list local variables.")
-def command(fmu: Path, with_locals: bool) -> None:
+@json_option(
+    "an object with properties and variables, a list of name, type, causality, variability, unit, shape, start, minimum, "
+    "maximum, items and description"
+)
+def command(fmu: Path, with_locals: bool, as_json: bool) -> None:
     """Print the properties and variables of FMU: version, capabilities, platforms, inputs, outputs and parameters."""
     from ...components.fmi import FmuFile
 
     file = FmuFile(fmu)
+    groups = ["input", "output", "structuralParameter", "parameter", "calculatedParameter", *(["local"] if with_locals else [])]
+    variables = {kind: [v for v in file.description.variables if v.causality == kind] for kind in groups}
+    properties = {name: value for name, value in _properties(file).items() if value}
+    if as_json:
+        found = [_variable_as_json(variable) for group in variables.values() for variable in group]
+        print_json({"properties": properties, "variables": found})
+        return
+    for name, value in properties.items():
+        print_line(f"{name:13} {value}")
+    for causality, group in variables.items():
+        _print_variables(causality, group)
+
+
+def _properties(file: FmuFile) -> dict[str, str]:
     about = file.description
     experiment = about.default_experiment
     capabilities = {
@@ -29,7 +58,7 @@ def command(fmu: Path, with_locals: bool) -> None:
         "one instance per process": about.once_per_process,
         "needs an external tool": about.needs_execution_tool,
     }
-    rows = {
+    return {
         "model": about.model_name,
         "description": about.description,
         "FMI version": f"{about.fmi_version} {' and '.join(_INTERFACE_NAMES[name] for name in about.interfaces)}",
@@ -42,12 +71,12 @@ def command(fmu: Path, with_locals: bool) -> None:
         "capabilities": ", ".join(name for name, has in capabilities.items() if has),
         "sha256": file.sha256,
     }
-    for name, value in rows.items():
-        if value:
-            print_line(f"{name:13} {value}")
-    groups = ["input", "output", "structuralParameter", "parameter", "calculatedParameter", *(["local"] if with_locals else [])]
-    for causality in groups:
-        _print_variables(causality, [v for v in about.variables if v.causality == causality])
+
+
+def _variable_as_json(variable: Variable) -> dict[str, Any]:
+    names = ("name", "type", "causality", "variability", "shape", "start", "minimum", "maximum", "description")
+    unit = variable.unit.name if variable.unit else None
+    return {**{name: getattr(variable, name) for name in names}, "unit": unit, "items": dict(variable.items)}
 
 
 def _print_variables(causality: str, variables: list[Variable]) -> None:
@@ -58,11 +87,12 @@ def _print_variables(causality: str, variables: list[Variable]) -> None:
     for variable in variables:
         dimensions = f"[{','.join(map(str, variable.shape))}]" if variable.shape else ""
         unit = variable.unit.name if variable.unit else "-"
-        start = "" if variable.start is None else f" = {_shorten(variable.start)}"
+        start = "" if variable.start is None else f" = {_start_text(variable.start)}"
         start += "".join(f", {number}: {name}" for name, number in variable.items).replace(", ", "; ", 1)
         print_line(f"  {variable.name:{width}} {variable.type + dimensions:12} {unit:8} {variable.description}{start}".rstrip())
 
 
-def _shorten(start: object) -> str:
-    text = str(start)
-    return text if len(text) <= 40 else text[:37] + "..."
+def _start_text(start: object) -> str:
+    """Return a start value as text, with six significant digits; --verbose does not shorten it."""
+    text = f"{start:.6g}" if isinstance(start, float) else str(start)
+    return text if current_command_line().verbosity > 0 else shorten(text, _MAX_START_LENGTH)

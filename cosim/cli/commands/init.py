@@ -25,9 +25,9 @@ _PROJECT_FILES = {
     "pytest.ini": _TEMPLATES / "project/pytest.ini",
     ".gitignore": _TEMPLATES / "project/gitignore",
     ".github/workflows/ci.yml": _TEMPLATES / "project/ci.yml",
-    "controllers/speed_keeper.py": _TEMPLATES / "python/speed_keeper.py",
+    "controllers/speed_keeper.py": _TEMPLATES / "project/speed_keeper.py",
     "scenarios/course.json": _TEMPLATES / "project/course.json",
-    "scenarios/pictures.py": _TEMPLATES / "vessel/pictures.py",
+    "scenarios/pictures.py": _TEMPLATES / "vessel_autopilot/pictures.py",
     "tests/test_controller.py": _TEMPLATES / "project/test_controller.py",
 }
 _PLANT = "fmus/strider.fmu"

@@ -18,33 +18,52 @@ from ...core.errors import InputError, Problem, did_you_mean
 from . import new_scenario
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
-#: name of the controller in the templates, as a file and as a class; the new controller's name replaces it
-_SNAKE, _CAMEL = "speed_keeper", "SpeedKeeper"
 _MODELICA_TYPES = ("Real", "Integer", "Boolean", "String")
-_FIGURES_FILE, _PLANT = "pictures.py", "fmus/strider.fmu"
+_FIGURES_FILE = "pictures.py"
+#: text in the tests that stands for the name of the controller
+_TEST_NAME = "CONTROLLER"
+
+
+@dataclass(frozen=True, slots=True)
+class Role:
+    """Template of the controllers of a role: its folder below `TEMPLATES` has the name of the role.
+
+    Attributes:
+        snake: name of the controller in the template, in files and scenarios; the new controller's name replaces it.
+        camel: the same name as a class.
+        plants: FMUs of the plant in the scenario.
+    """
+
+    snake: str
+    camel: str
+    plants: tuple[str, ...]
 
 
 @dataclass(frozen=True, slots=True)
 class Language:
-    """Template of a controller in one language.
+    """Language of a controller; in the texts, SNAKE and CAMEL stand for its names.
 
     Attributes:
-        folder: folder of the template.
         key: key of the component's source in a scenario.
         component: value of that key.
         source: source for `cosim build`.
+        shared: folder below `TEMPLATES` with the files of all roles.
     """
 
-    folder: Path
     key: str
     component: str
     source: str
+    shared: str = "."
 
 
+ROLES = {
+    "vessel_autopilot": Role("waypoint_follower", "WaypointFollower", ("fmus/strider.fmu",)),
+    "uav_controller": Role("deck_follower", "DeckFollower", ("fmus/ar_drone.fmu", "fmus/strider.fmu")),
+}
 LANGUAGES = {
-    "python": Language(TEMPLATES / "python", "python", f"{_SNAKE}.py:{_CAMEL}", f"{_SNAKE}.py"),
-    "modelica": Language(TEMPLATES / "modelica", "modelica", f"{_CAMEL}.mo:{_CAMEL}", f"{_CAMEL}.mo"),
-    "c": Language(resources.root() / "controllers/c" / _SNAKE, "fmu", f"{_SNAKE}.fmu", "."),
+    "python": Language("python", "SNAKE.py:CAMEL", "SNAKE.py"),
+    "modelica": Language("modelica", "CAMEL.mo:CAMEL", "CAMEL.mo"),
+    "c": Language("fmu", "SNAKE.fmu", ".", "c"),
 }
 
 
@@ -60,76 +79,87 @@ command.add_command(new_scenario.command, "scenario")
 @click.argument("name")
 @click.option("--language", required=True, help=f"Language of the controller: {', '.join(LANGUAGES)}.")
 @click.option(
+    "--role", default=next(iter(ROLES)), show_default=True, help=f"Role, which determines the variables: {', '.join(ROLES)}."
+)
+@click.option(
     "--directory",
     type=click.Path(path_type=Path),
     default=Path(),
     help="Parent of the folder NAME; default: the working directory.",
 )
 @click.option("--force", is_flag=True, help="Overwrite existing files.")
-def controller(name: str, language: str, directory: Path, force: bool) -> None:
-    """Create the folder NAME with a vessel autopilot and a scenario in which it keeps a speed and a course.
+def controller(name: str, language: str, role: str, directory: Path, force: bool) -> None:
+    """Create the folder NAME with a controller, a scenario in which it runs, and a test.
 
-    The scenario checks both. Change the controller and run the scenario again.
+    A vessel_autopilot passes waypoints. A uav_controller is a quadcopter controller that follows the deck of a vessel. The
+    scenario checks it. Change the controller and run the scenario again.
     """
-    if language not in LANGUAGES:
-        raise InputError(f'there is no language "{language}"{did_you_mean(language, LANGUAGES)}')
-    chosen = LANGUAGES[language]
-    template = _read_template(chosen)
-    names = _template_names(name, template.values())
-    folder = directory / names[_SNAKE]
-    files = {folder / _substitute_names(file, names): _substitute_names(text, names) for file, text in template.items()}
-    files[folder / f"{names[_SNAKE]}.json"] = _scenario_text(chosen, names)
-    files[folder / _FIGURES_FILE] = (TEMPLATES / "vessel" / _FIGURES_FILE).read_text()
-    _write_files(files, folder / _PLANT, force)
-    _print_next_steps(chosen, folder, names)
+    for kind, chosen, known in (("language", language, LANGUAGES), ("role", role, ROLES)):
+        if chosen not in known:
+            raise InputError(f'there is no {kind} "{chosen}"{did_you_mean(chosen, known)}')
+    names, texts = _controller_files(name, role, language)
+    folder = directory / names["SNAKE"]
+    _write_files({folder / file: text for file, text in texts.items()}, [folder / plant for plant in ROLES[role].plants], force)
+    _print_next_steps(LANGUAGES[language], folder, names)
 
 
-def _read_template(language: Language) -> dict[str, str]:
-    """Return the texts of a template's files by file name."""
-    return {path.name: path.read_text() for path in sorted(language.folder.iterdir()) if path.is_file()}
+def _controller_files(name: str, role: str, language: str) -> tuple[dict[str, str], dict[str, str]]:
+    """Return the names of a controller (SNAKE and CAMEL), and the texts of its files by file name."""
+    template, chosen = ROLES[role], LANGUAGES[language]
+    texts = _read_texts(TEMPLATES / role / language) | _read_texts(TEMPLATES / chosen.shared)
+    test = texts.pop("test_controller.py")
+    names = _controller_names(name, template, texts.values())
+    replaced = {template.snake: names["SNAKE"], template.camel: names["CAMEL"]}
+    files = {_substitute(file, replaced): _substitute(text, replaced) for file, text in texts.items()}
+    source = {"SOURCE": chosen.key, "FILE": _substitute(chosen.component, names)}
+    files[f"{names['SNAKE']}.json"] = _substitute((TEMPLATES / role / "scenario.json").read_text(), replaced | source)
+    files[f"test_{names['SNAKE']}.py"] = _substitute(test, {_TEST_NAME: names["SNAKE"]})
+    files[_FIGURES_FILE] = (TEMPLATES / role / _FIGURES_FILE).read_text()
+    return names, files
 
 
-def _template_names(name: str, texts: Iterable[str]) -> dict[str, str]:
-    """Map names in the template to names of the controller; raise InputError if a language does not allow one of them."""
+def _read_texts(folder: Path) -> dict[str, str]:
+    """Return the texts of a folder's files by file name."""
+    return {path.name: path.read_text() for path in sorted(folder.iterdir()) if path.is_file()}
+
+
+def _controller_names(name: str, template: Role, texts: Iterable[str]) -> dict[str, str]:
+    """Return the names of the controller; raise InputError if a language does not allow one of them."""
     from ...export.sources import snake_case
 
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
         raise InputError(f'"{name}" is not a valid name of a controller: expected a letter, then letters, digits and underscores')
     snake = snake_case(name)
     camel = "".join(word[:1].upper() + word[1:] for word in snake.split("_"))
-    taken = {*_MODELICA_TYPES, *(word for text in texts for word in re.findall(r"\w+", text))} - {_CAMEL}
+    taken = {*_MODELICA_TYPES, *(word for text in texts for word in re.findall(r"\w+", text))} - {template.camel}
     modules = {*sys.stdlib_module_names, "pythonfmu", Path(_FIGURES_FILE).stem}
     if camel in taken or snake in modules or keyword.iskeyword(snake) or keyword.iskeyword(camel):
         raise InputError(f'"{name}" is already used for something else; choose another name')
-    return {_SNAKE: snake, _CAMEL: camel}
+    return {"SNAKE": snake, "CAMEL": camel}
 
 
-def _substitute_names(text: str, names: Mapping[str, str]) -> str:
+def _substitute(text: str, names: Mapping[str, str]) -> str:
     return re.sub("|".join(names), lambda match: names[match[0]], text)
 
 
-def _scenario_text(language: Language, names: Mapping[str, str]) -> str:
-    placeholders = {"SOURCE": language.key, "FILE": _substitute_names(language.component, names)}
-    return _substitute_names((TEMPLATES / "scenario.json").read_text(), {**names, **placeholders})
-
-
-def _write_files(files: Mapping[Path, str], plant: Path, force: bool) -> None:
-    present = [path for path in (*files, plant) if path.exists()]
+def _write_files(files: Mapping[Path, str], plants: Iterable[Path], force: bool) -> None:
+    present = [path for path in (*files, *plants) if path.exists()]
     if present and not force:
         raise InputError([Problem("exists; --force overwrites it", str(path)) for path in present])
     for path, text in files.items():
         path.parent.mkdir(parents=True, exist_ok=True)
         path.write_text(text)
         click.echo(path)
-    plant.parent.mkdir(exist_ok=True)
-    shutil.copyfile(resources.root() / _PLANT, plant)
-    click.echo(plant)
+    for plant in plants:
+        plant.parent.mkdir(exist_ok=True)
+        shutil.copyfile(resources.root() / "fmus" / plant.name, plant)
+        click.echo(plant)
 
 
 def _print_next_steps(language: Language, folder: Path, names: Mapping[str, str]) -> None:
-    name = names[_SNAKE]
+    name = names["SNAKE"]
     run = shlex.join(["cosim", "run", str(folder / f"{name}.json")])
-    source, fmu = folder / _substitute_names(language.source, names), folder / f"{name}.fmu"
+    source, fmu = folder / _substitute(language.source, names), folder / f"{name}.fmu"
     build = shlex.join(["cosim", "build", str(source), "--output", str(fmu)])
     click.echo(
         f"\nBuild and run it:\n  {build}\n  {run}" if language.key == "fmu" else f"\nRun it:\n  {run}\nAs an FMU:\n  {build}"

@@ -4,11 +4,16 @@ from __future__ import annotations
 
 from pathlib import Path
 from shutil import rmtree
+from typing import TYPE_CHECKING
 
 import click
 
 from ...core.errors import CosimError, InputError
+from ...core.text import count_noun
 from ..unfinished_runs import OutputFiles, how_to_recover
+
+if TYPE_CHECKING:
+    from ...core.recording import Recording
 
 
 @click.command()
@@ -34,7 +39,7 @@ def command(output: Path) -> None:
 
 def _recover(unfinished: Path, target: Path, shown: Path) -> None:
     """Write the results from the rows in the folder `unfinished`, and remove it."""
-    from ...process.run_files.folder import find_kept_rows, read_metadata, recover_recording
+    from ...process.run_files.folder import find_kept_rows, read_metadata
     from ...results import Result
     from ...results.result import write_run
 
@@ -45,7 +50,8 @@ def _recover(unfinished: Path, target: Path, shown: Path) -> None:
     rows_file, count = kept
     metadata = read_metadata(unfinished)
     kpis, timing = metadata.pop("kpis", {}), metadata.pop("timing", {})
-    result = Result(recover_recording(unfinished, count, rows_file), kpis, timing, metadata)
+    csv = target / "result.csv" if target.is_dir() else target
+    result = Result(_read_recording(unfinished, count, rows_file, csv), kpis, timing, metadata)
     try:
         if target.is_dir():
             write_run(result, target)
@@ -54,4 +60,23 @@ def _recover(unfinished: Path, target: Path, shown: Path) -> None:
     except CosimError as error:
         raise type(error)(f"{error}; {how_to_recover(result, unfinished, shown, error)}") from None
     rmtree(unfinished)
-    click.echo(f"{len(result.time)} rows until t = {result.time[-1]:g} s in {shown}")
+    rows = len(result.time)
+    text = count_noun(rows, "row") if rows == count else f"{rows} of {count_noun(count, 'row')}"
+    click.echo(f"{text} until t = {result.time[-1]:g} s in {shown}")
+
+
+def _read_recording(unfinished: Path, count: int, rows_file: Path, csv: Path) -> Recording:
+    """Return the `count` rows of a file, or those that are left of them; never replace a CSV file by fewer rows."""
+    from ...process.run_files.folder import HEADER_FILE, recover_recording
+
+    try:
+        recording = recover_recording(unfinished, count, rows_file)
+    except (ValueError, TypeError, LookupError, ArithmeticError) as error:  # a damaged header
+        raise InputError(f'cannot read "{unfinished / HEADER_FILE}": {error}; the rows stay in "{rows_file}"') from error
+    rows = len(recording.time)
+    if not rows or (rows < count and csv.exists()):
+        hint = (
+            f'; "{csv}" has the rows that were written during the run, remove it to write those that can be read' if rows else ""
+        )
+        raise InputError(f'only {rows} of {count} rows in "{rows_file}" can be read: it or "{HEADER_FILE}" is damaged{hint}')
+    return recording

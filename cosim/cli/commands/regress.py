@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from ...core.processors import available_processors
+from ...core.text import count_noun
 from ...studies.regression import RegressionOutcome
 from ...studies.regression_runs import default_folder, run_regressions
-from ..messages import print_verdict
+from .. import current_command_line
+from ..completion import complete_scenario
+from ..messages import print_json, print_verdict
+from ..output_options import json_option
 
 if TYPE_CHECKING:
     from ...report.junit import JUnitCase
@@ -20,14 +25,19 @@ EXIT_CODE_SEVERITY = (130, 70, 2, 1, 3, 0)
 
 
 @click.command()
-@click.argument("scenarios", nargs=-1, metavar="[DIR|SCENARIO...]", type=click.Path(path_type=Path))
+@click.argument(
+    "scenarios", nargs=-1, metavar="[DIR|SCENARIO...]", type=click.Path(path_type=Path), shell_complete=complete_scenario
+)
 @click.option("--update", is_flag=True, help="Write new references from these runs.")
 @click.option("--junit", type=click.Path(path_type=Path), metavar="FILE.xml", help="Also write the outcomes as JUnit XML.")
 @click.option(
     "--output-dir", type=click.Path(path_type=Path), default=Path("runs"), show_default=True, help="Folder for the results."
 )
 @click.option("--jobs", type=click.IntRange(min=1), help="Number of scenarios at a time; default: one per processor.")
-def command(scenarios: tuple[Path, ...], update: bool, junit: Path | None, output_dir: Path, jobs: int | None) -> int:
+@json_option("an object with failed, their number, and scenarios, a list of name, code, summary, details and seconds")
+def command(
+    scenarios: tuple[Path, ...], update: bool, junit: Path | None, output_dir: Path, jobs: int | None, as_json: bool
+) -> int:
     """Run all scenarios that have checks or a reference, and compare their results with these.
 
     SCENARIO is a file or the name of a shipped scenario; DIR stands for its files *.json; default: the folder scenarios/. Each
@@ -37,19 +47,26 @@ def command(scenarios: tuple[Path, ...], update: bool, junit: Path | None, outpu
     """
     outcomes = []
     for outcome in run_regressions(scenarios or [default_folder()], update, output_dir, jobs or available_processors()):
-        _print_outcome(outcome)
         outcomes.append(outcome)
+        if not as_json:
+            print_outcome(outcome)
     if junit:
         from ...report.junit import write_junit
 
         write_junit("cosim regress", [_junit_case(outcome) for outcome in outcomes], junit)
     failed = sum(outcome.code != 0 for outcome in outcomes)
-    count = "1 scenario" if len(outcomes) == 1 else f"{len(outcomes)} scenarios"
-    click.echo(f"{count}, {failed} failed" if failed else f"{count}, all passed")
+    if as_json:
+        print_json({"failed": failed, "scenarios": [asdict(outcome) for outcome in outcomes]})
+    else:
+        click.echo(f"{count_noun(len(outcomes), 'scenario')}, {f'{failed} failed' if failed else 'all passed'}")
     return min((outcome.code for outcome in outcomes), key=EXIT_CODE_SEVERITY.index)
 
 
-def _print_outcome(outcome: RegressionOutcome) -> None:
+def print_outcome(outcome: RegressionOutcome) -> None:
+    """Print a line about a scenario and its problems; with --quiet, print only the problems."""
+    if outcome.code and current_command_line().verbosity < 0:
+        for line in outcome.details:
+            click.echo(f"{outcome.name}: {line}", err=True)
     print_verdict(outcome.code == 0)
     click.echo(f"  {outcome.name:<28} {outcome.summary:<24} {outcome.seconds:5.1f} s")
     for line in outcome.details:

@@ -6,6 +6,8 @@ from pathlib import Path
 
 import click
 
+from ..messages import print_log
+
 
 @click.command()
 @click.argument("result", type=click.Path(path_type=Path))
@@ -18,18 +20,11 @@ def command(result: Path, output_file: Path | None, open_page: bool) -> None:
 
     RESULT is a folder written by `cosim run`. The page is a single file and needs no network.
     """
-    from ...report.figures import draw_figure, figure_to_svg
-    from ...report.run_page import write_report
-    from ...report.runs import load_figures, read_run
-    from ...results.checks import evaluate_checks
+    from ...report.finished_run import write_folder_report
 
-    run, target = read_run(result), output_file or result / "report.html"
-    checks = run.metadata.get("scenario", {}).get("checks", [])
-    outcomes = evaluate_checks(run.kpis, [check for check in checks if check["kpi"] in run.kpis])
-    pictures = (
-        (name, figure_to_svg(draw_figure(run, name, function, arguments))) for name, function, arguments in load_figures(run)
-    )
-    write_report(run, outcomes, pictures, target)
+    print_log()
+    target = output_file or result / "report.html"
+    write_folder_report(result, target)
     click.echo(target)
     if open_page:
         click.launch(str(target.absolute()))

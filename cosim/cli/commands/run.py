@@ -5,6 +5,7 @@ from __future__ import annotations
 import time
 from collections.abc import Iterator
 from contextlib import contextmanager
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -12,12 +13,14 @@ import click
 
 from ...core.errors import InputError, Problem
 from ...core.json_values import parse_object
-from ...process.journal import STEP_COUNT
 from ...process.output_lock import LockKeeper
 from .. import live, strict_sandbox, supervision
+from ..completion import complete_scenario
 from ..csv_options import csv_options
+from ..failed_runs import save_after_crash
+from ..output_options import json_option
 from ..progress import progress_bar
-from ..run_outputs import RunOptions, RunOutcome, write_outputs, write_partial_result
+from ..run_outputs import RunOptions, RunOutcome, write_outputs
 from ..unfinished_runs import OutputFiles
 
 if TYPE_CHECKING:
@@ -25,7 +28,6 @@ if TYPE_CHECKING:
 
     from ...api import Simulation
     from ...engine.plan_run import Observer
-    from ...process.supervisor import SupervisedOutcome
     from ...report.drawing_process import DrawingProcess
     from ...scenario import PreparedRun
 
@@ -33,7 +35,7 @@ RESULT_FILES = ("result.csv", "result.parquet", "result.mcap", "kpis.json", "run
 
 
 @click.command(cls=strict_sandbox.SandboxCommand)
-@click.argument("scenario")
+@click.argument("scenario", shell_complete=complete_scenario)
 @click.option("--output-dir", type=click.Path(path_type=Path), help="Folder for the results; default: runs/NAME.")
 @click.option("--stop-time", help="Stop time (s), instead of the scenario's.")
 @click.option("--step-size", help="Macro step size (s), instead of the scenario's.")
@@ -62,6 +64,10 @@ RESULT_FILES = ("result.csv", "result.parquet", "result.mcap", "kpis.json", "run
 @click.option("--parquet", is_flag=True, help="Also write result.parquet (extra `parquet`).")
 @click.option("--mcap", is_flag=True, help="Also write result.mcap, for Foxglove and ROS 2 (extra `mcap`).")
 @click.option("--no-report", is_flag=True, help="Write neither figures nor report.html.")
+@json_option(
+    "an object with name, exit_code, failure, termination, start_time and end_time (s), loop_seconds, kpis, checks, warnings, "
+    "folder and files"
+)
 @csv_options
 @live.view_options
 @supervision.supervision_options
@@ -70,19 +76,18 @@ def command(isolation: str, sandbox: str | None, view: bool, view_port: int, **o
 
     SCENARIO is a JSON file or the name of a shipped scenario. Writes result.csv, kpis.json, run.json, figures and report.html
     to the output directory. Exit code 0: the run ended and all checks passed; 1: a component failed, the results until then
-    are kept; 2: the scenario was refused; 3: a check failed.
+    are kept; 2: the scenario was refused; 3: a check failed, or a condition with the outcome "crash" ended the run.
     """
     run_options = RunOptions(**options, isolation="fmu" if isolation == "fmu" else "none", sandbox=bool(sandbox))
     if view:
         live.check_view_options(isolation, sandbox, run_options.late)
     if strict_sandbox.must_rerun(sandbox):
         return strict_sandbox.rerun_in_bubblewrap(*_sandbox_paths(run_options))
+    save = partial(save_after_crash, options=run_options)
     with LockKeeper() as locks:
         if view:
-            return live.run_with_view(
-                lambda link: _run_scenario(run_options, locks, link), isolation, _save_after_crash, view_port
-            )
-        return supervision.run_supervised_command(lambda: _run_scenario(run_options, locks), isolation, _save_after_crash)
+            return live.run_with_view(lambda link: _run_scenario(run_options, locks, link), isolation, save, view_port)
+        return supervision.run_supervised_command(lambda: _run_scenario(run_options, locks), isolation, save)
 
 
 def _sandbox_paths(options: RunOptions) -> tuple[list[Path], Path | None]:
@@ -157,7 +162,7 @@ def _require_packages(options: RunOptions) -> None:
 
 
 def _load(options: RunOptions, real_time: float | None) -> Simulation:
-    """Load the scenario, announce its deadlines to the supervisor and print warnings about it."""
+    """Load the scenario and print warnings about it."""
     from ...api import load
     from ...scenario.nested_systems import parse_settings
     from ...scenario.plausibility import find_run_warnings
@@ -173,27 +178,8 @@ def _load(options: RunOptions, real_time: float | None) -> Simulation:
         isolation=options.isolation,
         sandbox=options.sandbox,
     )
-    supervision.set_deadlines(simulation.prepared.spec.deadlines)
     messages.log_problems(find_run_warnings(simulation.prepared))
     return simulation
-
-
-def _save_after_crash(outcome: SupervisedOutcome) -> None:
-    """Write the rows of a child process that crashed, was killed or was interrupted."""
-    from ...process.run_files.folder import read_metadata
-    from ...results import Result
-    from ...results.non_finite import warn_non_finite
-    from .. import messages
-
-    folder = outcome.journal.folder
-    if folder is not None:
-        failure = "interrupted" if outcome.interrupted else str(outcome.failure)
-        metadata = {**read_metadata(folder), "macro_steps": outcome.journal[STEP_COUNT], "failure": failure}
-        recording = supervision.recover_outcome_recording(outcome)
-        if metadata.get("scenario", {}).get("non_finite") != "allow":
-            messages.print_log()
-            metadata["non_finite"] = warn_non_finite(recording)
-        write_partial_result(Result(recording, metadata=metadata), folder.parent, folder.parent, folder)
 
 
 def _prepare_folder(prepared: PreparedRun, options: RunOptions, locks: LockKeeper) -> None:

@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ...core.text import count_noun
 from ...process.output_lock import LockKeeper
 from ...process.temporary_folders import temporary_run_folder
 from .. import current_command_line, report_error, strict_sandbox, supervision
 from ..csv_options import csv_options
-from ..messages import print_line
+from ..messages import print_json, print_line
+from ..output_options import json_option
 from ..unfinished_runs import OutputFiles, writing_results
 
 if TYPE_CHECKING:
@@ -40,6 +42,7 @@ if TYPE_CHECKING:
 )
 @click.option("--solver-step-size", help="Largest step size (s) of euler and rk4; default: the FMU's, else --step-size.")
 @click.option("--tolerance", type=click.FloatRange(0, min_open=True), help="Relative tolerance; default: the FMU's.")
+@json_option("an object with time (s) and the final values of the outputs by name; nothing with --output-file")
 @csv_options
 @supervision.supervision_options
 def command(isolation: str, sandbox: str | None, output_file: Path | None, **options: Any) -> int:
@@ -72,6 +75,7 @@ def _simulate(
     solver: Method | None,
     solver_step_size: str | None,
     tolerance: float | None,
+    as_json: bool,
 ) -> int:
     from ...api.single_fmu import compile_fmu, parse_solver
     from ...components.fmi import InstanceSettings
@@ -107,9 +111,9 @@ def _simulate(
         if run.failure:
             return supervision.results_written(report_error(run.failure, current_command_line()))
         if not output:
-            _print_final_values(run.recording)
+            _print_final_values(run.recording, as_json)
         if run.termination:
-            click.echo(describe_termination("the FMU", run.termination.time), err=True)
+            click.echo(describe_termination(run.termination.time, "the FMU"), err=True)
         return supervision.results_written(0)
 
 
@@ -131,13 +135,20 @@ def _write_recording(recording: Recording, output: Path | None, shown: Path | No
         result = Result(recording)
         with writing_results(result, unfinished, shown):
             result.to_csv(output)
-        click.echo(f"{len(recording.time)} rows in {shown}")
+        click.echo(f"{count_noun(len(recording.time), 'row')} in {shown}")
 
 
-def _print_final_values(recording: Recording) -> None:
-    click.echo(f"time = {recording.time.tolist()[-1]!r} s")
-    for name, values in recording.columns.items():
-        print_line(f"{name} = {values.tolist()[-1]!r} {recording.units[name]}".rstrip())
+def _print_final_values(recording: Recording, as_json: bool) -> None:
+    """Print the last row: numbers with six significant digits, as JSON with all digits."""
+    time, last = recording.time.tolist()[-1], {name: values.tolist()[-1] for name, values in recording.columns.items()}
+    if as_json:
+        print_json({"time": time, "values": last})
+        return
+    click.echo(f"time = {time:.6g} s")
+    for name, value in last.items():
+        text = f"{value:.6g}" if isinstance(value, float) else repr(value)
+        unit = "" if recording.units[name] == "1" else recording.units[name]
+        print_line(f"{name} = {text} {unit}".rstrip())
 
 
 def _isolation(isolation: str, sandbox: bool) -> Isolation | None:

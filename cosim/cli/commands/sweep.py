@@ -3,14 +3,19 @@
 from __future__ import annotations
 
 import time
+from collections.abc import Iterator, Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TypeVar
 
 import click
 
 from ...core.errors import CosimError, InputError
 from ...core.processors import available_processors
-from .. import study_options
+from ...core.text import count_noun
+from .. import current_command_line, study_options
+from ..completion import complete_study
+from ..messages import print_json
+from ..output_options import json_option
 
 if TYPE_CHECKING:
     from ...studies.execution.run_store import RunStore
@@ -18,17 +23,23 @@ if TYPE_CHECKING:
     from ...studies.summary.sweep_files import SweepSummary
     from ...studies.sweep import Sweep
 
+T = TypeVar("T")
+
 #: largest numbers of groups and of causes of failure that are printed; the files hold all of them
 _MAX_PRINTED = 20
 
 
 @click.command()
-@click.argument("sweep")
+@click.argument("sweep", shell_complete=complete_study)
 @click.option("--output-dir", type=click.Path(path_type=Path), help="Folder for the results; default: runs/NAME.")
 @click.option("--parquet", is_flag=True, help="Also write table.parquet (extra `parquet`).")
 @click.option("--replays", is_flag=True, help="Also write the 3-D replay of one run of each cell of the maps.")
+@json_option(
+    "an object with name, folder, runs, finished, failed, failure_causes (cause, runs, first_run) and groups, whose entries have "
+    "labels, runs, distinct, passed, success_rate, interval (95 %) and kpis; the first group is all runs and has the kpis"
+)
 @study_options.study_options
-def command(sweep: str, output_dir: Path | None, parquet: bool, replays: bool, **study: Any) -> int:
+def command(sweep: str, output_dir: Path | None, parquet: bool, replays: bool, as_json: bool, **study: Any) -> int:
     """Run a scenario at many points: parameter studies and Monte Carlo.
 
     SWEEP is a JSON file or the name of a shipped sweep. Each run has its own child process. Writes table.csv (one row per
@@ -44,11 +55,18 @@ def command(sweep: str, output_dir: Path | None, parquet: bool, replays: bool, *
     loaded = Sweep.from_file(sweep, study.pop("max_runs"))
     folder = output_dir or Path("runs") / loaded.study_file.spec.name
     with study_options.open_run_store(folder, study.pop("retry_failed")) as run_store:
-        return _run_sweep(loaded, run_store, folder, parquet, replays, **study)
+        return _run_sweep(loaded, run_store, folder, parquet, replays, as_json, **study)
 
 
 def _run_sweep(
-    sweep: Sweep, run_store: RunStore, folder: Path, parquet: bool, replays: bool, workers: int | None, scheduler: str | None
+    sweep: Sweep,
+    run_store: RunStore,
+    folder: Path,
+    parquet: bool,
+    replays: bool,
+    as_json: bool,
+    workers: int | None,
+    scheduler: str | None,
 ) -> int:
     from ...process.supervisor import interrupt_on_termination
     from ...studies.summary.sweep_files import write_sweep_files
@@ -74,9 +92,13 @@ def _run_sweep(
         sweep.check_names(run_store)
     summary = write_sweep_files(sweep, run_store, folder, parquet)
     _write_maps_and_page(sweep, run_store, summary, folder, replays and not interrupted, workers)
-    _print_summary(sweep, summary)
-    new = f"{summary.finished - done} made now in {study_options.format_duration(time.monotonic() - began)}"
-    click.echo(f"{summary.finished} of {len(sweep)} runs, {new}, {summary.failed} failed; table.csv and others in {folder}")
+    if as_json:
+        print_json(_summary_as_json(sweep, summary, folder))
+    else:
+        _print_summary(sweep, summary)
+        new = f"{summary.finished - done} made now in {study_options.format_duration(time.monotonic() - began)}"
+        runs = count_noun(len(sweep), "run")
+        click.echo(f"{summary.finished} of {runs}, {new}, {summary.failed} failed; table.csv and others in {folder}")
     if interrupted:
         raise KeyboardInterrupt
     return 1 if summary.failed else 0
@@ -107,14 +129,45 @@ def _print_summary(sweep: Sweep, summary: SweepSummary) -> None:
         study_options.print_table(["KPI", "mean", "std", "min", "median", "max"], kpis)
     if sweep.criteria or summary.failed:
         study_options.print_table(
-            ["runs", "n", "success", "95 % interval"], [_success_row(group) for group in summary.groups[:_MAX_PRINTED]]
+            ["runs", "n", "success", "95 % interval"], [_success_row(group) for group in _first(summary.groups, "success.csv")]
         )
         if summary.groups[0].distinct < summary.groups[0].runs:
-            click.echo(
-                f"{summary.groups[0].distinct} of {summary.groups[0].runs} runs are distinct; only these count in the intervals"
-            )
-    for cause, count, first in summary.failure_causes[:_MAX_PRINTED]:
+            runs = count_noun(summary.groups[0].runs, "run")
+            click.echo(f"{summary.groups[0].distinct} of {runs} are distinct; only these count in the intervals")
+    for cause, count, first in _first(summary.failure_causes, "failures.csv"):
         click.echo(f"{count} failed, first run {first}: {cause}", err=True)
+
+
+def _first(entries: Sequence[T], file: str) -> Iterator[T]:
+    """Yield the first entries, all of them with --verbose, and print how many are left out and where they are."""
+    count = len(entries) if current_command_line().verbosity > 0 else _MAX_PRINTED
+    yield from entries[:count]
+    if len(entries) > count:
+        click.echo(f"{len(entries) - count} more in {file}; --verbose prints all")
+
+
+def _summary_as_json(sweep: Sweep, summary: SweepSummary, folder: Path) -> dict[str, Any]:
+    groups = [
+        {
+            "labels": group.labels,
+            "runs": group.runs,
+            "distinct": group.distinct,
+            "passed": group.passed,
+            "success_rate": group.success_rate,
+            "interval": group.interval,
+            "kpis": dict(group.statistics()),
+        }
+        for group in summary.groups
+    ]
+    return {
+        "name": sweep.study_file.spec.name,
+        "folder": folder,
+        "runs": len(sweep),
+        "finished": summary.finished,
+        "failed": summary.failed,
+        "failure_causes": [{"cause": cause, "runs": count, "first_run": first} for cause, count, first in summary.failure_causes],
+        "groups": groups,
+    }
 
 
 def _success_row(group: RunGroup) -> list[str]:

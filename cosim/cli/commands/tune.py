@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ...core.errors import CosimError, InputError
+from ...core.text import count_noun
 from .. import study_options
+from ..completion import complete_study
 
 if TYPE_CHECKING:
     from ...studies.execution.run_store import RunStore
@@ -17,7 +19,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("tuning", metavar="TUNE")
+@click.argument("tuning", metavar="TUNE", shell_complete=complete_study)
 @click.option("--output-dir", type=click.Path(path_type=Path), help="Folder for the results; default: runs/NAME.")
 @study_options.study_options
 def command(tuning: str, output_dir: Path | None, **study: Any) -> int:
@@ -65,7 +67,7 @@ def _print_best(tuning: Tuning, best: Trial, folder: Path) -> None:
     if not best.feasible:
         click.echo(_failure_text(tuning, best), err=True)
     settings = {**tuning.spec.settings, **tuning.spec.cases[0], **tuning.settings(best.parameters)}
-    click.echo(f"{len(tuning.trials)} points evaluated; trials.csv and best.json in {folder}")
+    click.echo(f"{count_noun(len(tuning.trials), 'point')} evaluated; trials.csv and best.json in {folder}")
     click.echo(format_run_command(tuning.study_file.scenario, settings))
 
 

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
-import json
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import click
+
+from ..messages import print_json
+from ..output_options import json_option
 
 if TYPE_CHECKING:
     from ...components.fmi.preflight import Finding
@@ -15,7 +17,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("fmus", metavar="FMU...", nargs=-1, required=True, type=click.Path(path_type=Path))
-@click.option("--json", "as_json", is_flag=True, help="Print a JSON array with one object per finding.")
+@json_option("a list of findings with file, severity, rule, source, member, line and message")
 def command(fmus: tuple[Path, ...], as_json: bool) -> int:
     """Validate FMUs against the FMI standard without running them.
 
@@ -25,9 +27,7 @@ def command(fmus: tuple[Path, ...], as_json: bool) -> int:
     """
     findings = {path: _validate_fmu(path) for path in fmus}
     if as_json:
-        click.echo(
-            json.dumps([_finding_as_json(path, finding) for path, found in findings.items() for finding in found], indent=1)
-        )
+        print_json([_finding_as_json(path, finding) for path, found in findings.items() for finding in found])
     else:
         _print_findings(findings)
     return 2 if any(findings.values()) else 0

@@ -48,7 +48,8 @@ def create_component(
 ) -> FmuComponent:
     """Create a component for one instance of an FMU.
 
-    No code of the FMU runs here: its binary is loaded by `Component.instantiate`.
+    No code of the FMU runs here: its binary is loaded by `Component.instantiate`. `loggingOn`, which enables the FMU's debug
+    messages, is true if the logger "cosim.component" has the level DEBUG.
 
     Args:
         file: The FMU; instances of the same FMU share one `FmuFile`.

@@ -28,6 +28,8 @@ _VARIABILITIES: Mapping[str, Variability] = {name: name for name in get_args(Var
 _C_INT = np.dtype(np.int32)
 _TRUE = ("true", "1")
 _EXPERIMENT = ("startTime", "stopTime", "stepSize", "tolerance")
+#: standard names of the log categories of errors (FMI 2.0 section 2.2.4, FMI 3.0 section 2.4.5)
+_ERROR_CATEGORIES = ("logStatusError", "logStatusFatal")
 
 
 @dataclass(frozen=True)
@@ -65,6 +67,7 @@ class FmuDescription:
         indicator_count: `numberOfEventIndicators` of FMI 1.0 and 2.0.
         needs_completed_step: Model Exchange requires fmi*CompletedIntegratorStep.
         platforms: Platforms with a binary, as the FMU names their folders, and "c-code" if it contains sources.
+        error_categories: Those of FMI's log categories of errors that the FMU declares.
     """
 
     fmi_version: str
@@ -87,6 +90,7 @@ class FmuDescription:
     indicator_count: int
     needs_completed_step: bool
     platforms: Sequence[str]
+    error_categories: Sequence[str]
 
     @property
     def major(self) -> int:
@@ -152,6 +156,7 @@ def build_description(path: Path, examination: Examination, interface: Interface
         int(model.root.get("numberOfEventIndicators", 0)),
         _needs_completed_step(model.major, attributes),
         list_platforms(examination.members),
+        [name for name in model.log_categories if name in _ERROR_CATEGORIES],
     )
 
 

@@ -1,4 +1,4 @@
-"""What this process remembers of FMU files from run to run: examinations by content, and extracted folders."""
+"""FMU files that a process has examined, by content, and their extracted folders."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any, Generic, NamedTuple, TypeVar
 
+from ...process.journal import current_journal
 from ...process.temporary_folders import LockedFolder
 
 K = TypeVar("K")
@@ -45,8 +46,12 @@ class RecentlyUsed(Generic[K, V]):
     def put(self, key: K, value: V) -> V | None:
         """Store a value; return the one that is forgotten."""
         self._values[key] = value
+        return self.pop_oldest() if len(self._values) > self._size else None
+
+    def pop_oldest(self) -> V | None:
+        """Remove and return the value that was not used for the longest time, None if there is none."""
         with suppress(KeyError):
-            return self._values.popitem(last=False)[1] if len(self._values) > self._size else None
+            return self._values.popitem(last=False)[1]
         return None
 
     def pop(self, key: K) -> V | None:
@@ -73,15 +78,20 @@ _idle_folders: RecentlyUsed[FileKey, ExtractedFolder] = RecentlyUsed(_MAX_FOLDER
 
 def take_folder(key: FileKey) -> ExtractedFolder | None:
     """Return the folder of an FMU that was extracted for an earlier run, if its files are unchanged; else None."""
-    extracted = _idle_folders.pop(key)
-    if extracted and list_files(extracted.folder.name) != extracted.listing:
-        extracted.folder.cleanup()
+    if not (extracted := _idle_folders.pop(key)):
         return None
-    return extracted
+    with suppress(OSError):  # another program has removed the folder
+        if list_files(extracted.folder.name) == extracted.listing:
+            return extracted
+    extracted.folder.cleanup()
+    return None
 
 
 def keep_folder(key: FileKey, extracted: ExtractedFolder, library: str) -> None:
     """Keep the folder for the next run, unless the operating system has kept the FMU's library with its static variables."""
+    if current_journal():  # no other run follows in a supervised process, which ends without finalizers
+        extracted.folder.cleanup()
+        return
     with suppress(OSError):
         ctypes.CDLL(library, mode=os.RTLD_NOLOAD | os.RTLD_NOW)
         extracted.folder.cleanup()
@@ -90,6 +100,12 @@ def keep_folder(key: FileKey, extracted: ExtractedFolder, library: str) -> None:
     for surplus in (other, _idle_folders.put(key, extracted)):
         if surplus:
             surplus.folder.cleanup()
+
+
+def remove_idle_folders() -> None:
+    """Remove the folders that are kept for further runs."""
+    while extracted := _idle_folders.pop_oldest():
+        extracted.folder.cleanup()
 
 
 def list_files(folder: str) -> Listing:

@@ -43,7 +43,7 @@ class Fmi1Instance(FmuInstance):
         slave_class: type = FMU1Slave
         return slave_class
 
-    def _instantiate_fmu(self) -> None:
+    def _instantiate_fmu(self, logging_on: bool) -> None:
         from fmpy import calloc, fmi1, free
 
         # the logger is variadic in C; with fixed arguments the text arrives unformatted, printf directives are not expanded
@@ -51,7 +51,7 @@ class Fmi1Instance(FmuInstance):
         callbacks.logger = fmi1.fmi1CallbackLoggerTYPE(lambda _, __, status, ___, text: self.log_message(status, text))
         callbacks.allocateMemory = fmi1.fmi1CallbackAllocateMemoryTYPE(calloc)
         callbacks.freeMemory = fmi1.fmi1CallbackFreeMemoryTYPE(free)
-        self._fmu.instantiate(functions=callbacks)
+        self._fmu.instantiate(functions=callbacks, loggingOn=logging_on)
         if not self._fmu.component:
             raise self._instantiation_error()
 

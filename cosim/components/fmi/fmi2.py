@@ -32,7 +32,7 @@ class Fmi2Instance(FmuInstance):
         slave_class: type = FMU2Slave
         return slave_class
 
-    def _instantiate_fmu(self) -> None:
+    def _instantiate_fmu(self, logging_on: bool) -> None:
         from fmpy import calloc, fmi2, free
 
         # the logger is variadic in C; with fixed arguments the text arrives unformatted, printf directives are not expanded
@@ -41,7 +41,7 @@ class Fmi2Instance(FmuInstance):
         callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(calloc)
         callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(free)
         try:
-            self._fmu.instantiate(callbacks=callbacks)
+            self._fmu.instantiate(callbacks=callbacks, loggingOn=logging_on)
         except Exception:
             raise self._instantiation_error() from None
 

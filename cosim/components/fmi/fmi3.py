@@ -35,9 +35,9 @@ class Fmi3Instance(FmuInstance):
         slave_class: type = FMU3Slave
         return slave_class
 
-    def _instantiate_fmu(self) -> None:
+    def _instantiate_fmu(self, logging_on: bool) -> None:
         try:
-            self._fmu.instantiate(logMessage=lambda _, status, __, text: self.log_message(status, text))
+            self._fmu.instantiate(loggingOn=logging_on, logMessage=lambda _, status, __, text: self.log_message(status, text))
         except Exception:
             raise self._instantiation_error() from None
 

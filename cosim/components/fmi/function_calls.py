@@ -30,6 +30,8 @@ class FunctionCaller:
         #: FMPy's slave object of this instance
         self._fmu: Any = None
         self._last_message = ""
+        #: ignore messages with status OK
+        self._hides_information = False
         #: name of the deadline (see `Deadlines`) of the calls in the present phase of the life cycle
         self._deadline_name = "initialization"
         #: communication point at which the next step starts (s); doStep reads it
@@ -88,5 +90,7 @@ class FunctionCaller:
 
     def log_message(self, status: int, text: bytes | None) -> None:
         """Forward a log message of the FMU to the log, and keep it as the reason of a later failure."""
+        if status == OK and self._hides_information:
+            return
         self._last_message = (text or b"").decode("utf-8", "replace").strip()
         component_log.log_message(self.name, _LOG_LEVELS.get(status, component_log.ERROR), self._last_message)

@@ -7,7 +7,9 @@ with prepared arguments, because FMPy's own methods take 3 to 30 times as long.
 from __future__ import annotations
 
 import ctypes
+import logging
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from copy import copy
 from math import nan
 from pathlib import Path
@@ -23,7 +25,7 @@ from ...process.process_state import restoring_process_state
 from .accessor_calls import AccessorCallFactory
 from .c_functions import as_double, as_pointer
 from .file import FmuFile
-from .fmpy_library import load_library
+from .fmpy_library import MissingFunctionError, load_library
 from .function_calls import OK, FunctionCaller
 from .instance_settings import InstanceSettings
 from .preflight.binary import version_deviations
@@ -59,6 +61,7 @@ class FmuInstance(FunctionCaller, Component):
         self._variables_by_name = {variable.name: variable for variable in self.variables}
         self._is_instantiated, self._has_acquired_file = False, False
         self._settings = settings
+        self._logging_on = logging.getLogger(component_log.LOGGER_NAME).isEnabledFor(logging.DEBUG)
         #: relative tolerance that the FMU receives; None: none
         self.tolerance = settings.tolerance or self.description.default_experiment.tolerance
         file.check_binary()
@@ -69,7 +72,7 @@ class FmuInstance(FunctionCaller, Component):
         """Import FMPy's class of a slave of this FMI version."""
         raise NotImplementedError
 
-    def _instantiate_fmu(self) -> None:
+    def _instantiate_fmu(self, logging_on: bool) -> None:
         """Call fmi2Instantiate or fmi3InstantiateCoSimulation."""
         raise NotImplementedError
 
@@ -107,8 +110,12 @@ class FmuInstance(FunctionCaller, Component):
                 self._fmu = self._copy_fmpy_slave(folder)
             if not is_loaded:
                 self._check_version()
+        logs_only_errors = bool(self.description.error_categories) and not self._logging_on
+        self._hides_information = logs_only_errors
         with restoring_process_state(self.name), calling_component(self.name, self._instantiate_function, "load"):
-            self._instantiate_fmu()
+            self._instantiate_fmu(self._logging_on or logs_only_errors)
+        if logs_only_errors:
+            self._limit_log_to_errors()
         self._is_instantiated = True
         self._handle: int = self._fmu.component
         self._instance = as_pointer(self._handle)
@@ -141,6 +148,14 @@ class FmuInstance(FunctionCaller, Component):
                 texts[name] = function()
         for text in version_deviations(texts):
             component_log.log_message(self.name, component_log.WARNING, text)
+
+    def _limit_log_to_errors(self) -> None:
+        """Call fmi*SetDebugLogging, so that the FMU gives the reason of an error; a refusal leaves its log as it is."""
+        from fmpy.fmi1 import FMICallException
+
+        name = f"{self.prefix}SetDebugLogging"
+        with calling_component(self.name, name, "load"), suppress(FMICallException, MissingFunctionError):
+            self._fmu.setDebugLogging(True, self.description.error_categories)
 
     def _instantiation_error(self) -> ComponentError:
         return ComponentError(self.name, self._instantiate_function, self._last_message or "the FMU gave no reason")

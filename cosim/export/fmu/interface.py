@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 from ...core import units
 from ...core.component import Variable
 from ...core.errors import InputError, Problem, did_you_mean
+from ...core.text import count_noun
 from .block import Block, BlockVariable
 
 C_TYPES = {"Float64": "double", "Int32": "int32_t", "Boolean": "bool", "Enumeration": "int32_t"}
@@ -104,7 +105,7 @@ def _variable_problems(variable: BlockVariable) -> Iterator[str]:
         yield "the enumeration has no literals"
     found, expected = len(start_values(variable)), math.prod(variable.shape)
     if found != expected:
-        yield f"found {found} start {'value' if found == 1 else 'values'}, expected {expected}"
+        yield f"found {count_noun(found, 'start value')}, expected {expected}"
     try:
         units.parse_unit(variable.unit or "1")
     except ValueError as error:

@@ -3,116 +3,136 @@
 PythonFMU supports FMI 2.0 only. Its builder runs in a separate process, because it imports the source. The FMU state consists
 of the variables that the class registers: register internal states as `local` variables.
 
-All Python FMUs of a process share one interpreter and one `sys.modules`. Therefore the source becomes a package, and the modules
-that it imports become members of this package. The name of the package contains a hash of all contents, so that FMUs with
-modules of the same name do not conflict.
+All Python FMUs of a process share one interpreter and one `sys.modules`. Therefore the source and the modules that it imports
+become members of a package. The name of the package contains a hash of all contents, so that FMUs with modules of the same name
+do not conflict.
 """
 
 from __future__ import annotations
 
-import ast
+import json
 import subprocess
 import sys
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from hashlib import sha256
 from pathlib import Path
 from tempfile import TemporaryDirectory
+from typing import Any
 from xml.etree import ElementTree
 from zipfile import ZipFile
 
+from ...components.python_units import checked_units
+from ...components.sibling_imports import read_with_relative_imports, with_imported_siblings
 from ...core.errors import InputError, Problem
 from ..fmu.archive import content_token, write_archive
 from ..fmu.model_description import Element, add_units, to_bytes
 from ..fmu.validation import DESCRIPTION_FILE, validate_description
-from .relative_imports import with_relative_imports
 
-#: turns a module into a package whose members are the files beside it
-_PACKAGE_STATEMENT = "__path__, __package__ = [__import__('os').path.dirname(__file__)], __name__  # inserted by cosim"
+_PROGRAM = Path(__file__).with_name("pythonfmu_program.py")
+_PROTECTION = Path(__file__).with_name("slave_protection.py")
+#: FMI 2.0 type -> FMI 3.0 type, as far as PythonFMU supports them
+_TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "String": "String"}
 
 
-def write_python_fmu(source: Path, target: Path) -> Path:
+def write_python_fmu(source: Path, target: Path, include: Sequence[Path] = ()) -> list[Path]:
     """Write the FMI 2.0 FMU of the `Fmi2Slave` class in a Python file.
 
     The FMU contains
 
     - the source,
-    - the files of its folder that it imports relatively (`from .pid import Pid`),
+    - the files of its folder that it imports (`from .pid import Pid` or `from pid import Pid`),
     - the JSON file with the same name beside it, if there is one,
+    - the files of `include`,
     - PythonFMU and its binaries for linux64 and win64.
 
-    The importing host needs Python and all other packages that the source imports. Unit definitions are added for all units
-    that the variables declare (attribute `unit`, written by `to_xml` of the variable).
+    The importing host needs Python and all other packages that the source imports. Units are those of the class attribute
+    `units` and those that variables declare (attribute `unit`, written by `to_xml` of the variable). Exceptions are logged with
+    file and line.
 
     Args:
         source: The Python file; it defines exactly one subclass of `Fmi2Slave`.
         target: The FMU to write.
+        include: Further files and folders. Those below the folder of the source keep their paths relative to it; the others are
+            placed beside the source.
 
     Returns:
-        `target`.
+        The files that the FMU was made from.
 
     Raises:
         InputError: The class cannot be exported, or its model description is invalid.
     """
-    files = _build_with_pythonfmu(source)
-    root = ElementTree.fromstring(files[DESCRIPTION_FILE])  # noqa: S314 - just written by PythonFMU
+    contents, files = _read_files(source, include)
+    members, units = _build_with_pythonfmu(source, contents)
+    root = ElementTree.fromstring(members[DESCRIPTION_FILE])  # noqa: S314 - just written by PythonFMU
+    _set_units(root, units, source)
     _complete_description(root)
-    root.set("guid", content_token([to_bytes(root), *(files[name] for name in sorted(files) if name != DESCRIPTION_FILE)]))
-    files[DESCRIPTION_FILE] = to_bytes(root)
-    validate_description(files[DESCRIPTION_FILE], source)
-    return write_archive(files, target)
+    root.set("guid", content_token([to_bytes(root), *(members[name] for name in sorted(members) if name != DESCRIPTION_FILE)]))
+    members[DESCRIPTION_FILE] = to_bytes(root)
+    validate_description(members[DESCRIPTION_FILE], source)
+    write_archive(members, target)
+    return files
 
 
-def files_of_python_fmu(source: Path) -> list[Path]:
-    """Return the files that the FMU of a Python source is made from."""
-    data = source.resolve().with_suffix(".json")
-    return [*with_relative_imports(source), *([data] if data.is_file() else [])]
+def _read_files(source: Path, include: Sequence[Path]) -> tuple[dict[Path, bytes], list[Path]]:
+    """Return the contents of the FMU's own files (path in the FMU -> contents) and their paths.
+
+    Absolute imports of modules beside the source become relative.
+    """
+    folder, data = source.resolve().parent, source.resolve().with_suffix(".json")
+    try:
+        modules = [file.resolve() for file in with_imported_siblings(source)]
+        outside = [file for file in modules if not file.is_relative_to(folder)]
+        if outside:
+            reason = "is imported, but an FMU can only contain imported files from the folder of its source"
+            raise InputError([Problem(reason, str(file)) for file in outside])
+        contents = {file.relative_to(folder): read_with_relative_imports(file, folder).encode() for file in modules}
+    except SyntaxError as error:
+        raise InputError(Problem(f"cannot be exported: {error}", str(source))) from None
+    included = {name: file for name, file in _included_files(folder, include) if name not in contents}
+    if data.is_file():
+        included[data.relative_to(folder)] = data
+    return contents | {name: file.read_bytes() for name, file in included.items()}, [*modules, *included.values()]
 
 
-def _build_with_pythonfmu(source: Path) -> dict[str, bytes]:
-    """Return the members of the FMU that PythonFMU builds (name -> contents)."""
-    modules = _read_modules(source)
+def _included_files(folder: Path, include: Sequence[Path]) -> Iterator[tuple[Path, Path]]:
+    """Yield the path in the FMU and the path of each included file."""
+    for path in map(Path.resolve, include):
+        if not path.exists():
+            raise InputError(Problem("does not exist", str(path)))
+        base = folder if path.is_relative_to(folder) else path.parent
+        files = [path] if path.is_file() else sorted(file for file in path.rglob("*") if file.is_file())
+        yield from ((file.relative_to(base), file) for file in files if "__pycache__" not in file.parts)
+
+
+def _build_with_pythonfmu(source: Path, contents: Mapping[Path, bytes]) -> tuple[dict[str, bytes], Any]:
+    """Return the members of the FMU that PythonFMU builds (name -> contents), and the attribute `units` of the class."""
+    contents = {**contents, Path(_PROTECTION.name): _PROTECTION.read_bytes()}
+    package = f"{source.stem}_{sha256(repr(sorted(contents.items())).encode()).hexdigest()[:12]}"
     with TemporaryDirectory(prefix="cosim-build-") as folder, TemporaryDirectory(prefix="cosim-build-") as target:
-        package, files = _stage_files(modules, source.stem, Path(folder))
-        command = [sys.executable, "-m", "pythonfmu", "build", "-f", package, "-d", target, "--handle-state", *files]
+        for path, content in contents.items():
+            (folder / path).parent.mkdir(parents=True, exist_ok=True)
+            (folder / path).write_bytes(content)
+        command = [sys.executable, "-P", str(_PROGRAM), folder, package, source.stem, target]
         process = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
         built = list(Path(target).glob("*.fmu"))
         if process.returncode or not built:
             reason = (process.stderr.strip() or "PythonFMU has built no FMU").splitlines()[-1]
             raise InputError(Problem(f"cannot be exported: {reason}", str(source)))
         with ZipFile(built[0]) as archive:
-            return {name: archive.read(name) for name in archive.namelist()}
+            units = json.loads((Path(target) / "units.json").read_text())
+            return {name: archive.read(name) for name in archive.namelist()}, units
 
 
-def _read_modules(source: Path) -> dict[Path, bytes]:
-    """Return the files of a source (path relative to its folder -> contents)."""
-    folder = source.resolve().parent
+def _set_units(root: Element, units: Any, source: Path) -> None:
+    """Set the unit of each variable that the class attribute `units` names."""
+    elements = {variable.get("name", ""): variable[0] for variable in root.iter("ScalarVariable")}
     try:
-        files = sorted(file.resolve() for file in files_of_python_fmu(source))
-    except SyntaxError as error:
-        raise InputError(Problem(f"cannot be exported: {error}", str(source))) from None
-    outside = [file for file in files if not file.is_relative_to(folder)]
-    if outside:
-        reason = "is imported, but an FMU can only contain files from the folder of its source"
-        raise InputError([Problem(reason, str(file)) for file in outside])
-    return {file.relative_to(folder): file.read_bytes() for file in files}
-
-
-def _stage_files(modules: Mapping[Path, bytes], name: str, folder: Path) -> tuple[str, list[str]]:
-    """Write the modules and the package module to `folder`; return the package file and the other members for PythonFMU."""
-    package = f"{name}_{sha256(repr(sorted(modules.items())).encode()).hexdigest()[:12]}"
-    for path, content in modules.items():
-        (folder / path).parent.mkdir(parents=True, exist_ok=True)
-        (folder / path).write_bytes(content)
-    (folder / f"{package}.py").write_text(_as_package(modules[Path(f"{name}.py")].decode()))
-    return f"{package}.py", sorted({path.parts[0] for path in modules})
-
-
-def _as_package(text: str) -> str:
-    """Insert the package statement after the `from __future__` imports, so that relative imports work in the FMU."""
-    future = [node for node in ast.parse(text).body if isinstance(node, ast.ImportFrom) and node.module == "__future__"]
-    line = future[-1].end_lineno or 0 if future else 0
-    lines = text.splitlines()
-    return "\n".join([*lines[:line], _PACKAGE_STATEMENT, *lines[line:], ""])
+        checked = checked_units(units, {name: _TYPES[element.tag] for name, element in elements.items()})
+    except InputError as error:
+        raise InputError([replace(problem, where=str(source)) for problem in error.problems]) from None
+    for name, unit in checked.items():
+        elements[name].set("unit", unit)
 
 
 def _complete_description(root: Element) -> None:

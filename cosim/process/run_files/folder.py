@@ -15,7 +15,7 @@ import json
 import os
 import shutil
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import closing, contextmanager, suppress
 from dataclasses import dataclass
 from fractions import Fraction
 from pathlib import Path
@@ -138,6 +138,10 @@ class TextReader:
         self._file.seek(0)
         self._row, self._pending_change = -1, (-1, dict[str, Any]())
         self._texts: dict[str, Any] = dict.fromkeys(self._names, "")
+
+    def close(self) -> None:
+        """Close the file of the strings."""
+        self._file.close()
 
     def read_row(self, number: int) -> list[Any]:
         """Return the string signals of a row; fast if rows are read in ascending order."""
@@ -272,10 +276,10 @@ def recover_recording(folder: Path | None, rows: int, rows_file: Path | None = N
     columns, rows = header.columns, _count_readable_rows(rows_file, header, rows)
     data = read_rows(rows_file, header.dtype, rows)
     numbers = [data[column.name].astype(bool) if column.boolean else data[column.name] for column in columns]
-    reader = TextReader(folder, header)
     texts = np.empty((rows, len(header.texts)), object)
-    for row in range(rows if header.texts else 0):
-        texts[row] = reader.read_row(row)
+    with closing(TextReader(folder, header)) as reader:
+        for row in range(rows if header.texts else 0):
+            texts[row] = reader.read_row(row)
     units = header.merge_columns([column.unit for column in columns], [""] * len(header.texts))
     values = header.merge_columns(numbers, texts.T)
     signals = dict(zip(header.names, values, strict=True))

@@ -48,8 +48,9 @@ class RowFeed:
         table[0] = [self._header.time_at(row * self._header.steps_per_row) for row in numbers]
         if count and self._dtype.itemsize:
             rows = self._rows(numbers)
-            for column, name in enumerate(self.columns[1:], start=1):
-                table[column] = rows[name]
+            with np.errstate(over="ignore"):  # beyond float32 a value is shown as infinite
+                for column, name in enumerate(self.columns[1:], start=1):
+                    table[column] = rows[name]
         return table.tobytes()
 
     def _rows(self, numbers: range) -> np.ndarray:

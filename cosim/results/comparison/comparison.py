@@ -12,6 +12,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ...core.errors import InputError, did_you_mean
+from ...core.text import count_noun
 from .. import Result
 from .tube import ComparisonPoints, TimeWindows, Tolerance, Tube, UniformTimeWindows, time_tolerance, uniform_spacing
 
@@ -71,8 +72,8 @@ class Comparison:
         if not self.verdicts:
             return "nothing was compared"
         if not failures:
-            return f"all {len(self.verdicts)} signals stay in their tubes"
-        return "\n".join([f"{len(failures)} of {len(self.verdicts)} signals fail", *map(str, failures)])
+            return f"{count_noun(len(self.verdicts), 'signal')} compared, none leaves its tube"
+        return "\n".join([f"{len(failures)} of {count_noun(len(self.verdicts), 'signal')} failed", *map(str, failures)])
 
 
 def compare(result: Result, reference: Result, tolerances: Mapping[str, Tolerance]) -> Comparison:

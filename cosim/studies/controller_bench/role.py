@@ -9,6 +9,7 @@ Each role is a JSON file; the shipped ones are in scenarios/roles/. Paths in it 
                 "altitude_command": "m"},                                       a single variable and its unit
      "outputs": {"thrust": "N", "rotor_speed[1]": "rad/s"},
      "parameters": {"speed_command": "m/s"},
+     "goals": ["waypoints.reached", "waypoints.time*"],                         KPIs that rank controllers, the first one first
      "stand_ins": {"../../fmus/strider_autopilot.fmu": "../systems/strider_autopilot.json"}}
 
 A controller declares the inputs and parameters that it uses; it must have all outputs. A parameter without an index stands for
@@ -44,6 +45,7 @@ class RoleSpec(Spec):
     controllers: list[str]
     inputs: dict[str, str | OutputsSpec]
     outputs: dict[str, str]
+    goals: list[str] = []
     parameters: dict[str, str] = {}
     stand_ins: dict[str, str] = {}
 
@@ -57,6 +59,8 @@ class Role:
     inputs: dict[str, Unit | None]
     outputs: dict[str, Unit | None]
     parameters: dict[str, Unit | None]
+    #: patterns of the KPI values that rank controllers, the most important first; "*" matches any text
+    goals: tuple[str, ...]
     #: resolved paths of the shipped controllers, and of nested systems by the path of the file that they replace
     controllers: frozenset[Path]
     stand_ins: dict[Path, Path]
@@ -79,6 +83,7 @@ def read_role(role: str) -> Role:
         dict(inputs),
         {name: _parse_unit(unit) for name, unit in spec.outputs.items()},
         {name: _parse_unit(unit) for name, unit in spec.parameters.items()},
+        tuple(spec.goals),
         frozenset((folder / path).resolve() for path in spec.controllers),
         {(folder / path).resolve(): (folder / system).resolve() for path, system in spec.stand_ins.items()},
     )
@@ -86,7 +91,7 @@ def read_role(role: str) -> Role:
 
 def role_names() -> list[str]:
     """Return the names of the shipped roles."""
-    return sorted(path.stem for path in (resources.root() / "scenarios/roles").glob("*.json"))
+    return resources.shipped_names("scenarios/roles/*.json")
 
 
 def _find_role(role: str) -> Path:

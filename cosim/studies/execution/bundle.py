@@ -11,7 +11,7 @@ from hashlib import sha256
 from pathlib import Path, PurePosixPath
 from typing import Any
 
-from ...components.python_import import package_root
+from ...components.python_import import package_files, package_root
 from ...core import paths, resources
 from ...core.errors import InputError, Problem
 from ...core.version import __version__
@@ -76,14 +76,14 @@ def absolute_paths(scenario: Path, settings: Mapping[str, Any]) -> list[Problem]
     """Return a problem for each absolute path in the scenario, which another machine would not have."""
     return [
         Problem(f'absolute path "{path}" cannot be shipped to a cluster; expected a path relative to this file', where)
-        for node in load_scenario(scenario, _pointer_settings(settings)).root.walk()
+        for node in load_scenario(scenario, _pointer_settings(settings), scenario.parent).root.walk()
         for path, where in _named_files(node)
         if Path(path).is_absolute() and paths.is_file(Path(path))
     ]
 
 
 def _scenario_files(scenario: Path, settings: Mapping[str, Any]) -> Iterator[Path]:
-    root = load_scenario(scenario, _pointer_settings(settings)).root
+    root = load_scenario(scenario, _pointer_settings(settings), scenario.parent).root
     for node in root.walk():
         yield from (file.resolve() for file in node.document.files)
         yield from _existing_files(node.folder, (name for name, _ in _named_files(node)))
@@ -133,10 +133,10 @@ def _strings(value: Any) -> Iterator[str]:
 
 
 def _package_files(path: Path) -> Iterator[Path]:
-    """Yield a file, or if it belongs to a Python package, all files of its outermost package including data files."""
+    """Yield a file and those beside it that it imports, or all files of its outermost Python package including data files."""
     root = package_root(path)
     if path.suffix != ".py" or root == path.parent:
-        yield path
+        yield from package_files([path]) if path.suffix == ".py" else [path]
         return
     package = root / path.relative_to(root).parts[0]
     yield from (each for each in package.rglob("*") if each.is_file() and "__pycache__" not in each.parts)

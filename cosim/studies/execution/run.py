@@ -18,7 +18,7 @@ from ...core.errors import ComponentError, CosimError, InputError, Problem
 from ...core.json_values import parse_object
 from ...engine.run_loop import simulating
 from ...process.float_mode import default_float_mode
-from ...process.journal import EXIT_CODE, Deadlines, Phase, current_journal
+from ...process.journal import EXIT_CODE, Phase, current_journal
 from ...process.run_files.folder import keeping_run_files
 from ...process.supervisor import SupervisedOutcome, run_supervised
 from ...results import Result
@@ -28,6 +28,8 @@ from .job import Job, Record, StudyContext
 
 #: length kept of the text that components printed in a failed run (bytes)
 _MAX_OUTPUT = 2000
+#: longest time of a timer (s); the system accepts no more than its integers can hold
+_LONGEST_TIMER = 1e9
 
 #: unpacked FMUs by path
 FmuFiles = Mapping[Path, FmuFile]
@@ -128,14 +130,12 @@ def _run_with_replay(replay: ReplayRequest, context: StudyContext, job: Job, fmu
 def _set_deadline(context: StudyContext) -> None:
     if context.deadline:
         signal.signal(signal.SIGALRM, signal.SIG_DFL)
-        signal.setitimer(signal.ITIMER_REAL, context.deadline)
+        signal.setitimer(signal.ITIMER_REAL, min(context.deadline, _LONGEST_TIMER))
 
 
 def _prepare_job(context: StudyContext, job: Job, fmu_files: FmuFiles) -> PreparedRun:
-    prepared = load(context.scenario, job.settings, loaded_fmus={path: file.share() for path, file in fmu_files.items()})
-    if journal := current_journal():
-        journal.deadlines = Deadlines(**prepared.spec.deadlines.model_dump())
-    return prepared
+    shared = {path: file.share() for path, file in fmu_files.items()}
+    return load(context.scenario, job.settings, settings_folder=context.scenario.parent, loaded_fmus=shared)
 
 
 def _results_written() -> None:

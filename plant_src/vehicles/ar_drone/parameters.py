@@ -56,6 +56,10 @@ ROTOR_RADIUS = 0.1016
 #: gravitational acceleration [model] (m/s2)
 GRAVITY = 9.81
 
+#: collision speed of a crash: a fall from 0.495 m, 1.5 times the 13 inches of a limit drop test. The landing gear of a small
+#: rotorcraft must withstand it without collapsing (14 CFR 27.725 and 27.727) (m/s)
+CRASH_SPEED = 3.1
+
 
 AIRFRAME = Airframe(
     name="ar_drone",

@@ -8,8 +8,9 @@
     contact_correct     state at the start, predicted state, commanded twist, Bullet's twist, constants, step size
                         -> state, magnitude of the contact impulse (0 without contact), outputs
 
-Each kind of body has further arguments and results: a free body the orientation of its principal axes, a planar one its
-vertical load, a floating one its contact impulse. Floating vessels also export `water_elevation` (`vessel/wave_loads.py`).
+Each kind of body has further arguments and results: a free body the orientation of its principal axes and the height of the
+highest possible water surface, a planar one its vertical load, a floating one its contact impulse. Floating vessels also
+export `water_elevation` (`vessel/wave_loads.py`).
 
 The twist that Bullet changes in contact, times the mass and inertia of Bullet's body, gives the contact impulse. Divided by the
 mass and inertia of the vehicle it is added to the predicted velocity. In contact the published velocity is Bullet's mean velocity
@@ -31,7 +32,7 @@ from cosim.export.equations.model import ContinuousModel
 
 from . import kinematics
 from .interface import ENVIRONMENT_INPUTS
-from .step_status import INVALID_STATE, LEAVES_SAFE_BOX, MAX_STATE_NORM, VALID
+from .step_status import INVALID_STATE, LEAVES_SAFE_BOX, MAX_STATE_NORM, MAY_FAIL
 
 #: integration steps per step of the world, which is at most 10 ms long
 SUB_STEPS = 2
@@ -87,15 +88,16 @@ class FreeContactMaps:
     def _predict_function(self) -> ca.Function:
         arguments = predict_symbols(self.model)
         state, end, step = arguments[0], predicted_state(self.model, *arguments[:5]), arguments[4]
-        (axes,) = create_symbols(principal_axes=4)
+        axes, highest_water = create_symbols(principal_axes=4, highest_water=1)
         linear = (end[0:3] - state[0:3]) / step
         angular = kinematics.rotation_vector(kinematics.quaternion_product(end[3:7], kinematics.conjugate(state[3:7]))) / step
         # cancels the gyroscopic torque that Bullet adds to its body
         torque = ca.cross(angular, self.rigid_body(arguments[3]).inertia_in_world(state[3:7]) @ angular)
         twist, endpoints = ca.vertcat(linear, angular), ca.vertcat(state[0:3], end[0:3])
-        status = step_status(end, endpoints, arguments)
+        may_fail = ca.logic_or(end[2] < highest_water, is_upside_down(end[3:7]))
+        status = step_status(end, endpoints, arguments, may_fail)
         results = [state, end, twist, twist, torque, _bullet_pose(state, axes), endpoints, status]
-        return ca.Function("contact_predict", [*arguments, axes], results)
+        return ca.Function("contact_predict", [*arguments, axes, highest_water], results)
 
     def _correct_function(self) -> ca.Function:
         start, predicted, twist, bullet_twist, constants, step = arguments = correct_symbols(self.model)
@@ -167,20 +169,26 @@ def create_symbols(**sizes: int) -> list[ca.SX]:
     return [ca.SX.sym(name, size) for name, size in sizes.items()]
 
 
-def step_status(end: ca.SX, endpoints: ca.SX, arguments: list[ca.SX]) -> ca.SX:
+def is_upside_down(orientation: ca.SX) -> ca.SX:
+    """Return whether the up axis of a body points downwards."""
+    return orientation[1] ** 2 + orientation[2] ** 2 > 0.5
+
+
+def step_status(end: ca.SX, endpoints: ca.SX, arguments: list[ca.SX], may_fail: ca.SX) -> ca.SX:
     """Return the code (`step_status.py`) of a predicted step.
 
     Args:
         end: Predicted state.
         endpoints: Centre of mass at the start and the end of the step (m, world frame), shape (6,).
         arguments: Symbols of `predict_symbols`.
+        may_fail: Condition of MAY_FAIL.
     """
     _, inputs, environment_inputs, _, _, reference_position, safe_distance = arguments
     magnitudes = ca.fabs(ca.vertcat(inputs, environment_inputs))
     valid = ca.logic_and(ca.sum1(magnitudes) < ca.inf, ca.norm_2(end) < MAX_STATE_NORM)
     distance = ca.fabs(endpoints - ca.vertcat(reference_position, reference_position))
     excess = distance - ca.vertcat(safe_distance, safe_distance)
-    return ca.if_else(valid, ca.if_else(ca.mmax(excess) > 0, LEAVES_SAFE_BOX, VALID), INVALID_STATE)
+    return ca.if_else(valid, LEAVES_SAFE_BOX * (ca.mmax(excess) > 0) + MAY_FAIL * may_fail, INVALID_STATE)
 
 
 def contact_impulse(impulse: ca.SX) -> ca.SX:

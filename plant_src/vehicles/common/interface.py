@@ -50,10 +50,13 @@ DECK_OUTPUTS = (
     *vector_variables("deck.velocity", "xyz", "m/s", "centre of the top of the landing deck, world frame"),
 )
 
-CONTACT_OUTPUTS = (
+#: outputs that only a world computes: contact and failures; a plant FMU publishes 0 and false
+WORLD_OUTPUTS = (
     Variable("contact.force", "Float64", "output", unit=parse_unit("N"), description="sum of normal forces, mean over the step"),
     Variable("contact.touching", "Boolean", "output", "discrete", description="contact with anything"),
     Variable("contact.vessel", "Boolean", "output", "discrete", description="contact with a vessel"),
+    Variable("crashed", "Boolean", "output", "discrete", description="collision above the crash speed or capsize; stays true"),
+    Variable("ditched", "Boolean", "output", "discrete", description="centre of mass below the water; stays true"),
 )
 
 #: external loads at the centre of mass

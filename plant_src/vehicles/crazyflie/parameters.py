@@ -74,3 +74,6 @@ AIRFRAME = Airframe(
     rotor_radius=ROTOR_RADIUS,
     effects=EFFECTS,
 )
+
+#: collision speed of a crash [assumed]: a fall from 1.3 m; so light a vehicle survives more than a large one (m/s)
+CRASH_SPEED = 5.0

@@ -8,11 +8,11 @@ from cosim.core.component import Variable
 from cosim.core.units import parse_unit
 
 from ..common.interface import (
-    CONTACT_OUTPUTS,
     EXTERNAL_LOADS,
     GROUND_DISTANCE_INPUT,
     MOTION_OUTPUTS,
     WIND_INPUTS,
+    WORLD_OUTPUTS,
     initial_variables,
     scalar_variable,
 )
@@ -33,7 +33,7 @@ def variables(airframe: Airframe) -> tuple[Variable, ...]:
         *WIND_INPUTS,
         *GROUND_DISTANCE_INPUT,
         *MOTION_OUTPUTS,
-        *CONTACT_OUTPUTS,
+        *WORLD_OUTPUTS,
     )
 
 

@@ -35,6 +35,7 @@ from cosim.export.equations.model import ContinuousModel, runge_kutta_4
 from cosim.export.fmu.block import Block
 
 from ..common import contact_maps, kinematics
+from ..common.interface import WORLD_OUTPUTS
 from ..common.named_values import ConstantsMap, NamedValues, values_by_name, variables_of
 from .airframe import Airframe, RotorEffects
 from .interface import states, variables
@@ -211,7 +212,7 @@ def multirotor_block(airframe: Airframe, description: str) -> Block:
         states(airframe),
         equations.initial_state,
         equations.rate,
-        lambda state, _inputs, _constants: ca.vertcat(motion_of_state(state), ca.SX.zeros(3)),
+        lambda state, _inputs, _constants: ca.vertcat(motion_of_state(state), ca.SX.zeros(len(WORLD_OUTPUTS))),
         derived_parameters=equations.constants.vector,
         callees=[step],
         free_step=step.function,

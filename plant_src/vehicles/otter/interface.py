@@ -6,7 +6,6 @@ from cosim.core.component import Variable
 from cosim.core.units import parse_unit
 
 from ..common.interface import (
-    CONTACT_OUTPUTS,
     CURRENT_INPUTS,
     DECK_OUTPUTS,
     EXTERNAL_LOADS,
@@ -15,6 +14,7 @@ from ..common.interface import (
     WAVE_GAIN_INPUT,
     WAVE_PARAMETERS,
     WIND_INPUTS,
+    WORLD_OUTPUTS,
     initial_variables,
 )
 
@@ -51,7 +51,7 @@ PARAMETERS = (
     *WAVE_PARAMETERS,
 )
 INPUTS = (PROPELLER_SPEED, *EXTERNAL_LOADS, *WIND_INPUTS, *CURRENT_INPUTS, *WAVE_GAIN_INPUT)
-VARIABLES = (*PARAMETERS, *INPUTS, *MOTION_OUTPUTS, *DECK_OUTPUTS, *CONTACT_OUTPUTS)
+VARIABLES = (*PARAMETERS, *INPUTS, *MOTION_OUTPUTS, *DECK_OUTPUTS, *WORLD_OUTPUTS)
 
 #: actuator states
 PROPELLER_STATES = ("propeller_speed[1]", "propeller_speed[2]")

@@ -16,6 +16,9 @@ WATER_DENSITY = 1025.0  # kg/m3
 
 LENGTH, BEAM = 2.0, 1.08  # m
 
+#: change of velocity by a collision that counts as a crash [assumed]: twice the 0.3 m/s of a fast berthing (m/s)
+CRASH_SPEED = 0.6
+
 #: hull without payload: mass (kg), centre of mass (m), radii of gyration about x, y, z (m)
 HULL_MASS = 55.0
 HULL_CENTRE = (0.2, 0.0, 0.2)

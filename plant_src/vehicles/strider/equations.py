@@ -14,6 +14,7 @@ from cosim.export.fmu.block import Block
 
 from ..common import kinematics
 from ..common.elementary_functions import arctangent, sine_and_cosine, sine_of_right_angle_share
+from ..common.interface import WORLD_OUTPUTS
 from ..common.named_values import NamedValues, values_by_name
 from ..vessel import planar_maps
 from . import parameters as p
@@ -91,7 +92,7 @@ def block() -> Block:
         STATES,
         initial_state,
         lambda state, inputs, _parameters: rate(state, values_by_name(inputs, INPUTS)),
-        lambda state, _inputs, _parameters: ca.vertcat(observe(state), ca.SX.zeros(3)),
+        lambda state, _inputs, _parameters: ca.vertcat(observe(state), ca.SX.zeros(len(WORLD_OUTPUTS))),
     )
     maps = planar_maps.PlanarContactMaps(model, p.MASS, p.INERTIA[2], p.CENTRE_OF_MASS_HEIGHT, observe)
     return as_block(model, maps.functions())

@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from ..common.interface import (
-    CONTACT_OUTPUTS,
     CURRENT_INPUTS,
     DECK_OUTPUTS,
     EXTERNAL_LOADS,
     MOTION_OUTPUTS,
     WIND_INPUTS,
+    WORLD_OUTPUTS,
     initial_variables,
     scalar_variable,
 )
@@ -19,6 +19,6 @@ THRUST = scalar_variable(
 RUDDER_ANGLE = scalar_variable("rudder_angle", "rad", "rudder angle; positive: trailing edge and bow to starboard, yaw decreases")
 
 INPUTS = (THRUST, RUDDER_ANGLE, *EXTERNAL_LOADS, *WIND_INPUTS, *CURRENT_INPUTS)
-VARIABLES = (*initial_variables("xy", "uv", "r"), *INPUTS, *MOTION_OUTPUTS, *DECK_OUTPUTS, *CONTACT_OUTPUTS)
+VARIABLES = (*initial_variables("xy", "uv", "r"), *INPUTS, *MOTION_OUTPUTS, *DECK_OUTPUTS, *WORLD_OUTPUTS)
 
 STATES = ("position.x", "position.y", "attitude.yaw", "velocity_body.u", "velocity_body.v", "rates.r")

@@ -19,6 +19,9 @@ INERTIA = (0.4957, 0.2478, 0.6391)
 #: height of the centre of mass above the water [model] (m)
 CENTRE_OF_MASS_HEIGHT = 0.1245
 
+#: change of velocity by a collision that counts as a crash [assumed]: twice the 0.3 m/s of a fast berthing (m/s)
+CRASH_SPEED = 0.6
+
 HULL_COUNT = 2
 
 #: hydrodynamic derivatives of sway force Y and yaw moment N of one hull at about 1 m/s [model, paper]

@@ -6,7 +6,6 @@ from cosim.core.component import Variable
 from cosim.core.units import parse_unit
 
 from ..common.interface import (
-    CONTACT_OUTPUTS,
     CURRENT_INPUTS,
     DECK_OUTPUTS,
     EXTERNAL_LOADS,
@@ -15,6 +14,7 @@ from ..common.interface import (
     WAVE_GAIN_INPUT,
     WAVE_PARAMETERS,
     WIND_INPUTS,
+    WORLD_OUTPUTS,
     initial_variables,
 )
 from ..strider.interface import RUDDER_ANGLE, THRUST
@@ -34,7 +34,7 @@ HYDRODYNAMICS_PARAMETER = Variable(
 
 PARAMETERS = (*initial_variables("xy", "uvw", "pqr"), *FLOATING_INITIAL_PARAMETERS, HYDRODYNAMICS_PARAMETER, *WAVE_PARAMETERS)
 INPUTS = (THRUST, RUDDER_ANGLE, *EXTERNAL_LOADS, *WIND_INPUTS, *CURRENT_INPUTS, *WAVE_GAIN_INPUT)
-VARIABLES = (*PARAMETERS, *INPUTS, *MOTION_OUTPUTS, *DECK_OUTPUTS, *CONTACT_OUTPUTS)
+VARIABLES = (*PARAMETERS, *INPUTS, *MOTION_OUTPUTS, *DECK_OUTPUTS, *WORLD_OUTPUTS)
 
 #: number of constants that the equations derive from the parameters
 CONSTANT_COUNT = 435

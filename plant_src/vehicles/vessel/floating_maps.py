@@ -22,6 +22,7 @@ from ..common.contact_maps import (
     contact_impulse,
     correct_symbols,
     create_symbols,
+    is_upside_down,
     parameters_and_constants,
     predict_symbols,
     predicted_state,
@@ -85,7 +86,7 @@ class FloatingContactMaps:
         )
         torque = ca.cross(twist[3:6], inertia @ twist[3:6])
         endpoints = ca.vertcat(state[0:3], end[0:3])
-        status = step_status(end, endpoints, arguments)
+        status = step_status(end, endpoints, arguments, is_upside_down(end[3:7]))
         results = [state, end, twist, twist, torque, _bullet_pose(state), impulse, endpoints, status]
         return ca.Function("contact_predict", [*arguments, impulse], results)
 

@@ -64,7 +64,7 @@ class PlanarContactMaps:
         twist = _planar_twist(rates[0:2], _minmod(vertical_load[0], vertical_load[1]) / self.mass, rates[2])
         endpoints = ca.vertcat(self.observe(state)[0:3], self.observe(end)[0:3])
         previous_load = ca.vertcat(vertical_load[0], vertical_load[2])
-        status = step_status(end, endpoints, arguments)
+        status = step_status(end, endpoints, arguments, ca.SX(0))
         results = [state, end, twist, twist, self._bullet_pose(state), previous_load, endpoints, status]
         return ca.Function("contact_predict", [*arguments, vertical_load], results)
 

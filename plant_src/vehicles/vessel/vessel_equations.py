@@ -13,7 +13,7 @@ from cosim.core.component import Variable
 from cosim.export.equations.model import ContinuousModel
 
 from ..common import kinematics
-from ..common.interface import VESSEL_STATES
+from ..common.interface import VESSEL_STATES, WORLD_OUTPUTS
 from ..common.named_values import ConstantsMap, NamedValues, values_by_name, variables_of
 from .hull import Hull
 from .wave_loads import SURFACE_SUM, WAVE_SUM, Footprint, wave_table
@@ -68,7 +68,7 @@ class VesselModel:
             (*VESSEL_STATES, *self.actuators),
             lambda c: self.hull_with(c).initial_state(self.constants.by_name(c), actuators),
             lambda x, u, c: ca.vertcat(self.hull_with(c).rate(x, values_by_name(u, inputs)), ca.SX.zeros(actuators)),
-            lambda x, _u, c: ca.vertcat(self.hull_with(c).observe(x), ca.SX.zeros(3)),
+            lambda x, _u, c: ca.vertcat(self.hull_with(c).observe(x), ca.SX.zeros(len(WORLD_OUTPUTS))),
             normalised_state,
             derived_parameters=self.constants.vector,
             callees=[WAVE_SUM, SURFACE_SUM],

@@ -30,7 +30,7 @@ def failures(result, tolerances=EXACT, reference=REFERENCE):
 def test_a_run_is_equal_to_itself():
     comparison = compare(REFERENCE, REFERENCE, EXACT)
     assert comparison.passed
-    assert str(comparison) == "all 3 signals stay in their tubes"
+    assert str(comparison) == "3 signals compared, none leaves its tube"
 
 
 def test_message_names_first_signal_time_and_distance():
@@ -40,7 +40,7 @@ def test_message_names_first_signal_time_and_distance():
     first = "t = 3 s: 3.25 m is 0.05 m above 3.2 m; at most 0.55 m outside, at t = 4 s; 71 of 101 points outside"
     second = "t = 7 s: -0.5 is 0.3 below -0.2; at most 0.3 outside, at t = 7 s; 31 of 101 points outside"
     assert str(compare(result, reference, {"*": Tolerance(absolute=0.2)})).splitlines() == [
-        "2 of 2 signals fail",
+        "2 of 2 signals failed",
         f"a.y leaves its tube at {first}",
         f"a.x leaves its tube at {second}",
     ]

@@ -74,7 +74,10 @@ def columns(result):
 
 def test_one_controller_fmu_flies_like_the_nested_system(demo):
     _, nested = demo
-    whole = {"fmu": "../fmus/ar_drone_cascaded.fmu", "parameters": {"vtol.landing_time": 5.0, "altitude_command": 2.0}}
+    whole = {
+        "fmu": str(resources.root() / "fmus/ar_drone_cascaded.fmu"),
+        "parameters": {"vtol.landing_time": 5.0, "altitude_command": 2.0},
+    }
     single = cosim.run("demo1_box", {"/components/uav": whole})
     for name in ("plant.uav.position.x", "plant.uav.position.z", "uav.altitude_reference", "uav.mode"):
         assert np.array_equal(single[name], nested[name]), name

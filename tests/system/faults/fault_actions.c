@@ -15,7 +15,9 @@
 #include <stdio.h>
 #include <stdlib.h>
 #include <string.h>
+#include <stdint.h>
 #include <sys/mman.h>
+#include <sys/prctl.h>
 #include <sys/resource.h>
 #include <sys/socket.h>
 #include <sys/stat.h>
@@ -140,6 +142,11 @@ static int flush_to_zero(Lag *m) { _mm_setcsr(_mm_getcsr() | 0x8040); return OK;
 static int fp_traps(Lag *m) { feenableexcept(FE_DIVBYZERO | FE_INVALID | FE_OVERFLOW); return OK; }
 static int change_folder(Lag *m) { return chdir("/"); }
 static int change_locale(Lag *m) { return !setlocale(LC_ALL, "C.UTF-8"); }
+static int give_up_files(Lag *m) { /* Landlock: all accesses to files are denied from now on */
+    const uint64_t handled[2] = {0x1fff, 0};
+    const long rules = syscall(444, handled, sizeof handled, 0);
+    return prctl(PR_SET_NO_NEW_PRIVS, 1, 0, 0, 0) || rules < 0 || syscall(446, rules, 0);
+}
 static int change_umask(Lag *m) { umask(0777); return OK; }
 static int change_environment(Lag *m) { setenv("HOME", "/nowhere", 1); return unsetenv("PATH"); }
 static int limit(int kind, long most) {
@@ -253,7 +260,7 @@ static const struct { const char *name; int (*act)(Lag *); } FAULTS[] = {
     {"flood_stdout", flood_stdout}, {"flood_stderr", flood_stderr}, {"flood_log", flood_log}, {"open_files", open_files},
     {"log_directives", log_directives}, {"log_null", log_null}, {"log_bytes", log_bytes}, {"log_long", log_long}, {"log_control", log_control}, {"print_control", print_control},
     {"log_thread", log_thread}, {"log_20000", log_20000}, {"round_up", round_up}, {"flush_to_zero", flush_to_zero}, {"fp_traps", fp_traps},
-    {"change_folder", change_folder}, {"change_locale", change_locale}, {"change_umask", change_umask},
+    {"give_up_files", give_up_files}, {"change_folder", change_folder}, {"change_locale", change_locale}, {"change_umask", change_umask},
     {"limit_files", limit_files}, {"limit_size", limit_size}, {"set_alarm", set_alarm}, {"block_signals", block_signals},
     {"change_environment", change_environment}, {"ignore_interrupts", ignore_interrupts}, {"close_output", close_output},
     {"truncate_all", truncate_all}, {"close_all", close_all}, {"fork", fork_}, {"daemon", daemon_}, {"answer", answer},

@@ -53,3 +53,19 @@ def test_a_program_that_closed_its_streams(fmus, isolation):
     path = scenario(fmus.folder, fmus(2), record={"signals": ["lag.y"]})
     program = f"import cosim; assert cosim.run('{path}', isolation='{isolation}')['lag.y'][-1] == {lag_output(STEP_COUNT)!r}"
     assert run_shell(f'{sys.executable} -c "{program}" <&- >&- 2>&-', fmus.folder).returncode == 0
+
+
+@pytest.mark.parametrize(("command", "code"), [("check fault.json", 1), ("check missing.json", 2), ("--help", 1)])
+def test_a_full_disk_behind_the_streams(fmus, command, code):
+    """One line and an exit code of the table; Python alone would end with 120 and a traceback."""
+    scenario(fmus.folder, fmus(2))
+    done = run_shell(f"{sys.executable} -m cosim {command} > /dev/full", fmus.folder)
+    assert (done.returncode, len(done.stderr.splitlines())) == (code, 1)
+    assert run_shell(f"{sys.executable} -m cosim {command} > /dev/full 2> /dev/full", fmus.folder).returncode == code
+
+
+def test_a_full_disk_behind_standard_error_ends_no_run(fmus):
+    path = scenario(fmus.folder, fmus(2, "DoStep 6 flush_to_zero"))
+    assert (
+        run_shell(f"{sys.executable} -m cosim run {path} --no-report --output-dir out 2> /dev/full", fmus.folder).returncode == 0
+    )

@@ -84,7 +84,7 @@ class Disk(CommandFolder):
         done = self.run("recover", "out")
         assert done.returncode == 0, done.stderr
         rows = kept(self)
-        assert f"; {rows} row" in errors
+        assert f"; kept {rows} row" in errors
         return rows
 
     def _stop(self) -> float:
@@ -156,7 +156,7 @@ def test_all_rows_of_a_finished_run_are_kept(tmp_path):
     run = "$COSIM run robust.json --no-report --output-dir"
     done = on_small_disk(workplace, "5m", f"{run} out; code=$?", RECOVER, f"{run} whole >&2")
     assert done.returncode == 1, done.stderr
-    assert "; 200001 rows are kept: free about " in done.stderr
+    assert "; kept 200001 rows: free about " in done.stderr
     for name in ("result.csv", "kpis.json"):
         assert (workplace.out / name).read_bytes() == (workplace.folder / "whole" / name).read_bytes()
     whole, recovered = (json.loads((folder / "run.json").read_text()) for folder in (workplace.folder / "whole", workplace.out))
@@ -170,7 +170,7 @@ def test_one_fmu_alone_on_a_full_disk(tmp_path):
     recover = RECOVER.replace("recover out", "recover out/x.csv")
     done = on_small_disk(workplace, "5500k", simulate, "test -e out/x.csv && code=97", recover)
     assert done.returncode == 1, done.stderr
-    assert "; 100001 rows are kept: free about " in done.stderr
+    assert "; kept 100001 rows: free about " in done.stderr
     assert [path.name for path in workplace.out.iterdir()] == ["x.csv"]
     assert len(cosim.Result.from_csv(workplace.out / "x.csv").time) == 100_001
 
@@ -181,7 +181,7 @@ def test_a_result_that_cannot_be_written_for_another_reason(workplace):
     done = workplace.run("run", "robust.json", *RUN, "--no-report")
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
-    assert line.endswith("; 101 rows are kept: remove the cause, then call `cosim recover out`")
+    assert line.endswith("; kept 101 rows: remove the cause, then call `cosim recover out`")
     again = workplace.run("recover", "out")
     assert again.returncode == 2
     assert again.stderr.endswith("; remove the cause, then call `cosim recover out`\n")
@@ -198,7 +198,7 @@ def test_a_component_that_fails_on_a_full_disk_is_named(tmp_path):
     done = on_small_disk(workplace, "480k", "$COSIM run robust.json --output-dir out --no-report; code=$?")
     assert done.returncode == 1
     full, failure = done.stderr.splitlines()
-    assert "; 20000 rows are kept: free about " in full
+    assert "; kept 20000 rows: free about " in full
     assert failure.startswith("ticker: do_step failed at t = 199.99 s")
 
 

@@ -19,7 +19,7 @@ from ....core.errors import ComponentError, InputError
 from ....process import float_mode
 from ....process import journal as journals
 from ....process.forks import attributing_forks, report_forks, watch_forks
-from ....process.journal import CALL_NUMBER, Phase
+from ....process.journal import CALL_NUMBER, OVERWRITTEN, Phase
 from ..instance import FmuInstance
 from .pipes import STEP_COMMAND, STEP_DONE, SpinningPoller, decode_line, encode_line, read_line, write_line
 from .shared_memory import SharedMemoryBlock, string_array
@@ -111,8 +111,9 @@ class Worker:
         except InputError as error:
             return encode_line({"input_error": [str(problem) for problem in error.problems]})
         except Exception as error:
-            fields = self._instance.name, "the worker process", f"{type(error).__name__}: {error}", None
-            return encode_line({"component_error": fields})
+            reason = f"{type(error).__name__}: {error}" if self._block.journal.is_valid else OVERWRITTEN
+            fields = self._instance.name, "the worker process", reason, None
+            return encode_line({"component_error": fields, "fatal": True})
 
     def _instantiate(self) -> None:
         """Enter the sandbox, bind the instance to the shared memory and instantiate the FMU."""

@@ -11,6 +11,7 @@ import struct
 from dataclasses import dataclass
 from io import BufferedReader
 
+from ....core.text import count_noun
 from .findings import FatalFindingError, Rule
 
 NO_ZIP = Rule("archive.zip", "APPNOTE 4.3")
@@ -98,7 +99,7 @@ def read_central_directory(file: BufferedReader, max_entries: int) -> tuple[list
         entry, position = _read_entry(directory, position)
         entries.append(entry)
     if position != size:
-        text = f"the central directory is {size - position} bytes longer than its {count} header{'s' if count != 1 else ''}"
+        text = f"the central directory is {count_noun(size - position, 'byte')} longer than its {count_noun(count, 'header')}"
         raise FatalFindingError(CENTRAL_DIRECTORY(text))
     return entries, offset
 
@@ -115,7 +116,7 @@ def _read_eocd(file: BufferedReader) -> tuple[int, int, int]:
     surplus = len(tail) - position - _EOCD.size - comment_size
     if surplus or _is_in_comment(tail, position):
         raise FatalFindingError(
-            TRAILING(f"found {abs(surplus)} bytes behind the end of the archive or a second end, expected neither")
+            TRAILING(f"found {count_noun(abs(surplus), 'byte')} behind the end of the archive or a second end, expected neither")
         )
     if (disk, directory_disk) != (0, 0) or disk_count != count:
         raise FatalFindingError(CENTRAL_DIRECTORY("is one part of an archive in several parts"))

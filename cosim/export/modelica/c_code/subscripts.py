@@ -5,6 +5,7 @@ from __future__ import annotations
 from itertools import product
 from math import prod
 
+from ....core.text import count_noun
 from ..model import syntax_tree
 from ..model.syntax_tree import Expression, SourceLocation, raise_model_error
 from .c_values import CValue, c_call, linear_index, variable_value
@@ -29,7 +30,7 @@ class SubscriptLowering(Lowering):
             InputError: A subscript is not supported, or a constant subscript is out of range.
         """
         if len(node.subscripts) > len(base.shape):
-            found = f"found {len(node.subscripts)} {'subscript' if len(node.subscripts) == 1 else 'subscripts'}"
+            found = f"found {count_noun(len(node.subscripts), 'subscript')}"
             raise_model_error(f"{found}, expected at most {len(base.shape)}", node.where)
         label = node.base.name if isinstance(node.base, syntax_tree.Name) else "array"
         subscripts = [*node.subscripts, *[syntax_tree.Colon()] * (len(base.shape) - len(node.subscripts))]

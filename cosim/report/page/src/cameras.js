@@ -69,6 +69,16 @@ export class Cameras {
   }
 }
 
+const FAR = 8; // distance of an outlier over the median distance
+
+/** The positions without those that are far from the median position, compared with the others. */
+export function withoutOutliers(places) {
+  const median = (values) => values.sort((a, b) => a - b)[values.length >> 1] ?? 0;
+  const middle = new Vector3(...["x", "y", "z"].map((axis) => median(places.map((place) => place[axis]))));
+  const limit = FAR * Math.max(1, median(places.map((place) => place.distanceTo(middle))));
+  return places.filter((place) => place.distanceTo(middle) <= limit);
+}
+
 /** The bounding box of positions, enlarged by half a metre. */
 export function boxAround(places) {
   return new Box3().setFromPoints(places).expandByScalar(0.5);

@@ -1,4 +1,5 @@
 // User controls: play, time slider, speed, cameras, vehicles, layers and selection of signals.
+import { marksOf } from "./marks.js";
 
 const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8];
 const PLAY = '<svg viewBox="0 0 16 16"><path d="M4 2.5v11l9-5.5z"/></svg>';
@@ -95,8 +96,8 @@ function chip(actor, follow) {
   return button;
 }
 
-/** Intervals in which Boolean signals are true, along the time slider. */
-export function showSpans(page, run, spans) {
+/** Intervals in which Boolean signals are true, and marks, along the time slider. */
+export function showSpans(page, run, { spans, marks }) {
   const length = run.last - run.first || 1;
   page.spans.replaceChildren();
   for (const { signal, label, colour } of spans.filter(({ signal }) => run.has(signal))) {
@@ -105,6 +106,12 @@ export function showSpans(page, run, spans) {
       mark.title = `${label} ${first.toFixed(2)} to ${last.toFixed(2)} s`;
       mark.style.cssText = `left:${(100 * (first - run.first)) / length}%;width:${(100 * (last - first)) / length}%;background:${colour}`;
     }
+  }
+  for (const { time, label, colour } of marksOf(run, marks)) {
+    const mark = page.spans.appendChild(document.createElement("b"));
+    mark.textContent = "×";
+    mark.title = `${label} at ${time.toFixed(2)} s`;
+    mark.style.cssText = `left:${(100 * (time - run.first)) / length}%;background:${colour}`;
   }
 }
 

@@ -22,9 +22,9 @@ async function start(root, data) {
   if (view) {
     player.onChange(() => view.update(player.time));
     connectView(page, view, data.scene, live ? "chase" : "orbit");
-    showSpans(page, runs[0], data.scene.spans);
+    showSpans(page, runs[0], data.scene);
   }
-  const plots = new Plots(page.plots, runs, player);
+  const plots = new Plots(page.plots, runs, player, data.scene.marks);
   for (const patterns of data.scene.plots) plots.add(patterns);
   connectSignals(page, runs[0], plots);
   onThemeChange(() => (view?.recolour(), plots.recolour()));
@@ -32,13 +32,13 @@ async function start(root, data) {
   animate(player, view);
   if (live) {
     player.seek(player.last);
-    watch(live, page, { player, view, plots, spans: data.scene.spans });
+    watch(live, page, { player, view, plots, scene: data.scene });
   }
   return { player, view, plots, runs, live };
 }
 
 /** Show new rows until the run has ended; then the page is an ordinary replay. */
-function watch(live, page, { player, view, plots, spans }) {
+function watch(live, page, { player, view, plots, scene }) {
   const show = steer(page, live);
   let drawn = 0;
   live.follow(() => {
@@ -48,7 +48,7 @@ function watch(live, page, { player, view, plots, spans }) {
     drawn = performance.now();
     plots.grow();
     view?.grow();
-    if (view) showSpans(page, live.run, spans);
+    if (view) showSpans(page, live.run, scene);
   });
 }
 

@@ -2,11 +2,12 @@
 import { CanvasTexture, DoubleSide, Group, Mesh, MeshBasicMaterial, RingGeometry, Sprite, SpriteMaterial } from "three";
 import { mergeGeometries } from "three/addons/utils/BufferGeometryUtils.js";
 
-function label(text) {
+/** A disk with a text, of the same size at every distance. */
+export function label(text, colour = "rgba(20, 30, 40, 0.78)") {
   const canvas = document.createElement("canvas");
   canvas.width = canvas.height = 96;
   const pen = canvas.getContext("2d");
-  pen.fillStyle = "rgba(20, 30, 40, 0.78)";
+  pen.fillStyle = colour;
   pen.beginPath();
   pen.arc(48, 48, 42, 0, 2 * Math.PI);
   pen.fill();

@@ -1,5 +1,6 @@
 // Signals over time, with a cursor at the time of the replay; press or drag in a plot to change it.
 import uPlot from "uplot";
+import { marksOf } from "./marks.js";
 import { theme } from "./theme.js";
 
 const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
@@ -32,8 +33,8 @@ function room(chart, texts, number) {
 }
 
 class Plot {
-  constructor(parent, signals, runs, player, remove) {
-    Object.assign(this, { signals, runs, player });
+  constructor(parent, signals, runs, player, marks, remove) {
+    Object.assign(this, { signals, runs, player, marks });
     this.element = parent.appendChild(document.createElement("figure"));
     this.element.className = "plot";
     this.legend = this.element.appendChild(document.createElement("figcaption"));
@@ -77,7 +78,19 @@ class Plot {
     this.line = this.chart.over.appendChild(document.createElement("div"));
     this.line.className = "now";
     this.#scrub(this.chart.over);
+    this.#mark();
     this.update();
+  }
+
+  /** Draw a line at each mark. */
+  #mark() {
+    for (const line of this.chart.over.querySelectorAll(".mark")) line.remove();
+    for (const { time, label, colour } of marksOf(this.runs[0], this.marks)) {
+      const line = this.chart.over.appendChild(document.createElement("div"));
+      line.className = "mark";
+      line.title = `${label} at ${time.toFixed(2)} s`;
+      line.style.cssText = `border-color:${colour};transform:translateX(${this.chart.valToPos(time, "x")}px)`;
+    }
   }
 
   #data(series) {
@@ -88,6 +101,7 @@ class Plot {
   /** Update after the runs have received more rows. */
   grow() {
     this.chart.setData(this.#data(this.#series()));
+    this.#mark();
     this.update();
   }
 
@@ -119,6 +133,7 @@ class Plot {
 
   resize() {
     this.chart.setSize({ width: Math.max(this.element.clientWidth, 120), height: HEIGHT });
+    this.#mark();
     this.update();
   }
 
@@ -134,8 +149,8 @@ function padded(low, high) {
 }
 
 export class Plots {
-  constructor(parent, runs, player) {
-    Object.assign(this, { parent, runs, player, list: [] });
+  constructor(parent, runs, player, marks) {
+    Object.assign(this, { parent, runs, player, marks, list: [] });
     new ResizeObserver(() => this.list.forEach((plot) => plot.resize())).observe(parent);
     player.onChange(() => this.list.forEach((plot) => plot.move()));
     player.onReading(() => this.list.forEach((plot) => plot.read()));
@@ -146,7 +161,7 @@ export class Plots {
     const tests = patterns.map((pattern) => new RegExp(`^${pattern.split("*").map((s) => s.replace(/[.[\]()+?^$|{}\\]/g, "\\$&")).join(".*")}$`));
     const signals = this.runs[0].signals.filter((name) => tests.some((test) => test.test(name)));
     if (!signals.length) return false;
-    this.list.push(new Plot(this.parent, signals.slice(0, 12), this.runs, this.player, (plot) => this.#remove(plot)));
+    this.list.push(new Plot(this.parent, signals.slice(0, 12), this.runs, this.player, this.marks, (plot) => this.#remove(plot)));
     return true;
   }
 

@@ -21,10 +21,12 @@ function spread(run, count) {
 }
 
 export class Trail {
-  constructor(run, body, colour, isOther) {
+  /** `end`: time after which the path does not count for the accuracy, because the body has failed. */
+  constructor(run, body, colour, isOther, end) {
     const rows = spread(run, MOST_POINTS).filter((row) => run.position(body, row).toArray().every(Number.isFinite));
     const places = rows.map((row) => run.position(body, row));
-    const kept = simplified(places, FLAT * new Box3().setFromPoints(places).getSize(new Vector3()).length());
+    const extent = new Box3().setFromPoints(places.filter((_, i) => run.time[rows[i]] <= end));
+    const kept = simplified(places, FLAT * extent.getSize(new Vector3()).length());
     this.rows = kept.map((i) => rows[i]);
     this.points = kept.map((i) => places[i]);
     if (this.points.length === 1) this.points.push(this.points[0]); // a line has two ends

@@ -4,8 +4,9 @@ import {
   PCFShadowMap, Scene, Vector3, WebGLRenderer,
 } from "three";
 import { bodyOf, reachOf } from "./bodies.js";
-import { boxAround, Cameras } from "./cameras.js";
+import { boxAround, Cameras, withoutOutliers } from "./cameras.js";
 import { markersOf } from "./markers.js";
+import { Cross, marksOf } from "./marks.js";
 import { drawnBySoftware, FINEST, Quality, setDetail } from "./quality.js";
 import { theme } from "./theme.js";
 import { Ghosts, Trail } from "./trails.js";
@@ -14,6 +15,7 @@ import { Water } from "./water.js";
 const REST = 350; // ms without a change until the picture is rendered at the highest quality
 const SUN = new Vector3(-0.45, -0.6, 0.66).normalize();
 const OTHER = "#c2185b";
+const LOWEST = -3; // m; what sinks below this height does not count for the camera
 
 ColorManagement.enabled = false; // blend colours without conversion, which is slow in software rendering
 
@@ -31,7 +33,7 @@ function rendererOn(canvas) {
 
 export class View {
   constructor(canvas, scene, runs) {
-    Object.assign(this, { runs, time: runs[0].first });
+    Object.assign(this, { runs, marks: scene.marks, time: runs[0].first });
     this.scene = new Scene();
     const { renderer, software } = rendererOn(canvas);
     const most = software ? Infinity : devicePixelRatio; // smaller pixels smooth edges; a graphics card does that at a lower cost
@@ -72,27 +74,36 @@ export class View {
   }
 
   #past({ run, body, solid, isOther }) {
-    const trail = new Trail(run, body, isOther ? OTHER : body.colour, isOther);
+    const marks = marksOf(run, this.marks).filter(({ on }) => on === body.name);
+    const end = Math.min(run.last, ...marks.map((mark) => mark.time));
+    const trail = new Trail(run, body, isOther ? OTHER : body.colour, isOther, end);
     const ghosts = isOther || !solid ? null : new Ghosts(run, body, solid);
-    this.scene.add(...trail.lines, ...(ghosts ? [ghosts.mesh] : []));
-    return { trail, ghosts };
+    const crosses = marks.map((mark) => new Cross(mark, run.position(body, mark.row)));
+    this.scene.add(...trail.lines, ...(ghosts ? [ghosts.mesh] : []), ...crosses.map((cross) => cross.object));
+    return { trail, ghosts, crosses, end };
   }
 
+  /** The box around all bodies until they are marked (a crash), without what is far below the water or far away for a short time. */
   #box() {
-    const places = this.own.flatMap(({ run, body }) => Array.from({ length: 60 }, (_, i) => run.position(body, Math.floor((i * run.time.length) / 60))));
-    return boxAround(places.filter((place) => place.toArray().every(Number.isFinite)));
+    const places = this.own.flatMap(({ run, body, end }) => {
+      const rows = run.place(end).row;
+      return Array.from({ length: 60 }, (_, i) => run.position(body, Math.round((i * rows) / 59)));
+    });
+    const visible = ({ z }) => !this.water || z > LOWEST;
+    return boxAround(withoutOutliers(places.filter((place) => place.toArray().every(Number.isFinite) && visible(place))));
   }
 
   /** Update after the runs have received more rows. */
   grow() {
     for (const actor of this.actors) {
-      const { trail, ghosts } = actor;
-      this.scene.remove(...trail.lines, ...(ghosts ? [ghosts.mesh] : []));
+      const { trail, ghosts, crosses } = actor;
+      this.scene.remove(...trail.lines, ...(ghosts ? [ghosts.mesh] : []), ...crosses.map((cross) => cross.object));
       Object.assign(actor, this.#past(actor));
       for (const line of actor.trail.lines) line.visible = trail.whole.visible;
       if (ghosts) actor.ghosts.mesh.visible = ghosts.mesh.visible;
       trail.dispose();
       ghosts?.dispose();
+      for (const cross of crosses) cross.dispose();
     }
     setDetail(this.scene, Boolean(this.shown?.coarse));
     this.cameras.cover(this.#box());
@@ -139,12 +150,13 @@ export class View {
   /** Set the poses of all bodies at a time. */
   update(time) {
     this.time = time;
-    for (const { run, body, object, trail, ghosts } of this.actors) {
+    for (const { run, body, object, trail, ghosts, crosses } of this.actors) {
       const { position, orientation } = run.pose(body, time);
       object.position.copy(position);
       object.quaternion.copy(orientation);
       trail.update(run.place(time).row, position);
       ghosts?.update(time);
+      for (const cross of crosses) cross.update(time);
     }
     this.light.target.position.copy(this.subject.position);
     this.light.position.copy(this.subject.position).addScaledVector(SUN, 10);

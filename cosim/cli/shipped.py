@@ -1,0 +1,76 @@
+"""Lists of what cosim ships: scenarios, sweeps, vehicle models, roles of controllers and KPIs."""
+
+from __future__ import annotations
+
+import ast
+from collections.abc import Callable, Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+
+from ..core import resources
+from ..core.json_values import parse_object
+
+#: module of the KPIs of any signal
+_KPI_MODULE = "cosim.kpis"
+
+
+@dataclass(frozen=True)
+class Entry:
+    """Shipped item.
+
+    Attributes:
+        name: name by which commands and scenarios refer to it.
+        description: one line.
+        file: file that defines it; that of a model describes it.
+    """
+
+    name: str
+    description: str
+    file: str
+
+
+def _list_documents(pattern: str) -> Iterator[Entry]:
+    """Yield the JSON files that match a pattern, with their "description"."""
+    for path in sorted(resources.root().glob(pattern)):
+        yield Entry(path.stem, parse_object(path.read_text(encoding="utf-8")).get("description", ""), str(path))
+
+
+def _list_models() -> Iterator[Entry]:
+    """Yield the models that are exported from equations and have a README file, with its title."""
+    from ..export.sources import find_sources
+
+    for source in find_sources(resources.root()):
+        readme = source.path.parent / "README.md"
+        if source.kind.name == "equations" and readme.is_file():
+            yield Entry(source.name, readme.read_text(encoding="utf-8").partition("\n")[0].lstrip("# "), str(readme))
+
+
+def _list_kpis() -> Iterator[Entry]:
+    """Yield the public functions of the files from which shipped scenarios name KPIs, and the first lines of their docstrings."""
+    for name, path in sorted(_kpi_files().items()):
+        for node in ast.parse(path.read_text(encoding="utf-8")).body:
+            if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
+                text = (ast.get_docstring(node) or "").partition("\n")[0]
+                yield Entry(f"{name}:{node.name}", text, str(path))
+
+
+def _kpi_files() -> dict[str, Path]:
+    """Return the files of KPI functions by their names relative to the folder of shipped files, or as modules."""
+    folder, files = resources.root() / "scenarios", {_KPI_MODULE: resources.package_folder() / "kpis.py"}
+    for scenario in folder.glob("*.json"):
+        kpis = parse_object(scenario.read_text(encoding="utf-8")).get("kpis", [])
+        for kpi in kpis if isinstance(kpis, list) else ():  # a scenario that extends another may change single KPIs
+            path = (folder / kpi["python"].rpartition(":")[0]).resolve()
+            if path.suffix == ".py":
+                files[path.relative_to(resources.root().resolve()).as_posix()] = path
+    return files
+
+
+#: function that yields the entries of each kind
+CATALOGUE: Mapping[str, Callable[[], Iterator[Entry]]] = {
+    "scenarios": lambda: _list_documents("scenarios/*.json"),
+    "sweeps": lambda: _list_documents("scenarios/sweeps/*.json"),
+    "models": _list_models,
+    "roles": lambda: _list_documents("scenarios/roles/*.json"),
+    "kpis": _list_kpis,
+}

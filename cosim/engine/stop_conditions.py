@@ -1,0 +1,108 @@
+"""Conditions on recorded signals that end a simulation."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+from typing import Any, NamedTuple
+
+import numpy as np
+
+from ..core.expressions import Expression, Reader
+from .layout import ArrayPosition
+from .plan import Plan
+from .settings import StopCondition, StopOutcome
+
+#: communication point that is never reached
+NEVER = (1 << 63) - 1
+
+
+class MetCondition(NamedTuple):
+    """Condition that ended the simulation.
+
+    Attributes:
+        condition: its name.
+        outcome: "crash" or "decided".
+        cause: the condition, or those operands of its outermost `or` that were met.
+        since: time of the first of the uninterrupted points at which the condition was met (s).
+        time: end of the simulation (s).
+    """
+
+    condition: str
+    outcome: StopOutcome
+    cause: str
+    since: float
+    time: float
+
+
+class StopConditions:
+    """Evaluation of the stop conditions of a plan at recorded communication points.
+
+    A condition ends the simulation at the first recorded point at which it has been met for its hold time: at this point, at an
+    earlier recorded point that lies at least the hold time back, and at all recorded points between them. Of several conditions
+    that end at the same point the first one counts. A condition without a value is not met.
+
+    Attributes:
+        begins: for each condition the first of the uninterrupted points at which it was met; None: it is not met now. These are
+            its state.
+        wake_point: communication point from which on a condition may have been met for its hold time.
+    """
+
+    def __init__(self, plan: Plan):
+        self._plan, self._conditions = plan, plan.settings.stop_conditions
+        self._evaluators = [condition.expression.bind(self._reader) for condition in self._conditions]
+        self._holds = [math.ceil(condition.hold / plan.grid.step) for condition in self._conditions]
+        self.begins: list[int | None] = [None] * len(self._conditions)
+        self.wake_point = NEVER
+
+    def __bool__(self) -> bool:
+        return bool(self._conditions)
+
+    def _position(self, name: str) -> ArrayPosition:
+        return self._plan.outputs.positions[self._plan.settings.columns[name]]
+
+    def _reader(self, name: str) -> Reader:
+        position = self._position(name)
+        values: Any = self._plan.outputs.arrays[position.dtype].data
+        index = position.offset
+        return lambda: float(values[index])
+
+    def monitored_values(self) -> Iterator[np.ndarray]:
+        """Yield an array of one element for each signal that a condition depends on."""
+        for name in dict.fromkeys(name for condition in self._conditions for name in condition.expression.names):
+            position = self._position(name)
+            yield self._plan.outputs.arrays[position.dtype][position.offset : position.offset + 1]
+
+    def check(self, n: int) -> MetCondition | None:
+        """Evaluate all conditions at the recorded communication point `n`, and return the one that ends the simulation."""
+        met = None
+        for k, evaluate in enumerate(self._evaluators):
+            value = evaluate()
+            if not value or math.isnan(value):
+                self.begins[k] = None
+                continue
+            begin = self.begins[k]
+            begin = self.begins[k] = n if begin is None else begin
+            if n - begin >= self._holds[k] and met is None:
+                met = self._describe(self._conditions[k], begin, n)
+        self._set_wake_point()
+        return met
+
+    def restore(self, begins: Sequence[int | None]) -> None:
+        """Restore a state."""
+        self.begins = list(begins)
+        self._set_wake_point()
+
+    def _set_wake_point(self) -> None:
+        pending = (begin + hold for begin, hold in zip(self.begins, self._holds, strict=True) if begin is not None)
+        self.wake_point = min(pending, default=NEVER)
+
+    def _describe(self, condition: StopCondition, begin: int, end: int) -> MetCondition:
+        parts = condition.expression.alternatives
+        cause = " or ".join(part.text for part in parts if self._is_met(part)) or condition.expression.text
+        time_at = self._plan.grid.time_at
+        return MetCondition(condition.name, condition.outcome, cause, time_at(begin), time_at(end))
+
+    def _is_met(self, expression: Expression) -> bool:
+        value = expression.bind(self._reader)()
+        return bool(value) and not math.isnan(value)

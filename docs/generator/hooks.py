@@ -1,0 +1,72 @@
+"""Hooks of MkDocs: the pages of the repository in their places, and the generated pages of the reference."""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Mapping
+from os.path import normpath
+from pathlib import Path
+
+from commands import commands_page
+from mkdocs.config.defaults import MkDocsConfig
+from mkdocs.structure.files import File, Files
+from pages import kpis_page, python_page, roles_page, scenarios_page, variables_page
+from schema_keys import scenario_keys_page, study_keys_page
+
+ROOT = Path(__file__).parents[2]
+#: documents outside of docs/ that the navigation contains; others are found by links
+STARTS = ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md", "plant_src/README.md")
+#: files that the theme loads
+ASSETS = ("docs/generator/assets/iframe-worker.js", "docs/generator/assets/site.css")
+#: generated pages
+REFERENCE = {
+    "commands": commands_page,
+    "scenario_keys": scenario_keys_page,
+    "study_keys": study_keys_page,
+    "python": python_page,
+    "variables": variables_page,
+    "roles": roles_page,
+    "kpis": kpis_page,
+    "scenarios": scenarios_page,
+}
+
+_LINK = re.compile(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)")
+_CODE = re.compile(r"`[^`\n]*`")
+
+
+def on_files(files: Files, config: MkDocsConfig) -> Files:
+    """Replace the files below docs/ by those of `repository_files`, and add the generated pages."""
+    site = Files([file for file in files if file.src_dir != config.docs_dir])
+    generated = {f"docs/reference/{name}.md": make_page() for name, make_page in REFERENCE.items()}
+    for name, text in generated.items():
+        site.append(File.generated(config, name, content=text))
+    for name in repository_files(generated):
+        site.append(File(name, str(ROOT), config.site_dir, config.use_directory_urls))
+    return site
+
+
+def on_page_markdown(markdown: str, **_: object) -> str:
+    """Remove the backslashes before bars in code, which only GitHub's tables need."""
+    return _CODE.sub(lambda code: code[0].replace(r"\|", "|"), markdown)
+
+
+def repository_files(generated: Mapping[str, str]) -> list[str]:
+    """Return the documents of the repository and all files that they link to, as paths relative to its root.
+
+    Args:
+        generated: texts of the generated pages by path; the files that they link to are returned too.
+
+    Raises:
+        FileNotFoundError: A document links to another document that does not exist.
+    """
+    pending = [*generated, *STARTS, *ASSETS, *(str(path.relative_to(ROOT)) for path in (ROOT / "docs").rglob("*.md"))]
+    found: set[str] = set()
+    while pending:
+        name = pending.pop()
+        if name in found:
+            continue
+        found.add(name)
+        if name.endswith(".md"):
+            text = generated[name] if name in generated else (ROOT / name).read_text(encoding="utf-8")
+            pending += [normpath(Path(name).parent / target) for target in _LINK.findall(text)]
+    return sorted(found.difference(generated))

@@ -1,0 +1,110 @@
+"""Reference of the Python interface, variables, roles, KPIs and shipped scenarios."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Iterator
+from itertools import groupby
+from pathlib import Path
+from typing import Any
+
+from markdown_parts import code, page, plain, table
+
+import cosim
+from cosim.cli.shipped import CATALOGUE, Entry
+from cosim.components.fmi import FmuFile
+from cosim.components.python_import import load_object
+from cosim.core import resources
+from cosim.core.component import Variable
+from cosim.studies.controller_bench.role import Role, read_role
+
+#: public names that the package `cosim` does not contain
+OTHERS = ("cosim.core.component.StepResult", "cosim.core.units.parse_unit")
+_CAUSALITIES = ("input", "output", "parameter")
+
+
+def python_page() -> str:
+    """Return the page with the public names of the package `cosim`."""
+    names = [f"cosim.{name}" for name in sorted(cosim.__all__, key=str.swapcase) if name != "__version__"]
+    return page("Python", *(f"::: {name}" for name in (*names, *OTHERS)))
+
+
+def variables_page() -> str:
+    """Return the page with the variables of the vehicle models."""
+    intro = (
+        "In a scenario with the plant, the variables of a vehicle `V` are `plant.V.NAME`. Controllers receive them as "
+        "`vehicle.NAME`. The world frame is east-north-up, the body frame forward-left-up; all quantities are in SI units."
+    )
+    return page("Variables", intro, *(_model_section(entry) for entry in CATALOGUE["models"]()))
+
+
+def _model_section(entry: Entry) -> str:
+    """Return the variables of the FMU of a model."""
+    variables = FmuFile(resources.root() / f"fmus/{entry.name}.fmu").description.variables
+    tables = (
+        f"**{causality.capitalize()}s**\n\n{table(('name', 'unit', 'start', 'meaning'), _variable_rows(variables, causality))}"
+        for causality in _CAUSALITIES
+    )
+    link = f"[Equations and parameters](../../plant_src/vehicles/{entry.name}/README.md)"
+    return "\n\n".join((f"## {entry.description}", f"Model `{entry.name}`. {link}", *tables))
+
+
+def _variable_rows(variables: Iterable[Variable], causality: str) -> Iterator[tuple[str, ...]]:
+    for variable in variables:
+        if variable.causality == causality:
+            unit = variable.unit.name if variable.unit else "1" if variable.type.startswith("Float") else variable.type
+            start = "" if variable.start is None or causality == "output" else f"{variable.start:g}"
+            yield code(variable.name), plain(unit), start, plain(variable.description)
+
+
+def roles_page() -> str:
+    """Return the page with the variables that a controller of each role receives and returns."""
+    intro = (
+        "A role is a place for a controller. A controller declares the inputs and parameters that it uses; it must have all "
+        "outputs. `cosim bench-controller CONTROLLER --role ROLE` runs a controller in every scenario with the role."
+    )
+    return page("Roles of controllers", intro, *(_role_section(read_role(entry.name)) for entry in CATALOGUE["roles"]()))
+
+
+def _role_section(role: Role) -> str:
+    kinds: dict[str, dict[str, Any]] = {"input": role.inputs, "output": role.outputs, "parameter": role.parameters}
+    rows = (
+        (kind, code(name), plain(unit.name) if unit else "")
+        for kind, variables in kinds.items()
+        for name, unit in variables.items()
+    )
+    return f"## {role.name}\n\n{plain(role.description)}\n\n{table(('kind', 'name', 'unit'), rows)}"
+
+
+def kpis_page() -> str:
+    """Return the page with the shipped KPI functions."""
+    intro = (
+        'A scenario names a KPI function under `"kpis"`; a relative path starts at the folder of the scenario. A value has the '
+        "name of the KPI in the scenario as its prefix. The unit `{signal}` is that of the signal that the argument names."
+    )
+    parts = [intro]
+    for file, entries in groupby(CATALOGUE["kpis"](), key=lambda entry: entry.name.rpartition(":")[0]):
+        parts.append(f"## {file}")
+        parts += [part for entry in entries for part in _kpi_parts(entry)]
+    return page("KPIs", *parts)
+
+
+def _kpi_parts(entry: Entry) -> Iterator[str]:
+    name, path = entry.name.rpartition(":")[2], Path(entry.file)
+    function = load_object(f"{path.name}:{name}", path.parent)
+    units, senses = getattr(function, "units", {}), getattr(function, "better", {})
+    rows = ((code(value), code(units.get(value, "")), senses.get(value, "")) for value in dict.fromkeys((*units, *senses)))
+    yield f"::: {entry.name.partition(':')[0].removesuffix('.py').replace('/', '.')}.{name}"
+    yield table(("value", "unit", "better"), rows)
+
+
+def scenarios_page() -> str:
+    """Return the page with the shipped scenarios, sweeps and tunings."""
+    scenarios, studies = CATALOGUE["scenarios"](), CATALOGUE["sweeps"]()
+    return page(
+        "Shipped scenarios",
+        "`cosim run NAME` runs a scenario, `cosim sweep NAME` and `cosim tune NAME` a study. `cosim list` prints these lists.",
+        *(
+            table((kind, "content"), ((code(each.name), plain(each.description)) for each in entries))
+            for kind, entries in (("scenario", scenarios), ("study", studies))
+        ),
+    )

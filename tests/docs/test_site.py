@@ -1,0 +1,59 @@
+"""The documentation site is built without warnings, is complete, and needs no network."""
+
+import re
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+from chromium import open_browser
+
+from cosim.cli import COMMANDS
+from cosim.scenario import json_schema
+
+ROOT = Path(__file__).parents[2]
+
+
+@pytest.fixture(scope="module")
+def site(tmp_path_factory):
+    pytest.importorskip("mkdocs")
+    folder = tmp_path_factory.mktemp("site")
+    command = [sys.executable, "-m", "mkdocs", "build", "--strict", "--quiet", "--site-dir", str(folder)]
+    done = subprocess.run(command, cwd=ROOT, capture_output=True, text=True, check=False)
+    assert done.returncode == 0, done.stdout + done.stderr
+    return folder
+
+
+def text_of(page):
+    return re.sub(r"<[^>]*>", "", page.read_text())
+
+
+def test_the_reference_is_complete(site):
+    reference = site / "docs/reference"
+    commands = (reference / "commands.html").read_text()
+    assert all(f'id="cosim-{name}"' in commands for name in COMMANDS)
+    keys = text_of(reference / "scenario_keys.html")
+    schemas = [json_schema(), json_schema(nested=True)]
+    parts = [part for schema in schemas for part in (schema, *schema["$defs"].values())]
+    assert all(key in keys for part in parts for key in part["properties"])
+    assert "landing_waves" in text_of(reference / "scenarios.html")
+    assert "usv_autopilot" in text_of(reference / "roles.html")
+    assert "rotor_speed[1]" in text_of(reference / "variables.html")
+    assert "touchdown_speed" in text_of(reference / "kpis.html")
+    assert "cosim.run" in text_of(reference / "python.html")
+
+
+def test_pages_are_read_and_searched_as_files_without_a_network(site):
+    """The browser has no network and opens no other address than files."""
+    for page in site.rglob("*.html"):
+        assert not re.search(r'<(script|link|img)[^>]*(src|href)="?(https?:)?//', page.read_text()), page
+    with open_browser(flags=()) as browser:
+        context = browser.new_context(offline=True, viewport={"width": 1300, "height": 700})
+        page, requests = context.new_page(), []
+        page.on("request", lambda request: requests.append(request.url))
+        page.goto((site / "index.html").as_uri())
+        page.click("input[name=query]")
+        page.keyboard.type("waypoint_count", delay=20)
+        page.wait_for_function("document.querySelector('.md-search-result__meta').innerText.includes('matching')")
+        assert page.locator(".md-search-result__link").count() > 0
+    assert {url.partition(":")[0] for url in requests} <= {"file", "data", "blob"}

@@ -1,0 +1,148 @@
+"""Conditions on recorded signals that end a simulation, in both executors."""
+
+from __future__ import annotations
+
+from fractions import Fraction
+from typing import Any
+
+import numpy as np
+import pytest
+from fakes import FakeComponent, outputs
+from systems import endpoint, make_system
+
+from cosim.core.component import StepResult, Variable
+from cosim.core.expressions import parse_condition
+from cosim.core.time_grid import exact_fraction
+from cosim.engine import EXECUTORS, compile_plan
+from cosim.engine.plan_run import PlanRun, SimulationOutcome
+from cosim.engine.run_loop import simulate
+from cosim.engine.settings import Event, Settings, StopCondition
+
+
+def series(values: list[float], crash_after: float = 1e9) -> FakeComponent:
+    """A component whose output y at t = n/10 s is values[n]; `flag` is true from `crash_after` (s) on."""
+    variables = [*outputs("y"), Variable("flag", "Boolean", "output"), Variable("gain", causality="input", start=1.0)]
+
+    def step(state: dict[str, Any], time: float, step_size: float) -> None:
+        state["y"] = values[round((time + step_size) * 10)] * state["gain"]
+        state["flag"] = time + step_size >= crash_after - 1e-9
+
+    return FakeComponent(variables, step, start={"y": values[0], "flag": crash_after <= 0.0})
+
+
+def stop(when: str, hold: float | str = 0, name: str = "end", **more: Any) -> StopCondition:
+    return StopCondition(name, parse_condition(when), exact_fraction(hold), **more)
+
+
+def run(component: FakeComponent, *stops: StopCondition, steps: int = 50, kind: Any = "auto", **more: Any) -> SimulationOutcome:
+    columns = {name: endpoint(name) for name in ("a.y", "a.flag")}
+    settings = Settings(Fraction(0), Fraction(steps, 10), Fraction(1, 10), columns, stop_conditions=stops, executor=kind, **more)
+    outcome = simulate(make_system({"a": component}), settings)
+    assert outcome.failure is None
+    return outcome
+
+
+@pytest.mark.parametrize("kind", EXECUTORS)
+def test_the_run_ends_with_the_row_at_which_a_condition_has_been_met_for_its_hold_time(kind: Any) -> None:
+    values = [0, 1, 1, 0, 1, 1, 1, 1, 0, 0] * 6
+    outcome = run(series(values), stop("a.y > 0.5", hold=0.3), kind=kind)
+    assert outcome.termination is not None
+    assert outcome.termination.condition is not None
+    assert outcome.termination.condition._asdict() == {
+        "condition": "end",
+        "outcome": "decided",
+        "cause": "a.y > 0.5",
+        "since": 0.4,
+        "time": 0.7,
+    }
+    assert outcome.recording.time[-1] == 0.7
+    assert outcome.macro_steps == 7
+    assert outcome.recording.columns["a.y"].tolist() == values[:8]
+
+
+def first_end(values: list[float], hold: int, every: int) -> int | None:
+    """Return the end by definition: the first recorded point that ends an uninterrupted series of `hold` steps or more."""
+    begin = None
+    for n in range(0, len(values), every):
+        begin = None if values[n] <= 0 else n if begin is None else begin
+        if begin is not None and n - begin >= hold:
+            return n
+    return None
+
+
+@pytest.mark.parametrize("kind", EXECUTORS)
+@pytest.mark.parametrize("every", [1, 3])
+def test_the_end_is_that_of_the_definition(kind: Any, every: int) -> None:
+    generator = np.random.default_rng(every)
+    for hold in (0, 1, 2, 3, 5, 8):
+        values = generator.choice([0.0, 0.0, 1.0, 1.0, 1.0, 2.0], 61).tolist()
+        settings = {"record_interval": Fraction(every, 10)}
+        outcome = run(series(values), stop("a.y > 0", hold=f"{hold}/10"), steps=60, kind=kind, **settings)
+        expected = first_end(values, hold, every)
+        assert outcome.macro_steps == (60 if expected is None else expected)
+        assert len(outcome.recording.time) == outcome.macro_steps // every + 1
+
+
+@pytest.mark.parametrize("kind", EXECUTORS)
+def test_a_condition_can_end_the_run_at_its_start(kind: Any) -> None:
+    outcome = run(series([1.0] * 60), stop("a.y == 1"), kind=kind)
+    assert (outcome.macro_steps, outcome.recording.time.tolist()) == (0, [0.0])
+
+
+@pytest.mark.parametrize("kind", EXECUTORS)
+def test_the_first_condition_to_end_counts_and_the_cause_names_what_was_met(kind: Any) -> None:
+    stops = stop("a.y > 20", name="far"), stop("a.flag or a.y < -1", hold=0.2, name="crash", outcome="crash")
+    outcome = run(series([float(k) for k in range(60)], crash_after=1.2), *stops, kind=kind)
+    assert outcome.termination is not None
+    assert outcome.termination.condition == ("crash", "crash", "a.flag", 1.2, 1.4)
+
+
+@pytest.mark.parametrize("kind", EXECUTORS)
+def test_a_condition_without_a_value_is_not_met(kind: Any) -> None:
+    outcome = run(series([0.0] * 60), stop("1 / a.y > 0"), stop("not (1 / a.y > 0)"), kind=kind)
+    assert (outcome.macro_steps, outcome.termination) == (50, None)
+
+
+@pytest.mark.parametrize("kind", EXECUTORS)
+def test_the_end_comes_before_an_event_at_the_same_point(kind: Any) -> None:
+    component = series([0.0, 0.0, 1.0] + [0.0] * 60)
+    run(component, stop("a.y > 0"), kind=kind, events=[Event(Fraction(2, 10), {"a": {"gain": 5.0}})])
+    assert "set gain" not in component.calls
+
+
+@pytest.mark.parametrize("kind", EXECUTORS)
+def test_runs_in_single_steps_end_at_the_same_point(kind: Any) -> None:
+    settings = {"real_time": 1000.0}
+    outcome = run(series([0.0] * 10 + [1.0] * 60), stop("a.y > 0", hold=0.5), kind=kind, **settings)
+    assert outcome.macro_steps == 15
+
+
+@pytest.mark.parametrize("kind", EXECUTORS)
+def test_the_request_of_a_component_at_the_same_point_counts(kind: Any) -> None:
+    component = series([0.0, 1.0, 1.0])
+    component._step = lambda _values, time, step: StepResult(time + step, terminate_requested=True)
+    outcome = run(component, stop("a.y >= 0", hold=0.1), kind=kind)
+    assert outcome.termination == ("a", 0.1, True, None)
+
+
+@pytest.mark.parametrize("kind", EXECUTORS)
+@pytest.mark.parametrize("saved_at", [3, 6, 8])
+def test_a_restored_run_ends_at_the_same_point(kind: Any, saved_at: int) -> None:
+    """The condition has been met since point 5; the run ends at point 9, also after a later end was undone."""
+    component = series([0.0] * 5 + [1.0] * 60)
+    columns = {name: endpoint(name) for name in ("a.y", "a.flag")}
+    stops = [stop("a.y > 0", hold=0.4)]
+    settings = Settings(Fraction(0), Fraction(5), Fraction(1, 10), columns, stop_conditions=stops, executor=kind)
+    simulation = PlanRun(compile_plan(make_system({"a": component}), settings))
+    try:
+        simulation.initialize()
+        simulation.advance(saved_at)
+        state = simulation.save()
+        for _ in range(2):
+            simulation.advance(50)
+            assert simulation.executor.completed_steps == 9
+            assert simulation.executor.termination is not None
+            simulation.restore(state)
+            assert simulation.executor.termination is None
+    finally:
+        simulation.close()
