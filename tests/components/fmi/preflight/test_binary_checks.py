@@ -215,8 +215,10 @@ def test_another_platform_is_reported_with_the_existing_ones(fmu):
     assert FmuFile(path).description.platforms == ["win64"]
 
 
-def test_sources_alone_are_no_binary(fmu):
-    assert "it has: c-code" in refusal_message(fmu(b"int x;", "sources/model.c"))
+def test_sources_alone_are_compiled_when_the_fmu_is_used(fmu):
+    path = fmu(b"int x;", "sources/model.c")
+    assert FmuFile(path).must_be_compiled
+    assert [(f.rule.name, f.rule.severity) for f in find_problems(path)] == [("binary.sources-only", "warning")]
 
 
 def test_the_library_must_have_the_name_of_the_model_identifier(good, fmu):
