@@ -163,11 +163,11 @@ def load_scenario(
     document = open_scenario(scenario)
     problems: list[Problem] = []
     variables: dict[str, Any] = {}
-    change = relocating(Path(), None) if folder is None else relocating(folder, document.file.parent)
     for name, value in (settings or {}).items():
         if text := next(_text_problems([name, value]), ""):
             problems.append(Problem(text, f'setting "{shorten(acceptable_text(name))}"'))
         elif name.startswith("/"):
+            change = relocating(Path(), None) if folder is None else relocating(folder, document.file.parent)
             if text := json_pointer.set_value(document.value, name, change_pointed(name, value, change)):
                 problems.append(Problem(text, f'setting "{name}"'))
         else:

@@ -9,6 +9,7 @@ import pytest
 from cosim_command import run_cosim
 
 import cosim
+from cosim.core.resources import root
 
 FIRST_CONTROLLER = """
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real
@@ -60,7 +61,7 @@ def test_a_first_controller_that_falls_into_the_sea_ends_with_its_cause(tmp_path
 
 
 def test_without_the_condition_the_fall_goes_on_and_kpis_tell_it(settings: dict[str, object]) -> None:
-    kpi = {"name": "uav", "python": "../plant_src/kpis.py:failures", "arguments": {"vehicle": "plant.uav"}}
+    kpi = {"name": "uav", "python": f"{root()}/plant_src/kpis.py:failures", "arguments": {"vehicle": "plant.uav"}}
     result = cosim.run("demo1_box", {**settings, "/stop_when": [], "/kpis": [kpi], "/checks": []})
     assert result.time[-1] == 40.0
     assert result["plant.uav.position.z"][-1] < -4000

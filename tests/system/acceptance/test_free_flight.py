@@ -3,6 +3,7 @@
 import numpy as np
 
 import cosim
+from cosim.core.resources import root
 
 MOTION = [
     *(f"{group}.{axis}" for group in ("position", "velocity") for axis in "xyz"),
@@ -11,7 +12,7 @@ MOTION = [
 ]
 
 WORLD = {
-    "python": "../plant_src/world.py:World",
+    "python": f"{root()}/plant_src/world.py:World",
     "arguments": {
         "vehicles": {
             "quadcopter": {"model": "ar_drone", "position": [-5.0, 1.0, 2.0], "yaw": 1.5707963267948966},

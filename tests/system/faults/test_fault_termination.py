@@ -43,7 +43,7 @@ def test_the_report_names_component_and_time(fmus, runner, tmp_path, version):
     done = runner.cosim(tmp_path, "run", scenario(tmp_path, fmus(version, "DoStep 6 terminate")), "--output-dir", "out")
     assert done.code == 0, done.err
     page = (tmp_path / "out/report.html").read_text()
-    assert "<dt>ended by</dt><dd>lag at 0.06 s</dd>" in page
+    assert "<dt>end</dt><dd>lag requested the end of the simulation at t = 0.06 s</dd>" in page
 
 
 def test_a_result_in_python_says_so(fmus, tmp_path, version):
@@ -66,7 +66,7 @@ def test_a_regression_that_passes_says_so(fmus, runner, tmp_path, version):
     file = scenario(tmp_path, fmus(version, "DoStep 6 terminate"), kpis=kpis, checks=LAST_VALUE)
     done = runner.cosim(tmp_path, "regress", file)
     assert done.code == 0, done.err
-    assert f"1 checks; {SENTENCE.format('lag', 0.06)}" in done.out
+    assert f"1 check; {SENTENCE.format('lag', 0.06)}" in done.out
 
 
 def test_of_two_fmus_that_request_it_the_first_is_named(fmus, runner, tmp_path, version):

@@ -16,7 +16,7 @@ from pathlib import Path
 
 import cosim
 
-NO_OUTPUTS = {"/record": {"signals": []}, "/kpis": [], "/checks": [], "/figures": []}
+NO_OUTPUTS = {"/record": {"signals": []}, "/stop_when": [], "/kpis": [], "/checks": [], "/figures": []}
 
 
 def resource_usage() -> dict[str, int]:
