@@ -4,7 +4,7 @@
 - Objects are merged key by key. Every other value replaces that of the base. `null` removes a key.
 - The lists `connections`, `kpis`, `figures` and `checks` of the base are changed by an object whose keys are the names of
   elements: `to`, `name`, `name` and `kpi`. New names are appended.
-- A component has one source: a source of another kind replaces that of the base and its `arguments`.
+- A component that gets a source of another kind inherits only `period`, and `isolation` where it is valid.
 - `name`, `description`, `reference` and `$schema` describe the base alone and are not inherited.
 """
 
@@ -112,7 +112,8 @@ class _Merger:
             if path in KEYED_LISTS:
                 return self._merge_list(str(path[0]), KEYED_LISTS[path], old if isinstance(old, list) else [], new)
             if len(path) == 2 and path[0] == "components" and isinstance(old, dict):
-                old = _without_other_sources(old, new)
+                source = next((each for each in SOURCES if new.get(each) is not None), None)
+                old = inherited_component(old, source) if source else old
             return self.merge_objects(path, old if isinstance(old, dict) else {}, new, old_path, new_path)
         return self._copy(self._document, path, new, new_path)
 
@@ -159,9 +160,9 @@ class _Merger:
         self.problems.append(Problem(text, self._document.where(path)))
 
 
-def _without_other_sources(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
-    """Return a component of the base without its source and arguments, if the new one has a source of another kind."""
-    given = [source for source in SOURCES if new.get(source) is not None]
-    if not given or given[0] in old:
-        return dict(old)
-    return {key: value for key, value in old.items() if key not in (*SOURCES, "arguments")}
+def inherited_component(component: Mapping[str, Any], source: str) -> dict[str, Any]:
+    """Return what a component with a source of the kind `source` inherits: all of it, unless its source is of another kind."""
+    if source in component or not any(each in component for each in SOURCES):
+        return dict(component)
+    kept = ("period", "isolation") if source in ("fmu", "modelica") else ("period",)
+    return {key: component[key] for key in kept if key in component}

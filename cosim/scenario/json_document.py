@@ -47,15 +47,19 @@ class Document:
     bases: tuple[Path, ...] = ()
     #: Python classes and objects by the names of the components that they implement; only in a scenario that is a dict
     objects: Mapping[str, Any] = field(default_factory=dict)
+    #: JSON pointers of the caller's settings by the paths of the values that they set
+    settings: dict[JsonPath, str] = field(default_factory=dict)
     #: the scenario is a dict and no file; `file` lies in the folder from which relative paths start
     is_dict: bool = False
 
     def where(self, path: Sequence[str | int]) -> str:
         """Return "file:line:column: $.json.path", with the position of the deepest part of `path` that exists.
 
-        File and JSON path are those in which the value was written.
+        File and JSON path are those in which the value was written. For a value that the caller has set it is its JSON pointer.
         """
         known = tuple(path)
+        if pointer := next((self.settings[known[:n]] for n in range(len(known), 0, -1) if known[:n] in self.settings), None):
+            return f'setting "{pointer}"' + ("" if known in self.settings else f": {json_path(path)}")
         while known and self.origins and known not in self.origins:
             known = known[:-1]
         if origin := self.origins.get(known):

@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+#: keys of objects that are created when a value in them is set
+_OPTIONAL_OBJECTS = ("parameters", "arguments")
+
 
 def pointer_keys(pointer: str) -> list[str]:
     """Return the keys and indices of a JSON pointer.
@@ -32,9 +35,15 @@ def find_value(value: Any, keys: Sequence[str]) -> tuple[Any, int]:
 
 
 def set_value(document: Any, pointer: str, value: Any) -> str:
-    """Set a value in a JSON document; only the last key of the pointer may be new. Return the problem, or ""."""
+    """Set a value in a JSON document; only the last key, and "parameters" or "arguments" before it, may be new.
+
+    Returns:
+        The problem, or "".
+    """
     keys = pointer_keys(pointer)
     target, depth = find_value(document, keys[:-1])
+    if depth == len(keys) - 2 and keys[depth] in _OPTIONAL_OBJECTS and isinstance(target, dict):
+        target, depth = target.setdefault(keys[depth], {}), depth + 1
     if depth < len(keys) - 1:
         return f'the scenario has no "/{"/".join(keys[: depth + 1])}"'
     if isinstance(target, dict):
@@ -44,3 +53,12 @@ def set_value(document: Any, pointer: str, value: Any) -> str:
     else:
         return f'the scenario has no "{pointer}"'
     return ""
+
+
+def value_path(document: Any, pointer: str) -> tuple[str | int, ...]:
+    """Return the keys and indices that lead to an existing value, with indices of lists as integers."""
+    path: list[str | int] = []
+    for key in pointer_keys(pointer):
+        path.append(int(key) if isinstance(document, list) else key)
+        document = document[path[-1]]
+    return tuple(path)

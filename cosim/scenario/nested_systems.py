@@ -3,10 +3,8 @@
 from __future__ import annotations
 
 import copy
-import json
-import math
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -15,16 +13,17 @@ from ..components.python_import import package_files
 from ..core import paths
 from ..core.errors import InputError, Problem
 from ..core.size_limits import MAX_LEVELS
-from ..core.text import acceptable_text, shorten, text_problem
+from ..core.text import shorten
 from . import json_pointer
 from .dict_document import document_of_dict
 from .evaluation_schema import CallSpec
 from .expanded_size import SystemFile, check_expanded_size
 from .extension import expand_document, read_system_document
-from .file_paths import change_paths, change_pointed, find_scenario, relocating
+from .file_paths import change_paths, find_scenario, relocating
 from .json_document import Document
 from .schema import NestedSpec, PortsSpec, ScenarioSpec, SystemSpec, ports_of
 from .schema_types import accepted
+from .settings import apply_settings
 from .validation import validate_document
 
 _LEGAL_NAME = re.compile("[A-Za-z_][A-Za-z0-9_]*")
@@ -161,17 +160,7 @@ def load_scenario(
             the result.
     """
     document = open_scenario(scenario)
-    problems: list[Problem] = []
-    variables: dict[str, Any] = {}
-    for name, value in (settings or {}).items():
-        if text := next(_text_problems([name, value]), ""):
-            problems.append(Problem(text, f'setting "{shorten(acceptable_text(name))}"'))
-        elif name.startswith("/"):
-            change = relocating(Path(), None) if folder is None else relocating(folder, document.file.parent)
-            if text := json_pointer.set_value(document.value, name, change_pointed(name, value, change)):
-                problems.append(Problem(text, f'setting "{name}"'))
-        else:
-            variables[name] = value
+    variables, problems = apply_settings(document, settings or {}, folder)
     reader = _SystemReader()
     file = reader.read(document, ScenarioSpec, ())
     check_expanded_size(file)
@@ -241,50 +230,3 @@ def _make_node(file: SystemFile, prefix: str = "") -> Node:
     node = Node(file.document, file.spec, prefix, {}, set(file.invalid_components), set(file.invalid_keys))
     node.children = {name: _make_node(child, node.full_name(name)) for name, child in file.children.items()}
     return node
-
-
-def _text_problems(value: Any) -> Iterator[str]:
-    """Yield the problems of the texts in a JSON value."""
-    if isinstance(value, str) and (problem := text_problem(value)):
-        yield problem
-    elif isinstance(value, dict | list):
-        for part in value if isinstance(value, list) else (*value, *value.values()):
-            yield from _text_problems(part)
-
-
-def parse_settings(settings: Sequence[str]) -> dict[str, Any]:
-    """Return the values of `NAME=value` texts by name. A value that is not JSON is taken as text.
-
-    Raises:
-        InputError: A text has no name or no "=", or a number is not finite.
-    """
-    parsed: dict[str, Any] = {}
-    problems = []
-    for text in settings:
-        name, separator, value = text.partition("=")
-        if not separator or not name:
-            problems.append(Problem(f'expected NAME=value, found "{text}"'))
-            continue
-        try:
-            parsed[name] = _parse_json_or_text(value)
-            if not _is_finite(parsed[name]):
-                problems.append(Problem(f"expected finite numbers, found {shorten(value)}", name))
-        except RecursionError:
-            problems.append(Problem("nested too deeply", name))
-    if problems:
-        raise InputError(problems)
-    return parsed
-
-
-def _parse_json_or_text(text: str) -> Any:
-    try:
-        return json.loads(text)
-    except ValueError:
-        return text
-
-
-def _is_finite(value: Any) -> bool:
-    """Return True if all numbers in a JSON value are finite."""
-    if isinstance(value, dict | list):
-        return all(map(_is_finite, value.values() if isinstance(value, dict) else value))
-    return not isinstance(value, float) or math.isfinite(value)

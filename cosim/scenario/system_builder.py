@@ -25,6 +25,7 @@ from .name_resolution import SlotIndex, UnknownNameError, check_assignment, reso
 from .named_functions import find_function_problems
 from .nested_systems import Node, Scenario
 from .recorded_signals import SignalSelector
+from .schema import SOURCES
 from .schema_types import accepted
 from .stages import parallel_mode, root_stages
 from .stop_conditions import StopConditionReader
@@ -124,7 +125,7 @@ class SystemBuilder:
                 scalars += count_scalars(component.variables)
             except InputError as error:
                 node.invalid_components.add(name)
-                self._add_problems(error, node, "components", name)
+                self._add_source_problems(error, node, name)
             noun = f"variables and elements of arrays up to {node.full_name(name)}"
             require_at_most(MAX_SCALARS, scalars, noun, node.where("components", name))
         self.profiles = [f"{PROFILE_PREFIX}.{i}" for i, _ in accepted(self.spec.inputs)]
@@ -261,6 +262,14 @@ class SystemBuilder:
             else problem
             for problem in error.problems
         ]
+
+    def _add_source_problems(self, error: InputError, node: Node, name: str) -> None:
+        """Add the problems of a component; those without a subject belong to its source if the caller has set the source."""
+        source = next(each for each in SOURCES if getattr(node.spec.components[name], each) is not None)
+        path = ("components", name, source)
+        where = node.where(*path) if path in node.document.settings else ""
+        problems = [each if each.subject else replace(each, where=each.where or where) for each in error.problems]
+        self._add_problems(InputError(problems), node, "components", name)
 
     def _is_consequence(self, problem: Problem) -> bool:
         """Return True if a problem with times only follows from an invalid start time, stop time or step size."""

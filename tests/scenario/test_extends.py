@@ -68,9 +68,13 @@ def test_named_elements_of_lists_are_changed_by_an_object(extend):
     assert value["checks"] == [{"kpi": "mean.value", "min": 0}]
 
 
-def test_a_new_source_replaces_the_old_one(extend):
-    value = expanded(extend(components={"b": {"fmu": "my.fmu", "period": 1}}))
-    assert value["components"]["b"] == {"fmu": "my.fmu", "period": 1}
+def test_a_source_of_another_kind_replaces_the_component(extend):
+    base = {"a": {"period": 1}, "b": {"parameters": {"k": 3.0}, "period": 1}}
+    middle = extend("middle.json", components=base)
+    other = expanded(extend(extends=middle.name, components={"a": {"fmu": "a.fmu"}, "b": {"fmu": "b.fmu", "tolerance": 1e-3}}))
+    assert other["components"] == {"a": {"period": 1, "fmu": "a.fmu"}, "b": {"period": 1, "fmu": "b.fmu", "tolerance": 1e-3}}
+    same = expanded(extend(extends=middle.name, components={"b": {"python": "b.py:B"}}))
+    assert same["components"]["b"] == {"python": "b.py:B", "parameters": {"k": 3.0}, "period": 1}
 
 
 def test_what_describes_the_base_is_not_inherited(folder, base, extend):
@@ -148,6 +152,35 @@ def test_settings_act_on_the_expanded_scenario(extend):
     result = cosim.run(extend(), parameters={"/checks/0/max": 3.0, "a.u": 2.0, "/components/b/parameters": {"k": 1.0}})
     assert result.kpis["end.value"] == 4.0
     assert [check.passed for check in result.checks] == [False]
+
+
+def test_a_setting_replaces_a_component_by_a_source_of_another_kind(folder, extend):
+    nested = {"components": {"g": folder.block("Gain")}, "ports": {"inputs": {"u": "g.u"}, "outputs": {"y": "g.y"}}}
+    folder.write({**nested, "name": "gain"}, "mine.json")
+    file = extend(components={"b": {"parameters": {"not_of_the_nested_system": 3.0}}})
+    source = {"/components/b/system": str(folder.path / "mine.json")}
+    assert cosim.run(file, parameters=source)["b.y"].tolist() == [0, 4, 4, 4]
+    (problem,) = folder.problems_of(file, parameters={"/components/b/parameters/v": 1.0, **source})
+    assert problem.startswith('setting "/components/b/parameters/v": nested system "b" has no parameter port "v"')
+
+
+def test_a_problem_of_a_setting_is_located_at_the_setting(folder, extend):
+    file = extend()
+    cases = {
+        "/components/b/python": ("my.py:Class", 'setting "/components/b/python": file "my.py" does not exist'),
+        "/components/b/fmu": ("my.fmu", 'setting "/components/b/fmu": FMU "my.fmu" does not exist'),
+        "/components/b": ({"fmu": "my.fmu", "perod": 1}, 'setting "/components/b": $.components.b.perod: unknown key'),
+        "/checks/0/max": ("high", 'setting "/checks/0/max": expected a valid number; found "high"'),
+    }
+    for pointer, (value, problem) in cases.items():
+        value = str(folder.path / value) if isinstance(value, str) and value.startswith("my") else value
+        assert folder.problems_of(file, parameters={pointer: value})[0].startswith(problem)
+
+
+def test_a_setting_creates_missing_parameters(folder, extend):
+    assert cosim.run(extend(), parameters={"/components/b/parameters/k": 5.0}).kpis["end.value"] == 10.0
+    (problem,) = folder.problems_of(extend(), parameters={"/components/b/parametres/k": 5.0})
+    assert problem == 'setting "/components/b/parametres/k": the scenario has no "/components/b/parametres"'
 
 
 def test_inherited_checks_make_a_regression_test(extend):

@@ -68,7 +68,7 @@ def command(
     compare all KPIs with those of the shipped controller and of the candidate's last run. Exit code 0: all checks passed; 1: a
     component failed; 2: the controller's variables do not fit the role; 3: a check failed.
     """
-    from ...scenario.nested_systems import parse_settings
+    from ...scenario.settings import parse_settings
     from ...studies.controller_bench.candidate import parse_source
     from ...studies.controller_bench.ranking import rank
 

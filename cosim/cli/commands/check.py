@@ -46,8 +46,9 @@ def command(
     scenario that runs anywhere on this machine.
     """
     from ...scenario import load
-    from ...scenario.nested_systems import load_scenario, parse_settings
+    from ...scenario.nested_systems import load_scenario
     from ...scenario.plausibility import find_warnings
+    from ...scenario.settings import parse_settings
 
     fmu_isolation: Literal["fmu", "none"] = "fmu" if isolation == "fmu" else "none"
     prepared = load(scenario, parse_settings(settings), isolation=fmu_isolation, sandbox=bool(sandbox))

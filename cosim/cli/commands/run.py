@@ -93,7 +93,7 @@ def command(isolation: str, sandbox: str | None, view: bool, view_port: int, **o
 def _sandbox_paths(options: RunOptions) -> tuple[list[Path], Path | None]:
     """Return the files that the command reads, and its output directory (None if the scenario is invalid)."""
     from ...scenario import load_scenario
-    from ...scenario.nested_systems import parse_settings
+    from ...scenario.settings import parse_settings
 
     loaded = load_scenario(options.scenario, parse_settings(options.settings))
     return loaded.files(), None if loaded.problems else options.output_folder(loaded.spec.name).absolute()
@@ -142,7 +142,7 @@ def _drawing_process(options: RunOptions) -> Iterator[DrawingProcess | None]:
         return
     from ...report.drawing_process import DrawingProcess
     from ...scenario import import_figures
-    from ...scenario.nested_systems import parse_settings
+    from ...scenario.settings import parse_settings
 
     settings = parse_settings(options.settings)
     with DrawingProcess(lambda: import_figures(options.scenario, settings)) as process:
@@ -164,8 +164,8 @@ def _require_packages(options: RunOptions) -> None:
 def _load(options: RunOptions, real_time: float | None) -> Simulation:
     """Load the scenario and print warnings about it."""
     from ...api import load
-    from ...scenario.nested_systems import parse_settings
     from ...scenario.plausibility import find_run_warnings
+    from ...scenario.settings import parse_settings
     from .. import messages
 
     simulation = load(

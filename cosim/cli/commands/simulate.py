@@ -86,7 +86,7 @@ def _simulate(
     from ...results.files import check_writable, remove_files
     from ...results.non_finite import warn_non_finite
     from ...results.result import describe_termination
-    from ...scenario.nested_systems import parse_settings
+    from ...scenario.settings import parse_settings
     from .. import messages
 
     messages.print_log()
