@@ -188,6 +188,15 @@ def test_entries_about_missing_variables_are_removed_and_noted(folder):
     assert "reference" not in written
 
 
+def test_equal_notes_of_several_scenarios_are_one_line(folder):
+    (folder / "scenarios/row.json").write_text(json.dumps({**SAIL, "name": "row"}))
+    note = '"usv.waypoint_count" is left out: the candidate has no such variable'
+    brief, full = bench(folder, keeper(folder)).stdout, bench(folder, keeper(folder), "--verbose").stdout
+    assert f"note: 2 scenarios: {note}" in brief
+    assert brief.count(note) == 1
+    assert all(f"note: {name}: {note}" in full for name in ("row", "sail"))
+
+
 @pytest.fixture(scope="module")
 def fault_libraries(tmp_path_factory):
     library = tmp_path_factory.mktemp("fault")

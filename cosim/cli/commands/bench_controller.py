@@ -13,6 +13,7 @@ import click
 
 from ...core.errors import InputError, Problem
 from ...core.processors import available_processors
+from ...core.text import count_noun
 from ...studies.regression_runs import check_unique_names, default_folder, find_scenario_files
 from .. import current_command_line, supervision
 from ..bench_table import print_comparison, print_ranking
@@ -94,8 +95,7 @@ def command(
     if as_json:
         _print_json(candidate.name, role, results, prepared["notes"], ranking)
     else:
-        for note in prepared["notes"]:
-            click.echo(f"note: {note}")
+        _print_notes(prepared["notes"])
         print_ranking(ranking, candidate.name)
     return min((result.outcome.code for result in results), key=EXIT_CODE_SEVERITY.index)
 
@@ -139,6 +139,17 @@ def _print_trial(result: TrialResult, candidate: str) -> None:
     print_outcome(result.outcome)
     if current_command_line().verbosity > 0:
         print_comparison(result.rows(), candidate)
+
+
+def _print_notes(notes: Sequence[str]) -> None:
+    """Print what is left out of the scenarios; equal notes of several scenarios on one line, unless --verbose is given."""
+    scenarios: dict[str, list[str]] = {}
+    for name, _, text in (note.partition(": ") for note in notes):
+        scenarios.setdefault(text, []).append(name)
+    for text, names in scenarios.items():
+        is_grouped = len(names) > 1 and current_command_line().verbosity <= 0
+        for where in [count_noun(len(names), "scenario")] if is_grouped else names:
+            click.echo(f"note: {where}: {text}")
 
 
 def _print_json(candidate: str, role: str, results: Sequence[TrialResult], notes: Sequence[str], ranking: Ranking) -> None:
