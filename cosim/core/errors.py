@@ -166,12 +166,15 @@ def join_alternatives(names: Iterable[str]) -> str:
 def did_you_mean(name: str, valid: Iterable[str]) -> str:
     """Return a hint for the end of a message: the most similar valid name, else up to 8 valid names, else "".
 
-    A name that differs by two swapped neighbouring letters counts as the most similar one.
+    A name that differs by two swapped neighbouring letters counts as the most similar one. For a name with dots, names that begin
+    with the same component come first; others must be nearly equal.
 
     >>> did_you_mean("stop_tme", ["start_time", "stop_time"])
     '; did you mean "stop_time"?'
     >>> did_you_mean("uva", ["usv", "uav"])
     '; did you mean "uav"?'
+    >>> did_you_mean("uav.altitude_reference", ["usv.heading_reference", "uav.altitude"])
+    '; did you mean "uav.altitude"?'
     """
     return _did_you_mean(name, tuple(valid))
 
@@ -181,8 +184,17 @@ def _did_you_mean(name: str, names: tuple[str, ...]) -> str:
     if len(name) > MAX_QUOTATION_LENGTH:  # no slip of the pen, and the search takes quadratic time
         return ""
     swapped = {name[:i] + name[i + 1] + name[i] + name[i + 2 :] for i in range(len(name) - 1)}
-    if near := [other for other in names if other in swapped] or difflib.get_close_matches(name, names, n=1):
+    if near := [other for other in names if other in swapped] or _close_matches(name, names):
         return f'; did you mean "{near[0]}"?'
     if 0 < len(names) <= 8:
         return f"; valid: {', '.join(names)}"
     return ""
+
+
+def _close_matches(name: str, names: tuple[str, ...]) -> list[str]:
+    """Return the most similar name, or an empty list."""
+    component, dot, _ = name.partition(".")
+    if not dot or not any("." in other for other in names):
+        return difflib.get_close_matches(name, names, n=1)
+    siblings = [other for other in names if other.startswith(f"{component}.")]
+    return difflib.get_close_matches(name, siblings, n=1) or difflib.get_close_matches(name, names, n=1, cutoff=0.85)

@@ -154,10 +154,12 @@ class System:
         seen: set[str] = set()
         unknown = 0
         subject = ("algorithm", "stages")
+        named = set(component_names(self.stages))
+        unnamed = [name for name in self.components if name not in named]
         for name in component_names(self.stages):
             if name not in self.components:
                 unknown += 1
-                yield Problem(f'unknown component "{name}"{did_you_mean(name, self.components)}', subject=subject)
+                yield Problem(f'unknown component "{name}"{did_you_mean(name, unnamed)}', subject=subject)
             elif name in seen:
                 yield Problem(f'component "{name}" is in the stages twice', subject=subject)
             seen.add(name)

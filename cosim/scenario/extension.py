@@ -52,7 +52,10 @@ def expand_document(document: Document, extending: tuple[Path, ...] = ()) -> Doc
     invalid = [path for path, origin in merger.origins.items() if origin.path in origin.document.invalid_paths]
     problems = [*document.problems, *base.problems, *merger.problems]
     bases = (base.file, *base.bases)
-    return replace(document, value=merged, problems=problems, invalid_paths=invalid, origins=merger.origins, bases=bases)
+    origins, removed = merger.origins, merger.removed
+    return replace(
+        document, value=merged, problems=problems, invalid_paths=invalid, origins=origins, bases=bases, removed=removed
+    )
 
 
 def _read_base(document: Document, name: Any, extending: tuple[Path, ...]) -> Document:
@@ -83,12 +86,13 @@ def _inherited(base: Document, folder: Path) -> dict[str, Any]:
 
 
 class _Merger:
-    """Merger of a document with its base. `origins` collects where each value was written, `problems` what cannot be merged."""
+    """Merger of a document with its base. Results besides the value: `origins`, `problems`, `removed`."""
 
     def __init__(self, document: Document, base: Document) -> None:
         self._document, self._base = document, base
         self.origins: dict[JsonPath, Origin] = {(): Origin(document, ())}
         self.problems: list[Problem] = []
+        self.removed = set(base.removed)
 
     def merge_objects(
         self, path: JsonPath, old: Mapping[str, Any], new: Mapping[str, Any], old_path: JsonPath = (), new_path: JsonPath = ()
@@ -101,7 +105,9 @@ class _Merger:
                 result[key] = self._copy(self._base, places[0], old[key], places[1])
             elif new[key] is not None:
                 result[key] = self._merge(*places, old.get(key), new[key])
-            elif key not in old:
+            elif key in old:
+                self.removed.add(places[0])
+            else:
                 self._report(places[2], f"nothing to remove{did_you_mean(key, old)}")
         return result
 

@@ -47,6 +47,8 @@ class Document:
     bases: tuple[Path, ...] = ()
     #: Python classes and objects by the names of the components that they implement; only in a scenario that is a dict
     objects: Mapping[str, Any] = field(default_factory=dict)
+    #: paths of the values of other files that are removed
+    removed: set[JsonPath] = field(default_factory=set)
     #: JSON pointers of the caller's settings by the paths of the values that they set
     settings: dict[JsonPath, str] = field(default_factory=dict)
     #: the scenario is a dict and no file; `file` lies in the folder from which relative paths start

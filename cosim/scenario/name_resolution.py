@@ -48,7 +48,9 @@ def resolve_name(node: Node, text: str, ports: Sequence[str], include_inner: boo
     if component not in node.spec.components:
         if node.has_wrong_names:
             raise UnknownNameError
-        raise UnknownNameError(f'unknown component "{component}"{did_you_mean(component, node.spec.components)}')
+        is_removed = ("components", component) in node.document.removed
+        hint = ", which was removed" if is_removed else did_you_mean(component, node.spec.components)
+        raise UnknownNameError(f'unknown component "{component}"{hint}')
     child = node.children.get(component)
     if child is None:
         return [Target(node.full_name(component), rest)]

@@ -129,6 +129,12 @@ def test_problems_name_the_file_that_contains_the_value(folder, base, extend):
     assert unknown == "base.json:38:1: $.colour: unknown key"
 
 
+def test_a_removed_component_is_not_mistaken_for_another(folder, extend):
+    """The base connects a.y; the remaining component has a similar name."""
+    (problem,) = folder.problems_of(extend(components={"a": None, "aa": folder.block("Gain")}))
+    assert problem.endswith('$.connections[0].from: unknown component "a", which was removed')
+
+
 def test_changes_of_nothing_are_refused(folder, extend):
     file = extend(
         components={"z": None}, checks={"end.walue": None}, connections={"b.u": 3}, kpis={"end": {"arguments": {"target": None}}}
