@@ -33,6 +33,13 @@ def test_a_log_message_is_short(caplog):
     assert caplog.messages[-1].endswith("x ... and 19996000 characters more")
 
 
+def test_a_similar_signal_of_the_same_component_comes_first():
+    names = ["usv.heading_reference", "uav.altitude_command", *(f"a.x{i}" for i in range(9))]
+    assert did_you_mean("uav.altitude_reference", names) == '; did you mean "uav.altitude_command"?'
+    assert did_you_mean("uav.altitude_reference", [names[0], *names[2:]]) == ""
+    assert did_you_mean("uva.altitude_command", names) == '; did you mean "uav.altitude_command"?'
+
+
 def test_a_long_name_has_no_similar_one():
     assert did_you_mean(LONG, ["x" * 100, LONG[:-1]]) == ""
     assert did_you_mean("x" * 99, ["x" * 100]) == f'; did you mean "{"x" * 100}"?'
