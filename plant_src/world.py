@@ -284,4 +284,6 @@ def _constants(body: ContactBody) -> Iterator[tuple[Variable, np.ndarray]]:
         if not variable.name.startswith((INITIAL_PREFIX, WAVE_PREFIX)):
             value = values.tolist() if variable.shape else values.item()
             name = f"{body.name}.{variable.name}"
-            yield replace(variable, name=name, causality="local", variability="constant", start=value), values
+            text = f"{variable.description}; set by the argument vehicles/{body.name}/parameters/{variable.name}"
+            constant = replace(variable, name=name, causality="local", variability="constant", start=value, description=text)
+            yield constant, values

@@ -156,7 +156,8 @@ def _check_value(variable: Variable, value: Any, all_elements: bool = False) -> 
     if variable.causality not in ("parameter", "structuralParameter", "input") and variable.start is None:
         raise ValueError(f'"{variable.name}" is of causality {variable.causality} and cannot be set')
     if variable.variability == "constant":
-        raise ValueError(f'"{variable.name}" is a constant and cannot be set')
+        description = variable.description and f": {variable.description}"
+        raise ValueError(f'"{variable.name}" is a constant and cannot be set{description}')
     if variable.causality == "structuralParameter" and value != variable.start:
         raise ValueError(
             f'"{variable.name}" is a structural parameter: it stays {json.dumps(variable.start)}, found {_quote(value)}'

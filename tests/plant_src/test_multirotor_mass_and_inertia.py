@@ -10,6 +10,7 @@ from plant_fmu import PlantFmu
 from scipy.spatial.transform import Rotation
 from world_harness import PLATFORM, PLATFORM_TOP, REST_HEIGHT, WorldHarness, quadcopter_settings
 
+import cosim
 from cosim.core.errors import InputError
 from plant_src.world import World
 
@@ -92,3 +93,11 @@ def test_an_impact_at_the_rim_turns_it_about_its_own_axes() -> None:
 def test_impossible_bodies_are_refused_with_their_path(parameters: dict[str, Any], message: str) -> None:
     with pytest.raises(InputError, match=message):
         World("plant", {"uav": quadcopter_settings([0.0, 0.0, 2.0], parameters=parameters)})
+
+
+def test_a_scenario_sets_the_mass_at_the_place_that_the_message_names() -> None:
+    place = "vehicles/uav/parameters/mass"
+    with pytest.raises(InputError, match=f"is a constant and cannot be set: total mass .*; set by the argument {place}"):
+        cosim.load("demo1_box", parameters={"plant.uav.mass": 0.5})
+    with cosim.load("demo1_box", parameters={f"/components/plant/arguments/{place}": 0.5}) as simulation:
+        assert simulation.get("plant.uav.mass") == 0.5

@@ -11,7 +11,9 @@ from pathlib import Path
 
 from cosim.core.component import Variable
 from plant_src.catalogue import VEHICLE_MODELS
+from plant_src.vehicles.model import Model
 from plant_src.world import World
+from plant_src.world_settings import INITIAL_PREFIX, WAVE_PREFIX
 
 DOCUMENT = Path(__file__).parents[2] / "docs/variables.md"
 BEGIN, END = "<!-- made by tests/plant_src/vehicle_variables.py -->\n", "<!-- end -->\n"
@@ -22,7 +24,7 @@ _COMPONENTS = [*"xyzwuvpqr", "roll", "pitch", "yaw", *map(str, range(1, 9))]
 
 
 def make_tables() -> str:
-    """Return the tables of measurements and inputs."""
+    """Return the tables of measurements, inputs, rotors and parameters."""
     vehicles, labels = {}, {}
     for vehicle, motions in VEHICLE_MODELS.items():
         for motion, model in motions.items():
@@ -40,7 +42,29 @@ def make_tables() -> str:
         "| vehicle | input | place | position forward, left / m | its reaction turns the body |",
         "|---|---|---|---|---|",
     ]
-    return "\n".join([*parts, *_rotor_rows(), ""])
+    parts += [
+        *_rotor_rows(),
+        "",
+        "### Parameters\n",
+        "The argument `vehicles/NAME/parameters` of the world sets these parameters of a vehicle.\n",
+        "| vehicle | parameter | unit | default | meaning |",
+        "|---|---|---|---|---|",
+    ]
+    models = [each for motions in VEHICLE_MODELS.values() for each in motions.values()]
+    return "\n".join(
+        [
+            *parts,
+            *(row for label, model in zip(labels.values(), models, strict=True) for row in _parameter_rows(label, model)),
+            "",
+        ]
+    )
+
+
+def _parameter_rows(label: str, model: Model) -> Iterator[str]:
+    for variable in model.real_variables("parameter"):
+        if not variable.name.startswith((INITIAL_PREFIX, WAVE_PREFIX)):
+            unit = variable.unit.name if variable.unit else ""
+            yield f"| {label} | `{variable.name}` | {unit} | {variable.start:.7g} | {variable.description} |"
 
 
 def _rotor_rows() -> Iterator[str]:
