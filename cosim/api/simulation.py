@@ -195,8 +195,8 @@ class Simulation:
         Outputs have the values of the last step. A connected input has the value of its last transfer.
 
         Args:
-            name: Name of a signal such as "plant.uav.position.z", of an input or a parameter. The name of an array, or of
-                variables with indices ("plant.uav.rotor_speed"), gives a list.
+            name: Name of a signal such as "plant.uav.position.z", of an input or a parameter. The name of an array, of
+                variables with indices ("plant.uav.rotor_speed") or of a vector ("plant.uav.position") gives a list.
 
         Raises:
             InputError: There is no such variable.
@@ -209,8 +209,8 @@ class Simulation:
         """Set an input without connection or a tunable parameter; it acts in the next step.
 
         Args:
-            name: Name of the variable, or of a list of variables with indices.
-            value: The value, in the unit of the variable; a list for an array.
+            name: Name of the variable, of a list of variables with indices, or of a vector.
+            value: The value, in the unit of the variable; a list for an array or a vector.
 
         Raises:
             InputError: There is no such variable, it cannot be set now, or it does not accept the value.

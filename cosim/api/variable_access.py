@@ -12,7 +12,7 @@ from ..engine.layout import Layout
 from ..engine.plan_run import PlanRun
 from ..engine.run_checks import not_settable_reason
 from ..scenario import PreparedRun
-from ..scenario.name_resolution import Target, UnknownNameError, check_assignment, resolve_name
+from ..scenario.name_resolution import Target, UnknownNameError, check_assignment, resolve_name, vector_names
 from .arguments import expect
 
 #: returns the present value of a variable of the run
@@ -87,8 +87,10 @@ class VariableAccess:
         elements = self._system.slots[component]
         if text in elements:
             return self._make_scalar_reader(Endpoint(component, text))
-        variable = self._variables_of(component).get(text)
+        variables = self._variables_of(component)
+        variable = variables.get(text)
         names = variable.scalar_names if variable else [slot for slot in elements if slot.startswith(f"{text}[")]
+        names = names or vector_names(variables, text)
         if not names:
             raise InputError(f'component "{component}" has no variable "{text}"{did_you_mean(text, elements)}')
         readers = [self._make_scalar_reader(Endpoint(component, slot)) for slot in names]

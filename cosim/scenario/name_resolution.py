@@ -124,7 +124,7 @@ def check_assignment(
 ) -> dict[str, Any]:
     """Check the assignment `text` = `value` to a component and return the checked values by variable name.
 
-    A list sets an array variable, or the scalar variables text[1], text[2], ...
+    A list sets an array variable, the scalar variables text[1], text[2], ..., or a vector: text.x, text.y, ...
 
     Args:
         name: The component's name, for messages.
@@ -148,8 +148,23 @@ def check_assignment(
             size = sum(other.startswith(f"{text}[") for other in variables)
             raise ValueError(f'"{text}" takes at most {size} values, found {len(value)}')
         return {each: _check_value(variables[each], element) for each, element in zip(names, value, strict=True)}
+    if isinstance(value, list) and (names := vector_names(variables, text)):
+        if len(value) != len(names):
+            raise ValueError(f'"{text}" takes {len(names)} values, found {len(value)}')
+        return {each: _check_value(variables[each], element) for each, element in zip(names, value, strict=True)}
     settable = [v.name for v in variables.values() if v.causality in ("parameter", "input")]
     raise UnknownNameError(f'component "{name}" has no variable "{text}"{did_you_mean(text, settable)}')
+
+
+def vector_names(variables: Mapping[str, Variable], prefix: str) -> list[str]:
+    """Return the scalar variables of a vector, such as prefix.x, prefix.y and prefix.z, in their order.
+
+    They have the same type, unit and causality. The list is empty if the prefix names no vector.
+    """
+    begin = f"{prefix}."
+    found = [each for name, each in variables.items() if name.startswith(begin) and not re.search(r"[.\[]", name[len(begin) :])]
+    kinds = {(each.type, each.unit, each.causality, each.shape) for each in found}
+    return [each.name for each in found] if len(found) > 1 and len(kinds) == 1 and not found[0].shape else []
 
 
 def _check_value(variable: Variable, value: Any, all_elements: bool = False) -> Any:

@@ -83,6 +83,14 @@ def test_arrays_and_ports_are_read_by_their_names(demo):
     assert demo.get("plant.uav.contact.touching") is False
 
 
+def test_vectors_are_read_and_set_by_their_names(demo):
+    assert demo.get("plant.uav.position") == [demo.get(f"plant.uav.position.{axis}") for axis in "xyz"]
+    demo.set("plant.uav.external_force", np.array([0.5, 0.0, 0.25]))
+    assert demo.get("plant.uav.external_force") == [0.5, 0.0, 0.25]
+    assert 'has no variable "uav.deck"' in refusal(demo.get, "plant.uav.deck")
+    assert '"uav.external_force" takes 3 values, found 2' in refusal(demo.set, "plant.uav.external_force", [1.0, 2.0])
+
+
 @pytest.mark.parametrize(
     ("name", "value", "reason"),
     [
