@@ -131,7 +131,8 @@ def _select_sources(sources: Sequence[Path] | None, root: Path) -> list[Source]:
     for path in files:
         if path.resolve() not in known:
             patterns = ", ".join(kind.pattern for kind in SOURCE_KINDS)
-            problems.append(Problem(f"is not a source of an FMU ({patterns}){did_you_mean(str(path), known_names)}", str(path)))
+            text = f"is not a source of an FMU of cosim ({patterns}){did_you_mean(str(path), known_names)}"
+            problems.append(Problem(f"{text}; --output FILE.fmu exports a source of your own", str(path)))
     if problems:
         raise InputError(problems)
     return [known[path.resolve()] for path in files]

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("sources", nargs=-1, type=click.Path(path_type=Path))
-@click.option("--check", is_flag=True, help="Build nothing; check that fmus/ is up to date with its sources.")
+@click.option("--check", is_flag=True, help="Build nothing; check that the fmus/ of cosim are up to date.")
 @click.option("--output", type=click.Path(path_type=Path), help="Export a single source, in any folder, to this FMI 2.0 FMU.")
 @click.option(
     "--modelica-compiler",
@@ -40,8 +40,8 @@ def command(
     --modelica-compiler omc exports models that need the Modelica Standard Library or features that cosim's own compiler lacks;
     OpenModelica must be installed (this was written from its documentation and not tried with it).
 
-    Requires a C compiler and the extra "build". --check compares the hashes of all sources with the manifest, and the behaviour
-    of newly built FMUs with those in fmus/ (exit code 3 if they differ).
+    Requires a C compiler and the extra "build". --check is for changes of cosim itself: it compares the hashes of all sources
+    with the manifest, and the behaviour of newly built FMUs with those in fmus/ (exit code 3 if they differ).
     """
     from ...core import resources
     from ...export.build import build
@@ -49,6 +49,10 @@ def command(
 
     root = resources.root()
     if check:
+        if sources or output:
+            raise InputError(
+                "--check compares all FMUs that belong to cosim with their sources and takes no SOURCES and no --output"
+            )
         if problems := check_fmus(root):
             raise CheckError("\n".join(map(str, problems)))
         click.echo("every FMU is up to date with its source")
