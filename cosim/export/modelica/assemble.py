@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from math import prod
 from pathlib import Path
 from typing import Any
@@ -17,10 +18,11 @@ from ..fmu.block import Block, BlockVariable
 from .c_code.emit import generate_c
 from .c_code.header import struct_members
 from .causality.continuous_states import introduce_derivatives
+from .causality.hybrid import prepare_hybrid
 from .causality.interpreter import Interpreter
 from .causality.matching import is_input
-from .frontend.constants import inline_constants
-from .frontend.folded_branches import check_folded_branches
+from .frontend.constants import fold_constants
+from .frontend.folded_branches import folded_parameters
 from .frontend.reader import ModelReader
 from .frontend.rumoca_frontend import ModelicaSources, flatten_model
 from .model.flat_model import Model, Variable
@@ -88,10 +90,16 @@ def _refusing_deep_nesting(path: Path) -> Iterator[None]:
 
 def _flatten(path: Path, model: str | None) -> tuple[Interpreter, ModelicaSources]:
     json, sources = flatten_model(Path(path), model)
-    check_folded_branches(json, sources)
-    flat = introduce_derivatives(inline_constants(ModelReader(json, sources).read_model(model or Path(path).stem)))
+    return analyse(json, sources, model or Path(path).stem), sources
+
+
+def analyse(json: Mapping[str, Any], sources: ModelicaSources, name: str) -> Interpreter:
+    """Convert the document of the front end to an interpreter of the model."""
+    flat = ModelReader(json, sources).read_model(name)
+    flat = replace(flat, structural=flat.structural | folded_parameters(json, sources))
+    flat = prepare_hybrid(introduce_derivatives(fold_constants(flat)))
     _check_types(flat)
-    return Interpreter(flat), sources
+    return Interpreter(flat)
 
 
 def _check_types(model: Model) -> None:
@@ -102,8 +110,6 @@ def _check_types(model: Model) -> None:
             raise_model_error(f"{variable.name}: the model has more than {MAX_MODEL_SIZE} values", variable.where)
         if variable.type not in _FMI_TYPES:
             raise_model_error(f"{variable.name}: variables of type {variable.type} are not supported", variable.where)
-        if 0 in variable.shape:
-            raise_model_error(f"{variable.name}: arrays without elements are not supported", variable.where)
 
 
 def _source_root(files: Sequence[Path]) -> Path:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import reduce
 
 from ..model import syntax_tree
@@ -98,6 +99,41 @@ def _fill(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
     value = lowering.evaluated_once(lowering.lower(node.arguments[0])) if node.name == "fill" else None
     element = value or scalar_value("Integer", c_literal(int(node.name == "ones"), "Integer"))
     return CValue(element.type, _shape(lowering, node, sizes), lambda _: element.text, reusable=True)
+
+
+def _vector(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
+    value = lowering.lower(node.arguments[0])
+    return replace(value, shape=(value.size,))
+
+
+def _scalar(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
+    return replace(lowering.lower(node.arguments[0]), shape=())
+
+
+def _diagonal(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
+    value = lowering.evaluated_once(lowering.lower(node.arguments[0]))
+    n, zero = value.size, c_literal(0, value.type)
+    return CValue(
+        value.type, (n, n), lambda k: value.element(int(k) // n) if int(k) % (n + 1) == 0 else zero, indexable_in_loop=False
+    )
+
+
+def _linspace(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
+    first, last = (lowering.evaluated_once(lowering.lower(argument)).text for argument in node.arguments[:2])
+    (n,) = _shape(lowering, node, node.arguments[2:])
+
+    def element(k: int | str) -> CExpression:
+        step = infix("*", infix("-", last, first), c_literal(float(k), "Real"))
+        return infix("+", first, infix("/", step, c_literal(float(n - 1), "Real")))
+
+    return CValue("Real", (n,), element, indexable_in_loop=False)
+
+
+def _past(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
+    """Lower past(k, T), the value of the argument of delay() number k at the time - T."""
+    index, duration = lowering.static_integer(node.arguments[0]), lowering.scalar_of(node.arguments[1])
+    at = infix("-", CExpression("time"), duration)
+    return scalar_value("Real", c_call("past_value", f"&m->past[{index}]", at))
 
 
 def _identity(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
@@ -197,6 +233,10 @@ BUILTINS: dict[str, Callable[[SubscriptLowering, syntax_tree.Builtin], CValue]] 
     "abs": _abs,
     "atan2": _atan2,
     "cat": _cat,
+    "diagonal": _diagonal,
+    "linspace": _linspace,
+    "past": _past,
+    "scalar": _scalar,
     "change": _change,
     "cross": _cross,
     "edge": _edge,
@@ -210,4 +250,5 @@ BUILTINS: dict[str, Callable[[SubscriptLowering, syntax_tree.Builtin], CValue]] 
     "smooth": _smooth,
     "sum": _sum,
     "transpose": _transpose,
+    "vector": _vector,
 }

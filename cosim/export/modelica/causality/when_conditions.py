@@ -7,6 +7,7 @@ edge detector k has become true in this event".
 from __future__ import annotations
 
 from dataclasses import dataclass, field
+from typing import Any
 
 from ..model.flat_model import Model
 from ..model.syntax_tree import (
@@ -22,7 +23,7 @@ from ..model.syntax_tree import (
     When,
     raise_model_error,
 )
-from ..model.traversal import PRE_OPERATORS, has_builtin
+from ..model.traversal import rewrite_outermost
 
 
 @dataclass(frozen=True, slots=True)
@@ -71,16 +72,13 @@ class WhenConditions:
     def _flag(self, condition: Expression, where: SourceLocation | None) -> Builtin:
         if isinstance(condition, Builtin) and condition.name == "sample":
             return tick_flag(self._clock_index(condition, where))
-        if has_builtin(condition, "sample", "initial"):
-            raise_model_error(
-                "sample() cannot be combined with other conditions in a when-condition; use an if inside the when-clause", where
-            )
-        if has_builtin(condition, *PRE_OPERATORS):
-            raise_model_error(
-                "pre(), edge() and change() in a when-condition are not supported: a when-clause is active at rising edges only",
-                where,
-            )
-        return edge_flag(self._edge_detector_index(condition, where))
+        return edge_flag(self._edge_detector_index(rewrite_outermost(condition, self.as_tick_flag), where))
+
+    def as_tick_flag(self, node: Any) -> Builtin | None:
+        """Return the event flag of a sample(), or None for all other nodes."""
+        if not (isinstance(node, Builtin) and node.name == "sample"):
+            return None
+        return tick_flag(self._clock_index(node, node.where))
 
     def _edge_detector_index(self, condition: Expression, where: SourceLocation | None) -> int:
         conditions = [detector.condition for detector in self.edge_detectors]

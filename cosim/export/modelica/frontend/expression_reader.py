@@ -19,8 +19,6 @@ _OPERATORS = {
     "Lt": "<", "Le": "<=", "Gt": ">", "Ge": ">=", "Eq": "==", "Neq": "<>", "And": "and", "Or": "or",
 }  # fmt: skip
 _UNSUPPORTED_BUILTINS = {
-    "delay": "delay() is not supported; keep old values in an array",
-    "terminal": "terminal() is not supported: the end of a simulation is not known to an FMU",
     "terminate": "terminate() is not supported; use assert()",
 }
 _INTEGER_OPERATORS = {"+": operator.add, "-": operator.sub, "*": operator.mul}
@@ -84,6 +82,8 @@ class ExpressionReader:
             ),
             "BuiltinCall": self._builtin,
             "FunctionCall": self._call,
+            "StringConversion": lambda n: syntax_tree.Builtin("String", (self.read_expression(n["value"]),), self.locate(n)),
+            "ArrayComprehension": self._comprehension,
         }
         if kind not in readers:
             raise_model_error(f"the expression {kind} is not supported", self.locate(payload))
@@ -131,6 +131,16 @@ class ExpressionReader:
     def _if(self, node: Json) -> syntax_tree.If:
         branches = tuple((self.read_expression(condition), self.read_expression(value)) for condition, value in node["branches"])
         return syntax_tree.If(branches, self.read_expression(node["else_branch"]))
+
+    def _comprehension(self, node: Json) -> Expression:
+        """Convert an array constructor with iterators; the last iterator varies fastest in Modelica's nesting order."""
+        where = self.locate(node)
+        if node.get("filter") is not None:
+            raise_model_error("an array constructor with a condition is not supported", where)
+        value = self.read_expression(node["expr"])
+        for index in node["indices"]:
+            value = syntax_tree.Comprehension(value, index["name"], self.read_expression(index["range"]), where)
+        return value
 
     def _builtin(self, node: Json) -> syntax_tree.Builtin:
         name = node["function"].lower()

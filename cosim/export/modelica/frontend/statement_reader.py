@@ -23,6 +23,10 @@ class StatementReader(ExpressionReader):
             "FunctionCall": self._multi_assign,
             "If": self._if_statement,
             "For": self._for,
+            "While": lambda n: syntax_tree.While(
+                self.read_expression(n["block"]["cond"]), self.read_body(n["block"]["stmts"]), self.locate(n)
+            ),
+            "Reinit": lambda n: syntax_tree.Reinit(self._target(n["variable"]), self.read_expression(n["value"]), self.locate(n)),
             "Assert": self._assert,
             "When": lambda n: syntax_tree.When(
                 tuple((self.read_expression(block["cond"]), self.read_body(block["stmts"])) for block in n["blocks"]),
@@ -68,17 +72,14 @@ class StatementReader(ExpressionReader):
         return cast(syntax_tree.For, body[0])
 
     def _assert(self, node: Json) -> syntax_tree.Assert:
-        message, where = self.read_expression(node["message"]), self.locate(split_tagged(node["condition"])[1])
-        if node["level"] is not None and self.read_expression(node["level"]) != syntax_tree.Literal(2, "Integer"):
-            raise_model_error("assert() with a level other than AssertionLevel.error is not supported", where)
-        return syntax_tree.Assert(self.read_expression(node["condition"]), self._message_text(message, where), where)
-
-    def _message_text(self, message: Expression, where: SourceLocation | None) -> str:
-        if isinstance(message, syntax_tree.Binary) and message.operator == "+":
-            return self._message_text(message.left, where) + self._message_text(message.right, where)
-        if not (isinstance(message, syntax_tree.Literal) and message.type == "String"):
-            raise_model_error("the message of an assert() must be a String literal", where)
-        return str(message.value)
+        where = self.locate(split_tagged(node["condition"])[1])
+        level = None if node["level"] is None else self.read_expression(node["level"])
+        if level is not None and not isinstance(level, syntax_tree.Literal):
+            raise_model_error("the level of an assert() must be a literal of AssertionLevel", where)
+        message = tuple(_message_parts(self.read_expression(node["message"])))
+        return syntax_tree.Assert(
+            self.read_expression(node["condition"]), message, where, warning=level is not None and level.value == 1
+        )
 
     def read_function(self, node: Json) -> flat_model.Function:
         """Convert a function.
@@ -98,3 +99,16 @@ class StatementReader(ExpressionReader):
         dimensions = tuple(None if isinstance(d, syntax_tree.Colon) else d for d in self._subscripts(node["shape_expr"]))
         kind = self._type(node["effective_type"]["canonical_type"])
         return flat_model.FunctionVariable(node["name"], kind, dimensions, self._optional(node["default"]), where)
+
+
+def _message_parts(message: Expression) -> list[Expression]:
+    """Return the terms of a concatenation of Strings; adjacent literals become one literal."""
+    if isinstance(message, syntax_tree.Builtin) and message.name == "String":
+        return [message.arguments[0]]
+    if not (isinstance(message, syntax_tree.Binary) and message.operator == "+"):
+        return [message]
+    left, right = _message_parts(message.left), _message_parts(message.right)
+    if isinstance(left[-1], syntax_tree.Literal) and isinstance(right[0], syntax_tree.Literal):
+        joined = syntax_tree.Literal(f"{left[-1].value}{right[0].value}", "String")
+        return [*left[:-1], joined, *right[1:]]
+    return left + right

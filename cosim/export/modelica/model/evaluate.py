@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import operator
 from collections import ChainMap
-from collections.abc import Mapping, MutableMapping
+from collections.abc import Callable, Mapping, MutableMapping
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -45,6 +45,8 @@ class Evaluator:
     event_flags: dict[tuple[str, int], bool] = field(default_factory=dict)
     #: edge detector -> its condition at the previous event
     previous_conditions: dict[int, bool] = field(default_factory=dict)
+    #: value of the argument of delay() number k at a past time
+    past: Callable[[int, float], float] = lambda _index, _time: 0.0
 
     # statements
 
@@ -86,9 +88,18 @@ class Evaluator:
         if shadowed is not None:
             self.values[node.index] = shadowed
 
+    def _while(self, node: syntax_tree.While) -> None:
+        while self(node.condition):
+            self.execute(node.body)
+
     def _assert(self, node: syntax_tree.Assert) -> None:
-        if not self(node.condition):
-            raise EvaluationError(node.message, node.where)
+        if not self(node.condition) and not node.warning:
+            raise EvaluationError("".join(map(self._as_text, node.message)), node.where)
+
+    def _as_text(self, node: Expression) -> str:
+        """Return the value of an expression as in a composed message: Reals with 6 significant digits."""
+        value = self(node)
+        return f"{value:g}" if isinstance(value, float) else str(value).lower() if isinstance(value, bool) else str(value)
 
     def _edgedetector(self, node: syntax_tree.EdgeDetector) -> None:
         condition = bool(self(node.condition))
@@ -113,6 +124,16 @@ class Evaluator:
 
     def _array(self, node: syntax_tree.Array) -> np.ndarray:
         return np.array([self(element) for element in node.elements])
+
+    def _comprehension(self, node: syntax_tree.Comprehension) -> np.ndarray:
+        shadowed, elements = self.values.get(node.index), []
+        for number in self(node.range):
+            self.values[node.index] = to_python_scalar(number)
+            elements.append(self(node.value))
+        self.values.pop(node.index, None)
+        if shadowed is not None:
+            self.values[node.index] = shadowed
+        return np.array(elements)
 
     def _range(self, node: syntax_tree.Range) -> np.ndarray:
         step = self(node.step) if node.step else 1
@@ -154,7 +175,7 @@ class Evaluator:
         return index - 1
 
     def _call(self, node: syntax_tree.Call) -> Any:
-        return self._call_function(node)[0]
+        return self._call_function(node)[node.result]
 
     def _call_function(self, node: syntax_tree.Call) -> list[Any]:
         function, arguments = self.functions[node.function], [self(argument) for argument in node.arguments]
@@ -177,6 +198,8 @@ class Evaluator:
             return self._evaluate_pre(node)
         if node.name == "smooth":
             return self(node.arguments[1])
+        if node.name == "past":
+            return self.past(int(self(node.arguments[0])), self.values["time"] - self(node.arguments[1]))
         return BUILTINS[node.name](*map(self, node.arguments))
 
     def _evaluate_pre(self, node: syntax_tree.Builtin) -> Any:

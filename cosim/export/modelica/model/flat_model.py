@@ -10,9 +10,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Literal as OneOf
-from typing import NamedTuple
 
-from .syntax_tree import Assert, Body, Expression, SourceLocation, When
+from .syntax_tree import Assert, Binary, Body, Expression, SourceLocation, When
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +29,8 @@ class Variable:
     #: true if the binding comes from a modifier of the component that contains the variable
     bound_by_modifier: bool
     final: bool
+    #: attribute `fixed`; None if it is not given
+    fixed: bool | None
     protected: bool
     #: true if the variable belongs to the model itself and not to one of its components
     top_level: bool
@@ -74,12 +75,32 @@ class Function:
     where: SourceLocation | None = field(default=None, compare=False)
 
 
-class StructuralParameters(NamedTuple):
-    """Parameters whose default value determined an array size, a loop range or the choice of equations in the front end."""
+@dataclass(frozen=True, slots=True)
+class Relation:
+    """A comparison that changes between events; `name` is the Boolean variable that holds its value until the next event."""
 
-    purpose: str
-    parameters: tuple[str, ...]
-    where: SourceLocation | None
+    name: str
+    condition: Binary
+
+
+@dataclass(frozen=True, slots=True)
+class Delay:
+    """A `delay(x, duration)`; `name` is the variable that is equal to x."""
+
+    name: str
+    duration: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Hybrid:
+    """Parts of a model with event iteration."""
+
+    relations: tuple[Relation, ...]
+    delays: tuple[Delay, ...]
+    #: variables with a variable for their value before the event
+    remembered: tuple[str, ...]
+    #: variables of `remembered` whose change in an event requires another evaluation
+    iterated: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -99,9 +120,12 @@ class Model:
     functions: Mapping[str, Function]
     #: enumeration type -> literals
     enumerations: Mapping[str, tuple[str, ...]]
-    structural: tuple[StructuralParameters, ...]
+    #: parameters whose values determine array sizes, loop ranges or the choice of equations
+    structural: frozenset[str]
     #: continuous states (see `causality/continuous_states.py`)
     states: tuple[str, ...] = ()
+    #: None for a model whose equations are evaluated once per event (see `causality/hybrid.py`)
+    hybrid: Hybrid | None = None
 
 
 def derivative_name(state: str) -> str:
@@ -109,6 +133,11 @@ def derivative_name(state: str) -> str:
     return f"der({state})"
 
 
+def previous_name(variable: str) -> str:
+    """Return the name of the variable that holds the value of a variable before the current event."""
+    return f"pre({variable})"
+
+
 def owning_component(name: str) -> str:
     """Return the component that a variable belongs to, or "" for the model itself."""
-    return name.removeprefix("der(").rpartition(".")[0]
+    return name.removeprefix("der(").removeprefix("pre(").rpartition(".")[0]
