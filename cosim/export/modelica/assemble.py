@@ -97,7 +97,7 @@ def analyse(json: Mapping[str, Any], sources: ModelicaSources, name: str) -> Int
     """Convert the document of the front end to an interpreter of the model."""
     flat = ModelReader(json, sources).read_model(name)
     flat = replace(flat, structural=flat.structural | folded_parameters(json, sources))
-    flat = prepare_hybrid(introduce_derivatives(fold_constants(flat)))
+    flat = prepare_hybrid(introduce_derivatives(fold_constants(flat)), bool(sources.libraries))
     _check_types(flat)
     return Interpreter(flat)
 

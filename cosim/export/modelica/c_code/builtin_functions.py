@@ -101,6 +101,30 @@ def _fill(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
     return CValue(element.type, _shape(lowering, node, sizes), lambda _: element.text, reusable=True)
 
 
+def _matrix(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
+    """Lower a concatenation: rows(a, b) of the parts of `[a; b]`, columns(a, b) of `[a, b]`; scalars and vectors are columns."""
+    parts = [lowering.lower(argument) for argument in node.arguments]
+    shapes = [(*part.shape, 1, 1)[:2] if len(part.shape) < 2 else part.shape for part in parts]
+    vertical = node.name == "rows"
+    if len({shape[vertical] for shape in shapes}) != 1:
+        raise_model_error(f"the parts of a matrix have the sizes {', '.join(str(list(s)) for s in shapes)}", node.where)
+    shape = (sum(s[0] for s in shapes), shapes[0][1]) if vertical else (shapes[0][0], sum(s[1] for s in shapes))
+    elements = [
+        (part, row * size[1] + column)
+        for row_parts in ([[pair] for pair in zip(parts, shapes, strict=True)] if vertical else [list(zip(parts, shapes, strict=True))])
+        for row in range(row_parts[0][1][0])
+        for part, size in row_parts
+        for column in range(size[1])
+    ]
+    return CValue(
+        common_type([part.type for part in parts]),
+        shape,
+        lambda k: elements[int(k)][0].element(elements[int(k)][1]),
+        indexable_in_loop=False,
+        reusable=all(part.reusable for part in parts),
+    )
+
+
 def _vector(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
     value = lowering.lower(node.arguments[0])
     return replace(value, shape=(value.size,))
@@ -230,6 +254,7 @@ BUILTINS: dict[str, Callable[[SubscriptLowering, syntax_tree.Builtin], CValue]] 
     **dict.fromkeys(("fill", "zeros", "ones"), _fill),
     **dict.fromkeys(("noEvent", "homotopy"), _first_argument),
     **dict.fromkeys(("due", "risen"), _event_flag),
+    **dict.fromkeys(("rows", "columns"), _matrix),
     "abs": _abs,
     "atan2": _atan2,
     "cat": _cat,

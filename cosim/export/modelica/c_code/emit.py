@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib import resources
 from typing import Any
@@ -13,18 +13,33 @@ import numpy as np
 from ..causality.interpreter import Interpreter
 from ..causality.matching import is_input
 from ..causality.schedule import finite_variables, pre_variables, start_value
-from ..model.flat_model import Variable, derivative_name, owning_component
-from ..model.syntax_tree import Body, Name, SourceLocation, Statement, referenced_variable
-from ..model.traversal import assigned_references
+from ..model.flat_model import Variable, derivative_name, owning_component, previous_name
+from ..model.syntax_tree import Body, Name, Solve, SourceLocation, Statement, referenced_variable
+from ..model.traversal import assigned_references, walk
 from .c_values import C_TYPES, CExpression, CValue, c_literal, scalar_value
 from .formatting import function_definition, uses_variable
 from .functions import FunctionTranslator
 from .header import HeaderWriter, struct_member, struct_members
+from .hybrid_code import (
+    MAX_PASSES,
+    copy_values,
+    crossing_function,
+    event_functions,
+    hybrid_step_body,
+    record_function,
+)
 from .model_step import continuous_step_body, sampled_step_body
 from .statements import StatementLowering
 
 #: failure reasons of runtime.h, in the order of its enumeration (from 1)
-_STANDARD_REASONS = ("Integer overflow", "division by zero in div(), mod() or rem()", "the period of sample() must be positive")
+_STANDARD_REASONS = (
+    "Integer overflow",
+    "division by zero in div(), mod() or rem()",
+    "the period of sample() must be positive",
+)
+_HYBRID_REASONS = (*_STANDARD_REASONS, "the integration step has become too small")
+#: number of stored values for each delay()
+_PAST_VALUES = 2048
 
 
 def generate_c(defaults: Interpreter, sources: Sequence[str]) -> dict[str, str]:
@@ -41,9 +56,24 @@ def generate_c(defaults: Interpreter, sources: Sequence[str]) -> dict[str, str]:
         InputError: The model uses a feature that is not supported.
     """
     header = HeaderWriter(defaults.model, defaults.schedule, defaults.parameter_roles, sources).text()
-    fixed = ("runtime.h", "runge_kutta.h") if defaults.model.states else ("runtime.h",)
-    texts = {name: resources.files(__package__ or "").joinpath(name).read_text(encoding="utf-8") for name in fixed}
+    texts = {
+        name: resources.files(__package__ or "").joinpath(name).read_text(encoding="utf-8")
+        for name in ("runtime.h", *_optional_headers(defaults))
+    }
     return {"model.c": _Emitter(defaults).model_c(), "model.h": header, **texts}
+
+
+def _optional_headers(defaults: Interpreter) -> list[str]:
+    """Return the names of the C headers that model.c includes besides runtime.h."""
+    model, schedule = defaults.model, defaults.schedule
+    bodies = (schedule.initialization, schedule.event, schedule.derivatives, schedule.indicators)
+    needed = {
+        "past.h": model.hybrid and model.hybrid.delays,
+        "newton.h": any(isinstance(item, Solve) for item in walk(bodies)),
+        "hybrid.h": model.hybrid and model.states,
+        "runge_kutta.h": model.states and not model.hybrid,
+    }
+    return [name for name, condition in needed.items() if condition]
 
 
 @dataclass
@@ -51,24 +81,28 @@ class _Emitter:
     """Code generator of model.c; collects the failure reasons and the functions of the model while it generates code."""
 
     defaults: Interpreter
-    reasons: list[str] = field(default_factory=lambda: list(_STANDARD_REASONS))
+    reasons: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
+        self.reasons += _HYBRID_REASONS if self.defaults.model.hybrid else _STANDARD_REASONS
         self.model, self.schedule, self.roles = self.defaults.model, self.defaults.schedule, self.defaults.parameter_roles
         self.members = struct_members(self.model)
         self.functions = FunctionTranslator(dict(self.model.functions), self._failure_code)
 
     def model_c(self) -> str:
         """Return the text of model.c."""
+        includes = "\n".join(f'#include "{name}"' for name in ("model.h", *(_optional_headers(self.defaults) or ["runtime.h"])))
+        definitions = self._hybrid_definitions() if self.model.hybrid else self._definitions()
+        return "\n\n".join([includes, self._reasons(), *self.functions.definitions, *definitions]) + "\n"
+
+    def _definitions(self) -> list[str]:
         event = self._event()
         optional = {"time": "double time", "due": "const bool *due"}
         parameters = {"m": "Model *m"} | {name: code for name, code in optional.items() if uses_variable(name, event)}
         call = f"event({', '.join(parameters).replace('time', 'now')});"
         step = continuous_step_body if self.model.states else sampled_step_body
-        definitions = [
-            function_definition("static void start_variables(Model *m)", self._start_variables()),
-            function_definition("void model_parameters(Model *m)", self._model_parameters()),
-            function_definition("void model_start(Model *m)", self._model_start()),
+        return [
+            *self._common_definitions(),
             function_definition(f"static void event({', '.join(parameters.values())})", event),
             function_definition("const char *model_initialize(Model *m, double time)", self._model_initialize()),
             *self._continuous(),
@@ -76,8 +110,84 @@ class _Emitter:
                 "const char *model_step(Model *m, double time, double step_size)", step(len(self.schedule.clocks), call)
             ),
         ]
-        includes = f'#include "model.h"\n#include "{"runge_kutta.h" if self.model.states else "runtime.h"}"'
-        return "\n\n".join([includes, self._reasons(), *self.functions.definitions, *definitions]) + "\n"
+
+    def _common_definitions(self) -> list[str]:
+        return [
+            function_definition("static void start_variables(Model *m)", self._start_variables()),
+            function_definition("void model_parameters(Model *m)", self._model_parameters()),
+            function_definition("void model_start(Model *m)", self._model_start()),
+        ]
+
+    def _hybrid_definitions(self) -> list[str]:
+        """Generate the functions of a model with event iteration."""
+        model, clocks = self.model, len(self.schedule.clocks)
+        assert model.hybrid
+        values = self._make_lowering().scope
+        endless = self._failure_code("the event iteration does not end", None)
+        too_many = self._failure_code("too many events in one step (chattering)", None)
+        initial = self._body(self.schedule.initialization, initial=True)
+        definitions = [
+            *self._common_definitions(),
+            f"static const bool NO_TICK[{max(clocks, 1)}] = {{false}};",
+            record_function(model, values, self._make_lowering(), _PAST_VALUES),
+            *event_functions(model, values, self._event(), endless, initial),
+            function_definition("const char *model_initialize(Model *m, double time)", self._initialize_hybrid(endless)),
+        ]
+        if model.states:
+            definitions += [*self._hybrid_system(values)]
+        step = hybrid_step_body(clocks, bool(model.states), too_many)
+        return [*definitions, function_definition("const char *model_step(Model *m, double time, double step_size)", step)]
+
+    def _initialize_hybrid(self, endless: str) -> list[str]:
+        """Generate the body of model_initialize: the initial equations, repeated until relations are consistent, and an event."""
+        past = [f"memset(m->past, 0, sizeof m->past);"] if self.model.hybrid and self.model.hybrid.delays else []
+        return [
+            "m->failure = 0;",
+            *(["m->step = 0;"] if self.model.states else []),
+            *past,
+            "start_variables(m);",
+            *self._clock_lines(),
+            "for (int pass = 0; initialize(m, time); pass++) {",
+            f"    if (pass == {MAX_PASSES}) fail(m, {endless});",
+            *(f"    {line}" for line in self._copy_relations()),
+            "}",
+            "if (m->failure == 0) remember_inputs(m);",
+            *(["record(m, time);"] if past else []),
+            "if (m->failure == 0) event(m, time, NO_TICK);",
+            "return REASONS[m->failure];",
+        ]
+
+    def _copy_relations(self) -> list[str]:
+        values = self._make_lowering().scope
+        assert self.model.hybrid
+        names = [relation.name for relation in self.model.hybrid.relations]
+        return copy_values((values[previous_name(name)], values[name]) for name in names)
+
+    def _hybrid_system(self, values: Mapping[str, CValue]) -> list[str]:
+        """Generate the functions for the integration between events."""
+        assert self.model.hybrid
+        lowering = self._make_lowering()
+        lowering.body(self.schedule.indicators)
+        states, rates = self._element_pointers(self.model.states), self._element_pointers(map(derivative_name, self.model.states))
+        return [
+            function_definition(
+                "static void derivatives(Model *m, double time)", ["(void)time;", *self._body(self.schedule.derivatives, initial=False)]
+            ),
+            crossing_function(self.model.hybrid.relations, values, lowering),
+            function_definition(
+                "static bool advance(Model *m, double from, double to, double *reached)",
+                [
+                    "const Hybrid system = {",
+                    f"    {{{states}}},",
+                    f"    {{{rates}}},",
+                    "    derivatives, crossed, record,",
+                    "};",
+                    "bool event;",
+                    "*reached = advance_hybrid(m, &system, from, to, &event);",
+                    "return event;",
+                ],
+            ),
+        ]
 
     def _reasons(self) -> str:
         texts = ",\n    ".join(["NULL", *(json.dumps(reason, ensure_ascii=False) for reason in self.reasons)])
@@ -153,13 +263,16 @@ class _Emitter:
         return [f"for (int each = 0; each < {value.size}; each++) {test}"] if variable.shape else [test]
 
     def _model_initialize(self) -> list[str]:
+        lines = [*self._clock_lines(), *self._body(self.schedule.initialization, initial=True)]
+        unused = [] if uses_variable("time", lines) else ["(void)time;"]
+        return [*unused, "m->failure = 0;", "start_variables(m);", *lines, "return REASONS[m->failure];"]
+
+    def _clock_lines(self) -> list[str]:
         lowering = self._make_lowering()
         for k, clock in enumerate(self.schedule.clocks):
             start, period = lowering.scalar_of(clock.start).code, lowering.scalar_of(clock.period).code
             lowering.lines.append(f"set_clock(m, &m->clock[{k}], {start}, {period}, time);")
-        lines = [*lowering.lines, *self._body(self.schedule.initialization, initial=True)]
-        unused = [] if uses_variable("time", lines) else ["(void)time;"]
-        return [*unused, "m->failure = 0;", "start_variables(m);", *lines, "return REASONS[m->failure];"]
+        return lowering.lines
 
     # continuous states
 

@@ -183,7 +183,7 @@ class ExpressionLowering(SubscriptLowering):
         return BUILTINS[node.name](self, node)
 
     def _call(self, node: syntax_tree.Call) -> CValue:
-        return self.lower_call(node)[0]
+        return self.lower_call(node)[node.result]
 
     def lower_call(self, node: syntax_tree.Call, target: str | None = None) -> tuple[CValue, ...]:
         """Lower a call of a function of the model.
@@ -196,7 +196,9 @@ class ExpressionLowering(SubscriptLowering):
             The results of the function.
         """
         arguments = [self.lower(argument) for argument in node.arguments]
-        function = self.translation_unit.function_instance(node, tuple(argument.shape for argument in arguments))
+        function = self.translation_unit.function_instance(
+            node, tuple(argument.shape for argument in arguments), tuple(map(self.static_integer, node.arguments))
+        )
         c_arguments = ["m"] * function.takes_model
         for argument, parameter in zip(arguments, function.inputs, strict=True):
             c_arguments.append(self.as_c_array(argument, parameter.type) if argument.shape else argument.text.code)

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 from ..model import syntax_tree
 from ..model.flat_model import Function, FunctionVariable
 from ..model.syntax_tree import SourceLocation, raise_model_error, referenced_variable
-from ..model.traversal import read_references
+from ..model.traversal import read_references, rewrite, variable_names
 from .c_values import C_TYPES, CValue, c_identifier, variable_value
 from .formatting import uses_variable, wrap_lines
 from .lowering import FunctionInstance
 from .statements import StatementLowering
 
 Shapes = tuple[tuple[int, ...], ...]
+Sizes = tuple[tuple[str, int], ...]
 
 
 @dataclass
@@ -26,23 +27,29 @@ class FunctionTranslator:
     failure_code: Callable[[str, SourceLocation | None], str]
     #: definitions of the translated functions, each after those that it calls
     definitions: list[str] = field(default_factory=list)
-    _instances: dict[tuple[str, Shapes], FunctionInstance] = field(default_factory=dict)
+    _instances: dict[tuple[str, Shapes, Sizes], FunctionInstance] = field(default_factory=dict)
     _in_translation: list[str] = field(default_factory=list)
 
-    def function_instance(self, call: syntax_tree.Call, shapes: Shapes) -> FunctionInstance:
+    def function_instance(self, call: syntax_tree.Call, shapes: Shapes, numbers: tuple[int | None, ...]) -> FunctionInstance:
         """Return the C function for a call; it is translated at the first call with arguments of these shapes.
+
+        Args:
+            call: The call.
+            shapes: Shapes of the arguments.
+            numbers: Values of the constant Integer arguments; they can determine the sizes of variables of the function.
 
         Raises:
             InputError: The function is recursive, unknown, or uses an unsupported feature.
         """
-        key = (call.function, shapes)
+        if call.function not in self.functions:
+            raise_model_error(f"unknown function {call.function}", call.where)
+        function, sizes = _with_sizes(self.functions[call.function], numbers)
+        key = (call.function, shapes, sizes)
         if key not in self._instances:
             if call.function in self._in_translation:
                 raise_model_error(f"the recursive function {call.function} is not supported", call.where)
-            if call.function not in self.functions:
-                raise_model_error(f"unknown function {call.function}", call.where)
             self._in_translation.append(call.function)
-            self._instances[key] = self._translate(self.functions[call.function], shapes, call.where)
+            self._instances[key] = self._translate(function, shapes, call.where)
             self._in_translation.pop()
         return self._instances[key]
 
@@ -86,6 +93,20 @@ class FunctionTranslator:
         base = c_identifier(name) if "." in name else c_identifier(name) + "_"
         used = {instance.name for instance in self._instances.values()}
         return next(n for n in (base, *(f"{base}_{k}" for k in range(2, len(used) + 3))) if n not in used)
+
+
+def _with_sizes(function: Function, numbers: tuple[int | None, ...]) -> tuple[Function, Sizes]:
+    """Insert the values of constant Integer arguments in the sizes of the other variables; return these values too."""
+    used = variable_names(tuple(local.dimensions for local in (*function.outputs, *function.locals)))
+    sizes = tuple((i.name, n) for i, n in zip(function.inputs, numbers, strict=False) if n is not None and i.name in used)
+    literals = {name: syntax_tree.Literal(number, "Integer") for name, number in sizes}
+
+    def resize(local: FunctionVariable) -> FunctionVariable:
+        return replace(
+            local, dimensions=rewrite(local.dimensions, lambda n: literals.get(n.name, n) if isinstance(n, syntax_tree.Name) else n)
+        )
+
+    return replace(function, outputs=tuple(map(resize, function.outputs)), locals=tuple(map(resize, function.locals))), sizes
 
 
 def _function_text(function: Function, instance: FunctionInstance, local_values: list[CValue], body: list[str]) -> str:

@@ -15,7 +15,7 @@ from .c_values import C_TYPES, CValue, c_identifier, variable_value
 def struct_members(model: Model) -> dict[str, str]:
     """Return the struct member of each variable: its name as a unique C identifier."""
     members: dict[str, str] = {}
-    used = {"clock", "held", "failure"}
+    used = {"clock", "held", "failure", "past", "step"}
     for name in model.variables:
         member = c_identifier(name)
         while member in used:
@@ -58,6 +58,7 @@ class HeaderWriter:
             "} Clock;",
             "",
             *self._states(),
+            *self._past(),
             "typedef struct {",
             *(f"    {line}" for line in self._struct()),
             "} Model;",
@@ -73,7 +74,29 @@ class HeaderWriter:
 
     def _states(self) -> list[str]:
         count = sum(struct_member(self.model.variables[name], name).size for name in self.model.states)
-        return [f"enum {{ STATES = {count} }};", ""] if count else []
+        hybrid = self.model.hybrid
+        if not (count and hybrid):
+            return [f"enum {{ STATES = {count} }};", ""] if count else []
+        return [
+            f"enum {{ STATES = {count}, RELATIONS = {max(len(hybrid.relations), 1)} }};",
+            "",
+            "#define RELATIVE_TOLERANCE 1e-7",
+            "#define ABSOLUTE_TOLERANCE 1e-9",
+            "",
+        ]
+
+    def _past(self) -> list[str]:
+        if not (self.model.hybrid and self.model.hybrid.delays):
+            return []
+        return [
+            "/* Values of the argument of a delay(), oldest first. */",
+            "#define PAST_VALUES 2048",
+            "typedef struct {",
+            "    double time[PAST_VALUES], value[PAST_VALUES];",
+            "    int32_t first, count;",
+            "} Past;",
+            "",
+        ]
 
     def _struct(self) -> Iterator[str]:
         sections: dict[str, Callable[[Variable], bool]] = {
@@ -96,11 +119,14 @@ class HeaderWriter:
         yield "/* internal data */"
         yield from [f"Clock clock[{len(self.schedule.clocks)}];"] * bool(self.schedule.clocks)
         yield from [f"bool held[{self.schedule.edge_detector_count}];"] * bool(self.schedule.edge_detector_count)
+        if self.model.hybrid:
+            yield from [f"Past past[{len(self.model.hybrid.delays)}];"] * bool(self.model.hybrid.delays)
+            yield from ["double step; /* next integration step (s) */"] * bool(self.model.states)
         yield "int32_t failure;"
 
 
 def _member_declaration(variable: Variable, name: str) -> str:
-    size = f"[{struct_member(variable, name).size}]" if variable.shape else ""
+    size = f"[{max(struct_member(variable, name).size, 1)}]" if variable.shape else ""
     return f"{C_TYPES[variable.type]} {name}{size};"
 
 

@@ -35,7 +35,9 @@ class TranslationUnit(Protocol):
     def failure_code(self, reason: str, where: SourceLocation | None) -> str:
         """Return the number of a failure reason."""
 
-    def function_instance(self, call: syntax_tree.Call, shapes: tuple[tuple[int, ...], ...]) -> FunctionInstance:
+    def function_instance(
+        self, call: syntax_tree.Call, shapes: tuple[tuple[int, ...], ...], numbers: tuple[int | None, ...]
+    ) -> FunctionInstance:
         """Return the C function for a call with arguments of these shapes."""
 
 

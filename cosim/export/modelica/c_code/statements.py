@@ -69,7 +69,8 @@ class StatementLowering(ExpressionLowering):
 
     def _can_return_into(self, value: syntax_tree.Call, target: CValue) -> bool:
         """Return whether a function can write its result to the target without a copy."""
-        outputs = self.translation_unit.function_instance(value, tuple(map(self.shape_of, value.arguments))).outputs
+        shapes, numbers = tuple(map(self.shape_of, value.arguments)), tuple(map(self.static_integer, value.arguments))
+        outputs = self.translation_unit.function_instance(value, shapes, numbers).outputs
         return [(output.type, output.shape) for output in outputs] == [(target.type, target.shape)]
 
     def _needs_if_statement(self, target: CValue, value: syntax_tree.If) -> bool:
@@ -140,9 +141,31 @@ class StatementLowering(ExpressionLowering):
         self.lines += [*lines, "}"]
 
     def _assert(self, node: syntax_tree.Assert) -> None:
+        if node.warning:
+            return
         condition = self.scalar_of(node.condition)
-        failure = self.translation_unit.failure_code(node.message, node.where)
+        text = "".join(str(part.value) if isinstance(part, syntax_tree.Literal) else "..." for part in node.message)
+        failure = self.translation_unit.failure_code(text, node.where)
         self.lines.append(f"if (!{condition.parenthesized(13)}) fail(m, {failure});")
+
+    def _solve(self, node: syntax_tree.Solve) -> None:
+        """Lower a system of equations to a loop of Newton's method."""
+        n, failure = len(node.unknowns), self.translation_unit.failure_code("a system of equations has no solution", node.where)
+        unknowns = ", ".join(f"&{self.lower(unknown).text.code}" for unknown in node.unknowns)
+        with self.collect_lines() as lines:
+            self.lines.append(f"double residual[{n}], jacobian[{n * n}];")
+            for k, residual in enumerate(node.residuals):
+                self.lines.append(f"residual[{k}] = {self.scalar_of(residual).code};")
+            for k, derivative in enumerate(item for row in node.jacobian for item in row):
+                self.lines.append(f"jacobian[{k}] = {self.scalar_of(derivative).code};")
+            self.lines.append(f"if (newton(m, {n}, (double *[]){{{unknowns}}}, residual, jacobian, iteration, {failure})) break;")
+        self.lines += ["for (int iteration = 0;; iteration++) {", *lines, "}"]
+
+    def _while(self, node: syntax_tree.While) -> None:
+        with self.collect_lines() as lines:
+            self.lines.append(f"if (!{self.scalar_of(node.condition).parenthesized(13)}) break;")
+            self.body(node.body)
+        self.lines += ["for (;;) {", *lines, "}"]
 
     def _multiassign(self, node: syntax_tree.MultiAssign) -> None:
         for target, result in zip(node.targets, self.lower_call(node.call), strict=False):

@@ -43,10 +43,15 @@ _SECTIONS = ("equations", "whens", "algorithms", "asserts", "initial_equations",
 _COMPARISONS = ("<", "<=", ">", ">=")
 
 
-def prepare_hybrid(model: Model) -> Model:
-    """Return the model prepared for event iteration, or the model itself if it does not need it."""
+def prepare_hybrid(model: Model, error_control: bool) -> Model:
+    """Return the model prepared for event iteration, or the model itself if it does not need it.
+
+    Args:
+        model: The flat model, with continuous states introduced.
+        error_control: Whether a model with continuous states is integrated with error control in any case.
+    """
     preparation = _Preparation(model)
-    return preparation.prepare() if preparation.is_needed() else model
+    return preparation.prepare() if (error_control and model.states) or preparation.is_needed() else model
 
 
 class _Preparation:
@@ -79,6 +84,7 @@ class _Preparation:
         sections = {name: rewrite(getattr(model, name), self._replace_delay) for name in _SECTIONS}
         sections["equations"] = (*sections["equations"], *self._equations)
         used = {name for section in sections.values() for name in _remembered(section)}
+        used |= {relation.name for relation in self._relations} | {v.name for v in self._variables.values() if is_input(v)}
         sections = {name: rewrite(section, self._replace_pre) for name, section in sections.items()}
         reinitialized = {item.name for item in walk((model.whens, model.algorithms)) if isinstance(item, Reinit)}
         remembered = tuple(n for n, v in self._variables.items() if n in used | reinitialized and v.variability not in ("constant", "parameter"))

@@ -76,7 +76,7 @@ class ExpressionReader:
             "Unary": self._unary,
             "Binary": self._binary,
             "If": self._if,
-            "Array": lambda n: syntax_tree.Array(tuple(map(self.read_expression, n["elements"]))),
+            "Array": self._array,
             "Range": lambda n: syntax_tree.Range(
                 self.read_expression(n["start"]), self._optional(n["step"]), self.read_expression(n["end"])
             ),
@@ -131,6 +131,30 @@ class ExpressionReader:
     def _if(self, node: Json) -> syntax_tree.If:
         branches = tuple((self.read_expression(condition), self.read_expression(value)) for condition, value in node["branches"])
         return syntax_tree.If(branches, self.read_expression(node["else_branch"]))
+
+    def _array(self, node: Json) -> Expression:
+        """Convert an array constructor, or a concatenation `[a, b; c, d]`, whose elements may be arrays."""
+        elements = tuple(map(self.read_expression, node["elements"]))
+        kind = node.get("kind")
+        if kind not in ("Horizontal", "Vertical") or self._is_matrix_of_scalars(elements, kind):
+            return syntax_tree.Array(elements)
+        return syntax_tree.Builtin("rows" if kind == "Vertical" else "columns", elements, self.locate(node))
+
+    def _is_matrix_of_scalars(self, elements: tuple[Expression, ...], kind: str) -> bool:
+        if kind == "Vertical":
+            return all(isinstance(element, syntax_tree.Array) for element in elements)
+        return all(self._is_scalar(element) for element in elements)
+
+    def _is_scalar(self, node: Expression) -> bool:
+        """Return whether an expression is certainly a scalar."""
+        if isinstance(node, syntax_tree.Name):
+            variable = self.json["variables"].get(node.name)
+            return variable is not None and not variable["dims"]
+        if isinstance(node, syntax_tree.Index):
+            return isinstance(node.base, syntax_tree.Name) and all(isinstance(s, syntax_tree.Literal) for s in node.subscripts)
+        if isinstance(node, syntax_tree.Binary):
+            return self._is_scalar(node.left) and self._is_scalar(node.right)
+        return isinstance(node, syntax_tree.Literal) or (isinstance(node, syntax_tree.Unary) and self._is_scalar(node.operand))
 
     def _comprehension(self, node: Json) -> Expression:
         """Convert an array constructor with iterators; the last iterator varies fastest in Modelica's nesting order."""

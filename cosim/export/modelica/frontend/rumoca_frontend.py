@@ -38,6 +38,8 @@ class ModelicaSources:
     files: Sequence[Path]
     #: rumoca's hash of the file name -> file
     _by_hash: Mapping[int, Path]
+    #: folders of the libraries that the model uses
+    libraries: Sequence[Path] = ()
 
     @classmethod
     def from_files(cls, files: Sequence[Path]) -> ModelicaSources:

@@ -129,6 +129,12 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.array([a[i] * b[j] - a[j] * b[i] for i, j in ((1, 2), (2, 0), (0, 1))])
 
 
+def _as_matrix(value: Any) -> np.ndarray:
+    """Return a scalar or a vector as a matrix with one column, as concatenation does."""
+    array = np.asarray(value)
+    return array.reshape(array.shape + (1,) * (2 - array.ndim)) if array.ndim < 2 else array
+
+
 def _size(array: Any, dimension: int | None = None) -> Any:
     return np.array(np.shape(array)) if dimension is None else np.shape(array)[dimension - 1]
 
@@ -155,6 +161,7 @@ BUILTINS: Mapping[str, Callable[..., Any]] = {
     "abs": lambda x: elementwise(lambda y: check_int32(abs(y)), x),
     "atan2": math.atan2,
     "cat": lambda _, *arrays: np.concatenate(arrays),
+    "columns": lambda *parts: np.concatenate([_as_matrix(part) for part in parts], axis=1),
     "cross": _cross,
     "diagonal": lambda x: np.diag(np.asarray(x)),
     "div": _real_or_integer(lambda a, b: float(np.trunc(divide(a, b))), _quotient),
@@ -170,6 +177,7 @@ BUILTINS: Mapping[str, Callable[..., Any]] = {
     "noEvent": lambda x: x,
     "ones": lambda *sizes: np.ones(sizes, np.int64),
     "product": lambda x: reduce(lambda a, b: check_int32(a * b), _flat_elements((x,))),
+    "rows": lambda *parts: np.concatenate([_as_matrix(part) for part in parts], axis=0),
     "scalar": lambda x: to_python_scalar(np.asarray(x).flat[0]),
     "rem": _real_or_integer(lambda a, b: a - float(np.trunc(divide(a, b))) * b, lambda a, b: a - b * _quotient(a, b)),
     "sign": lambda x: elementwise(lambda y: (y > 0) - (y < 0), x),
