@@ -12,6 +12,7 @@ from typing import Any
 
 import numpy as np
 
+from ...core import units
 from ...core.component import Causality, Variability
 from ...core.errors import InputError, Problem
 from ..fmu.block import Block, BlockVariable
@@ -150,13 +151,22 @@ def _block_variable(variable: Variable, member: str, role: FmiRole, defaults: In
         causality=role[0],
         variability=role[1],
         start=_to_python(defaults.get(variable.name)),
-        unit=variable.unit,
+        unit=_known_unit(variable.unit, role),
         shape=variable.shape,
         description=variable.description,
         minimum=None if variable.minimum is None else float(np.min(defaults.evaluate(variable.minimum))),
         maximum=None if variable.maximum is None else float(np.max(defaults.evaluate(variable.maximum))),
         enumeration=tuple((literal, "") for literal in _literals(variable, defaults.model)),
     )
+
+
+def _known_unit(unit: str, role: FmiRole) -> str:
+    """Return the unit, or "" for a parameter with a unit that has no conversion, for example dB."""
+    try:
+        units.parse_unit(unit or "1")
+    except ValueError:
+        return unit if role[0] in ("input", "output") else ""
+    return unit
 
 
 def _literals(variable: Variable, model: Model) -> tuple[str, ...]:

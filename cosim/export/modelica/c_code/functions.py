@@ -157,7 +157,7 @@ def _c_name(value: CValue) -> str:
 
 
 def _parameter(value: CValue, qualifier: str) -> str:
-    size = f"[{value.size}]" if value.shape else ""
+    size = f"[{max(value.size, 1)}]" if value.shape else ""
     return f"{qualifier if value.shape else ''}{C_TYPES[value.type]} {_c_name(value)}{size}"
 
 
@@ -166,4 +166,4 @@ def _zero_fill(value: CValue) -> str:
 
 
 def _declaration(value: CValue) -> str:
-    return f"{C_TYPES[value.type]} {_c_name(value)}{f'[{value.size}] = {{0}}' if value.shape else ' = 0'};"
+    return f"{C_TYPES[value.type]} {_c_name(value)}{f'[{max(value.size, 1)}] = {{0}}' if value.shape else ' = 0'};"

@@ -63,7 +63,8 @@ def event_functions(model: Model, values: Mapping[str, CValue], evaluation: list
             "static void event(Model *m, double time, const bool *due)",
             [
                 "remember(m);",
-                f"for (int pass = 0; evaluate(m, time, due); pass++) {{",
+                "/* flags of ticks are true in the first evaluation only */",
+                "for (int pass = 0; (evaluate(m, time, due) || due != NO_TICK) && m->failure == 0; pass++) {",
                 f"    if (pass == {MAX_PASSES}) fail(m, {endless});",
                 "    remember(m);",
                 "    remember_inputs(m);",
@@ -92,7 +93,7 @@ def record_function(model: Model, values: Mapping[str, CValue], lowering: Statem
 
 def crossing_function(relations: Iterable[Relation], values: Mapping[str, CValue], lowering: StatementLowering) -> str:
     """Generate `crossed`, which compares the relations with their stored values."""
-    lines = ["bool changed = false;", "(void)time;", "(void)z;"]
+    lines = ["bool changed = false;", "(void)m;", "(void)time;", "z[0] = 0;"]
     for k, relation in enumerate(relations):
         left, right = (lowering.evaluated_once(lowering.lower(side)).text for side in (relation.condition.left, relation.condition.right))
         lowering.lines += [
@@ -106,11 +107,7 @@ def crossing_function(relations: Iterable[Relation], values: Mapping[str, CValue
 
 def hybrid_step_body(clocks: int, continuous: bool, too_many: str) -> list[str]:
     """Generate the body of model_step."""
-    lines = [
-        "const double end = time + step_size;",
-        "m->failure = 0;",
-        "if (inputs_changed(m)) event(m, time, NO_TICK);",
-    ]
+    lines = ["const double end = time + step_size;", "m->failure = 0;"]
     tick = ["const bool tick = false;", *["const double target = end;"] * continuous]
     if clocks:
         tick = [
@@ -119,11 +116,15 @@ def hybrid_step_body(clocks: int, continuous: bool, too_many: str) -> list[str]:
             f"const bool tick = next < end - TOLERANCE * shortest_period(m->clock, {clocks});",
             "const double target = tick ? next : end;",
         ]
-    loop = [*tick]
+    loop, at_start = [*tick], "count == 0"
+    if clocks:
+        loop.append(f"const bool at_start = tick && next <= time + TOLERANCE * shortest_period(m->clock, {clocks});")
+        at_start += " && !at_start"
+    loop.append(f"if ({at_start} && inputs_changed(m)) event(m, time, NO_TICK);")
     if continuous:
         lines.append("double reached = time;")
         loop += [
-            "const bool crossing = advance(m, reached, target, &reached);",
+            f"const bool crossing = {'!at_start && ' * bool(clocks)}advance(m, reached, target, &reached);",
             "if (m->failure != 0) break;",
             "if (crossing) {",
             "    event(m, reached, NO_TICK);",

@@ -9,6 +9,7 @@ from math import prod
 from typing import Protocol
 
 from ..model import syntax_tree
+from ..model.arithmetic import BUILTINS
 from ..model.syntax_tree import Expression, SourceLocation, raise_model_error
 from .c_values import C_TYPES, CExpression, CValue, scalar_value, variable_value
 
@@ -92,7 +93,7 @@ class Lowering:
         """Declare a temporary C variable or array without initialization."""
         self.temporaries += 1
         name = f"tmp_{self.temporaries}"
-        self.lines.append(f"{C_TYPES[type_name]} {name}{f'[{prod(shape)}]' if shape else ''};")
+        self.lines.append(f"{C_TYPES[type_name]} {name}{f'[{max(prod(shape), 1)}]' if shape else ''};")
         return variable_value(type_name, shape, name)
 
     def evaluated_once(self, value: CValue) -> CValue:
@@ -146,6 +147,9 @@ class Lowering:
         if isinstance(node, syntax_tree.Builtin) and node.name == "size" and len(node.arguments) == 2:
             dimension = self.static_integer(node.arguments[1])
             return None if dimension is None else self.shape_of(node.arguments[0])[dimension - 1]
+        if isinstance(node, syntax_tree.Builtin) and node.name in ("min", "max", "div", "mod"):
+            numbers = [self.static_integer(argument) for argument in node.arguments]
+            return None if None in numbers else int(BUILTINS[node.name](*numbers))
         return None
 
     def static_range(self, node: syntax_tree.Range) -> list[int]:
