@@ -19,6 +19,7 @@ from ..fmu.block import Block, BlockVariable
 from .c_code.emit import generate_c
 from .c_code.header import struct_members
 from .causality.continuous_states import introduce_derivatives
+from .causality.dependent_states import reduce_states
 from .causality.hybrid import prepare_hybrid
 from .causality.interpreter import Interpreter
 from .causality.matching import is_input
@@ -27,6 +28,7 @@ from .frontend.folded_branches import folded_parameters
 from .frontend.reader import ModelReader
 from .frontend.rumoca_frontend import ModelicaSources, flatten_model
 from .model.flat_model import Model, Variable
+from .model.traversal import variable_names
 from .model.syntax_tree import raise_model_error
 
 _FMI_TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration"}
@@ -98,9 +100,21 @@ def analyse(json: Mapping[str, Any], sources: ModelicaSources, name: str) -> Int
     """Convert the document of the front end to an interpreter of the model."""
     flat = ModelReader(json, sources).read_model(name)
     flat = replace(flat, structural=flat.structural | folded_parameters(json, sources))
-    flat = prepare_hybrid(introduce_derivatives(fold_constants(flat)), bool(sources.libraries))
+    flat = _without_unused_connectors(flat)
+    flat = prepare_hybrid(reduce_states(introduce_derivatives(fold_constants(flat))), bool(sources.libraries))
     _check_types(flat)
     return Interpreter(flat)
+
+
+def _without_unused_connectors(model: Model) -> Model:
+    """Return the model without the variables of its components that occur nowhere, as in expandable connectors."""
+    used = variable_names((model.equations, model.whens, model.algorithms, model.asserts, model.initial_equations))
+    unused = {
+        v.name
+        for v in model.variables.values()
+        if "." in v.name and v.name not in used and v.variability in ("continuous", "discrete") and v.causality == "local" and not v.binding
+    }
+    return replace(model, variables={name: v for name, v in model.variables.items() if name not in unused})
 
 
 def _check_types(model: Model) -> None:

@@ -9,7 +9,8 @@ from math import prod
 from typing import Protocol
 
 from ..model import syntax_tree
-from ..model.arithmetic import BUILTINS
+from ..model.evaluate import Evaluator
+from ..model.traversal import walk
 from ..model.syntax_tree import Expression, SourceLocation, raise_model_error
 from .c_values import C_TYPES, CExpression, CValue, scalar_value, variable_value
 
@@ -147,9 +148,9 @@ class Lowering:
         if isinstance(node, syntax_tree.Builtin) and node.name == "size" and len(node.arguments) == 2:
             dimension = self.static_integer(node.arguments[1])
             return None if dimension is None else self.shape_of(node.arguments[0])[dimension - 1]
-        if isinstance(node, syntax_tree.Builtin) and node.name in ("min", "max", "div", "mod"):
-            numbers = [self.static_integer(argument) for argument in node.arguments]
-            return None if None in numbers else int(BUILTINS[node.name](*numbers))
+        if isinstance(node, syntax_tree.Builtin) and not any(isinstance(n, syntax_tree.Name | syntax_tree.Call) for n in walk(node)):
+            value = Evaluator({}, {})(node)
+            return value if isinstance(value, int) else None
         return None
 
     def static_range(self, node: syntax_tree.Range) -> list[int]:

@@ -8,22 +8,26 @@ from typing import TypeVar
 Key = TypeVar("Key", bound=Hashable)
 
 
-def match(candidates: Sequence[Sequence[Key]], optional: Collection[Key] = ()) -> dict[int, Key]:
+def match(candidates: Sequence[Sequence[Key]], optional: Sequence[Collection[Key]] = ()) -> dict[int, Key]:
     """Assign an unknown to each equation, if possible.
 
     Assignments without an alternative are made first, so that a system that can be solved in sequence is.
 
     Args:
         candidates: For each equation the unknowns for which it can be solved, the preferred ones first.
-        optional: Unknowns that have a value anyway. They are assigned only to equations that cannot be assigned otherwise.
+        optional: Groups of unknowns that have a value anyway. They are assigned only to equations that cannot be assigned
+            otherwise, those of the first group first.
 
     Returns:
         Equation number -> unknown; equations that cannot be matched are missing.
     """
-    required = [[key for key in keys if key not in optional] for keys in candidates]
-    matched = _match_in_sequence(required)
+    excluded = {key for group in optional for key in group}
+    options = [[key for key in keys if key not in excluded] for keys in candidates]
+    matched = _match_in_sequence(options)
     owner = {key: number for number, key in matched.items()}
-    for options in (required, candidates):
+    for group in ((), *optional):
+        excluded -= set(group)
+        options = [[key for key in keys if key not in excluded] for keys in candidates]
         for number in range(len(options)):
             if number not in matched:
                 _augment(number, options, matched, owner)

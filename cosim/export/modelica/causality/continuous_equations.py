@@ -53,7 +53,7 @@ def _has_loop(model: Model, statements: Sequence[Assign]) -> bool:
 
 def solve_initial_equations(
     model: Model, assigned: Collection[str], continuous: Sequence[Assign | Solve], written: Collection[ScalarKey]
-) -> Sequence[Assign | Solve]:
+) -> tuple[Sequence[Assign | Solve], set[ScalarKey]]:
     """Solve the continuous and the initial equations for the values at the start.
 
     States, variables that when-clauses assign, and values before the initialization have their start values unless an initial
@@ -65,6 +65,9 @@ def solve_initial_equations(
         continuous: The solved continuous equations.
         written: The scalars that when-clauses and algorithms assign at the initialization.
 
+    Returns:
+        The solved equations, and the relations in algebraic loops.
+
     Raises:
         InputError: The equations do not determine the initial values, or contradict each other.
     """
@@ -74,21 +77,22 @@ def solve_initial_equations(
         except InputError:
             explicit = None
         if explicit is not None and not any(isinstance(s, Solve) for s in continuous):
-            return [*continuous, *explicit]
+            return [*continuous, *explicit], set()
     known = {v.name for v in model.variables.values() if v.variability in ("constant", "parameter") or is_input(v)}
     fixed = {name for name in model.states if model.variables[name].fixed}
     started = (set(assigned) | _previous_values(model)) - fixed
     optional = _keys(model, started) - set(written)
     unknowns = _keys(model, set(model.variables) - known - started - fixed) - set(written)
     equations = (*model.equations, *model.initial_equations)
-    solved = EquationSystem(model, equations, unknowns, optional).solve()
+    system = EquationSystem(model, equations, unknowns, [optional])
+    solved = system.solve()
     determined = {key for s in solved for key in _solved_keys(model, s)} | set(written)
     kept = [
         Assign(reference_of(key, model), reference_of((previous_name(key[0]), key[1]), model))
         for key in sorted(optional - determined)
         if key[0] not in model.states and previous_name(key[0]) in model.variables
     ]
-    return [*solved, *kept]
+    return [*solved, *kept], system.held
 
 
 def _solved_keys(model: Model, statement: Assign | Solve) -> set[ScalarKey]:

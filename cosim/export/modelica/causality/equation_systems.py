@@ -16,7 +16,7 @@ from ..model.syntax_tree import (
     SourceLocation,
     raise_model_error,
 )
-from ..model.traversal import read_references, rewrite
+from ..model.traversal import read_references, rewrite, rewrite_outermost
 from .assignment import match, strongly_connected_components
 from .differentiation import ZERO, Differentiation, divide, negate, subtract
 from .matching import ScalarKey, scalar_keys
@@ -42,18 +42,27 @@ class EquationSystem:
     model: Model
     equations: Sequence[Equation]
     unknowns: Collection[ScalarKey]
-    #: unknowns that have a value if no equation is needed for them, for example start values
-    optional: Collection[ScalarKey] = ()
+    #: groups of unknowns that have a value if no equation is needed for them, for example start values
+    optional: Sequence[Collection[ScalarKey]] = ()
 
     def __post_init__(self) -> None:
         splitter = EquationSplitter(self.model)
         self._scalar = [scalar for equation in self.equations for scalar in splitter.split(equation)]
-        self._all = set(self.unknowns) | set(self.optional)
+        self._all = set(self.unknowns).union(*self.optional)
         self._incidence = [self._keys(equation) for equation in self._scalar]
         relations = self.model.hybrid.relations if self.model.hybrid else ()
         self._relations = {relation.name for relation in relations}
         #: relations in algebraic loops, which keep their value while the equations are evaluated
         self.held: set[ScalarKey] = set()
+
+    @property
+    def scalar_equations(self) -> Sequence[Equation]:
+        """The equations, one for each element."""
+        return self._scalar
+
+    def matching(self) -> dict[int, ScalarKey]:
+        """Return the unknown that each scalar equation determines; equations without one are missing."""
+        return match([self._preferences(k) for k in range(len(self._scalar))], self.optional)
 
     def solve(self) -> list[Assign | Solve]:
         """Return the equations as assignments and systems of equations, in no particular order.
@@ -61,7 +70,7 @@ class EquationSystem:
         Raises:
             InputError: The system is structurally singular.
         """
-        matched = match([self._preferences(k) for k in range(len(self._scalar))], self.optional)
+        matched = self.matching()
         self._check(matched)
         numbers = sorted(matched)
         owner = {matched[number]: k for k, number in enumerate(numbers)}
@@ -136,9 +145,11 @@ class EquationSystem:
         """Return an expression that is linear in an unknown with zero instead of the unknown."""
 
         def substitute(item: object) -> object:
-            return ZERO if isinstance(item, Name | Index) and self._key_of(item) == {key} else item
+            if not isinstance(item, Name | Index):
+                return None
+            return ZERO if self._key_of(item) == {key} else item
 
-        result: Expression = _simplified(rewrite(node, substitute))
+        result: Expression = _simplified(rewrite_outermost(node, substitute))
         return result
 
     def _system(self, equations: Sequence[Equation], keys: Sequence[ScalarKey]) -> Solve:

@@ -58,6 +58,7 @@ class _Preparation:
     def __init__(self, model: Model):
         self._model = model
         self._discrete = {referenced_variable(target) for target in assigned_references((model.whens, model.algorithms))}
+        self._discrete |= model.initialized
         self._discrete |= {v.name for v in model.variables.values() if v.variability != "continuous" or v.type != "Real"}
         self._variables: dict[str, Variable] = dict(model.variables)
         self._relations: list[Relation] = []

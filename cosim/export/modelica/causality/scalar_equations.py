@@ -49,7 +49,9 @@ class EquationSplitter:
         try:
             with np.errstate(all="ignore"):
                 return np.shape(self._evaluate(node))
-        except (EvaluationError, ZeroDivisionError, KeyError) as error:
+        except KeyError:  # a built-in function without a value here, such as sample()
+            return ()
+        except (EvaluationError, ZeroDivisionError) as error:
             raise_model_error(f"the size of an expression is not known: {error}", getattr(node, "where", None))
 
     def element(self, node: Expression, position: Position) -> Expression:

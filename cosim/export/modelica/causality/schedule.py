@@ -88,15 +88,16 @@ def build_schedule(model: Model) -> Schedule:
     conditions = WhenConditions(model)
     model = _with_tick_flags(model, conditions)
     assigned = {referenced_variable(target) for target in assigned_references((model.whens, model.algorithms))}
-    assigned |= set(model.states)
+    assigned |= {*model.states, *model.initialized}
     continuous, held = solve_equations(model, assigned)
     events = [*_event_nodes(model, conditions), *(_make_node(model, (statement,)) for statement in continuous)]
     initial = _initial_nodes(model, conditions)
-    initial += [_make_node(model, (s,)) for s in solve_initial_equations(model, assigned, continuous, _written(initial))]
-    for nodes in (events, initial):
+    solved, initially_held = solve_initial_equations(model, assigned, continuous, _written(initial))
+    initial += [_make_node(model, (statement,)) for statement in solved]
+    for nodes, constant in ((events, held), (initial, initially_held)):
         nodes += [_make_node(model, (detector,)) for detector in conditions.edge_detectors]
         for node in nodes:
-            node.reads -= held
+            node.reads -= constant
     event_body = merge_statements(sort_topologically(events))
     if len(conditions.clocks) == 1 and not model.states and not model.hybrid:
         event_body = _remove_clock_condition(event_body)

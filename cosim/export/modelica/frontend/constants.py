@@ -49,18 +49,24 @@ def fold_constants(model: Model) -> Model:
 
 
 def _bind_parameters(model: Model) -> Model:
-    """Return the model with the initial equations of parameters with `fixed = false` as their bindings."""
+    """Return the model with the initial equations of parameters with `fixed = false` as their bindings.
+
+    Those that depend on variables or on the time become variables that are only computed at the initialization.
+    """
+    free = {v.name for v in model.variables.values() if v.variability == "parameter" and v.fixed is False and 0 not in v.shape}
+    known = {v.name for v in model.variables.values() if v.variability in ("constant", "parameter")}
     bindings: dict[str, Expression] = {}
     remaining = []
     for equation in model.initial_equations:
         name = equation.left.name if isinstance(equation.left, Name) else ""
-        variable = model.variables.get(name)
-        if variable is not None and variable.variability == "parameter" and variable.fixed is False and name not in bindings:
+        if name in free - set(bindings) and variable_names(equation.right) <= known:
             bindings[name] = equation.right
         else:
             remaining.append(equation)
+    initialized = free - set(bindings)
     variables = {n: replace(v, binding=bindings[n]) if n in bindings else v for n, v in model.variables.items()}
-    return replace(model, variables=variables, initial_equations=tuple(remaining))
+    variables |= {n: replace(model.variables[n], variability="discrete", binding=None) for n in initialized}
+    return replace(model, variables=variables, initial_equations=tuple(remaining), initialized=frozenset(initialized))
 
 
 def _rewrite_model(model: Model, change: Any, names: Iterable[str] | None = None) -> Model:
