@@ -99,9 +99,10 @@ def _flatten(path: Path, model: str | None) -> tuple[Interpreter, ModelicaSource
 def analyse(json: Mapping[str, Any], sources: ModelicaSources, name: str) -> Interpreter:
     """Convert the document of the front end to an interpreter of the model."""
     flat = ModelReader(json, sources).read_model(name)
-    flat = replace(flat, structural=flat.structural | folded_parameters(json, sources))
+    structural = flat.structural | folded_parameters(json, sources)
+    flat = replace(flat, structural=structural, uses_library=bool(sources.libraries))
     flat = _without_unused_connectors(flat)
-    flat = prepare_hybrid(reduce_states(introduce_derivatives(fold_constants(flat))), bool(sources.libraries))
+    flat = prepare_hybrid(reduce_states(introduce_derivatives(fold_constants(flat))))
     _check_types(flat)
     return Interpreter(flat)
 
@@ -142,11 +143,13 @@ def _fmi_role(variable: Variable, defaults: Interpreter) -> FmiRole | None:
     """Return causality and variability of a variable in the FMU, or None if the FMU does not contain it.
 
     The FMU contains the inputs and outputs of the model itself, and all parameters that are neither protected nor set by a
-    modifier.
+    modifier. Structural parameters are constants. The FMU of a model with event iteration or of a library contains all other variables too.
     """
     roles = defaults.parameter_roles
     if variable.name in roles.settable:
         return "parameter", "fixed" if variable.name in roles.clock_parameters else "tunable"
+    if variable.name in defaults.model.structural and not variable.protected:
+        return "local", "constant"
     if variable.variability == "parameter":
         return None if variable.protected or variable.bound_by_modifier else ("calculatedParameter", "tunable")
     continuous = variable.type == "Real" and bool(defaults.model.states or not defaults.schedule.clocks)
@@ -154,6 +157,8 @@ def _fmi_role(variable: Variable, defaults: Interpreter) -> FmiRole | None:
         return "input", "continuous" if variable.type == "Real" else "discrete"
     if variable.causality == "output" and variable.top_level:
         return "output", "continuous" if continuous else "discrete"
+    if (defaults.model.hybrid or defaults.model.uses_library) and not variable.name.startswith(("$", "pre(")) and 0 not in variable.shape:
+        return "local", "continuous" if continuous and variable.variability == "continuous" else "discrete"
     return None
 
 

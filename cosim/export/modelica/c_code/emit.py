@@ -26,6 +26,7 @@ from .hybrid_code import (
     crossing_function,
     event_functions,
     hybrid_step_body,
+    is_integrated,
     record_function,
 )
 from .model_step import continuous_step_body, sampled_step_body
@@ -70,7 +71,7 @@ def _optional_headers(defaults: Interpreter) -> list[str]:
     needed = {
         "past.h": model.hybrid and model.hybrid.delays,
         "newton.h": any(isinstance(item, Solve) for item in walk(bodies)),
-        "hybrid.h": model.hybrid and model.states,
+        "hybrid.h": is_integrated(model),
         "runge_kutta.h": model.states and not model.hybrid,
     }
     return [name for name, condition in needed.items() if condition]
@@ -133,9 +134,9 @@ class _Emitter:
             *event_functions(model, values, self._event(), endless, initial),
             function_definition("const char *model_initialize(Model *m, double time)", self._initialize_hybrid(endless)),
         ]
-        if model.states:
+        if is_integrated(model):
             definitions += [*self._hybrid_system(values)]
-        step = hybrid_step_body(clocks, bool(model.states), too_many)
+        step = hybrid_step_body(clocks, is_integrated(model), too_many)
         return [*definitions, function_definition("const char *model_step(Model *m, double time, double step_size)", step)]
 
     def _initialize_hybrid(self, endless: str) -> list[str]:
@@ -143,7 +144,7 @@ class _Emitter:
         past = [f"memset(m->past, 0, sizeof m->past);"] if self.model.hybrid and self.model.hybrid.delays else []
         return [
             "m->failure = 0;",
-            *(["m->step = 0;"] if self.model.states else []),
+            *(["m->step = 0;"] if is_integrated(self.model) else []),
             *past,
             "start_variables(m);",
             *self._clock_lines(),
@@ -154,7 +155,22 @@ class _Emitter:
             "if (m->failure == 0) remember_inputs(m);",
             *(["record(m, time);"] if past else []),
             "if (m->failure == 0) event(m, time, NO_TICK);",
+            *self._first_ticks(),
             "return REASONS[m->failure];",
+        ]
+
+    def _first_ticks(self) -> list[str]:
+        """Generate the event of the clocks that tick at the start time."""
+        clocks = len(self.schedule.clocks)
+        if not clocks:
+            return []
+        return [
+            f"bool due[{clocks}];",
+            f"const double next = next_event(m->clock, {clocks}, due);",
+            f"if (m->failure == 0 && next <= time + TOLERANCE * shortest_period(m->clock, {clocks})) {{",
+            "    event(m, time, due);",
+            f"    for (int k = 0; k < {clocks}; k++) m->clock[k].ticks += due[k];",
+            "}",
         ]
 
     def _copy_relations(self) -> list[str]:
@@ -169,9 +185,11 @@ class _Emitter:
         lowering = self._make_lowering()
         lowering.body(self.schedule.indicators)
         states, rates = self._element_pointers(self.model.states), self._element_pointers(map(derivative_name, self.model.states))
+        if not self.model.states:
+            states, rates = "&m->no_state[0]", "&m->no_state[1]"
         return [
             function_definition(
-                "static void derivatives(Model *m, double time)", ["(void)time;", *self._body(self.schedule.derivatives, initial=False)]
+                "static void derivatives(Model *m, double time)", ["(void)m;", "(void)time;", *self._body(self.schedule.derivatives, initial=False)]
             ),
             crossing_function(self.model.hybrid.relations, values, lowering),
             function_definition(

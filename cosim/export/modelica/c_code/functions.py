@@ -4,11 +4,12 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 from ..model import syntax_tree
 from ..model.flat_model import Function, FunctionVariable
 from ..model.syntax_tree import SourceLocation, raise_model_error, referenced_variable
-from ..model.traversal import read_references, rewrite, variable_names
+from ..model.traversal import read_references, rewrite, variable_names, walk
 from .c_values import C_TYPES, CValue, c_identifier, variable_value
 from .formatting import uses_variable, wrap_lines
 from .lowering import FunctionInstance
@@ -96,17 +97,24 @@ class FunctionTranslator:
 
 
 def _with_sizes(function: Function, numbers: tuple[int | None, ...]) -> tuple[Function, Sizes]:
-    """Insert the values of constant Integer arguments in the sizes of the other variables; return these values too."""
+    """Insert the values of constant Integer arguments that determine sizes, here or in functions that it calls.
+
+    Returns:
+        The function, and the names and values of these arguments.
+    """
     used = variable_names(tuple(local.dimensions for local in (*function.outputs, *function.locals)))
+    used |= variable_names(tuple(n.arguments for n in walk(function.body) if isinstance(n, syntax_tree.Call)))
     sizes = tuple((i.name, n) for i, n in zip(function.inputs, numbers, strict=False) if n is not None and i.name in used)
     literals = {name: syntax_tree.Literal(number, "Integer") for name, number in sizes}
 
-    def resize(local: FunctionVariable) -> FunctionVariable:
-        return replace(
-            local, dimensions=rewrite(local.dimensions, lambda n: literals.get(n.name, n) if isinstance(n, syntax_tree.Name) else n)
-        )
+    def insert(node: Any) -> Any:
+        return literals.get(node.name, node) if isinstance(node, syntax_tree.Name) else node
 
-    return replace(function, outputs=tuple(map(resize, function.outputs)), locals=tuple(map(resize, function.locals))), sizes
+    def resize(local: FunctionVariable) -> FunctionVariable:
+        return replace(local, dimensions=rewrite(local.dimensions, insert), default=rewrite(local.default, insert))
+
+    outputs, local_variables = tuple(map(resize, function.outputs)), tuple(map(resize, function.locals))
+    return replace(function, outputs=outputs, locals=local_variables, body=rewrite(function.body, insert)), sizes
 
 
 def _function_text(function: Function, instance: FunctionInstance, local_values: list[CValue], body: list[str]) -> str:

@@ -9,13 +9,14 @@ from ..causality.matching import is_input
 from ..causality.parameter_roles import ParameterRoles
 from ..causality.schedule import Schedule
 from ..model.flat_model import Model, Variable, derivative_name
+from .hybrid_code import is_integrated
 from .c_values import C_TYPES, CValue, c_identifier, variable_value
 
 
 def struct_members(model: Model) -> dict[str, str]:
     """Return the struct member of each variable: its name as a unique C identifier."""
     members: dict[str, str] = {}
-    used = {"clock", "held", "failure", "past", "step"}
+    used = {"clock", "held", "failure", "past", "step", "no_state"}
     for name in model.variables:
         member = c_identifier(name)
         while member in used:
@@ -75,10 +76,10 @@ class HeaderWriter:
     def _states(self) -> list[str]:
         count = sum(struct_member(self.model.variables[name], name).size for name in self.model.states)
         hybrid = self.model.hybrid
-        if not (count and hybrid):
+        if not (hybrid and is_integrated(self.model)):
             return [f"enum {{ STATES = {count} }};", ""] if count else []
         return [
-            f"enum {{ STATES = {count}, RELATIONS = {max(len(hybrid.relations), 1)} }};",
+            f"enum {{ STATES = {max(count, 1)}, RELATIONS = {max(len(hybrid.relations), 1)} }};",
             "",
             "#define RELATIVE_TOLERANCE 1e-7",
             "#define ABSOLUTE_TOLERANCE 1e-9",
@@ -121,7 +122,8 @@ class HeaderWriter:
         yield from [f"bool held[{self.schedule.edge_detector_count}];"] * bool(self.schedule.edge_detector_count)
         if self.model.hybrid:
             yield from [f"Past past[{len(self.model.hybrid.delays)}];"] * bool(self.model.hybrid.delays)
-            yield from ["double step; /* next integration step (s) */"] * bool(self.model.states)
+            yield from ["double step; /* next integration step (s) */"] * is_integrated(self.model)
+            yield from ["double no_state[2];"] * (is_integrated(self.model) and not self.model.states)
         yield "int32_t failure;"
 
 

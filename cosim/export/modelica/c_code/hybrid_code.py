@@ -23,6 +23,11 @@ def copy_values(variables: Iterable[tuple[CValue, CValue]]) -> list[str]:
     ]
 
 
+def is_integrated(model: Model) -> bool:
+    """Return whether a model with event iteration has states, or relations that change with time."""
+    return model.hybrid is not None and bool(model.states or model.hybrid.relations)
+
+
 def _differs(a: CValue, b: CValue) -> str:
     return f"memcmp({a.pointer}, {b.pointer}, sizeof {a.pointer}) != 0" if a.shape else f"{a.text.code} != {b.text.code}"
 

@@ -6,9 +6,10 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from math import prod
-from typing import Protocol
+from typing import Any, Protocol
 
 from ..model import syntax_tree
+from ..model.arithmetic import EvaluationError
 from ..model.evaluate import Evaluator
 from ..model.traversal import walk
 from ..model.syntax_tree import Expression, SourceLocation, raise_model_error
@@ -148,10 +149,17 @@ class Lowering:
         if isinstance(node, syntax_tree.Builtin) and node.name == "size" and len(node.arguments) == 2:
             dimension = self.static_integer(node.arguments[1])
             return None if dimension is None else self.shape_of(node.arguments[0])[dimension - 1]
-        if isinstance(node, syntax_tree.Builtin) and not any(isinstance(n, syntax_tree.Name | syntax_tree.Call) for n in walk(node)):
-            value = Evaluator({}, {})(node)
-            return value if isinstance(value, int) else None
-        return None
+        value = self.static_value(node) if isinstance(node, syntax_tree.Builtin) else None
+        return value if isinstance(value, int) else None
+
+    def static_value(self, node: Expression) -> Any:
+        """Return the value of an expression without variables; None for all other expressions."""
+        if any(isinstance(n, syntax_tree.Name | syntax_tree.Call) for n in walk(node)):
+            return None
+        try:
+            return Evaluator({}, {})(node)
+        except (EvaluationError, KeyError):
+            return None
 
     def static_range(self, node: syntax_tree.Range) -> list[int]:
         """Return the values of a range.

@@ -105,6 +105,12 @@ class StatementLowering(ExpressionLowering):
 
     def _ifstatement(self, node: syntax_tree.IfStatement) -> None:
         (condition, body), rest = node.branches[0], node.branches[1:]
+        if (known := self.static_value(condition)) is not None:
+            if known or not rest:
+                self.body(body if known else node.otherwise)
+            else:
+                self._ifstatement(syntax_tree.IfStatement(rest, node.otherwise, node.where))
+            return
         self.lines.append(f"if ({self.scalar_of(condition).code}) {{")
         with self.collect_lines() as yes:
             self.body(body)

@@ -9,8 +9,8 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 from ....core.errors import InputError
-from ..model.flat_model import Model, previous_name
-from ..model.syntax_tree import Assign, Name, Solve
+from ..model.flat_model import Equation, Model, previous_name
+from ..model.syntax_tree import Assign, Literal, Name, Solve
 from ..model.traversal import read_references
 from .assignment import strongly_connected_components
 from .equation_systems import EquationSystem, reference_of
@@ -83,7 +83,12 @@ def solve_initial_equations(
     started = (set(assigned) | _previous_values(model)) - fixed
     optional = _keys(model, started) - set(written)
     unknowns = _keys(model, set(model.variables) - known - started - fixed) - set(written)
-    equations = (*model.equations, *model.initial_equations)
+    fixed_unknowns = [
+        Equation(Name(v.name), v.start or Literal(0.0, "Real"), v.where)
+        for v in model.variables.values()
+        if v.fixed and v.type == "Real" and v.name in {name for name, _ in unknowns}
+    ]
+    equations = (*model.equations, *model.initial_equations, *fixed_unknowns)
     system = EquationSystem(model, equations, unknowns, [optional])
     solved = system.solve()
     determined = {key for s in solved for key in _solved_keys(model, s)} | set(written)

@@ -71,14 +71,8 @@ class _Reduction:
                 continue
             done.add(key)
             equations.append(self._differentiated(key))
-        starts = tuple(
-            Equation(Name(name), variable.start or Literal(0.0, "Real"), variable.where)
-            for name, variable in self._model.variables.items()
-            if name in names and variable.fixed
-        )
         states = tuple(name for name in self._model.states if name not in names)
-        initial = (*self._model.initial_equations, *starts)
-        return replace(self._model, variables=self._variables, states=states, equations=tuple(equations), initial_equations=initial)
+        return replace(self._model, variables=self._variables, states=states, equations=tuple(equations))
 
     def _differentiated(self, key: ScalarKey) -> Equation:
         """Return the derivative of the equation that determines a variable."""

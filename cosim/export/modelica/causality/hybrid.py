@@ -1,7 +1,7 @@
 """Preparation of models with event iteration.
 
 A model needs it if `pre()` or `sample()` occurs outside when-clauses, or if it has `reinit()`, `delay()`, or comparisons between
-values that change while the states are integrated. In such a model
+values that change while the states are integrated, or if it has states and uses a library. In such a model
 
 - `pre(x)` becomes a variable with this name, which holds the value of x before the current evaluation of the equations;
 - a comparison becomes a Boolean variable, which keeps its value between events; its change is an event;
@@ -43,15 +43,10 @@ _SECTIONS = ("equations", "whens", "algorithms", "asserts", "initial_equations",
 _COMPARISONS = ("<", "<=", ">", ">=")
 
 
-def prepare_hybrid(model: Model, error_control: bool) -> Model:
-    """Return the model prepared for event iteration, or the model itself if it does not need it.
-
-    Args:
-        model: The flat model, with continuous states introduced.
-        error_control: Whether a model with continuous states is integrated with error control in any case.
-    """
+def prepare_hybrid(model: Model) -> Model:
+    """Return the model prepared for event iteration, or the model itself if it does not need it."""
     preparation = _Preparation(model)
-    return preparation.prepare() if (error_control and model.states) or preparation.is_needed() else model
+    return preparation.prepare() if preparation.is_needed() else model
 
 
 class _Preparation:
@@ -75,12 +70,14 @@ class _Preparation:
             return True
         if any(isinstance(item, Reinit) for item in walk((self._model.whens, self._model.algorithms))):
             return True
+        if self._model.uses_library and self._model.states:
+            return True
         comparisons = rewrite_outermost((self._model.equations, conditions), _without_events)
         return bool(self._model.states) and any(self._is_relation(item) for item in walk(comparisons))
 
     def prepare(self) -> Model:
         model = self._model
-        if model.states:
+        if model.states or "time" in variable_names((model.equations, model.whens)):
             model = replace(model, equations=self._with_relations(model.equations), whens=self._with_relations_in_conditions(model.whens))
         sections = {name: rewrite(getattr(model, name), self._replace_delay) for name in _SECTIONS}
         sections["equations"] = (*sections["equations"], *self._equations)

@@ -57,7 +57,7 @@ class EquationSplitter:
     def element(self, node: Expression, position: Position) -> Expression:
         """Return the expression of one element, counted from 0."""
         method = getattr(self, f"_{type(node).__name__.lower()}", None)
-        result = method(node, position) if method and (position or isinstance(node, Index | Binary | Builtin)) else None
+        result = method(node, position) if method and (position or not isinstance(node, syntax_tree.Array)) else None
         if result is not None:
             return result
         return Index(node, _literals(position)) if position else node
@@ -69,7 +69,7 @@ class EquationSplitter:
         return replace(node, operand=self.element(node.operand, position))
 
     def _if(self, node: syntax_tree.If, position: Position) -> Expression:
-        branches = tuple((condition, self.element(value, position)) for condition, value in node.branches)
+        branches = tuple((self.element(condition, ()), self.element(value, position)) for condition, value in node.branches)
         return syntax_tree.If(branches, self.element(node.otherwise, position))
 
     def _index(self, node: Index, position: Position) -> Expression | None:
@@ -125,7 +125,7 @@ class EquationSplitter:
         return None
 
     def _call(self, node: Call, position: Position) -> Expression | None:
-        return None
+        return None if position else node
 
 
 def _literals(position: Sequence[int]) -> tuple[Expression, ...]:

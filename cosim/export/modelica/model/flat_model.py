@@ -124,6 +124,8 @@ class Model:
     structural: frozenset[str]
     #: continuous states (see `causality/continuous_states.py`)
     states: tuple[str, ...] = ()
+    #: true if the model uses a library that is not part of its own sources
+    uses_library: bool = False
     #: variables that are only computed at the initialization
     initialized: frozenset[str] = frozenset()
     #: None for a model whose equations are evaluated once per event (see `causality/hybrid.py`)
