@@ -62,6 +62,7 @@ def derivative_variable(state: Variable) -> Variable:
         causality="local",
         start=None,
         binding=None,
+        fixed=None,
         protected=True,
         top_level=False,
         unit="",
