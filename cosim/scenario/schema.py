@@ -49,6 +49,9 @@ class ComponentSpec(Spec):
     fmu: str | None = Field(default=None, description="path of an FMU")
     python: str | None = Field(default=None, description='"file.py:Class": a PythonFMU class or a component class of cosim')
     modelica: str | None = Field(default=None, description='"file.mo:Model"; built when needed (requires the extra "build")')
+    libraries: list[str] = Field(
+        default=[], description="folders of Modelica libraries, searched before those of MODELICAPATH; only for Modelica models"
+    )
     system: str | None = Field(default=None, description="path of the JSON file of a nested system")
     arguments: dict[str, Any] = Field(default={}, description="arguments of the constructor; only for Python components")
     parameters: dict[str, Value] = Field(default={}, description="values of parameters and start values, by variable name")
@@ -62,6 +65,8 @@ class ComponentSpec(Spec):
             raise ValueError(f"expected exactly one of {', '.join(SOURCES)}; found {' and '.join(given) or 'none'}")
         if self.arguments and self.python is None:
             raise ValueError('"arguments" are for components with "python"; variables are set with "parameters"')
+        if self.libraries and self.modelica is None:
+            raise ValueError('"libraries" are for components with "modelica"')
         if self.isolation and self.fmu is None and self.modelica is None:
             raise ValueError('"isolation" is for components with "fmu" or "modelica"')
         return self
