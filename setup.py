@@ -1,4 +1,4 @@
-"""Build steps beyond pyproject.toml: the optional native executor and the bundle of shipped files.
+"""Build steps beyond pyproject.toml: the optional extension modules and the bundle of shipped files.
 
 The wheel carries scenarios, FMUs, plant and controller sources as cosim/_bundle/ in the layout of the checkout.
 """
@@ -27,17 +27,20 @@ class BuildWithBundle(build_py):
             shutil.copytree(name, target, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
 
 
-def native_executor() -> Extension:
-    """Extension that is optional unless COSIM_REQUIRE_NATIVE is set; without it cosim runs the pure Python executor."""
+def extension(name: str) -> Extension:
+    """Extension that is optional unless COSIM_REQUIRE_NATIVE is set; without it cosim runs slower, in pure Python."""
     optional = not os.environ.get("COSIM_REQUIRE_NATIVE")
     flags = [] if sys.platform == "win32" else ["-std=c11", "-O2", "-ffp-contract=off"]
-    return Extension(
-        "cosim.engine._native", ["cosim/engine/_native.c"], extra_compile_args=flags, py_limited_api=True, optional=optional
-    )
+    libraries = [] if sys.platform == "win32" else ["m"]
+    source = f"{name.replace('.', '/')}.c"
+    return Extension(name, [source], extra_compile_args=flags, libraries=libraries, py_limited_api=True, optional=optional)
 
+
+#: modules in C; the second one reads the state of a Linux process
+EXTENSIONS = ["cosim.engine._native", *(["cosim.process._process_state"] if sys.platform == "linux" else [])]
 
 setup(
     cmdclass={"build_py": BuildWithBundle},
-    ext_modules=[native_executor()],
+    ext_modules=[extension(name) for name in EXTENSIONS],
     options={"bdist_wheel": {"py_limited_api": "cp311"}},
 )

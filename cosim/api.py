@@ -11,7 +11,8 @@ from typing import Any, TypedDict, Unpack
 
 from .core.errors import ComponentError, CosimError, InputError, Problem
 from .engine.pacer import LatePolicy
-from .engine.run_loop import Observer, SimulationOutcome, StepHook, simulating
+from .engine.plan_run import Observer, SimulationOutcome, StepHook
+from .engine.run_loop import simulating
 from .results import Kpis, Result
 from .results.checks import CheckOutcome, evaluate_all_checks, evaluate_checks
 from .results.kpi import evaluate_kpis, kpi_senses, kpi_units
@@ -127,9 +128,9 @@ def _evaluate_run(result: Result, prepared: PreparedRun) -> Execution:
     kpis = Kpis()
     failures: list[BaseException] = []
     functions = prepared.kpis()
-    for i, kpi in enumerate(functions):
+    for kpi in functions:
         try:
-            with _adding_location(prepared, "kpis", i):
+            with _adding_location(prepared, "kpis", prepared.index_of_kpi(kpi[0])):
                 kpis.update(evaluate_kpis(result, [kpi]))
         except (CosimError, KeyboardInterrupt) as error:
             failures.append(error)
@@ -147,7 +148,7 @@ def evaluate_scenario_checks(prepared: PreparedRun, result: Result) -> list[Chec
         result: A result with KPIs.
 
     Returns:
-        The outcome of each check, in the order of the scenario.
+        The outcome of each check, in the order of the scenario. A check of an optional KPI that was left out is not met.
 
     Raises:
         InputError: A check names a KPI that the result does not have.
@@ -155,7 +156,8 @@ def evaluate_scenario_checks(prepared: PreparedRun, result: Result) -> list[Chec
     outcomes = []
     for i, check in enumerate(prepared.checks):
         with _adding_location(prepared, "checks", i):
-            outcomes += evaluate_checks(result.kpis, [check])
+            is_optional = check["kpi"].partition(".")[0] in prepared.optional_kpis
+            outcomes += (evaluate_all_checks if is_optional else evaluate_checks)(result.kpis, [check])
     return outcomes
 
 

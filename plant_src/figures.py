@@ -30,7 +30,7 @@ from .figure_style import (
     fit_height,
 )
 from .kpis import waypoints
-from .recorded_motion import horizontal_distance, touchdown_row
+from .recorded_motion import horizontal_distance, touchdown_row, used_waypoints
 
 TIME_AFTER_TOUCHDOWN = 4.0  # s, shown by default
 MIN_PLOTTED_ERROR = 1e-3  # m, lower end of the logarithmic axis
@@ -40,9 +40,10 @@ def paths(
     result: Result,
     vehicle: Prefix,
     deck: Prefix,
-    x: Sequence[float] = (),
-    y: Sequence[float] = (),
-    radius: float = 0.0,
+    waypoint_x: Sequence[float] = (),
+    waypoint_y: Sequence[float] = (),
+    acceptance_radius: float = 0.0,
+    waypoint_count: float | None = None,
     platforms: Mapping[str, Mapping[str, Sequence[float]]] | None = None,
 ) -> Figure:
     """Draw the paths of a multirotor and a vessel in the horizontal plane; dots mark their first positions.
@@ -51,9 +52,10 @@ def paths(
         result: Recorded mission.
         vehicle: Signal prefix of the multirotor ("plant.uav").
         deck: Signal prefix of the vessel's landing deck ("plant.usv.deck").
-        x: East coordinates of the vessel's waypoints (m, world).
-        y: North coordinates of the vessel's waypoints (m, world).
-        radius: Radius of the circles of acceptance (m).
+        waypoint_x: East coordinates of the vessel's waypoints (m, world).
+        waypoint_y: North coordinates of the vessel's waypoints (m, world).
+        acceptance_radius: Radius of the circles of acceptance (m).
+        waypoint_count: Number of waypoints that are used; None: all.
         platforms: Platforms as in the arguments of the plant: {"start": {"size": [x, y, z], "position": [x, y, z]}},
             edges and centre (m, world).
 
@@ -64,7 +66,7 @@ def paths(
     axes = figure.add_subplot(aspect="equal", xlabel="x / m", ylabel="y / m")
     for name, platform in (platforms or {}).items():
         _draw_platform(axes, name, platform)
-    _draw_waypoints(axes, x, y, radius)
+    _draw_waypoints(axes, used_waypoints(waypoint_x, waypoint_y, waypoint_count), acceptance_radius)
     _draw_path(axes, result, deck.removesuffix(".deck"), color=VESSEL_COLOUR, label="vessel")
     _draw_path(axes, result, vehicle, color=MULTIROTOR_COLOUR, label="quadcopter", linestyle=(0, (1.2, 1.0)))
     row = touchdown_row(result, vehicle)
@@ -82,10 +84,10 @@ def _draw_platform(axes: Axes, name: str, platform: Mapping[str, Sequence[float]
     annotate(axes, name, corner, offset=(3, 3), color="#8A7650")
 
 
-def _draw_waypoints(axes: Axes, x: Sequence[float], y: Sequence[float], radius: float) -> None:
-    if len(x):
-        axes.plot(x, y, "+", color="#555555", markersize=5, label="waypoints", zorder=2)
-    for number, (east, north) in enumerate(zip(x, y, strict=True), start=1):
+def _draw_waypoints(axes: Axes, waypoints: Sequence[tuple[float, float]], radius: float) -> None:
+    if waypoints:
+        axes.plot(*zip(*waypoints, strict=True), "+", color="#555555", markersize=5, label="waypoints", zorder=2)
+    for number, (east, north) in enumerate(waypoints, start=1):
         axes.add_patch(Circle((east, north), radius, fill=False, color="#888888", linestyle="--", linewidth=0.7, zorder=2))
         annotate(axes, str(number), (east + 0.7 * radius, north + 0.7 * radius), offset=(1, 1), color="#333333")
 
@@ -193,9 +195,10 @@ def tracking_error(
     result: Result,
     vehicle: Prefix,
     target: Prefix,
-    x: Sequence[float] = (),
-    y: Sequence[float] = (),
-    radius: float = 0.0,
+    waypoint_x: Sequence[float] = (),
+    waypoint_y: Sequence[float] = (),
+    acceptance_radius: float = 0.0,
+    waypoint_count: float | None = None,
     limit: float | None = None,
     start: float = 0.0,
 ) -> Figure:
@@ -207,9 +210,10 @@ def tracking_error(
         result: Recorded mission.
         vehicle: Signal prefix of the vehicle ("plant.uav").
         target: Signal prefix of the target ("plant.usv.deck").
-        x: East coordinates of the vessel's waypoints (m, world).
-        y: North coordinates of the vessel's waypoints (m, world).
-        radius: Radius of the circles of acceptance (m).
+        waypoint_x: East coordinates of the vessel's waypoints (m, world).
+        waypoint_y: North coordinates of the vessel's waypoints (m, world).
+        acceptance_radius: Radius of the circles of acceptance (m).
+        waypoint_count: Number of waypoints that are used; None: all.
         limit: Distance that is marked by a line (m).
         start: First time shown (s).
 
@@ -221,16 +225,17 @@ def tracking_error(
     shown = slice(int(np.searchsorted(result.time, start)), None)
     _draw_error(axes, result.time[shown], horizontal_distance(result, vehicle, target)[shown], limit)
     axes.set(xlabel="t / s", xlim=(start, result.time[-1]))
-    if len(x):
-        _mark_turns(axes, waypoints(result, target.removesuffix(".deck"), x, y, radius), len(x))
+    if len(waypoint_x):
+        vessel = target.removesuffix(".deck")
+        _mark_turns(axes, waypoints(result, vessel, waypoint_x, waypoint_y, acceptance_radius, waypoint_count))
     return figure
 
 
-def _mark_turns(axes: Axes, reached: Mapping[str, Any], count: int) -> None:
+def _mark_turns(axes: Axes, reached: Mapping[str, Any]) -> None:
     """Draw a numbered line for every waypoint that was reached, except the last: no turn follows it."""
     first, last = axes.get_xlim()
-    for number in range(1, count):
-        time = reached[f"time[{number}]"]
+    *times, _ = (time for key, time in reached.items() if key.startswith("time"))
+    for number, time in enumerate(times, start=1):
         if first <= time <= last:
             axes.axvline(time, color=VESSEL_COLOUR, linewidth=0.8, linestyle=":", zorder=1)
             axes.text(

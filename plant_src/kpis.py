@@ -17,7 +17,7 @@ from cosim.results.checks import Number
 from cosim.results.kpi import Prefix, Signal, better, declared_units, units
 
 from . import deck_frame
-from .recorded_motion import distance_from_line, horizontal_distance, touchdown_row
+from .recorded_motion import distance_from_line, horizontal_distance, touchdown_row, used_waypoints
 
 
 @better(
@@ -174,18 +174,26 @@ def descent(result: Result, vehicle: Prefix, mode: Signal, descending: float) ->
 
 @better(reached="higher", all_reached="higher", time="lower")
 @units(time="s")
-def waypoints(result: Result, vehicle: Prefix, x: Sequence[float], y: Sequence[float], radius: float) -> dict[str, Number]:
+def waypoints(
+    result: Result,
+    vehicle: Prefix,
+    waypoint_x: Sequence[float],
+    waypoint_y: Sequence[float],
+    acceptance_radius: float,
+    waypoint_count: float | None = None,
+) -> dict[str, Number]:
     """Evaluate which waypoints a vehicle reached in their order.
 
     A waypoint is reached at the first row inside its circle of acceptance (Fossen (2021), chapter 12), not before the
-    waypoint ahead of it.
+    waypoint ahead of it. The last four arguments have the names of an autopilot's parameters.
 
     Args:
         result: Recorded mission.
         vehicle: Signal prefix of the vehicle ("plant.usv").
-        x: East coordinates of the waypoints (m, world).
-        y: North coordinates of the waypoints (m, world).
-        radius: Radius of the circles of acceptance (m).
+        waypoint_x: East coordinates of the waypoints (m, world).
+        waypoint_y: North coordinates of the waypoints (m, world).
+        acceptance_radius: Radius of the circles of acceptance (m).
+        waypoint_count: Number of waypoints that are used; None: all.
 
     Returns:
         Values by name:
@@ -194,10 +202,11 @@ def waypoints(result: Result, vehicle: Prefix, x: Sequence[float], y: Sequence[f
         - `all_reached`: true if that is the number of waypoints
         - `time[1]`, `time[2]`, ...: time at which each waypoint was reached (s); NaN if it was not
     """
-    times, row = [math.nan] * len(x), 0
+    route = used_waypoints(waypoint_x, waypoint_y, waypoint_count)
+    times, row = [math.nan] * len(route), 0
     position_x, position_y = result[f"{vehicle}.position.x"], result[f"{vehicle}.position.y"]
-    for i, (waypoint_x, waypoint_y) in enumerate(zip(x, y, strict=True)):
-        inside = np.hypot(position_x[row:] - waypoint_x, position_y[row:] - waypoint_y) <= radius
+    for i, (x, y) in enumerate(route):
+        inside = np.hypot(position_x[row:] - x, position_y[row:] - y) <= acceptance_radius
         if not inside.any():
             break
         row += int(inside.argmax())
@@ -212,7 +221,14 @@ def waypoints(result: Result, vehicle: Prefix, x: Sequence[float], y: Sequence[f
 
 @better(rms="lower", max="lower", leg="lower")
 @units(rms="m", max="m", leg="m")
-def cross_track(result: Result, vehicle: Prefix, x: Sequence[float], y: Sequence[float], radius: float) -> dict[str, Number]:
+def cross_track(
+    result: Result,
+    vehicle: Prefix,
+    waypoint_x: Sequence[float],
+    waypoint_y: Sequence[float],
+    acceptance_radius: float,
+    waypoint_count: float | None = None,
+) -> dict[str, Number]:
     """Evaluate the cross-track error of a vehicle on the straight legs between waypoints.
 
     The first leg starts at the position in the first row. A leg begins when the previous waypoint is reached (see
@@ -222,9 +238,10 @@ def cross_track(result: Result, vehicle: Prefix, x: Sequence[float], y: Sequence
     Args:
         result: Recorded mission.
         vehicle: Signal prefix of the vehicle ("plant.usv").
-        x: East coordinates of the waypoints (m, world).
-        y: North coordinates of the waypoints (m, world).
-        radius: Radius of the circles of acceptance (m).
+        waypoint_x: East coordinates of the waypoints (m, world).
+        waypoint_y: North coordinates of the waypoints (m, world).
+        acceptance_radius: Radius of the circles of acceptance (m).
+        waypoint_count: Number of waypoints that are used; None: all.
 
     Returns:
         Values by name:
@@ -233,9 +250,10 @@ def cross_track(result: Result, vehicle: Prefix, x: Sequence[float], y: Sequence
         - `max`: largest error (m)
         - `leg[1]`, `leg[2]`, ...: largest error on each leg (m); NaN for a leg that was not begun
     """
-    times = [value for key, value in waypoints(result, vehicle, x, y, radius).items() if key.startswith("time")]
+    values = waypoints(result, vehicle, waypoint_x, waypoint_y, acceptance_radius, waypoint_count)
+    times = [value for key, value in values.items() if key.startswith("time")]
     position = result[f"{vehicle}.position.x"] + 1j * result[f"{vehicle}.position.y"]
-    corners = [position[0], *(east + 1j * north for east, north in zip(x, y, strict=True))]
+    corners = [position[0], *(east + 1j * north for east, north in zip(waypoint_x, waypoint_y, strict=True))]
     begin, errors_of_legs = float(result.time[0]), []
     for start, end, reached in zip(corners, corners[1:], times, strict=False):
         rows = (result.time >= begin) & ~(result.time > reached)  # no time is later than NaN: an unfinished leg has all rows

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
+
 import numpy as np
 
 from cosim.results import Result
@@ -41,3 +43,9 @@ def distance_from_line(position: np.ndarray, start: complex, end: complex) -> np
         np.abs(((position - start) * np.conj(direction)).imag) / abs(direction) if direction else np.abs(position - start)
     )
     return distance
+
+
+def used_waypoints(x: Sequence[float], y: Sequence[float], count: float | None) -> list[tuple[float, float]]:
+    """Return the first `count` waypoints as (x, y); None: all. An autopilot has more elements than it uses."""
+    waypoints = list(zip(x, y, strict=True))
+    return waypoints if count is None else waypoints[: int(count)]

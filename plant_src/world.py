@@ -17,14 +17,14 @@ from cosim.core.errors import ComponentError, InputError, Problem, did_you_mean
 from . import world_settings
 from .catalogue import MODELS
 from .environment.environment_model import EnvironmentModel
-from .physics.body import InvalidStateError, create_platform
+from .physics.body import ContactBody, InvalidStateError, create_platform
 from .physics.client import connect, preconnect, pybullet
 from .physics.compiled_equations import library_path
 from .physics.contacts import overlap_depths
 from .physics.fleet import Fleet, FleetState
 from .scene import replay
 from .variable_views import variable_views
-from .world_settings import WorldSettings
+from .world_settings import INITIAL_PREFIX, WAVE_PREFIX, WorldSettings
 
 if TYPE_CHECKING:
     from cosim.results import Result
@@ -136,6 +136,7 @@ class World(Component):
             prefixed = [replace(variable, name=f"{body.name}.{variable.name}") for variable in body.model.variables]
             yield from variable_views([v for v in prefixed if v.causality == "input"], {_FLOAT: body.inputs})
             yield from variable_views([v for v in prefixed if v.causality == "output"], {_FLOAT: body.outputs, _FLAG: flags})
+            yield from _constants(body)
         environment = self._environment
         yield from variable_views(environment.input_variables, {_FLOAT: environment.inputs})
         yield from variable_views(environment.output_variables, {_FLOAT: environment.outputs})
@@ -254,3 +255,12 @@ class World(Component):
         """Release the memory of a state in Bullet."""
         if self._disconnect.alive:
             self._fleet.free_state(state.fleet)
+
+
+def _constants(body: ContactBody) -> Iterator[tuple[Variable, np.ndarray]]:
+    """Yield the parameters of a vehicle as constants with their values, except those of its initial state and of the waves."""
+    for variable, values in variable_views(body.model.real_variables("parameter"), {_FLOAT: body.parameters}):
+        if not variable.name.startswith((INITIAL_PREFIX, WAVE_PREFIX)):
+            value = values.tolist() if variable.shape else values.item()
+            name = f"{body.name}.{variable.name}"
+            yield replace(variable, name=name, causality="local", variability="constant", start=value), values

@@ -44,5 +44,5 @@ def executor(request, monkeypatch):
     """Whatever a test simulates, it does so with each executor."""
     if request.param == "native" and not native_available():
         pytest.skip("the native executor was not built")
-    monkeypatch.setattr("cosim.engine.run_loop.executor_class", lambda _kind: EXECUTORS[request.param])
+    monkeypatch.setattr("cosim.engine.plan_run.executor_class", lambda _kind: EXECUTORS[request.param])
     return request.param

@@ -20,4 +20,8 @@ class Stopwatch:
         try:
             yield
         finally:
-            self.seconds[part] = self.seconds.get(part, 0.0) + perf_counter() - began
+            self.add(part, perf_counter() - began)
+
+    def add(self, part: str, seconds: float) -> None:
+        """Add a duration (s) to `part`."""
+        self.seconds[part] = self.seconds.get(part, 0.0) + seconds

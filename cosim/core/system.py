@@ -36,12 +36,21 @@ class Connection:
         target: The input.
         delay: Number of macro steps by which the value is delayed.
         where: Location in the scenario file, for messages.
+        gain: Factor that is applied after the conversion of units.
+        offset: Value that is added after `gain`, in the unit of the input.
     """
 
     source: Endpoint
     target: Endpoint
     delay: int = 0
     where: str = ""
+    gain: float = 1.0
+    offset: float = 0.0
+
+    @property
+    def is_mapped(self) -> bool:
+        """True if a gain or an offset changes the value."""
+        return (self.gain, self.offset) != (1.0, 0.0)
 
 
 #: parallel execution of the components of a stage on threads: if it is faster, always, or never
@@ -181,9 +190,11 @@ class System:
                 first = by_target[connection.target].source
                 yield Problem(f"input {connection.target} is connected twice: it is already fed by {first}", connection.where)
             by_target.setdefault(connection.target, connection)
-            if text := incompatibility(
-                self.find_element(connection.source).variable, self.find_element(connection.target).variable
-            ):
+            source_variable, target_variable = (self.find_element(end).variable for end in (connection.source, connection.target))
+            text = incompatibility(source_variable, target_variable)
+            if connection.is_mapped and not text and target_variable.type not in FLOAT_TYPES:
+                text = f'"gain" and "offset" are for inputs of floating-point numbers, found {target_variable.type}'
+            if text:
                 yield Problem(f"{connection.source} cannot feed {connection.target}: {text}", connection.where)
 
     def _find_endpoint_problem(self, end: Endpoint, causality: str) -> str:

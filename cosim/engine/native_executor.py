@@ -131,7 +131,7 @@ class NativeExecutor(Executor):
         grid = self.plan.grid
         coefficients = grid.float_coefficients(end)
         count = min(end - first, self._steps_per_call(first)) if coefficients else 1
-        self._program.set_row_address(self.recorder.chunk.ctypes.data + self.recorder.chunk_bytes_used)
+        self._program.set_row_address(self.recorder.next_row_address)
         self._program.run(first, count, *(coefficients or (grid.time_at(first), 0.0, 1.0)))
 
     def _steps_per_call(self, first: int) -> int:

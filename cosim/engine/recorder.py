@@ -60,8 +60,8 @@ class Recorder:
         self._string_writers: list[RowWriter] = [column.append for column in self._string_columns.values()]
         #: functions that write a row of the current chunk
         self.row_writers: Sequence[RowWriter] = ()
-        #: number of rows that still fit into the current chunk, and the bytes of the chunk
-        self.free_rows, self.chunk = 0, np.zeros(0, np.uint8)
+        #: number of rows that still fit into the current chunk, the bytes of the chunk, and the address of its end
+        self.free_rows, self.chunk, self._chunk_end = 0, np.zeros(0, np.uint8), 0
 
     def _pack_row(self, numeric: Sequence[ArrayPosition]) -> Iterator[RowPart]:
         row_offset = 0
@@ -95,6 +95,7 @@ class Recorder:
         """Add a chunk to the row store; call it when the current chunk is full."""
         chunk = self.row_store.add_chunk()
         self.free_rows, self.chunk = len(chunk), chunk.view(np.uint8) if chunk.dtype.itemsize else np.zeros(0, np.uint8)
+        self._chunk_end = self.chunk.ctypes.data + len(self.chunk)
         size, first = self.row_store.dtype.itemsize, self.row_count
         if self.whole_buffer:
             writers = [_buffer_writer(self.chunk.data, self._plan.outputs.buffer.data, size, first)]
@@ -126,9 +127,9 @@ class Recorder:
         self.row_count = rows
 
     @property
-    def chunk_bytes_used(self) -> int:
-        """Number of bytes of the current chunk that are in use."""
-        return len(self.chunk) - self.free_rows * self.row_store.dtype.itemsize
+    def next_row_address(self) -> int:
+        """Address of the next row in the current chunk."""
+        return self._chunk_end - self.free_rows * self.row_store.dtype.itemsize
 
     @property
     def has_strings(self) -> bool:

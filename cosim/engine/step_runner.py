@@ -42,13 +42,13 @@ class StepRunner:
     def __init__(self, marker: np.ndarray):
         self.current_time = ctypes.c_double()
         self.termination: Termination | None = None
-        self._marker = marker
+        self._marker = marker.data
         self._float_mode = float_mode.FloatModeGuard()
 
     @property
     def completed_steps(self) -> int:
         """Number of macro steps completed so far, which is the number of the current one."""
-        return int(self._marker[STEP_COUNT])
+        return self._marker[STEP_COUNT]
 
     @property
     def termination_status(self) -> int:

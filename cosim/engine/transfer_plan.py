@@ -55,7 +55,7 @@ class TransferPlanner:
         #: (dtype of source, position of target) -> offset of source, for connections without delay and conversion
         self._copies: dict[tuple[Dtype, ArrayPosition], int] = {}
         for connection in system.connections:
-            if not connection.delay and self._unit_conversion(connection) == (1.0, 0.0):
+            if not connection.delay and self._conversion(connection) == (1.0, 0.0):
                 source, target = self._positions(connection)
                 self._copies[source.dtype, target] = source.offset
         #: targets of the connections of this phase and of earlier ones, which must not be overwritten with newer values
@@ -64,13 +64,15 @@ class TransferPlanner:
     def _positions(self, connection: Connection) -> tuple[ArrayPosition, ArrayPosition]:
         return self._outputs.positions[connection.source], self._inputs.positions[connection.target]
 
-    def _unit_conversion(self, connection: Connection) -> tuple[float, float]:
-        return unit_conversion(
+    def _conversion(self, connection: Connection) -> tuple[float, float]:
+        """Return (factor, offset) of the conversion of units, followed by the connection's own gain and offset."""
+        factor, offset = unit_conversion(
             self._system.find_element(connection.source).variable, self._system.find_element(connection.target).variable
         )
+        return connection.gain * factor, connection.gain * offset + connection.offset
 
     def plan_transfers(self, connections: Iterable[Connection]) -> Iterator[Transfer]:
-        """Yield the transfers of one phase, grouped by dtypes, delay and unit conversion.
+        """Yield the transfers of one phase, grouped by dtypes, delay and conversion.
 
         Args:
             connections: those that are read in this phase; call this method in the order of the phases.
@@ -80,7 +82,7 @@ class TransferPlanner:
         groups: dict[tuple[Dtype, Dtype, int, bool], list[Connection]] = defaultdict(list)
         for connection in connections:
             source, target = self._positions(connection)
-            converted = self._unit_conversion(connection) != (1.0, 0.0)
+            converted = self._conversion(connection) != (1.0, 0.0)
             groups[source.dtype, target.dtype, connection.delay, converted].append(connection)
         for (_, _, delay, converted), group in groups.items():
             if delay or converted:
@@ -92,7 +94,7 @@ class TransferPlanner:
         sources, targets = zip(*map(self._positions, connections), strict=True)
         if not converted:
             return self._make_transfer(sources, targets, delay)
-        factor, offset = np.ascontiguousarray(np.transpose([self._unit_conversion(connection) for connection in connections]))
+        factor, offset = np.ascontiguousarray(np.transpose([self._conversion(connection) for connection in connections]))
         return self._make_transfer(sources, targets, delay, factor, offset)
 
     def _contiguous_copies(self, connections: list[Connection]) -> Iterator[Transfer]:

@@ -67,7 +67,7 @@ def _remove_orphans(manifest: dict[str, Any], sources: Sequence[Source], root: P
             (root / fmu).unlink(missing_ok=True)
 
 
-def build_to(source: Path, model: str | None, target: Path, fmi_version: int = 2) -> Path:
+def build_to(source: Path, model: str | None, target: Path, fmi_version: int = 2, *, library_path: Sequence[Path] = ()) -> Path:
     """Export one source file to one FMU.
 
     Args:
@@ -75,6 +75,7 @@ def build_to(source: Path, model: str | None, target: Path, fmi_version: int = 2
         model: Name of the Modelica model. None selects the model with the name of the file.
         target: The FMU to write.
         fmi_version: 2 or 3.
+        library_path: Folders of Modelica libraries, which are searched before those of MODELICAPATH.
 
     Returns:
         `target`.
@@ -85,40 +86,45 @@ def build_to(source: Path, model: str | None, target: Path, fmi_version: int = 2
     classified = classify_source(source, model)
     if fmi_version not in classified.fmi_versions:
         raise InputError(Problem(f"a {classified.kind.name} cannot be exported as FMI {fmi_version}.0", str(source)))
-    export_source(classified, {fmi_version: target}, model)
+    export_source(classified, {fmi_version: target}, model, library_path)
     return target
 
 
-def cached_fmu(source: Path, model: str | None) -> Path:
+def cached_fmu(source: Path, model: str | None, library_path: Sequence[Path] = ()) -> Path:
     """Return the FMI 2.0 FMU of a Modelica model from the user's cache.
 
-    The FMU is built if the model, the Modelica files beside it, the exporter or the tools have changed since the last build.
+    The FMU is built if the model, the Modelica files beside it, a library that it uses, the exporter or the tools have changed
+    since the last build.
 
     Args:
         source: The Modelica file.
         model: Name of the model. None selects the model with the name of the file.
+        library_path: Folders of Modelica libraries, which are searched before those of MODELICAPATH.
 
     Raises:
         InputError: The model cannot be exported, or the cache cannot be written.
         OutputError: The disk is full or defective.
     """
+    from .modelica.frontend.libraries import find_libraries, library_folders
+
     classified = classify_source(source, model)
     files = sorted(source.resolve().parent.rglob("*.mo"))
     exporter = sorted(path for path in Path(__file__).parent.rglob("*") if path.suffix in (".py", ".c", ".h"))
     contents = [(str(path), file_hash(path)) for path in [*files, *exporter]]
+    contents += [(str(library.path), library.digest) for library in find_libraries([source], library_folders(library_path), ())]
     key = sha256(json.dumps([str(source.resolve()), model, tool_versions(classified), contents]).encode())
     target = cache_directory() / "fmus" / key.hexdigest()[:24] / f"{classified.name}.fmu"
     if not _is_intact(target):
-        _build_in_cache(source, model, target)
+        _build_in_cache(source, model, target, library_path)
     return target
 
 
-def _build_in_cache(source: Path, model: str | None, target: Path) -> None:
+def _build_in_cache(source: Path, model: str | None, target: Path, library_path: Sequence[Path]) -> None:
     """Build a cached FMU and its digest, unless another process does it while this one waits."""
     with waiting_for_lock(target.parent / LOCK_FILE):
         if not _is_intact(target):
             remove_files(target.parent, target.name)
-            build_to(source, model, target)
+            build_to(source, model, target, library_path=library_path)
             with writing_atomically(_digest_file(target)) as temporary:
                 temporary.write_text(file_hash(target))
 

@@ -9,8 +9,7 @@ from __future__ import annotations
 
 import ctypes
 import os
-from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from collections.abc import Callable
 from functools import cache
 
 from ..core import component_log
@@ -23,20 +22,25 @@ _describe_call: CallDescription | None = None
 _noted_calls: dict[tuple[str, str], bool] = {}
 
 
-@contextmanager
-def attributing_forks(describe_call: CallDescription | None) -> Iterator[None]:
-    """Attribute forks in the block to the present call, and end a copy of this process that reaches the end of the block.
+class attributing_forks:  # noqa: N801  # a generator as context manager would take twice as long
+    """Attribute forks in the block to the present call, and end a copy of this process that reaches the end of the block."""
 
-    Args:
-        describe_call: Returns component and function of the present call; None for forks that are not made by foreign code.
-    """
-    global _describe_call
-    process, outer, _describe_call = os.getpid(), _describe_call, describe_call
-    try:
-        yield
-    finally:
-        _describe_call = outer
-        if os.getpid() != process:
+    def __init__(self, describe_call: CallDescription | None):
+        """Prepare the block.
+
+        Args:
+            describe_call: Returns component and function of the present call; None for forks that are not made by foreign code.
+        """
+        self._inner = describe_call
+
+    def __enter__(self) -> None:
+        global _describe_call
+        self._process, self._outer, _describe_call = os.getpid(), _describe_call, self._inner
+
+    def __exit__(self, *error: object) -> None:
+        global _describe_call
+        _describe_call = self._outer
+        if os.getpid() != self._process:
             os._exit(1)
 
 

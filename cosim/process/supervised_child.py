@@ -13,7 +13,7 @@ from . import journal as journals
 from .forks import watch_forks
 from .journal import EXIT_CODE, Journal, Phase
 from .limits import detach, lower_limit
-from .process_state import reserve_descriptors
+from .process_attributes import reserve_descriptors
 from .standard_streams import protected_stream
 
 #: limit of the private memory of a supervised run (bytes); mapped files of rows do not count

@@ -129,7 +129,10 @@ def _serve(request: Mapping[str, Any], figures: Sequence[Figure], answers: IO[by
     result = Result(recording, Kpis(content["kpis"]), content["timing"], content["metadata"], checks)
     answers.write(b"\n")
     folders = Path(request["folder"]), Path(request["pictures"])
-    processes = {figure[0]: _fork_drawing(result, figure, *folders) for figure in figures}
+    functions = {name: function for name, function, _ in figures}
+    specs = result.metadata["scenario"].get("figures", ())  # with the arguments that the run has resolved
+    resolved = [(spec["name"], functions[spec["name"]], spec.get("arguments", {})) for spec in specs if spec["name"] in functions]
+    processes = {figure[0]: _fork_drawing(result, figure, *folders) for figure in resolved}
     statuses = {name: os.waitpid(process, 0)[1] for name, process in processes.items()}
     answers.write(json.dumps(statuses).encode() + b"\n")
 

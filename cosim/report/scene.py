@@ -26,7 +26,7 @@ from typing import Any
 from ..components.python_import import load_object
 from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, InputError, did_you_mean
 from ..results.files import to_json_types
-from ..scenario.json_document import read_document
+from ..scenario.extension import read_system_document
 from ..scenario.named_functions import load_function
 
 LIST_KEYS = ("bodies", "fixed", "markers", "views", "spans", "plots")
@@ -97,7 +97,7 @@ def flatten_components(system: Mapping[str, Any], folder: Path) -> Iterator[tupl
             yield name, component, folder
             continue
         file = folder / component["system"]
-        for inner, leaf, leaf_folder in flatten_components(read_document(file).value, file.parent):
+        for inner, leaf, leaf_folder in flatten_components(read_system_document(file).value, file.parent):
             parameters = component.get("parameters", {}).items()
             outer = {key.removeprefix(f"{inner}."): value for key, value in parameters if key.startswith(f"{inner}.")}
             yield f"{name}.{inner}", {**leaf, "parameters": {**leaf.get("parameters", {}), **outer}}, leaf_folder

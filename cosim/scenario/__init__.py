@@ -1,6 +1,7 @@
 """Scenario files: read, validate and build them into systems that are ready to run."""
 
-from .nested_systems import find_scenario, load_scenario
+from .file_paths import find_scenario
+from .nested_systems import load_scenario
 from .prepared_run import IsolationMode, PreparedRun, import_figures, load
 from .schema import json_schema
 

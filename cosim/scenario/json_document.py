@@ -10,11 +10,11 @@ import json
 import math
 import re
 from bisect import bisect_right
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ..core.errors import InputError, Problem
 from ..core.paths import open_text
@@ -41,13 +41,33 @@ class Document:
     problems: list[Problem] = field(default_factory=list)
     #: paths of the values with these problems; they hold placeholders
     invalid_paths: list[JsonPath] = field(default_factory=list)
+    #: where each value was written, if the value is merged from several documents
+    origins: Mapping[JsonPath, Origin] = field(default_factory=dict)
+    #: the other files from which the value is merged
+    bases: tuple[Path, ...] = ()
 
     def where(self, path: Sequence[str | int]) -> str:
-        """Return "file:line:column: $.json.path", with the position of the deepest part of `path` that exists."""
+        """Return "file:line:column: $.json.path", with the position of the deepest part of `path` that exists.
+
+        File and JSON path are those in which the value was written.
+        """
         known = tuple(path)
+        while known and self.origins and known not in self.origins:
+            known = known[:-1]
+        if origin := self.origins.get(known):
+            return origin.document.where((*origin.path, *path[len(known) :]))
         while known and known not in self.offsets:
             known = known[:-1]
         return f"{self.position(self.offsets.get(known, 0))}: {json_path(path)}"
+
+    @property
+    def files(self) -> tuple[Path, ...]:
+        """All files from which the value was read."""
+        return (self.file, *self.bases)
+
+    def origin(self, path: JsonPath) -> Origin:
+        """Return where the value at an existing path was written."""
+        return self.origins.get(path) or Origin(self, path)
 
     def position(self, offset: int) -> str:
         """Return "file:line:column" of an offset in the text."""
@@ -58,6 +78,13 @@ class Document:
     def _lines(self) -> list[int]:
         """Offset of the first character of each line."""
         return [0, *(match.end() for match in re.finditer("\n", self.text))]
+
+
+class Origin(NamedTuple):
+    """Place of a value in the document in which it was written."""
+
+    document: Document
+    path: JsonPath
 
 
 def json_path(path: Sequence[str | int]) -> str:

@@ -102,10 +102,16 @@ class SlotIndex:
     def below(self, prefix: str) -> dict[str, str]:
         """Return the scalars below a prefix, keyed by their names after the prefix.
 
-        The key is "" for the prefix itself, and for example ".position.x" below it. The order is that of the variables.
+        The key is "" for the prefix itself, and for example ".position.x" below it. In a pattern such as "pos_*", "*" matches one
+        or more characters, which are the key. The order is that of the variables.
         """
         if not prefix:
             return {f".{slot}": slot for slot in self._positions}
+        head, star, tail = prefix.partition("*")
+        if star:
+            fixed = len(head) + len(tail)
+            found = (slot for slot in self._names.with_prefix(head) if len(slot) > fixed and slot.endswith(tail))
+            return {slot[len(head) : len(slot) - len(tail)]: slot for slot in sorted(found, key=self._positions.__getitem__)}
         slots = [prefix] if prefix in self._positions else []
         slots += [slot for separator in ".[" for slot in self._names.with_prefix(prefix + separator)]
         return {slot[len(prefix) :]: slot for slot in sorted(slots, key=self._positions.__getitem__)}
@@ -147,6 +153,8 @@ def check_assignment(
 def _check_value(variable: Variable, value: Any, all_elements: bool = False) -> Any:
     if variable.causality not in ("parameter", "structuralParameter", "input") and variable.start is None:
         raise ValueError(f'"{variable.name}" is of causality {variable.causality} and cannot be set')
+    if variable.variability == "constant":
+        raise ValueError(f'"{variable.name}" is a constant and cannot be set')
     if variable.causality == "structuralParameter" and value != variable.start:
         raise ValueError(
             f'"{variable.name}" is a structural parameter: it stays {json.dumps(variable.start)}, found {_quote(value)}'

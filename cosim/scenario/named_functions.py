@@ -19,12 +19,15 @@ from .schema import CallSpec, FunctionSpec, ScenarioSpec
 from .schema_types import accepted
 
 
-def find_function_problems(root: Node, spec: ScenarioSpec, signals: Collection[str] | None) -> Iterator[Problem]:
+def find_function_problems(
+    root: Node, declared: ScenarioSpec, spec: ScenarioSpec, signals: Collection[str] | None
+) -> Iterator[Problem]:
     """Yield the problems of a scenario's KPIs, figures, scene and checks.
 
     Args:
         root: The scenario.
-        spec: Its specification.
+        declared: Its specification.
+        spec: Its specification with the values of all arguments, see `FunctionResolver`.
         signals: The names of the recorded signals, or None if they are not all known.
     """
     for kind in ("kpis", "figures"):
@@ -40,19 +43,26 @@ def find_function_problems(root: Node, spec: ScenarioSpec, signals: Collection[s
         yield Problem(text, root.where("scene"))
     if signals is not None:
         yield from signal_problems(root, "kpis", signals)
-    kpis = [kpi for _, kpi in accepted(spec.kpis)]
+    kpis = [kpi for _, kpi in accepted(declared.kpis)]
     for i, check in accepted(spec.checks) if "kpis" not in root.invalid_keys else ():
         if text := _kpi_name_problem(check.kpi, kpis, root.folder):
             yield Problem(text, root.where("checks", i, "kpi"))
 
 
 def function_problem(spec: CallSpec, folder: Path) -> str:
-    """Return why a function cannot be called with the arguments in the scenario, or "" if it can.
+    """Return why a function cannot be called with the arguments in the scenario, or "" if it can; see `definition_problem`."""
+    if text := definition_problem(spec, folder):
+        return text
+    return _argument_problem(spec.python.rpartition(":")[2], _function_definition(spec, folder).args, spec.arguments)
+
+
+def definition_problem(spec: CallSpec, folder: Path) -> str:
+    """Return why a function cannot be found, or "" if it can.
 
     The source file is parsed, but not executed.
 
     Args:
-        spec: The reference `file.py:function` or `package.module:function`, and the keyword arguments.
+        spec: The reference `file.py:function` or `package.module:function`.
         folder: The folder that the path of the file starts from.
     """
     file, _, name = spec.python.rpartition(":")
@@ -67,14 +77,19 @@ def function_problem(spec: CallSpec, folder: Path) -> str:
         return f'"{file}" is not valid Python: {error.msg} (line {error.lineno})'
     if name not in functions:
         return f'"{file}" defines no function "{name}"{did_you_mean(name, functions)}'
-    return _argument_problem(name, functions[name].args, spec.arguments)
+    return ""
+
+
+def declared_arguments(spec: CallSpec, folder: Path) -> dict[str, bool]:
+    """Return the keyword arguments that a function declares, without the first one, and whether each is required."""
+    return _declared_arguments(_function_definition(spec, folder).args)
 
 
 def signal_problems(root: Node, kind: str, signals: Collection[str]) -> Iterator[Problem]:
     """Yield a problem for every argument of a KPI or figure that should name a recorded signal and does not.
 
     The parameters are recognized by their annotations: `Signal` is the name of a signal, `Prefix` that of a group of signals
-    (see `cosim.results.kpi`). Functions for which `function_problem` finds a problem are skipped.
+    (see `cosim.results.kpi`). Optional functions, and those for which `definition_problem` finds a problem, are skipped.
 
     Args:
         root: The scenario.
@@ -82,12 +97,12 @@ def signal_problems(root: Node, kind: str, signals: Collection[str]) -> Iterator
         signals: The names of the recorded signals.
     """
     for i, spec in accepted(getattr(root.spec, kind)):
-        if not function_problem(spec, root.folder):
-            for argument, text in _unknown_signals(spec, root.folder, signals):
+        if not spec.optional and not definition_problem(spec, root.folder):
+            for argument, text in unknown_signals(spec, root.folder, signals):
                 yield Problem(text, root.where(kind, i, "arguments", argument))
 
 
-def _unknown_signals(spec: CallSpec, folder: Path, signals: Collection[str]) -> Iterator[tuple[str, str]]:
+def unknown_signals(spec: CallSpec, folder: Path, signals: Collection[str]) -> Iterator[tuple[str, str]]:
     """Yield (parameter, message) of every argument that names no recorded signal."""
     declared = _function_definition(spec, folder).args
     for parameter in (*declared.posonlyargs, *declared.args, *declared.kwonlyargs):
@@ -109,7 +124,7 @@ def _kpi_name_problem(kpi: str, kpis: Sequence[FunctionSpec], folder: Path) -> s
     spec = next((spec for spec in kpis if spec.name == name), None)
     if spec is None:
         return f'no KPI "{kpi}"{did_you_mean(name, [spec.name for spec in kpis])}'
-    keys = [] if function_problem(spec, folder) else _kpi_value_names(_function_definition(spec, folder))
+    keys = [] if definition_problem(spec, folder) else _kpi_value_names(_function_definition(spec, folder))
     if not keys or key.partition("[")[0] in keys:
         return ""
     return f'no KPI "{kpi}"{did_you_mean(kpi, [f"{name}.{known}" for known in keys])}'
@@ -121,7 +136,7 @@ def _source_path(file: str, folder: Path) -> Path | None:
 
 
 def _function_definition(spec: CallSpec, folder: Path) -> ast.FunctionDef:
-    """Return the definition of a function for which `function_problem` finds nothing."""
+    """Return the definition of a function for which `definition_problem` finds nothing."""
     file, _, name = spec.python.rpartition(":")
     path = _source_path(file, folder)
     assert path is not None
@@ -210,16 +225,20 @@ def load_function(reference: str, folder: Path) -> Callable[..., Any]:
 
 def _argument_problem(name: str, declared: ast.arguments, given: Collection[str]) -> str:
     """Return the problem of the keyword arguments `given`, or ""; the first argument is the result or the scenario."""
-    positional = [argument.arg for argument in (*declared.posonlyargs, *declared.args)]
-    optional = positional[len(positional) - len(declared.defaults) :]
-    keywords = dict(zip((argument.arg for argument in declared.kwonlyargs), declared.kw_defaults, strict=True))
-    known = [*positional[1:], *keywords]
-    required = [
-        *(arg for arg in positional[1:] if arg not in optional),
-        *(arg for arg, default in keywords.items() if not default),
-    ]
+    known = _declared_arguments(declared)
     for argument in given:
         if argument not in known and declared.kwarg is None:
             return f'"{name}" takes no argument "{argument}"{did_you_mean(argument, known)}'
-    missing = [argument for argument in required if argument not in given]
+    missing = [argument for argument, is_required in known.items() if is_required and argument not in given]
     return f'"{name}" needs the argument{"s" * (len(missing) > 1)} {", ".join(missing)}' if missing else ""
+
+
+def _declared_arguments(declared: ast.arguments) -> dict[str, bool]:
+    """Return the names of all arguments but the first, and whether each is required."""
+    positional = [argument.arg for argument in (*declared.posonlyargs, *declared.args)]
+    first_default = len(positional) - len(declared.defaults)
+    keywords = zip((argument.arg for argument in declared.kwonlyargs), declared.kw_defaults, strict=True)
+    required = {name: i < first_default for i, name in enumerate(positional)} | {
+        name: default is None for name, default in keywords
+    }
+    return {name: is_required for name, is_required in required.items() if name not in positional[:1]}

@@ -11,12 +11,15 @@ from pathlib import Path
 from typing import Any
 
 from ..components.python_import import package_files
-from ..core import paths, resources
-from ..core.errors import InputError, Problem, did_you_mean
+from ..core import paths
+from ..core.errors import InputError, Problem
 from ..core.size_limits import MAX_LEVELS
 from ..core.text import acceptable_text, shorten, text_problem
+from . import json_pointer
 from .expanded_size import SystemFile, check_expanded_size
-from .json_document import Document, read_document
+from .extension import read_system_document
+from .file_paths import find_scenario
+from .json_document import Document
 from .schema import CallSpec, NestedSpec, PortsSpec, ScenarioSpec, SystemSpec, ports_of
 from .schema_types import accepted
 from .validation import validate_document
@@ -108,7 +111,7 @@ class Scenario:
 
         These are the scenario and its nested systems, sources with their packages, input profiles, KPIs and figures.
         """
-        files = [node.document.file for node in self.root.walk()]
+        files = [file for node in self.root.walk() for file in node.document.files]
         files += [self.root.folder / spec.file for _, spec in accepted(self.spec.inputs)]
         functions: list[CallSpec] = [spec for _, spec in (*accepted(self.spec.kpis), *accepted(self.spec.figures))]
         functions += [self.spec.scene] if self.spec.scene else []
@@ -120,22 +123,6 @@ class Scenario:
             else:
                 files.append(node.folder / (spec.fmu or (spec.modelica or "").rpartition(":")[0]))
         return [*files, *package_files(python)]
-
-
-def find_scenario(scenario: str | Path) -> Path:
-    """Return the path of a scenario file that is given by its path or by the name of a shipped scenario.
-
-    Raises:
-        InputError: There is neither such a file nor a shipped scenario of this name.
-    """
-    path = Path(scenario)
-    shipped = resources.root() / "scenarios"
-    if path.suffix == ".json" or paths.is_file(path):
-        return path
-    names = sorted(file.stem for file in shipped.glob("*.json"))
-    if str(scenario) not in names:
-        raise InputError(f'no scenario file and no shipped scenario "{scenario}"{did_you_mean(str(scenario), names)}')
-    return shipped / f"{scenario}.json"
 
 
 def load_scenario(scenario: str | Path, settings: Mapping[str, Any] | None = None) -> Scenario:
@@ -150,14 +137,15 @@ def load_scenario(scenario: str | Path, settings: Mapping[str, Any] | None = Non
         InputError: The file does not exist or is not JSON, or the expanded scenario is too large. Other problems are collected in
             the result.
     """
-    document = read_document(find_scenario(scenario))
+    document = read_system_document(find_scenario(scenario))
     problems: list[Problem] = []
     variables: dict[str, Any] = {}
     for name, value in (settings or {}).items():
         if text := next(_text_problems([name, value]), ""):
             problems.append(Problem(text, f'setting "{shorten(acceptable_text(name))}"'))
         elif name.startswith("/"):
-            problems += _set_pointer(document, name, value)
+            if text := json_pointer.set_value(document.value, name, value):
+                problems.append(Problem(text, f'setting "{name}"'))
         else:
             variables[name] = value
     reader = _SystemReader()
@@ -205,7 +193,7 @@ class _SystemReader:
                 raise InputError(f'the nested system "{path}" is nested more than {MAX_LEVELS} levels deep')
             if key not in self._files:
                 self._files[key] = None
-                child = self._files[key] = self.read(read_document(file), NestedSpec, ancestors)
+                child = self._files[key] = self.read(read_system_document(file), NestedSpec, ancestors)
         except InputError as error:
             where = parent.document.where(("components", name, "system"))
             self.problems += [Problem(problem.message, problem.where or where) for problem in error.problems]
@@ -219,32 +207,6 @@ def _make_node(file: SystemFile, prefix: str = "") -> Node:
     return node
 
 
-def pointer_keys(pointer: str) -> list[str]:
-    """Return the keys and indices of a JSON pointer (RFC 6901).
-
-    >>> pointer_keys("/components/uav/and~1or")
-    ['components', 'uav', 'and/or']
-    """
-    return [key.replace("~1", "/").replace("~0", "~") for key in pointer[1:].split("/")]
-
-
-def _set_pointer(document: Document, pointer: str, value: Any) -> list[Problem]:
-    """Set a value in the JSON document; only the last key of the pointer may be new."""
-    keys = pointer_keys(pointer)
-    target, where = document.value, f'setting "{pointer}"'
-    for depth, key in enumerate(keys[:-1]):
-        target = _json_child(target, key)
-        if target is None:
-            return [Problem(f'the scenario has no "/{"/".join(keys[: depth + 1])}"', where)]
-    if isinstance(target, dict):
-        target[keys[-1]] = value
-    elif isinstance(target, list) and keys[-1].isdigit() and int(keys[-1]) < len(target):
-        target[int(keys[-1])] = value
-    else:
-        return [Problem(f'the scenario has no "{pointer}"', where)]
-    return []
-
-
 def _text_problems(value: Any) -> Iterator[str]:
     """Yield the problems of the texts in a JSON value."""
     if isinstance(value, str) and (problem := text_problem(value)):
@@ -252,14 +214,6 @@ def _text_problems(value: Any) -> Iterator[str]:
     elif isinstance(value, dict | list):
         for part in value if isinstance(value, list) else (*value, *value.values()):
             yield from _text_problems(part)
-
-
-def _json_child(value: Any, key: str) -> Any:
-    if isinstance(value, dict):
-        return value.get(key)
-    if isinstance(value, list) and key.isdigit() and int(key) < len(value):
-        return value[int(key)]
-    return None
 
 
 def parse_settings(settings: Sequence[str]) -> dict[str, Any]:

@@ -67,11 +67,19 @@ def _describe_member(member: str | Group) -> Any:
 
 
 def _describe_connection(system: System, connection: Connection) -> list[str]:
+    unit = system.find_element(connection.source).variable.unit
+    notes = connection_notes(system, connection)
+    return [str(connection.source), str(connection.target), unit.name if unit else "", notes]
+
+
+def connection_notes(system: System, connection: Connection) -> str:
+    """Return the delay and all conversions of a connection as text, such as "delay 1, deg to rad"; "" for a plain copy."""
     source, target = system.find_element(connection.source).variable, system.find_element(connection.target).variable
-    unit = source.unit.name if source.unit else ""
     notes = [f"delay {connection.delay}"] if connection.delay else []
     if source.unit and target.unit and unit_conversion(source, target) != (1.0, 0.0):
         notes.append(f"{source.unit.name} to {target.unit.name}")
     if source.type != target.type:
         notes.append(f"{source.type} to {target.type}")
-    return [str(connection.source), str(connection.target), unit, ", ".join(notes)]
+    if connection.is_mapped:
+        notes += [f"gain {connection.gain:g}", *([f"offset {connection.offset:g}"] if connection.offset else [])]
+    return ", ".join(notes)

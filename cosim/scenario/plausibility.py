@@ -22,7 +22,8 @@ def find_warnings(prepared: PreparedRun) -> list[Problem]:
 
 
 def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
-    """Yield the warnings that concern the results: at most one about connections, and one for each FMU file."""
+    """Yield the warnings that concern the results: functions left out, at most one about connections, one for each FMU file."""
+    yield from prepared.left_out
     yield from _missing_connections(prepared)
     for file in prepared.component_factory.fmus.values():
         if file.run_warning:

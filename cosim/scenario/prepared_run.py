@@ -19,7 +19,7 @@ from ..core.stopwatch import Stopwatch
 from ..core.system import System
 from ..engine.pacer import LatePolicy
 from ..engine.plan import Plan
-from ..engine.run_loop import free_components
+from ..engine.plan_run import free_components
 from ..engine.settings import Settings
 from ..process.float_mode import default_float_mode
 from ..process.process_state import exclusive_process_state
@@ -46,6 +46,8 @@ class PreparedRun:
     spec: ScenarioSpec
     plan: Plan
     component_factory: ComponentFactory
+    #: reasons why optional KPIs and figures are left out; `spec` does not contain these
+    left_out: Sequence[Problem]
     #: wall time (s) of the preparation "load_seconds" and its parts "parse_seconds", "instantiate_seconds", "wiring_seconds"
     timing: Mapping[str, float]
 
@@ -74,6 +76,20 @@ class PreparedRun:
         """Checks of the scenario in the form of `cosim.results.checks.evaluate_checks`."""
         return [check.model_dump(exclude_none=True) for check in self.spec.checks]
 
+    @property
+    def optional_kpis(self) -> set[str]:
+        """Names of the KPIs that may be left out."""
+        return {spec.name for spec in self._all_kpis if spec.optional}
+
+    def index_of_kpi(self, name: str) -> int:
+        """Return the index of a KPI in the scenario."""
+        return [spec.name for spec in self._all_kpis].index(name)
+
+    @property
+    def _all_kpis(self) -> Sequence[FunctionSpec]:
+        assert isinstance(self.root.spec, ScenarioSpec)
+        return self.root.spec.kpis
+
     def kpis(self) -> list[NamedCall]:
         """Import the KPI functions and return (name, function, arguments) of each."""
         return _load_functions(self.spec.kpis, self.root.folder)
@@ -95,19 +111,25 @@ class PreparedRun:
         """Metadata of the run that are known before it: scenario, system, versions, hashes of all files."""
         return {
             "name": self.spec.name,
-            "scenario": self.document.value,
+            "scenario": self._resolved_document(),
             "scenario_file": str(self.document.file.resolve()),
             "system": describe_system(self.system, self.sources),
             **describe_software(),
             "sha256": {name: sha256(file.read_bytes()).hexdigest() for name, file in self.files().items()},
         }
 
+    def _resolved_document(self) -> dict[str, Any]:
+        """Return the expanded scenario with the values of all arguments, without the functions that are left out."""
+        functions = self.spec.model_dump(include={"kpis", "figures", "scene"}, exclude_defaults=True, by_alias=True)
+        value: dict[str, Any] = self.document.value
+        return {key: functions.get(key, item) for key, item in value.items()}
+
     def files(self) -> dict[str, Path]:
         """Return all files that the run depends on, by their path relative to the scenario's folder.
 
         These are the scenario and its nested systems, FMUs, Python and Modelica sources, and input profiles.
         """
-        own = [node.document.file for node in self.root.walk()]
+        own = [file for node in self.root.walk() for file in node.document.files]
         own += [self.root.folder / spec.file for spec in self.spec.inputs]
         calls = (*self.spec.kpis, *self.spec.figures, *([self.spec.scene] if self.spec.scene else []))
         modules = (spec.python.rpartition(":")[0] for spec in calls)
@@ -180,7 +202,7 @@ def load(
         except BaseException:
             free_components(builder.components)
             raise
-    return PreparedRun(loaded.root, loaded.spec, plan, builder.component_factory, watch.seconds)
+    return PreparedRun(loaded.root, builder.spec, plan, builder.component_factory, builder.left_out, watch.seconds)
 
 
 def import_figures(scenario: str | Path, parameters: Mapping[str, Any] | None = None) -> list[NamedCall]:

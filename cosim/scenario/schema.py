@@ -17,12 +17,18 @@ from .schema_types import INVALID, AutoOrBool, BoolOrNumber, Integer, Name, Name
 SOURCES = ("fmu", "python", "modelica", "system")
 
 
+#: lists whose elements can be changed by an object in a file with "extends", and the key that names their elements
+KEYED_LISTS = {("connections",): "to", ("kpis",): "name", ("figures",): "name", ("checks",): "kpi"}
+#: keys that a file with "extends" does not inherit
+NOT_INHERITED = ("$schema", "name", "description", "reference")
+
+
 def _has_text(key: str) -> dict[str, Any]:
     """Return the JSON Schema of objects with a text under `key`."""
     return {"required": [key], "properties": {key: {"type": "string"}}}
 
 
-#: the rules of `ComponentSpec._one_source` and `CheckSpec._check_bounds` that JSON Schema can express
+#: the rules of the validators below that JSON Schema can express
 _COMPONENT_RULES: dict[str, Any] = {
     "oneOf": [_has_text(source) for source in SOURCES],
     "allOf": [
@@ -35,6 +41,11 @@ _COMPONENT_RULES: dict[str, Any] = {
             "then": {"anyOf": [_has_text("fmu"), _has_text("modelica")]},
         },
     ],
+}
+_CONNECTION_RULES: dict[str, Any] = {
+    "anyOf": [
+        {"properties": {end: {"pattern": pattern} for end in ("from", "to")}} for pattern in (r"^[^*]*$", r"^[^*]*\*[^*]*$")
+    ]
 }
 _CHECK_RULES: dict[str, Any] = {
     "anyOf": [{"required": [bound], "properties": {bound: {"not": {"type": "null"}}}} for bound in ("min", "max", "equals")]
@@ -49,6 +60,9 @@ class ComponentSpec(Spec):
     fmu: str | None = Field(default=None, description="path of an FMU")
     python: str | None = Field(default=None, description='"file.py:Class": a PythonFMU class or a component class of cosim')
     modelica: str | None = Field(default=None, description='"file.mo:Model"; built when needed (requires the extra "build")')
+    libraries: list[str] = Field(
+        default=[], description="folders of Modelica libraries, searched before those of MODELICAPATH; only for Modelica models"
+    )
     system: str | None = Field(default=None, description="path of the JSON file of a nested system")
     arguments: dict[str, Any] = Field(default={}, description="arguments of the constructor; only for Python components")
     parameters: dict[str, Value] = Field(default={}, description="values of parameters and start values, by variable name")
@@ -62,19 +76,34 @@ class ComponentSpec(Spec):
             raise ValueError(f"expected exactly one of {', '.join(SOURCES)}; found {' and '.join(given) or 'none'}")
         if self.arguments and self.python is None:
             raise ValueError('"arguments" are for components with "python"; variables are set with "parameters"')
+        if self.libraries and self.modelica is None:
+            raise ValueError('"libraries" are for components with "modelica"')
         if self.isolation and self.fmu is None and self.modelica is None:
             raise ValueError('"isolation" is for components with "fmu" or "modelica"')
         return self
 
 
 class ConnectionSpec(Spec):
-    """A connection of an output to an input, or of two prefixes; variables match if their names after the prefixes are equal."""
+    """A connection of an output to an input, of two prefixes, or of two patterns with one "*" each.
 
-    source: str = Field(alias="from", description='output "component.variable", or a prefix of outputs')
-    target: str = Field(alias="to", description='input "component.variable", or a prefix of inputs')
+    Variables below prefixes match if their names after the prefixes are equal; those of patterns, if the texts at "*" are equal.
+    """
+
+    model_config = ConfigDict(json_schema_extra=_CONNECTION_RULES)
+
+    source: str = Field(alias="from", description='output "component.variable", a prefix of outputs, or a pattern')
+    target: str = Field(alias="to", description='input "component.variable", a prefix of inputs, or a pattern')
+    gain: float = Field(default=1.0, description="factor that is applied after the conversion of units")
+    offset: float = Field(default=0.0, description="value that is added after the gain, in the unit of the input")
     delay: Integer = Field(
         default=0, ge=0, le=1_000_000, description="delay in macro steps; the input keeps the initial output until then"
     )
+
+    @model_validator(mode="after")
+    def _same_wildcards(self) -> ConnectionSpec:
+        if self is not INVALID and (self.source.count("*"), self.target.count("*")) not in ((0, 0), (1, 1)):
+            raise ValueError('expected one "*" in each of "from" and "to", or none')
+        return self
 
 
 class IterationSpec(Spec):
@@ -133,13 +162,26 @@ class CallSpec(Spec):
     """A Python function that is called with the scenario as its first argument."""
 
     python: str = Field(description='"file.py:function" or "package.module:function"')
-    arguments: dict[str, Any] = Field(default={}, description="keyword arguments of the function")
+    arguments: dict[str, Any] = Field(
+        default={},
+        description='keyword arguments of the function; {"from": "usv.waypoint_x"} is the value of a parameter, and '
+        '{"from": "/components/plant/arguments/platforms"} that of an entry of the scenario',
+    )
+    sources: NameList = Field(
+        default=[],
+        alias="from",
+        description='components ("usv"), prefixes of variables ("plant.uav") or JSON pointers of objects, from which arguments '
+        "that are not given are taken by name",
+    )
 
 
 class FunctionSpec(CallSpec):
     """A Python function that is called with the result: a KPI returns numbers, a figure returns a matplotlib Figure."""
 
     name: Name = Field(description="unique name; that of a KPI is the prefix of its values, that of a figure the file name")
+    optional: bool = Field(
+        default=False, description="leave it out with a warning if an argument names a signal or parameter that does not exist"
+    )
 
 
 class CheckSpec(Spec):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -20,6 +20,7 @@ from ..engine.plan import Plan, compile_plan
 from ..engine.settings import Event, Settings
 from ..process.journal import Deadlines
 from .component_factory import ComponentFactory
+from .function_arguments import FunctionResolver, without_placeholders
 from .name_resolution import SlotIndex, UnknownNameError, check_assignment, resolve_name
 from .named_functions import find_function_problems
 from .nested_systems import Node, Scenario
@@ -50,9 +51,11 @@ class SystemBuilder:
         #: some signals are missing because of other problems
         self._has_missing_signals = False
         self.start_values: dict[str, dict[str, Any]] = defaultdict(dict)
+        #: reasons why optional KPIs and figures are left out
+        self.left_out: Sequence[Problem] = ()
 
     def build_plan(self, real_time: float | None, late: LatePolicy) -> Plan:
-        """Set start values, connections, stages, recorded signals and events, and compile the result.
+        """Set start values, connections, stages, recorded signals, events and arguments of functions, and compile the result.
 
         Args:
             real_time: See `Settings`.
@@ -90,7 +93,10 @@ class SystemBuilder:
             found = (problem for problem in error.problems if not self._is_consequence(problem))
             self.problems += map(self._with_location, found)
         signals = None if self._has_missing_signals else settings.columns
-        self.problems += find_function_problems(self.root, self.spec, signals)
+        resolver = FunctionResolver(self.root, self.components, self.start_values, signals)
+        resolved = resolver.resolve(self.spec)
+        self.problems += [*resolver.problems, *find_function_problems(self.root, self.spec, resolved, signals)]
+        self.spec, self.left_out = without_placeholders(resolved), resolver.left_out
         if self.problems:
             raise InputError(dict.fromkeys(self.problems))
         return plan

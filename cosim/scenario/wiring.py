@@ -26,8 +26,9 @@ class _Candidate(NamedTuple):
 class Wiring:
     """Expander of the connections of a scenario and its nested systems; `problems` collects those that are invalid.
 
-    A prefix connects every input below it to the output with the same name after the prefix. An input without such an output is
-    a problem unless it has a value or another connection. A connection of single variables overrides one of prefixes.
+    A prefix connects every input below it to the output with the same name after the prefix. Two patterns with "*" connect every
+    input to the output with the same text at the "*". An input without such an output is a problem unless it has a value or
+    another connection. A connection of single variables overrides those of prefixes and patterns.
 
     Args:
         components: The components by full name.
@@ -83,7 +84,7 @@ class Wiring:
             self.excuse(node, spec.target)
         for source, own_outputs in outputs:
             for target, own_inputs in inputs:
-                self._match(source, own_outputs, target, own_inputs, spec.delay, node.where("connections", i))
+                self._match(source, own_outputs, target, own_inputs, spec, node.where("connections", i))
 
     def _match(
         self,
@@ -91,17 +92,19 @@ class Wiring:
         outputs: Mapping[str, str],
         target: Target,
         inputs: Mapping[str, str],
-        delay: int,
+        spec: ConnectionSpec,
         where: str,
     ) -> None:
-        """Connect every input to the output with the same name after the prefix."""
+        """Connect every input to the output with the same name after the prefix, or at the "*" of a pattern."""
         for rest, slot in inputs.items():
             end = Endpoint(target.component, slot)
             if rest in outputs:
-                connection = Connection(Endpoint(source.component, outputs[rest]), end, delay, where)
+                output = Endpoint(source.component, outputs[rest])
+                connection = Connection(output, end, spec.delay, where, spec.gain, spec.offset)
                 self._add(_Candidate(connection, is_variable=rest == ""))
             elif end not in self._inputs_with_values:
-                expected = f"{source.component}.{source.prefix}{rest}".replace("..", ".")
+                name = source.prefix.replace("*", rest) if "*" in source.prefix else source.prefix + rest
+                expected = f"{source.component}.{name}".replace("..", ".")
                 hint = did_you_mean(expected, (f"{source.component}.{name}" for name in outputs.values()))
                 self._unmatched_inputs[end] = Problem(f"input {end} has no matching output {expected}{hint}", where)
 

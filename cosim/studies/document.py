@@ -13,8 +13,9 @@ from pydantic import ValidationError
 from ..core import paths, resources
 from ..core.errors import InputError, Problem, did_you_mean
 from ..core.size_limits import MAX_RUNS, require_at_most
+from ..scenario.file_paths import find_scenario
 from ..scenario.json_document import Document, json_path, read_document
-from ..scenario.nested_systems import find_scenario, pointer_keys
+from ..scenario.json_pointer import pointer_keys
 from ..scenario.validation import schema_problems
 from .schema import StudySpec
 

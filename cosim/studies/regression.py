@@ -130,10 +130,10 @@ class _FinishedRun:
         return checks
 
     def failed_checks(self) -> list[str]:
-        from ..results.checks import evaluate_checks
+        from ..results.checks import evaluate_all_checks
 
         kpis = {name: math.nan if value is None else value for name, value in self.result.kpis.items()}
-        return [str(outcome) for outcome in evaluate_checks(kpis, self.checks) if not outcome.passed]
+        return [str(outcome) for outcome in evaluate_all_checks(kpis, self.checks) if not outcome.passed]
 
     @property
     def reference_path(self) -> Path:

@@ -97,7 +97,7 @@ class ContactBody:
         constants = vehicle.model.constant_count if vehicle.model.constant_count is not None else len(vehicle.parameters)
         fixed = {"parameters": np.array(vehicle.parameters), "principal_axes": np.array(vehicle.body.axes)}
         self._arrays = arrays = {**arrays, **fixed, "constants": np.zeros(constants)}
-        self.inputs, self.outputs = arrays["inputs"], arrays["outputs"]
+        self.inputs, self.outputs, self.parameters = arrays["inputs"], arrays["outputs"], arrays["parameters"]
         self.environment_inputs = arrays["environment_inputs"]
         self.environment_inputs[:] = [variable.start for variable in vehicle.model.environment_inputs]
         # memoryviews: access to a few numbers is faster than with NumPy

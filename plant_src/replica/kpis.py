@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 
 import numpy as np
@@ -13,11 +13,18 @@ from cosim.results.checks import Number
 from cosim.results.kpi import Prefix, units
 
 from ..kpis import waypoints
-from ..recorded_motion import horizontal_distance
+from ..recorded_motion import horizontal_distance, used_waypoints
 
 
 @units(leg="m")
-def overshoots(result: Result, vehicle: Prefix, x: Sequence[float], y: Sequence[float], radius: float) -> dict[str, Number]:
+def overshoots(
+    result: Result,
+    vehicle: Prefix,
+    waypoint_x: Sequence[float],
+    waypoint_y: Sequence[float],
+    acceptance_radius: float,
+    waypoint_count: float | None = None,
+) -> dict[str, Number]:
     """Evaluate the largest distance from each leg between waypoints.
 
     The first leg starts at the position in the first row. A leg ends when its circle of acceptance is entered.
@@ -25,17 +32,21 @@ def overshoots(result: Result, vehicle: Prefix, x: Sequence[float], y: Sequence[
     Args:
         result: Recorded mission.
         vehicle: Signal prefix of the vehicle ("plant.usv").
-        x: East coordinates of the waypoints (m, world).
-        y: North coordinates of the waypoints (m, world).
-        radius: Radius of the circles of acceptance (m).
+        waypoint_x: East coordinates of the waypoints (m, world).
+        waypoint_y: North coordinates of the waypoints (m, world).
+        acceptance_radius: Radius of the circles of acceptance (m).
+        waypoint_count: Number of waypoints that are used; None: all.
 
     Returns:
         `leg[1]`, `leg[2]`, ...: largest distance from the straight line to each waypoint (m); NaN for unfinished legs.
     """
-    switches = [result.time[0], *_waypoint_times(result, vehicle, x, y, radius)]
+    switches = [
+        result.time[0],
+        *_reached_times(waypoints(result, vehicle, waypoint_x, waypoint_y, acceptance_radius, waypoint_count)),
+    ]
     position = np.column_stack([result[f"{vehicle}.position.{axis}"] for axis in "xy"])
-    corners = [position[0], *np.column_stack([x, y])]
-    legs = dict.fromkeys((f"leg[{i}]" for i in range(1, len(x) + 1)), math.nan)
+    corners = [position[0], *np.array(used_waypoints(waypoint_x, waypoint_y, waypoint_count))]
+    legs = dict.fromkeys((f"leg[{i}]" for i in range(1, len(corners))), math.nan)
     for i, ((begin, end), (a, b)) in enumerate(zip(pairwise(switches), pairwise(corners), strict=False), start=1):
         direction = (b - a) / np.hypot(*(b - a))
         offset = position[(result.time >= begin) & (result.time <= end)] - a
@@ -45,7 +56,14 @@ def overshoots(result: Result, vehicle: Prefix, x: Sequence[float], y: Sequence[
 
 @units(straight="m", turn="m", least_turn="m")
 def turns(
-    result: Result, vehicle: Prefix, target: Prefix, x: Sequence[float], y: Sequence[float], radius: float, settling: float
+    result: Result,
+    vehicle: Prefix,
+    target: Prefix,
+    waypoint_x: Sequence[float],
+    waypoint_y: Sequence[float],
+    acceptance_radius: float,
+    settling: float,
+    waypoint_count: float | None = None,
 ) -> dict[str, Number]:
     """Evaluate how a vehicle follows a target on straight legs and in turns at waypoints.
 
@@ -53,10 +71,11 @@ def turns(
         result: Recorded mission.
         vehicle: Signal prefix of the vehicle ("plant.uav").
         target: Signal prefix of the target ("plant.usv").
-        x: East coordinates of the target's waypoints (m, world).
-        y: North coordinates of the target's waypoints (m, world).
-        radius: Radius of the circles of acceptance (m).
+        waypoint_x: East coordinates of the target's waypoints (m, world).
+        waypoint_y: North coordinates of the target's waypoints (m, world).
+        acceptance_radius: Radius of the circles of acceptance (m).
         settling: Time after the start and after each waypoint that does not count as straight (s).
+        waypoint_count: Number of waypoints that are used; None: all.
 
     Returns:
         Values by name:
@@ -65,7 +84,7 @@ def turns(
         - `turn`: largest of the peaks within `settling` after each waypoint (m)
         - `least_turn`: smallest of these peaks (m)
     """
-    switches = _waypoint_times(result, target, x, y, radius)
+    switches = _reached_times(waypoints(result, target, waypoint_x, waypoint_y, acceptance_radius, waypoint_count))
     distance, time = horizontal_distance(result, vehicle, target), result.time
     windows = [(time >= switch) & (time < switch + settling) for switch in (time[0], *switches)]
     peaks = [float(distance[window].max()) for window in windows[1:]]
@@ -77,10 +96,9 @@ def turns(
     }
 
 
-def _waypoint_times(result: Result, vehicle: str, x: Sequence[float], y: Sequence[float], radius: float) -> list[float]:
-    """Return the times (s) at which waypoints were reached, without those that were not."""
-    reached = waypoints(result, vehicle, x, y, radius)
-    return [float(reached[f"time[{i}]"]) for i in range(1, int(reached["reached"]) + 1)]
+def _reached_times(values: Mapping[str, Number]) -> list[float]:
+    """Return the times (s) of the waypoints that were reached, from the values of `waypoints`."""
+    return [float(values[f"time[{i}]"]) for i in range(1, int(values["reached"]) + 1)]
 
 
 @units(time="s", error="m", speed="m/s", lowest="m")

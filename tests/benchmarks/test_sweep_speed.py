@@ -12,8 +12,7 @@ from cosim.components.fmi import FmuFile
 from cosim.engine.run_loop import simulating
 from cosim.results import Result
 from cosim.results.kpi import evaluate_kpis
-from cosim.scenario import load
-from cosim.scenario.nested_systems import find_scenario, load_scenario
+from cosim.scenario import find_scenario, load, load_scenario
 from cosim.studies.execution.job import Job, StudyContext
 from cosim.studies.execution.local import LocalRunner
 

@@ -13,7 +13,7 @@ from systems import endpoint, make_system
 from cosim.components.fmi import FmuFile, Isolation, create_component
 from cosim.core.component import DTYPES, Variable
 from cosim.core.errors import ComponentError
-from cosim.core.system import Connection, Endpoint, Group, System, incompatibility
+from cosim.core.system import FLOAT_TYPES, Connection, Endpoint, Group, System, incompatibility
 from cosim.core.time_grid import exact_fraction
 from cosim.core.units import parse_unit
 from cosim.engine import EXECUTORS, native_available, parallel
@@ -60,7 +60,7 @@ def _mixed(name, value, draw):
 
 
 def random_system(seed, extra=()):
-    """Return a system with random connections of all types, delays, periods, stages and groups; and its output names."""
+    """Return a system with random connections of all types, delays, gains, periods, stages and groups; and its output names."""
     draw = random.Random(seed)  # noqa: S311
     components = {f"m{i}": random_component(100 * seed + i) for i in range(5)} | dict(extra)
     ends = {
@@ -74,7 +74,11 @@ def random_system(seed, extra=()):
     for target in ends["input"]:
         sources = [e for e in ends["output"] if not incompatibility(find_element(e).variable, find_element(target).variable)]
         if sources and draw.random() < 0.9:
-            connections.append(Connection(draw.choice(sources), target, draw.choice([0, 0, 0, 1, 3])))
+            mapping = draw.choice([{}, {"gain": -0.3}, {"offset": 0.7}, {"gain": 0.1, "offset": -0.2}])
+            is_float = find_element(target).variable.type in FLOAT_TYPES
+            connections.append(
+                Connection(draw.choice(sources), target, draw.choice([0, 0, 0, 1, 3]), **(mapping if is_float else {}))
+            )
     names = draw.sample(list(components), len(components))
     stages = ((names[0], Group("g", ((names[1],), (names[2], names[3])))), tuple(names[4:]))
     periods = {names[1]: exact_fraction(0.02), names[4]: exact_fraction(0.05)}

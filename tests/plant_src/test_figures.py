@@ -35,7 +35,7 @@ def test_paths_are_the_recorded_positions():
 
 
 def test_waypoints_have_circles_of_acceptance_and_numbers():
-    axes = paths(mission_result(), **DECK, x=[5.0, 10.0], y=[1.0, -1.0], radius=0.5).axes[0]
+    axes = paths(mission_result(), **DECK, waypoint_x=[5.0, 10.0], waypoint_y=[1.0, -1.0], acceptance_radius=0.5).axes[0]
     circles = [(patch.center, patch.radius) for patch in axes.patches if isinstance(patch, Circle)]
     assert circles == [((5.0, 1.0), 0.5), ((10.0, -1.0), 0.5)]
     assert [text.get_text() for text in axes.texts] == ["1", "2"]
@@ -60,7 +60,7 @@ def test_without_a_landing_there_is_no_mark(figure):
 
 
 def test_both_axes_have_the_same_scale():
-    figure = paths(mission_result(), **DECK, x=[0.0, 0.0], y=[-3.0, 14.0], radius=0.5)
+    figure = paths(mission_result(), **DECK, waypoint_x=[0.0, 0.0], waypoint_y=[-3.0, 14.0], acceptance_radius=0.5)
     axes = figure.axes[0]
     figure.draw_without_rendering()
     (x_first, x_last), (y_first, y_last), box = axes.get_xlim(), axes.get_ylim(), axes.get_window_extent()
@@ -138,7 +138,7 @@ def test_axes_carry_units_and_the_figure_fits_a_column(figure):
     assert picture.axes[-1].get_xlabel() in ("x / m", "t / s")
 
 
-TURNS = {"x": [4.0, 9.0, 30.0], "y": [0.0, 0.0, 0.0], "radius": 0.5}
+TURNS = {"waypoint_x": [4.0, 9.0, 30.0], "waypoint_y": [0.0, 0.0, 0.0], "acceptance_radius": 0.5}
 
 
 def turns(figure):

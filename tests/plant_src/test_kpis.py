@@ -112,19 +112,21 @@ def test_a_result_from_its_file_has_the_same_kpis(tmp_path):
 
 
 def test_waypoints_are_reached_one_after_the_other():
-    kpis = waypoints(mission_result(), "plant.usv", x=[5.0, 10.0], y=[0.29, 0.0], radius=0.5)
+    kpis = waypoints(mission_result(), "plant.usv", waypoint_x=[5.0, 10.0], waypoint_y=[0.29, 0.0], acceptance_radius=0.5)
     assert kpis == {"reached": 2, "all_reached": True, "time[1]": 4.6, "time[2]": 9.5}
 
 
 def test_a_waypoint_out_of_order_does_not_count():
-    kpis = waypoints(mission_result(), "plant.usv", x=[10.0, 5.0, 15.0], y=[0.0, 0.0, 0.0], radius=0.5)
+    kpis = waypoints(
+        mission_result(), "plant.usv", waypoint_x=[10.0, 5.0, 15.0], waypoint_y=[0.0, 0.0, 0.0], acceptance_radius=0.5
+    )
     assert (kpis["reached"], kpis["all_reached"], kpis["time[1]"]) == (1, False, 9.5)
     assert math.isnan(kpis["time[2]"])
     assert math.isnan(kpis["time[3]"])
 
 
 def test_a_waypoint_out_of_reach_is_not_reached():
-    kpis = waypoints(mission_result(), "plant.usv", x=[5.0], y=[0.6], radius=0.5)
+    kpis = waypoints(mission_result(), "plant.usv", waypoint_x=[5.0], waypoint_y=[0.6], acceptance_radius=0.5)
     assert (kpis["reached"], kpis["all_reached"]) == (0, False)
 
 

@@ -10,7 +10,7 @@ from systems import connection
 import cosim
 from cosim.cli.commands import check
 from cosim.core import size_limits
-from cosim.scenario import nested_systems
+from cosim.scenario import extension
 
 ARRAYS = """
 from cosim.core.component import Component, Variable
@@ -68,8 +68,8 @@ def test_small_files_that_expand_to_many_components_are_refused_before(folder, l
 
 
 def test_a_file_is_read_once_however_often_it_is_used(folder, monkeypatch):
-    read, files = nested_systems.read_document, []
-    monkeypatch.setattr(nested_systems, "read_document", lambda file: files.append(file.name) or read(file))
+    read, files = extension.read_document, []
+    monkeypatch.setattr(extension, "read_document", lambda file: files.append(file.name) or read(file))
     (folder.path / "up").mkdir()
     folder.write({"components": {"x": folder.block("Gain")}}, "leaf.json")
     folder.write({"components": {"a": {"system": "leaf.json"}, "b": {"system": "up/../leaf.json"}}}, "pair.json")

@@ -22,7 +22,7 @@ from pathlib import Path
 from typing import Any
 
 from cosim.cli import main
-from cosim.engine import ExecutorKind, executor_class, run_loop
+from cosim.engine import ExecutorKind, executor_class, plan_run
 
 PRELOADED = (
     "api",
@@ -66,7 +66,7 @@ def prepare_child(folder: str, output: str, environment: dict[str, str], stdin: 
     os.chdir(folder)
     os.environ.update(environment)
     tempfile.tempdir = None
-    run_loop.executor_class = lambda kind: executor_class(executor if kind == "auto" else kind)
+    plan_run.executor_class = lambda kind: executor_class(executor if kind == "auto" else kind)
     files = ((0, stdin, os.O_RDWR), (1, f"{output}/stdout", os.O_WRONLY), (2, f"{output}/stderr", os.O_WRONLY))
     for number, name, flags in files:
         file = os.open(name, flags | os.O_CREAT | os.O_TRUNC * (number > 0), 0o666)

@@ -23,7 +23,16 @@ if TYPE_CHECKING:
     default="cosim",
     help="Compiler of Modelica for --output: that of cosim, or OpenModelica.",
 )
-def command(sources: tuple[Path, ...], check: bool, output: Path | None, modelica_compiler: str) -> int:
+@click.option(
+    "--library",
+    type=click.Path(path_type=Path),
+    multiple=True,
+    metavar="DIR",
+    help="Folder of Modelica libraries for --output, searched before those of MODELICAPATH; repeatable.",
+)
+def command(
+    sources: tuple[Path, ...], check: bool, output: Path | None, modelica_compiler: str, library: tuple[Path, ...]
+) -> int:
     """Export controllers and plants to fmus/.
 
     SOURCES are .mo or .py files, or folders of controllers in C; default: all controllers and plants. The FMUs are written to
@@ -45,7 +54,7 @@ def command(sources: tuple[Path, ...], check: bool, output: Path | None, modelic
         click.echo("every FMU is up to date with its source")
         return 0
     if output is not None:
-        _build_one(sources, output, modelica_compiler)
+        _build_one(sources, output, modelica_compiler, library)
     elif modelica_compiler != "cosim":
         raise InputError("--modelica-compiler omc requires --output: the FMUs in fmus/ are built by the compiler of cosim")
     else:
@@ -53,7 +62,7 @@ def command(sources: tuple[Path, ...], check: bool, output: Path | None, modelic
     return 0
 
 
-def _build_one(sources: tuple[Path, ...], output: Path, modelica_compiler: str) -> None:
+def _build_one(sources: tuple[Path, ...], output: Path, modelica_compiler: str, library: tuple[Path, ...]) -> None:
     from ...export.build import build_to
     from ...export.modelica.frontend.openmodelica import export_with_omc
 
@@ -64,7 +73,7 @@ def _build_one(sources: tuple[Path, ...], output: Path, modelica_compiler: str) 
     if modelica_compiler == "omc":
         export_with_omc(sources[0], output)
     else:
-        build_to(sources[0], None, output)
+        build_to(sources[0], None, output, library_path=library)
     click.echo(f"{sources[0]} -> {output}")
 
 

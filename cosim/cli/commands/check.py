@@ -95,18 +95,13 @@ def _print_nested_stages(stages: Sequence[Stage], indent: str) -> None:
 
 
 def _print_connections(prepared: PreparedRun) -> None:
-    from ...engine.transfer_plan import unit_conversion
+    from ...scenario.overview import connection_notes
 
     system = prepared.system
     click.echo(f"\nconnections ({len(system.connections)})")
     for connection in system.connections:
-        source, target = system.find_element(connection.source).variable, system.find_element(connection.target).variable
-        notes = [f"delay {connection.delay}"] if connection.delay else []
-        if unit_conversion(source, target) != (1.0, 0.0) and source.unit and target.unit:
-            notes.append(f"{source.unit.name} to {target.unit.name}")
-        if source.type != target.type:
-            notes.append(f"{source.type} to {target.type}")
-        click.echo(f"  {connection.source} -> {connection.target}" + (f"  ({', '.join(notes)})" if notes else ""))
+        notes = connection_notes(system, connection)
+        click.echo(f"  {connection.source} -> {connection.target}" + (f"  ({notes})" if notes else ""))
 
 
 def _print_unconnected_inputs(prepared: PreparedRun) -> None:

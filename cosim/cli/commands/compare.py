@@ -66,7 +66,7 @@ def _scenario_reference(scenario: Path) -> tuple[Path, Mapping[str, Tolerance]]:
     """Return the path of a scenario's reference, and its tolerances."""
     from ...core.errors import InputError
     from ...results.comparison import Tolerance
-    from ...scenario.nested_systems import find_scenario, load_scenario
+    from ...scenario import find_scenario, load_scenario
 
     path = find_scenario(scenario)
     spec = load_scenario(path).spec.reference

@@ -72,7 +72,7 @@ def find_scenario_files(paths: Iterable[Path]) -> Iterator[Path]:
     Raises:
         InputError: if a file does not exist or a folder has no scenarios.
     """
-    from ...scenario.nested_systems import find_scenario
+    from ...scenario import find_scenario
 
     for path in paths:
         if not path.is_dir():

@@ -23,7 +23,7 @@ from ..unfinished_runs import OutputFiles
 if TYPE_CHECKING:
     from multiprocessing.connection import Connection
 
-    from ...engine.run_loop import Observer
+    from ...engine.plan_run import Observer
     from ...process.supervisor import SupervisedOutcome
     from ...report.drawing_process import DrawingProcess
     from ...scenario import PreparedRun

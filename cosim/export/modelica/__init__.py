@@ -4,8 +4,8 @@ The package rumoca parses, checks and flattens a model. The order of computation
 
 | Folder       | Modules                                                                                                    |
 | ------------ | ---------------------------------------------------------------------------------------------------------- |
-| `frontend/`  | `rumoca_frontend`: flatten a model with rumoca; `rumoca_client`, `rumoca_process`: run rumoca in a child   |
-|              | process; `reader` (`expression_reader`, `statement_reader`, `unrolling`): convert its JSON to the flat     |
+| `frontend/`  | `rumoca_frontend`: flatten a model with rumoca; `libraries`: find the libraries that it uses; `flat_cache`: |
+|              | keep flat models; `rumoca_client`, `rumoca_process`: run rumoca in a child process; `reader` (`expression_reader`, `statement_reader`, `unrolling`): convert its JSON to the flat     |
 |              | model; `constants`: inline constants; `folded_branches`: reject models that rumoca simplifies wrongly;     |
 |              | `openmodelica`: export with OpenModelica instead                                                           |
 | `model/`     | `flat_model`, `syntax_tree`: the data structure; `traversal`; `evaluate`, `arithmetic`: evaluation in      |

@@ -40,22 +40,23 @@ MAX_MODEL_SIZE = 1_000_000
 FmiRole = tuple[Causality, Variability]
 
 
-def load_block(path: Path, model: str | None = None) -> Block:
+def load_block(path: Path, model: str | None = None, library_path: Sequence[Path] = ()) -> Block:
     """Compile a Modelica model to a block.
 
     Args:
         path: The Modelica file. It may use the packages in folders beside it.
         model: Name of the model. None selects the model with the name of the file.
+        library_path: Folders of libraries, which are searched before those of MODELICAPATH.
 
     Raises:
         InputError: The model has errors or uses unsupported features; the error contains the file and line.
     """
     with _refusing_deep_nesting(path):
-        return _load_block(path, model)
+        return _load_block(path, model, library_path)
 
 
-def _load_block(path: Path, model: str | None) -> Block:
-    defaults, sources = _flatten(path, model)
+def _load_block(path: Path, model: str | None, library_path: Sequence[Path]) -> Block:
+    defaults, sources = _flatten(path, model, library_path)
     folder = _source_root(sources.files)
     names = {str(file.relative_to(folder)): file for file in sources.files}
     return Block(
@@ -68,18 +69,19 @@ def _load_block(path: Path, model: str | None) -> Block:
     )
 
 
-def load_interpreter(path: Path, model: str | None = None) -> Interpreter:
+def load_interpreter(path: Path, model: str | None = None, library_path: Sequence[Path] = ()) -> Interpreter:
     """Create an interpreter of a Modelica model with default parameters.
 
     Args:
         path: The Modelica file.
         model: Name of the model. None selects the model with the name of the file.
+        library_path: Folders of libraries, which are searched before those of MODELICAPATH.
 
     Raises:
         InputError: The model has errors or uses unsupported features.
     """
     with _refusing_deep_nesting(path):
-        return _flatten(path, model)[0]
+        return _flatten(path, model, library_path)[0]
 
 
 @contextmanager
@@ -91,8 +93,8 @@ def _refusing_deep_nesting(path: Path) -> Iterator[None]:
         raise InputError(Problem("an expression or statement is nested too deeply; divide it into several", str(path))) from None
 
 
-def _flatten(path: Path, model: str | None) -> tuple[Interpreter, ModelicaSources]:
-    json, sources = flatten_model(Path(path), model)
+def _flatten(path: Path, model: str | None, library_path: Sequence[Path]) -> tuple[Interpreter, ModelicaSources]:
+    json, sources = flatten_model(Path(path), model, library_path)
     return analyse(json, sources, model or Path(path).stem), sources
 
 

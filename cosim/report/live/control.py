@@ -32,7 +32,7 @@ _Command = Callable[[int, Mapping[str, Any]], None]
 
 
 class LiveControl:
-    """Step hook (`cosim.engine.run_loop.StepHook`) that carries out commands; used in the main thread of the simulation process.
+    """Step hook (`cosim.engine.plan_run.StepHook`) that carries out commands; used in the main thread of the simulation process.
 
     Args:
         connection: The pipe to the supervising process.

@@ -14,7 +14,7 @@ from typing import Any
 
 from ...core.errors import InputError, did_you_mean
 from ...results.files import write_json
-from ...scenario.json_document import read_document
+from ...scenario.extension import read_system_document
 from ...scenario.nested_systems import load_scenario
 from ...scenario.schema import SOURCES
 from .candidate import CandidateInterface, CandidateSource
@@ -112,7 +112,7 @@ class ControllerSubstitution:
     def _substitute_nested(self, file: Path, full_name: str) -> tuple[Path, NameFilter] | None:
         """Write a nested system with the candidate; return its path and name filter, or None if no component has the role."""
         before = len(self.replaced_components)
-        value, known = self._substitute_system(read_document(file).value, file.parent, f"{full_name}.")
+        value, known = self._substitute_system(read_system_document(file).value, file.parent, f"{full_name}.")
         if len(self.replaced_components) == before:
             return None
         ports, lost = self._prune_ports(value.get("ports", {}), known)

@@ -85,7 +85,7 @@ def absolute_paths(scenario: Path, settings: Mapping[str, Any]) -> list[Problem]
 def _scenario_files(scenario: Path, settings: Mapping[str, Any]) -> Iterator[Path]:
     root = load_scenario(scenario, _pointer_settings(settings)).root
     for node in root.walk():
-        yield node.document.file.resolve()
+        yield from (file.resolve() for file in node.document.files)
         yield from _existing_files(node.folder, (name for name, _ in _named_files(node)))
     variables = [value for name, value in settings.items() if not name.startswith("/")]
     yield from _existing_files(root.folder, _strings(variables))

@@ -178,7 +178,7 @@ def test_unknown_elements_of_the_front_ends_json_are_refused():
     from cosim.export.modelica.frontend.reader import ModelReader
     from cosim.export.modelica.frontend.rumoca_frontend import ModelicaSources
 
-    reader = ModelReader({"enum_literal_ordinals": {}}, ModelicaSources.from_files([]))
+    reader = ModelReader({"enum_literal_ordinals": {}}, ModelicaSources([]))
     with pytest.raises(InputError, match="the expression Quantum is not supported"):
         reader.read_expression({"Quantum": {}})
     with pytest.raises(InputError, match="the statement Goto is not supported"):

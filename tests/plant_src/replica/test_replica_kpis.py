@@ -12,7 +12,7 @@ from cosim.results import Result
 from plant_src.replica.kpis import overshoots, touchdown, turns
 
 TIME = np.arange(3001) / 100
-COURSE = {"x": [10.0, 10.0], "y": [0.0, 10.0], "radius": 0.5}
+COURSE = {"waypoint_x": [10.0, 10.0], "waypoint_y": [0.0, 10.0], "acceptance_radius": 0.5}
 
 
 def result(**columns: np.ndarray) -> Result:
@@ -33,7 +33,7 @@ def test_an_overshoot_is_the_largest_distance_from_the_line_of_a_leg() -> None:
 
 
 def test_a_leg_that_is_not_finished_has_no_overshoot() -> None:
-    legs = overshoots(result(**vessel()), "plant.usv", x=[10.0, 50.0], y=[0.0, 0.0], radius=0.5)
+    legs = overshoots(result(**vessel()), "plant.usv", waypoint_x=[10.0, 50.0], waypoint_y=[0.0, 0.0], acceptance_radius=0.5)
     assert legs["leg[1]"] == pytest.approx(0.0)
     assert math.isnan(legs["leg[2]"])
 

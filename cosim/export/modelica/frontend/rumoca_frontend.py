@@ -1,7 +1,8 @@
 """Invocation of the front end rumoca, which flattens a model and returns it as JSON.
 
-Names are looked up in the file itself and in every package folder (a folder with `package.mo`) beside it. Other files beside it
-are never read. A file that belongs to a package (`within P;`) is loaded as a member of this package.
+Names are looked up in the file itself, in every package folder (a folder with `package.mo`) beside it, and in libraries
+(`libraries.py`). Other files beside it are never read. A file that belongs to a package (`within P;`) is loaded as a member of
+this package.
 """
 
 from __future__ import annotations
@@ -10,11 +11,15 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 from ....core.errors import InputError, Problem
 from ..model.syntax_tree import SourceLocation
+from .flat_cache import link_libraries, read_document, store_document
+from .libraries import Library, find_libraries, library_folders
 from .rumoca_client import run_rumoca
 
 RUMOCA_VERSION = "0.10.2"
@@ -32,20 +37,26 @@ _SYNTAX_ERROR = re.compile(r"×\s*(?P<what>.+?)\n.*?\[[^\]]*:(?P<line>\d+):\d+\]
 
 @dataclass(frozen=True)
 class ModelicaSources:
-    """The Modelica files that the front end has read, and the conversion of its spans (file hash, byte offset) to lines."""
+    """The Modelica files that the front end has read, and the conversion of its spans (file hash, byte offset) to lines.
 
-    #: the file of the model first
+    Attributes:
+        files: Files of the model and of the packages beside it, the file of the model first.
+        libraries: Libraries that the model uses.
+        links: Folder with a link to each library, through which the front end reads them; None without libraries.
+    """
+
     files: Sequence[Path]
-    #: rumoca's hash of the file name -> file
-    _by_hash: Mapping[int, Path]
-    #: folders of the libraries that the model uses
-    libraries: Sequence[Path] = ()
+    libraries: Sequence[Library] = ()
+    links: Path | None = None
 
-    @classmethod
-    def from_files(cls, files: Sequence[Path]) -> ModelicaSources:
-        """Create the sources from files, with the file of the model first."""
-        model_file = {_fnv1a(_display_name(file)): file for file in files[:1]}
-        return cls(files, model_file | {_fnv1a(str(file)): file for file in files})
+    @cached_property
+    def _by_hash(self) -> Mapping[int, Path]:
+        """Files by rumoca's hash of their names."""
+        names = {_display_name(file): file for file in self.files[:1]} | {str(file): file for file in self.files}
+        for library in self.libraries:
+            link = str(self.links and self.links / library.link_name)
+            names |= {link + str(file).removeprefix(str(library.path)): file for file in library.files}
+        return {_fnv1a(name): file for name, file in names.items()}
 
     def find(self, name: str) -> Path | None:
         """Return the file with the name that the front end uses in messages, or None."""
@@ -59,33 +70,49 @@ class ModelicaSources:
         return SourceLocation(path, path.read_bytes().count(b"\n", 0, span["start"]) + 1)
 
 
-def flatten_model(path: Path, model: str | None) -> tuple[dict[str, Any], ModelicaSources]:
+def flatten_model(path: Path, model: str | None, library_path: Sequence[Path] = ()) -> tuple[dict[str, Any], ModelicaSources]:
     """Flatten a Modelica model with rumoca.
 
     Args:
         path: The Modelica file.
         model: Name of the model. None selects the model with the name of the file.
+        library_path: Folders that are searched for libraries before those of MODELICAPATH.
 
     Returns:
         The flat model as rumoca's JSON, and its sources.
 
     Raises:
-        InputError: The front end reports errors, for example syntax errors and unknown names.
+        InputError: The front end reports errors, for example syntax errors and unknown names, or a library is not found.
     """
     path = path.resolve()
     text = read_source(path)
     packages, name = find_packages(path, text), model_name(path, text, model)
-    sources = ModelicaSources.from_files(
-        [path, *(file for package in packages for file in sorted(package.rglob("*.mo")) if file != path)]
-    )
-    answer = run_rumoca(RUMOCA_VERSION, sources.files, packages, name, None if _WITHIN.search(text) else _display_name(path))
+    files = [path, *(file for package in packages for file in sorted(package.rglob("*.mo")) if file != path)]
+    libraries = find_libraries(files, library_folders(library_path), [package.name for package in packages])
+    sources = ModelicaSources(files, libraries, link_libraries(libraries) if libraries else None)
+    if not libraries:
+        return json.loads(_flatten(sources, packages, name, text)), sources
+    contents = [(str(file), sha256(file.read_bytes()).hexdigest()) for file in files]
+    key = [RUMOCA_VERSION, name, contents, [(str(library.path), library.digest) for library in libraries]]
+    flat = read_document(key)
+    if flat is None:
+        flat = _flatten(sources, packages, name, text)
+        store_document(key, flat)
+    return json.loads(flat), sources
+
+
+def _flatten(sources: ModelicaSources, packages: Sequence[Path], name: str, text: str) -> str:
+    """Return the flat model as JSON text."""
+    path, roots = sources.files[0], [*packages, *([sources.links] if sources.links else [])]
+    answer = run_rumoca(RUMOCA_VERSION, sources.files, roots, name, None if _WITHIN.search(text) else _display_name(path))
     if "version" in answer:
         raise InputError(_version_problem(answer["version"]))
     if "syntax_errors" in answer:
         raise InputError(_to_syntax_problem(*error) for error in answer["syntax_errors"])
     if "error" in answer:
         raise InputError(_to_problems(answer["error"], answer["panicked"], name, path, sources))
-    return json.loads(answer["flat"]), sources
+    flat: str = answer["flat"]
+    return flat
 
 
 def read_source(path: Path) -> str:

@@ -1,0 +1,255 @@
+"""A plan that is being simulated: initialize its components, step them with events and observers, and free them in every case."""
+
+from __future__ import annotations
+
+import tempfile
+from bisect import bisect_left, bisect_right
+from collections.abc import Callable, Mapping, Sequence
+from contextlib import ExitStack, nullcontext
+from dataclasses import dataclass
+from pathlib import Path
+from time import perf_counter
+from typing import Any
+
+import numpy as np
+
+from ..core import component_log
+from ..core.component import Component
+from ..core.errors import InputError, Problem, join_alternatives
+from ..core.recording import Recording
+from ..core.stopwatch import Stopwatch
+from ..process.float_mode import default_float_mode
+from ..process.forks import attributing_forks, report_forks
+from ..process.journal import MARKER_SIZE, Phase, calling_component, current_journal, suspending_deadline
+from ..process.process_state import restoring_process_state
+from . import Executor, Plan, Recorder, Termination, executor_class
+from .disk_space import find_space_problems
+from .initialization import instantiate_components
+from .pacer import Pacer
+from .saving_recorder import SavingRecorder
+
+#: called with (completed macro steps, all macro steps); must not change the system
+Observer = Callable[[int, int], None]
+
+#: called with n before the macro step that starts at communication point n; may wait, and may set variables like an event
+StepHook = Callable[[int], None]
+
+
+@dataclass(frozen=True)
+class SimulationOutcome:
+    """Result of a run.
+
+    Attributes:
+        recording: the recorded rows; after a failure, the rows until then.
+        timing: wall time (s) of extracting and instantiating ("instantiate_seconds"), of initialization mode
+            ("initialize_seconds") and of the stepping loop ("loop_seconds").
+        macro_steps: number of completed macro steps.
+        termination: a component's request to end the simulation, if there was one.
+        failure: the error that ended the run early, if there was one.
+        real_time: lateness of the steps, see `pacer.Pacer.statistics`; None for a run without pacing.
+    """
+
+    recording: Recording
+    timing: Mapping[str, float]
+    macro_steps: int
+    termination: Termination | None
+    failure: BaseException | None
+    real_time: Mapping[str, Any] | None = None
+
+    @property
+    def loop_seconds(self) -> float:
+        """Wall time (s) of the stepping loop; 0 if it was not reached."""
+        return self.timing.get("loop_seconds", 0.0)
+
+
+class PlanRun:
+    """A plan that is being simulated: call `initialize`, then `advance` as often as needed, and `close` in every case.
+
+    Every method that runs components sets the default floating-point mode, and restores the state of the process that components
+    have changed. The first error is final: the components are then in an unknown state, and `close` only frees them.
+
+    Attributes:
+        executor: steps the components.
+        failure: the error that ended the simulation early, if there was one.
+    """
+
+    def __init__(self, plan: Plan, step_hook: StepHook | None = None):
+        """Create the executor of a plan.
+
+        Args:
+            plan: the compiled system. The run owns its components, and frees them also if it cannot be created.
+            step_hook: called before every macro step.
+
+        Raises:
+            InputError: the recorded rows are larger than the free disk space.
+        """
+        self._components, settings = plan.system.components, plan.settings
+        try:
+            if problems := _space_problems(plan):
+                raise InputError(problems)
+            self.executor = _create_executor(plan)
+        except BaseException:
+            free_components(self._components)
+            raise
+        self.failure: BaseException | None = None
+        self._plan, self._step_hook, self._watch = plan, step_hook, Stopwatch()
+        self._pacer = Pacer(plan.grid, settings.real_time, settings.late) if settings.real_time else None
+        self._names = join_alternatives(self._components)
+        self._runs_foreign_code = any(component.runs_foreign_code for component in self._components.values())
+        self._event_points = sorted(n for n in plan.events if n < plan.grid.count)
+        self._is_initialized = self._is_closed = False
+
+    @property
+    def is_finished(self) -> bool:
+        """True at the last communication point, and after a component has requested termination."""
+        return self.executor.completed_steps >= self._plan.grid.count or self.executor.termination is not None
+
+    def initialize(self) -> None:
+        """Bring the components to step mode, record the initial outputs and apply the events at the start time.
+
+        Raises:
+            ComponentError: a component failed.
+            InputError: a component cannot be instantiated.
+        """
+        try:
+            with default_float_mode(), restoring_process_state(self._names):
+                with self._watch.measure("instantiate_seconds"):
+                    instantiate_components(self._plan)
+                with self._watch.measure("initialize_seconds"):
+                    self.executor.initialize()
+        except BaseException as error:
+            self.failure = error
+            raise
+        self._is_initialized = True
+        if self._pacer:
+            self._pacer.start()
+        self.advance(0)
+
+    def advance(self, end: int, observers: Sequence[Observer] = ()) -> None:
+        """Run macro steps until communication point `end` is reached or a component requests termination.
+
+        Args:
+            end: number of a communication point, at most that of the stop time.
+            observers: called about 100 times.
+
+        Raises:
+            ComponentError: a component failed.
+            LateError: the run fell behind real time.
+        """
+        state = restoring_process_state(self._names) if self._runs_foreign_code else nullcontext()
+        journal, began = current_journal(), perf_counter()
+        if journal:
+            journal.enter_phase(Phase.STEPPING, journal.deadlines.step)
+        try:
+            with default_float_mode(), state, attributing_forks(self.executor.describe_call):
+                self._run_to_stops(end, observers)
+        except BaseException as error:
+            self.failure = error
+            raise
+        finally:
+            self._watch.add("loop_seconds", perf_counter() - began)
+            if journal:
+                journal.enter_phase(Phase.IDLE)
+            if self.failure or self.is_finished:
+                self.executor.close()
+
+    def _run_to_stops(self, end: int, observers: Sequence[Observer]) -> None:
+        """Run up to `end`, interrupted at events and whenever the observers are called."""
+        executor, begin, events = self.executor, self.executor.completed_steps, self._event_points
+        observed = range(begin, end, max(1, (end - begin) // 100)) if observers else ()
+        for stop in sorted({*events[bisect_left(events, begin) : bisect_right(events, end)], *observed, end}):
+            if self._pacer or self._step_hook:
+                self._run_in_single_steps(stop)
+            else:
+                executor.run(stop)
+            for observe in observers:
+                observe(executor.completed_steps, self._plan.grid.count)
+            if executor.termination:
+                return
+            if stop > begin or not end:
+                self._apply_events(stop)
+
+    def _run_in_single_steps(self, stop: int) -> None:
+        """Run until communication point `stop` or until a component requests termination, with hook and pacer at every step."""
+        for n in range(self.executor.completed_steps + 1, stop + 1):
+            if self._step_hook:
+                self._step_hook(n - 1)
+            self.executor.run(n)
+            if self.executor.termination:
+                return
+            if self._pacer:
+                with suspending_deadline():
+                    self._pacer.wait(n)
+
+    def _apply_events(self, point: int) -> None:
+        for event in self._plan.events.get(point, ()) if point < self._plan.grid.count else ():
+            for name, values in event.values.items():
+                for variable, value in values.items():
+                    self._components[name].set(variable, value)
+
+    def outcome(self) -> SimulationOutcome:
+        """Return everything recorded and measured so far."""
+        report_forks()
+        component_log.report_dropped_messages()
+        executor, lateness = self.executor, self._pacer.statistics() if self._pacer else None
+        recording = executor.recorder.recording()
+        return SimulationOutcome(
+            recording, self._watch.seconds, executor.completed_steps, executor.termination, self.failure, lateness
+        )
+
+    def close(self) -> None:
+        """Terminate the components unless one of them failed, and free them all; later calls do nothing.
+
+        Raises:
+            ComponentError: a component failed in terminate or free.
+        """
+        if self._is_closed:
+            return
+        self._is_closed = True
+        self.executor.close()
+        try:
+            with default_float_mode(), restoring_process_state(self._names):
+                _end_components(self._components, terminate=self._is_initialized and not self.failure)
+        finally:
+            report_forks()
+
+
+def _end_components(components: Mapping[str, Component], terminate: bool) -> None:
+    """Free all components, even if one of them fails; call `terminate` first if requested."""
+    with ExitStack() as stack:
+        stack.callback(free_components, components)
+        for name, component in components.items() if terminate else ():
+            with calling_component(name, "terminate", "end"):
+                component.terminate()
+
+
+def free_components(components: Mapping[str, Component]) -> None:
+    """Free all components, even if freeing one of them fails.
+
+    Raises:
+        ComponentError: a component cannot be freed.
+    """
+    with ExitStack() as stack:
+        for name, component in components.items():
+            stack.callback(_free_component, name, component)
+
+
+def _free_component(name: str, component: Component) -> None:
+    with calling_component(name, "free", "end"):
+        component.free()
+
+
+def _space_problems(plan: Plan) -> list[Problem]:
+    journal, settings = current_journal(), plan.settings
+    rows = (journal and journal.folder) or (settings.rows_file and settings.rows_file.parent)
+    return find_space_problems(plan, rows or Path(tempfile.gettempdir()), csv=bool(journal and journal.csv_path))
+
+
+def _create_executor(plan: Plan) -> Executor:
+    journal, settings = current_journal(), plan.settings
+    if journal and journal.folder and not settings.rows_file:
+        recorder: Recorder = SavingRecorder(plan, journal.folder)
+    else:
+        recorder = Recorder(plan, settings.rows_file)
+    marker = None if journal is None else np.frombuffer(journal.memory, np.int64, MARKER_SIZE)
+    return executor_class(settings.executor)(plan, recorder, marker)

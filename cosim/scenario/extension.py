@@ -1,0 +1,166 @@
+"""Scenarios and nested systems that extend another one.
+
+- "extends" names a file, with or without ".json", or a shipped scenario.
+- Objects are merged key by key. Every other value replaces that of the base. `null` removes a key.
+- The lists `connections`, `kpis`, `figures` and `checks` of the base are changed by an object whose keys are the names of
+  elements: `to`, `name`, `name` and `kpi`. New names are appended.
+- A component has one source: a source of another kind replaces that of the base and its `arguments`.
+- `name`, `description`, `reference` and `$schema` describe the base alone and are not inherited.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+from ..core import paths
+from ..core.errors import InputError, Problem, did_you_mean
+from ..core.size_limits import MAX_LEVELS
+from .file_paths import change_paths, find_scenario, relocating
+from .json_document import Document, JsonPath, Origin, read_document
+from .schema import KEYED_LISTS, NOT_INHERITED, SOURCES
+
+
+def read_system_document(file: Path) -> Document:
+    """Read a scenario or nested system and merge it with those that it extends.
+
+    Raises:
+        InputError: A file cannot be read or is not JSON, or "extends" is wrong.
+    """
+    return expand_document(read_document(file))
+
+
+def expand_document(document: Document, extending: tuple[Path, ...] = ()) -> Document:
+    """Merge a document with those that it extends; a document without "extends" is returned as it is.
+
+    Args:
+        document: A scenario or nested system.
+        extending: Resolved paths of the files that extend this one.
+
+    Raises:
+        InputError: A base does not exist, is not JSON, or extends itself.
+    """
+    value = document.value
+    if not isinstance(value, dict) or "extends" not in value:
+        return document
+    extending = (*extending, paths.resolve_path(document.file))
+    base = expand_document(_read_base(document, value["extends"], extending), extending)
+    merger = _Merger(document, base)
+    merged = merger.merge_objects((), _inherited(base, document.file.parent), {k: v for k, v in value.items() if k != "extends"})
+    invalid = [path for path, origin in merger.origins.items() if origin.path in origin.document.invalid_paths]
+    problems = [*document.problems, *base.problems, *merger.problems]
+    bases = (base.file, *base.bases)
+    return Document(document.file, document.text, merged, document.offsets, problems, invalid, merger.origins, bases)
+
+
+def _read_base(document: Document, name: Any, extending: tuple[Path, ...]) -> Document:
+    where = document.where(("extends",))
+    if not isinstance(name, str):
+        raise InputError([Problem("expected the path of a file or the name of a shipped scenario", where)])
+    near = document.file.parent / (name if name.endswith(".json") else f"{name}.json")
+    try:
+        file = near if paths.is_file(near) or name.endswith(".json") else find_scenario(name)
+        if paths.resolve_path(file) in extending:
+            raise InputError(f'"{name}" extends itself')
+        if len(extending) > MAX_LEVELS:
+            raise InputError(f"more than {MAX_LEVELS} files extend each other")
+        base = read_document(file)
+    except InputError as error:
+        raise InputError([Problem(problem.message, problem.where or where) for problem in error.problems]) from None
+    if not isinstance(base.value, dict):
+        raise InputError([Problem("expected an object", base.where(()))])
+    return base
+
+
+def _inherited(base: Document, folder: Path) -> dict[str, Any]:
+    """Return what a file in `folder` inherits, with paths relative to this folder."""
+    value = {key: each for key, each in base.value.items() if key not in NOT_INHERITED}
+    if paths.resolve_path(base.file.parent) == paths.resolve_path(folder):
+        return value
+    return change_paths(value, relocating(base.file.parent, folder))
+
+
+class _Merger:
+    """Merger of a document with its base. `origins` collects where each value was written, `problems` what cannot be merged."""
+
+    def __init__(self, document: Document, base: Document) -> None:
+        self._document, self._base = document, base
+        self.origins: dict[JsonPath, Origin] = {(): Origin(document, ())}
+        self.problems: list[Problem] = []
+
+    def merge_objects(
+        self, path: JsonPath, old: Mapping[str, Any], new: Mapping[str, Any], old_path: JsonPath = (), new_path: JsonPath = ()
+    ) -> dict[str, Any]:
+        """Merge two objects; the paths are those of the result and of the two objects in their documents."""
+        result = {}
+        for key in dict.fromkeys((*old, *new)):
+            places = ((*path, key), (*old_path, key), (*new_path, key))
+            if key not in new:
+                result[key] = self._copy(self._base, places[0], old[key], places[1])
+            elif new[key] is not None:
+                result[key] = self._merge(*places, old.get(key), new[key])
+            elif key not in old:
+                self._report(places[2], f"nothing to remove{did_you_mean(key, old)}")
+        return result
+
+    def _merge(self, path: JsonPath, old_path: JsonPath, new_path: JsonPath, old: Any, new: Any) -> Any:
+        """Merge two values; `old` is None if the base has no such value."""
+        if isinstance(new, dict):
+            self.origins[path] = Origin(self._document, new_path)
+            if path in KEYED_LISTS:
+                return self._merge_list(str(path[0]), KEYED_LISTS[path], old if isinstance(old, list) else [], new)
+            if len(path) == 2 and path[0] == "components" and isinstance(old, dict):
+                old = _without_other_sources(old, new)
+            return self.merge_objects(path, old if isinstance(old, dict) else {}, new, old_path, new_path)
+        return self._copy(self._document, path, new, new_path)
+
+    def _merge_list(self, kind: str, key: str, old: list[Any], new: Mapping[str, Any]) -> list[Any]:
+        """Merge a list of named elements with changes by name."""
+        names = [str(element.get(key)) if isinstance(element, dict) else "" for element in old]
+        result: list[Any] = []
+        for i, name in enumerate(names):
+            path = (kind, len(result))
+            if name not in new or names.count(name) > 1:
+                result.append(self._copy(self._base, path, old[i], (kind, i)))
+            elif new[name] is not None:
+                result.append(self._merge_element(path, (kind, i), (kind, name), old[i], new[name]))
+        for name, change in new.items():
+            if names.count(name) > 1:
+                self._report(
+                    (kind, name), f"the base has {names.count(name)} elements with this name; a list replaces all elements"
+                )
+            elif name not in names and change is None:
+                self._report((kind, name), f"nothing to remove{did_you_mean(name, names)}")
+            elif name not in names:
+                path = (kind, len(result))
+                result.append({key: name, **self._merge_element(path, (), (kind, name), {}, change)})
+                self.origins[(*path, key)] = Origin(self._document, (kind, name))
+        return result
+
+    def _merge_element(self, path: JsonPath, old_path: JsonPath, new_path: JsonPath, old: Any, new: Any) -> dict[str, Any]:
+        if not isinstance(new, dict):
+            self._report(new_path, "expected an object, or null to remove the element")
+            new = {}
+        self.origins[path] = Origin(self._document, new_path)
+        return self.merge_objects(path, old, new, old_path, new_path)
+
+    def _copy(self, document: Document, path: JsonPath, value: Any, old_path: JsonPath) -> Any:
+        """Return a copy of a value that one of the documents has at `old_path`."""
+        self.origins[path] = document.origin(old_path)
+        if isinstance(value, dict):
+            return {key: self._copy(document, (*path, key), each, (*old_path, key)) for key, each in value.items()}
+        if isinstance(value, list):
+            return [self._copy(document, (*path, i), each, (*old_path, i)) for i, each in enumerate(value)]
+        return value
+
+    def _report(self, path: JsonPath, text: str) -> None:
+        self.problems.append(Problem(text, self._document.where(path)))
+
+
+def _without_other_sources(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
+    """Return a component of the base without its source and arguments, if the new one has a source of another kind."""
+    given = [source for source in SOURCES if new.get(source) is not None]
+    if not given or given[0] in old:
+        return dict(old)
+    return {key: value for key, value in old.items() if key not in (*SOURCES, "arguments")}

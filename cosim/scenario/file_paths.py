@@ -1,0 +1,85 @@
+"""Paths of files in the JSON of scenarios and nested systems."""
+
+from __future__ import annotations
+
+import os
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+from ..core import paths, resources
+from ..core.errors import InputError, did_you_mean
+from .json_pointer import pointer_keys
+
+#: returns the new text of a path
+PathChange = Callable[[str], str]
+
+#: keys of a scenario with lists or objects of entries that name files, and keys with one such entry
+_ENTRIES, _ENTRY = ("components", "inputs", "kpis", "figures"), ("scene", "reference")
+#: keys of an entry that hold a path, and keys that hold a reference such as "file.py:Class"
+_PATH_KEYS, _REFERENCE_KEYS = ("fmu", "system", "file"), ("python", "modelica")
+
+
+def find_scenario(scenario: str | Path) -> Path:
+    """Return the path of a scenario file that is given by its path or by the name of a shipped scenario.
+
+    Raises:
+        InputError: There is neither such a file nor a shipped scenario of this name.
+    """
+    path = Path(scenario)
+    if path.suffix == ".json" or paths.is_file(path):
+        return path
+    shipped = resources.root() / "scenarios"
+    names = sorted(file.stem for file in shipped.glob("*.json"))
+    if str(scenario) not in names:
+        raise InputError(f'no scenario file and no shipped scenario "{scenario}"{did_you_mean(str(scenario), names)}')
+    return shipped / f"{scenario}.json"
+
+
+def relocating(old_folder: Path, new_folder: Path) -> PathChange:
+    """Return a function that changes paths relative to one folder into paths relative to another folder."""
+    shift = os.path.relpath(paths.resolve_path(old_folder), paths.resolve_path(new_folder))
+    return lambda text: os.path.normpath(os.path.join(shift, text)).replace(os.sep, "/")  # noqa: PTH118
+
+
+def change_paths(system: Mapping[str, Any], change: PathChange) -> dict[str, Any]:
+    """Return a copy of a scenario or nested system, or of a part of one, in which every path is changed.
+
+    Strings in `arguments` and `parameters` are not paths for cosim and stay as they are.
+    """
+    return {key: _change_value(key, value, change) for key, value in system.items()}
+
+
+def _change_value(key: str, value: Any, change: PathChange) -> Any:
+    if key in _ENTRY:
+        return _change_entry(value, change)
+    if key in _ENTRIES and isinstance(value, list):
+        return [_change_entry(each, change) for each in value]
+    if key in _ENTRIES and isinstance(value, Mapping):
+        return {name: _change_entry(each, change) for name, each in value.items()}
+    return value
+
+
+def _change_entry(entry: Any, change: PathChange) -> Any:
+    if not isinstance(entry, Mapping):
+        return entry
+    paths = {key: change(text) for key in _PATH_KEYS if isinstance(text := entry.get(key), str)}
+    references = {key: change_reference(text, change) for key in _REFERENCE_KEYS if isinstance(text := entry.get(key), str)}
+    return {**entry, **paths, **references}
+
+
+def change_pointed(pointer: str, value: Any, change: PathChange) -> Any:
+    """Return the value of a JSON pointer into a scenario with every path changed."""
+    keys = pointer_keys(pointer)
+    for key in reversed(keys):
+        value = {key: value}
+    value = change_paths(value, change)
+    for key in keys:
+        value = value[key]
+    return value
+
+
+def change_reference(reference: str, change: PathChange) -> str:
+    """Return a reference "file.py:name" or "file.mo:Model" with a changed path; modules stay as they are."""
+    file, separator, name = reference.rpartition(":")
+    return f"{change(file)}{separator}{name}" if file.endswith((".py", ".mo")) else reference

@@ -1,0 +1,152 @@
+"""Arguments of KPIs, figures and the scene that are taken from the system, including the values that the caller sets.
+
+- The argument {"from": NAME} is a parameter or start value ("usv.waypoint_x": a list for waypoint_x[1], waypoint_x[2], ...), or
+  with a JSON pointer ("/components/plant/arguments/platforms") an entry of the expanded scenario.
+- The key "from" of a function names components, prefixes of variables or JSON pointers of objects. Arguments that are not given
+  are taken from these by their names.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from itertools import count, takewhile
+from typing import Any, TypeVar
+
+from ..core.component import Component, Variable
+from ..core.errors import Problem, did_you_mean
+from .json_pointer import find_value, pointer_keys
+from .name_resolution import Target, UnknownNameError, resolve_name
+from .named_functions import declared_arguments, definition_problem, unknown_signals
+from .nested_systems import Node
+from .schema import CallSpec, FunctionSpec, ScenarioSpec
+from .schema_types import INVALID, accepted
+
+C = TypeVar("C", bound=CallSpec)
+
+
+@dataclass
+class FunctionResolver:
+    """Resolver of the arguments of a scenario's functions.
+
+    Attributes:
+        root: The scenario.
+        components: All components by full name.
+        start_values: Values that the scenario and the caller set, by component and variable.
+        signals: Names of the recorded signals; None if they are not all known.
+        problems: Arguments that cannot be resolved.
+        left_out: Reasons why optional functions are left out.
+    """
+
+    root: Node
+    components: Mapping[str, Component]
+    start_values: Mapping[str, Mapping[str, Any]]
+    signals: Collection[str] | None
+    problems: list[Problem] = field(default_factory=list)
+    left_out: list[Problem] = field(default_factory=list)
+
+    def resolve(self, spec: ScenarioSpec) -> ScenarioSpec:
+        """Return the scenario with the values of all arguments.
+
+        Functions with problems, and optional functions that lack a signal or value, are replaced by placeholders.
+        """
+        functions = {
+            kind: [self._resolve_function(kind, i, each) if each is not INVALID else INVALID for i, each in enumerate(specs)]
+            for kind, specs in (("kpis", spec.kpis), ("figures", spec.figures))
+        }
+        scene = spec.scene and self._resolve_arguments(spec.scene, self.problems, "scene")
+        return spec.model_copy(update={**functions, "scene": scene})
+
+    def _resolve_function(self, kind: str, i: int, spec: FunctionSpec) -> Any:
+        if definition_problem(spec, self.root.folder):
+            return spec
+        found: list[Problem] = []
+        resolved = self._resolve_arguments(spec, found, kind, i)
+        if not spec.optional:
+            self.problems += found
+            return INVALID if found else resolved
+        if self.signals is not None:
+            unknown = unknown_signals(resolved, self.root.folder, self.signals)
+            found += [Problem(text, self.root.where(kind, i, "arguments", argument)) for argument, text in unknown]
+        if found:
+            noun = "KPI" if kind == "kpis" else "figure"
+            self.left_out.append(replace(found[0], message=f'{noun} "{spec.name}" is left out: {found[0].message}'))
+        return INVALID if found else resolved
+
+    def _resolve_arguments(self, spec: C, problems: list[Problem], *path: str | int) -> C:
+        """Return a function with the values of its arguments; arguments without a value are added to `problems`."""
+        arguments = dict(spec.arguments)
+        for name, argument in spec.arguments.items():
+            try:
+                arguments[name] = self._resolve_value(argument)
+            except UnknownNameError as error:
+                if str(error):
+                    problems.append(Problem(str(error), self.root.where(*path, "arguments", name)))
+        if spec.sources:
+            for name, is_required in declared_arguments(spec, self.root.folder).items():
+                if name not in arguments:
+                    self._add_argument(arguments, name, spec.sources, is_required, problems, self.root.where(*path, "from"))
+        return spec.model_copy(update={"arguments": arguments, "sources": []})
+
+    def _add_argument(
+        self, arguments: dict[str, Any], name: str, sources: Sequence[str], is_required: bool, problems: list[Problem], where: str
+    ) -> None:
+        """Take one argument from the first source that has it."""
+        errors = []
+        for source in sources:
+            try:
+                arguments[name] = self._resolve_name(f"{source}/{name}" if source.startswith("/") else f"{source}.{name}")
+                return
+            except UnknownNameError as error:
+                errors.append(str(error))
+        if is_required and errors[0]:
+            problems.append(Problem(f"{errors[0]} for the argument {name}", where))
+
+    def _resolve_value(self, value: Any) -> Any:
+        if isinstance(value, list):
+            return [self._resolve_value(each) for each in value]
+        if not isinstance(value, dict):
+            return value
+        if set(value) != {"from"} or not isinstance(value["from"], str):
+            return {key: self._resolve_value(each) for key, each in value.items()}
+        return self._resolve_name(value["from"])
+
+    def _resolve_name(self, name: str) -> Any:
+        return self._value_at(name) if name.startswith("/") else self._value_of(name)
+
+    def _value_at(self, pointer: str) -> Any:
+        keys = pointer_keys(pointer)
+        value, depth = find_value(self.root.document.value, keys)
+        if depth < len(keys):
+            raise UnknownNameError(f'the scenario has no "{pointer}"')
+        return value
+
+    def _value_of(self, name: str) -> Any:
+        """Return the value of a parameter or start value; a port of a nested system has that of its first inner variable."""
+        target = next(iter(resolve_name(self.root, name, ("parameters", "inputs"), include_inner=True)))
+        if target.component not in self.components:
+            raise UnknownNameError
+        variables = {variable.name: variable for variable in self.components[target.component].variables}
+        if target.prefix in variables:
+            return self._value_of_variable(target, variables[target.prefix])
+        names = (f"{target.prefix}[{i}]" for i in count(1))
+        elements = [variables[each] for each in takewhile(variables.__contains__, names)]
+        if not elements:
+            known = [each.name for each in variables.values() if each.causality != "output"]
+            text = f'component "{target.component}" has no parameter "{target.prefix}"'
+            raise UnknownNameError(text + did_you_mean(target.prefix, known))
+        return [self._value_of_variable(target, element) for element in elements]
+
+    def _value_of_variable(self, target: Target, variable: Variable) -> Any:
+        value = self.start_values.get(target.component, {}).get(variable.name, variable.start)
+        if variable.causality == "output" or value is None:
+            reason = "is an output" if variable.causality == "output" else "has no start value"
+            raise UnknownNameError(f'"{target.component}.{variable.name}" {reason}, expected a parameter')
+        if variable.shape and not isinstance(value, list | tuple):
+            return [value] * len(variable.scalar_names)
+        return list(value) if isinstance(value, tuple) else value
+
+
+def without_placeholders(spec: ScenarioSpec) -> ScenarioSpec:
+    """Return a resolved scenario without the placeholders of functions."""
+    return spec.model_copy(update={kind: [each for _, each in accepted(getattr(spec, kind))] for kind in ("kpis", "figures")})
