@@ -21,6 +21,7 @@ from .c_code.header import struct_members
 from .causality.continuous_states import introduce_derivatives
 from .causality.dependent_states import reduce_states
 from .causality.hybrid import prepare_hybrid
+from .causality.hybrid_interpreter import HybridInterpreter
 from .causality.interpreter import Interpreter
 from .causality.matching import is_input
 from .frontend.constants import fold_constants
@@ -106,7 +107,7 @@ def analyse(json: Mapping[str, Any], sources: ModelicaSources, name: str) -> Int
     flat = _without_unused_connectors(flat)
     flat = prepare_hybrid(reduce_states(introduce_derivatives(fold_constants(flat))))
     _check_types(flat)
-    return Interpreter(flat)
+    return HybridInterpreter(flat) if flat.hybrid else Interpreter(flat)
 
 
 def _without_unused_connectors(model: Model) -> Model:

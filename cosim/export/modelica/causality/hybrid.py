@@ -77,9 +77,10 @@ class _Preparation:
 
     def prepare(self) -> Model:
         model = self._model
-        if model.states or "time" in variable_names((model.equations, model.whens)):
-            model = replace(model, equations=self._with_relations(model.equations), whens=self._with_relations_in_conditions(model.whens))
         sections = {name: rewrite(getattr(model, name), self._replace_delay) for name in _SECTIONS}
+        if model.states or "time" in variable_names((model.equations, model.whens)):
+            sections["equations"] = self._with_relations(sections["equations"])
+            sections["whens"] = self._with_relations_in_conditions(sections["whens"])
         sections["equations"] = (*sections["equations"], *self._equations)
         used = {name for section in sections.values() for name in _remembered(section)}
         used |= {relation.name for relation in self._relations} | {v.name for v in self._variables.values() if is_input(v)}
@@ -89,7 +90,8 @@ class _Preparation:
         for name in remembered:
             self._variables[previous_name(name)] = _internal(self._variables[name], previous_name(name))
         iterated = tuple(n for n in remembered if n in self._discrete | reinitialized and not (is_input(self._variables[n])))
-        hybrid = Hybrid(tuple(self._relations), tuple(self._delays), remembered, iterated)
+        relations = tuple(Relation(r.name, rewrite(r.condition, self._replace_pre)) for r in self._relations)
+        hybrid = Hybrid(relations, tuple(self._delays), remembered, iterated)
         return replace(model, variables=self._variables, hybrid=hybrid, **sections)
 
     # comparisons

@@ -65,6 +65,29 @@ def _sum(values: Any) -> Any:
     return reduce(lambda a, b: check_int32(a + b), map(to_python_scalar, np.asarray(values).flat)) if np.size(values) else 0
 
 
+def solve_linear(a: list[list[float]], b: list[float]) -> list[float] | None:
+    """Return the solution of a linear system, with the operations of newton.h in the same order; None if it is singular."""
+    n = len(b)
+    for column in range(n):
+        pivot = column
+        for row in range(column + 1, n):
+            if abs(a[row][column]) > abs(a[pivot][column]):
+                pivot = row
+        if not abs(a[pivot][column]) > 0:
+            return None
+        a[column], a[pivot], b[column], b[pivot] = a[pivot], a[column], b[pivot], b[column]
+        for row in range(column + 1, n):
+            factor = divide(a[row][column], a[column][column])
+            for k in range(column, n):
+                a[row][k] -= factor * a[column][k]
+            b[row] -= factor * b[column]
+    for row in range(n - 1, -1, -1):
+        for k in range(row + 1, n):
+            b[row] -= a[row][k] * b[k]
+        b[row] = divide(b[row], a[row][row])
+    return b
+
+
 def divide(a: float, b: float) -> float:
     """Return `a / b` as defined by IEEE 754, also for b = 0."""
     if b != 0:

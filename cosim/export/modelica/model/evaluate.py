@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import operator
 from collections import ChainMap
 from collections.abc import Callable, Mapping, MutableMapping
@@ -11,10 +12,21 @@ from typing import Any
 import numpy as np
 
 from . import syntax_tree
-from .arithmetic import BUILTINS, OPERATORS, EvaluationError, check_int32, elementwise, matrix_product, to_python_scalar
+from .arithmetic import (
+    BUILTINS,
+    OPERATORS,
+    EvaluationError,
+    check_int32,
+    divide,
+    elementwise,
+    matrix_product,
+    solve_linear,
+    to_python_scalar,
+)
 from .flat_model import Function, FunctionVariable
 from .syntax_tree import Body, Expression
 
+NEWTON_ITERATIONS = 50
 DTYPES = {"Real": np.float64, "Integer": np.int64, "Enumeration": np.int64, "Boolean": np.bool_}
 
 
@@ -87,6 +99,26 @@ class Evaluator:
         self.values.pop(node.index, None)
         if shadowed is not None:
             self.values[node.index] = shadowed
+
+    def _solve(self, node: syntax_tree.Solve) -> None:
+        """Solve a system of equations as in newton.h."""
+        for _ in range(NEWTON_ITERATIONS):
+            residual = [float(self(item)) for item in node.residuals]
+            changes = solve_linear([[float(self(item)) for item in row] for row in node.jacobian], residual)
+            if changes is None:
+                break
+            largest = 0.0
+            for unknown, change in zip(node.unknowns, changes, strict=True):
+                value = float(self(unknown)) - change
+                self._store(unknown, value)
+                ratio = divide(abs(change), 1 + abs(value))
+                if not ratio <= largest:
+                    largest = ratio
+            if largest <= 1e-11:
+                return
+            if not math.isfinite(largest):
+                break
+        raise EvaluationError("a system of equations has no solution", node.where)
 
     def _while(self, node: syntax_tree.While) -> None:
         while self(node.condition):
