@@ -90,8 +90,7 @@ def test_unknown_names_come_with_file_and_line(folder):
 def test_a_model_is_not_confused_with_a_member_of_the_same_name(folder):
     text = TOP.replace("Top", "Double").replace("  y = double.y;", "  y = sin(y) + double.y;")
     (folder / "Double.mo").write_text(text)
-    with pytest.raises(InputError, match=r"models/Double.mo:7: algebraic loop: y \(Double.mo:7\)"):
-        load_block(folder / "Double.mo")
+    assert "newton.h" in load_block(folder / "Double.mo").files
 
 
 def test_a_panic_of_the_front_end_is_an_input_error(write_model):

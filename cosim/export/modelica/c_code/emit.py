@@ -160,9 +160,9 @@ class _Emitter:
         ]
 
     def _first_ticks(self) -> list[str]:
-        """Generate the event of the clocks that tick at the start time."""
+        """Generate the event of the clocks that tick at the start time; with inputs, it belongs to the first step."""
         clocks = len(self.schedule.clocks)
-        if not clocks:
+        if not clocks or any(map(is_input, self.model.variables.values())):
             return []
         return [
             f"bool due[{clocks}];",

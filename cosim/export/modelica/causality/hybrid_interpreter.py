@@ -107,7 +107,7 @@ class HybridInterpreter(Interpreter):
         self._record(time)
         self._event("initialize", time, ())
         due, tick = self._next_ticks()
-        if due and tick <= time + TICK_TOLERANCE * self._shortest_period():
+        if due and not self._inputs and tick <= time + TICK_TOLERANCE * self._shortest_period():
             self._event("initialize", time, due)
             self._count_ticks(due)
 
