@@ -29,8 +29,8 @@ from .frontend.folded_branches import folded_parameters
 from .frontend.reader import ModelReader
 from .frontend.rumoca_frontend import ModelicaSources, flatten_model
 from .model.flat_model import Model, Variable
-from .model.traversal import variable_names
 from .model.syntax_tree import raise_model_error
+from .model.traversal import variable_names
 
 _FMI_TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration"}
 _DEFAULT_STEP_SIZE = 0.01
@@ -116,7 +116,11 @@ def _without_unused_connectors(model: Model) -> Model:
     unused = {
         v.name
         for v in model.variables.values()
-        if "." in v.name and v.name not in used and v.variability in ("continuous", "discrete") and v.causality == "local" and not v.binding
+        if "." in v.name
+        and v.name not in used
+        and v.variability in ("continuous", "discrete")
+        and v.causality == "local"
+        and not v.binding
     }
     return replace(model, variables={name: v for name, v in model.variables.items() if name not in unused})
 
@@ -146,7 +150,8 @@ def _fmi_role(variable: Variable, defaults: Interpreter) -> FmiRole | None:
     """Return causality and variability of a variable in the FMU, or None if the FMU does not contain it.
 
     The FMU contains the inputs and outputs of the model itself, and all parameters that are neither protected nor set by a
-    modifier. Structural parameters are constants. The FMU of a model with event iteration or of a library contains all other variables too.
+    modifier. Structural parameters are constants. The FMU of a model with event iteration or with a library contains all other
+    variables too.
     """
     roles = defaults.parameter_roles
     if variable.name in roles.settable:
@@ -160,7 +165,11 @@ def _fmi_role(variable: Variable, defaults: Interpreter) -> FmiRole | None:
         return "input", "continuous" if variable.type == "Real" else "discrete"
     if variable.causality == "output" and variable.top_level:
         return "output", "continuous" if continuous else "discrete"
-    if (defaults.model.hybrid or defaults.model.uses_library) and not variable.name.startswith(("$", "pre(")) and 0 not in variable.shape:
+    if (
+        (defaults.model.hybrid or defaults.model.uses_library)
+        and not variable.name.startswith(("$", "pre("))
+        and 0 not in variable.shape
+    ):
         return "local", "continuous" if continuous and variable.variability == "continuous" else "discrete"
     return None
 

@@ -173,7 +173,8 @@ def test_an_fmu_with_a_library_is_built(model, library, tmp_path):
     assert simulate_fmu(str(target), stop_time=0.1, start_values={"u": 4.0})["y"][-1] == 8
 
 
-def test_a_scenario_names_libraries(model, library, tmp_path):
+@pytest.mark.usefixtures("library")
+def test_a_scenario_names_libraries(model, tmp_path):
     component = {"modelica": f"{model()}:Doubled", "libraries": ["library"], "parameters": {"u": 1.5}}
     scenario = {"name": "s", "stop_time": 0.1, "step_size": 0.01, "components": {"a": component}, "record": {"signals": ["a.*"]}}
     path = write(tmp_path, {"s.json": json.dumps(scenario)}) / "s.json"

@@ -122,7 +122,10 @@ end Limited;""")
 @pytest.mark.parametrize(
     ("equations", "message"),
     [
-        ("x = u;\n  x = 2*u;\n  when u > 1 then\n  end when;", "the equations do not determine y, and this equation contradicts others"),
+        (
+            "x = u;\n  x = 2*u;\n  when u > 1 then\n  end when;",
+            "the equations do not determine y, and this equation contradicts others",
+        ),
         ("x = u;\n  sin(x) = u;\n  y = x;\n  z = der(u);", "superfluous|unbalanced|input"),
     ],
 )

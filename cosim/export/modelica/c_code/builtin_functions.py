@@ -111,7 +111,9 @@ def _matrix(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
     shape = (sum(s[0] for s in shapes), shapes[0][1]) if vertical else (shapes[0][0], sum(s[1] for s in shapes))
     elements = [
         (part, row * size[1] + column)
-        for row_parts in ([[pair] for pair in zip(parts, shapes, strict=True)] if vertical else [list(zip(parts, shapes, strict=True))])
+        for row_parts in (
+            [[pair] for pair in zip(parts, shapes, strict=True)] if vertical else [list(zip(parts, shapes, strict=True))]
+        )
         for row in range(row_parts[0][1][0])
         for part, size in row_parts
         for column in range(size[1])

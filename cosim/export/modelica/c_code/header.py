@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from ..causality.matching import is_input
 from ..causality.parameter_roles import ParameterRoles
 from ..causality.schedule import Schedule
-from ..model.flat_model import Model, Variable, derivative_name
-from .hybrid_code import is_integrated
+from ..model.flat_model import Model, Variable, derivative_name, is_integrated
 from .c_values import C_TYPES, CValue, c_identifier, variable_value
 
 

@@ -3,36 +3,135 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
 
+from ..causality.hybrid_interpreter import MAX_EVENTS, MAX_PASSES
 from ..causality.matching import is_input
-from ..model.flat_model import Model, Relation, Variable, previous_name
-from ..model.syntax_tree import Name
+from ..causality.past_values import PAST_VALUES
+from ..model.flat_model import Model, Relation, derivative_name, is_integrated, previous_name
 from .c_values import CValue
 from .formatting import function_definition
+from .model_code import ModelCode
 from .statements import StatementLowering
-
-#: largest numbers of evaluations in one event, and of located events in one communication step
-MAX_PASSES, MAX_EVENTS = 100, 100_000
 
 
 def copy_values(variables: Iterable[tuple[CValue, CValue]]) -> list[str]:
     """Generate the assignments `target = source` of scalars and arrays."""
     return [
-        f"memcpy({target.pointer}, {source.pointer}, sizeof {target.pointer});" if target.shape else f"{target.text.code} = {source.text.code};"
+        f"memcpy({target.pointer}, {source.pointer}, sizeof {target.pointer});"
+        if target.shape
+        else f"{target.text.code} = {source.text.code};"
         for target, source in variables
     ]
 
 
-def is_integrated(model: Model) -> bool:
-    """Return whether a model with event iteration has states, or relations that change with time."""
-    return model.hybrid is not None and bool(model.states or model.hybrid.relations)
+@dataclass
+class HybridCode(ModelCode):
+    """Code generator of model.c for a model with event iteration."""
+
+    def headers(self) -> list[str]:
+        """Return the names of the C headers that model.c includes besides model.h and runtime.h."""
+        assert self.model.hybrid
+        others = [name for name in super().headers() if name != "runge_kutta.h"]
+        return [*others, *["past.h"] * bool(self.model.hybrid.delays), *["hybrid.h"] * is_integrated(self.model)]
+
+    def definitions(self) -> list[str]:
+        """Generate the functions of model.c."""
+        model, clocks = self.model, len(self.schedule.clocks)
+        assert model.hybrid
+        values = self._make_lowering().scope
+        endless = self._failure_code("the event iteration does not end", None)
+        too_many = self._failure_code("too many events in one step (chattering)", None)
+        initial = self._body(self.schedule.initialization, initial=True)
+        definitions = [
+            *self._common_definitions(),
+            f"static const bool NO_TICK[{max(clocks, 1)}] = {{false}};",
+            record_function(model, values, self._make_lowering(), PAST_VALUES),
+            *event_functions(model, values, self._event(), endless, initial),
+            function_definition("const char *model_initialize(Model *m, double time)", self._initialize_hybrid(endless)),
+        ]
+        if is_integrated(model):
+            definitions += [*self._hybrid_system(values)]
+        step = hybrid_step_body(clocks, is_integrated(model), too_many)
+        return [*definitions, function_definition("const char *model_step(Model *m, double time, double step_size)", step)]
+
+    def _initialize_hybrid(self, endless: str) -> list[str]:
+        """Generate the body of model_initialize: the initial equations, repeated until relations are consistent, and an event."""
+        past = ["memset(m->past, 0, sizeof m->past);"] if self.model.hybrid and self.model.hybrid.delays else []
+        return [
+            "m->failure = 0;",
+            *(["m->step = 0;"] if is_integrated(self.model) else []),
+            *past,
+            "start_variables(m);",
+            *self._clock_lines(),
+            "for (int pass = 0; initialize(m, time); pass++) {",
+            f"    if (pass == {MAX_PASSES}) fail(m, {endless});",
+            *(f"    {line}" for line in self._copy_relations()),
+            "}",
+            "if (m->failure == 0) remember_inputs(m);",
+            *(["record(m, time);"] if past else []),
+            "if (m->failure == 0) event(m, time, NO_TICK);",
+            *self._first_ticks(),
+            "return REASONS[m->failure];",
+        ]
+
+    def _first_ticks(self) -> list[str]:
+        """Generate the event of the clocks that tick at the start time; with inputs, it belongs to the first step."""
+        clocks = len(self.schedule.clocks)
+        if not clocks or any(map(is_input, self.model.variables.values())):
+            return []
+        return [
+            f"bool due[{clocks}];",
+            f"const double next = next_event(m->clock, {clocks}, due);",
+            f"if (m->failure == 0 && next <= time + TOLERANCE * shortest_period(m->clock, {clocks})) {{",
+            "    event(m, time, due);",
+            f"    for (int k = 0; k < {clocks}; k++) m->clock[k].ticks += due[k];",
+            "}",
+        ]
+
+    def _copy_relations(self) -> list[str]:
+        values = self._make_lowering().scope
+        assert self.model.hybrid
+        names = [relation.name for relation in self.model.hybrid.relations]
+        return copy_values((values[previous_name(name)], values[name]) for name in names)
+
+    def _hybrid_system(self, values: Mapping[str, CValue]) -> list[str]:
+        """Generate the functions for the integration between events."""
+        assert self.model.hybrid
+        lowering = self._make_lowering()
+        lowering.body(self.schedule.indicators)
+        states, rates = self._element_pointers(self.model.states), self._element_pointers(map(derivative_name, self.model.states))
+        if not self.model.states:
+            states, rates = "&m->no_state[0]", "&m->no_state[1]"
+        return [
+            function_definition(
+                "static void derivatives(Model *m, double time)",
+                ["(void)m;", "(void)time;", *self._body(self.schedule.derivatives, initial=False)],
+            ),
+            crossing_function(self.model.hybrid.relations, values, lowering),
+            function_definition(
+                "static bool advance(Model *m, double from, double to, double *reached)",
+                [
+                    "const Hybrid system = {",
+                    f"    {{{states}}},",
+                    f"    {{{rates}}},",
+                    "    derivatives, crossed, record,",
+                    "};",
+                    "bool event;",
+                    "*reached = advance_hybrid(m, &system, from, to, &event);",
+                    "return event;",
+                ],
+            ),
+        ]
 
 
 def _differs(a: CValue, b: CValue) -> str:
     return f"memcmp({a.pointer}, {b.pointer}, sizeof {a.pointer}) != 0" if a.shape else f"{a.text.code} != {b.text.code}"
 
 
-def event_functions(model: Model, values: Mapping[str, CValue], evaluation: list[str], endless: str, initial: list[str]) -> list[str]:
+def event_functions(
+    model: Model, values: Mapping[str, CValue], evaluation: list[str], endless: str, initial: list[str]
+) -> list[str]:
     """Generate `evaluate`, `initialize` and `event`.
 
     Args:
@@ -80,7 +179,8 @@ def event_functions(model: Model, values: Mapping[str, CValue], evaluation: list
             ],
         ),
         function_definition(
-            "static bool initialize(Model *m, double time)", ["(void)time;", *initial, f"return m->failure == 0 && ({relations});"]
+            "static bool initialize(Model *m, double time)",
+            ["(void)time;", *initial, f"return m->failure == 0 && ({relations});"],
         ),
     ]
 
@@ -91,7 +191,10 @@ def record_function(model: Model, values: Mapping[str, CValue], lowering: Statem
     lines = ["(void)m;", "(void)time;"]
     for k, delay in enumerate(model.hybrid.delays):
         duration = lowering.scalar_of(delay.duration).parenthesized(11)
-        lines += [*lowering.lines, f"record_value(&m->past[{k}], time, {values[delay.name].text.code}, {duration} / {capacity // 2});"]
+        lines += [
+            *lowering.lines,
+            f"record_value(&m->past[{k}], time, {values[delay.name].text.code}, {duration} / {capacity // 2});",
+        ]
         lowering.lines = []
     return function_definition("static void record(Model *m, double time)", lines)
 
@@ -100,10 +203,11 @@ def crossing_function(relations: Iterable[Relation], values: Mapping[str, CValue
     """Generate `crossed`, which compares the relations with their stored values."""
     lines = ["bool changed = false;", "(void)m;", "(void)time;", "z[0] = 0;"]
     for k, relation in enumerate(relations):
-        left, right = (lowering.evaluated_once(lowering.lower(side)).text for side in (relation.condition.left, relation.condition.right))
+        a, b = (lowering.evaluated_once(lowering.lower(s)).text for s in (relation.condition.left, relation.condition.right))
+        left, right, held = a.parenthesized(9), b.parenthesized(10), values[relation.name].text.code
         lowering.lines += [
-            f"z[{k}] = {left.parenthesized(9)} - {right.parenthesized(10)};",
-            f"if (({left.parenthesized(9)} {relation.condition.operator} {right.parenthesized(9)}) != {values[relation.name].text.code}) changed = true;",
+            f"z[{k}] = {left} - {right};",
+            f"if (({left} {relation.condition.operator} {right}) != {held}) changed = true;",
         ]
     return function_definition(
         "static bool crossed(Model *m, double time, double *z)", [*lines, *lowering.lines, "return changed;"]

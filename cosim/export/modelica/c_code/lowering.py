@@ -11,8 +11,8 @@ from typing import Any, Protocol
 from ..model import syntax_tree
 from ..model.arithmetic import EvaluationError
 from ..model.evaluate import Evaluator
-from ..model.traversal import walk
 from ..model.syntax_tree import Expression, SourceLocation, raise_model_error
+from ..model.traversal import walk
 from .c_values import C_TYPES, CExpression, CValue, scalar_value, variable_value
 
 

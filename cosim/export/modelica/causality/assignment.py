@@ -25,7 +25,8 @@ def match(candidates: Sequence[Sequence[Key]], optional: Sequence[Collection[Key
     options = [[key for key in keys if key not in excluded] for keys in candidates]
     matched = _match_in_sequence(options)
     owner = {key: number for number, key in matched.items()}
-    for group in ((), *optional):
+    groups: list[Collection[Key]] = [[], *optional]
+    for group in groups:
         excluded -= set(group)
         options = [[key for key in keys if key not in excluded] for keys in candidates]
         for number in range(len(options)):
@@ -45,16 +46,16 @@ def _match_in_sequence(candidates: Sequence[Sequence[Key]]) -> dict[int, Key]:
 
     def assign(number: int, key: Key) -> None:
         matched[number] = key
-        for other in equations_of.pop(key):
-            free[other].discard(key)
-        for other in free[number]:
-            equations_of[other].discard(number)
+        for equation in equations_of.pop(key):
+            free[equation].discard(key)
+        for unknown in free[number]:
+            equations_of[unknown].discard(number)
         free[number] = set()
 
     progress = True
     while progress:
         progress = False
-        for number, keys in enumerate(candidates):
+        for number in range(len(candidates)):
             if number not in matched and len(free[number]) == 1:
                 assign(number, next(iter(free[number])))
                 progress = True

@@ -48,7 +48,9 @@ def _has_loop(model: Model, statements: Sequence[Assign]) -> bool:
         {writers[key] for item in read_references(s) for key in scalar_keys(model.variables, item) if key in writers}
         for s in statements
     ]
-    return any(len(component) > 1 for component in strongly_connected_components(reads)) or any(k in r for k, r in enumerate(reads))
+    return any(len(component) > 1 for component in strongly_connected_components(reads)) or any(
+        k in r for k, r in enumerate(reads)
+    )
 
 
 def solve_initial_equations(

@@ -62,7 +62,9 @@ class _Reduction:
         names = {name for name, _ in dependent}
         for name in names:
             if not scalar_keys(self._model.variables, Name(name)) <= dependent:
-                raise_model_error(f"only some elements of the state {name} are determined by equations", self._model.variables[name].where)
+                raise_model_error(
+                    f"only some elements of the state {name} are determined by equations", self._model.variables[name].where
+                )
         self._pending = sorted(dependent)
         equations, done = list(self._model.equations), set[ScalarKey]()
         while self._pending:
@@ -78,7 +80,9 @@ class _Reduction:
         """Return the derivative of the equation that determines a variable."""
         equation = self._equation_of.get(key)
         if equation is None:
-            raise_model_error(f"the derivative of {key[0]} is needed, but no equation gives it", self._model.variables[key[0]].where)
+            raise_model_error(
+                f"the derivative of {key[0]} is needed, but no equation gives it", self._model.variables[key[0]].where
+            )
         return Equation(self._differentiate(equation.left), self._differentiate(equation.right), equation.where)
 
     def _derivative(self, reference: Name | Index) -> Expression | None:

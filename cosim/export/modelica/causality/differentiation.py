@@ -109,9 +109,9 @@ class Differentiation:
             return self._binary(node)
         if isinstance(node, Call) and (inlined := inline_call(node, self._functions)) is not None:
             return self(inlined)
-        if isinstance(node, Builtin):
-            return self._builtin(node)
-        raise_model_error("this expression cannot be differentiated", getattr(node, "where", None))
+        if not isinstance(node, Builtin):
+            raise_model_error("this expression cannot be differentiated", getattr(node, "where", None))
+        return self._builtin(node)
 
     def _binary(self, node: Binary) -> Expression:
         operator, a, b = node.operator.removeprefix("."), node.left, node.right
@@ -121,9 +121,9 @@ class Differentiation:
             return add(multiply(self(a), b), multiply(a, self(b)))
         if operator == "/":
             return subtract(divide(self(a), b), divide(multiply(a, self(b)), _square(b)))
-        if operator == "^":
-            return self._power(a, b)
-        raise_model_error(f"the operator {operator} cannot be differentiated", node.where)
+        if operator != "^":
+            raise_model_error(f"the operator {operator} cannot be differentiated", node.where)
+        return self._power(a, b)
 
     def _power(self, a: Expression, b: Expression) -> Expression:
         if isinstance(b, Literal):
@@ -146,9 +146,9 @@ class Differentiation:
             return divide(subtract(multiply(x, self(y)), multiply(y, self(x))), add(_square(x), _square(y)))
         if node.name in ("pre", "sign", "integer", "floor", "ceil"):
             return ZERO
-        if node.name in _DERIVATIVES:
-            return multiply(_DERIVATIVES[node.name](arguments[0]), self(arguments[0]))
-        raise_model_error(f"{node.name}() cannot be differentiated", node.where)
+        if node.name not in _DERIVATIVES:
+            raise_model_error(f"{node.name}() cannot be differentiated", node.where)
+        return multiply(_DERIVATIVES[node.name](arguments[0]), self(arguments[0]))
 
 
 def inline_call(call: Call, functions: Mapping[str, Function]) -> Expression | None:

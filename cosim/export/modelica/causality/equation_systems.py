@@ -74,9 +74,13 @@ class EquationSystem:
         self._check(matched)
         numbers = sorted(matched)
         owner = {matched[number]: k for k, number in enumerate(numbers)}
-        successors = [{owner[key] for key in self._incidence[n] if key in owner and owner[key] != k} for k, n in enumerate(numbers)]
+        successors = [
+            {owner[key] for key in self._incidence[n] if key in owner and owner[key] != k} for k, n in enumerate(numbers)
+        ]
         components = strongly_connected_components(successors)
-        if loops := {key for c in components if len(c) > 1 for key in (matched[numbers[k]] for k in c) if key[0] in self._relations}:
+        if loops := {
+            key for c in components if len(c) > 1 for key in (matched[numbers[k]] for k in c) if key[0] in self._relations
+        }:
             self.held |= loops
             successors = [{k for k in nodes if matched[numbers[k]] not in loops} for nodes in successors]
             components = strongly_connected_components(successors)
@@ -91,7 +95,9 @@ class EquationSystem:
     def _preferences(self, number: int) -> list[ScalarKey]:
         """Return the unknowns for which an equation can be solved; those that stand alone on one side are first."""
         equation = self._scalar[number]
-        alone = [key for side in (equation.left, equation.right) for key in self._key_of(side) if self._is_free_of(key, side, equation)]
+        alone = [
+            key for side in (equation.left, equation.right) for key in self._key_of(side) if self._is_free_of(key, side, equation)
+        ]
         others = [key for key in self._incidence[number] if key not in alone and not self._is_discrete(key)]
         return [*dict.fromkeys(alone), *others]
 
@@ -175,8 +181,8 @@ def _first_location(equations: Sequence[Equation]) -> SourceLocation | None:
 
 def _simplified(node: Expression) -> Expression:
     """Remove terms and factors that are zero."""
-    from .differentiation import add, multiply
     from ..model.syntax_tree import Binary, Unary
+    from .differentiation import add, multiply
 
     operations = {"+": add, "-": subtract, "*": multiply, "/": divide}
 

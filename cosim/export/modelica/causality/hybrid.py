@@ -15,7 +15,6 @@ from typing import Any
 
 from ..model.flat_model import Delay, Equation, Hybrid, Model, Relation, Variable, previous_name
 from ..model.syntax_tree import (
-    Assign,
     Binary,
     Builtin,
     Expression,
@@ -63,7 +62,9 @@ class _Preparation:
     def is_needed(self) -> bool:
         """Return whether the model has elements that require event iteration."""
         outside = tuple(s for body in self._model.algorithms for s in body if not isinstance(s, When))
-        conditions = tuple(c for item in walk((self._model.whens, self._model.algorithms)) if isinstance(item, When) for c, _ in item.branches)
+        conditions = tuple(
+            c for item in walk((self._model.whens, self._model.algorithms)) if isinstance(item, When) for c, _ in item.branches
+        )
         if has_builtin((self._model.equations, outside, self._model.asserts), *PRE_OPERATORS, "sample", "delay"):
             return True
         if has_builtin(conditions, *PRE_OPERATORS) or any(_is_combined_sample(c) for c in conditions):
@@ -86,7 +87,9 @@ class _Preparation:
         used |= {relation.name for relation in self._relations} | {v.name for v in self._variables.values() if is_input(v)}
         sections = {name: rewrite(section, self._replace_pre) for name, section in sections.items()}
         reinitialized = {item.name for item in walk((model.whens, model.algorithms)) if isinstance(item, Reinit)}
-        remembered = tuple(n for n, v in self._variables.items() if n in used | reinitialized and v.variability not in ("constant", "parameter"))
+        remembered = tuple(
+            n for n, v in self._variables.items() if n in used | reinitialized and v.variability not in ("constant", "parameter")
+        )
         for name in remembered:
             self._variables[previous_name(name)] = _internal(self._variables[name], previous_name(name))
         iterated = tuple(n for n in remembered if n in self._discrete | reinitialized and not (is_input(self._variables[n])))
@@ -128,7 +131,10 @@ class _Preparation:
     def _add_variable(self, name: str, type_name: str, value: Expression) -> None:
         template = next(iter(self._model.variables.values()))
         self._variables[name] = replace(
-            _internal(template, name), type=type_name, shape=(), variability="discrete" if type_name == "Boolean" else "continuous"
+            _internal(template, name),
+            type=type_name,
+            shape=(),
+            variability="discrete" if type_name == "Boolean" else "continuous",
         )
         self._equations.append(Equation(Name(name), value, getattr(value, "where", None)))
 
@@ -164,9 +170,18 @@ class _Preparation:
         return previous if isinstance(argument, Name) else replace(argument, base=previous)
 
 
+def delay_number(past: Builtin) -> int:
+    """Return the number of the delay() that a call of past() belongs to."""
+    (number, _) = past.arguments
+    assert isinstance(number, Literal)
+    return int(number.number)
+
+
 def _without_events(node: Any) -> Any:
     """Return the node itself if comparisons in it are no events, else None."""
-    if isinstance(node, Builtin) and (node.name == "noEvent" or (node.name == "smooth" and node.arguments[0] != Literal(0, "Integer"))):
+    if isinstance(node, Builtin) and (
+        node.name == "noEvent" or (node.name == "smooth" and node.arguments[0] != Literal(0, "Integer"))
+    ):
         return Literal(True, "Boolean")
     return None
 

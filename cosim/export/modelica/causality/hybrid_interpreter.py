@@ -10,11 +10,12 @@ import numpy as np
 
 from ....core.errors import ComponentError
 from ..model.arithmetic import EvaluationError, divide
-from ..model.flat_model import Model, derivative_name, previous_name
+from ..model.flat_model import Model, derivative_name, is_integrated, previous_name
 from .interpreter import TICK_TOLERANCE, Interpreter
 from .matching import is_input
+from .past_values import PAST_VALUES, PastValues
 
-MAX_PASSES, MAX_EVENTS, PAST_VALUES = 100, 100_000, 2048
+MAX_PASSES, MAX_EVENTS = 100, 100_000
 RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-7, 1e-9
 
 _NODES = (0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0)
@@ -36,39 +37,6 @@ _COMPARISONS: dict[str, Callable[[float, float], bool]] = {
 }
 
 
-class _Past:
-    """Ring buffer of the values of the argument of a delay()."""
-
-    def __init__(self) -> None:
-        self._values: list[tuple[float, float]] = []
-
-    def record(self, time: float, value: float, spacing: float) -> None:
-        """Append a value; see `record_value` in past.h."""
-        values = self._values
-        if values and values[-1] == (time, value):
-            return
-        if len(values) > 1 and values[-1][0] < time and time - values[-2][0] < spacing and values[-2][0] < values[-1][0]:
-            values[-1] = (time, value)
-            return
-        values.append((time, value))
-        del values[:-PAST_VALUES]
-
-    def value(self, time: float) -> float:
-        """Return the value at a time by linear interpolation; see `past_value` in past.h."""
-        low, high, at = 0, len(self._values), time + 1e-12 * (1 + abs(time))
-        while high - low > 1:
-            middle = (low + high) // 2
-            if self._values[middle][0] <= at:
-                low = middle
-            else:
-                high = middle
-        start, value = self._values[low]
-        if low + 1 >= len(self._values) or time <= start:
-            return value
-        end, next_value = self._values[low + 1]
-        return value + (next_value - value) * ((time - start) / (end - start))
-
-
 class HybridInterpreter(Interpreter):
     """An instance of a model with event iteration."""
 
@@ -79,7 +47,7 @@ class HybridInterpreter(Interpreter):
         self._inputs = [name for name in self._hybrid.remembered if is_input(model.variables[name])]
         self._states = list(_elements(model, model.states))
         self._rates = list(_elements(model, [derivative_name(name) for name in model.states]))
-        self._past = [_Past() for _ in self._hybrid.delays]
+        self._past = [PastValues() for _ in self._hybrid.delays]
         self.evaluate.past = lambda index, time: self._past[index].value(time)
         self._step = 0.0
 
@@ -90,7 +58,7 @@ class HybridInterpreter(Interpreter):
             ComponentError: The model has failed.
         """
         self._step = 0.0
-        self._past[:] = [_Past() for _ in self._hybrid.delays]
+        self._past[:] = [PastValues() for _ in self._hybrid.delays]
         self._apply_start_values(inputs=False)
         self.evaluate.previous_conditions.clear()
         self._start_clocks(time)
@@ -131,7 +99,7 @@ class HybridInterpreter(Interpreter):
             if count == 0 and not at_start and self._changed(self._inputs):
                 self._event("step", time, ())
             crossing = False
-            if self._is_integrated() and not at_start:
+            if is_integrated(self.model) and not at_start:
                 with self._as_component_error("step", reached), np.errstate(all="ignore"):
                     reached, crossing = self._advance(reached, target)
             count += 1
@@ -191,9 +159,6 @@ class HybridInterpreter(Interpreter):
             self.clocks[k][2] += 1
 
     # integration
-
-    def _is_integrated(self) -> bool:
-        return bool(self._states or self._hybrid.relations)
 
     def _get_states(self) -> list[float]:
         return [_element(self.values, key) for key in self._states]

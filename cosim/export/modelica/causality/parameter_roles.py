@@ -11,6 +11,7 @@ from ..model.syntax_tree import raise_model_error
 from ..model.traversal import variable_names
 from .schedule import Schedule
 
+
 @dataclass(frozen=True)
 class ParameterRoles:
     """The names of a model's parameters and constants, by role."""

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import replace
 from itertools import product
 from typing import Any
@@ -19,9 +19,8 @@ from ..model.traversal import variable_names
 
 Position = tuple[int, ...]
 
-_ELEMENTWISE = """
-    sin cos tan asin acos atan sinh cosh tanh exp log log10 sqrt ceil floor abs sign integer noEvent homotopy pre der String
-""".split()
+_MATH_FUNCTIONS = {"sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "log10", "sqrt"}
+_ELEMENTWISE = _MATH_FUNCTIONS | {"ceil", "floor", "abs", "sign", "integer", "noEvent", "homotopy", "pre", "der", "String"}
 
 
 class EquationSplitter:
@@ -39,9 +38,13 @@ class EquationSplitter:
         shapes = [self.shape(side) for side in (equation.left, equation.right)]
         shape = max(shapes, key=len)
         if any(other and other != shape for other in shapes):
-            raise_model_error(f"the sides of this equation have the sizes {list(shapes[0])} and {list(shapes[1])}", equation.where)
+            raise_model_error(
+                f"the sides of this equation have the sizes {list(shapes[0])} and {list(shapes[1])}", equation.where
+            )
         for position in product(*map(range, shape)):
-            left, right = (self.element(side, position if s else ()) for side, s in zip((equation.left, equation.right), shapes, strict=True))
+            left, right = (
+                self.element(side, position if s else ()) for side, s in zip((equation.left, equation.right), shapes, strict=True)
+            )
             yield Equation(left, right, equation.where)
 
     def shape(self, node: Expression) -> tuple[int, ...]:
@@ -56,7 +59,7 @@ class EquationSplitter:
 
     def element(self, node: Expression, position: Position) -> Expression:
         """Return the expression of one element, counted from 0."""
-        method = getattr(self, f"_{type(node).__name__.lower()}", None)
+        method: Callable[..., Expression | None] | None = getattr(self, f"_{type(node).__name__.lower()}", None)
         result = method(node, position) if method and (position or not isinstance(node, syntax_tree.Array)) else None
         if result is not None:
             return result
@@ -80,7 +83,7 @@ class EquationSplitter:
             if isinstance(subscript, Colon):
                 subscripts.append(Literal(rest.pop(0) + 1, "Integer"))
             elif variable_names(subscript) & set(self._evaluate.values):
-                return None if self.shape(subscript) else self._dynamic_index(node, position)
+                return None if position else node
             else:
                 numbers = self._evaluate(subscript)
                 subscripts.append(Literal(int(numbers[rest.pop(0)] if np.ndim(numbers) else numbers), "Integer"))
@@ -88,20 +91,20 @@ class EquationSplitter:
             return Index(node.base, tuple(subscripts), node.where)
         return self.element(node.base, tuple(int(s.number) - 1 for s in subscripts if isinstance(s, Literal)))
 
-    def _dynamic_index(self, node: Index, position: Position) -> Expression | None:
-        return None if position else node
-
     def _binary(self, node: Binary, position: Position) -> Expression | None:
         left, right = self.shape(node.left), self.shape(node.right)
         if node.operator == "*" and left and right:
             return self._product(node, len(left), len(right), left[-1], position)
-        operands = (self.element(side, position if shape else ()) for side, shape in ((node.left, left), (node.right, right)))
-        return Binary(node.operator.removeprefix("."), *operands, where=node.where)
+        a, b = (self.element(side, position if shape else ()) for side, shape in ((node.left, left), (node.right, right)))
+        return Binary(node.operator.removeprefix("."), a, b, node.where)
 
     def _product(self, node: Binary, left: int, right: int, inner: int, position: Position) -> Expression:
         row, column = position[: left - 1], position[left - 1 :]
         assert len(column) == right - 1
-        terms = [Binary("*", self.element(node.left, (*row, k)), self.element(node.right, (k, *column)), node.where) for k in range(inner)]
+        terms = [
+            Binary("*", self.element(node.left, (*row, k)), self.element(node.right, (k, *column)), node.where)
+            for k in range(inner)
+        ]
         return _total(terms)
 
     def _builtin(self, node: Builtin, position: Position) -> Expression | None:
@@ -132,7 +135,7 @@ def _literals(position: Sequence[int]) -> tuple[Expression, ...]:
     return tuple(Literal(k + 1, "Integer") for k in position)
 
 
-def _total(terms: list[Expression]) -> Expression:
+def _total(terms: Sequence[Expression]) -> Expression:
     if not terms:
         return Literal(0.0, "Real")
     result = terms[0]

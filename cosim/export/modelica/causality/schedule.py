@@ -32,6 +32,7 @@ from ..model.syntax_tree import (
 )
 from ..model.traversal import assigned_references, pre_references, read_references, rewrite, rewrite_outermost, walk
 from .continuous_equations import solve_equations, solve_initial_equations
+from .hybrid import delay_number
 from .matching import ScalarKey, scalar_keys
 from .topological_sort import Node, merge_statements, required_nodes, sort_topologically
 from .when_conditions import Clock, WhenConditions, tick_flag
@@ -132,7 +133,7 @@ def _at_initialization(model: Model, body: Body) -> Body:
             return _FALSE
         if isinstance(node, Builtin) and node.name == "past":
             assert model.hybrid
-            return Name(model.hybrid.delays[int(node.arguments[0].number)].name)
+            return Name(model.hybrid.delays[delay_number(node)].name)
         return node
 
     result: Body = _substitute_initial(rewrite(body, change) if model.hybrid else body, True)
@@ -141,7 +142,9 @@ def _at_initialization(model: Model, body: Body) -> Body:
 
 def _reinits(model: Model, conditions: WhenConditions) -> Body:
     """Return the assignments of reinit(), which follow all others."""
-    bodies = [conditions.at_event(when) for when in (*model.whens, *(s for b in model.algorithms for s in b if isinstance(s, When)))]
+    bodies = [
+        conditions.at_event(when) for when in (*model.whens, *(s for b in model.algorithms for s in b if isinstance(s, When)))
+    ]
     selected = (_filter_statements(body, lambda s: isinstance(s, Reinit)) for body in bodies)
     return tuple(rewrite_outermost(tuple(s for body in selected for s in body), _as_assignment))
 

@@ -1,9 +1,10 @@
-"""Replacement of constants and structural parameters by literals, so that they can determine array sizes, slices and loop ranges."""
+"""Replacement of constants and structural parameters by literals, which can determine array sizes, slices and loop ranges."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -136,4 +137,8 @@ def _unroll(node: Comprehension, model: Model) -> Expression:
         return node
     numbers = np.atleast_1d(Evaluator(model.functions, {})(node.range))
     literals = [Literal(to_python_scalar(number), "Integer") for number in numbers]
-    return Array(tuple(rewrite(node.value, lambda n, k=k: k if n == Name(node.index) else n) for k in literals))
+    return Array(tuple(rewrite(node.value, partial(_substitute, Name(node.index), literal)) for literal in literals))
+
+
+def _substitute(name: Name, value: Expression, node: Any) -> Any:
+    return value if node == name else node

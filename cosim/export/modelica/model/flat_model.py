@@ -132,6 +132,11 @@ class Model:
     hybrid: Hybrid | None = None
 
 
+def is_integrated(model: Model) -> bool:
+    """Return whether a model with event iteration has states, or relations that change with time."""
+    return model.hybrid is not None and bool(model.states or model.hybrid.relations)
+
+
 def derivative_name(state: str) -> str:
     """Return the name of the variable that holds the derivative of a state."""
     return f"der({state})"

@@ -10,7 +10,6 @@ from .syntax_tree import (
     Assign,
     Builtin,
     Colon,
-    Expression,
     Index,
     Literal,
     MultiAssign,
@@ -118,6 +117,6 @@ def pre_references(node: Any) -> Iterator[tuple[str, Builtin]]:
             yield referenced_variable(item.arguments[0]), item
 
 
-def has_builtin(node: Expression, *builtins: str) -> bool:
-    """Return whether an expression calls one of these built-in functions."""
+def has_builtin(node: Any, *builtins: str) -> bool:
+    """Return whether a tree calls one of these built-in functions."""
     return any(isinstance(item, Builtin) and item.name in builtins for item in walk(node))
