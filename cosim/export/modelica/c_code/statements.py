@@ -47,7 +47,10 @@ class StatementLowering(ExpressionLowering):
             value: The expression.
             reference: The assigned variable as an expression. It determines whether `value` depends on the target.
         """
-        if isinstance(value, syntax_tree.If) and (target.shape or self._needs_if_statement(target, value)):
+        if isinstance(value, syntax_tree.If) and target.shape and (known := self.static_value(value.branches[0][0])) is not None:
+            rest = syntax_tree.If(value.branches[1:], value.otherwise) if value.branches[1:] else value.otherwise
+            self.store(target, value.branches[0][1] if known else rest, reference)
+        elif isinstance(value, syntax_tree.If) and (target.shape or self._needs_if_statement(target, value)):
             self._lower_choice(target, value, reference)
         elif (
             isinstance(value, syntax_tree.Call)

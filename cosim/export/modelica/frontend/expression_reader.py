@@ -151,6 +151,8 @@ class ExpressionReader:
         kind = node.get("kind")
         if kind not in ("Horizontal", "Vertical") or self._is_matrix_of_scalars(elements, kind):
             return syntax_tree.Array(elements)
+        if kind == "Vertical":  # a row of scalars is a matrix with one row
+            elements = tuple(syntax_tree.Array((e,)) if isinstance(e, syntax_tree.Array) else e for e in elements)
         return syntax_tree.Builtin("rows" if kind == "Vertical" else "columns", elements, self.locate(node))
 
     def _is_matrix_of_scalars(self, elements: tuple[Expression, ...], kind: str) -> bool:
