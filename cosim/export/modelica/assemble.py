@@ -105,7 +105,12 @@ def analyse(json: Mapping[str, Any], sources: ModelicaSources, name: str) -> Int
     """Convert the document of the front end to an interpreter of the model."""
     flat = ModelReader(json, sources).read_model(name)
     structural = flat.structural | folded_parameters(json, sources) | string_parameters(flat)
-    flat = replace(flat, structural=structural, functions=callable_functions(flat.functions, sources.packages), uses_library=bool(sources.libraries))
+    flat = replace(
+        flat,
+        structural=structural,
+        functions=callable_functions(flat.functions, sources.packages),
+        uses_library=bool(sources.libraries),
+    )
     flat = _without_unused_connectors(flat)
     flat = prepare_hybrid(reduce_states(introduce_derivatives(fold_strings(fold_constants(flat)))))
     _check_types(flat)

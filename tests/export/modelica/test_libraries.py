@@ -120,13 +120,13 @@ def test_the_required_version_is_selected(model, library):
 
 def test_a_version_that_does_not_fit_is_refused(model, library):
     path = model('annotation(uses(Blocks(version="1.0")));')
-    assert problems_of(path, library) == [f'{path}: uses the library Blocks 1.0, found Blocks 2.1.0 in "{library / "Blocks"}"']
+    assert problems_of(path, library) == [f'{path}:5: uses the library Blocks 1.0, found Blocks 2.1.0 in "{library / "Blocks"}"']
 
 
 def test_a_missing_library_is_named(model, library):
     path = model('annotation(uses(Block(version="1.0")));')
     text = 'which is not found; add its folder to MODELICAPATH or pass --library; did you mean "Blocks"?'
-    assert problems_of(path, library) == [f"{path}: uses the library Block 1.0, {text}"]
+    assert problems_of(path, library) == [f"{path}:9: uses the library Block 1.0, {text}"]
 
 
 def test_the_standard_library_is_missed_without_an_annotation(tmp_path):

@@ -111,10 +111,11 @@ TABLE = """package Tables
       input String fileName;
       input Real table[:, :];
       input Integer columns[:];
-      input Integer factor;
+      input Integer smoothness;
+      input Integer extrapolation;
       input String label;
       output Table result;
-    external "C" result = ModelicaStandardTables_CombiTable1D_init3(label, table, size(table, 1), columns, factor)
+    external "C" result = ModelicaStandardTables_CombiTable1D_init3(label, table, size(table, 1), columns, smoothness)
       annotation(Include="#include \\"tables.h\\"");
     end constructor;
     function destructor
@@ -161,7 +162,7 @@ double ModelicaStandardTables_CombiTable1D_getValue(void *table, int row) { retu
 TABLE_MODEL = """model M
   parameter String name = "curve";
   parameter Real values[2, 2] = {{1, 2}, {3, 4}};
-  parameter Tables.Table table = Tables.Table("NoName", "NoName", values, {2}, 10, name);
+  parameter Tables.Table table = Tables.Table("NoName", "NoName", values, {2}, 10, 2, name);
   parameter Real first = Tables.value(table, 1);
   input Real u;
   output Real y;
@@ -209,7 +210,7 @@ def test_an_external_object_follows_its_parameters_and_is_constructed_again_for_
     ("change", "message"),
     [
         (("signals.h", "missing.h"), r'M.mo:2: mean: the file "missing.h" of its Include annotation is not found'),
-        (("external \"C\" split", "external \"FORTRAN 77\" split"), r"M.mo:7: .*FORTRAN 77"),
+        (('external "C" split', 'external "FORTRAN 77" split'), r"M.mo:7: .*FORTRAN 77"),
         (("mean(u, size(u, 1))", "mean(u, 2 * size(u, 1))"), "M.mo:2: mean: an argument of a C function must be a variable"),
     ],
 )

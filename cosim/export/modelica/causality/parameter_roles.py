@@ -82,4 +82,6 @@ def _transitive_dependencies(name: str, dependencies: dict[str, list[str]]) -> I
 
 def _is_open(parameter: Variable, model: Model) -> bool:
     """Return whether the importer may set a parameter."""
-    return not (parameter.type == "ExternalObject" or parameter.final or parameter.protected or parameter.name in model.structural)
+    return not (
+        parameter.type == "ExternalObject" or parameter.final or parameter.protected or parameter.name in model.structural
+    )

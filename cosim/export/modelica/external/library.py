@@ -31,7 +31,9 @@ _C_TYPES: dict[str, Any] = {
     "String": ctypes.c_char_p,
     "ExternalObject": ctypes.c_void_p,
 }
-_VISIBLE = '#pragma GCC visibility push(default)\n#include "external.h"\n#include "external_calls.h"\n#pragma GCC visibility pop\n'
+_VISIBLE = (
+    '#pragma GCC visibility push(default)\n#include "external.h"\n#include "external_calls.h"\n#pragma GCC visibility pop\n'
+)
 _owners = count(1)
 
 
@@ -79,7 +81,9 @@ class ExternalLibrary:
         results = [(ctypes.c_uint64 if signature.is_constructor else _C_TYPES[signature.result])()] if signature.result else []
         arguments = [*self._arguments(signature, passed), *map(ctypes.byref, results)]
         if not getattr(self._library, signature.name)(*arguments):
-            text = self._library.external_reason(f"the external function {function.name} has failed".encode()).decode(errors="replace")
+            text = self._library.external_reason(f"the external function {function.name} has failed".encode()).decode(
+                errors="replace"
+            )
             raise EvaluationError(text, function.where)
         outputs = {k: _value(passed[k]) for k, argument in enumerate(signature.arguments) if argument.is_output}
         for result in results:

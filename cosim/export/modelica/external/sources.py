@@ -60,7 +60,9 @@ def _add_files(function: Function, packages: Mapping[str, Path], files: dict[str
         if path is None:
             if name in required:
                 places = ", ".join(map(str, folders)) or "no folder"
-                raise_model_error(f'{function.name}: the file "{name}" of its Include annotation is not found in {places}', function.where)
+                raise_model_error(
+                    f'{function.name}: the file "{name}" of its Include annotation is not found in {places}', function.where
+                )
             continue
         for source in (path, *_implementations(path)):
             text = source.read_text(encoding="utf-8", errors="replace")
@@ -84,4 +86,7 @@ def _include_folders(function: Function, packages: Mapping[str, Path]) -> Sequen
         if uri and uri[1] not in packages:
             raise_model_error(f'{function.name}: unknown package in "{given}"', function.where)
         return [packages[uri[1]] / uri[2] if uri else folder / given]
-    return [folder, *(parent / name for parent in (folder, *folder.parents) for name in _DEFAULT_FOLDERS if (parent / name).is_dir())]
+    return [
+        folder,
+        *(parent / name for parent in (folder, *folder.parents) for name in _DEFAULT_FOLDERS if (parent / name).is_dir()),
+    ]

@@ -133,7 +133,9 @@ def find_libraries(files: Sequence[Path], folders: Sequence[Path], known: Collec
         if name in known or (name in found and found[name].replaces(version)):
             continue
         if name in found:
-            raise InputError(Problem(f"uses the library {name} {version}, but another file uses {found[name]}", str(user)))
+            raise InputError(
+                Problem(f"uses the library {name} {version}, but another file uses {found[name]}", _place(user, name))
+            )
         found[name] = _choose(name, version, available, user)
         queue += [(used, needed, found[name].package_file) for used, needed in found[name].uses.items()]
     return list(found.values())
@@ -154,10 +156,17 @@ def _choose(name: str, version: str, available: Sequence[Library], user: Path) -
     wanted = f"{name} {version}".strip()
     if candidates:
         found = join_alternatives([f'{library} in "{library.path}"' for library in candidates])
-        raise InputError(Problem(f"uses the library {wanted}, found {found}", str(user)))
+        raise InputError(Problem(f"uses the library {wanted}, found {found}", _place(user, name)))
     hint = did_you_mean(name, {library.name for library in available})
     text = f"uses the library {wanted}, which is not found; add its folder to {_PATH_VARIABLE} or pass --library{hint}"
-    raise InputError(Problem(text, str(user)))
+    raise InputError(Problem(text, _place(user, name)))
+
+
+def _place(user: Path, library: str) -> str:
+    """Return the place of the first line of a file with the name of a library."""
+    lines = user.read_text(encoding="utf-8", errors="replace").splitlines()
+    number = next((k for k, line in enumerate(lines, 1) if re.search(rf"\b{library}\b", line)), 1)
+    return f"{user}:{number}"
 
 
 def _is_library(entry: Path) -> bool:

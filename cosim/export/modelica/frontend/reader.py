@@ -25,7 +25,7 @@ class ModelReader(StatementReader):
         Raises:
             InputError: The model contains an element that is not supported.
         """
-        self._check_document()
+        self._check_document(self.sources.locate_class(name))
         names = self.json["variables"]
         return flat_model.Model(
             name=name,
@@ -48,15 +48,15 @@ class ModelReader(StatementReader):
             ),
         )
 
-    def _check_document(self) -> None:
+    def _check_document(self, where: SourceLocation) -> None:
         if self.json["is_partial"]:
-            raise_model_error("the model is partial", None)
+            raise_model_error("the model is partial", where)
         for kind in ("initial_assert_equations", "definite_roots", "branches", "optional_edges", "potential_roots"):
             if self.json.get(kind):
-                raise_model_error(f"{kind.replace('_', ' ')} are not supported", None)
+                raise_model_error(f"{kind.replace('_', ' ')} are not supported", where)
 
         if next(unroll_equations(self.json, "initial_structured_equations"), None):
-            raise_model_error("a for-equation among the initial equations was not unrolled by the front end", None)
+            raise_model_error("a for-equation among the initial equations was not unrolled by the front end", where)
 
     def _resolve_name(self, candidates: list[str]) -> str:
         """Return the first of the candidate names (innermost scope first) that is a variable."""

@@ -27,7 +27,11 @@ RUMOCA_VERSION = "0.10.2"
 MAX_SOURCE_SIZE = 1 << 24
 
 _WITHIN = re.compile(r"^\s*within\s+([\w.]+)\s*;", re.MULTILINE)
-_QUOTED = re.compile(r"'([\w.]+)'")
+_QUOTED = re.compile(r"['`]([\w.]+)['`]")
+_CLASS = r"^[^/\n]*\b(?:model|block|class|function|package|record|connector|type)\s+{}\b"
+_PHASE = re.compile(r"^\w+ failed: \S+ failed in \w+: |^parse error: ")
+_COUNTS = re.compile(r"; unknowns\[.*$")
+_NOT_FOUND = " could not be compiled because resolve/parse failed"
 _LOCATION_SUFFIX = re.compile(r"\[(?P<file>[^\[\]]+):(?P<line>\d+):\d+\]$")
 _PANIC = re.compile(
     r'detail: "(?P<what>[^"]+)", span: Span \{ source: SourceId\((?P<source>\d+)\), start: BytePos\((?P<start>\d+)\)'
@@ -61,12 +65,23 @@ class ModelicaSources:
     @property
     def packages(self) -> dict[str, Path]:
         """Folders of the top-level packages by their names."""
-        tops = (file.parent for file in self.files if file.name == "package.mo" and not (file.parent.parent / "package.mo").is_file())
-        return {folder.name: folder for folder in tops} | {library.name: library.package_file.parent for library in self.libraries}
+        tops = (
+            file.parent for file in self.files if file.name == "package.mo" and not (file.parent.parent / "package.mo").is_file()
+        )
+        return {folder.name: folder for folder in tops} | {
+            library.name: library.package_file.parent for library in self.libraries
+        }
 
     def find(self, name: str) -> Path | None:
         """Return the file with the name that the front end uses in messages, or None."""
         return self._by_hash.get(_fnv1a(name))
+
+    def locate_class(self, name: str) -> SourceLocation:
+        """Return the line with the declaration of a class in the file of the model, or the first line of this file."""
+        path = self.files[0]
+        text = path.read_text(encoding="utf-8")
+        declaration = re.search(_CLASS.format(re.escape(name.rpartition(".")[2])), text, re.MULTILINE)
+        return SourceLocation(path, text.count("\n", 0, declaration.end()) + 1 if declaration else 1)
 
     def locate(self, span: Mapping[str, int] | None) -> SourceLocation | None:
         """Return the line at which a span starts, or None for a span that is not in these files."""
@@ -178,31 +193,38 @@ def _to_problems(error: str, panicked: bool, name: str, path: Path, sources: Mod
     if panic := _PANIC.search(error):
         return [Problem(panic["what"], str(sources.locate({key: int(panic[key]) for key in ("source", "start")}) or path))]
     lines = [line.rpartition("[Resolve]:")[2].strip(" -") for line in error.splitlines()]
-    reasons = [line for line in dict.fromkeys(lines) if line and not line.startswith("Related failures")]
+    reasons = [_shorten(line) for line in dict.fromkeys(lines) if line and not line.startswith("Related failures")]
+    if any(line.startswith("unresolved extends base class") for line in reasons):
+        reasons = [line for line in reasons if not line.startswith("base class not found")]
+    if [line for line in reasons if not line.endswith(_NOT_FOUND)] == []:
+        reasons = [f"the file contains no model with the name {name}"]
     specific = [line for line in reasons if " could not be compiled: " not in line] or reasons
     if not specific or panicked:
         specific = [f"the Modelica front end failed on the model {name}: {' '.join(lines)}"]
-    return [_locate_problem(reason, path, sources) for reason in specific]
+    return [_locate_problem(reason, name, path, sources) for reason in specific]
 
 
-def _locate_problem(reason: str, path: Path, sources: ModelicaSources) -> Problem:
-    """Add a location to a reason: the one at its end or, if it has none, the first line with the name that it quotes."""
+def _shorten(reason: str) -> str:
+    """Return a reason without the phase of the front end and without counts of its internal kinds of equations."""
+    return _COUNTS.sub("", _PHASE.sub("", reason))
+
+
+def _locate_problem(reason: str, name: str, path: Path, sources: ModelicaSources) -> Problem:
+    """Add a location to a reason: the one at its end, else the first line with a name that it quotes, else that of the model."""
     if ending := _LOCATION_SUFFIX.search(reason):
         where = SourceLocation(sources.find(ending["file"]) or path, int(ending["line"]))
         return Problem(reason[: ending.start()].rstrip(), str(where))
-    return Problem(reason, str(_find_quoted_name(reason, sources) or path))
+    return Problem(reason, str(_find_quoted_name(reason, sources) or sources.locate_class(name)))
 
 
 def _find_quoted_name(reason: str, sources: ModelicaSources) -> SourceLocation | None:
     """Return the first source line with the name that a message quotes."""
-    quoted = _QUOTED.search(reason)
-    if quoted is None:
-        return None
-    word = re.compile(rf"(?<![\w.]){re.escape(quoted[1])}(?![\w])")
-    for file in sources.files:
-        for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), 1):
-            if word.search(line):
-                return SourceLocation(file, number)
+    for quoted in _QUOTED.findall(reason):
+        word = re.compile(rf"(?<![\w.]){re.escape(quoted)}(?![\w])")
+        for file in sources.files:
+            for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), 1):
+                if word.search(line):
+                    return SourceLocation(file, number)
     return None
 
 

@@ -37,7 +37,9 @@ def fold_strings(model: Model) -> Model:
     variables = {name: v for name, v in model.variables.items() if v.type != "String" or v.variability not in fixed}
     return replace(
         model,
-        variables={name: replace(v, binding=rewrite(v.binding, fold), start=rewrite(v.start, fold)) for name, v in variables.items()},
+        variables={
+            name: replace(v, binding=rewrite(v.binding, fold), start=rewrite(v.start, fold)) for name, v in variables.items()
+        },
         equations=rewrite(model.equations, fold),
         algorithms=rewrite(model.algorithms, fold),
         whens=rewrite(model.whens, fold),

@@ -34,7 +34,9 @@ def raise_model_error(message: str, where: SourceLocation | None) -> NoReturn:
 
 
 Expression: TypeAlias = "Literal | Name | Index | Unary | Binary | If | Array | Comprehension | Range | Builtin | Call"
-Statement: TypeAlias = "Assign | MultiAssign | IfStatement | For | While | Assert | When | Reinit | EdgeDetector | Solve | ExternalCall"
+Statement: TypeAlias = (
+    "Assign | MultiAssign | IfStatement | For | While | Assert | When | Reinit | EdgeDetector | Solve | ExternalCall"
+)
 Body: TypeAlias = "tuple[Statement, ...]"
 
 
