@@ -15,7 +15,7 @@ from .c_values import C_TYPES, CValue, c_identifier, variable_value
 def struct_members(model: Model) -> dict[str, str]:
     """Return the struct member of each variable: its name as a unique C identifier."""
     members: dict[str, str] = {}
-    used = {"clock", "held", "failure", "past", "step", "no_state"}
+    used = {"clock", "held", "failure", "past", "step", "no_state", "changed"}
     for name in model.variables:
         member = c_identifier(name)
         while member in used:
@@ -121,6 +121,7 @@ class HeaderWriter:
         yield from [f"bool held[{self.schedule.edge_detector_count}];"] * bool(self.schedule.edge_detector_count)
         if self.model.hybrid:
             yield from [f"Past past[{len(self.model.hybrid.delays)}];"] * bool(self.model.hybrid.delays)
+            yield "bool changed; /* a parameter was set after the last event */"
             yield from ["double step; /* next integration step (s) */"] * is_integrated(self.model)
             yield from ["double no_state[2];"] * (is_integrated(self.model) and not self.model.states)
         yield "int32_t failure;"

@@ -121,7 +121,7 @@ class ModelCode:
         for name in self.roles.dependent:
             binding = self.model.variables[name].binding
             lowering.store(lowering.scope[name], binding if binding is not None else start_value(self.model, name), Name(name))
-        return lowering.lines or ["(void)m;"]
+        return [*lowering.lines, *["m->changed = true;"] * bool(self.model.hybrid)] or ["(void)m;"]
 
     # events
 

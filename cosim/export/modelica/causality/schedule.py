@@ -30,7 +30,16 @@ from ..model.syntax_tree import (
     When,
     referenced_variable,
 )
-from ..model.traversal import assigned_references, pre_references, read_references, rewrite, rewrite_outermost, walk
+from ..model.traversal import (
+    assigned_references,
+    has_builtin,
+    pre_references,
+    read_references,
+    rewrite,
+    rewrite_outermost,
+    variable_names,
+    walk,
+)
 from .continuous_equations import solve_equations, solve_initial_equations
 from .hybrid import delay_number
 from .matching import ScalarKey, scalar_keys
@@ -54,7 +63,7 @@ class Schedule:
     event: Body
     #: statements that compute the derivatives of the continuous states between events
     derivatives: Body
-    #: statements that compute the other operands of relations between events, after the derivatives
+    #: statements that compute the operands of relations between events
     indicators: Body
 
 
@@ -154,7 +163,7 @@ def _as_assignment(node: Any) -> Any:
 
 
 def _between_events(model: Model, continuous: Iterable[Assign | Solve], held: set[ScalarKey]) -> tuple[Body, Body]:
-    """Return the statements for the derivatives of the states, and those for the other operands of relations."""
+    """Return the statements for the derivatives of the states, and those for the operands of relations."""
     statements = [s for s in continuous if not (model.hybrid and _is_discrete(model, s))]
     nodes = [_make_node(model, (_without_ticks(statement),)) for statement in statements]
     nodes += [node for body in model.algorithms for node in _algorithm_nodes(model, body, lambda _: ())]
@@ -170,9 +179,19 @@ def _between_events(model: Model, continuous: Iterable[Assign | Solve], held: se
         for reference in read_references(tuple(relation.condition for relation in model.hybrid.relations))
         for key in scalar_keys(model.variables, reference)
     }
-    derivatives = required_nodes(order, required)
-    others = [node for node in required_nodes(order, required | operands) if node not in derivatives]
-    return merge_statements(derivatives), merge_statements(others)
+    order = _varying(model, order)
+    return merge_statements(required_nodes(order, required)), merge_statements(required_nodes(order, operands))
+
+
+def _varying(model: Model, order: Iterable[Node]) -> list[Node]:
+    """Return the sorted nodes whose values change between events, because they depend on states or on the time."""
+    changing = {key for name in model.states for key in scalar_keys(model.variables, Name(name))}
+    nodes = []
+    for node in order:
+        if node.reads & changing or "time" in variable_names(node.statements) or has_builtin(node.statements, "past"):
+            changing |= node.writes
+            nodes.append(node)
+    return nodes
 
 
 def _without_ticks(statement: Statement) -> Statement:
