@@ -24,8 +24,9 @@ def generate_c(defaults: Interpreter, sources: Sequence[str]) -> dict[str, str]:
     Raises:
         InputError: The model uses a feature that is not supported.
     """
-    header = HeaderWriter(defaults.model, defaults.schedule, defaults.parameter_roles, sources).text()
     code = (HybridCode if defaults.model.hybrid else ModelCode)(defaults)
     folder = resources.files(__package__ or "")
     texts = {name: folder.joinpath(name).read_text(encoding="utf-8") for name in ("runtime.h", *code.headers())}
-    return {"model.c": code.model_c(), "model.h": header, **texts}
+    model_c = code.model_c()
+    header = HeaderWriter(defaults.model, defaults.schedule, defaults.parameter_roles, sources, len(code.functions.warnings))
+    return {"model.c": model_c, "model.h": header.text(), **texts}

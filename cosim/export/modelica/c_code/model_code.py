@@ -18,7 +18,7 @@ from ..model.traversal import assigned_references, walk
 from .c_values import C_TYPES, CExpression, CValue, c_literal, scalar_value
 from .formatting import function_definition, uses_variable
 from .functions import FunctionTranslator
-from .header import struct_member, struct_members
+from .header import has_messages, struct_member, struct_members
 from .model_step import continuous_step_body, sampled_step_body
 from .statements import StatementLowering
 
@@ -44,17 +44,27 @@ class ModelCode:
         self.members = struct_members(self.model)
         self.functions = FunctionTranslator(dict(self.model.functions), self._failure_code)
 
+    @property
+    def has_messages(self) -> bool:
+        """Whether messages are composed at run time."""
+        return has_messages(self.model)
+
     def model_c(self) -> str:
         """Return the text of model.c."""
         includes = "\n".join(f'#include "{name}"' for name in ("model.h", *(self.headers() or ["runtime.h"])))
         definitions = self.definitions()
-        return "\n\n".join([includes, self._reasons(), *self.functions.definitions, *definitions]) + "\n"
+        text = "\n\n".join([includes, self._reasons(), *self.functions.definitions, *definitions]) + "\n"
+        if not self.has_messages:
+            return text
+        return text.replace(
+            "return REASONS[m->failure];", "return m->failure == COMPOSED_REASON ? m->reason : REASONS[m->failure];"
+        )
 
     def headers(self) -> list[str]:
         """Return the names of the C headers that model.c includes besides model.h and runtime.h."""
         bodies = (self.schedule.initialization, self.schedule.event, self.schedule.derivatives, self.schedule.indicators)
         solved = any(isinstance(item, Solve) for item in walk(bodies))
-        return [*["newton.h"] * solved, *["runge_kutta.h"] * bool(self.model.states)]
+        return [*["messages.h"] * self.has_messages, *["newton.h"] * solved, *["runge_kutta.h"] * bool(self.model.states)]
 
     def definitions(self) -> list[str]:
         """Generate the functions of model.c."""
