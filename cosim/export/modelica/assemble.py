@@ -24,10 +24,12 @@ from .causality.hybrid import prepare_hybrid
 from .causality.hybrid_interpreter import HybridInterpreter
 from .causality.interpreter import Interpreter
 from .causality.matching import is_input
+from .external.library import callable_functions
 from .frontend.constants import fold_constants
 from .frontend.folded_branches import folded_parameters
 from .frontend.reader import ModelReader
 from .frontend.rumoca_frontend import ModelicaSources, flatten_model
+from .frontend.strings import fold_strings, string_parameters
 from .model.arithmetic import EvaluationError
 from .model.flat_model import Model, Variable
 from .model.syntax_tree import raise_model_error
@@ -66,7 +68,7 @@ def _load_block(path: Path, model: str | None, library_path: Sequence[Path]) -> 
         description=defaults.model.description,
         variables=_block_variables(defaults),
         step_size=min((float(defaults.evaluate(clock.period)) for clock in defaults.schedule.clocks), default=_DEFAULT_STEP_SIZE),
-        files=generate_c(defaults, sorted(names)),
+        files=generate_c(defaults, sorted(names), sources.packages),
         resources=names,
     )
 
@@ -103,10 +105,15 @@ def _flatten(path: Path, model: str | None, library_path: Sequence[Path]) -> tup
 def analyse(json: Mapping[str, Any], sources: ModelicaSources, name: str) -> Interpreter:
     """Convert the document of the front end to an interpreter of the model."""
     flat = ModelReader(json, sources).read_model(name)
-    structural = flat.structural | folded_parameters(json, sources)
-    flat = replace(flat, structural=structural, uses_library=bool(sources.libraries))
+    structural = flat.structural | folded_parameters(json, sources) | string_parameters(flat)
+    flat = replace(
+        flat,
+        structural=structural,
+        functions=callable_functions(flat.functions, sources.packages),
+        uses_library=bool(sources.libraries),
+    )
     flat = _without_unused_connectors(flat)
-    flat = prepare_hybrid(reduce_states(introduce_derivatives(fold_constants(flat))))
+    flat = prepare_hybrid(reduce_states(introduce_derivatives(fold_strings(fold_constants(flat)))))
     _check_types(flat)
     try:
         return HybridInterpreter(flat) if flat.hybrid else Interpreter(flat)
@@ -136,6 +143,8 @@ def _check_types(model: Model) -> None:
         size += prod(variable.shape)
         if size > MAX_MODEL_SIZE:
             raise_model_error(f"{variable.name}: the model has more than {MAX_MODEL_SIZE} values", variable.where)
+        if variable.type == "ExternalObject" and variable.variability == "parameter" and not variable.shape:
+            continue
         if variable.type not in _FMI_TYPES:
             raise_model_error(f"{variable.name}: variables of type {variable.type} are not supported", variable.where)
 
@@ -159,6 +168,8 @@ def _fmi_role(variable: Variable, defaults: Interpreter) -> FmiRole | None:
     variables too.
     """
     roles = defaults.parameter_roles
+    if variable.type == "ExternalObject":
+        return None
     if variable.name in roles.settable:
         return "parameter", "fixed" if variable.name in roles.clock_parameters else "tunable"
     if variable.name in defaults.model.structural and not variable.protected:

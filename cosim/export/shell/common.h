@@ -162,6 +162,9 @@ static Instance *create(const char *function, const char *name, const char *toke
 static void destroy(Instance *instance)
 {
     if (instance == NULL) return;
+#ifdef MODEL_FREE
+    model_free(&instance->state.model);
+#endif
     free(instance->name);
     free(instance);
 }

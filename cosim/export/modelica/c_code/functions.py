@@ -63,10 +63,16 @@ class FunctionTranslator:
             self._in_translation.pop()
         return self._instances[key]
 
+    @property
+    def external_functions(self) -> list[Function]:
+        """External functions that are called."""
+        names = dict.fromkeys(name for name, _, _ in self._instances)
+        return [self.functions[name] for name in names if self.functions[name].external]
+
     def _translate(self, function: Function, shapes: Shapes, where: SourceLocation | None) -> FunctionInstance:
         if len(shapes) != len(function.inputs):
             raise_model_error(f"{function.name}: found {len(shapes)} arguments, expected {len(function.inputs)}", where)
-        lowering = StatementLowering(self, {})
+        lowering = StatementLowering(self, {}, function=function.name)
         inputs = [self._declare(lowering, local, shape, where) for local, shape in zip(function.inputs, shapes, strict=True)]
         outputs = [self._declare(lowering, local, None, where) for local in function.outputs]
         local_values = [self._declare(lowering, local, None, where) for local in function.locals]
@@ -183,4 +189,5 @@ def _zero_fill(value: CValue) -> str:
 
 
 def _declaration(value: CValue) -> str:
-    return f"{C_TYPES[value.type]} {_c_name(value)}{f'[{max(value.size, 1)}] = {{0}}' if value.shape else ' = 0'};"
+    start = ' = ""' if value.type == "String" else " = 0"
+    return f"{C_TYPES[value.type]} {_c_name(value)}{f'[{max(value.size, 1)}] = {{0}}' if value.shape else start};"

@@ -11,6 +11,7 @@ from typing import Any, Protocol
 from ..model import syntax_tree
 from ..model.arithmetic import EvaluationError
 from ..model.evaluate import Evaluator
+from ..model.flat_model import Function
 from ..model.syntax_tree import Expression, SourceLocation, raise_model_error
 from ..model.traversal import walk
 from .c_values import C_TYPES, CExpression, CValue, scalar_value, variable_value
@@ -34,6 +35,8 @@ class FunctionInstance:
 
 class TranslationUnit(Protocol):
     """The C file that contains the lowered code: its failure reasons and functions."""
+
+    functions: dict[str, Function]
 
     def failure_code(self, reason: str, where: SourceLocation | None) -> str:
         """Return the number of a failure reason."""

@@ -31,6 +31,21 @@ _STANDARD_REASONS = (
 _HYBRID_REASONS = (*_STANDARD_REASONS, "the integration step has become too small")
 
 
+#: function that returns an external object, which is constructed again if a state of another instance was restored
+_OBJECTS = """static void *object(Model *m, uint64_t identifier)
+{
+    static _Thread_local bool constructing;
+    void *found = external_object(m, identifier);
+    if (found != NULL || constructing) return found;
+    constructing = true;
+    model_parameters(m);
+    constructing = false;
+    return external_object(m, identifier);
+}
+
+void model_free(Model *m) { external_delete(m); }"""
+
+
 @dataclass
 class ModelCode:
     """Code generator of model.c; collects the failure reasons and the functions of the model while it generates code."""
@@ -53,12 +68,13 @@ class ModelCode:
         """Return the text of model.c."""
         includes = "\n".join(f'#include "{name}"' for name in ("model.h", *(self.headers() or ["runtime.h"])))
         definitions = self.definitions()
-        text = "\n\n".join([includes, self._reasons(), *self.functions.definitions, *definitions]) + "\n"
-        if not self.has_messages:
-            return text
-        return text.replace(
-            "return REASONS[m->failure];", "return m->failure == COMPOSED_REASON ? m->reason : REASONS[m->failure];"
-        )
+        objects = [_OBJECTS] * self._has_objects
+        text = "\n\n".join([includes, self._reasons(), *objects, *self.functions.definitions, *definitions]) + "\n"
+        reason = "m->failure == COMPOSED_REASON ? m->reason : REASONS[m->failure]" if self.has_messages else "REASONS[m->failure]"
+        if not self.functions.external_functions:
+            return text.replace("return REASONS[m->failure];", f"return {reason};")
+        text = text.replace("return REASONS[m->failure];", f"return external_reason({reason});")
+        return f'#include "external_calls.h"\n{text}'
 
     def headers(self) -> list[str]:
         """Return the names of the C headers that model.c includes besides model.h and runtime.h."""
@@ -111,7 +127,7 @@ class ModelCode:
     # start values and parameters
 
     def _model_start(self) -> list[str]:
-        lines = ["memset(m, 0, sizeof *m);"]
+        lines = [*["external_delete(m);"] * self._has_objects, "memset(m, 0, sizeof *m);"]
         constants = [self.model.variables[name] for name in (*self.roles.settable, *self.roles.fixed)]
         for variable in [*constants, *filter(is_input, self.model.variables.values())]:
             lines += _assign_constant(
@@ -131,7 +147,13 @@ class ModelCode:
         for name in self.roles.dependent:
             binding = self.model.variables[name].binding
             lowering.store(lowering.scope[name], binding if binding is not None else start_value(self.model, name), Name(name))
-        return [*lowering.lines, *["m->changed = true;"] * bool(self.model.hybrid)] or ["(void)m;"]
+        begin = ["external_begin();"] * self._has_objects
+        changed = ["m->changed = true;"] * bool(self.model.hybrid)
+        return [*begin, *lowering.lines, *changed] or ["(void)m;"]
+
+    @property
+    def _has_objects(self) -> bool:
+        return any(v.type == "ExternalObject" for v in self.model.variables.values())
 
     # events
 

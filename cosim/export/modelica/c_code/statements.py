@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass, replace
 
+from ..external.calls import call_signature
 from ..model import syntax_tree
 from ..model.syntax_tree import Body, Expression, Statement, raise_model_error
 from ..model.traversal import assigned_references, composed_asserts, read_references, variable_names
@@ -20,6 +21,8 @@ class StatementLowering(ExpressionLowering):
 
     #: true for the initialization, false for an event
     initial: bool = False
+    #: name of the function whose body is lowered, or ""
+    function: str = ""
 
     def body(self, body: Body) -> None:
         """Lower several statements."""
@@ -45,6 +48,8 @@ class StatementLowering(ExpressionLowering):
             value: The expression.
             reference: The assigned variable as an expression. It determines whether `value` depends on the target.
         """
+        while isinstance(value, syntax_tree.If) and (known := self.known_branch(value)) is not None:
+            value = known
         if isinstance(value, syntax_tree.If) and (target.shape or self._needs_if_statement(target, value)):
             self._lower_choice(target, value, reference)
         elif (
@@ -194,6 +199,23 @@ class StatementLowering(ExpressionLowering):
                 self.lines.append(f"jacobian[{k}] = {self.scalar_of(derivative).code};")
             self.lines.append(f"if (newton(m, {n}, (double *[]){{{unknowns}}}, residual, jacobian, iteration, {failure})) break;")
         self.lines += ["for (int iteration = 0;; iteration++) {", *lines, "}"]
+
+    def _externalcall(self, node: syntax_tree.ExternalCall) -> None:
+        """Lower the body of an external function."""
+        function = self.translation_unit.functions[self.function]
+        signature, outputs = call_signature(function), {output.name for output in function.outputs}
+        arguments = ["m"] * signature.is_constructor
+        for expression, argument in zip(node.arguments, signature.arguments, strict=True):
+            value = self.lower(expression)
+            if argument.is_array:
+                arguments += [self.as_c_array(value, argument.type), *[str(value.size)] * signature.is_constructor]
+            elif isinstance(expression, syntax_tree.Name) and expression.name in outputs:
+                arguments.append(f"&{value.text.code}")
+            else:
+                arguments.append(f"object(m, {value.text.code})" if argument.type == "ExternalObject" else value.text.code)
+        arguments += [f"&{self.lower(node.result).text.code}"] if node.result else []
+        failure = self.translation_unit.failure_code(f"the external function {function.name} has failed", node.where)
+        self.lines.append(f"if (!{signature.name}({', '.join(arguments)})) fail(m, {failure});")
 
     def _while(self, node: syntax_tree.While) -> None:
         with self.collect_lines() as lines:

@@ -41,7 +41,8 @@ def classify_parameters(model: Model, schedule: Schedule) -> ParameterRoles:
     _check_dependencies(model, dependencies)
     settable = [v.name for v in parameters if v.variability == "parameter" and not dependencies[v.name] and _is_open(v, model)]
     try:
-        dependent = [name for name in TopologicalSorter(dependencies).static_order() if dependencies[name]]
+        order = TopologicalSorter(dependencies).static_order()
+        dependent = [name for name in order if dependencies[name] or model.variables[name].type == "ExternalObject"]
     except CycleError as error:
         raise_model_error(
             f"these parameters depend on each other: {', '.join(error.args[1])}", model.variables[error.args[1][0]].where
@@ -54,7 +55,7 @@ def classify_parameters(model: Model, schedule: Schedule) -> ParameterRoles:
     }
     return ParameterRoles(
         settable,
-        [v.name for v in parameters if not dependencies[v.name] and v.name not in settable],
+        [v.name for v in parameters if v.name not in settable and v.name not in dependent],
         dependent,
         [name for name in settable if name in used_by_clocks],
     )
@@ -81,4 +82,6 @@ def _transitive_dependencies(name: str, dependencies: dict[str, list[str]]) -> I
 
 def _is_open(parameter: Variable, model: Model) -> bool:
     """Return whether the importer may set a parameter."""
-    return not (parameter.final or parameter.protected or parameter.name in model.structural)
+    return not (
+        parameter.type == "ExternalObject" or parameter.final or parameter.protected or parameter.name in model.structural
+    )

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from itertools import product
 from typing import Any
@@ -13,7 +13,7 @@ import numpy as np
 from ..model import syntax_tree
 from ..model.arithmetic import EvaluationError
 from ..model.evaluate import Evaluator, convert_to_type
-from ..model.flat_model import Equation, Model
+from ..model.flat_model import Equation, Function, Model
 from ..model.syntax_tree import Binary, Builtin, Call, Colon, Expression, Index, Literal, Name, raise_model_error
 from ..model.traversal import variable_names
 
@@ -31,7 +31,7 @@ class EquationSplitter:
             v.name: convert_to_type(1, v.type, v.shape) for v in model.variables.values() if v.type != "String"
         }
         flags: defaultdict[tuple[str, int], bool] = defaultdict(bool)
-        self._evaluate = Evaluator(model.functions, {**values, "time": 0.0}, dict(values), flags)
+        self._evaluate = Evaluator(_uncalled(model.functions), {**values, "time": 0.0}, dict(values), flags)
 
     def split(self, equation: Equation) -> Iterator[Equation]:
         """Yield one equation for each element; an equation between arrays without elements yields none."""
@@ -142,3 +142,8 @@ def _total(terms: Sequence[Expression]) -> Expression:
     for term in terms[1:]:
         result = Binary("+", result, term)
     return result
+
+
+def _uncalled(functions: Mapping[str, Function]) -> dict[str, Function]:
+    """Return the functions with external ones that leave their outputs zero, since only the sizes matter."""
+    return {name: replace(f, external=replace(f.external, library=None)) if f.external else f for name, f in functions.items()}

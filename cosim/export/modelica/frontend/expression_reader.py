@@ -5,6 +5,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from ..model import syntax_tree
@@ -23,6 +24,11 @@ _UNSUPPORTED_BUILTINS = {
 }
 _INTEGER_OPERATORS = {"+": operator.add, "-": operator.sub, "*": operator.mul}
 _MODELICA_SPELLING = {"noevent": "noEvent", "outerproduct": "outerProduct"}
+
+
+def is_object_constructor(function: Json) -> bool:
+    """Return whether a function constructs an external object; it has the name of the object's class."""
+    return any(output["type_class"] == "Class" for output in function["outputs"])
 
 
 def split_tagged(node: Json) -> tuple[str, Any]:
@@ -55,7 +61,14 @@ class ExpressionReader:
 
     def _type(self, canonical: int) -> str:
         predefined: dict[int, str] = {number: name.capitalize() for name, number in self.json["predefined_types"].items()}
-        return predefined.get(canonical, "Enumeration")
+        return predefined.get(canonical) or ("ExternalObject" if canonical in self._object_types else "Enumeration")
+
+    @cached_property
+    def _object_types(self) -> set[int]:
+        """Numbers of the types of external objects."""
+        functions = self.json["functions"].values()
+        locals_ = (local for f in functions for kind in ("inputs", "outputs", "locals") for local in f[kind])
+        return {local["effective_type"]["canonical_type"] for local in locals_ if local["type_class"] == "Class"}
 
     def _optional(self, node: Json | None) -> Expression | None:
         return None if node is None else self.read_expression(node)
@@ -136,14 +149,18 @@ class ExpressionReader:
         """Convert an array constructor, or a concatenation `[a, b; c, d]`, whose elements may be arrays."""
         elements = tuple(map(self.read_expression, node["elements"]))
         kind = node.get("kind")
-        if kind not in ("Horizontal", "Vertical") or self._is_matrix_of_scalars(elements, kind):
+        if kind not in ("Horizontal", "Vertical"):
             return syntax_tree.Array(elements)
+        if kind == "Vertical" and (rows := self._scalar_rows(elements)):
+            return syntax_tree.Array(rows)
         return syntax_tree.Builtin("rows" if kind == "Vertical" else "columns", elements, self.locate(node))
 
-    def _is_matrix_of_scalars(self, elements: tuple[Expression, ...], kind: str) -> bool:
-        if kind == "Vertical":
-            return all(isinstance(element, syntax_tree.Array) for element in elements)
-        return all(self._is_scalar(element) for element in elements)
+    def _scalar_rows(self, rows: tuple[Expression, ...]) -> tuple[syntax_tree.Array, ...]:
+        """Return the rows of a matrix as arrays if all their elements are certainly scalars, else no rows."""
+        columns = [row.arguments for row in rows if isinstance(row, syntax_tree.Builtin) and row.name == "columns"]
+        if len(columns) != len(rows) or not all(self._is_scalar(element) for row in columns for element in row):
+            return ()
+        return tuple(map(syntax_tree.Array, columns))
 
     def _is_scalar(self, node: Expression) -> bool:
         """Return whether an expression is certainly a scalar."""
@@ -187,6 +204,6 @@ class ExpressionReader:
         """
         name = reference["name"]
         function = self.json["functions"].get(name) or raise_model_error(f"unknown function {name}", where)
-        if reference["component_ref"]["parts"][-1]["def_id"] != function["def_id"]:
+        if not is_object_constructor(function) and reference["component_ref"]["parts"][-1]["def_id"] != function["def_id"]:
             raise_model_error(f'the model uses several functions named "{name}"; give them different names', where)
         return syntax_tree.Call(name, tuple(map(self.read_expression, arguments)), where)

@@ -58,6 +58,16 @@ class ModelicaSources:
             names |= {link + str(file).removeprefix(str(library.path)): file for file in library.files}
         return {_fnv1a(name): file for name, file in names.items()}
 
+    @property
+    def packages(self) -> dict[str, Path]:
+        """Folders of the top-level packages by their names."""
+        tops = (
+            file.parent for file in self.files if file.name == "package.mo" and not (file.parent.parent / "package.mo").is_file()
+        )
+        return {folder.name: folder for folder in tops} | {
+            library.name: library.package_file.parent for library in self.libraries
+        }
+
     def find(self, name: str) -> Path | None:
         """Return the file with the name that the front end uses in messages, or None."""
         return self._by_hash.get(_fnv1a(name))

@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from typing import cast
 
 from ..model import flat_model, syntax_tree
 from ..model.syntax_tree import Body, Expression, SourceLocation, Statement, raise_model_error
-from .expression_reader import ExpressionReader, Json, split_tagged
+from .expression_reader import ExpressionReader, Json, is_object_constructor, split_tagged
+
+_DESTRUCTOR = re.compile(r'\bfunction\s+destructor\b.*?\bexternal\s*(?:"C"\s*)?(\w+)\s*\(', re.DOTALL)
 
 
 class StatementReader(ExpressionReader):
@@ -85,12 +88,39 @@ class StatementReader(ExpressionReader):
         """Convert a function.
 
         Raises:
-            InputError: The function is external or contains an unsupported element.
+            InputError: The function contains an unsupported element.
         """
-        if node["external"]:
-            raise_model_error(f"the external function {node['name']} is not supported", self.locate(node))
         inputs, outputs, local = (tuple(map(self._local, node[kind])) for kind in ("inputs", "outputs", "locals"))
-        return flat_model.Function(node["name"], inputs, outputs, local, self.read_body(node["body"]), self.locate(node))
+        body, external = self.read_body(node["body"]), None
+        if node["external"]:
+            body, external = (self._external_call(node),), self._external_code(node)
+        return flat_model.Function(node["name"], inputs, outputs, local, body, self.locate(node), external)
+
+    def _external_call(self, node: Json) -> syntax_tree.ExternalCall:
+        external, where = node["external"], self.locate(node)
+        if external["language"] not in ("C", "", None):
+            raise_model_error(f"found the language {external['language']} of an external function, expected C", where)
+        name, result = external["function_name"], external["output_name"]
+        arguments = tuple(map(self.read_expression, external["args"]))
+        if not name:  # the call that the language standard defines for a function without one
+            results = node["outputs"] if len(node["outputs"]) == 1 and not node["outputs"][0]["shape_expr"] else []
+            result = results[0]["name"] if results else None
+            passed = [local for local in (*node["inputs"], *node["outputs"]) if local["name"] != result]
+            name, arguments = node["name"].rpartition(".")[2], tuple(a for local in passed for a in _with_sizes(local))
+        return syntax_tree.ExternalCall(name, arguments, syntax_tree.Name(result) if result else None, where)
+
+    def _external_code(self, node: Json) -> flat_model.ExternalCode:
+        values = {item["name"][-1]: self.read_expression(item["value"]) for item in node["external"]["annotations"]}
+        include, directory, libraries = (_texts(values.get(key)) for key in ("Include", "IncludeDirectory", "LibraryDirectory"))
+        library, destructor = _texts(values.get("Library")), self._destructor(node) if is_object_constructor(node) else ""
+        return flat_model.ExternalCode("".join(include), "".join(directory), library, "".join(libraries), destructor)
+
+    def _destructor(self, constructor: Json) -> str:
+        """Return the C function of the destructor of an external object, which the document does not contain."""
+        where = self.locate(constructor)
+        text = where.path.read_bytes()[constructor["span"]["start"] :].decode() if where else ""
+        match = _DESTRUCTOR.search(text)
+        return match[1] if match else ""
 
     def _local(self, node: Json) -> flat_model.FunctionVariable:
         where = self.locate(node)
@@ -112,3 +142,16 @@ def _message_parts(message: Expression) -> list[Expression]:
         joined = syntax_tree.Literal(f"{left[-1].value}{right[0].value}", "String")
         return [*left[:-1], joined, *right[1:]]
     return left + right
+
+
+def _with_sizes(local: Json) -> list[Expression]:
+    """Return the arguments of an external call for a variable: the variable, and the sizes of its dimensions."""
+    name = syntax_tree.Name(local["name"])
+    dimensions = (syntax_tree.Literal(k, "Integer") for k in range(1, len(local["shape_expr"]) + 1))
+    return [name, *(syntax_tree.Builtin("size", (name, dimension)) for dimension in dimensions)]
+
+
+def _texts(value: Expression | None) -> tuple[str, ...]:
+    """Return the String literals of an annotation, which is one literal or an array of them."""
+    items = value.elements if isinstance(value, syntax_tree.Array) else (value,)
+    return tuple(str(item.value) for item in items if isinstance(item, syntax_tree.Literal))

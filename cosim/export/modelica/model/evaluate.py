@@ -38,6 +38,8 @@ def convert_to_type(value: Any, type_name: str, shape: tuple[int, ...]) -> Any:
     """
     if shape:
         return np.array(np.broadcast_to(np.asarray(value, DTYPES[type_name]), shape))
+    if type_name == "String":
+        return str(value or "")
     return float(value) if type_name == "Real" else bool(value) if type_name == "Boolean" else int(value)
 
 
@@ -216,8 +218,23 @@ class Evaluator:
             scope.values[local.name] = convert_to_type(value, local.type, np.shape(value))
         for local in (*function.outputs, *function.locals):
             scope._declare(local)
-        scope.execute(function.body)
+        if function.external:
+            scope.call_external(function)
+        else:
+            scope.execute(function.body)
         return [scope.values[local.name] for local in function.outputs]
+
+    def call_external(self, function: Function) -> None:
+        """Call the C function of an external function, with this scope as the one of the function."""
+        (node,) = function.body
+        assert isinstance(node, syntax_tree.ExternalCall) and function.external
+        if function.external.library is None:
+            return
+        results = function.external.library.call(function, node, [self(argument) for argument in node.arguments])
+        for k, value in results.items():
+            target = node.result if k < 0 else node.arguments[k]
+            assert isinstance(target, syntax_tree.Name)
+            self._store(target, value)
 
     def _declare(self, local: FunctionVariable) -> None:
         shape = tuple(int(self(d)) for d in local.dimensions if d is not None)

@@ -2,16 +2,17 @@
 
 The front end produces it; causality analysis, code generation and the interpreter use it. In a flat model components,
 connections and modifiers are resolved, names are dotted ("pid.kp"), and for-equations are unrolled. Types are "Real",
-"Integer", "Boolean", "Enumeration" (an Integer, counted from 1) and "String".
+"Integer", "Boolean", "Enumeration" (an Integer, counted from 1), "String" and "ExternalObject".
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any, Protocol
 from typing import Literal as OneOf
 
-from .syntax_tree import Assert, Binary, Body, Expression, SourceLocation, When
+from .syntax_tree import Assert, Binary, Body, Expression, ExternalCall, SourceLocation, When
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,6 +64,30 @@ class FunctionVariable:
     where: SourceLocation | None = field(default=None, compare=False)
 
 
+class CallableLibrary(Protocol):
+    """External functions that can be called."""
+
+    def call(self, function: Function, node: ExternalCall, inputs: Sequence[Any]) -> dict[int, Any]:
+        """Return the outputs of a C function by the numbers of the arguments; the result has the number -1."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExternalCode:
+    """Annotations of an external function."""
+
+    #: C code that declares or defines the C function
+    include: str
+    #: folder of the headers, as a URI or a path relative to the file of the function
+    include_directory: str
+    libraries: tuple[str, ...]
+    #: folder of the libraries
+    library_directory: str
+    #: C function that deletes the object which the function constructs, or ""
+    destructor: str = ""
+    #: evaluation of the function in Python
+    library: CallableLibrary | None = field(default=None, compare=False)
+
+
 @dataclass(frozen=True, slots=True)
 class Function:
     """A function of the model."""
@@ -73,6 +98,8 @@ class Function:
     locals: tuple[FunctionVariable, ...]
     body: Body
     where: SourceLocation | None = field(default=None, compare=False)
+    #: annotations of an external function, whose body is one `ExternalCall`
+    external: ExternalCode | None = None
 
 
 @dataclass(frozen=True, slots=True)

@@ -34,7 +34,9 @@ def raise_model_error(message: str, where: SourceLocation | None) -> NoReturn:
 
 
 Expression: TypeAlias = "Literal | Name | Index | Unary | Binary | If | Array | Comprehension | Range | Builtin | Call"
-Statement: TypeAlias = "Assign | MultiAssign | IfStatement | For | While | Assert | When | Reinit | EdgeDetector | Solve"
+Statement: TypeAlias = (
+    "Assign | MultiAssign | IfStatement | For | While | Assert | When | Reinit | EdgeDetector | Solve | ExternalCall"
+)
 Body: TypeAlias = "tuple[Statement, ...]"
 
 
@@ -222,6 +224,17 @@ class Solve:
     #: partial derivatives, one row for each residual
     jacobian: tuple[tuple[Expression, ...], ...]
     linear: bool
+    where: SourceLocation | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class ExternalCall:
+    """The call of a C function, the body of an external function: `result = function(arguments)`."""
+
+    function: str
+    #: names of inputs, of outputs (passed by pointers), or expressions
+    arguments: tuple[Expression, ...]
+    result: Name | None
     where: SourceLocation | None = field(default=None, compare=False)
 
 
