@@ -26,7 +26,7 @@ CASES = {
         "v = {u, u, u};\n  y = sum(v[1:n]);",
         "M.mo:10: the bounds of a range must be",
     ),
-    "text": ('parameter String name = "x";', "y = u;", "M.mo:6: name: variables of type String are not supported"),
+    "text": ("String name;", 'name = "x";\n  y = u;', "M.mo:6: name: variables of type String are not supported"),
     "unknown name": ("", "y = u + speeed;", "M.mo:8: unresolved component reference: 'speeed'"),
     "too few equations": ("Real a;", "y = u;", "unbalanced model"),
 }

@@ -94,9 +94,10 @@ def declarations(functions: Iterable[Function]) -> str:
 def definitions(functions: Iterable[Function]) -> str:
     """Return the text of external_calls.c."""
     functions = list(functions)
-    includes = dict.fromkeys(f.external.include for f in functions if f.external and f.external.include)
+    includes = {f.external.include: f.where for f in reversed(functions) if f.external and f.external.include}
+    lines = [f'#line {where.line} "{where.path.name}"\n{text}' if where else text for text, where in includes.items()]
     texts = [_definition(function) for function in functions]
-    return "\n\n".join(['#include "external_calls.h"', *includes, *texts]) + "\n"
+    return "\n\n".join(['#include "external_calls.h"', *lines, '#line 1 "external_calls.c"', *texts]) + "\n"
 
 
 def _head(signature: CallSignature) -> str:

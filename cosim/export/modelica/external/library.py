@@ -76,20 +76,17 @@ class ExternalLibrary:
         key = (function.name, *(value.tobytes() if isinstance(value, np.ndarray) else value for value in inputs))
         if signature.is_constructor and key in self._objects:
             return {-1: self._objects[key]}
-        passed = [
-            _passed(self._object(value) if a.type == "ExternalObject" else value, a)
-            for value, a in zip(inputs, signature.arguments, strict=True)
-        ]
-        result = ctypes.c_uint64() if signature.is_constructor else _C_TYPES[signature.result]() if signature.result else None
-        if not getattr(self._library, signature.name)(
-            *self._arguments(signature, passed), *([ctypes.byref(result)] * bool(signature.result))
-        ):
+        pairs = zip(inputs, signature.arguments, strict=True)
+        passed = [_passed(self._object(value) if a.type == "ExternalObject" else value, a) for value, a in pairs]
+        results = [(ctypes.c_uint64 if signature.is_constructor else _C_TYPES[signature.result])()] if signature.result else []
+        arguments = [*self._arguments(signature, passed), *map(ctypes.byref, results)]
+        if not getattr(self._library, signature.name)(*arguments):
             text = self._library.external_reason(f"the external function {function.name} has failed".encode()).decode(
                 errors="replace"
             )
             raise EvaluationError(text, function.where)
         outputs = {k: _value(passed[k]) for k, argument in enumerate(signature.arguments) if argument.is_output}
-        if result is not None:
+        for result in results:
             outputs[-1] = result.value.decode(errors="replace") if signature.result == "String" else result.value
         if signature.is_constructor:
             self._objects[key] = outputs[-1]

@@ -102,11 +102,6 @@ class StatementReader(ExpressionReader):
             raise_model_error(f"found the language {external['language']} of an external function, expected C", where)
         name, result = external["function_name"], external["output_name"]
         arguments = tuple(map(self.read_expression, external["args"]))
-        if not name:  # the call that the language standard defines for a function without one
-            results = node["outputs"] if len(node["outputs"]) == 1 and not node["outputs"][0]["shape_expr"] else []
-            result = results[0]["name"] if results else None
-            passed = [local for local in (*node["inputs"], *node["outputs"]) if local["name"] != result]
-            name, arguments = node["name"].rpartition(".")[2], tuple(a for local in passed for a in _with_sizes(local))
         return syntax_tree.ExternalCall(name, arguments, syntax_tree.Name(result) if result else None, where)
 
     def _external_code(self, node: Json) -> flat_model.ExternalCode:
@@ -142,13 +137,6 @@ def _message_parts(message: Expression) -> list[Expression]:
         joined = syntax_tree.Literal(f"{left[-1].value}{right[0].value}", "String")
         return [*left[:-1], joined, *right[1:]]
     return left + right
-
-
-def _with_sizes(local: Json) -> list[Expression]:
-    """Return the arguments of an external call for a variable: the variable, and the sizes of its dimensions."""
-    name = syntax_tree.Name(local["name"])
-    dimensions = (syntax_tree.Literal(k, "Integer") for k in range(1, len(local["shape_expr"]) + 1))
-    return [name, *(syntax_tree.Builtin("size", (name, dimension)) for dimension in dimensions)]
 
 
 def _texts(value: Expression | None) -> tuple[str, ...]:
