@@ -30,6 +30,7 @@ from .frontend.folded_branches import folded_parameters
 from .frontend.reader import ModelReader
 from .frontend.rumoca_frontend import ModelicaSources, flatten_model
 from .frontend.strings import fold_strings, string_parameters
+from .model.arithmetic import EvaluationError
 from .model.flat_model import Model, Variable
 from .model.syntax_tree import raise_model_error
 from .model.traversal import variable_names
@@ -114,7 +115,11 @@ def analyse(json: Mapping[str, Any], sources: ModelicaSources, name: str) -> Int
     flat = _without_unused_connectors(flat)
     flat = prepare_hybrid(reduce_states(introduce_derivatives(fold_strings(fold_constants(flat)))))
     _check_types(flat)
-    return HybridInterpreter(flat) if flat.hybrid else Interpreter(flat)
+    try:
+        return HybridInterpreter(flat) if flat.hybrid else Interpreter(flat)
+    except EvaluationError as error:
+        where = str(sources.files[0]) if sources.files else ""
+        raise InputError(Problem(f"the default values of the parameters are not valid: {error}", where)) from None
 
 
 def _without_unused_connectors(model: Model) -> Model:

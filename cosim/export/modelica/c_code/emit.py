@@ -27,9 +27,10 @@ def generate_c(defaults: Interpreter, sources: Sequence[str], packages: Mapping[
     Raises:
         InputError: The model uses a feature that is not supported.
     """
-    header = HeaderWriter(defaults.model, defaults.schedule, defaults.parameter_roles, sources).text()
     code = (HybridCode if defaults.model.hybrid else ModelCode)(defaults)
     folder = resources.files(__package__ or "")
     texts = {name: folder.joinpath(name).read_text(encoding="utf-8") for name in ("runtime.h", *code.headers())}
     model_c = code.model_c()
-    return {"model.c": model_c, "model.h": header, **texts, **external_files(code.functions.external_functions, packages or {})}
+    header = HeaderWriter(defaults.model, defaults.schedule, defaults.parameter_roles, sources, len(code.functions.warnings))
+    external = external_files(code.functions.external_functions, packages or {})
+    return {"model.c": model_c, "model.h": header.text(), **texts, **external}

@@ -160,7 +160,17 @@ class ExpressionLowering(SubscriptLowering):
             type_name, (*left.shape[:-1], *right.shape[1:]), element, indexable_in_loop=columns == 1 and left.indexable_in_loop
         )
 
+    def known_branch(self, node: syntax_tree.If) -> syntax_tree.Expression | None:
+        """Return the value of an if-expression without the branches before it, if the first condition is constant, else None."""
+        (condition, value), rest = node.branches[0], node.branches[1:]
+        known = self.static_value(condition)
+        if known is None:
+            return None
+        return value if known else syntax_tree.If(rest, node.otherwise) if rest else node.otherwise
+
     def _if(self, node: syntax_tree.If) -> CValue:
+        if (known := self.known_branch(node)) is not None:
+            return self.lower(known)
         (condition, yes), rest = node.branches[0], node.branches[1:]
         test = self.scalar_of(condition)
         with self.collect_lines() as yes_lines:

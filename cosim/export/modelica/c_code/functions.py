@@ -31,6 +31,15 @@ class FunctionTranslator:
     _instances: dict[tuple[str, Shapes, Sizes], FunctionInstance] = field(default_factory=dict)
     _in_translation: list[str] = field(default_factory=list)
 
+    #: assertions with the level warning, in the order of their numbers
+    warnings: list[syntax_tree.Assert] = field(default_factory=list)
+
+    def warning_number(self, node: syntax_tree.Assert) -> int:
+        """Return the number of an assertion with the level warning."""
+        if node not in self.warnings:
+            self.warnings.append(node)
+        return self.warnings.index(node)
+
     def function_instance(self, call: syntax_tree.Call, shapes: Shapes, numbers: tuple[int | None, ...]) -> FunctionInstance:
         """Return the C function for a call; it is translated at the first call with arguments of these shapes.
 

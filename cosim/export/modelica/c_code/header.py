@@ -4,18 +4,20 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 from ..causality.matching import is_input
 from ..causality.parameter_roles import ParameterRoles
 from ..causality.schedule import Schedule
 from ..model.flat_model import Model, Variable, derivative_name, is_integrated
+from ..model.traversal import composed_asserts
 from .c_values import C_TYPES, CValue, c_identifier, variable_value
 
 
 def struct_members(model: Model) -> dict[str, str]:
     """Return the struct member of each variable: its name as a unique C identifier."""
     members: dict[str, str] = {}
-    used = {"clock", "held", "failure", "past", "step", "no_state"}
+    used = {"clock", "held", "failure", "past", "step", "no_state", "changed", "reason", "warning", "warned"}
     for name in model.variables:
         member = c_identifier(name)
         while member in used:
@@ -39,6 +41,8 @@ class HeaderWriter:
     roles: ParameterRoles
     #: names of the Modelica files, for a comment
     sources: Sequence[str]
+    #: number of assertions with the level warning
+    warnings: int
 
     def text(self) -> str:
         """Return the text of model.h."""
@@ -64,6 +68,7 @@ class HeaderWriter:
             *(f"    {line}" for line in self._struct()),
             "} Model;",
             "",
+            *["#define MODEL_WARNINGS"] * has_messages(self.model),
             "void model_start(Model *m);",
             "void model_parameters(Model *m);",
             "const char *model_initialize(Model *m, double time);",
@@ -123,9 +128,23 @@ class HeaderWriter:
         yield from [f"bool held[{self.schedule.edge_detector_count}];"] * bool(self.schedule.edge_detector_count)
         if self.model.hybrid:
             yield from [f"Past past[{len(self.model.hybrid.delays)}];"] * bool(self.model.hybrid.delays)
+            yield "bool changed; /* a parameter was set after the last event */"
             yield from ["double step; /* next integration step (s) */"] * is_integrated(self.model)
             yield from ["double no_state[2];"] * (is_integrated(self.model) and not self.model.states)
+        if has_messages(self.model):
+            yield "char reason[512], warning[512];"
+            yield f"bool warned[{max(self.warnings, 1)}];"
         yield "int32_t failure;"
+
+
+def has_messages(model: Model) -> bool:
+    """Return whether a model has messages that are composed at run time, or warnings."""
+    return bool(composed_asserts(_asserts(model)))
+
+
+def _asserts(model: Model) -> tuple[Any, ...]:
+    functions = tuple(function.body for function in model.functions.values())
+    return (model.asserts, model.whens, model.algorithms, model.initial_algorithms, functions)
 
 
 def _member_declaration(variable: Variable, name: str) -> str:

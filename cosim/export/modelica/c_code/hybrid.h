@@ -6,48 +6,41 @@
 
 #include <float.h>
 
-/* Pointers to the states of a model and to their derivatives, and functions of the model. */
+/* Pointers to the states of a model and to their derivatives. */
 typedef struct {
     double *x[STATES];
     const double *dx[STATES];
-    void (*derivatives)(Model *m, double time);
-    /* Returns whether a relation differs from its stored value; z is positive on one side of each relation. */
-    bool (*crossed)(Model *m, double time, double *z);
-    /* Stores the present values of the arguments of delay(). */
-    void (*record)(Model *m, double time);
 } Hybrid;
+
+/* Functions of the model. `crossed` returns whether a relation differs from its stored value; z is positive on one side of each
+   relation. `record` stores the present values of the arguments of delay(). */
+static void derivatives(Model *m, double time);
+static bool crossed(Model *m, double time, double *z);
+static void record(Model *m, double time);
 
 enum { STAGES = 7 };
 
-/* The method of Dormand and Prince of order 5 with an error estimate of order 4; the last stage is the first one of the next step. */
-static const double NODE[STAGES] = {0, 1.0 / 5, 3.0 / 10, 4.0 / 5, 8.0 / 9, 1, 1};
-static const double WEIGHT[STAGES][STAGES - 1] = {
-    {0},
-    {1.0 / 5},
-    {3.0 / 40, 9.0 / 40},
-    {44.0 / 45, -56.0 / 15, 32.0 / 9},
-    {19372.0 / 6561, -25360.0 / 2187, 64448.0 / 6561, -212.0 / 729},
-    {9017.0 / 3168, -355.0 / 33, 46732.0 / 5247, 49.0 / 176, -5103.0 / 18656},
-    {35.0 / 384, 0, 500.0 / 1113, 125.0 / 192, -2187.0 / 6784, 11.0 / 84},
-};
-static const double ERROR[STAGES] = {71.0 / 57600, 0, -71.0 / 16695, 71.0 / 1920, -17253.0 / 339200, 22.0 / 525, -1.0 / 40};
+/* One stage of the method of Dormand and Prince of order 5, whose last stage is the first one of the next step. */
+#define STAGE(NUMBER, NODE, SLOPE)                                                                                          \
+    for (int i = 0; i < STATES; i++) *s->x[i] = start[i] + h * (SLOPE);                                                     \
+    derivatives(m, time + (NODE) * h);                                                                                   \
+    for (int i = 0; i < STATES; i++) k[NUMBER][i] = *s->dx[i];
 
 /* Advances the states from `start` with the slopes k[0] by h; returns the estimated error as a multiple of the tolerance. */
 static inline double dormand_prince(Model *m, const Hybrid *s, double time, double h, const double *start, double k[STAGES][STATES])
 {
-    for (int stage = 1; stage < STAGES; stage++) {
-        for (int i = 0; i < STATES; i++) {
-            double slope = 0;
-            for (int j = 0; j < stage; j++) slope += WEIGHT[stage][j] * k[j][i];
-            *s->x[i] = start[i] + h * slope;
-        }
-        s->derivatives(m, time + NODE[stage] * h);
-        for (int i = 0; i < STATES; i++) k[stage][i] = *s->dx[i];
-    }
+    STAGE(1, 1.0 / 5, 1.0 / 5 * k[0][i])
+    STAGE(2, 3.0 / 10, 3.0 / 40 * k[0][i] + 9.0 / 40 * k[1][i])
+    STAGE(3, 4.0 / 5, 44.0 / 45 * k[0][i] + -56.0 / 15 * k[1][i] + 32.0 / 9 * k[2][i])
+    STAGE(4, 8.0 / 9, 19372.0 / 6561 * k[0][i] + -25360.0 / 2187 * k[1][i] + 64448.0 / 6561 * k[2][i] + -212.0 / 729 * k[3][i])
+    STAGE(5, 1, 9017.0 / 3168 * k[0][i] + -355.0 / 33 * k[1][i] + 46732.0 / 5247 * k[2][i] + 49.0 / 176 * k[3][i] +
+                    -5103.0 / 18656 * k[4][i])
+    STAGE(6, 1, 35.0 / 384 * k[0][i] + 500.0 / 1113 * k[2][i] + 125.0 / 192 * k[3][i] + -2187.0 / 6784 * k[4][i] +
+                    11.0 / 84 * k[5][i])
     double largest = 0;
     for (int i = 0; i < STATES; i++) {
-        double error = 0;
-        for (int j = 0; j < STAGES; j++) error += ERROR[j] * k[j][i];
+        const double error = 71.0 / 57600 * k[0][i] + -71.0 / 16695 * k[2][i] + 71.0 / 1920 * k[3][i] +
+                             -17253.0 / 339200 * k[4][i] + 22.0 / 525 * k[5][i] + -1.0 / 40 * k[6][i];
         const double scale = ABSOLUTE_TOLERANCE + RELATIVE_TOLERANCE * larger(fabs(start[i]), fabs(*s->x[i]));
         const double ratio = fabs(h * error) / scale;
         if (!(ratio <= largest)) largest = ratio;
@@ -65,10 +58,10 @@ static inline double locate(Model *m, const Hybrid *s, double time, double h, co
 {
     const double width = larger(1e-10, 8 * DBL_EPSILON * fabs(time + h));
     double left = 0, right = h, z[2][RELATIONS];
-    s->crossed(m, time + h, z[1]);
+    crossed(m, time + h, z[1]);
     set_states(s, start);
-    s->derivatives(m, time);
-    s->crossed(m, time, z[0]);
+    derivatives(m, time);
+    crossed(m, time, z[0]);
     for (int n = 0, side = 1; right - left > width && n < 100; n++) {
         double at = right;
         for (int r = 0; r < RELATIONS; r++) {
@@ -79,7 +72,7 @@ static inline double locate(Model *m, const Hybrid *s, double time, double h, co
         at = smaller(larger(at, left + width / 4), right - width / 4);
         double trial[RELATIONS];
         dormand_prince(m, s, time, at, start, k);
-        side = s->crossed(m, time + at, trial);
+        side = crossed(m, time + at, trial);
         memcpy(z[side], trial, sizeof trial);
         if (side == 1) right = at;
         else left = at;
@@ -93,7 +86,7 @@ static inline double advance_hybrid(Model *m, const Hybrid *s, double from, doub
 {
     double time = from, start[STATES], k[STAGES][STATES], z[RELATIONS];
     *event = false;
-    s->derivatives(m, time);
+    derivatives(m, time);
     for (int i = 0; i < STATES; i++) k[0][i] = *s->dx[i];
     if (!(m->step > 0)) m->step = to - from;
     while (time < to && m->failure == 0) {
@@ -108,16 +101,16 @@ static inline double advance_hybrid(Model *m, const Hybrid *s, double from, doub
             if (!(time + m->step > time)) fail(m, STEP_SIZE_TOO_SMALL);
             continue;
         }
-        if (s->crossed(m, time + h, z)) {
+        if (crossed(m, time + h, z)) {
             *event = true;
             time = locate(m, s, time, h, start, k);
-            s->record(m, time);
+            record(m, time);
             return time;
         }
         const double next = h * smaller(factor, 5);
         m->step = last ? larger(m->step, next) : next;
         time = last ? to : time + h;
-        s->record(m, time);
+        record(m, time);
         memcpy(k[0], k[STAGES - 1], sizeof k[0]);
     }
     return time;

@@ -9,7 +9,8 @@ from ..causality.hybrid_interpreter import MAX_EVENTS, MAX_PASSES
 from ..causality.matching import is_input
 from ..causality.past_values import PAST_VALUES
 from ..model.flat_model import Model, Relation, derivative_name, is_integrated, previous_name
-from .c_values import CValue
+from ..model.syntax_tree import Assign, Name
+from .c_values import C_TYPES, CExpression, CValue, scalar_value
 from .formatting import function_definition
 from .model_code import ModelCode
 from .statements import StatementLowering
@@ -75,6 +76,22 @@ class HybridCode(ModelCode):
             "return REASONS[m->failure];",
         ]
 
+    def _derivatives(self) -> list[str]:
+        """Generate the derivatives of the states; values that are needed nowhere else are local variables."""
+        assert self.model.hybrid
+        stored = {*self.model.hybrid.remembered, *(delay.name for delay in self.model.hybrid.delays)}
+        stored |= {derivative_name(name) for name in self.model.states}
+        body = self.schedule.derivatives
+        targets = [s.target.name for s in body if isinstance(s, Assign) and isinstance(s.target, Name)]
+        names = [name for name in targets if name not in stored and not self.model.variables[name].shape]
+        lowering = self._make_lowering()
+        for name in names:
+            local = f"local_{self.members[name]}"
+            lowering.scope[name] = scalar_value(self.model.variables[name].type, CExpression(local), reusable=True)
+            lowering.lines.append(f"{C_TYPES[self.model.variables[name].type]} {local};")
+        lowering.body(body)
+        return ["(void)m;", "(void)time;", *lowering.lines]
+
     def _first_ticks(self) -> list[str]:
         """Generate the event of the clocks that tick at the start time; with inputs, it belongs to the first step."""
         clocks = len(self.schedule.clocks)
@@ -106,7 +123,7 @@ class HybridCode(ModelCode):
         return [
             function_definition(
                 "static void derivatives(Model *m, double time)",
-                ["(void)m;", "(void)time;", *self._body(self.schedule.derivatives, initial=False)],
+                self._derivatives(),
             ),
             crossing_function(self.model.hybrid.relations, values, lowering),
             function_definition(
@@ -115,7 +132,6 @@ class HybridCode(ModelCode):
                     "const Hybrid system = {",
                     f"    {{{states}}},",
                     f"    {{{rates}}},",
-                    "    derivatives, crossed, record,",
                     "};",
                     "bool event;",
                     "*reached = advance_hybrid(m, &system, from, to, &event);",
@@ -175,6 +191,7 @@ def event_functions(
                 "    due = NO_TICK;",
                 "}",
                 "remember_inputs(m);",
+                "m->changed = false;",
                 "record(m, time);",
             ],
         ),
@@ -229,7 +246,7 @@ def hybrid_step_body(clocks: int, continuous: bool, too_many: str) -> list[str]:
     if clocks:
         loop.append(f"const bool at_start = tick && next <= time + TOLERANCE * shortest_period(m->clock, {clocks});")
         at_start += " && !at_start"
-    loop.append(f"if ({at_start} && inputs_changed(m)) event(m, time, NO_TICK);")
+    loop.append(f"if ({at_start} && (m->changed || inputs_changed(m))) event(m, time, NO_TICK);")
     if continuous:
         lines.append("double reached = time;")
         loop += [

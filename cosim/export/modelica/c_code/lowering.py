@@ -41,6 +41,9 @@ class TranslationUnit(Protocol):
     def failure_code(self, reason: str, where: SourceLocation | None) -> str:
         """Return the number of a failure reason."""
 
+    def warning_number(self, node: syntax_tree.Assert) -> int:
+        """Return the number of an assertion with the level warning."""
+
     def function_instance(
         self, call: syntax_tree.Call, shapes: tuple[tuple[int, ...], ...], numbers: tuple[int | None, ...]
     ) -> FunctionInstance:

@@ -18,7 +18,7 @@ from ..model.traversal import assigned_references, walk
 from .c_values import C_TYPES, CExpression, CValue, c_literal, scalar_value
 from .formatting import function_definition, uses_variable
 from .functions import FunctionTranslator
-from .header import struct_member, struct_members
+from .header import has_messages, struct_member, struct_members
 from .model_step import continuous_step_body, sampled_step_body
 from .statements import StatementLowering
 
@@ -59,22 +59,28 @@ class ModelCode:
         self.members = struct_members(self.model)
         self.functions = FunctionTranslator(dict(self.model.functions), self._failure_code)
 
+    @property
+    def has_messages(self) -> bool:
+        """Whether messages are composed at run time."""
+        return has_messages(self.model)
+
     def model_c(self) -> str:
         """Return the text of model.c."""
         includes = "\n".join(f'#include "{name}"' for name in ("model.h", *(self.headers() or ["runtime.h"])))
         definitions = self.definitions()
         objects = [_OBJECTS] * self._has_objects
         text = "\n\n".join([includes, self._reasons(), *objects, *self.functions.definitions, *definitions]) + "\n"
+        reason = "m->failure == COMPOSED_REASON ? m->reason : REASONS[m->failure]" if self.has_messages else "REASONS[m->failure]"
         if not self.functions.external_functions:
-            return text
-        text = text.replace("return REASONS[m->failure];", "return external_reason(REASONS[m->failure]);")
+            return text.replace("return REASONS[m->failure];", f"return {reason};")
+        text = text.replace("return REASONS[m->failure];", f"return external_reason({reason});")
         return f'#include "external_calls.h"\n{text}'
 
     def headers(self) -> list[str]:
         """Return the names of the C headers that model.c includes besides model.h and runtime.h."""
         bodies = (self.schedule.initialization, self.schedule.event, self.schedule.derivatives, self.schedule.indicators)
         solved = any(isinstance(item, Solve) for item in walk(bodies))
-        return [*["newton.h"] * solved, *["runge_kutta.h"] * bool(self.model.states)]
+        return [*["messages.h"] * self.has_messages, *["newton.h"] * solved, *["runge_kutta.h"] * bool(self.model.states)]
 
     def definitions(self) -> list[str]:
         """Generate the functions of model.c."""
@@ -142,7 +148,8 @@ class ModelCode:
             binding = self.model.variables[name].binding
             lowering.store(lowering.scope[name], binding if binding is not None else start_value(self.model, name), Name(name))
         begin = ["external_begin();"] * self._has_objects
-        return [*begin, *lowering.lines] or ["(void)m;"]
+        changed = ["m->changed = true;"] * bool(self.model.hybrid)
+        return [*begin, *lowering.lines, *changed] or ["(void)m;"]
 
     @property
     def _has_objects(self) -> bool:

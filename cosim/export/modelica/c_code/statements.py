@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, replace
 
+from ..external.calls import call_signature
 from ..model import syntax_tree
 from ..model.syntax_tree import Body, Expression, Statement, raise_model_error
-from ..model.traversal import assigned_references, read_references, variable_names
-from ..external.calls import call_signature
+from ..model.traversal import assigned_references, composed_asserts, read_references, variable_names
 from .c_values import CExpression, CValue, c_identifier, scalar_value
 from .expressions import ExpressionLowering
 
@@ -47,10 +48,9 @@ class StatementLowering(ExpressionLowering):
             value: The expression.
             reference: The assigned variable as an expression. It determines whether `value` depends on the target.
         """
-        if isinstance(value, syntax_tree.If) and target.shape and (known := self.static_value(value.branches[0][0])) is not None:
-            rest = syntax_tree.If(value.branches[1:], value.otherwise) if value.branches[1:] else value.otherwise
-            self.store(target, value.branches[0][1] if known else rest, reference)
-        elif isinstance(value, syntax_tree.If) and (target.shape or self._needs_if_statement(target, value)):
+        while isinstance(value, syntax_tree.If) and (known := self.known_branch(value)) is not None:
+            value = known
+        if isinstance(value, syntax_tree.If) and (target.shape or self._needs_if_statement(target, value)):
             self._lower_choice(target, value, reference)
         elif (
             isinstance(value, syntax_tree.Call)
@@ -153,12 +153,39 @@ class StatementLowering(ExpressionLowering):
         self.lines += [*lines, "}"]
 
     def _assert(self, node: syntax_tree.Assert) -> None:
-        if node.warning:
+        if composed_asserts(node):
+            self._composed_assert(node)
             return
         condition = self.scalar_of(node.condition)
-        text = "".join(str(part.value) if isinstance(part, syntax_tree.Literal) else "..." for part in node.message)
+        text = "".join(str(part.value) for part in node.message if isinstance(part, syntax_tree.Literal))
         failure = self.translation_unit.failure_code(text, node.where)
         self.lines.append(f"if (!{condition.parenthesized(13)}) fail(m, {failure});")
+
+    def _composed_assert(self, node: syntax_tree.Assert) -> None:
+        """Lower an assertion whose message contains values, or whose level is warning."""
+        condition = self.scalar_of(node.condition).parenthesized(13)
+        with self.collect_lines() as lines:
+            texts, values = zip(*map(self._message_part, node.message), strict=True)
+            location = f" ({node.where.file_and_line})" if node.where else ""
+            arguments = "".join(f", {value}" for value in values if value)
+            text = json.dumps("".join(texts) + location.replace("%", "%%"), ensure_ascii=False) + arguments
+            if not node.warning:
+                self.lines.append(f"fail_with(m, {text});")
+        if node.warning:
+            number = self.translation_unit.warning_number(node)
+            self.lines += [line.removeprefix("    ") for line in lines]
+            self.lines.append(f"warn(m, !{condition}, &m->warned[{number}], {text});")
+        else:
+            self.lines += [f"if (!{condition}) {{", *lines, "}"]
+
+    def _message_part(self, part: Expression) -> tuple[str, str]:
+        """Return the format of a part of a message and the C expression of its value, "" for a literal."""
+        if isinstance(part, syntax_tree.Literal):
+            return str(part.value).replace("%", "%%"), ""
+        value = self.lower(part)
+        if value.type == "Boolean":
+            return "%s", f"truth({value.text.code})"
+        return ("%g" if value.type == "Real" else "%d"), value.text.code
 
     def _solve(self, node: syntax_tree.Solve) -> None:
         """Lower a system of equations to a loop of Newton's method."""

@@ -50,6 +50,12 @@ class HybridInterpreter(Interpreter):
         self._past = [PastValues() for _ in self._hybrid.delays]
         self.evaluate.past = lambda index, time: self._past[index].value(time)
         self._step = 0.0
+        self._parameters_changed = False
+
+    def set(self, name: str, value: Any) -> None:
+        """Set a parameter or an input; a parameter causes an event at the start of the next step."""
+        super().set(name, value)
+        self._parameters_changed |= self.model.variables[name].variability == "parameter"
 
     def initialize(self, time: float = 0.0) -> None:
         """Solve the initial equations, and evaluate the events at the start time (s).
@@ -96,7 +102,7 @@ class HybridInterpreter(Interpreter):
             is_tick = bool(due) and tick < end - slack
             at_start = is_tick and tick <= time + slack
             target = tick if is_tick else end
-            if count == 0 and not at_start and self._changed(self._inputs):
+            if count == 0 and not at_start and (self._parameters_changed or self._changed(self._inputs)):
                 self._event("step", time, ())
             crossing = False
             if is_integrated(self.model) and not at_start:
@@ -130,6 +136,7 @@ class HybridInterpreter(Interpreter):
                 self._remember(self._hybrid.remembered)
                 due = ()
         self._remember(self._inputs)
+        self._parameters_changed = False
         self._record(time)
 
     def _remember(self, names: Sequence[str]) -> None:
@@ -258,7 +265,8 @@ class HybridInterpreter(Interpreter):
 def _weighted(weights: Sequence[float], slopes: Sequence[Sequence[float]], index: int) -> float:
     total = 0.0
     for weight, row in zip(weights, slopes, strict=True):
-        total += weight * row[index]
+        if weight:
+            total += weight * row[index]
     return total
 
 

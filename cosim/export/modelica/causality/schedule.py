@@ -30,7 +30,16 @@ from ..model.syntax_tree import (
     When,
     referenced_variable,
 )
-from ..model.traversal import assigned_references, pre_references, read_references, rewrite, rewrite_outermost, walk
+from ..model.traversal import (
+    assigned_references,
+    has_builtin,
+    pre_references,
+    read_references,
+    rewrite,
+    rewrite_outermost,
+    variable_names,
+    walk,
+)
 from .continuous_equations import solve_equations, solve_initial_equations
 from .hybrid import delay_number
 from .matching import ScalarKey, scalar_keys
@@ -54,7 +63,7 @@ class Schedule:
     event: Body
     #: statements that compute the derivatives of the continuous states between events
     derivatives: Body
-    #: statements that compute the other operands of relations between events, after the derivatives
+    #: statements that compute the operands of relations between events
     indicators: Body
 
 
@@ -96,7 +105,8 @@ def build_schedule(model: Model) -> Schedule:
     solved, initially_held = solve_initial_equations(model, assigned, continuous, _written(initial))
     initial += [_make_node(model, (statement,)) for statement in solved]
     for nodes, constant in ((events, held), (initial, initially_held)):
-        nodes += [_make_node(model, (detector,)) for detector in conditions.edge_detectors]
+        separate = [d for d in conditions.edge_detectors if nodes is initial or d.index not in conditions.in_place]
+        nodes += [_make_node(model, (detector,)) for detector in separate]
         for node in nodes:
             node.reads -= constant
     event_body = merge_statements(sort_topologically(events))
@@ -154,7 +164,7 @@ def _as_assignment(node: Any) -> Any:
 
 
 def _between_events(model: Model, continuous: Iterable[Assign | Solve], held: set[ScalarKey]) -> tuple[Body, Body]:
-    """Return the statements for the derivatives of the states, and those for the other operands of relations."""
+    """Return the statements for the derivatives of the states, and those for the operands of relations."""
     statements = [s for s in continuous if not (model.hybrid and _is_discrete(model, s))]
     nodes = [_make_node(model, (_without_ticks(statement),)) for statement in statements]
     nodes += [node for body in model.algorithms for node in _algorithm_nodes(model, body, lambda _: ())]
@@ -170,9 +180,19 @@ def _between_events(model: Model, continuous: Iterable[Assign | Solve], held: se
         for reference in read_references(tuple(relation.condition for relation in model.hybrid.relations))
         for key in scalar_keys(model.variables, reference)
     }
-    derivatives = required_nodes(order, required)
-    others = [node for node in required_nodes(order, required | operands) if node not in derivatives]
-    return merge_statements(derivatives), merge_statements(others)
+    order = _varying(model, order)
+    return merge_statements(required_nodes(order, required)), merge_statements(required_nodes(order, operands))
+
+
+def _varying(model: Model, order: Iterable[Node]) -> list[Node]:
+    """Return the sorted nodes whose values change between events, because they depend on states or on the time."""
+    changing = {key for name in model.states for key in scalar_keys(model.variables, Name(name))}
+    nodes = []
+    for node in order:
+        if node.reads & changing or "time" in variable_names(node.statements) or has_builtin(node.statements, "past"):
+            changing |= node.writes
+            nodes.append(node)
+    return nodes
 
 
 def _without_ticks(statement: Statement) -> Statement:
@@ -205,7 +225,9 @@ def _make_node(model: Model, statements: Body, assigned: Iterable[str] = ()) -> 
     read = {key for reference in read_references(statements) for key in scalar_keys(model.variables, reference)}
     flags_read = {_flag_key(item.arguments[0]) for item in walk(statements) if isinstance(item, Builtin) and item.name == "risen"}
     flags_written = {_flag_key(Literal(s.index, "Integer")) for s in statements if isinstance(s, EdgeDetector)}
-    return Node(statements, {key for key in read if key[0] not in assigned} | flags_read, written | flags_written)
+    return Node(
+        statements, {key for key in read if key[0] not in assigned} | (flags_read - flags_written), written | flags_written
+    )
 
 
 def _flag_key(index: Expression) -> ScalarKey:
@@ -217,7 +239,7 @@ def _event_nodes(model: Model, conditions: WhenConditions) -> Iterator[Node]:
     for when in model.whens:
         yield from _split_by_target(model, conditions.at_event(when))
     for body in model.algorithms:
-        yield from _algorithm_nodes(model, body, conditions.at_event)
+        yield from _algorithm_nodes(model, body, conditions.at_event, conditions)
     yield from (_make_node(model, (statement,)) for statement in model.asserts)
 
 
@@ -228,11 +250,22 @@ def _initial_nodes(model: Model, conditions: WhenConditions) -> list[Node]:
     return nodes + [_make_node(model, (statement,)) for statement in model.asserts]
 
 
-def _algorithm_nodes(model: Model, body: Body, translate_when: Callable[[When], Body]) -> Iterator[Node]:
-    """Yield one node for an algorithm with its when-clauses translated, or none if no statement remains."""
-    statements = tuple(item for s in body for item in (translate_when(s) if isinstance(s, When) else (s,)))
+def _algorithm_nodes(
+    model: Model, body: Body, translate_when: Callable[[When], Body], conditions: WhenConditions | None = None
+) -> Iterator[Node]:
+    """Yield one node for an algorithm with its when-clauses translated, or none if no statement remains.
+
+    With `conditions`, edge detectors that depend on the algorithm itself become part of it.
+    """
+    assigned = {referenced_variable(target) for target in assigned_references(body)}
+    statements: list[Statement] = []
+    for statement in body:
+        translated = translate_when(statement) if isinstance(statement, When) else (statement,)
+        if conditions and isinstance(statement, When):
+            statements += conditions.detectors_in(translated, assigned)
+        statements += translated
     if statements:
-        yield _make_node(model, statements, {referenced_variable(target) for target in assigned_references(statements)})
+        yield _make_node(model, tuple(statements), {referenced_variable(t) for t in assigned_references(tuple(statements))})
 
 
 def _split_by_target(model: Model, statements: Body) -> Iterator[Node]:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 from ..model.flat_model import Function, FunctionVariable
-from ..model.syntax_tree import Builtin, ExternalCall, Expression, Literal, Name, raise_model_error
+from ..model.syntax_tree import Builtin, Expression, ExternalCall, Literal, Name, raise_model_error
 
 _C_TYPES = {
     "Real": "double",

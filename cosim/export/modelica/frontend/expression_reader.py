@@ -149,16 +149,18 @@ class ExpressionReader:
         """Convert an array constructor, or a concatenation `[a, b; c, d]`, whose elements may be arrays."""
         elements = tuple(map(self.read_expression, node["elements"]))
         kind = node.get("kind")
-        if kind not in ("Horizontal", "Vertical") or self._is_matrix_of_scalars(elements, kind):
+        if kind not in ("Horizontal", "Vertical"):
             return syntax_tree.Array(elements)
-        if kind == "Vertical":  # a row of scalars is a matrix with one row
-            elements = tuple(syntax_tree.Array((e,)) if isinstance(e, syntax_tree.Array) else e for e in elements)
+        if kind == "Vertical" and (rows := self._scalar_rows(elements)):
+            return syntax_tree.Array(rows)
         return syntax_tree.Builtin("rows" if kind == "Vertical" else "columns", elements, self.locate(node))
 
-    def _is_matrix_of_scalars(self, elements: tuple[Expression, ...], kind: str) -> bool:
-        if kind == "Vertical":
-            return all(isinstance(element, syntax_tree.Array) for element in elements)
-        return all(self._is_scalar(element) for element in elements)
+    def _scalar_rows(self, rows: tuple[Expression, ...]) -> tuple[syntax_tree.Array, ...]:
+        """Return the rows of a matrix as arrays if all their elements are certainly scalars, else no rows."""
+        columns = [row.arguments for row in rows if isinstance(row, syntax_tree.Builtin) and row.name == "columns"]
+        if len(columns) != len(rows) or not all(self._is_scalar(element) for row in columns for element in row):
+            return ()
+        return tuple(map(syntax_tree.Array, columns))
 
     def _is_scalar(self, node: Expression) -> bool:
         """Return whether an expression is certainly a scalar."""

@@ -7,6 +7,7 @@ from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 from .syntax_tree import (
+    Assert,
     Assign,
     Builtin,
     Colon,
@@ -115,6 +116,12 @@ def pre_references(node: Any) -> Iterator[tuple[str, Builtin]]:
     for item in walk(node):
         if isinstance(item, Builtin) and item.name in PRE_OPERATORS:
             yield referenced_variable(item.arguments[0]), item
+
+
+def composed_asserts(node: Any) -> list[Assert]:
+    """Return the assertions whose message is composed at run time or is a warning."""
+    asserts = [item for item in walk(node) if isinstance(item, Assert)]
+    return [item for item in asserts if item.warning or not all(isinstance(part, Literal) for part in item.message)]
 
 
 def has_builtin(node: Any, *builtins: str) -> bool:
