@@ -109,6 +109,11 @@ class ComponentSpec(Spec):
     modelica: str | None = key(
         '"file.mo:Model"; built when needed (requires the extra "build")', "MyAutopilot.mo:MyAutopilot", default=None
     )
+    libraries: list[str] = key(
+        "folders of Modelica libraries, searched before those of MODELICAPATH; only for Modelica models",
+        ["../modelica"],
+        default=[],
+    )
     system: str | None = key("path of the JSON file of a nested system", "systems/strider_autopilot.json", default=None)
     arguments: dict[str, Any] = key(
         "arguments of the constructor; only for Python components", {"environment": {"seed": 1}}, default={}
@@ -140,6 +145,8 @@ class ComponentSpec(Spec):
             raise ValueError(f"expected exactly one of {', '.join(SOURCES)}; found {' and '.join(given) or 'none'}")
         if self.arguments and self.python is None:
             raise ValueError('"arguments" are for components with "python"; variables are set with "parameters"')
+        if self.libraries and self.modelica is None:
+            raise ValueError('"libraries" are for components with "modelica"')
         if self.isolation and self.fmu is None and self.modelica is None:
             raise ValueError('"isolation" is for components with "fmu" or "modelica"')
         for name in ("solver", "tolerance"):

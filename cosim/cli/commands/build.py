@@ -30,8 +30,20 @@ if TYPE_CHECKING:
     help="File or folder that the Python class reads at run time, for --output; repeatable. The class finds it below "
     "`self.resources` or beside its own file.",
 )
+@click.option(
+    "--library",
+    type=click.Path(path_type=Path),
+    multiple=True,
+    metavar="DIR",
+    help="Folder of Modelica libraries for --output, searched before those of MODELICAPATH; repeatable.",
+)
 def command(
-    sources: tuple[Path, ...], check: bool, output: Path | None, modelica_compiler: str, include: tuple[Path, ...]
+    sources: tuple[Path, ...],
+    check: bool,
+    output: Path | None,
+    modelica_compiler: str,
+    include: tuple[Path, ...],
+    library: tuple[Path, ...],
 ) -> int:
     """Export controllers and plants to fmus/.
 
@@ -58,7 +70,7 @@ def command(
         click.echo("every FMU is up to date with its source")
         return 0
     if output is not None:
-        _build_one(sources, output, modelica_compiler, include)
+        _build_one(sources, output, modelica_compiler, include, library)
     elif include:
         raise InputError("--include requires --output: the FMUs in fmus/ contain the files that their sources import")
     elif modelica_compiler != "cosim":
@@ -68,7 +80,9 @@ def command(
     return 0
 
 
-def _build_one(sources: tuple[Path, ...], output: Path, modelica_compiler: str, include: tuple[Path, ...]) -> None:
+def _build_one(
+    sources: tuple[Path, ...], output: Path, modelica_compiler: str, include: tuple[Path, ...], library: tuple[Path, ...]
+) -> None:
     from ...export.build import build_to
     from ...export.modelica.frontend.openmodelica import export_with_omc
 
@@ -79,7 +93,7 @@ def _build_one(sources: tuple[Path, ...], output: Path, modelica_compiler: str, 
     if modelica_compiler == "omc":
         export_with_omc(sources[0], output)
     else:
-        build_to(sources[0], None, output, include=include)
+        build_to(sources[0], None, output, include=include, library_path=library)
     click.echo(f"{sources[0]} -> {output}")
 
 

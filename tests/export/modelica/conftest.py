@@ -33,7 +33,8 @@ class CompiledBlock:
         layout = ", ".join(["sizeof(Model)", *(f"offsetof(Model, {v.member})" for v in block.variables)])
         (folder / "layout.c").write_text(f'#include <stddef.h>\n#include "model.h"\nsize_t layout[] = {{{layout}}};\n')
         library = folder / "block.so"
-        subprocess.run([*GCC, "-o", str(library), str(folder / "model.c"), str(folder / "layout.c"), "-lm"], check=True)
+        sources = [name for name in (*block.files, "layout.c") if name.endswith(".c")]
+        subprocess.run([*GCC, "-o", str(library), *sources, "-lm"], check=True, cwd=folder)
         self._library = ctypes.CDLL(str(library))
         size, *offsets = (ctypes.c_size_t * (1 + len(block.variables))).in_dll(self._library, "layout")
         self._offsets = dict(zip(self.variables, offsets, strict=True))
