@@ -12,8 +12,8 @@ from ..core.errors import InputError
 from ..core.paths import is_file, resolve_path
 from ..export.foreign.source_fmus import usable_fmu
 from ..process.journal import calling_component
+from .component_schema import ComponentSpec
 from .nested_systems import Node
-from .schema import ComponentSpec
 
 
 class ComponentFactory:
