@@ -61,7 +61,7 @@ class ModelCode:
 
     @property
     def has_messages(self) -> bool:
-        """Whether messages are composed at run time."""
+        """True if messages are composed at run time."""
         return has_messages(self.model)
 
     def model_c(self) -> str:
