@@ -9,6 +9,7 @@ import pytest
 from cosim.core.errors import ComponentError, InputError
 from cosim.export.fmu.interface import check_block
 from cosim.export.modelica import load_block, load_interpreter
+from cosim.export.modelica.causality.interpreter import Interpreter
 
 
 def in_model(declarations: str, equations: str = "y = u;") -> str:
@@ -263,7 +264,8 @@ BAD = {
     ),
     "connect of unlike connectors": (
         in_model(
-            "connector C\n    Real e;\n    flow Real f;\n  end C;\n  connector D\n    Real g;\n    flow Real h;\n  end D;\n  C c;\n  D d;",
+            "connector C\n    Real e;\n    flow Real f;\n  end C;\n  connector D\n    Real g;\n    flow Real h;"
+            "\n  end D;\n  C c;\n  D d;",
             "connect(c, d);\n  y = u;",
         ),
         "M.mo:6: this equation is superfluous: the others determine all its",
@@ -274,7 +276,8 @@ BAD = {
         "M.mo:8: the recursive function M.f is not supported",
     ),
     "missing library": (
-        'model M\n  input Real u;\n  output Real y;\n  \nequation\n  y = u;\n  annotation(uses(Missing(version="1.0")));\nend M;\n',
+        "model M\n  input Real u;\n  output Real y;\n  \nequation\n  y = u;"
+        '\n  annotation(uses(Missing(version="1.0")));\nend M;\n',
         "M.mo:7: uses the library Missing 1.0, which is not found; add its",
     ),
     "missing standard library": (
@@ -287,21 +290,25 @@ BAD = {
     ),
     "external include is missing": (
         in_model(
-            'pure function f\n    input Real a;\n    output Real r;\n  external "C" r = f(a) annotation(Include="#include \\"missing.h\\"");\n  end f;',
+            "pure function f\n    input Real a;\n    output Real r;"
+            '\n  external "C" r = f(a) annotation(Include="#include \\"missing.h\\"");\n  end f;',
             "y = f(u);",
         ),
         'M.mo:4: f: the file "missing.h" of its Include annotation is not',
     ),
     "external package is unknown": (
         in_model(
-            'pure function f\n    input Real a;\n    output Real r;\n  external "C" r = f(a) annotation(Include="#include \\"f.h\\"", IncludeDirectory="modelica://Missing/Resources");\n  end f;',
+            "pure function f\n    input Real a;\n    output Real r;"
+            '\n  external "C" r = f(a) annotation(Include="#include \\"f.h\\"", '
+            'IncludeDirectory="modelica://Missing/Resources");\n  end f;',
             "y = f(u);",
         ),
         'M.mo:4: f: unknown package in "modelica://Missing/Resources"',
     ),
     "external String array": (
         in_model(
-            'pure function f\n    input Boolean a[:];\n    output Real r;\n  external "C" r = f(a) annotation(Include="");\n  end f;',
+            "pure function f\n    input Boolean a[:];\n    output Real r;"
+            '\n  external "C" r = f(a) annotation(Include="");\n  end f;',
             "y = f({true, false});",
         ),
         "M.mo:1: canonical DAE construction rejected an invalid operation:",
@@ -355,7 +362,10 @@ def test_a_model_that_cannot_be_simulated_fails_with_a_reason(tmp_path, case):
     text, expected = FAILING[case]
     path = tmp_path / "M.mo"
     path.write_text(text)
-    model = load_interpreter(path)
     with pytest.raises(ComponentError, match=expected):
-        model.initialize()
-        model.step(0.0, 0.01)
+        _simulate(load_interpreter(path))
+
+
+def _simulate(model: Interpreter) -> None:
+    model.initialize()
+    model.step(0.0, 0.01)

@@ -7,6 +7,7 @@ import os
 
 import numpy as np
 import pytest
+from fmpy import simulate_fmu
 
 from cosim.core.errors import ComponentError, InputError
 from cosim.export.fmu.package import write_fmu
@@ -35,6 +36,7 @@ void split(double x, double *sign_of, int *whole, int *is_large)
 double checked_root(double x)
 {
     if (x < 0) ModelicaFormatError("the argument %g is negative\\n", x);
+    if (x > 10) ModelicaFormatWarning("the argument %g is large", x);
     return sqrt(x);
 }
 """
@@ -83,7 +85,8 @@ def signals(tmp_path, monkeypatch):
     (tmp_path / "signals.c").write_text(SOURCE)
 
 
-def test_functions_in_c_give_the_same_results_in_the_fmu_and_in_the_interpreter(signals, compile_both):
+@pytest.mark.usefixtures("signals")
+def test_functions_in_c_give_the_same_results_in_the_fmu_and_in_the_interpreter(compile_both):
     model = compile_both(MODEL)
     for _ in model.simulate(50):
         pass
@@ -93,7 +96,8 @@ def test_functions_in_c_give_the_same_results_in_the_fmu_and_in_the_interpreter(
     assert model.get("y") == (-1.5 - 3.0 + 1.0) / 3 + (-1.5 * -1.5) * -1.5
 
 
-def test_modelica_error_ends_the_step_with_its_text(signals, compile_both):
+@pytest.mark.usefixtures("signals")
+def test_modelica_error_ends_the_step_with_its_text(compile_both):
     model = compile_both(MODEL)
     model.initialize()
     model.set(u=-7)
@@ -101,6 +105,15 @@ def test_modelica_error_ends_the_step_with_its_text(signals, compile_both):
     assert model.c.step(0.0, 0.01) == reason
     with pytest.raises(ComponentError, match="the argument -4 is negative"):
         model.python.step(0.0, 0.01)
+
+
+@pytest.mark.usefixtures("signals")
+def test_modelica_warning_is_written_to_the_log_of_the_fmu(tmp_path, write_model):
+    fmu = write_fmu(load_block(write_model(MODEL)), 2, tmp_path / "M.fmu")
+    messages: list[str] = []
+    inputs = np.array([(0.0, 12.0), (1.0, 12.0)], dtype=[("time", float), ("u", float)])
+    simulate_fmu(fmu, stop_time=1.0, output_interval=0.5, input=inputs, logger=lambda *values: messages.append(str(values)))
+    assert [message for message in messages if "is large" in message]
 
 
 TABLE = """package Tables
@@ -184,7 +197,8 @@ def tables(tmp_path, monkeypatch):
     (folder / "Resources" / "C-Sources" / "tables.c").write_text(TABLE_SOURCE)
 
 
-def test_an_external_object_follows_its_parameters_and_is_constructed_again_for_a_restored_state(tables, compile_both):
+@pytest.mark.usefixtures("tables")
+def test_an_external_object_follows_its_parameters_and_is_constructed_again_for_a_restored_state(compile_both):
     model = compile_both(TABLE_MODEL)
     for _ in model.simulate(3):
         pass
@@ -206,6 +220,7 @@ def test_an_external_object_follows_its_parameters_and_is_constructed_again_for_
     assert "the first value is negative" in (model.c.step(3.0, 0.01) or "")
 
 
+@pytest.mark.usefixtures("signals")
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -214,11 +229,12 @@ def test_an_external_object_follows_its_parameters_and_is_constructed_again_for_
         (("mean(u, size(u, 1))", "mean(u, 2 * size(u, 1))"), "M.mo:2: mean: an argument of a C function must be a variable"),
     ],
 )
-def test_a_faulty_declaration_is_refused(signals, write_model, change, message):
+def test_a_faulty_declaration_is_refused(write_model, change, message):
     with pytest.raises(InputError, match=message):
         load_block(write_model(MODEL.replace(*change)))
 
 
+@pytest.mark.usefixtures("signals")
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -226,13 +242,13 @@ def test_a_faulty_declaration_is_refused(signals, write_model, change, message):
         (("checked_root(x)", "checked_rot(x)"), "implicit declaration|undefined reference.*checked_rot"),
     ],
 )
-def test_code_that_does_not_compile_is_refused_with_the_place(signals, tmp_path, write_model, change, message):
+def test_code_that_does_not_compile_is_refused_with_the_place(tmp_path, write_model, change, message):
     with pytest.raises(InputError, match=message):
         write_fmu(load_block(write_model(MODEL.replace(*change))), 2, tmp_path / "M.fmu")
 
 
 @pytest.mark.skipif(not os.environ.get("MODELICAPATH"), reason="needs the Modelica Standard Library in MODELICAPATH")
-def test_tables_of_the_standard_library(write_model, compile_both):
+def test_tables_of_the_standard_library(compile_both):
     model = compile_both("""model T
   input Real u;
   output Real y;
