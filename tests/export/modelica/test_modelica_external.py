@@ -7,7 +7,8 @@ import os
 
 import numpy as np
 import pytest
-from fmpy import simulate_fmu
+from fmpy import extract, read_model_description
+from fmpy.fmi2 import FMU2Slave
 
 from cosim.core.errors import ComponentError, InputError
 from cosim.export.fmu.package import write_fmu
@@ -108,12 +109,18 @@ def test_modelica_error_ends_the_step_with_its_text(compile_both):
 
 
 @pytest.mark.usefixtures("signals")
-def test_modelica_warning_is_written_to_the_log_of_the_fmu(tmp_path, write_model):
+def test_modelica_warning_is_written_to_the_log_of_the_fmu(tmp_path, write_model, capfd):
     fmu = write_fmu(load_block(write_model(MODEL)), 2, tmp_path / "M.fmu")
-    messages: list[str] = []
-    inputs = np.array([(0.0, 12.0), (1.0, 12.0)], dtype=[("time", float), ("u", float)])
-    simulate_fmu(fmu, stop_time=1.0, output_interval=0.5, input=inputs, logger=lambda *values: messages.append(str(values)))
-    assert [message for message in messages if "is large" in message]
+    description, folder = read_model_description(str(fmu)), extract(str(fmu), tmp_path / "unpacked")
+    instance = FMU2Slave(guid=description.guid, unzipDirectory=folder, modelIdentifier="M", instanceName="m")
+    instance.instantiate(loggingOn=True)
+    instance.setupExperiment()
+    instance.enterInitializationMode()
+    instance.exitInitializationMode()
+    instance.setReal([next(v.valueReference for v in description.modelVariables if v.name == "u")], [12.0])
+    instance.doStep(0.0, 0.01)
+    instance.freeInstance()
+    assert "[WARNING] the argument 15 is large" in capfd.readouterr().out
 
 
 TABLE = """package Tables
