@@ -64,6 +64,11 @@ MODEL = """model M "Functions in C"
     output Real y;
   external "C" y = cube(x) annotation(Include="static double cube(double x) { return x * x * x; }");
   end cube;
+  pure function half
+    input Real x;
+    output Real y;
+  external "C" y = half(x) annotation(Library="halves", LibraryDirectory="c");
+  end half;
   input Real u;
   output Real y;
   output Real s;
@@ -71,7 +76,7 @@ MODEL = """model M "Functions in C"
   output Boolean large;
   output Real r;
 equation
-  y = mean({u, 2*u, 1}) + cube(u);
+  y = mean({u, 2*u, 1}) + cube(u) + half(0);
   (s, n, large) = split(u);
   r = root(u + 3);
 end M;
@@ -84,6 +89,8 @@ def signals(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     (tmp_path / "signals.h").write_text(HEADER)
     (tmp_path / "signals.c").write_text(SOURCE)
+    (tmp_path / "c").mkdir()
+    (tmp_path / "c" / "halves.c").write_text("double half(double x) { return x / 2; }\n")
 
 
 @pytest.mark.usefixtures("signals")
