@@ -20,8 +20,9 @@ The source files define these functions:
 
 If `model.h` defines MODEL_FREE, `void model_free(Model *m);` is called before the memory of a model is freed.
 
-The functions `model_initialize` and `model_step` return NULL on success, else the reason for the failure (static text). It is logged, and the FMI
-function returns fmi2Error or fmi3Error. Functions that other programs load from the binary are marked `MODEL_EXPORT`
+The functions `model_initialize` and `model_step` return NULL on success, else the reason for the failure, a text that is valid
+until the next call. It is logged, and the FMI function returns fmi2Error or fmi3Error.
+Functions that other programs load from the binary are marked `MODEL_EXPORT`
 (defined in `export.h` of the shell).
 """
 

@@ -8,7 +8,8 @@ The package rumoca parses, checks and flattens a model. The order of computation
 |              | keep flat models; `rumoca_client`, `rumoca_process`: run rumoca in a child process; `reader`               |
 |              | (`expression_reader`, `statement_reader`, `unrolling`): convert its JSON to the flat model; `constants`:   |
 |              | structural parameters and constants become literals; `folded_branches`: find the parameters with which     |
-|              | rumoca has selected equations; `openmodelica`: export with OpenModelica instead                            |
+|              | rumoca has selected equations; `strings`: String arguments become literals; `openmodelica`: export with    |
+|              | OpenModelica instead                                                                                       |
 | `model/`     | `flat_model`, `syntax_tree`: the data structure; `traversal`; `evaluate`, `arithmetic`: evaluation in      |
 |              | Python                                                                                                     |
 | `causality/` | `continuous_states`: replace der(x) by a variable; `dependent_states`: derivatives of other variables;     |
@@ -20,6 +21,8 @@ The package rumoca parses, checks and flattens a model. The order of computation
 | `c_code/`    | `emit`: the files; `model_code`: model.c; `hybrid_code`: model.c with event iteration; `header`: model.h;  |
 |              | `model_step`: clock ticks and integration; `functions`, `statements`, `expressions`, `subscripts`,         |
 |              | `builtin_functions`, `lowering`, `c_values`, `formatting`: parts of model.c                                |
+| `external/`  | `sources`: C files of external functions; `calls`: C functions that call them; `library`: evaluation in     |
+|              | Python; `external.c`: errors, messages, Strings and external objects                                       |
 | (here)       | `assemble`: a Modelica file to a block, with the FMI variables                                             |
 
 Sampled models, in a communication step from t to t + h:

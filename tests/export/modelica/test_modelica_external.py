@@ -7,6 +7,8 @@ import os
 
 import numpy as np
 import pytest
+from fmpy import extract, read_model_description
+from fmpy.fmi2 import FMU2Slave
 
 from cosim.core.errors import ComponentError, InputError
 from cosim.export.fmu.package import write_fmu
@@ -35,6 +37,7 @@ void split(double x, double *sign_of, int *whole, int *is_large)
 double checked_root(double x)
 {
     if (x < 0) ModelicaFormatError("the argument %g is negative\\n", x);
+    if (x > 10) ModelicaFormatWarning("the argument %g is large", x);
     return sqrt(x);
 }
 """
@@ -61,6 +64,11 @@ MODEL = """model M "Functions in C"
     output Real y;
   external "C" y = cube(x) annotation(Include="static double cube(double x) { return x * x * x; }");
   end cube;
+  pure function half
+    input Real x;
+    output Real y;
+  external "C" y = half(x) annotation(Library="halves", LibraryDirectory="c");
+  end half;
   input Real u;
   output Real y;
   output Real s;
@@ -68,7 +76,7 @@ MODEL = """model M "Functions in C"
   output Boolean large;
   output Real r;
 equation
-  y = mean({u, 2*u, 1}) + cube(u);
+  y = mean({u, 2*u, 1}) + cube(u) + half(0);
   (s, n, large) = split(u);
   r = root(u + 3);
 end M;
@@ -81,9 +89,12 @@ def signals(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     (tmp_path / "signals.h").write_text(HEADER)
     (tmp_path / "signals.c").write_text(SOURCE)
+    (tmp_path / "c").mkdir()
+    (tmp_path / "c" / "halves.c").write_text("double half(double x) { return x / 2; }\n")
 
 
-def test_functions_in_c_give_the_same_results_in_the_fmu_and_in_the_interpreter(signals, compile_both):
+@pytest.mark.usefixtures("signals")
+def test_functions_in_c_give_the_same_results_in_the_fmu_and_in_the_interpreter(compile_both):
     model = compile_both(MODEL)
     for _ in model.simulate(50):
         pass
@@ -93,7 +104,8 @@ def test_functions_in_c_give_the_same_results_in_the_fmu_and_in_the_interpreter(
     assert model.get("y") == (-1.5 - 3.0 + 1.0) / 3 + (-1.5 * -1.5) * -1.5
 
 
-def test_modelica_error_ends_the_step_with_its_text(signals, compile_both):
+@pytest.mark.usefixtures("signals")
+def test_modelica_error_ends_the_step_with_its_text(compile_both):
     model = compile_both(MODEL)
     model.initialize()
     model.set(u=-7)
@@ -101,6 +113,21 @@ def test_modelica_error_ends_the_step_with_its_text(signals, compile_both):
     assert model.c.step(0.0, 0.01) == reason
     with pytest.raises(ComponentError, match="the argument -4 is negative"):
         model.python.step(0.0, 0.01)
+
+
+@pytest.mark.usefixtures("signals")
+def test_modelica_warning_is_written_to_the_log_of_the_fmu(tmp_path, write_model, capfd):
+    fmu = write_fmu(load_block(write_model(MODEL)), 2, tmp_path / "M.fmu")
+    description, folder = read_model_description(str(fmu)), extract(str(fmu), tmp_path / "unpacked")
+    instance = FMU2Slave(guid=description.guid, unzipDirectory=folder, modelIdentifier="M", instanceName="m")
+    instance.instantiate(loggingOn=True)
+    instance.setupExperiment()
+    instance.enterInitializationMode()
+    instance.exitInitializationMode()
+    instance.setReal([next(v.valueReference for v in description.modelVariables if v.name == "u")], [12.0])
+    instance.doStep(0.0, 0.01)
+    instance.freeInstance()
+    assert "[WARNING] the argument 15 is large" in capfd.readouterr().out
 
 
 TABLE = """package Tables
@@ -184,7 +211,8 @@ def tables(tmp_path, monkeypatch):
     (folder / "Resources" / "C-Sources" / "tables.c").write_text(TABLE_SOURCE)
 
 
-def test_an_external_object_follows_its_parameters_and_is_constructed_again_for_a_restored_state(tables, compile_both):
+@pytest.mark.usefixtures("tables")
+def test_an_external_object_follows_its_parameters_and_is_constructed_again_for_a_restored_state(compile_both):
     model = compile_both(TABLE_MODEL)
     for _ in model.simulate(3):
         pass
@@ -206,6 +234,7 @@ def test_an_external_object_follows_its_parameters_and_is_constructed_again_for_
     assert "the first value is negative" in (model.c.step(3.0, 0.01) or "")
 
 
+@pytest.mark.usefixtures("signals")
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -214,11 +243,12 @@ def test_an_external_object_follows_its_parameters_and_is_constructed_again_for_
         (("mean(u, size(u, 1))", "mean(u, 2 * size(u, 1))"), "M.mo:2: mean: an argument of a C function must be a variable"),
     ],
 )
-def test_a_faulty_declaration_is_refused(signals, write_model, change, message):
+def test_a_faulty_declaration_is_refused(write_model, change, message):
     with pytest.raises(InputError, match=message):
         load_block(write_model(MODEL.replace(*change)))
 
 
+@pytest.mark.usefixtures("signals")
 @pytest.mark.parametrize(
     ("change", "message"),
     [
@@ -226,13 +256,13 @@ def test_a_faulty_declaration_is_refused(signals, write_model, change, message):
         (("checked_root(x)", "checked_rot(x)"), "implicit declaration|undefined reference.*checked_rot"),
     ],
 )
-def test_code_that_does_not_compile_is_refused_with_the_place(signals, tmp_path, write_model, change, message):
+def test_code_that_does_not_compile_is_refused_with_the_place(tmp_path, write_model, change, message):
     with pytest.raises(InputError, match=message):
         write_fmu(load_block(write_model(MODEL.replace(*change))), 2, tmp_path / "M.fmu")
 
 
 @pytest.mark.skipif(not os.environ.get("MODELICAPATH"), reason="needs the Modelica Standard Library in MODELICAPATH")
-def test_tables_of_the_standard_library(write_model, compile_both):
+def test_tables_of_the_standard_library(compile_both):
     model = compile_both("""model T
   input Real u;
   output Real y;

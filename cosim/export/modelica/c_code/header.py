@@ -138,8 +138,8 @@ class HeaderWriter:
 
 
 def has_messages(model: Model) -> bool:
-    """Return whether a model has messages that are composed at run time, or warnings."""
-    return bool(composed_asserts(_asserts(model)))
+    """Return whether a model has messages that are composed at run time, warnings, or external functions that may log them."""
+    return bool(composed_asserts(_asserts(model))) or any(f.external for f in model.functions.values())
 
 
 def _asserts(model: Model) -> tuple[Any, ...]:

@@ -73,7 +73,7 @@ class ModelCode:
         reason = "m->failure == COMPOSED_REASON ? m->reason : REASONS[m->failure]" if self.has_messages else "REASONS[m->failure]"
         if not self.functions.external_functions:
             return text.replace("return REASONS[m->failure];", f"return {reason};")
-        text = text.replace("return REASONS[m->failure];", f"return external_reason({reason});")
+        text = text.replace("return REASONS[m->failure];", f"return external_reason({reason}, m->warning, sizeof m->warning);")
         return f'#include "external_calls.h"\n{text}'
 
     def headers(self) -> list[str]:

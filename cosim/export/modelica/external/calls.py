@@ -82,7 +82,9 @@ def _argument(node: Expression, variables: dict[str, FunctionVariable], outputs:
         return Argument(node.type, False, False)
     if isinstance(node, Builtin) and node.name == "size":
         return Argument("Integer", False, False)
-    raise_model_error(f"{function.name}: an argument of a C function must be a variable, a literal or a size()", function.where)
+    return raise_model_error(
+        f"{function.name}: an argument of a C function must be a variable, a literal or a size()", function.where
+    )
 
 
 def declarations(functions: Iterable[Function]) -> str:

@@ -12,7 +12,8 @@
 /* ---- errors and messages --------------------------------------------------------------------------------------------- */
 
 static _Thread_local jmp_buf *current_frame;
-static _Thread_local char error_text[1024];
+static _Thread_local char error_text[512];
+static _Thread_local char messages[512]; /* and warnings, since the last step */
 
 jmp_buf *external_frame(jmp_buf *frame)
 {
@@ -22,12 +23,21 @@ jmp_buf *external_frame(jmp_buf *frame)
 }
 
 
+/* Appends a text of one line to a buffer; several texts are separated by "; ". */
+static void append(char *buffer, size_t size, const char *format, va_list arguments)
+{
+    size_t length = strlen(buffer);
+    if (length > 0 && length + 2 < size) length += (size_t)snprintf(buffer + length, size - length, "; ");
+    vsnprintf(buffer + length, size - length, format, arguments);
+    for (size_t end = strlen(buffer); end > 0 && buffer[end - 1] == '\n'; end--) buffer[end - 1] = '\0';
+    for (char *c = buffer; *c != '\0'; c++)
+        if (*c == '\n') *c = ' ';
+}
+
 void ModelicaVFormatError(const char *format, va_list arguments)
 {
-    vsnprintf(error_text, sizeof error_text, format, arguments);
-    for (size_t end = strlen(error_text); end > 0 && error_text[end - 1] == '\n'; end--) error_text[end - 1] = '\0';
-    for (char *c = error_text; *c != '\0'; c++)
-        if (*c == '\n') *c = ' ';
+    error_text[0] = '\0';
+    append(error_text, sizeof error_text, format, arguments);
     if (current_frame == NULL) abort();
     longjmp(*current_frame, 1);
 }
@@ -41,8 +51,7 @@ void ModelicaFormatError(const char *format, ...)
 
 void ModelicaError(const char *text) { ModelicaFormatError("%s", text); }
 
-/* Messages and warnings go to the standard error: a model has no access to the log of the importer between its failures. */
-void ModelicaVFormatMessage(const char *format, va_list arguments) { vfprintf(stderr, format, arguments); }
+void ModelicaVFormatMessage(const char *format, va_list arguments) { append(messages, sizeof messages, format, arguments); }
 
 void ModelicaFormatMessage(const char *format, ...)
 {
@@ -107,9 +116,12 @@ static void free_strings(void)
     }
 }
 
-const char *external_reason(const char *reason)
+const char *external_reason(const char *reason, char *log, size_t size)
 {
     static _Thread_local char text[2 * sizeof error_text];
+    const size_t length = log == NULL ? 0 : strlen(log);
+    if (log != NULL && messages[0] != '\0') snprintf(log + length, size - length, "%s%s", length > 0 ? "; " : "", messages);
+    messages[0] = '\0';
     if (reason != NULL && error_text[0] != '\0') {
         snprintf(text, sizeof text, "%s: %s", reason, error_text);
         reason = text;

@@ -21,8 +21,9 @@
 /* Sets the place to which ModelicaError jumps; returns the previous one. */
 jmp_buf *external_frame(jmp_buf *frame);
 
-/* Ends a step of the model: returns the reason for its failure (or NULL) with the text of ModelicaError, and frees Strings. */
-const char *external_reason(const char *reason);
+/* Ends a step of a model: returns the reason for its failure (or NULL) with the text of ModelicaError, appends messages and
+ * warnings of external functions to `log` (unless it is NULL) and frees Strings. */
+const char *external_reason(const char *reason, char *log, size_t size);
 
 /* External objects
  *

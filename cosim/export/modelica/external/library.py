@@ -19,7 +19,6 @@ from ....results.files import writing_atomically
 from ...fmu.compiler import compile_library
 from ..model.arithmetic import EvaluationError
 from ..model.flat_model import Function
-from ..model.syntax_tree import ExternalCall
 from .calls import Argument, CallSignature, call_signature
 from .sources import external_files
 
@@ -58,12 +57,11 @@ class ExternalLibrary:
     _objects: dict[tuple[Any, ...], int] = field(default_factory=dict)
     _owner: int = field(default_factory=lambda: next(_owners))
 
-    def call(self, function: Function, node: ExternalCall, inputs: Sequence[Any]) -> dict[int, Any]:
+    def call(self, function: Function, inputs: Sequence[Any]) -> dict[int, Any]:
         """Call the C function of an external function.
 
         Args:
             function: The external function.
-            node: Its call of the C function.
             inputs: Values of the arguments, those of the outputs included.
 
         Returns:
@@ -81,13 +79,13 @@ class ExternalLibrary:
         results = [(ctypes.c_uint64 if signature.is_constructor else _C_TYPES[signature.result])()] if signature.result else []
         arguments = [*self._arguments(signature, passed), *map(ctypes.byref, results)]
         if not getattr(self._library, signature.name)(*arguments):
-            text = self._library.external_reason(f"the external function {function.name} has failed".encode()).decode(
-                errors="replace"
-            )
-            raise EvaluationError(text, function.where)
+            reason = f"the external function {function.name} has failed".encode()
+            raise EvaluationError(self._library.external_reason(reason, None, 0).decode(errors="replace"), function.where)
         outputs = {k: _value(passed[k]) for k, argument in enumerate(signature.arguments) if argument.is_output}
         for result in results:
-            outputs[-1] = result.value.decode(errors="replace") if signature.result == "String" else result.value
+            outputs[-1] = (
+                result.value.decode(errors="replace") if isinstance(result, ctypes.c_char_p) and result.value else result.value
+            )
         if signature.is_constructor:
             self._objects[key] = outputs[-1]
         return outputs
@@ -122,6 +120,7 @@ class ExternalLibrary:
         library = ctypes.CDLL(str(target))
         library.external_object.restype = ctypes.c_void_p
         library.external_reason.restype = ctypes.c_char_p
+        library.external_reason.argtypes = [ctypes.c_char_p, ctypes.c_void_p, ctypes.c_size_t]
         for function in self.functions.values():
             getattr(library, call_signature(function).name).restype = ctypes.c_bool
         return library

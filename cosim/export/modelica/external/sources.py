@@ -48,10 +48,10 @@ def external_files(functions: Iterable[Function], packages: Mapping[str, Path]) 
 
 def _add_files(function: Function, packages: Mapping[str, Path], files: dict[str, str]) -> None:
     assert function.external
-    folders = _include_folders(function, packages)
+    folders = _folders(function, packages)
     pending = _INCLUDE.findall(function.external.include)
     required = set(pending)
-    pending += [f"{library}.h" for library in function.external.libraries]
+    pending += [f"{library}{suffix}" for library in function.external.libraries for suffix in (".h", ".c")]
     while pending:
         name = pending.pop()
         if Path(name).name in files:
@@ -77,16 +77,14 @@ def _implementations(header: Path) -> list[Path]:
     return [path for path in candidates if header.suffix == ".h" and path.is_file()]
 
 
-def _include_folders(function: Function, packages: Mapping[str, Path]) -> Sequence[Path]:
-    """Return the folders of the headers of an external function: that of its annotation, else those of its file's package."""
+def _folders(function: Function, packages: Mapping[str, Path]) -> Sequence[Path]:
+    """Return the folders of the C files of an external function: those of its annotations, else those of its file's package."""
     assert function.external
-    folder = function.where.path.parent if function.where else Path()
-    if given := function.external.include_directory:
-        uri = _URI.match(given)
-        if uri and uri[1] not in packages:
-            raise_model_error(f'{function.name}: unknown package in "{given}"', function.where)
-        return [packages[uri[1]] / uri[2] if uri else folder / given]
-    return [
-        folder,
-        *(parent / name for parent in (folder, *folder.parents) for name in _DEFAULT_FOLDERS if (parent / name).is_dir()),
-    ]
+    own = function.where.path.parent if function.where else Path()
+    given = [text for text in (function.external.include_directory, function.external.library_directory) if text]
+    for text in given:
+        if (uri := _URI.match(text)) and uri[1] not in packages:
+            raise_model_error(f'{function.name}: unknown package in "{text}"', function.where)
+    annotated = [packages[uri[1]] / uri[2] if (uri := _URI.match(text)) else own / text for text in given]
+    defaults = (parent / name for parent in (own, *own.parents) for name in _DEFAULT_FOLDERS)
+    return annotated or [own, *(folder for folder in defaults if folder.is_dir())]

@@ -29,7 +29,11 @@ MAX_SOURCE_SIZE = 1 << 24
 _WITHIN = re.compile(r"^\s*within\s+([\w.]+)\s*;", re.MULTILINE)
 _QUOTED = re.compile(r"['`]([\w.]+)['`]")
 _CLASS = r"^[^/\n]*\b(?:model|block|class|function|package|record|connector|type)\s+{}\b"
-_PHASE = re.compile(r"^\w+ failed: \S+ failed in \w+: |^parse error: ")
+#: beginnings of messages that name a part of the front end
+_PHASE = re.compile(
+    r"^(?:parse error: |\w+ failed: \S+ failed in \w+: (?:unsupported Flat semantic owner `[^`]*`: |"
+    r"unsupported runtime operator `\w+`: |canonical DAE construction rejected an invalid operation: )?)"
+)
 _COUNTS = re.compile(r"; unknowns\[.*$")
 _NOT_FOUND = " could not be compiled because resolve/parse failed"
 _LOCATION_SUFFIX = re.compile(r"\[(?P<file>[^\[\]]+):(?P<line>\d+):\d+\]$")
@@ -193,7 +197,7 @@ def _to_problems(error: str, panicked: bool, name: str, path: Path, sources: Mod
     if panic := _PANIC.search(error):
         return [Problem(panic["what"], str(sources.locate({key: int(panic[key]) for key in ("source", "start")}) or path))]
     lines = [line.rpartition("[Resolve]:")[2].strip(" -") for line in error.splitlines()]
-    reasons = [_shorten(line) for line in dict.fromkeys(lines) if line and not line.startswith("Related failures")]
+    reasons = [line for line in dict.fromkeys(lines) if line and not line.startswith("Related failures")]
     if any(line.startswith("unresolved extends base class") for line in reasons):
         reasons = [line for line in reasons if not line.startswith("base class not found")]
     if [line for line in reasons if not line.endswith(_NOT_FOUND)] == []:
@@ -213,8 +217,8 @@ def _locate_problem(reason: str, name: str, path: Path, sources: ModelicaSources
     """Add a location to a reason: the one at its end, else the first line with a name that it quotes, else that of the model."""
     if ending := _LOCATION_SUFFIX.search(reason):
         where = SourceLocation(sources.find(ending["file"]) or path, int(ending["line"]))
-        return Problem(reason[: ending.start()].rstrip(), str(where))
-    return Problem(reason, str(_find_quoted_name(reason, sources) or sources.locate_class(name)))
+        return Problem(_shorten(reason[: ending.start()].rstrip()), str(where))
+    return Problem(_shorten(reason), str(_find_quoted_name(reason, sources) or sources.locate_class(name)))
 
 
 def _find_quoted_name(reason: str, sources: ModelicaSources) -> SourceLocation | None:

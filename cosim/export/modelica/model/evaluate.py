@@ -227,10 +227,11 @@ class Evaluator:
     def call_external(self, function: Function) -> None:
         """Call the C function of an external function, with this scope as the one of the function."""
         (node,) = function.body
-        assert isinstance(node, syntax_tree.ExternalCall) and function.external
+        assert isinstance(node, syntax_tree.ExternalCall)
+        assert function.external
         if function.external.library is None:
             return
-        results = function.external.library.call(function, node, [self(argument) for argument in node.arguments])
+        results = function.external.library.call(function, [self(argument) for argument in node.arguments])
         for k, value in results.items():
             target = node.result if k < 0 else node.arguments[k]
             assert isinstance(target, syntax_tree.Name)

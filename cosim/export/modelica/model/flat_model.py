@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any, Protocol
 from typing import Literal as OneOf
 
-from .syntax_tree import Assert, Binary, Body, Expression, ExternalCall, SourceLocation, When
+from .syntax_tree import Assert, Binary, Body, Expression, SourceLocation, When
 
 
 @dataclass(frozen=True, slots=True)
@@ -67,7 +67,7 @@ class FunctionVariable:
 class CallableLibrary(Protocol):
     """External functions that can be called."""
 
-    def call(self, function: Function, node: ExternalCall, inputs: Sequence[Any]) -> dict[int, Any]:
+    def call(self, function: Function, inputs: Sequence[Any]) -> dict[int, Any]:
         """Return the outputs of a C function by the numbers of the arguments; the result has the number -1."""
 
 
