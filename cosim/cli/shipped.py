@@ -22,11 +22,13 @@ class Entry:
         name: name by which commands and scenarios refer to it.
         description: one line.
         file: file that defines it; that of a model describes it.
+        arguments: of a KPI: names, types and defaults of the arguments that a scenario gives.
     """
 
     name: str
     description: str
     file: str
+    arguments: str = ""
 
 
 def _list_documents(pattern: str) -> Iterator[Entry]:
@@ -51,7 +53,8 @@ def _list_kpis() -> Iterator[Entry]:
         for node in ast.parse(path.read_text(encoding="utf-8")).body:
             if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
                 text = (ast.get_docstring(node) or "").partition("\n")[0]
-                yield Entry(f"{name}:{node.name}", text, str(path))
+                arguments = ast.unparse(node.args).partition(", ")[2]  # without the result
+                yield Entry(f"{name}:{node.name}", text, str(path), arguments.replace("'", '"'))
 
 
 def _kpi_files() -> dict[str, Path]:

@@ -67,7 +67,15 @@ def _remove_orphans(manifest: dict[str, Any], sources: Sequence[Source], root: P
             (root / fmu).unlink(missing_ok=True)
 
 
-def build_to(source: Path, model: str | None, target: Path, fmi_version: int = 2, include: Sequence[Path] = ()) -> Path:
+def build_to(
+    source: Path,
+    model: str | None,
+    target: Path,
+    fmi_version: int = 2,
+    *,
+    include: Sequence[Path] = (),
+    library_path: Sequence[Path] = (),
+) -> Path:
     """Export one source file to one FMU.
 
     Args:
@@ -76,6 +84,7 @@ def build_to(source: Path, model: str | None, target: Path, fmi_version: int = 2
         target: The FMU to write.
         fmi_version: 2 or 3.
         include: Further files of the FMU of a Python source, see `write_python_fmu`.
+        library_path: Folders of Modelica libraries, which are searched before those of MODELICAPATH.
 
     Returns:
         `target`.
@@ -87,7 +96,7 @@ def build_to(source: Path, model: str | None, target: Path, fmi_version: int = 2
     if fmi_version not in classified.fmi_versions:
         raise InputError(Problem(f"a {classified.kind.name} cannot be exported as FMI {fmi_version}.0", str(source)))
     if not include:
-        export_source(classified, {fmi_version: target}, model)
+        export_source(classified, {fmi_version: target}, model, library_path)
     elif classified.kind.package == "pythonfmu":
         write_python_fmu(classified.path, target, include)
     else:
@@ -95,25 +104,34 @@ def build_to(source: Path, model: str | None, target: Path, fmi_version: int = 2
     return target
 
 
-def cached_fmu(source: Path, model: str | None) -> Path:
+def cached_fmu(source: Path, model: str | None, library_path: Sequence[Path] = ()) -> Path:
     """Return the FMI 2.0 FMU of a Modelica model from the user's cache.
 
-    The FMU is built if the model, the Modelica files beside it, the exporter or the tools have changed since the last build.
+    The FMU is built if the model, the Modelica files beside it, a library that it uses, the exporter or the tools have changed
+    since the last build.
 
     Args:
         source: The Modelica file.
         model: Name of the model. None selects the model with the name of the file.
+        library_path: Folders of Modelica libraries, which are searched before those of MODELICAPATH.
 
     Raises:
         InputError: The model cannot be exported, or the cache cannot be written.
         OutputError: The disk is full or defective.
     """
+    from .modelica.frontend.libraries import find_libraries, library_folders
+
     classified = classify_source(source, model)
     files = sorted(source.resolve().parent.rglob("*.mo"))
     exporter = sorted(path for path in Path(__file__).parent.rglob("*") if path.suffix in (".py", ".c", ".h"))
     contents = [(str(path), file_hash(path)) for path in [*files, *exporter]]
+    contents += [(str(library.path), library.digest) for library in find_libraries([source], library_folders(library_path), ())]
     key = sha256(json.dumps([str(source.resolve()), model, tool_versions(classified), contents]).encode())
-    return cached_file(key.hexdigest()[:24], f"{classified.name}.fmu", lambda target: build_to(source, model, target))
+    return cached_file(
+        key.hexdigest()[:24],
+        f"{classified.name}.fmu",
+        lambda target: build_to(source, model, target, library_path=library_path),
+    )
 
 
 def fmu_files(source: Source, root: Path) -> dict[int, Path]:
@@ -131,7 +149,8 @@ def _select_sources(sources: Sequence[Path] | None, root: Path) -> list[Source]:
     for path in files:
         if path.resolve() not in known:
             patterns = ", ".join(kind.pattern for kind in SOURCE_KINDS)
-            problems.append(Problem(f"is not a source of an FMU ({patterns}){did_you_mean(str(path), known_names)}", str(path)))
+            text = f"is not a source of an FMU of cosim ({patterns}){did_you_mean(str(path), known_names)}"
+            problems.append(Problem(f"{text}; --output FILE.fmu exports a source of your own", str(path)))
     if problems:
         raise InputError(problems)
     return [known[path.resolve()] for path in files]

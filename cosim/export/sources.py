@@ -28,8 +28,9 @@ class SourceKind:
     pattern: str
     #: distribution package that the exporter needs
     package: str
-    #: read a source file (and the named model in it) as a block, which is exported for FMI 2.0 and 3.0
-    load_block: Callable[[Path, str | None], Block] | None
+    #: read a source file (and the named model in it) as a block, which is exported for FMI 2.0 and 3.0; the last argument are
+    #: folders of libraries
+    load_block: Callable[[Path, str | None, Sequence[Path]], Block] | None
     #: folder of the FMUs below `fmus/`
     folder: str = ""
     #: write the FMI 2.0 FMU of a source file and return the files that it was made from
@@ -57,13 +58,13 @@ class Source:
         return (2, 3) if self.kind.load_block else (2,)
 
 
-def _load_modelica(path: Path, model: str | None) -> Block:
+def _load_modelica(path: Path, model: str | None, library_path: Sequence[Path]) -> Block:
     from .modelica import load_block
 
-    return load_block(path, model)
+    return load_block(path, model, library_path)
 
 
-def _load_equations(path: Path, _model: str | None) -> Block:
+def _load_equations(path: Path, _model: str | None, _library_path: Sequence[Path]) -> Block:
     from ..components.python_import import load_object
 
     create_block: Callable[[], Block] = load_object(f"{path.name}:block", path.parent)
@@ -140,13 +141,16 @@ def snake_case(name: str) -> str:
     return re.sub(r"(?<=[a-z0-9])(?=[A-Z])|(?<=[A-Z])(?=[A-Z][a-z])", "_", name).lower()
 
 
-def export_source(source: Source, targets: Mapping[int, Path], model: str | None = None) -> list[Path]:
+def export_source(
+    source: Source, targets: Mapping[int, Path], model: str | None = None, library_path: Sequence[Path] = ()
+) -> list[Path]:
     """Export a source to one FMU per FMI version.
 
     Args:
         source: The source.
         targets: The FMU to write for each FMI version.
         model: Name of the Modelica model. None selects the model with the name of the file.
+        library_path: Folders of Modelica libraries, which are searched before those of MODELICAPATH.
 
     Returns:
         All files that the FMUs were made from.
@@ -158,7 +162,7 @@ def export_source(source: Source, targets: Mapping[int, Path], model: str | None
     if source.kind.load_block is None:
         assert source.kind.write_fmi2 is not None
         return source.kind.write_fmi2(source.path, targets[2])
-    block = replace(source.kind.load_block(source.path, model), identifier=source.name)
+    block = replace(source.kind.load_block(source.path, model, library_path), identifier=source.name)
     for fmi_version, target in targets.items():
         write_fmu(block, fmi_version, target)
     return [*with_imported_siblings(source.path), *block.resources.values()]

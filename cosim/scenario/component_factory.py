@@ -12,8 +12,8 @@ from ..core.errors import InputError
 from ..core.paths import is_file, resolve_path
 from ..export.foreign.source_fmus import usable_fmu
 from ..process.journal import calling_component
+from .component_schema import ComponentSpec
 from .nested_systems import Node
-from .schema import ComponentSpec
 
 
 class ComponentFactory:
@@ -45,7 +45,7 @@ class ComponentFactory:
         spec, full_name = node.spec.components[name], node.full_name(name)
         if spec.python is not None:
             return self._load_python(node, name, spec, full_name)
-        path = self._build_modelica(node.folder, spec.modelica or "") if spec.fmu is None else node.folder / spec.fmu
+        path = self._build_modelica(node.folder, spec) if spec.fmu is None else node.folder / spec.fmu
         solver = SolverSettings(spec.solver.method, spec.solver.step_size) if spec.solver else None
         settings = InstanceSettings(spec.tolerance, solver)
         interface = settings.interface
@@ -73,14 +73,15 @@ class ComponentFactory:
             self.python_files.append(node.folder / spec.python.rpartition(":")[0])
             return load_component(spec.python, node.folder, full_name, spec.arguments)
 
-    def _build_modelica(self, folder: Path, reference: str) -> Path:
+    def _build_modelica(self, folder: Path, spec: ComponentSpec) -> Path:
         """Return the FMU of "file.mo:Model", from the user's cache if source and tools are unchanged."""
         from ..export.build import cached_fmu
 
+        reference = spec.modelica or ""
         file, _, model = reference.rpartition(":")
         if not file.endswith(".mo"):
             raise InputError(f'expected "file.mo:Model", found "{reference}"')
         if not is_file(folder / file):
             raise InputError(f'file "{file}" does not exist')
         self.modelica_files.append(folder / file)
-        return cached_fmu(folder / file, model)
+        return cached_fmu(folder / file, model, [folder / library for library in spec.libraries])

@@ -18,9 +18,10 @@ from typing import Any
 from ..core import paths
 from ..core.errors import InputError, Problem, did_you_mean
 from ..core.size_limits import MAX_LEVELS
+from .component_schema import SOURCES
 from .file_paths import change_paths, find_scenario, relocating
 from .json_document import Document, JsonPath, Origin, read_document
-from .schema import KEYED_LISTS, NOT_INHERITED, SOURCES
+from .schema import KEYED_LISTS, NOT_INHERITED
 
 
 def read_system_document(file: Path) -> Document:

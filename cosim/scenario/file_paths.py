@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Callable, Mapping
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeGuard
 
 from ..core import paths, resources
 from ..core.errors import InputError, did_you_mean
@@ -17,7 +17,7 @@ PathChange = Callable[[str], str]
 #: keys of a scenario with lists or objects of entries that name files, and keys with one such entry
 _ENTRIES, _ENTRY = ("components", "inputs", "kpis", "figures"), ("scene", "reference")
 #: keys of an entry that hold a path, and keys that hold a reference such as "file.py:Class"
-_PATH_KEYS, _REFERENCE_KEYS = ("fmu", "system", "file"), ("python", "modelica")
+_PATH_KEYS, _PATH_LIST_KEYS, _REFERENCE_KEYS = ("fmu", "system", "file"), ("libraries",), ("python", "modelica")
 
 
 def find_scenario(scenario: str | Path) -> Path:
@@ -67,7 +67,12 @@ def _change_entry(entry: Any, change: PathChange) -> Any:
         return entry
     paths = {key: change(text) for key in _PATH_KEYS if isinstance(text := entry.get(key), str)}
     references = {key: change_reference(text, change) for key in _REFERENCE_KEYS if isinstance(text := entry.get(key), str)}
-    return {**entry, **paths, **references}
+    lists = {key: list(map(change, each)) for key in _PATH_LIST_KEYS if _is_list_of_texts(each := entry.get(key))}
+    return {**entry, **paths, **references, **lists}
+
+
+def _is_list_of_texts(value: Any) -> TypeGuard[list[str]]:
+    return isinstance(value, list) and all(isinstance(each, str) for each in value)
 
 
 def change_pointed(pointer: str, value: Any, change: PathChange) -> Any:

@@ -93,15 +93,18 @@ class Regression:
         return replace(outcome, summary="; ".join(filter(None, (outcome.summary, run.result.termination))))
 
     def _compare(self, run: _FinishedRun) -> RegressionOutcome:
-        failed, summary = run.failed_checks(), count_noun(len(run.checks), "check")
+        failed = run.failed_checks()
+        summary = _count_failures(len(run.failed_checks(checks_only=True)), len(run.checks), "check")
+        tubes = self.directory / "tubes.png"
+        tubes.unlink(missing_ok=True)
         if run.scenario.get("reference"):
             comparison = run.compare()
-            summary += f", {count_noun(len(comparison.verdicts), 'signal')}"
+            summary += f", {_count_failures(len(comparison.failures), len(comparison.verdicts), 'signal')}"
             if not comparison.passed:
                 failed += [
                     *str(comparison).splitlines(),
                     *run.reference_changes(),
-                    f"see {run.draw_tubes(comparison, self.directory)}",
+                    f"see {run.draw_tubes(comparison, tubes)}",
                 ]
         return RegressionOutcome(self.file.stem, 3 if failed else 0, summary, tuple(failed))
 
@@ -114,6 +117,10 @@ class Regression:
         size = run.reference_path.stat().st_size / 1000
         amount = f"{count_noun(len(written), 'signal')}, {count_noun(len(written.time), 'row')}"
         return RegressionOutcome(self.file.stem, 0, f"{amount}, {size:.0f} kB in {run.reference_path}")
+
+
+def _count_failures(failed: int, number: int, noun: str) -> str:
+    return f"{failed} of {count_noun(number, noun)} failed" if failed else count_noun(number, noun)
 
 
 @dataclass(frozen=True)
@@ -136,11 +143,12 @@ class _FinishedRun:
         checks: list[dict[str, Any]] = self.scenario.get("checks", [])
         return checks
 
-    def failed_checks(self) -> list[str]:
+    def failed_checks(self, checks_only: bool = False) -> list[str]:
+        """Return the checks that are not met, after the crash that ended the run early (unless `checks_only`)."""
         from ..results.checks import evaluate_all_checks
 
         kpis = {name: math.nan if value is None else value for name, value in self.result.kpis.items()}
-        crash = [self.result.termination] if self.result.crashed else []
+        crash = [self.result.termination] if self.result.crashed and not checks_only else []
         return crash + [str(outcome) for outcome in evaluate_all_checks(kpis, self.checks) if not outcome.passed]
 
     @property
@@ -177,12 +185,11 @@ class _FinishedRun:
         if changes := describe_provenance_changes(made_by, self.result.metadata):
             yield f"changed since the reference was made: {', '.join(changes)}"
 
-    def draw_tubes(self, comparison: Comparison, directory: Path) -> Path:
-        """Draw the worst signals in their tubes to a file in `directory` and return its path."""
+    def draw_tubes(self, comparison: Comparison, path: Path) -> Path:
+        """Draw the worst signals in their tubes to a file and return its path."""
         from ..report.comparison_figure import draw_tubes
         from ..report.figures import draw_figure, save_figure
 
         arguments = {"reference": self.reference, "tolerances": self.tolerances, "comparison": comparison}
-        path = directory / "tubes.png"
         save_figure(draw_figure(self.result, "tubes", draw_tubes, arguments), path)
         return path

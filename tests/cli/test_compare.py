@@ -36,7 +36,7 @@ def test_a_signal_outside_its_tube_gives_exit_code_3_and_the_time(tmp_path):
     done = cosim("compare", csv(tmp_path / "a.csv", offset=0.2), csv(tmp_path / "b.csv"), "--absolute", "0.1")
     assert done.returncode == 3
     assert done.stderr.splitlines()[0] == "1 of 1 signal failed"
-    assert done.stderr.splitlines()[1].startswith("plant.x leaves its tube at t = 0 s: 0.2 is 0.1 above 0.1;")
+    assert done.stderr.splitlines()[1].startswith("plant.x leaves its tube at t = 0 s: 0.2 is 0.1 above its limit 0.1;")
 
 
 @pytest.mark.parametrize(("time", "code"), [("0.2", 0), ("0.05", 3)])

@@ -25,7 +25,7 @@ def test_a_shipped_file_can_be_run(file):
         study, settings = sweep.study, next(iter(sweep.design)).settings
         assert sweep.criteria
     assert str(study.bundle.scenario) in study.bundle.files
-    prepared = load(study.study_file.scenario, study.job(settings).settings)
+    prepared = load(study.study_file.scenario, study.job(settings).settings, settings_folder=study.study_file.scenario.parent)
     assert prepared.kpis()
     prepared.free()
 

@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("sources", nargs=-1, type=click.Path(path_type=Path))
-@click.option("--check", is_flag=True, help="Build nothing; check that fmus/ is up to date with its sources.")
+@click.option("--check", is_flag=True, help="Build nothing; check that the fmus/ of cosim are up to date.")
 @click.option("--output", type=click.Path(path_type=Path), help="Export a single source, in any folder, to this FMI 2.0 FMU.")
 @click.option(
     "--modelica-compiler",
@@ -30,8 +30,20 @@ if TYPE_CHECKING:
     help="File or folder that the Python class reads at run time, for --output; repeatable. The class finds it below "
     "`self.resources` or beside its own file.",
 )
+@click.option(
+    "--library",
+    type=click.Path(path_type=Path),
+    multiple=True,
+    metavar="DIR",
+    help="Folder of Modelica libraries for --output, searched before those of MODELICAPATH; repeatable.",
+)
 def command(
-    sources: tuple[Path, ...], check: bool, output: Path | None, modelica_compiler: str, include: tuple[Path, ...]
+    sources: tuple[Path, ...],
+    check: bool,
+    output: Path | None,
+    modelica_compiler: str,
+    include: tuple[Path, ...],
+    library: tuple[Path, ...],
 ) -> int:
     """Export controllers and plants to fmus/.
 
@@ -40,8 +52,8 @@ def command(
     --modelica-compiler omc exports models that need the Modelica Standard Library or features that cosim's own compiler lacks;
     OpenModelica must be installed (this was written from its documentation and not tried with it).
 
-    Requires a C compiler and the extra "build". --check compares the hashes of all sources with the manifest, and the behaviour
-    of newly built FMUs with those in fmus/ (exit code 3 if they differ).
+    Requires a C compiler and the extra "build". --check is for changes of cosim itself: it compares the hashes of all sources
+    with the manifest, and the behaviour of newly built FMUs with those in fmus/ (exit code 3 if they differ).
     """
     from ...core import resources
     from ...export.build import build
@@ -49,12 +61,16 @@ def command(
 
     root = resources.root()
     if check:
+        if sources or output:
+            raise InputError(
+                "--check compares all FMUs that belong to cosim with their sources and takes no SOURCES and no --output"
+            )
         if problems := check_fmus(root):
             raise CheckError("\n".join(map(str, problems)))
         click.echo("every FMU is up to date with its source")
         return 0
     if output is not None:
-        _build_one(sources, output, modelica_compiler, include)
+        _build_one(sources, output, modelica_compiler, include, library)
     elif include:
         raise InputError("--include requires --output: the FMUs in fmus/ contain the files that their sources import")
     elif modelica_compiler != "cosim":
@@ -64,7 +80,9 @@ def command(
     return 0
 
 
-def _build_one(sources: tuple[Path, ...], output: Path, modelica_compiler: str, include: tuple[Path, ...]) -> None:
+def _build_one(
+    sources: tuple[Path, ...], output: Path, modelica_compiler: str, include: tuple[Path, ...], library: tuple[Path, ...]
+) -> None:
     from ...export.build import build_to
     from ...export.modelica.frontend.openmodelica import export_with_omc
 
@@ -75,7 +93,7 @@ def _build_one(sources: tuple[Path, ...], output: Path, modelica_compiler: str, 
     if modelica_compiler == "omc":
         export_with_omc(sources[0], output)
     else:
-        build_to(sources[0], None, output, include=include)
+        build_to(sources[0], None, output, include=include, library_path=library)
     click.echo(f"{sources[0]} -> {output}")
 
 

@@ -135,6 +135,23 @@ def _tool_findings() -> Iterator[Finding]:
     except (InputError, OSError) as error:
         yield Finding("tools", "C compiler", str(error), "missing")
     yield _program_finding("OpenModelica", "omc", "--version")
+    yield from _library_findings()
+
+
+def _library_findings() -> Iterator[Finding]:
+    """Yield the Modelica libraries of MODELICAPATH."""
+    from ...export.modelica.frontend.libraries import libraries_in, library_folders
+
+    title, folders = "Modelica libraries", library_folders([])
+    if not folders:
+        yield Finding("tools", title, "MODELICAPATH is not set", "missing")
+    for folder in folders:
+        try:
+            found = ", ".join(map(str, libraries_in([folder])))
+        except InputError as error:
+            yield Finding("tools", title, f"MODELICAPATH: {error}", "missing")
+        else:
+            yield Finding("tools", title, f"{folder}: {found or 'none'}", "ok" if found else "missing")
 
 
 def _program_finding(name: str, program: str, option: str) -> Finding:

@@ -18,8 +18,11 @@ The source files define these functions:
         Advance from `time` by `step_size` with constant inputs. Afterwards the outputs of a continuous model belong to the
         new time; those of a sampled model were computed at the last tick in [time, time + step_size).
 
-The last two functions return NULL on success, else the reason for the failure (static text). It is logged, and the FMI
-function returns fmi2Error or fmi3Error. Functions that other programs load from the binary are marked `MODEL_EXPORT`
+If `model.h` defines MODEL_FREE, `void model_free(Model *m);` is called before the memory of a model is freed.
+
+The functions `model_initialize` and `model_step` return NULL on success, else the reason for the failure, a text that is valid
+until the next call. It is logged, and the FMI function returns fmi2Error or fmi3Error.
+Functions that other programs load from the binary are marked `MODEL_EXPORT`
 (defined in `export.h` of the shell).
 """
 

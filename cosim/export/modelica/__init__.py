@@ -4,17 +4,25 @@ The package rumoca parses, checks and flattens a model. The order of computation
 
 | Folder       | Modules                                                                                                    |
 | ------------ | ---------------------------------------------------------------------------------------------------------- |
-| `frontend/`  | `rumoca_frontend`: flatten a model with rumoca; `rumoca_client`, `rumoca_process`: run rumoca in a child   |
-|              | process; `reader` (`expression_reader`, `statement_reader`, `unrolling`): convert its JSON to the flat     |
-|              | model; `constants`: inline constants; `folded_branches`: reject models that rumoca simplifies wrongly;     |
-|              | `openmodelica`: export with OpenModelica instead                                                           |
+| `frontend/`  | `rumoca_frontend`: flatten a model with rumoca; `libraries`: find the libraries that it uses; `flat_cache`: |
+|              | keep flat models; `rumoca_client`, `rumoca_process`: run rumoca in a child process; `reader`               |
+|              | (`expression_reader`, `statement_reader`, `unrolling`): convert its JSON to the flat model; `constants`:   |
+|              | structural parameters and constants become literals; `folded_branches`: find the parameters with which     |
+|              | rumoca has selected equations; `strings`: String arguments become literals; `openmodelica`: export with    |
+|              | OpenModelica instead                                                                                       |
 | `model/`     | `flat_model`, `syntax_tree`: the data structure; `traversal`; `evaluate`, `arithmetic`: evaluation in      |
 |              | Python                                                                                                     |
-| `causality/` | `continuous_states`: replace der(x) by a variable; `matching`: which variable an equation defines;         |
-|              | `when_conditions`: clocks and edge detectors; `topological_sort`; `schedule`: the order of computation;    |
-|              | `parameter_roles`: which parameters can be set; `interpreter`: simulation of a model in Python             |
-| `c_code/`    | `emit`: model.c; `header`: model.h; `model_step`: clock ticks and integration; `functions`, `statements`,  |
-|              | `expressions`, `subscripts`, `builtin_functions`, `lowering`, `c_values`, `formatting`: parts of model.c   |
+| `causality/` | `continuous_states`: replace der(x) by a variable; `dependent_states`: derivatives of other variables;     |
+|              | `hybrid`: variables for pre(), relations and delay(); `continuous_equations`: solve the equations, with    |
+|              | `matching` if each has a variable alone on one side, else with `equation_systems` (`scalar_equations`,     |
+|              | `assignment`, `differentiation`); `when_conditions`: clocks and edge detectors; `topological_sort`;        |
+|              | `schedule`: the order of computation; `parameter_roles`: which parameters can be set; `interpreter`,       |
+|              | `hybrid_interpreter` (`past_values`): simulation of a model in Python                                      |
+| `c_code/`    | `emit`: the files; `model_code`: model.c; `hybrid_code`: model.c with event iteration; `header`: model.h;  |
+|              | `model_step`: clock ticks and integration; `functions`, `statements`, `expressions`, `subscripts`,         |
+|              | `builtin_functions`, `lowering`, `c_values`, `formatting`: parts of model.c                                |
+| `external/`  | `sources`: C files of external functions; `calls`: C functions that call them; `library`: evaluation in     |
+|              | Python; `external.c`: errors, messages, Strings and external objects                                       |
 | (here)       | `assemble`: a Modelica file to a block, with the FMI variables                                             |
 
 Sampled models, in a communication step from t to t + h:
@@ -36,9 +44,28 @@ Models with continuous states (`der(x) = ...`):
   outputs belong to this time.
 - The integration method is the classical Runge-Kutta method of order 4. The interval d between two events is divided into
   ceil(d/0.005 - 1e-9) equal integration steps. Inputs and sampled values are constant between two events.
-- There are no state events. If-expressions are evaluated at each stage of the integration method. When-clauses with conditions
-  (and reinit() in them) and assertions are evaluated at ticks and at t + h only.
-- The initial value of a state is its `start` value, whether `fixed` or not, or that of an initial equation `x = ...`.
+- Assertions are evaluated at ticks and at t + h only.
+- The initial value of a state is its `start` value, whether `fixed` or not, unless initial equations determine it. They are
+  solved together with the other equations, by Newton's method where they are not linear.
+
+Models with event iteration. These are all models with `pre()`, `edge()`, `change()` or `sample()` outside when-clauses, with
+`reinit()` or `delay()`, with continuous states and comparisons (outside `noEvent()`) of values that change with time, or with
+continuous states and a library:
+
+- There is an event at t if an input has changed, at every tick, at t + h, and whenever a comparison changes its value. The time
+  of this change is located to 1e-10 s. Between events, comparisons keep their value.
+- In an event all equations are evaluated again with pre(x) = x, until the discrete variables and the comparisons do not change.
+- The states are integrated by the method of Dormand and Prince of order 5 with error control (relative tolerance 1e-7, absolute
+  tolerance 1e-9).
+- Without inputs, the ticks at the start time belong to the initialization.
+- delay() interpolates linearly between at most 2048 stored values.
+
+Equations in any form:
+
+- Linear equations are solved symbolically, systems of linear equations by elimination, all others by Newton's method from the
+  last values with symbolic derivatives. A step fails if there is no solution.
+- A variable x in der(x) that equations determine is not a state; its derivative is computed from the derivatives of equations.
+- Structural parameters (those that select equations or sizes) are constants of the FMU.
 """
 
 from .assemble import load_block, load_interpreter

@@ -3,28 +3,37 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from math import prod
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ...core import units
 from ...core.component import Causality, Variability
 from ...core.errors import InputError, Problem
 from ..fmu.block import Block, BlockVariable
 from .c_code.emit import generate_c
 from .c_code.header import struct_members
 from .causality.continuous_states import introduce_derivatives
+from .causality.dependent_states import reduce_states
+from .causality.hybrid import prepare_hybrid
+from .causality.hybrid_interpreter import HybridInterpreter
 from .causality.interpreter import Interpreter
 from .causality.matching import is_input
-from .frontend.constants import inline_constants
-from .frontend.folded_branches import check_folded_branches
+from .external.library import callable_functions
+from .frontend.constants import fold_constants
+from .frontend.folded_branches import folded_parameters
 from .frontend.reader import ModelReader
 from .frontend.rumoca_frontend import ModelicaSources, flatten_model
+from .frontend.strings import fold_strings, string_parameters
+from .model.arithmetic import EvaluationError
 from .model.flat_model import Model, Variable
 from .model.syntax_tree import raise_model_error
+from .model.traversal import variable_names
 
 _FMI_TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration"}
 _DEFAULT_STEP_SIZE = 0.01
@@ -35,22 +44,23 @@ MAX_MODEL_SIZE = 1_000_000
 FmiRole = tuple[Causality, Variability]
 
 
-def load_block(path: Path, model: str | None = None) -> Block:
+def load_block(path: Path, model: str | None = None, library_path: Sequence[Path] = ()) -> Block:
     """Compile a Modelica model to a block.
 
     Args:
         path: The Modelica file. It may use the packages in folders beside it.
         model: Name of the model. None selects the model with the name of the file.
+        library_path: Folders of libraries, which are searched before those of MODELICAPATH.
 
     Raises:
         InputError: The model has errors or uses unsupported features; the error contains the file and line.
     """
     with _refusing_deep_nesting(path):
-        return _load_block(path, model)
+        return _load_block(path, model, library_path)
 
 
-def _load_block(path: Path, model: str | None) -> Block:
-    defaults, sources = _flatten(path, model)
+def _load_block(path: Path, model: str | None, library_path: Sequence[Path]) -> Block:
+    defaults, sources = _flatten(path, model, library_path)
     folder = _source_root(sources.files)
     names = {str(file.relative_to(folder)): file for file in sources.files}
     return Block(
@@ -58,23 +68,24 @@ def _load_block(path: Path, model: str | None) -> Block:
         description=defaults.model.description,
         variables=_block_variables(defaults),
         step_size=min((float(defaults.evaluate(clock.period)) for clock in defaults.schedule.clocks), default=_DEFAULT_STEP_SIZE),
-        files=generate_c(defaults, sorted(names)),
+        files=generate_c(defaults, sorted(names), sources.packages),
         resources=names,
     )
 
 
-def load_interpreter(path: Path, model: str | None = None) -> Interpreter:
+def load_interpreter(path: Path, model: str | None = None, library_path: Sequence[Path] = ()) -> Interpreter:
     """Create an interpreter of a Modelica model with default parameters.
 
     Args:
         path: The Modelica file.
         model: Name of the model. None selects the model with the name of the file.
+        library_path: Folders of libraries, which are searched before those of MODELICAPATH.
 
     Raises:
         InputError: The model has errors or uses unsupported features.
     """
     with _refusing_deep_nesting(path):
-        return _flatten(path, model)[0]
+        return _flatten(path, model, library_path)[0]
 
 
 @contextmanager
@@ -86,12 +97,44 @@ def _refusing_deep_nesting(path: Path) -> Iterator[None]:
         raise InputError(Problem("an expression or statement is nested too deeply; divide it into several", str(path))) from None
 
 
-def _flatten(path: Path, model: str | None) -> tuple[Interpreter, ModelicaSources]:
-    json, sources = flatten_model(Path(path), model)
-    check_folded_branches(json, sources)
-    flat = introduce_derivatives(inline_constants(ModelReader(json, sources).read_model(model or Path(path).stem)))
+def _flatten(path: Path, model: str | None, library_path: Sequence[Path]) -> tuple[Interpreter, ModelicaSources]:
+    json, sources = flatten_model(Path(path), model, library_path)
+    return analyse(json, sources, model or Path(path).stem), sources
+
+
+def analyse(json: Mapping[str, Any], sources: ModelicaSources, name: str) -> Interpreter:
+    """Convert the document of the front end to an interpreter of the model."""
+    flat = ModelReader(json, sources).read_model(name)
+    structural = flat.structural | folded_parameters(json, sources) | string_parameters(flat)
+    flat = replace(
+        flat,
+        structural=structural,
+        functions=callable_functions(flat.functions, sources.packages),
+        uses_library=bool(sources.libraries),
+    )
+    flat = _without_unused_connectors(flat)
+    flat = prepare_hybrid(reduce_states(introduce_derivatives(fold_strings(fold_constants(flat)))))
     _check_types(flat)
-    return Interpreter(flat), sources
+    try:
+        return HybridInterpreter(flat) if flat.hybrid else Interpreter(flat)
+    except EvaluationError as error:
+        where = str(sources.files[0]) if sources.files else ""
+        raise InputError(Problem(f"the default values of the parameters are not valid: {error}", where)) from None
+
+
+def _without_unused_connectors(model: Model) -> Model:
+    """Return the model without the variables of its components that occur nowhere, as in expandable connectors."""
+    used = variable_names((model.equations, model.whens, model.algorithms, model.asserts, model.initial_equations))
+    unused = {
+        v.name
+        for v in model.variables.values()
+        if "." in v.name
+        and v.name not in used
+        and v.variability in ("continuous", "discrete")
+        and v.causality == "local"
+        and not v.binding
+    }
+    return replace(model, variables={name: v for name, v in model.variables.items() if name not in unused})
 
 
 def _check_types(model: Model) -> None:
@@ -100,10 +143,10 @@ def _check_types(model: Model) -> None:
         size += prod(variable.shape)
         if size > MAX_MODEL_SIZE:
             raise_model_error(f"{variable.name}: the model has more than {MAX_MODEL_SIZE} values", variable.where)
+        if variable.type == "ExternalObject" and variable.variability == "parameter" and not variable.shape:
+            continue
         if variable.type not in _FMI_TYPES:
             raise_model_error(f"{variable.name}: variables of type {variable.type} are not supported", variable.where)
-        if 0 in variable.shape:
-            raise_model_error(f"{variable.name}: arrays without elements are not supported", variable.where)
 
 
 def _source_root(files: Sequence[Path]) -> Path:
@@ -121,11 +164,16 @@ def _fmi_role(variable: Variable, defaults: Interpreter) -> FmiRole | None:
     """Return causality and variability of a variable in the FMU, or None if the FMU does not contain it.
 
     The FMU contains the inputs and outputs of the model itself, and all parameters that are neither protected nor set by a
-    modifier.
+    modifier. Structural parameters are constants. The FMU of a model with event iteration or with a library contains all other
+    variables too.
     """
     roles = defaults.parameter_roles
+    if variable.type == "ExternalObject":
+        return None
     if variable.name in roles.settable:
         return "parameter", "fixed" if variable.name in roles.clock_parameters else "tunable"
+    if variable.name in defaults.model.structural and not variable.protected:
+        return "local", "constant"
     if variable.variability == "parameter":
         return None if variable.protected or variable.bound_by_modifier else ("calculatedParameter", "tunable")
     continuous = variable.type == "Real" and bool(defaults.model.states or not defaults.schedule.clocks)
@@ -133,6 +181,12 @@ def _fmi_role(variable: Variable, defaults: Interpreter) -> FmiRole | None:
         return "input", "continuous" if variable.type == "Real" else "discrete"
     if variable.causality == "output" and variable.top_level:
         return "output", "continuous" if continuous else "discrete"
+    if (
+        (defaults.model.hybrid or defaults.model.uses_library)
+        and not variable.name.startswith(("$", "pre("))
+        and 0 not in variable.shape
+    ):
+        return "local", "continuous" if continuous and variable.variability == "continuous" else "discrete"
     return None
 
 
@@ -144,13 +198,22 @@ def _block_variable(variable: Variable, member: str, role: FmiRole, defaults: In
         causality=role[0],
         variability=role[1],
         start=_to_python(defaults.get(variable.name)),
-        unit=variable.unit,
+        unit=_known_unit(variable.unit, role),
         shape=variable.shape,
         description=variable.description,
         minimum=None if variable.minimum is None else float(np.min(defaults.evaluate(variable.minimum))),
         maximum=None if variable.maximum is None else float(np.max(defaults.evaluate(variable.maximum))),
         enumeration=tuple((literal, "") for literal in _literals(variable, defaults.model)),
     )
+
+
+def _known_unit(unit: str, role: FmiRole) -> str:
+    """Return the unit, or "" for a parameter with a unit that has no conversion, for example dB."""
+    try:
+        units.parse_unit(unit or "1")
+    except ValueError:
+        return unit if role[0] in ("input", "output") else ""
+    return unit
 
 
 def _literals(variable: Variable, model: Model) -> tuple[str, ...]:

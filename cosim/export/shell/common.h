@@ -71,7 +71,7 @@ typedef struct {
 /* ---- failures -------------------------------------------------------------------------------------------------------- */
 
 /* Passes an error message to the log callback of the importer; defined by each shell. */
-static void report(const Instance *instance, const char *message);
+static void report(const Instance *instance, bool error, const char *message);
 
 /* Logs the reason for the failure of a call. After it only reading, restoring a saved state, reset and free are allowed. */
 static bool refuse(Instance *instance, const char *function, const char *format, ...)
@@ -82,7 +82,7 @@ static bool refuse(Instance *instance, const char *function, const char *format,
     va_start(arguments, format);
     vsnprintf(message + length, sizeof message - (size_t)length, format, arguments);
     va_end(arguments);
-    report(instance, message);
+    report(instance, true, message);
     instance->state.phase = FAILED;
     return false;
 }
@@ -112,6 +112,18 @@ static inline bool expect(Instance *instance, const char *function, int phases)
 static bool succeeded(Instance *instance, const char *function, const char *reason)
 {
     return reason == NULL || refuse(instance, function, "%s", reason);
+}
+
+/* Logs the warnings of the model since the last call. */
+static void report_warnings(Instance *instance)
+{
+#ifdef MODEL_WARNINGS
+    if (instance->state.model.warning[0] == '\0') return;
+    report(instance, false, instance->state.model.warning);
+    instance->state.model.warning[0] = '\0';
+#else
+    (void)instance;
+#endif
 }
 
 /* ---- life cycle ------------------------------------------------------------------------------------------------------ */
@@ -150,6 +162,9 @@ static Instance *create(const char *function, const char *name, const char *toke
 static void destroy(Instance *instance)
 {
     if (instance == NULL) return;
+#ifdef MODEL_FREE
+    model_free(&instance->state.model);
+#endif
     free(instance->name);
     free(instance);
 }
@@ -179,7 +194,9 @@ static bool refresh(Instance *instance, const char *function)
     State *state = &instance->state;
     if (state->phase != INITIALIZING || !state->stale) return true;
     state->stale = false;
-    return succeeded(instance, function, model_initialize(&state->model, state->time));
+    if (!succeeded(instance, function, model_initialize(&state->model, state->time))) return false;
+    report_warnings(instance);
+    return true;
 }
 
 static bool exit_initialization(Instance *instance, const char *function)
@@ -201,6 +218,7 @@ static bool step(Instance *instance, const char *function, double time, double s
     if (time + step_size > state->stop_time + slack)
         return refuse(instance, function, "the step to %.12g passes the stop time %.12g", time + step_size, state->stop_time);
     if (!succeeded(instance, function, model_step(&state->model, time, step_size))) return false;
+    report_warnings(instance);
     state->time = time + step_size;
     return true;
 }

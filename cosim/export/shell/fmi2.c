@@ -6,7 +6,7 @@ typedef fmi2CallbackLogger Logger;
 #include "common.h"
 
 /* FMI 2.0 messages are format strings with "%" directives and "#" references; both characters are escaped by doubling. */
-static void report(const Instance *instance, const char *message)
+static void report(const Instance *instance, bool error, const char *message)
 {
     char escaped[1024];
     char *end = escaped;
@@ -15,7 +15,8 @@ static void report(const Instance *instance, const char *message)
         *end++ = *c;
     }
     *end = '\0';
-    instance->logger(instance->environment, instance->name, fmi2Error, "logStatusError", escaped);
+    instance->logger(instance->environment, instance->name, error ? fmi2Error : fmi2Warning, error ? "logStatusError" : "logStatusWarning",
+                     escaped);
 }
 
 static fmi2Status status(bool ok)

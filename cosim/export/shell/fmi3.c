@@ -5,9 +5,10 @@ typedef fmi3LogMessageCallback Logger;
 #define ARRAYS 1
 #include "common.h"
 
-static void report(const Instance *instance, const char *message)
+static void report(const Instance *instance, bool error, const char *message)
 {
-    if (instance->logger) instance->logger(instance->environment, fmi3Error, "logStatusError", message);
+    if (instance->logger)
+        instance->logger(instance->environment, error ? fmi3Error : fmi3Warning, error ? "logStatusError" : "logStatusWarning", message);
 }
 
 static fmi3Status status(bool ok)

@@ -225,7 +225,7 @@ class Comparer:
         side, bound = ("above", tube.upper) if values[row] > tube.upper[row] else ("below", tube.lower)
         text = (
             f"leaves its tube at t = {tube.time[row]:g} s: {values[row]:.6g}{unit} is {distance[row]:.3g}{unit} {side} "
-            f"{bound[row]:.6g}{unit}; at most {distance[worst]:.3g}{unit} outside, at t = {tube.time[worst]:g} s; "
+            f"its limit {bound[row]:.6g}{unit}; at most {distance[worst]:.3g}{unit} outside, at t = {tube.time[worst]:g} s; "
             f"{outside.size} of {self.points.time.size} points outside"
         )
         return Verdict(name, text, float(tube.time[row]), _relative_excess(distance[worst], half_width))

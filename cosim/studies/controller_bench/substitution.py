@@ -14,11 +14,11 @@ from typing import Any
 
 from ...core.errors import InputError, did_you_mean
 from ...results.files import write_json
+from ...scenario.component_schema import SOURCES
 from ...scenario.evaluation_schema import FunctionSpec
 from ...scenario.extension import read_system_document
 from ...scenario.named_functions import declared_arguments
 from ...scenario.nested_systems import load_scenario
-from ...scenario.schema import SOURCES
 from .candidate import CandidateInterface, CandidateSource
 from .role import Role
 

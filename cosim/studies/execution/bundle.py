@@ -16,8 +16,8 @@ from ...core import paths, resources
 from ...core.errors import InputError, Problem
 from ...core.version import __version__
 from ...scenario import load_scenario
+from ...scenario.component_schema import ComponentSpec
 from ...scenario.nested_systems import Node
-from ...scenario.schema import ComponentSpec
 
 
 def cosim_fingerprint() -> str:

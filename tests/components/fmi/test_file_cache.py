@@ -63,19 +63,24 @@ def test_a_folder_in_which_a_file_has_changed_is_not_used_again(fmu, work):
     assert not folder.exists()
 
 
+def only_file(simulation):
+    (file,) = simulation.prepared.component_factory.fmus.values()
+    return file
+
+
 def test_simulations_at_the_same_time_have_folders_of_their_own(fmu):
     document = {"name": "two", "stop_time": 0.05, "step_size": 0.01, "components": {"a": {"fmu": str(fmu)}}}
     with cosim.load(document) as first, cosim.load(document) as second:
         first.step()
         second.step()
-        folders = {each.prepared.component_factory.fmus[fmu.resolve()]._folder.name for each in (first, second)}
+        folders = {only_file(each)._folder.name for each in (first, second)}
     assert len(folders) == 2
 
 
 def test_a_library_that_stays_loaded_is_loaded_from_another_folder(fmu):
     with cosim.load({"name": "one", "stop_time": 0.05, "step_size": 0.01, "components": {"a": {"fmu": str(fmu)}}}) as simulation:
         simulation.step()
-        library = simulation.prepared.component_factory.fmus[fmu.resolve()].library.dll._name
+        library = only_file(simulation).library.dll._name
         kept = ctypes.CDLL(library)
     assert idle_folder(fmu) is None
     assert kept

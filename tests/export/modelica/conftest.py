@@ -17,7 +17,20 @@ from cosim.export.modelica import load_block, load_interpreter
 from cosim.export.modelica.causality.interpreter import Interpreter
 
 CTYPES = {"Float64": ctypes.c_double, "Int32": ctypes.c_int32, "Enumeration": ctypes.c_int32, "Boolean": ctypes.c_bool}
-GCC = ["gcc", "-std=c11", "-O2", "-ffp-contract=off", "-Wall", "-Wextra", "-Werror", "-pedantic", "-fPIC", "-shared"]
+GCC = [
+    "gcc",
+    "-std=c11",
+    "-O2",
+    "-ffp-contract=off",
+    "-Wall",
+    "-Wextra",
+    "-Werror",
+    "-pedantic",
+    "-fPIC",
+    "-shared",
+]  #: for the C code of external functions
+LENIENT_GCC = ["gcc", "-std=c11", "-O2", "-ffp-contract=off", "-fPIC", "-w", "-c"]
+GENERATED = ("model.c", "layout.c", "external.c", "external_calls.c")
 
 TICKS = 500  # default number of steps with random inputs
 
@@ -33,7 +46,12 @@ class CompiledBlock:
         layout = ", ".join(["sizeof(Model)", *(f"offsetof(Model, {v.member})" for v in block.variables)])
         (folder / "layout.c").write_text(f'#include <stddef.h>\n#include "model.h"\nsize_t layout[] = {{{layout}}};\n')
         library = folder / "block.so"
-        subprocess.run([*GCC, "-o", str(library), str(folder / "model.c"), str(folder / "layout.c"), "-lm"], check=True)
+        sources = [name for name in (*block.files, "layout.c") if name.endswith(".c")]
+        foreign = [name for name in sources if name not in GENERATED]
+        if foreign:
+            subprocess.run([*LENIENT_GCC, *foreign], check=True, cwd=folder)
+        objects = [name.replace(".c", ".o") if name in foreign else name for name in sources]
+        subprocess.run([*GCC, "-o", str(library), *objects, "-lm"], check=True, cwd=folder)
         self._library = ctypes.CDLL(str(library))
         size, *offsets = (ctypes.c_size_t * (1 + len(block.variables))).in_dll(self._library, "layout")
         self._offsets = dict(zip(self.variables, offsets, strict=True))

@@ -90,8 +90,7 @@ def test_unknown_names_come_with_file_and_line(folder):
 def test_a_model_is_not_confused_with_a_member_of_the_same_name(folder):
     text = TOP.replace("Top", "Double").replace("  y = double.y;", "  y = sin(y) + double.y;")
     (folder / "Double.mo").write_text(text)
-    with pytest.raises(InputError, match=r"models/Double.mo:7: algebraic loop: y \(Double.mo:7\)"):
-        load_block(folder / "Double.mo")
+    assert "newton.h" in load_block(folder / "Double.mo").files
 
 
 def test_a_panic_of_the_front_end_is_an_input_error(write_model):
@@ -103,14 +102,14 @@ equation
     y = sum(w[i]*i for i in 1:3);
   end when;
 end M;""")
-    with pytest.raises(InputError, match=r"M.mo: the Modelica front end failed on the model M"):
+    with pytest.raises(InputError, match=r"M.mo:1: the Modelica front end failed on the model M"):
         load_block(path)
 
 
 def test_a_missing_model_and_a_missing_file(folder):
     with pytest.raises(InputError, match="no such Modelica file"):
         load_block(folder / "Nothing.mo")
-    with pytest.raises(InputError, match=r"Top.mo: .*Other"):
+    with pytest.raises(InputError, match=r"Top.mo:1: .*Other"):
         load_block(folder / "Top.mo", "Other")
 
 
@@ -130,5 +129,5 @@ model M
 equation
   y = 1;
 end M;""")
-    with pytest.raises(InputError, match=r"M.mo:5: typecheck failed: .*unevaluable array dimensions for 'v'"):
+    with pytest.raises(InputError, match=r"M.mo:5: unevaluable array dimensions for 'v'"):
         load_block(path)

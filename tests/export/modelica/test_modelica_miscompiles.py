@@ -76,11 +76,9 @@ end M;"""
         'y = x; if hold then assert(x < 1, "large"); end if;',
     ],
 )
-def test_an_if_equation_that_the_front_end_folds_with_a_default_value_is_refused(write_model, equations):
-    with pytest.raises(
-        InputError, match=r"M.mo:7: the front end evaluates the condition of this if-equation with the default value of hold"
-    ):
-        load_block(write_model(FOLDED.format(equations)))
+def test_a_parameter_that_selects_the_branch_of_an_if_equation_is_a_constant_of_the_fmu(write_model, equations):
+    variables = {variable.name: variable for variable in load_block(write_model(FOLDED.format(equations))).variables}
+    assert (variables["hold"].causality, variables["hold"].variability) == ("local", "constant")
 
 
 @pytest.mark.parametrize(

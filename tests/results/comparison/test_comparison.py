@@ -37,8 +37,8 @@ def test_message_names_first_signal_time_and_distance():
     late, early = np.where(TIME >= 7, 0.5, 0), np.where(TIME >= 3, 0.25, 0) + np.where(TIME == 4, 0.5, 0)
     result = recorded(units={"a.y": "m"}, a__x=-late, a__y=TIME + early)
     reference = recorded(a__x=np.zeros(101), a__y=TIME)
-    first = "t = 3 s: 3.25 m is 0.05 m above 3.2 m; at most 0.55 m outside, at t = 4 s; 71 of 101 points outside"
-    second = "t = 7 s: -0.5 is 0.3 below -0.2; at most 0.3 outside, at t = 7 s; 31 of 101 points outside"
+    first = "t = 3 s: 3.25 m is 0.05 m above its limit 3.2 m; at most 0.55 m outside, at t = 4 s; 71 of 101 points outside"
+    second = "t = 7 s: -0.5 is 0.3 below its limit -0.2; at most 0.3 outside, at t = 7 s; 31 of 101 points outside"
     assert str(compare(result, reference, {"*": Tolerance(absolute=0.2)})).splitlines() == [
         "2 of 2 signals failed",
         f"a.y leaves its tube at {first}",
@@ -106,14 +106,14 @@ def test_a_pattern_without_a_signal_fails():
 def test_time_tolerance_permits_a_late_switch():
     late = changed(b__x=TIME > 5.3)
     assert compare(late, REFERENCE, {"*": Tolerance(time=0.3)}).passed
-    assert failures(late, {"*": Tolerance(time=0.1)})[0].startswith("b.x leaves its tube at t = 5.2 s: 0 is 1 below 1;")
+    assert failures(late, {"*": Tolerance(time=0.1)})[0].startswith("b.x leaves its tube at t = 5.2 s: 0 is 1 below its limit 1;")
 
 
 def test_a_coarse_result_is_compared_at_rows_of_the_reference():
     peak = recorded(x=np.where(TIME == 5.5, 1.0, 0.0))
     coarse = recorded(TIME[::10], x=np.zeros(11))
     (failure,) = failures(coarse, {"x": Tolerance(0.5)}, peak)
-    assert failure.startswith("x leaves its tube at t = 5.5 s: 0 is 0.5 below 0.5")
+    assert failure.startswith("x leaves its tube at t = 5.5 s: 0 is 0.5 below its limit 0.5")
 
 
 def test_strings_must_be_equal():

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from dataclasses import replace
 from functools import reduce
 
 from ..model import syntax_tree
@@ -100,6 +101,67 @@ def _fill(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
     return CValue(element.type, _shape(lowering, node, sizes), lambda _: element.text, reusable=True)
 
 
+def _matrix(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
+    """Lower a concatenation: rows(a, b) of the parts of `[a; b]`, columns(a, b) of `[a, b]`; scalars and vectors are columns."""
+    parts = [lowering.lower(argument) for argument in node.arguments]
+    shapes = [(*part.shape, 1, 1)[:2] if len(part.shape) < 2 else part.shape for part in parts]
+    vertical = node.name == "rows"
+    if len({shape[vertical] for shape in shapes}) != 1:
+        raise_model_error(f"the parts of a matrix have the sizes {', '.join(str(list(s)) for s in shapes)}", node.where)
+    shape = (sum(s[0] for s in shapes), shapes[0][1]) if vertical else (shapes[0][0], sum(s[1] for s in shapes))
+    elements = [
+        (part, row * size[1] + column)
+        for row_parts in (
+            [[pair] for pair in zip(parts, shapes, strict=True)] if vertical else [list(zip(parts, shapes, strict=True))]
+        )
+        for row in range(row_parts[0][1][0])
+        for part, size in row_parts
+        for column in range(size[1])
+    ]
+    return CValue(
+        common_type([part.type for part in parts]),
+        shape,
+        lambda k: elements[int(k)][0].element(elements[int(k)][1]),
+        indexable_in_loop=False,
+        reusable=all(part.reusable for part in parts),
+    )
+
+
+def _vector(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
+    value = lowering.lower(node.arguments[0])
+    return replace(value, shape=(value.size,))
+
+
+def _scalar(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
+    return replace(lowering.lower(node.arguments[0]), shape=())
+
+
+def _diagonal(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
+    value = lowering.evaluated_once(lowering.lower(node.arguments[0]))
+    n, zero = value.size, c_literal(0, value.type)
+    return CValue(
+        value.type, (n, n), lambda k: value.element(int(k) // n) if int(k) % (n + 1) == 0 else zero, indexable_in_loop=False
+    )
+
+
+def _linspace(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
+    first, last = (lowering.evaluated_once(lowering.lower(argument)).text for argument in node.arguments[:2])
+    (n,) = _shape(lowering, node, node.arguments[2:])
+
+    def element(k: int | str) -> CExpression:
+        step = infix("*", infix("-", last, first), c_literal(float(k), "Real"))
+        return infix("+", first, infix("/", step, c_literal(float(n - 1), "Real")))
+
+    return CValue("Real", (n,), element, indexable_in_loop=False)
+
+
+def _past(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
+    """Lower past(k, T), the value of the argument of delay() number k at the time - T."""
+    index, duration = lowering.static_integer(node.arguments[0]), lowering.scalar_of(node.arguments[1])
+    at = infix("-", CExpression("time"), duration)
+    return scalar_value("Real", c_call("past_value", f"&m->past[{index}]", at))
+
+
 def _identity(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
     (n,) = _shape(lowering, node, node.arguments)
     return CValue(
@@ -194,9 +256,14 @@ BUILTINS: dict[str, Callable[[SubscriptLowering, syntax_tree.Builtin], CValue]] 
     **dict.fromkeys(("fill", "zeros", "ones"), _fill),
     **dict.fromkeys(("noEvent", "homotopy"), _first_argument),
     **dict.fromkeys(("due", "risen"), _event_flag),
+    **dict.fromkeys(("rows", "columns"), _matrix),
     "abs": _abs,
     "atan2": _atan2,
     "cat": _cat,
+    "diagonal": _diagonal,
+    "linspace": _linspace,
+    "past": _past,
+    "scalar": _scalar,
     "change": _change,
     "cross": _cross,
     "edge": _edge,
@@ -210,4 +277,5 @@ BUILTINS: dict[str, Callable[[SubscriptLowering, syntax_tree.Builtin], CValue]] 
     "smooth": _smooth,
     "sum": _sum,
     "transpose": _transpose,
+    "vector": _vector,
 }

@@ -9,7 +9,14 @@ from functools import reduce
 from math import prod
 from typing import NamedTuple
 
-C_TYPES = {"Real": "double", "Integer": "int32_t", "Enumeration": "int32_t", "Boolean": "bool"}
+C_TYPES = {
+    "Real": "double",
+    "Integer": "int32_t",
+    "Enumeration": "int32_t",
+    "Boolean": "bool",
+    "String": "const char *",
+    "ExternalObject": "uint64_t",
+}
 
 #: keywords of C, and the functions and local variables of the generated code
 _RESERVED_WORDS = """

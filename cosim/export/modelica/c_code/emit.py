@@ -1,38 +1,25 @@
-"""Code generation of model.c: readable C code of a flat model, which forms a block together with model.h and runtime.h."""
+"""Code generation of a block: model.c, model.h and the headers of the runtime functions."""
 
 from __future__ import annotations
 
-import json
-from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Mapping, Sequence
 from importlib import resources
-from typing import Any
-
-import numpy as np
+from pathlib import Path
 
 from ..causality.interpreter import Interpreter
-from ..causality.matching import is_input
-from ..causality.schedule import finite_variables, pre_variables, start_value
-from ..model.flat_model import Variable, derivative_name, owning_component
-from ..model.syntax_tree import Body, Name, SourceLocation, Statement, referenced_variable
-from ..model.traversal import assigned_references
-from .c_values import C_TYPES, CExpression, CValue, c_literal, scalar_value
-from .formatting import function_definition, uses_variable
-from .functions import FunctionTranslator
-from .header import HeaderWriter, struct_member, struct_members
-from .model_step import continuous_step_body, sampled_step_body
-from .statements import StatementLowering
-
-#: failure reasons of runtime.h, in the order of its enumeration (from 1)
-_STANDARD_REASONS = ("Integer overflow", "division by zero in div(), mod() or rem()", "the period of sample() must be positive")
+from ..external.sources import external_files
+from .header import HeaderWriter
+from .hybrid_code import HybridCode
+from .model_code import ModelCode
 
 
-def generate_c(defaults: Interpreter, sources: Sequence[str]) -> dict[str, str]:
+def generate_c(defaults: Interpreter, sources: Sequence[str], packages: Mapping[str, Path] | None = None) -> dict[str, str]:
     """Generate the C files of a model.
 
     Args:
         defaults: The model with its schedule and default values.
         sources: Names of the Modelica files, for a comment.
+        packages: Top-level package -> its folder, for the files of external functions.
 
     Returns:
         File name -> text.
@@ -40,169 +27,10 @@ def generate_c(defaults: Interpreter, sources: Sequence[str]) -> dict[str, str]:
     Raises:
         InputError: The model uses a feature that is not supported.
     """
-    header = HeaderWriter(defaults.model, defaults.schedule, defaults.parameter_roles, sources).text()
-    fixed = ("runtime.h", "runge_kutta.h") if defaults.model.states else ("runtime.h",)
-    texts = {name: resources.files(__package__ or "").joinpath(name).read_text(encoding="utf-8") for name in fixed}
-    return {"model.c": _Emitter(defaults).model_c(), "model.h": header, **texts}
-
-
-@dataclass
-class _Emitter:
-    """Code generator of model.c; collects the failure reasons and the functions of the model while it generates code."""
-
-    defaults: Interpreter
-    reasons: list[str] = field(default_factory=lambda: list(_STANDARD_REASONS))
-
-    def __post_init__(self) -> None:
-        self.model, self.schedule, self.roles = self.defaults.model, self.defaults.schedule, self.defaults.parameter_roles
-        self.members = struct_members(self.model)
-        self.functions = FunctionTranslator(dict(self.model.functions), self._failure_code)
-
-    def model_c(self) -> str:
-        """Return the text of model.c."""
-        event = self._event()
-        optional = {"time": "double time", "due": "const bool *due"}
-        parameters = {"m": "Model *m"} | {name: code for name, code in optional.items() if uses_variable(name, event)}
-        call = f"event({', '.join(parameters).replace('time', 'now')});"
-        step = continuous_step_body if self.model.states else sampled_step_body
-        definitions = [
-            function_definition("static void start_variables(Model *m)", self._start_variables()),
-            function_definition("void model_parameters(Model *m)", self._model_parameters()),
-            function_definition("void model_start(Model *m)", self._model_start()),
-            function_definition(f"static void event({', '.join(parameters.values())})", event),
-            function_definition("const char *model_initialize(Model *m, double time)", self._model_initialize()),
-            *self._continuous(),
-            function_definition(
-                "const char *model_step(Model *m, double time, double step_size)", step(len(self.schedule.clocks), call)
-            ),
-        ]
-        includes = f'#include "model.h"\n#include "{"runge_kutta.h" if self.model.states else "runtime.h"}"'
-        return "\n\n".join([includes, self._reasons(), *self.functions.definitions, *definitions]) + "\n"
-
-    def _reasons(self) -> str:
-        texts = ",\n    ".join(["NULL", *(json.dumps(reason, ensure_ascii=False) for reason in self.reasons)])
-        comment = "/* Reasons for failures; m->failure is an index in this array. */"
-        return f"{comment}\nstatic const char *const REASONS[] = {{\n    {texts},\n}};"
-
-    def _failure_code(self, reason: str, where: SourceLocation | None) -> str:
-        text = f"{reason} ({where.file_and_line})" if where else reason
-        if text not in self.reasons:
-            self.reasons.append(text)
-        return str(self.reasons.index(text) + 1)
-
-    def _make_lowering(self, initial: bool = False) -> StatementLowering:
-        """Create a lowering with the scope of the model: struct members, and local variables `pre_...` for pre()."""
-        scope = {v.name: struct_member(v, f"m->{self.members[v.name]}") for v in self.model.variables.values()}
-        scope["time"] = scalar_value("Real", CExpression("time"), reusable=True)
-        pre_scope = {v.name: struct_member(v, f"pre_{self.members[v.name]}") for v in self.model.variables.values()}
-        return StatementLowering(self.functions, scope, pre_scope, initial=initial)
-
-    # start values and parameters
-
-    def _model_start(self) -> list[str]:
-        lines = ["memset(m, 0, sizeof *m);"]
-        constants = [self.model.variables[name] for name in (*self.roles.settable, *self.roles.fixed)]
-        for variable in [*constants, *filter(is_input, self.model.variables.values())]:
-            lines += _assign_constant(
-                struct_member(variable, f"m->{self.members[variable.name]}"), self.defaults.get(variable.name)
-            )
-        return [*lines, "model_parameters(m);", "start_variables(m);"]
-
-    def _start_variables(self) -> list[str]:
-        lowering = self._make_lowering()
-        for variable in self.model.variables.values():
-            if variable.variability not in ("parameter", "constant") and not is_input(variable):
-                lowering.store(lowering.scope[variable.name], start_value(self.model, variable.name), Name(variable.name))
-        return lowering.lines or ["(void)m;"]
-
-    def _model_parameters(self) -> list[str]:
-        lowering = self._make_lowering()
-        for name in self.roles.dependent:
-            binding = self.model.variables[name].binding
-            lowering.store(lowering.scope[name], binding if binding is not None else start_value(self.model, name), Name(name))
-        return lowering.lines or ["(void)m;"]
-
-    # events
-
-    def _body(self, body: Body, initial: bool) -> list[str]:
-        """Generate statements, preceded by copies of the arguments of pre(); a comment marks the statements of a component."""
-        lowering = self._make_lowering(initial)
-        for name in pre_variables(self.model, body):
-            lowering.lines += _save_pre_value(self.model.variables[name], self.members[name])
-        previous_component = None
-        for statement in body:
-            if (component := _owning_component(statement)) != previous_component:
-                lowering.lines += [*[""] * bool(lowering.lines), f"/* {component or 'the model itself'} */"]
-                previous_component = component
-            lowering.statement(statement)
-        return lowering.lines
-
-    def _event(self) -> list[str]:
-        lines = self._body(self.schedule.event, initial=False)
-        lines += [""] * bool(finite_variables(self.model, self.schedule))
-        for name in finite_variables(self.model, self.schedule):
-            lines += self._finite_check(self.model.variables[name])
-        if uses_variable("risen", lines):
-            lines.insert(0, f"bool risen[{self.schedule.edge_detector_count}];")
-        return lines or ["(void)m;"]
-
-    def _finite_check(self, variable: Variable) -> list[str]:
-        value = struct_member(variable, f"m->{self.members[variable.name]}")
-        failure = self._failure_code(f"{variable.name} is not a finite number", None)
-        test = f"if (!isfinite({value.element('each').code})) fail(m, {failure});"
-        return [f"for (int each = 0; each < {value.size}; each++) {test}"] if variable.shape else [test]
-
-    def _model_initialize(self) -> list[str]:
-        lowering = self._make_lowering()
-        for k, clock in enumerate(self.schedule.clocks):
-            start, period = lowering.scalar_of(clock.start).code, lowering.scalar_of(clock.period).code
-            lowering.lines.append(f"set_clock(m, &m->clock[{k}], {start}, {period}, time);")
-        lines = [*lowering.lines, *self._body(self.schedule.initialization, initial=True)]
-        unused = [] if uses_variable("time", lines) else ["(void)time;"]
-        return [*unused, "m->failure = 0;", "start_variables(m);", *lines, "return REASONS[m->failure];"]
-
-    # continuous states
-
-    def _continuous(self) -> list[str]:
-        """Generate the functions `derivatives` and `advance` (integration) of a model with continuous states."""
-        if not self.model.states:
-            return []
-        lines = self._body(self.schedule.derivatives, initial=False)
-        unused = [] if uses_variable("time", lines) else ["(void)time;"]
-        states, rates = self._element_pointers(self.model.states), self._element_pointers(map(derivative_name, self.model.states))
-        system = ["const System system = {", f"    {{{states}}},", f"    {{{rates}}},", "    derivatives,", "};"]
-        return [
-            function_definition("static void derivatives(Model *m, double time)", [*unused, *lines]),
-            function_definition(
-                "static double advance(Model *m, double from, double to)", [*system, "return integrate(m, &system, from, to);"]
-            ),
-        ]
-
-    def _element_pointers(self, names: Iterable[str]) -> str:
-        """Return C pointers to all elements of variables."""
-        values = (struct_member(self.model.variables[name], f"m->{self.members[name]}") for name in names)
-        return ", ".join(f"&{value.element(k).code}" for value in values for k in range(value.size))
-
-
-def _owning_component(statement: Statement) -> str:
-    """Return the component whose variable a statement assigns first."""
-    return next((owning_component(referenced_variable(target)) for target in assigned_references(statement)), "")
-
-
-def _save_pre_value(variable: Variable, name: str) -> list[str]:
-    """Generate the copy of a variable to a local variable, which pre() reads."""
-    c_type = C_TYPES[variable.type]
-    if not variable.shape:
-        return [f"const {c_type} pre_{name} = m->{name};"]
-    return [f"{c_type} pre_{name}[{struct_member(variable, name).size}];", f"memcpy(pre_{name}, m->{name}, sizeof pre_{name});"]
-
-
-def _assign_constant(target: CValue, value: Any) -> list[str]:
-    """Generate the assignment of a constant value."""
-    literals = [c_literal(x, target.type).code for x in np.asarray(value).flat]
-    if target.size > 4:
-        while len(literals) > 1 and literals[-1] in ("0.0", "0", "false"):
-            literals.pop()  # C initializes the other elements to zero
-        array = f"(const {C_TYPES[target.type]}[{target.size}]){{{', '.join(literals)}}}"
-        return [f"memcpy({target.pointer}, {array}, sizeof {target.pointer});"]
-    return [f"{target.element(k).code} = {literal};" for k, literal in enumerate(literals)]
+    code = (HybridCode if defaults.model.hybrid else ModelCode)(defaults)
+    folder = resources.files(__package__ or "")
+    texts = {name: folder.joinpath(name).read_text(encoding="utf-8") for name in ("runtime.h", *code.headers())}
+    model_c = code.model_c()
+    header = HeaderWriter(defaults.model, defaults.schedule, defaults.parameter_roles, sources, len(code.functions.warnings))
+    external = external_files(code.functions.external_functions, packages or {})
+    return {"model.c": model_c, "model.h": header.text(), **texts, **external}

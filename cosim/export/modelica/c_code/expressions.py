@@ -6,6 +6,7 @@ to `Lowering.lines`; those of a branch that is not always evaluated remain insid
 
 from __future__ import annotations
 
+import json
 from collections.abc import Callable
 
 from ..model import syntax_tree
@@ -37,7 +38,7 @@ class ExpressionLowering(SubscriptLowering):
 
     def _literal(self, node: syntax_tree.Literal) -> CValue:
         if node.type == "String":
-            raise_model_error("a String is only supported as the message of assert()", None)
+            return scalar_value("String", CExpression(json.dumps(node.value, ensure_ascii=False)), reusable=True)
         if node.type == "Integer" and not -(2**31) <= node.number < 2**31:
             raise_model_error(f"the Integer {node.value} does not fit into 32 bits; use a Real", None)
         return scalar_value(node.type, c_literal(node.number, node.type), reusable=True)
@@ -86,6 +87,8 @@ class ExpressionLowering(SubscriptLowering):
         left, right = self.lower(node.left), self.lower(node.right)
         if operator == "*" and left.shape and right.shape:
             return self._matrix_product(left, right, node.where)
+        if "String" in (left.type, right.type):
+            raise_model_error(f"the operator {operator} is not supported for Strings that are not parameters", node.where)
         if operator in _COMPARISONS:
             return self._lower_elementwise(left, right, "Boolean", lambda a, b: infix(_COMPARISONS[operator], a, b), node.where)
         operator = operator.removeprefix(".")
@@ -157,7 +160,17 @@ class ExpressionLowering(SubscriptLowering):
             type_name, (*left.shape[:-1], *right.shape[1:]), element, indexable_in_loop=columns == 1 and left.indexable_in_loop
         )
 
+    def known_branch(self, node: syntax_tree.If) -> syntax_tree.Expression | None:
+        """Return the value of an if-expression without the branches before it, if the first condition is constant, else None."""
+        (condition, value), rest = node.branches[0], node.branches[1:]
+        known = self.static_value(condition)
+        if known is None:
+            return None
+        return value if known else syntax_tree.If(rest, node.otherwise) if rest else node.otherwise
+
     def _if(self, node: syntax_tree.If) -> CValue:
+        if (known := self.known_branch(node)) is not None:
+            return self.lower(known)
         (condition, yes), rest = node.branches[0], node.branches[1:]
         test = self.scalar_of(condition)
         with self.collect_lines() as yes_lines:
@@ -183,7 +196,7 @@ class ExpressionLowering(SubscriptLowering):
         return BUILTINS[node.name](self, node)
 
     def _call(self, node: syntax_tree.Call) -> CValue:
-        return self.lower_call(node)[0]
+        return self.lower_call(node)[node.result]
 
     def lower_call(self, node: syntax_tree.Call, target: str | None = None) -> tuple[CValue, ...]:
         """Lower a call of a function of the model.
@@ -196,7 +209,9 @@ class ExpressionLowering(SubscriptLowering):
             The results of the function.
         """
         arguments = [self.lower(argument) for argument in node.arguments]
-        function = self.translation_unit.function_instance(node, tuple(argument.shape for argument in arguments))
+        function = self.translation_unit.function_instance(
+            node, tuple(argument.shape for argument in arguments), tuple(map(self.static_integer, node.arguments))
+        )
         c_arguments = ["m"] * function.takes_model
         for argument, parameter in zip(arguments, function.inputs, strict=True):
             c_arguments.append(self.as_c_array(argument, parameter.type) if argument.shape else argument.text.code)

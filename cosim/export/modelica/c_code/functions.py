@@ -3,18 +3,20 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 from ..model import syntax_tree
 from ..model.flat_model import Function, FunctionVariable
 from ..model.syntax_tree import SourceLocation, raise_model_error, referenced_variable
-from ..model.traversal import read_references
+from ..model.traversal import read_references, rewrite, variable_names, walk
 from .c_values import C_TYPES, CValue, c_identifier, variable_value
 from .formatting import uses_variable, wrap_lines
 from .lowering import FunctionInstance
 from .statements import StatementLowering
 
 Shapes = tuple[tuple[int, ...], ...]
+Sizes = tuple[tuple[str, int], ...]
 
 
 @dataclass
@@ -26,30 +28,51 @@ class FunctionTranslator:
     failure_code: Callable[[str, SourceLocation | None], str]
     #: definitions of the translated functions, each after those that it calls
     definitions: list[str] = field(default_factory=list)
-    _instances: dict[tuple[str, Shapes], FunctionInstance] = field(default_factory=dict)
+    _instances: dict[tuple[str, Shapes, Sizes], FunctionInstance] = field(default_factory=dict)
     _in_translation: list[str] = field(default_factory=list)
 
-    def function_instance(self, call: syntax_tree.Call, shapes: Shapes) -> FunctionInstance:
+    #: assertions with the level warning, in the order of their numbers
+    warnings: list[syntax_tree.Assert] = field(default_factory=list)
+
+    def warning_number(self, node: syntax_tree.Assert) -> int:
+        """Return the number of an assertion with the level warning."""
+        if node not in self.warnings:
+            self.warnings.append(node)
+        return self.warnings.index(node)
+
+    def function_instance(self, call: syntax_tree.Call, shapes: Shapes, numbers: tuple[int | None, ...]) -> FunctionInstance:
         """Return the C function for a call; it is translated at the first call with arguments of these shapes.
+
+        Args:
+            call: The call.
+            shapes: Shapes of the arguments.
+            numbers: Values of the constant Integer arguments; they can determine the sizes of variables of the function.
 
         Raises:
             InputError: The function is recursive, unknown, or uses an unsupported feature.
         """
-        key = (call.function, shapes)
+        if call.function not in self.functions:
+            raise_model_error(f"unknown function {call.function}", call.where)
+        function, sizes = _with_sizes(self.functions[call.function], numbers)
+        key = (call.function, shapes, sizes)
         if key not in self._instances:
             if call.function in self._in_translation:
                 raise_model_error(f"the recursive function {call.function} is not supported", call.where)
-            if call.function not in self.functions:
-                raise_model_error(f"unknown function {call.function}", call.where)
             self._in_translation.append(call.function)
-            self._instances[key] = self._translate(self.functions[call.function], shapes, call.where)
+            self._instances[key] = self._translate(function, shapes, call.where)
             self._in_translation.pop()
         return self._instances[key]
+
+    @property
+    def external_functions(self) -> list[Function]:
+        """External functions that are called."""
+        names = dict.fromkeys(name for name, _, _ in self._instances)
+        return [self.functions[name] for name in names if self.functions[name].external]
 
     def _translate(self, function: Function, shapes: Shapes, where: SourceLocation | None) -> FunctionInstance:
         if len(shapes) != len(function.inputs):
             raise_model_error(f"{function.name}: found {len(shapes)} arguments, expected {len(function.inputs)}", where)
-        lowering = StatementLowering(self, {})
+        lowering = StatementLowering(self, {}, function=function.name)
         inputs = [self._declare(lowering, local, shape, where) for local, shape in zip(function.inputs, shapes, strict=True)]
         outputs = [self._declare(lowering, local, None, where) for local in function.outputs]
         local_values = [self._declare(lowering, local, None, where) for local in function.locals]
@@ -86,6 +109,27 @@ class FunctionTranslator:
         base = c_identifier(name) if "." in name else c_identifier(name) + "_"
         used = {instance.name for instance in self._instances.values()}
         return next(n for n in (base, *(f"{base}_{k}" for k in range(2, len(used) + 3))) if n not in used)
+
+
+def _with_sizes(function: Function, numbers: tuple[int | None, ...]) -> tuple[Function, Sizes]:
+    """Insert the values of constant Integer arguments that determine sizes, here or in functions that it calls.
+
+    Returns:
+        The function, and the names and values of these arguments.
+    """
+    used = variable_names(tuple(local.dimensions for local in (*function.outputs, *function.locals)))
+    used |= variable_names(tuple(n.arguments for n in walk(function.body) if isinstance(n, syntax_tree.Call)))
+    sizes = tuple((i.name, n) for i, n in zip(function.inputs, numbers, strict=False) if n is not None and i.name in used)
+    literals = {name: syntax_tree.Literal(number, "Integer") for name, number in sizes}
+
+    def insert(node: Any) -> Any:
+        return literals.get(node.name, node) if isinstance(node, syntax_tree.Name) else node
+
+    def resize(local: FunctionVariable) -> FunctionVariable:
+        return replace(local, dimensions=rewrite(local.dimensions, insert), default=rewrite(local.default, insert))
+
+    outputs, local_variables = tuple(map(resize, function.outputs)), tuple(map(resize, function.locals))
+    return replace(function, outputs=outputs, locals=local_variables, body=rewrite(function.body, insert)), sizes
 
 
 def _function_text(function: Function, instance: FunctionInstance, local_values: list[CValue], body: list[str]) -> str:
@@ -136,7 +180,7 @@ def _c_name(value: CValue) -> str:
 
 
 def _parameter(value: CValue, qualifier: str) -> str:
-    size = f"[{value.size}]" if value.shape else ""
+    size = f"[{max(value.size, 1)}]" if value.shape else ""
     return f"{qualifier if value.shape else ''}{C_TYPES[value.type]} {_c_name(value)}{size}"
 
 
@@ -145,4 +189,5 @@ def _zero_fill(value: CValue) -> str:
 
 
 def _declaration(value: CValue) -> str:
-    return f"{C_TYPES[value.type]} {_c_name(value)}{f'[{value.size}] = {{0}}' if value.shape else ' = 0'};"
+    start = ' = ""' if value.type == "String" else " = 0"
+    return f"{C_TYPES[value.type]} {_c_name(value)}{f'[{max(value.size, 1)}] = {{0}}' if value.shape else start};"

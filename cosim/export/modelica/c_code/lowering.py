@@ -6,10 +6,14 @@ from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from math import prod
-from typing import Protocol
+from typing import Any, Protocol
 
 from ..model import syntax_tree
+from ..model.arithmetic import EvaluationError
+from ..model.evaluate import Evaluator
+from ..model.flat_model import Function
 from ..model.syntax_tree import Expression, SourceLocation, raise_model_error
+from ..model.traversal import walk
 from .c_values import C_TYPES, CExpression, CValue, scalar_value, variable_value
 
 
@@ -32,10 +36,17 @@ class FunctionInstance:
 class TranslationUnit(Protocol):
     """The C file that contains the lowered code: its failure reasons and functions."""
 
+    functions: dict[str, Function]
+
     def failure_code(self, reason: str, where: SourceLocation | None) -> str:
         """Return the number of a failure reason."""
 
-    def function_instance(self, call: syntax_tree.Call, shapes: tuple[tuple[int, ...], ...]) -> FunctionInstance:
+    def warning_number(self, node: syntax_tree.Assert) -> int:
+        """Return the number of an assertion with the level warning."""
+
+    def function_instance(
+        self, call: syntax_tree.Call, shapes: tuple[tuple[int, ...], ...], numbers: tuple[int | None, ...]
+    ) -> FunctionInstance:
         """Return the C function for a call with arguments of these shapes."""
 
 
@@ -90,7 +101,7 @@ class Lowering:
         """Declare a temporary C variable or array without initialization."""
         self.temporaries += 1
         name = f"tmp_{self.temporaries}"
-        self.lines.append(f"{C_TYPES[type_name]} {name}{f'[{prod(shape)}]' if shape else ''};")
+        self.lines.append(f"{C_TYPES[type_name]} {name}{f'[{max(prod(shape), 1)}]' if shape else ''};")
         return variable_value(type_name, shape, name)
 
     def evaluated_once(self, value: CValue) -> CValue:
@@ -144,7 +155,17 @@ class Lowering:
         if isinstance(node, syntax_tree.Builtin) and node.name == "size" and len(node.arguments) == 2:
             dimension = self.static_integer(node.arguments[1])
             return None if dimension is None else self.shape_of(node.arguments[0])[dimension - 1]
-        return None
+        value = self.static_value(node) if isinstance(node, syntax_tree.Builtin) else None
+        return value if isinstance(value, int) else None
+
+    def static_value(self, node: Expression) -> Any:
+        """Return the value of an expression without variables; None for all other expressions."""
+        if any(isinstance(n, syntax_tree.Name | syntax_tree.Call) for n in walk(node)):
+            return None
+        try:
+            return Evaluator({}, {})(node)
+        except (EvaluationError, KeyError):
+            return None
 
     def static_range(self, node: syntax_tree.Range) -> list[int]:
         """Return the values of a range.

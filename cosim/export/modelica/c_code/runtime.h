@@ -8,7 +8,7 @@
 #include <stddef.h>
 #include <string.h>
 
-enum { OVERFLOW_OF_INTEGER = 1, DIVISION_BY_ZERO = 2, PERIOD_NOT_POSITIVE = 3 };
+enum { OVERFLOW_OF_INTEGER = 1, DIVISION_BY_ZERO = 2, PERIOD_NOT_POSITIVE = 3, STEP_SIZE_TOO_SMALL = 4, COMPOSED_REASON = 0x7fffffff };
 
 /* Records a failure; the first one is reported. */
 static inline void fail(Model *m, int32_t reason)

@@ -2,11 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass, replace
 
+from ..external.calls import call_signature
 from ..model import syntax_tree
 from ..model.syntax_tree import Body, Expression, Statement, raise_model_error
-from ..model.traversal import assigned_references, read_references, variable_names
+from ..model.traversal import assigned_references, composed_asserts, read_references, variable_names
 from .c_values import CExpression, CValue, c_identifier, scalar_value
 from .expressions import ExpressionLowering
 
@@ -19,6 +21,8 @@ class StatementLowering(ExpressionLowering):
 
     #: true for the initialization, false for an event
     initial: bool = False
+    #: name of the function whose body is lowered, or ""
+    function: str = ""
 
     def body(self, body: Body) -> None:
         """Lower several statements."""
@@ -44,6 +48,8 @@ class StatementLowering(ExpressionLowering):
             value: The expression.
             reference: The assigned variable as an expression. It determines whether `value` depends on the target.
         """
+        while isinstance(value, syntax_tree.If) and (known := self.known_branch(value)) is not None:
+            value = known
         if isinstance(value, syntax_tree.If) and (target.shape or self._needs_if_statement(target, value)):
             self._lower_choice(target, value, reference)
         elif (
@@ -69,7 +75,8 @@ class StatementLowering(ExpressionLowering):
 
     def _can_return_into(self, value: syntax_tree.Call, target: CValue) -> bool:
         """Return whether a function can write its result to the target without a copy."""
-        outputs = self.translation_unit.function_instance(value, tuple(map(self.shape_of, value.arguments))).outputs
+        shapes, numbers = tuple(map(self.shape_of, value.arguments)), tuple(map(self.static_integer, value.arguments))
+        outputs = self.translation_unit.function_instance(value, shapes, numbers).outputs
         return [(output.type, output.shape) for output in outputs] == [(target.type, target.shape)]
 
     def _needs_if_statement(self, target: CValue, value: syntax_tree.If) -> bool:
@@ -104,6 +111,12 @@ class StatementLowering(ExpressionLowering):
 
     def _ifstatement(self, node: syntax_tree.IfStatement) -> None:
         (condition, body), rest = node.branches[0], node.branches[1:]
+        if (known := self.static_value(condition)) is not None:
+            if known or not rest:
+                self.body(body if known else node.otherwise)
+            else:
+                self._ifstatement(syntax_tree.IfStatement(rest, node.otherwise, node.where))
+            return
         self.lines.append(f"if ({self.scalar_of(condition).code}) {{")
         with self.collect_lines() as yes:
             self.body(body)
@@ -140,9 +153,75 @@ class StatementLowering(ExpressionLowering):
         self.lines += [*lines, "}"]
 
     def _assert(self, node: syntax_tree.Assert) -> None:
+        if composed_asserts(node):
+            self._composed_assert(node)
+            return
         condition = self.scalar_of(node.condition)
-        failure = self.translation_unit.failure_code(node.message, node.where)
+        text = "".join(str(part.value) for part in node.message if isinstance(part, syntax_tree.Literal))
+        failure = self.translation_unit.failure_code(text, node.where)
         self.lines.append(f"if (!{condition.parenthesized(13)}) fail(m, {failure});")
+
+    def _composed_assert(self, node: syntax_tree.Assert) -> None:
+        """Lower an assertion whose message contains values, or whose level is warning."""
+        condition = self.scalar_of(node.condition).parenthesized(13)
+        with self.collect_lines() as lines:
+            texts, values = zip(*map(self._message_part, node.message), strict=True)
+            location = f" ({node.where.file_and_line})" if node.where else ""
+            arguments = "".join(f", {value}" for value in values if value)
+            text = json.dumps("".join(texts) + location.replace("%", "%%"), ensure_ascii=False) + arguments
+            if not node.warning:
+                self.lines.append(f"fail_with(m, {text});")
+        if node.warning:
+            number = self.translation_unit.warning_number(node)
+            self.lines += [line.removeprefix("    ") for line in lines]
+            self.lines.append(f"warn(m, !{condition}, &m->warned[{number}], {text});")
+        else:
+            self.lines += [f"if (!{condition}) {{", *lines, "}"]
+
+    def _message_part(self, part: Expression) -> tuple[str, str]:
+        """Return the format of a part of a message and the C expression of its value, "" for a literal."""
+        if isinstance(part, syntax_tree.Literal):
+            return str(part.value).replace("%", "%%"), ""
+        value = self.lower(part)
+        if value.type == "Boolean":
+            return "%s", f"truth({value.text.code})"
+        return ("%g" if value.type == "Real" else "%d"), value.text.code
+
+    def _solve(self, node: syntax_tree.Solve) -> None:
+        """Lower a system of equations to a loop of Newton's method."""
+        n, failure = len(node.unknowns), self.translation_unit.failure_code("a system of equations has no solution", node.where)
+        unknowns = ", ".join(f"&{self.lower(unknown).text.code}" for unknown in node.unknowns)
+        with self.collect_lines() as lines:
+            self.lines.append(f"double residual[{n}], jacobian[{n * n}];")
+            for k, residual in enumerate(node.residuals):
+                self.lines.append(f"residual[{k}] = {self.scalar_of(residual).code};")
+            for k, derivative in enumerate(item for row in node.jacobian for item in row):
+                self.lines.append(f"jacobian[{k}] = {self.scalar_of(derivative).code};")
+            self.lines.append(f"if (newton(m, {n}, (double *[]){{{unknowns}}}, residual, jacobian, iteration, {failure})) break;")
+        self.lines += ["for (int iteration = 0;; iteration++) {", *lines, "}"]
+
+    def _externalcall(self, node: syntax_tree.ExternalCall) -> None:
+        """Lower the body of an external function."""
+        function = self.translation_unit.functions[self.function]
+        signature, outputs = call_signature(function), {output.name for output in function.outputs}
+        arguments = ["m"] * signature.is_constructor
+        for expression, argument in zip(node.arguments, signature.arguments, strict=True):
+            value = self.lower(expression)
+            if argument.is_array:
+                arguments += [self.as_c_array(value, argument.type), *[str(value.size)] * signature.is_constructor]
+            elif isinstance(expression, syntax_tree.Name) and expression.name in outputs:
+                arguments.append(f"&{value.text.code}")
+            else:
+                arguments.append(f"object(m, {value.text.code})" if argument.type == "ExternalObject" else value.text.code)
+        arguments += [f"&{self.lower(node.result).text.code}"] if node.result else []
+        failure = self.translation_unit.failure_code(f"the external function {function.name} has failed", node.where)
+        self.lines.append(f"if (!{signature.name}({', '.join(arguments)})) fail(m, {failure});")
+
+    def _while(self, node: syntax_tree.While) -> None:
+        with self.collect_lines() as lines:
+            self.lines.append(f"if (!{self.scalar_of(node.condition).parenthesized(13)}) break;")
+            self.body(node.body)
+        self.lines += ["for (;;) {", *lines, "}"]
 
     def _multiassign(self, node: syntax_tree.MultiAssign) -> None:
         for target, result in zip(node.targets, self.lower_call(node.call), strict=False):

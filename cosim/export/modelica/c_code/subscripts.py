@@ -8,7 +8,7 @@ from math import prod
 from ....core.text import count_noun
 from ..model import syntax_tree
 from ..model.syntax_tree import Expression, SourceLocation, raise_model_error
-from .c_values import CValue, c_call, linear_index, variable_value
+from .c_values import CValue, c_call, linear_index, scalar_value, variable_value
 from .lowering import Lowering
 
 
@@ -43,6 +43,8 @@ class SubscriptLowering(Lowering):
         selected = [linear_index(list(zip(factors, index, strict=True))) for index in product(*offset_lists)]
         if shape == base.shape and selected == list(range(base.size)):
             return base
+        if not shape:
+            return scalar_value(base.type, base.element(selected[0]), reusable=base.reusable)
         return CValue(base.type, shape, lambda k: base.element(selected[int(k)]), indexable_in_loop=False, reusable=base.reusable)
 
     def _element_offsets(

@@ -26,7 +26,7 @@ def introduce_derivatives(model: Model) -> Model:
     states = tuple(name for name in model.variables if name in der_calls)
     return replace(
         model,
-        variables={**model.variables, **{derivative_name(name): _derivative_variable(model.variables[name]) for name in states}},
+        variables={**model.variables, **{derivative_name(name): derivative_variable(model.variables[name]) for name in states}},
         states=states,
         **{section: rewrite(getattr(model, section), _replace_der) for section in _SECTIONS},
     )
@@ -54,7 +54,7 @@ def _check_state(model: Model, name: str, call: Builtin) -> None:
         raise_model_error(f"der({name}): {name} is not a continuous Real variable of the model", call.where)
 
 
-def _derivative_variable(state: Variable) -> Variable:
+def derivative_variable(state: Variable) -> Variable:
     """Return the declaration of the derivative of a state."""
     return replace(
         state,
@@ -62,6 +62,7 @@ def _derivative_variable(state: Variable) -> Variable:
         causality="local",
         start=None,
         binding=None,
+        fixed=None,
         protected=True,
         top_level=False,
         unit="",

@@ -18,7 +18,7 @@ from .matching import is_input
 from .parameter_roles import classify_parameters
 from .schedule import build_schedule, finite_variables, pre_variables, start_value
 
-_TICK_TOLERANCE = 1e-6
+TICK_TOLERANCE = 1e-6
 _MAX_STEP_SIZE = 0.005
 
 
@@ -43,6 +43,7 @@ class Interpreter:
             "initialize": pre_variables(model, self.schedule.initialization),
         }
         self._finite_variables = finite_variables(model, self.schedule)
+        self.clocks: list[list[Any]] = []
         self.values: dict[str, Any] = {}
         self.evaluate = Evaluator(model.functions, self.values)
         for variable in model.variables.values():
@@ -71,15 +72,18 @@ class Interpreter:
             ComponentError: The model has failed.
         """
         self._apply_start_values(inputs=False)
-        #: start (s), period (s) and number of past ticks of each clock
+        self._start_clocks(time)
+        self._evaluate_event("initialize", time)
+        self.evaluate.event_flags.clear()
+
+    def _start_clocks(self, time: float) -> None:
+        """Set `clocks`, the start (s), the period (s) and the number of past ticks of each clock."""
         self.clocks = []
         for clock in self.schedule.clocks:
             start, period = self.evaluate(clock.start), self.evaluate(clock.period)
             if not period > 0:
                 raise ComponentError(self.model.name, "initialize", "the period of sample() must be positive", time)
-            self.clocks.append([start, period, max(0, math.ceil(divide(time - start, period) - _TICK_TOLERANCE))])
-        self._evaluate_event("initialize", time)
-        self.evaluate.event_flags.clear()
+            self.clocks.append([start, period, max(0, math.ceil(divide(time - start, period) - TICK_TOLERANCE))])
 
     def step(self, time: float, step_size: float) -> None:
         """Execute all ticks t with time <= t < time + step_size.
@@ -105,11 +109,11 @@ class Interpreter:
         while self.clocks:
             ticks = [start + count * period for start, period, count in self.clocks]
             next_tick = min(ticks)
-            if not next_tick < end - _TICK_TOLERANCE * min(period for _, period, _ in self.clocks):
+            if not next_tick < end - TICK_TOLERANCE * min(period for _, period, _ in self.clocks):
                 break
             reached = self._integrate(reached, next_tick)
             for k, (clock, tick) in enumerate(zip(self.clocks, ticks, strict=True)):
-                self.evaluate.event_flags["due", k] = tick <= next_tick + _TICK_TOLERANCE * clock[1]
+                self.evaluate.event_flags["due", k] = tick <= next_tick + TICK_TOLERANCE * clock[1]
             self._evaluate_event("step", next_tick)
             for k, clock in enumerate(self.clocks):
                 clock[2] += self.evaluate.event_flags["due", k]

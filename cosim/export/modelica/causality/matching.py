@@ -9,7 +9,7 @@ from collections.abc import Collection, Iterable, Mapping
 from itertools import product
 from math import prod
 
-from ..model.flat_model import Equation, Model, Variable
+from ..model.flat_model import Equation, Model, Variable, previous_name
 from ..model.syntax_tree import Assign, Builtin, Colon, Expression, Index, Literal, Name, raise_model_error
 
 #: a scalar: variable name and row-major index of the element
@@ -54,6 +54,8 @@ def match_equations(model: Model, assigned: Collection[str]) -> list[Assign]:
         InputError: An equation defines no variable, or a variable has no equation.
     """
     defined = {key for name in assigned for key in scalar_keys(model.variables, Name(name))}
+    for name in model.hybrid.remembered if model.hybrid else ():
+        defined |= scalar_keys(model.variables, Name(previous_name(name)))
     for variable in model.variables.values():
         if variable.variability in ("constant", "parameter") or is_input(variable):
             defined |= scalar_keys(model.variables, Name(variable.name))

@@ -11,12 +11,6 @@ from ..model.syntax_tree import raise_model_error
 from ..model.traversal import variable_names
 from .schedule import Schedule
 
-_STRUCTURAL_USES = {
-    "ArrayDimension": "it determines the size of an array",
-    "BranchSelection": "it selects equations (use an if-expression instead)",
-    "ForRange": "it determines the range of a for-loop",
-}
-
 
 @dataclass(frozen=True)
 class ParameterRoles:
@@ -40,17 +34,15 @@ def classify_parameters(model: Model, schedule: Schedule) -> ParameterRoles:
         schedule: Its order of computation, with the clocks.
 
     Raises:
-        InputError: A settable parameter determines the structure of the model, or parameters depend on each other cyclically.
+        InputError: Parameters depend on each other cyclically.
     """
     parameters = [v for v in model.variables.values() if v.variability in ("parameter", "constant")]
     dependencies = {v.name: _dependencies(v) for v in parameters}
     _check_dependencies(model, dependencies)
-    settable = [
-        v.name for v in parameters if v.variability == "parameter" and not (dependencies[v.name] or v.final or v.protected)
-    ]
-    _check_structure(model, dependencies, settable)
+    settable = [v.name for v in parameters if v.variability == "parameter" and not dependencies[v.name] and _is_open(v, model)]
     try:
-        dependent = [name for name in TopologicalSorter(dependencies).static_order() if dependencies[name]]
+        order = TopologicalSorter(dependencies).static_order()
+        dependent = [name for name in order if dependencies[name] or model.variables[name].type == "ExternalObject"]
     except CycleError as error:
         raise_model_error(
             f"these parameters depend on each other: {', '.join(error.args[1])}", model.variables[error.args[1][0]].where
@@ -63,7 +55,7 @@ def classify_parameters(model: Model, schedule: Schedule) -> ParameterRoles:
     }
     return ParameterRoles(
         settable,
-        [v.name for v in parameters if not dependencies[v.name] and v.name not in settable],
+        [v.name for v in parameters if v.name not in settable and v.name not in dependent],
         dependent,
         [name for name in settable if name in used_by_clocks],
     )
@@ -88,12 +80,8 @@ def _transitive_dependencies(name: str, dependencies: dict[str, list[str]]) -> I
         yield from _transitive_dependencies(other, dependencies)
 
 
-def _check_structure(model: Model, dependencies: dict[str, list[str]], settable: Sequence[str]) -> None:
-    for structural in model.structural:
-        used = [name for name in structural.parameters if name in model.variables]
-        for parameter in dict.fromkeys(base for name in used for base in _transitive_dependencies(name, dependencies)):
-            if parameter in settable:
-                purpose = _STRUCTURAL_USES.get(structural.purpose, f"it determines the structure ({structural.purpose})")
-                raise_model_error(
-                    f"the parameter {parameter} cannot be settable: {purpose}; declare it final or constant", structural.where
-                )
+def _is_open(parameter: Variable, model: Model) -> bool:
+    """Return whether the importer may set a parameter."""
+    return not (
+        parameter.type == "ExternalObject" or parameter.final or parameter.protected or parameter.name in model.structural
+    )

@@ -6,7 +6,9 @@ edge detector k has become true in this event".
 
 from __future__ import annotations
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
+from typing import Any
 
 from ..model.flat_model import Model
 from ..model.syntax_tree import (
@@ -17,12 +19,14 @@ from ..model.syntax_tree import (
     EdgeDetector,
     Expression,
     IfStatement,
+    Index,
     Literal,
+    Name,
     SourceLocation,
     When,
     raise_model_error,
 )
-from ..model.traversal import PRE_OPERATORS, has_builtin
+from ..model.traversal import rewrite_outermost, variable_names, walk
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,6 +57,8 @@ class WhenConditions:
         self._model = model
         self.clocks: list[Clock] = []
         self.edge_detectors: list[EdgeDetector] = []
+        #: edge detectors that are part of an algorithm
+        self.in_place: set[int] = set()
 
     def at_event(self, when: When) -> Body:
         """Translate a when-clause for an event; branches that only initial() activates are omitted."""
@@ -62,25 +68,40 @@ class WhenConditions:
 
     def at_initialization(self, when: When) -> Body:
         """Return the statements of a when-clause for the initialization: the first branch with initial() in its condition."""
-        return next((body for condition, body in when.branches if Builtin("initial", ()) in _alternatives(condition)), ())
+        return next((body for condition, body in when.branches if Builtin("initial", ()) in self._alternatives(condition)), ())
 
     def _flags(self, condition: Expression, where: SourceLocation | None) -> list[Builtin]:
-        alternatives = [c for c in _alternatives(condition) if c != Builtin("initial", ())]
+        alternatives = [c for c in self._alternatives(condition) if c != Builtin("initial", ())]
         return [self._flag(alternative, where) for alternative in alternatives]
+
+    def _alternatives(self, condition: Expression) -> tuple[Expression, ...]:
+        """Return the conditions of a vector of conditions."""
+        variable = self._model.variables.get(condition.name) if isinstance(condition, Name) else None
+        if variable is not None and variable.shape:
+            return tuple(Index(condition, (Literal(k + 1, "Integer"),)) for k in range(variable.shape[0]))
+        return condition.elements if isinstance(condition, Array) else (condition,)
+
+    def detectors_in(self, body: Body, assigned: Collection[str]) -> list[EdgeDetector]:
+        """Return the edge detectors of the statements whose conditions read variables that the same algorithm assigns.
+
+        They are evaluated in place, in the order of the algorithm.
+        """
+        used = {int(item.arguments[0].number) for item in walk(body) if _is_edge_flag(item)}
+        found = [detector for detector in self.edge_detectors if detector.index in used]
+        found = [detector for detector in found if variable_names(detector.condition) & set(assigned)]
+        self.in_place |= {detector.index for detector in found}
+        return found
 
     def _flag(self, condition: Expression, where: SourceLocation | None) -> Builtin:
         if isinstance(condition, Builtin) and condition.name == "sample":
             return tick_flag(self._clock_index(condition, where))
-        if has_builtin(condition, "sample", "initial"):
-            raise_model_error(
-                "sample() cannot be combined with other conditions in a when-condition; use an if inside the when-clause", where
-            )
-        if has_builtin(condition, *PRE_OPERATORS):
-            raise_model_error(
-                "pre(), edge() and change() in a when-condition are not supported: a when-clause is active at rising edges only",
-                where,
-            )
-        return edge_flag(self._edge_detector_index(condition, where))
+        return edge_flag(self._edge_detector_index(rewrite_outermost(condition, self.as_tick_flag), where))
+
+    def as_tick_flag(self, node: Any) -> Builtin | None:
+        """Return the event flag of a sample(), or None for all other nodes."""
+        if not (isinstance(node, Builtin) and node.name == "sample"):
+            return None
+        return tick_flag(self._clock_index(node, node.where))
 
     def _edge_detector_index(self, condition: Expression, where: SourceLocation | None) -> int:
         conditions = [detector.condition for detector in self.edge_detectors]
@@ -99,10 +120,6 @@ class WhenConditions:
         return self.clocks.index(clock)
 
 
-def _alternatives(condition: Expression) -> tuple[Expression, ...]:
-    return condition.elements if isinstance(condition, Array) else (condition,)
-
-
 def _disjunction(flags: list[Builtin]) -> Expression:
     result: Expression = flags[0]
     for flag in flags[1:]:
@@ -112,3 +129,7 @@ def _disjunction(flags: list[Builtin]) -> Expression:
 
 def _to_real(expression: Expression) -> Expression:
     return Literal(float(expression.number), "Real") if isinstance(expression, Literal) else expression
+
+
+def _is_edge_flag(node: Any) -> bool:
+    return isinstance(node, Builtin) and node.name == "risen" and isinstance(node.arguments[0], Literal)

@@ -1,34 +1,144 @@
-"""Replacement of scalar constants by literals, so that they can determine array sizes, slices and loop ranges."""
+"""Replacement of constants and structural parameters by literals, which can determine array sizes, slices and loop ranges."""
 
 from __future__ import annotations
 
+from collections.abc import Iterable
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
+import numpy as np
+
+from ..model.arithmetic import EvaluationError, to_python_scalar
 from ..model.evaluate import Evaluator
 from ..model.flat_model import Model, Variable
-from ..model.syntax_tree import Literal, Name
+from ..model.syntax_tree import Array, Builtin, Comprehension, Expression, Literal, Name, Range
 from ..model.traversal import rewrite, variable_names
 
+_DISCRETE_TYPES = ("Integer", "Boolean", "Enumeration", "String")
 
-def inline_constants(model: Model) -> Model:
-    """Return the model with its scalar constants replaced by their values."""
-    constants = {v.name: v for v in model.variables.values() if v.variability == "constant" and not v.shape}
+
+def fold_constants(model: Model) -> Model:
+    """Return the model with its scalar constants and structural parameters replaced by their values.
+
+    Structural parameters select equations, branches or sizes. Their declarations remain in the model. Protected and final
+    parameters of discrete types that depend on them only are replaced too.
+    """
+    model = _rewrite_model(_bind_parameters(model), _ShapeFolder(model).fold)
+    structural = _structural_parameters(model)
+    foldable = {v.name: v for v in model.variables.values() if not v.shape and _is_foldable(v, structural)}
     literals: dict[str, Literal] = {}
-    while ready := [v for v in constants.values() if v.name not in literals and variable_names(v.binding) <= set(literals)]:
-        evaluate = Evaluator(model.functions, {name: literal.value for name, literal in literals.items()})
-        literals |= {v.name: Literal(evaluate(v.binding or Literal(0, v.type)), v.type) for v in ready}
+    failed: set[str] = set()
+    while ready := [v for v in foldable.values() if v.name not in literals | dict.fromkeys(failed) and _is_ready(v, literals)]:
+        values = {name: literal.value for name, literal in literals.items()}
+        for variable in ready:
+            try:
+                value = Evaluator(model.functions, dict(values))(_value(variable))
+                literals[variable.name] = Literal(to_python_scalar(value), variable.type)
+            except (EvaluationError, KeyError, TypeError):
+                failed.add(variable.name)
+    constants = {v.name for v in model.variables.values() if v.variability == "constant"} & set(literals)
 
-    def replace_constant(node: Any) -> Any:
-        return literals.get(node.name, node) if isinstance(node, Name) else node
+    def fold(node: Any) -> Any:
+        if isinstance(node, Name):
+            return literals.get(node.name, node)
+        return _unroll(node, model) if isinstance(node, Comprehension) else node
 
-    def inline_in_variable(variable: Variable) -> Variable:
+    return replace(
+        _rewrite_model(model, fold, {name for name in model.variables if name not in constants}), structural=frozenset(structural)
+    )
+
+
+def _bind_parameters(model: Model) -> Model:
+    """Return the model with the initial equations of parameters with `fixed = false` as their bindings.
+
+    Those that depend on variables or on the time become variables that are only computed at the initialization.
+    """
+    free = {v.name for v in model.variables.values() if v.variability == "parameter" and v.fixed is False and 0 not in v.shape}
+    known = {v.name for v in model.variables.values() if v.variability in ("constant", "parameter")}
+    bindings: dict[str, Expression] = {}
+    remaining = []
+    for equation in model.initial_equations:
+        name = equation.left.name if isinstance(equation.left, Name) else ""
+        if name in free - set(bindings) and variable_names(equation.right) <= known:
+            bindings[name] = equation.right
+        else:
+            remaining.append(equation)
+    initialized = free - set(bindings)
+    variables = {n: replace(v, binding=bindings[n]) if n in bindings else v for n, v in model.variables.items()}
+    variables |= {n: replace(model.variables[n], variability="discrete", binding=None) for n in initialized}
+    return replace(model, variables=variables, initial_equations=tuple(remaining), initialized=frozenset(initialized))
+
+
+def _rewrite_model(model: Model, change: Any, names: Iterable[str] | None = None) -> Model:
+    """Return the model with `change` applied to all expressions; only the variables `names` remain."""
+
+    def change_variable(variable: Variable) -> Variable:
         expressions = ("start", "binding", "minimum", "maximum")
-        return replace(variable, **{key: rewrite(getattr(variable, key), replace_constant) for key in expressions})
+        return replace(variable, **{key: rewrite(getattr(variable, key), change) for key in expressions})
 
     sections = ("equations", "whens", "algorithms", "asserts", "initial_equations", "initial_algorithms")
+    names = model.variables if names is None else names
     return replace(
         model,
-        variables={name: inline_in_variable(variable) for name, variable in model.variables.items() if name not in literals},
-        **{section: rewrite(getattr(model, section), replace_constant) for section in sections},
+        variables={name: change_variable(model.variables[name]) for name in model.variables if name in names},
+        **{section: rewrite(getattr(model, section), change) for section in sections},
     )
+
+
+class _ShapeFolder:
+    """Replacement of `size()` of a variable by a number."""
+
+    def __init__(self, model: Model):
+        self._shapes = {v.name: v.shape for v in model.variables.values()}
+
+    def fold(self, node: Any) -> Any:
+        if not (isinstance(node, Builtin) and node.name == "size" and isinstance(node.arguments[0], Name)):
+            return node
+        shape = self._shapes.get(node.arguments[0].name)
+        if shape is None or len(node.arguments) != 2 or not isinstance(node.arguments[1], Literal):
+            return node
+        return Literal(shape[int(node.arguments[1].number) - 1], "Integer")
+
+
+def _structural_parameters(model: Model) -> set[str]:
+    """Return the scalar and Integer parameters that determine the structure of the model, with those that they depend on."""
+    pending, found = list(model.structural), set[str]()
+    while pending:
+        name = pending.pop()
+        variable = model.variables.get(name)
+        if variable is None or name in found or variable.variability != "parameter":
+            continue
+        if variable.shape and variable.type == "Real":
+            continue  # only its size matters, which cannot change
+        found.add(name)
+        pending += variable_names(_value(variable))
+    return found
+
+
+def _value(variable: Variable) -> Expression:
+    return variable.binding or variable.start or Literal(False if variable.type == "Boolean" else 0, variable.type)
+
+
+def _is_foldable(variable: Variable, structural: set[str]) -> bool:
+    if variable.variability == "constant" or variable.name in structural:
+        return True
+    hidden = variable.variability == "parameter" and (variable.protected or variable.final) and variable.fixed is not False
+    return hidden and variable.type in _DISCRETE_TYPES
+
+
+def _is_ready(variable: Variable, literals: dict[str, Literal]) -> bool:
+    return variable_names(_value(variable)) <= set(literals)
+
+
+def _unroll(node: Comprehension, model: Model) -> Expression:
+    """Return an array constructor with an iterator as a list of elements, if its range is known."""
+    if not isinstance(node.range, Range | Array) or variable_names(node.range):
+        return node
+    numbers = np.atleast_1d(Evaluator(model.functions, {})(node.range))
+    literals = [Literal(to_python_scalar(number), "Integer") for number in numbers]
+    return Array(tuple(rewrite(node.value, partial(_substitute, Name(node.index), literal)) for literal in literals))
+
+
+def _substitute(name: Name, value: Expression, node: Any) -> Any:
+    return value if node == name else node

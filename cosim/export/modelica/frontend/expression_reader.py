@@ -5,6 +5,7 @@ from __future__ import annotations
 import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Any
 
 from ..model import syntax_tree
@@ -19,12 +20,15 @@ _OPERATORS = {
     "Lt": "<", "Le": "<=", "Gt": ">", "Ge": ">=", "Eq": "==", "Neq": "<>", "And": "and", "Or": "or",
 }  # fmt: skip
 _UNSUPPORTED_BUILTINS = {
-    "delay": "delay() is not supported; keep old values in an array",
-    "terminal": "terminal() is not supported: the end of a simulation is not known to an FMU",
     "terminate": "terminate() is not supported; use assert()",
 }
 _INTEGER_OPERATORS = {"+": operator.add, "-": operator.sub, "*": operator.mul}
 _MODELICA_SPELLING = {"noevent": "noEvent", "outerproduct": "outerProduct"}
+
+
+def is_object_constructor(function: Json) -> bool:
+    """Return whether a function constructs an external object; it has the name of the object's class."""
+    return any(output["type_class"] == "Class" for output in function["outputs"])
 
 
 def split_tagged(node: Json) -> tuple[str, Any]:
@@ -57,7 +61,14 @@ class ExpressionReader:
 
     def _type(self, canonical: int) -> str:
         predefined: dict[int, str] = {number: name.capitalize() for name, number in self.json["predefined_types"].items()}
-        return predefined.get(canonical, "Enumeration")
+        return predefined.get(canonical) or ("ExternalObject" if canonical in self._object_types else "Enumeration")
+
+    @cached_property
+    def _object_types(self) -> set[int]:
+        """Numbers of the types of external objects."""
+        functions = self.json["functions"].values()
+        locals_ = (local for f in functions for kind in ("inputs", "outputs", "locals") for local in f[kind])
+        return {local["effective_type"]["canonical_type"] for local in locals_ if local["type_class"] == "Class"}
 
     def _optional(self, node: Json | None) -> Expression | None:
         return None if node is None else self.read_expression(node)
@@ -78,12 +89,14 @@ class ExpressionReader:
             "Unary": self._unary,
             "Binary": self._binary,
             "If": self._if,
-            "Array": lambda n: syntax_tree.Array(tuple(map(self.read_expression, n["elements"]))),
+            "Array": self._array,
             "Range": lambda n: syntax_tree.Range(
                 self.read_expression(n["start"]), self._optional(n["step"]), self.read_expression(n["end"])
             ),
             "BuiltinCall": self._builtin,
             "FunctionCall": self._call,
+            "StringConversion": lambda n: syntax_tree.Builtin("String", (self.read_expression(n["value"]),), self.locate(n)),
+            "ArrayComprehension": self._comprehension,
         }
         if kind not in readers:
             raise_model_error(f"the expression {kind} is not supported", self.locate(payload))
@@ -132,6 +145,44 @@ class ExpressionReader:
         branches = tuple((self.read_expression(condition), self.read_expression(value)) for condition, value in node["branches"])
         return syntax_tree.If(branches, self.read_expression(node["else_branch"]))
 
+    def _array(self, node: Json) -> Expression:
+        """Convert an array constructor, or a concatenation `[a, b; c, d]`, whose elements may be arrays."""
+        elements = tuple(map(self.read_expression, node["elements"]))
+        kind = node.get("kind")
+        if kind not in ("Horizontal", "Vertical"):
+            return syntax_tree.Array(elements)
+        if kind == "Vertical" and (rows := self._scalar_rows(elements)):
+            return syntax_tree.Array(rows)
+        return syntax_tree.Builtin("rows" if kind == "Vertical" else "columns", elements, self.locate(node))
+
+    def _scalar_rows(self, rows: tuple[Expression, ...]) -> tuple[syntax_tree.Array, ...]:
+        """Return the rows of a matrix as arrays if all their elements are certainly scalars, else no rows."""
+        columns = [row.arguments for row in rows if isinstance(row, syntax_tree.Builtin) and row.name == "columns"]
+        if len(columns) != len(rows) or not all(self._is_scalar(element) for row in columns for element in row):
+            return ()
+        return tuple(map(syntax_tree.Array, columns))
+
+    def _is_scalar(self, node: Expression) -> bool:
+        """Return whether an expression is certainly a scalar."""
+        if isinstance(node, syntax_tree.Name):
+            variable = self.json["variables"].get(node.name)
+            return variable is not None and not variable["dims"]
+        if isinstance(node, syntax_tree.Index):
+            return isinstance(node.base, syntax_tree.Name) and all(isinstance(s, syntax_tree.Literal) for s in node.subscripts)
+        if isinstance(node, syntax_tree.Binary):
+            return self._is_scalar(node.left) and self._is_scalar(node.right)
+        return isinstance(node, syntax_tree.Literal) or (isinstance(node, syntax_tree.Unary) and self._is_scalar(node.operand))
+
+    def _comprehension(self, node: Json) -> Expression:
+        """Convert an array constructor with iterators; the last iterator varies fastest in Modelica's nesting order."""
+        where = self.locate(node)
+        if node.get("filter") is not None:
+            raise_model_error("an array constructor with a condition is not supported", where)
+        value = self.read_expression(node["expr"])
+        for index in node["indices"]:
+            value = syntax_tree.Comprehension(value, index["name"], self.read_expression(index["range"]), where)
+        return value
+
     def _builtin(self, node: Json) -> syntax_tree.Builtin:
         name = node["function"].lower()
         if name in _UNSUPPORTED_BUILTINS:
@@ -153,6 +204,6 @@ class ExpressionReader:
         """
         name = reference["name"]
         function = self.json["functions"].get(name) or raise_model_error(f"unknown function {name}", where)
-        if reference["component_ref"]["parts"][-1]["def_id"] != function["def_id"]:
+        if not is_object_constructor(function) and reference["component_ref"]["parts"][-1]["def_id"] != function["def_id"]:
             raise_model_error(f'the model uses several functions named "{name}"; give them different names', where)
         return syntax_tree.Call(name, tuple(map(self.read_expression, arguments)), where)

@@ -1,4 +1,4 @@
-"""Detection of if-equations that the front end has replaced by one of their branches (constant folding).
+"""Detection of if-equations in when-clauses that the front end has replaced by one of their branches (constant folding).
 
 Inside a when-clause rumoca silently replaces `if p then ... else ... end if` by one branch if the condition can be evaluated
 with default values. A parameter that is set later would have no effect. The flat model does not record this. Therefore the
@@ -13,7 +13,6 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from ..model.syntax_tree import SourceLocation, raise_model_error
 from .rumoca_frontend import ModelicaSources
 
 _TOKEN = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\])*"|\'(?:\\.|[^\'\\])*\'|[A-Za-z_]\w*|\d[\w.]*|\S', re.DOTALL)
@@ -34,25 +33,22 @@ class _IfEquation:
     identifiers: frozenset[str]
 
 
-def check_folded_branches(json: Mapping[str, Any], sources: ModelicaSources) -> None:
-    """Check that the flat model contains all if-equations whose conditions depend on a settable parameter.
+def folded_parameters(json: Mapping[str, Any], sources: ModelicaSources) -> frozenset[str]:
+    """Return the parameters whose values have selected the branch of an if-equation; they are structural.
 
     Args:
         json: rumoca's document of the flat model.
         sources: The Modelica files.
-
-    Raises:
-        InputError: An if-equation has been replaced by one of its branches.
     """
+    found: set[str] = set()
     settable = {name.rpartition(".")[2] for name in json["variables"] if _is_settable(json, name)}
     for file, flat_equations in _equations_by_file(json, sources).items():
         text = file.read_bytes()
         for statement, depth in _Scanner(text.decode("latin-1")).if_equations():
-            names = ", ".join(sorted(statement.identifiers & settable))
+            names = statement.identifiers & settable
             if names and _is_folded(statement, depth, flat_equations):
-                where = SourceLocation(file, text.count(b"\n", 0, statement.start) + 1)
-                message = f"the front end evaluates the condition of this if-equation with the default value of {names}"
-                raise_model_error(f"{message}; use an if-expression or an algorithm", where)
+                found |= names
+    return frozenset(name for name in json["variables"] if name.rpartition(".")[2] in found and _is_settable(json, name))
 
 
 def _is_settable(json: Mapping[str, Any], name: str) -> bool:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import Any
 
 from ..model import flat_model, syntax_tree
@@ -24,7 +25,7 @@ class ModelReader(StatementReader):
         Raises:
             InputError: The model contains an element that is not supported.
         """
-        self._check_document()
+        self._check_document(self.sources.locate_class(name))
         names = self.json["variables"]
         return flat_model.Model(
             name=name,
@@ -40,23 +41,22 @@ class ModelReader(StatementReader):
                 key: self.read_function(node) for key, node in self.json["functions"].items() if not node["is_constructor"]
             },
             enumerations=self._enumerations(),
-            structural=tuple(
-                flat_model.StructuralParameters(
-                    node["kind"], tuple(map(self._resolve_name, node["references"])), self.locate(node)
-                )
+            structural=frozenset(
+                self._resolve_name(candidates)
                 for node in self.json.get("parameter_branch_selections", ())
+                for candidates in node["references"]
             ),
         )
 
-    def _check_document(self) -> None:
+    def _check_document(self, where: SourceLocation) -> None:
         if self.json["is_partial"]:
-            raise_model_error("the model is partial", None)
+            raise_model_error("the model is partial", where)
         for kind in ("initial_assert_equations", "definite_roots", "branches", "optional_edges", "potential_roots"):
             if self.json.get(kind):
-                raise_model_error(f"{kind.replace('_', ' ')} are not supported", None)
+                raise_model_error(f"{kind.replace('_', ' ')} are not supported", where)
 
         if next(unroll_equations(self.json, "initial_structured_equations"), None):
-            raise_model_error("a for-equation among the initial equations was not unrolled by the front end", None)
+            raise_model_error("a for-equation among the initial equations was not unrolled by the front end", where)
 
     def _resolve_name(self, candidates: list[str]) -> str:
         """Return the first of the candidate names (innermost scope first) that is a variable."""
@@ -79,6 +79,7 @@ class ModelReader(StatementReader):
             binding=self._optional(node["binding"]),
             bound_by_modifier=node["binding_from_modification"],
             final=bool(self.json["variable_final_flags"].get(name)),
+            fixed=_is_fixed(node["fixed"]),
             protected=node["is_protected"],
             top_level=self._is_top_level(name),
             unit=self._text(node["unit"]),
@@ -144,10 +145,23 @@ class ModelReader(StatementReader):
 
     def _equation(self, node: Json) -> list[flat_model.Equation]:
         kind, residual = split_tagged(node["residual"])
+        where = self.locate(node)
         if kind != "Binary" or residual["op"] != "Sub":
-            raise_model_error("this equation does not have the form a = b", self.locate(node))
-        left, right, where = self.read_expression(residual["lhs"]), self.read_expression(residual["rhs"]), self.locate(node)
+            return [flat_model.Equation(self.read_expression(node["residual"]), syntax_tree.Literal(0.0, "Real"), where)]
+        if "Tuple" in residual["lhs"]:
+            return self._split_tuple(residual["lhs"]["Tuple"]["elements"], self.read_expression(residual["rhs"]), where)
+        left, right = self.read_expression(residual["lhs"]), self.read_expression(residual["rhs"])
         return [flat_model.Equation(a, b, where) for a, b in self._split_records(left, right)]
+
+    def _split_tuple(self, targets: list[Json], call: Expression, where: SourceLocation | None) -> list[flat_model.Equation]:
+        """Return one equation for each result of a function with several results; omitted results have no name."""
+        if not isinstance(call, syntax_tree.Call):
+            raise_model_error("the right side of an equation with a tuple must be a function call", where)
+        return [
+            flat_model.Equation(self.read_expression(target), replace(call, result=k), where)
+            for k, target in enumerate(targets)
+            if "Empty" not in target
+        ]
 
     def _split_records(self, left: Expression, right: Expression) -> list[tuple[Expression, Expression]]:
         """Return the pairs of fields of an equation between two records, or the pair itself for all other equations."""
@@ -192,7 +206,8 @@ class ModelReader(StatementReader):
         if kind not in ("Assign", "Reinit"):
             raise_model_error(f"{kind} in a when-equation is not supported", where)
         target = self._parse_target(node["target" if kind == "Assign" else "state"], where)
-        return syntax_tree.Assign(target, self.read_expression(node["value"]), where)
+        statement = syntax_tree.Assign if kind == "Assign" else syntax_tree.Reinit
+        return statement(target, self.read_expression(node["value"]), where)
 
     def _parse_target(self, target: str, where: SourceLocation | None) -> syntax_tree.Name | syntax_tree.Index:
         """Parse the target of a when-equation, given as text: a name, perhaps with constant subscripts."""
@@ -205,3 +220,8 @@ class ModelReader(StatementReader):
         return syntax_tree.Index(
             syntax_tree.Name(base, where), tuple(syntax_tree.Literal(int(k), "Integer") for k in numbers), where
         )
+
+
+def _is_fixed(flags: list[bool] | bool | None) -> bool | None:
+    """Return the attribute `fixed`, or None if it is not given; an array is fixed if all its elements are."""
+    return all(flags) if isinstance(flags, list) else flags

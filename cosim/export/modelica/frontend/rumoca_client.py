@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 from collections.abc import Sequence
@@ -64,9 +65,11 @@ def run_rumoca(
 def _run_process(request: bytes, output: Any, errors: Any) -> str:
     """Run the child process to its end and return the description of a failure."""
     command = [sys.executable, "-P", str(_PROGRAM)]
+    # rumoca would read further libraries from the folders of MODELICAPATH
+    environment = {name: value for name, value in os.environ.items() if name != "MODELICAPATH"}
     try:
         process = subprocess.run(  # noqa: S603
-            command, input=request, stdout=output, stderr=errors, timeout=TIMEOUT, check=False
+            command, input=request, stdout=output, stderr=errors, timeout=TIMEOUT, check=False, env=environment
         )
     except subprocess.TimeoutExpired:
         return f"it did not end within {TIMEOUT:g} s"

@@ -1,7 +1,8 @@
 """Invocation of the front end rumoca, which flattens a model and returns it as JSON.
 
-Names are looked up in the file itself and in every package folder (a folder with `package.mo`) beside it. Other files beside it
-are never read. A file that belongs to a package (`within P;`) is loaded as a member of this package.
+Names are looked up in the file itself, in every package folder (a folder with `package.mo`) beside it, and in libraries
+(`libraries.py`). Other files beside it are never read. A file that belongs to a package (`within P;`) is loaded as a member of
+this package.
 """
 
 from __future__ import annotations
@@ -10,11 +11,15 @@ import json
 import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 from ....core.errors import InputError, Problem
 from ..model.syntax_tree import SourceLocation
+from .flat_cache import link_libraries, read_document, store_document
+from .libraries import Library, find_libraries, library_folders
 from .rumoca_client import run_rumoca
 
 RUMOCA_VERSION = "0.10.2"
@@ -22,7 +27,15 @@ RUMOCA_VERSION = "0.10.2"
 MAX_SOURCE_SIZE = 1 << 24
 
 _WITHIN = re.compile(r"^\s*within\s+([\w.]+)\s*;", re.MULTILINE)
-_QUOTED = re.compile(r"'([\w.]+)'")
+_QUOTED = re.compile(r"['`]([\w.]+)['`]")
+_CLASS = r"^[^/\n]*\b(?:model|block|class|function|package|record|connector|type)\s+{}\b"
+#: beginnings of messages that name a part of the front end
+_PHASE = re.compile(
+    r"^(?:parse error: |\w+ failed: \S+ failed in \w+: (?:unsupported Flat semantic owner `[^`]*`: |"
+    r"unsupported runtime operator `\w+`: |canonical DAE construction rejected an invalid operation: )?)"
+)
+_COUNTS = re.compile(r"; unknowns\[.*$")
+_NOT_FOUND = " could not be compiled because resolve/parse failed"
 _LOCATION_SUFFIX = re.compile(r"\[(?P<file>[^\[\]]+):(?P<line>\d+):\d+\]$")
 _PANIC = re.compile(
     r'detail: "(?P<what>[^"]+)", span: Span \{ source: SourceId\((?P<source>\d+)\), start: BytePos\((?P<start>\d+)\)'
@@ -32,22 +45,47 @@ _SYNTAX_ERROR = re.compile(r"×\s*(?P<what>.+?)\n.*?\[[^\]]*:(?P<line>\d+):\d+\]
 
 @dataclass(frozen=True)
 class ModelicaSources:
-    """The Modelica files that the front end has read, and the conversion of its spans (file hash, byte offset) to lines."""
+    """The Modelica files that the front end has read, and the conversion of its spans (file hash, byte offset) to lines.
 
-    #: the file of the model first
+    Attributes:
+        files: Files of the model and of the packages beside it, the file of the model first.
+        libraries: Libraries that the model uses.
+        links: Folder with a link to each library, through which the front end reads them; None without libraries.
+    """
+
     files: Sequence[Path]
-    #: rumoca's hash of the file name -> file
-    _by_hash: Mapping[int, Path]
+    libraries: Sequence[Library] = ()
+    links: Path | None = None
 
-    @classmethod
-    def from_files(cls, files: Sequence[Path]) -> ModelicaSources:
-        """Create the sources from files, with the file of the model first."""
-        model_file = {_fnv1a(_display_name(file)): file for file in files[:1]}
-        return cls(files, model_file | {_fnv1a(str(file)): file for file in files})
+    @cached_property
+    def _by_hash(self) -> Mapping[int, Path]:
+        """Files by rumoca's hash of their names."""
+        names = {_display_name(file): file for file in self.files[:1]} | {str(file): file for file in self.files}
+        for library in self.libraries:
+            link = str(self.links and self.links / library.link_name)
+            names |= {link + str(file).removeprefix(str(library.path)): file for file in library.files}
+        return {_fnv1a(name): file for name, file in names.items()}
+
+    @property
+    def packages(self) -> dict[str, Path]:
+        """Folders of the top-level packages by their names."""
+        tops = (
+            file.parent for file in self.files if file.name == "package.mo" and not (file.parent.parent / "package.mo").is_file()
+        )
+        return {folder.name: folder for folder in tops} | {
+            library.name: library.package_file.parent for library in self.libraries
+        }
 
     def find(self, name: str) -> Path | None:
         """Return the file with the name that the front end uses in messages, or None."""
         return self._by_hash.get(_fnv1a(name))
+
+    def locate_class(self, name: str) -> SourceLocation:
+        """Return the line with the declaration of a class in the file of the model, or the first line of this file."""
+        path = self.files[0]
+        text = path.read_text(encoding="utf-8")
+        declaration = re.search(_CLASS.format(re.escape(name.rpartition(".")[2])), text, re.MULTILINE)
+        return SourceLocation(path, text.count("\n", 0, declaration.end()) + 1 if declaration else 1)
 
     def locate(self, span: Mapping[str, int] | None) -> SourceLocation | None:
         """Return the line at which a span starts, or None for a span that is not in these files."""
@@ -57,33 +95,49 @@ class ModelicaSources:
         return SourceLocation(path, path.read_bytes().count(b"\n", 0, span["start"]) + 1)
 
 
-def flatten_model(path: Path, model: str | None) -> tuple[dict[str, Any], ModelicaSources]:
+def flatten_model(path: Path, model: str | None, library_path: Sequence[Path] = ()) -> tuple[dict[str, Any], ModelicaSources]:
     """Flatten a Modelica model with rumoca.
 
     Args:
         path: The Modelica file.
         model: Name of the model. None selects the model with the name of the file.
+        library_path: Folders that are searched for libraries before those of MODELICAPATH.
 
     Returns:
         The flat model as rumoca's JSON, and its sources.
 
     Raises:
-        InputError: The front end reports errors, for example syntax errors and unknown names.
+        InputError: The front end reports errors, for example syntax errors and unknown names, or a library is not found.
     """
     path = path.resolve()
     text = read_source(path)
     packages, name = find_packages(path, text), model_name(path, text, model)
-    sources = ModelicaSources.from_files(
-        [path, *(file for package in packages for file in sorted(package.rglob("*.mo")) if file != path)]
-    )
-    answer = run_rumoca(RUMOCA_VERSION, sources.files, packages, name, None if _WITHIN.search(text) else _display_name(path))
+    files = [path, *(file for package in packages for file in sorted(package.rglob("*.mo")) if file != path)]
+    libraries = find_libraries(files, library_folders(library_path), [package.name for package in packages])
+    sources = ModelicaSources(files, libraries, link_libraries(libraries) if libraries else None)
+    if not libraries:
+        return json.loads(_flatten(sources, packages, name, text)), sources
+    contents = [(str(file), sha256(file.read_bytes()).hexdigest()) for file in files]
+    key = [RUMOCA_VERSION, name, contents, [(str(library.path), library.digest) for library in libraries]]
+    flat = read_document(key)
+    if flat is None:
+        flat = _flatten(sources, packages, name, text)
+        store_document(key, flat)
+    return json.loads(flat), sources
+
+
+def _flatten(sources: ModelicaSources, packages: Sequence[Path], name: str, text: str) -> str:
+    """Return the flat model as JSON text."""
+    path, roots = sources.files[0], [*packages, *([sources.links] if sources.links else [])]
+    answer = run_rumoca(RUMOCA_VERSION, sources.files, roots, name, None if _WITHIN.search(text) else _display_name(path))
     if "version" in answer:
         raise InputError(_version_problem(answer["version"]))
     if "syntax_errors" in answer:
         raise InputError(_to_syntax_problem(*error) for error in answer["syntax_errors"])
     if "error" in answer:
         raise InputError(_to_problems(answer["error"], answer["panicked"], name, path, sources))
-    return json.loads(answer["flat"]), sources
+    flat: str = answer["flat"]
+    return flat
 
 
 def read_source(path: Path) -> str:
@@ -144,30 +198,37 @@ def _to_problems(error: str, panicked: bool, name: str, path: Path, sources: Mod
         return [Problem(panic["what"], str(sources.locate({key: int(panic[key]) for key in ("source", "start")}) or path))]
     lines = [line.rpartition("[Resolve]:")[2].strip(" -") for line in error.splitlines()]
     reasons = [line for line in dict.fromkeys(lines) if line and not line.startswith("Related failures")]
+    if any(line.startswith("unresolved extends base class") for line in reasons):
+        reasons = [line for line in reasons if not line.startswith("base class not found")]
+    if [line for line in reasons if not line.endswith(_NOT_FOUND)] == []:
+        reasons = [f"the file contains no model with the name {name}"]
     specific = [line for line in reasons if " could not be compiled: " not in line] or reasons
     if not specific or panicked:
         specific = [f"the Modelica front end failed on the model {name}: {' '.join(lines)}"]
-    return [_locate_problem(reason, path, sources) for reason in specific]
+    return [_locate_problem(reason, name, path, sources) for reason in specific]
 
 
-def _locate_problem(reason: str, path: Path, sources: ModelicaSources) -> Problem:
-    """Add a location to a reason: the one at its end or, if it has none, the first line with the name that it quotes."""
+def _shorten(reason: str) -> str:
+    """Return a reason without the phase of the front end and without counts of its internal kinds of equations."""
+    return _COUNTS.sub("", _PHASE.sub("", reason))
+
+
+def _locate_problem(reason: str, name: str, path: Path, sources: ModelicaSources) -> Problem:
+    """Add a location to a reason: the one at its end, else the first line with a name that it quotes, else that of the model."""
     if ending := _LOCATION_SUFFIX.search(reason):
         where = SourceLocation(sources.find(ending["file"]) or path, int(ending["line"]))
-        return Problem(reason[: ending.start()].rstrip(), str(where))
-    return Problem(reason, str(_find_quoted_name(reason, sources) or path))
+        return Problem(_shorten(reason[: ending.start()].rstrip()), str(where))
+    return Problem(_shorten(reason), str(_find_quoted_name(reason, sources) or sources.locate_class(name)))
 
 
 def _find_quoted_name(reason: str, sources: ModelicaSources) -> SourceLocation | None:
     """Return the first source line with the name that a message quotes."""
-    quoted = _QUOTED.search(reason)
-    if quoted is None:
-        return None
-    word = re.compile(rf"(?<![\w.]){re.escape(quoted[1])}(?![\w])")
-    for file in sources.files:
-        for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), 1):
-            if word.search(line):
-                return SourceLocation(file, number)
+    for quoted in _QUOTED.findall(reason):
+        word = re.compile(rf"(?<![\w.]){re.escape(quoted)}(?![\w])")
+        for file in sources.files:
+            for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), 1):
+                if word.search(line):
+                    return SourceLocation(file, number)
     return None
 
 

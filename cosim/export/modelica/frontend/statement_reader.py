@@ -2,12 +2,15 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Callable, Mapping
 from typing import cast
 
 from ..model import flat_model, syntax_tree
 from ..model.syntax_tree import Body, Expression, SourceLocation, Statement, raise_model_error
-from .expression_reader import ExpressionReader, Json, split_tagged
+from .expression_reader import ExpressionReader, Json, is_object_constructor, split_tagged
+
+_DESTRUCTOR = re.compile(r'\bfunction\s+destructor\b.*?\bexternal\s*(?:"C"\s*)?(\w+)\s*\(', re.DOTALL)
 
 
 class StatementReader(ExpressionReader):
@@ -23,6 +26,10 @@ class StatementReader(ExpressionReader):
             "FunctionCall": self._multi_assign,
             "If": self._if_statement,
             "For": self._for,
+            "While": lambda n: syntax_tree.While(
+                self.read_expression(n["block"]["cond"]), self.read_body(n["block"]["stmts"]), self.locate(n)
+            ),
+            "Reinit": lambda n: syntax_tree.Reinit(self._target(n["variable"]), self.read_expression(n["value"]), self.locate(n)),
             "Assert": self._assert,
             "When": lambda n: syntax_tree.When(
                 tuple((self.read_expression(block["cond"]), self.read_body(block["stmts"])) for block in n["blocks"]),
@@ -68,28 +75,47 @@ class StatementReader(ExpressionReader):
         return cast(syntax_tree.For, body[0])
 
     def _assert(self, node: Json) -> syntax_tree.Assert:
-        message, where = self.read_expression(node["message"]), self.locate(split_tagged(node["condition"])[1])
-        if node["level"] is not None and self.read_expression(node["level"]) != syntax_tree.Literal(2, "Integer"):
-            raise_model_error("assert() with a level other than AssertionLevel.error is not supported", where)
-        return syntax_tree.Assert(self.read_expression(node["condition"]), self._message_text(message, where), where)
-
-    def _message_text(self, message: Expression, where: SourceLocation | None) -> str:
-        if isinstance(message, syntax_tree.Binary) and message.operator == "+":
-            return self._message_text(message.left, where) + self._message_text(message.right, where)
-        if not (isinstance(message, syntax_tree.Literal) and message.type == "String"):
-            raise_model_error("the message of an assert() must be a String literal", where)
-        return str(message.value)
+        where = self.locate(split_tagged(node["condition"])[1])
+        level = None if node["level"] is None else self.read_expression(node["level"])
+        if level is not None and not isinstance(level, syntax_tree.Literal):
+            raise_model_error("the level of an assert() must be a literal of AssertionLevel", where)
+        message = tuple(_message_parts(self.read_expression(node["message"])))
+        return syntax_tree.Assert(
+            self.read_expression(node["condition"]), message, where, warning=level is not None and level.value == 1
+        )
 
     def read_function(self, node: Json) -> flat_model.Function:
         """Convert a function.
 
         Raises:
-            InputError: The function is external or contains an unsupported element.
+            InputError: The function contains an unsupported element.
         """
-        if node["external"]:
-            raise_model_error(f"the external function {node['name']} is not supported", self.locate(node))
         inputs, outputs, local = (tuple(map(self._local, node[kind])) for kind in ("inputs", "outputs", "locals"))
-        return flat_model.Function(node["name"], inputs, outputs, local, self.read_body(node["body"]), self.locate(node))
+        body, external = self.read_body(node["body"]), None
+        if node["external"]:
+            body, external = (self._external_call(node),), self._external_code(node)
+        return flat_model.Function(node["name"], inputs, outputs, local, body, self.locate(node), external)
+
+    def _external_call(self, node: Json) -> syntax_tree.ExternalCall:
+        external, where = node["external"], self.locate(node)
+        if external["language"] not in ("C", "", None):
+            raise_model_error(f"found the language {external['language']} of an external function, expected C", where)
+        name, result = external["function_name"], external["output_name"]
+        arguments = tuple(map(self.read_expression, external["args"]))
+        return syntax_tree.ExternalCall(name, arguments, syntax_tree.Name(result) if result else None, where)
+
+    def _external_code(self, node: Json) -> flat_model.ExternalCode:
+        values = {item["name"][-1]: self.read_expression(item["value"]) for item in node["external"]["annotations"]}
+        include, directory, libraries = (_texts(values.get(key)) for key in ("Include", "IncludeDirectory", "LibraryDirectory"))
+        library, destructor = _texts(values.get("Library")), self._destructor(node) if is_object_constructor(node) else ""
+        return flat_model.ExternalCode("".join(include), "".join(directory), library, "".join(libraries), destructor)
+
+    def _destructor(self, constructor: Json) -> str:
+        """Return the C function of the destructor of an external object, which the document does not contain."""
+        where = self.locate(constructor)
+        text = where.path.read_bytes()[constructor["span"]["start"] :].decode() if where else ""
+        match = _DESTRUCTOR.search(text)
+        return match[1] if match else ""
 
     def _local(self, node: Json) -> flat_model.FunctionVariable:
         where = self.locate(node)
@@ -98,3 +124,22 @@ class StatementReader(ExpressionReader):
         dimensions = tuple(None if isinstance(d, syntax_tree.Colon) else d for d in self._subscripts(node["shape_expr"]))
         kind = self._type(node["effective_type"]["canonical_type"])
         return flat_model.FunctionVariable(node["name"], kind, dimensions, self._optional(node["default"]), where)
+
+
+def _message_parts(message: Expression) -> list[Expression]:
+    """Return the terms of a concatenation of Strings; adjacent literals become one literal."""
+    if isinstance(message, syntax_tree.Builtin) and message.name == "String":
+        return [message.arguments[0]]
+    if not (isinstance(message, syntax_tree.Binary) and message.operator == "+"):
+        return [message]
+    left, right = _message_parts(message.left), _message_parts(message.right)
+    if isinstance(left[-1], syntax_tree.Literal) and isinstance(right[0], syntax_tree.Literal):
+        joined = syntax_tree.Literal(f"{left[-1].value}{right[0].value}", "String")
+        return [*left[:-1], joined, *right[1:]]
+    return left + right
+
+
+def _texts(value: Expression | None) -> tuple[str, ...]:
+    """Return the String literals of an annotation, which is one literal or an array of them."""
+    items = value.elements if isinstance(value, syntax_tree.Array) else (value,)
+    return tuple(str(item.value) for item in items if isinstance(item, syntax_tree.Literal))

@@ -65,6 +65,29 @@ def _sum(values: Any) -> Any:
     return reduce(lambda a, b: check_int32(a + b), map(to_python_scalar, np.asarray(values).flat)) if np.size(values) else 0
 
 
+def solve_linear(a: list[list[float]], b: list[float]) -> list[float] | None:
+    """Return the solution of a linear system, with the operations of newton.h in the same order; None if it is singular."""
+    n = len(b)
+    for column in range(n):
+        pivot = column
+        for row in range(column + 1, n):
+            if abs(a[row][column]) > abs(a[pivot][column]):
+                pivot = row
+        if not abs(a[pivot][column]) > 0:
+            return None
+        a[column], a[pivot], b[column], b[pivot] = a[pivot], a[column], b[pivot], b[column]
+        for row in range(column + 1, n):
+            factor = divide(a[row][column], a[column][column])
+            for k in range(column, n):
+                a[row][k] -= factor * a[column][k]
+            b[row] -= factor * b[column]
+    for row in range(n - 1, -1, -1):
+        for k in range(row + 1, n):
+            b[row] -= a[row][k] * b[k]
+        b[row] = divide(b[row], a[row][row])
+    return b
+
+
 def divide(a: float, b: float) -> float:
     """Return `a / b` as defined by IEEE 754, also for b = 0."""
     if b != 0:
@@ -129,6 +152,12 @@ def _cross(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.array([a[i] * b[j] - a[j] * b[i] for i, j in ((1, 2), (2, 0), (0, 1))])
 
 
+def _as_matrix(value: Any) -> np.ndarray:
+    """Return a scalar or a vector as a matrix with one column, as concatenation does."""
+    array = np.asarray(value)
+    return array.reshape(array.shape + (1,) * (2 - array.ndim)) if array.ndim < 2 else array
+
+
 def _size(array: Any, dimension: int | None = None) -> Any:
     return np.array(np.shape(array)) if dimension is None else np.shape(array)[dimension - 1]
 
@@ -155,12 +184,15 @@ BUILTINS: Mapping[str, Callable[..., Any]] = {
     "abs": lambda x: elementwise(lambda y: check_int32(abs(y)), x),
     "atan2": math.atan2,
     "cat": lambda _, *arrays: np.concatenate(arrays),
+    "columns": lambda *parts: np.concatenate([_as_matrix(part) for part in parts], axis=1),
     "cross": _cross,
+    "diagonal": lambda x: np.diag(np.asarray(x)),
     "div": _real_or_integer(lambda a, b: float(np.trunc(divide(a, b))), _quotient),
     "fill": lambda value, *sizes: np.full(sizes, value),
     "homotopy": lambda actual, _: actual,
     "identity": lambda n: np.eye(n, dtype=np.int64),
     "integer": lambda x: elementwise(lambda y: _floor_to_int32(y) if isinstance(y, float) else y, x),
+    "linspace": lambda first, last, n: np.array([first + (last - first) * k / (n - 1) for k in range(n)]),
     "max": _maximum,
     "min": _minimum,
     "mod": _real_or_integer(lambda a, b: a - float(np.floor(divide(a, b))) * b, operator.mod),
@@ -168,10 +200,13 @@ BUILTINS: Mapping[str, Callable[..., Any]] = {
     "noEvent": lambda x: x,
     "ones": lambda *sizes: np.ones(sizes, np.int64),
     "product": lambda x: reduce(lambda a, b: check_int32(a * b), _flat_elements((x,))),
+    "rows": lambda *parts: np.concatenate([_as_matrix(part) for part in parts], axis=0),
+    "scalar": lambda x: to_python_scalar(np.asarray(x).flat[0]),
     "rem": _real_or_integer(lambda a, b: a - float(np.trunc(divide(a, b))) * b, lambda a, b: a - b * _quotient(a, b)),
     "sign": lambda x: elementwise(lambda y: (y > 0) - (y < 0), x),
     "size": _size,
     "sum": _sum,
     "transpose": np.transpose,
+    "vector": np.ravel,
     "zeros": lambda *sizes: np.zeros(sizes, np.int64),
 }

@@ -2,19 +2,31 @@
 
 from __future__ import annotations
 
+import math
 import operator
 from collections import ChainMap
-from collections.abc import Mapping, MutableMapping
+from collections.abc import Callable, Mapping, MutableMapping
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
 from . import syntax_tree
-from .arithmetic import BUILTINS, OPERATORS, EvaluationError, check_int32, elementwise, matrix_product, to_python_scalar
+from .arithmetic import (
+    BUILTINS,
+    OPERATORS,
+    EvaluationError,
+    check_int32,
+    divide,
+    elementwise,
+    matrix_product,
+    solve_linear,
+    to_python_scalar,
+)
 from .flat_model import Function, FunctionVariable
 from .syntax_tree import Body, Expression
 
+NEWTON_ITERATIONS = 50
 DTYPES = {"Real": np.float64, "Integer": np.int64, "Enumeration": np.int64, "Boolean": np.bool_}
 
 
@@ -26,6 +38,8 @@ def convert_to_type(value: Any, type_name: str, shape: tuple[int, ...]) -> Any:
     """
     if shape:
         return np.array(np.broadcast_to(np.asarray(value, DTYPES[type_name]), shape))
+    if type_name == "String":
+        return str(value or "")
     return float(value) if type_name == "Real" else bool(value) if type_name == "Boolean" else int(value)
 
 
@@ -45,6 +59,8 @@ class Evaluator:
     event_flags: dict[tuple[str, int], bool] = field(default_factory=dict)
     #: edge detector -> its condition at the previous event
     previous_conditions: dict[int, bool] = field(default_factory=dict)
+    #: value of the argument of delay() number k at a past time
+    past: Callable[[int, float], float] = lambda _index, _time: 0.0
 
     # statements
 
@@ -86,9 +102,38 @@ class Evaluator:
         if shadowed is not None:
             self.values[node.index] = shadowed
 
+    def _solve(self, node: syntax_tree.Solve) -> None:
+        """Solve a system of equations as in newton.h."""
+        for _ in range(NEWTON_ITERATIONS):
+            residual = [float(self(item)) for item in node.residuals]
+            changes = solve_linear([[float(self(item)) for item in row] for row in node.jacobian], residual)
+            if changes is None:
+                break
+            largest = 0.0
+            for unknown, change in zip(node.unknowns, changes, strict=True):
+                value = float(self(unknown)) - change
+                self._store(unknown, value)
+                ratio = divide(abs(change), 1 + abs(value))
+                if not ratio <= largest:
+                    largest = ratio
+            if largest <= 1e-11:
+                return
+            if not math.isfinite(largest):
+                break
+        raise EvaluationError("a system of equations has no solution", node.where)
+
+    def _while(self, node: syntax_tree.While) -> None:
+        while self(node.condition):
+            self.execute(node.body)
+
     def _assert(self, node: syntax_tree.Assert) -> None:
-        if not self(node.condition):
-            raise EvaluationError(node.message, node.where)
+        if not self(node.condition) and not node.warning:
+            raise EvaluationError("".join(map(self._as_text, node.message)), node.where)
+
+    def _as_text(self, node: Expression) -> str:
+        """Return the value of an expression as in a composed message: Reals with 6 significant digits."""
+        value = self(node)
+        return f"{value:g}" if isinstance(value, float) else str(value).lower() if isinstance(value, bool) else str(value)
 
     def _edgedetector(self, node: syntax_tree.EdgeDetector) -> None:
         condition = bool(self(node.condition))
@@ -113,6 +158,16 @@ class Evaluator:
 
     def _array(self, node: syntax_tree.Array) -> np.ndarray:
         return np.array([self(element) for element in node.elements])
+
+    def _comprehension(self, node: syntax_tree.Comprehension) -> np.ndarray:
+        shadowed, elements = self.values.get(node.index), []
+        for number in self(node.range):
+            self.values[node.index] = to_python_scalar(number)
+            elements.append(self(node.value))
+        self.values.pop(node.index, None)
+        if shadowed is not None:
+            self.values[node.index] = shadowed
+        return np.array(elements)
 
     def _range(self, node: syntax_tree.Range) -> np.ndarray:
         step = self(node.step) if node.step else 1
@@ -154,7 +209,7 @@ class Evaluator:
         return index - 1
 
     def _call(self, node: syntax_tree.Call) -> Any:
-        return self._call_function(node)[0]
+        return self._call_function(node)[node.result]
 
     def _call_function(self, node: syntax_tree.Call) -> list[Any]:
         function, arguments = self.functions[node.function], [self(argument) for argument in node.arguments]
@@ -163,8 +218,24 @@ class Evaluator:
             scope.values[local.name] = convert_to_type(value, local.type, np.shape(value))
         for local in (*function.outputs, *function.locals):
             scope._declare(local)
-        scope.execute(function.body)
+        if function.external:
+            scope.call_external(function)
+        else:
+            scope.execute(function.body)
         return [scope.values[local.name] for local in function.outputs]
+
+    def call_external(self, function: Function) -> None:
+        """Call the C function of an external function, with this scope as the one of the function."""
+        (node,) = function.body
+        assert isinstance(node, syntax_tree.ExternalCall)
+        assert function.external
+        if function.external.library is None:
+            return
+        results = function.external.library.call(function, [self(argument) for argument in node.arguments])
+        for k, value in results.items():
+            target = node.result if k < 0 else node.arguments[k]
+            assert isinstance(target, syntax_tree.Name)
+            self._store(target, value)
 
     def _declare(self, local: FunctionVariable) -> None:
         shape = tuple(int(self(d)) for d in local.dimensions if d is not None)
@@ -177,6 +248,8 @@ class Evaluator:
             return self._evaluate_pre(node)
         if node.name == "smooth":
             return self(node.arguments[1])
+        if node.name == "past":
+            return self.past(int(self(node.arguments[0])), self.values["time"] - self(node.arguments[1]))
         return BUILTINS[node.name](*map(self, node.arguments))
 
     def _evaluate_pre(self, node: syntax_tree.Builtin) -> Any:

@@ -2,17 +2,17 @@
 
 The front end produces it; causality analysis, code generation and the interpreter use it. In a flat model components,
 connections and modifiers are resolved, names are dotted ("pid.kp"), and for-equations are unrolled. Types are "Real",
-"Integer", "Boolean", "Enumeration" (an Integer, counted from 1) and "String".
+"Integer", "Boolean", "Enumeration" (an Integer, counted from 1), "String" and "ExternalObject".
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from typing import Any, Protocol
 from typing import Literal as OneOf
-from typing import NamedTuple
 
-from .syntax_tree import Assert, Body, Expression, SourceLocation, When
+from .syntax_tree import Assert, Binary, Body, Expression, SourceLocation, When
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +30,8 @@ class Variable:
     #: true if the binding comes from a modifier of the component that contains the variable
     bound_by_modifier: bool
     final: bool
+    #: attribute `fixed`; None if it is not given
+    fixed: bool | None
     protected: bool
     #: true if the variable belongs to the model itself and not to one of its components
     top_level: bool
@@ -62,6 +64,30 @@ class FunctionVariable:
     where: SourceLocation | None = field(default=None, compare=False)
 
 
+class CallableLibrary(Protocol):
+    """External functions that can be called."""
+
+    def call(self, function: Function, inputs: Sequence[Any]) -> dict[int, Any]:
+        """Return the outputs of a C function by the numbers of the arguments; the result has the number -1."""
+
+
+@dataclass(frozen=True, slots=True)
+class ExternalCode:
+    """Annotations of an external function."""
+
+    #: C code that declares or defines the C function
+    include: str
+    #: folder of the headers, as a URI or a path relative to the file of the function
+    include_directory: str
+    libraries: tuple[str, ...]
+    #: folder of the libraries
+    library_directory: str
+    #: C function that deletes the object which the function constructs, or ""
+    destructor: str = ""
+    #: evaluation of the function in Python
+    library: CallableLibrary | None = field(default=None, compare=False)
+
+
 @dataclass(frozen=True, slots=True)
 class Function:
     """A function of the model."""
@@ -72,14 +98,36 @@ class Function:
     locals: tuple[FunctionVariable, ...]
     body: Body
     where: SourceLocation | None = field(default=None, compare=False)
+    #: annotations of an external function, whose body is one `ExternalCall`
+    external: ExternalCode | None = None
 
 
-class StructuralParameters(NamedTuple):
-    """Parameters whose default value determined an array size, a loop range or the choice of equations in the front end."""
+@dataclass(frozen=True, slots=True)
+class Relation:
+    """A comparison that changes between events; `name` is the Boolean variable that holds its value until the next event."""
 
-    purpose: str
-    parameters: tuple[str, ...]
-    where: SourceLocation | None
+    name: str
+    condition: Binary
+
+
+@dataclass(frozen=True, slots=True)
+class Delay:
+    """A `delay(x, duration)`; `name` is the variable that is equal to x."""
+
+    name: str
+    duration: Expression
+
+
+@dataclass(frozen=True, slots=True)
+class Hybrid:
+    """Parts of a model with event iteration."""
+
+    relations: tuple[Relation, ...]
+    delays: tuple[Delay, ...]
+    #: variables with a variable for their value before the event
+    remembered: tuple[str, ...]
+    #: variables of `remembered` whose change in an event requires another evaluation
+    iterated: tuple[str, ...]
 
 
 @dataclass(frozen=True)
@@ -99,9 +147,21 @@ class Model:
     functions: Mapping[str, Function]
     #: enumeration type -> literals
     enumerations: Mapping[str, tuple[str, ...]]
-    structural: tuple[StructuralParameters, ...]
+    #: parameters whose values determine array sizes, loop ranges or the choice of equations
+    structural: frozenset[str]
     #: continuous states (see `causality/continuous_states.py`)
     states: tuple[str, ...] = ()
+    #: true if the model uses a library that is not part of its own sources
+    uses_library: bool = False
+    #: variables that are only computed at the initialization
+    initialized: frozenset[str] = frozenset()
+    #: None for a model whose equations are evaluated once per event (see `causality/hybrid.py`)
+    hybrid: Hybrid | None = None
+
+
+def is_integrated(model: Model) -> bool:
+    """Return whether a model with event iteration has states, or relations that change with time."""
+    return model.hybrid is not None and bool(model.states or model.hybrid.relations)
 
 
 def derivative_name(state: str) -> str:
@@ -109,6 +169,11 @@ def derivative_name(state: str) -> str:
     return f"der({state})"
 
 
+def previous_name(variable: str) -> str:
+    """Return the name of the variable that holds the value of a variable before the current event."""
+    return f"pre({variable})"
+
+
 def owning_component(name: str) -> str:
     """Return the component that a variable belongs to, or "" for the model itself."""
-    return name.removeprefix("der(").rpartition(".")[0]
+    return name.removeprefix("der(").removeprefix("pre(").rpartition(".")[0]

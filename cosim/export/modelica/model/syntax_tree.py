@@ -33,8 +33,10 @@ def raise_model_error(message: str, where: SourceLocation | None) -> NoReturn:
     raise InputError(Problem(message, str(where or "")))
 
 
-Expression: TypeAlias = "Literal | Name | Index | Unary | Binary | If | Array | Range | Builtin | Call"
-Statement: TypeAlias = "Assign | MultiAssign | IfStatement | For | Assert | When | EdgeDetector"
+Expression: TypeAlias = "Literal | Name | Index | Unary | Binary | If | Array | Comprehension | Range | Builtin | Call"
+Statement: TypeAlias = (
+    "Assign | MultiAssign | IfStatement | For | While | Assert | When | Reinit | EdgeDetector | Solve | ExternalCall"
+)
 Body: TypeAlias = "tuple[Statement, ...]"
 
 
@@ -107,6 +109,16 @@ class Array:
 
 
 @dataclass(frozen=True, slots=True)
+class Comprehension:
+    """An array constructor with an iterator: `{value for index in range}`."""
+
+    value: Expression
+    index: str
+    range: Expression
+    where: SourceLocation | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
 class Range:
     """A range: `start:stop` or `start:step:stop`."""
 
@@ -131,6 +143,8 @@ class Call:
     function: str
     arguments: tuple[Expression, ...]
     where: SourceLocation | None = field(default=None, compare=False)
+    #: number of the result that is the value of the expression
+    result: int = 0
 
 
 @dataclass(frozen=True, slots=True)
@@ -176,12 +190,63 @@ class For:
 
 
 @dataclass(frozen=True, slots=True)
-class Assert:
-    """An `assert` with the level error."""
+class While:
+    """A while-loop."""
 
     condition: Expression
-    message: str
+    body: Body
     where: SourceLocation | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Reinit:
+    """A `reinit` of a continuous state; it takes effect after all equations of the event have been evaluated."""
+
+    target: Name | Index
+    value: Expression
+    where: SourceLocation | None = field(default=None, compare=False)
+
+    @property
+    def name(self) -> str:
+        """Name of the state."""
+        return referenced_variable(self.target)
+
+
+@dataclass(frozen=True, slots=True)
+class Solve:
+    """A system of equations `residuals = 0` that is solved for scalar unknowns by Newton's method.
+
+    It is inserted by the causality analysis. A linear system needs one iteration.
+    """
+
+    unknowns: tuple[Name | Index, ...]
+    residuals: tuple[Expression, ...]
+    #: partial derivatives, one row for each residual
+    jacobian: tuple[tuple[Expression, ...], ...]
+    linear: bool
+    where: SourceLocation | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class ExternalCall:
+    """The call of a C function, the body of an external function: `result = function(arguments)`."""
+
+    function: str
+    #: names of inputs, of outputs (passed by pointers), or expressions
+    arguments: tuple[Expression, ...]
+    result: Name | None
+    where: SourceLocation | None = field(default=None, compare=False)
+
+
+@dataclass(frozen=True, slots=True)
+class Assert:
+    """An `assert`; the message consists of String literals and of expressions whose values are inserted as text."""
+
+    condition: Expression
+    message: tuple[Expression, ...]
+    where: SourceLocation | None = field(default=None, compare=False)
+    #: true for the level warning, false for the level error
+    warning: bool = False
 
 
 @dataclass(frozen=True, slots=True)

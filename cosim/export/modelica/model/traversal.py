@@ -7,14 +7,15 @@ from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 from .syntax_tree import (
+    Assert,
     Assign,
     Builtin,
     Colon,
-    Expression,
     Index,
     Literal,
     MultiAssign,
     Name,
+    Solve,
     SourceLocation,
     referenced_variable,
 )
@@ -48,6 +49,22 @@ def rewrite(node: Any, change: Callable[[Any], Any]) -> Any:
     return change(replace(node, **{field.name: rewrite(getattr(node, field.name), change) for field in fields(node)}))
 
 
+def rewrite_outermost(node: Any, change: Callable[[Any], Any]) -> Any:
+    """Return the tree with nodes replaced from the root downwards; replaced nodes are not visited again.
+
+    Args:
+        node: A node, or a tuple of nodes.
+        change: Returns the replacement of a node, or None to continue with its children.
+    """
+    if isinstance(node, tuple) and not isinstance(node, SourceLocation | Colon):
+        return tuple(rewrite_outermost(item, change) for item in node)
+    if not is_dataclass(node) or isinstance(node, type):
+        return node
+    if (changed := change(node)) is not None:
+        return changed
+    return replace(node, **{field.name: rewrite_outermost(getattr(node, field.name), change) for field in fields(node)})
+
+
 def read_references(node: Any) -> Iterator[Name | Index]:
     """Yield the references whose current value is read: neither assignment targets nor arguments of pre()."""
     if isinstance(node, Assign):
@@ -57,6 +74,8 @@ def read_references(node: Any) -> Iterator[Name | Index]:
         for target in node.targets:
             yield from _references_in_subscripts(target)
         yield from read_references(node.call)
+    elif isinstance(node, Solve):
+        yield from (item for item in read_references((node.residuals, node.jacobian)) if item not in node.unknowns)
     elif isinstance(node, Name) or (isinstance(node, Index) and _has_literal_subscripts(node)):
         yield node
     elif isinstance(node, tuple) and not isinstance(node, SourceLocation | Colon):
@@ -88,6 +107,8 @@ def assigned_references(node: Any) -> Iterator[Name | Index]:
             yield item.target
         elif isinstance(item, MultiAssign):
             yield from item.targets
+        elif isinstance(item, Solve):
+            yield from item.unknowns
 
 
 def pre_references(node: Any) -> Iterator[tuple[str, Builtin]]:
@@ -97,6 +118,12 @@ def pre_references(node: Any) -> Iterator[tuple[str, Builtin]]:
             yield referenced_variable(item.arguments[0]), item
 
 
-def has_builtin(node: Expression, *builtins: str) -> bool:
-    """Return whether an expression calls one of these built-in functions."""
+def composed_asserts(node: Any) -> list[Assert]:
+    """Return the assertions whose message is composed at run time or is a warning."""
+    asserts = [item for item in walk(node) if isinstance(item, Assert)]
+    return [item for item in asserts if item.warning or not all(isinstance(part, Literal) for part in item.message)]
+
+
+def has_builtin(node: Any, *builtins: str) -> bool:
+    """Return whether a tree calls one of these built-in functions."""
     return any(isinstance(item, Builtin) and item.name in builtins for item in walk(node))

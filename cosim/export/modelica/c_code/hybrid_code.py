@@ -1,0 +1,265 @@
+"""Code generation for models with event iteration: the functions that hybrid.h and the communication step call."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass
+
+from ..causality.hybrid_interpreter import MAX_EVENTS, MAX_PASSES
+from ..causality.matching import is_input
+from ..causality.past_values import PAST_VALUES
+from ..model.flat_model import Model, Relation, derivative_name, is_integrated, previous_name
+from ..model.syntax_tree import Assign, Name
+from .c_values import C_TYPES, CExpression, CValue, scalar_value
+from .formatting import function_definition
+from .model_code import ModelCode
+from .statements import StatementLowering
+
+
+def copy_values(variables: Iterable[tuple[CValue, CValue]]) -> list[str]:
+    """Generate the assignments `target = source` of scalars and arrays."""
+    return [
+        f"memcpy({target.pointer}, {source.pointer}, sizeof {target.pointer});"
+        if target.shape
+        else f"{target.text.code} = {source.text.code};"
+        for target, source in variables
+    ]
+
+
+@dataclass
+class HybridCode(ModelCode):
+    """Code generator of model.c for a model with event iteration."""
+
+    def headers(self) -> list[str]:
+        """Return the names of the C headers that model.c includes besides model.h and runtime.h."""
+        assert self.model.hybrid
+        others = [name for name in super().headers() if name != "runge_kutta.h"]
+        return [*others, *["past.h"] * bool(self.model.hybrid.delays), *["hybrid.h"] * is_integrated(self.model)]
+
+    def definitions(self) -> list[str]:
+        """Generate the functions of model.c."""
+        model, clocks = self.model, len(self.schedule.clocks)
+        assert model.hybrid
+        values = self._make_lowering().scope
+        endless = self._failure_code("the event iteration does not end", None)
+        too_many = self._failure_code("too many events in one step (chattering)", None)
+        initial = self._body(self.schedule.initialization, initial=True)
+        definitions = [
+            *self._common_definitions(),
+            f"static const bool NO_TICK[{max(clocks, 1)}] = {{false}};",
+            record_function(model, values, self._make_lowering(), PAST_VALUES),
+            *event_functions(model, values, self._event(), endless, initial),
+            function_definition("const char *model_initialize(Model *m, double time)", self._initialize_hybrid(endless)),
+        ]
+        if is_integrated(model):
+            definitions += [*self._hybrid_system(values)]
+        step = hybrid_step_body(clocks, is_integrated(model), too_many)
+        return [*definitions, function_definition("const char *model_step(Model *m, double time, double step_size)", step)]
+
+    def _initialize_hybrid(self, endless: str) -> list[str]:
+        """Generate the body of model_initialize: the initial equations, repeated until relations are consistent, and an event."""
+        past = ["memset(m->past, 0, sizeof m->past);"] if self.model.hybrid and self.model.hybrid.delays else []
+        return [
+            "m->failure = 0;",
+            *(["m->step = 0;"] if is_integrated(self.model) else []),
+            *past,
+            "start_variables(m);",
+            *self._clock_lines(),
+            "for (int pass = 0; initialize(m, time); pass++) {",
+            f"    if (pass == {MAX_PASSES}) fail(m, {endless});",
+            *(f"    {line}" for line in self._copy_relations()),
+            "}",
+            "if (m->failure == 0) remember_inputs(m);",
+            *(["record(m, time);"] if past else []),
+            "if (m->failure == 0) event(m, time, NO_TICK);",
+            *self._first_ticks(),
+            "return REASONS[m->failure];",
+        ]
+
+    def _derivatives(self) -> list[str]:
+        """Generate the derivatives of the states; values that are needed nowhere else are local variables."""
+        assert self.model.hybrid
+        stored = {*self.model.hybrid.remembered, *(delay.name for delay in self.model.hybrid.delays)}
+        stored |= {derivative_name(name) for name in self.model.states}
+        body = self.schedule.derivatives
+        targets = [s.target.name for s in body if isinstance(s, Assign) and isinstance(s.target, Name)]
+        names = [name for name in targets if name not in stored and not self.model.variables[name].shape]
+        lowering = self._make_lowering()
+        for name in names:
+            local = f"local_{self.members[name]}"
+            lowering.scope[name] = scalar_value(self.model.variables[name].type, CExpression(local), reusable=True)
+            lowering.lines.append(f"{C_TYPES[self.model.variables[name].type]} {local};")
+        lowering.body(body)
+        return ["(void)m;", "(void)time;", *lowering.lines]
+
+    def _first_ticks(self) -> list[str]:
+        """Generate the event of the clocks that tick at the start time; with inputs, it belongs to the first step."""
+        clocks = len(self.schedule.clocks)
+        if not clocks or any(map(is_input, self.model.variables.values())):
+            return []
+        return [
+            f"bool due[{clocks}];",
+            f"const double next = next_event(m->clock, {clocks}, due);",
+            f"if (m->failure == 0 && next <= time + TOLERANCE * shortest_period(m->clock, {clocks})) {{",
+            "    event(m, time, due);",
+            f"    for (int k = 0; k < {clocks}; k++) m->clock[k].ticks += due[k];",
+            "}",
+        ]
+
+    def _copy_relations(self) -> list[str]:
+        values = self._make_lowering().scope
+        assert self.model.hybrid
+        names = [relation.name for relation in self.model.hybrid.relations]
+        return copy_values((values[previous_name(name)], values[name]) for name in names)
+
+    def _hybrid_system(self, values: Mapping[str, CValue]) -> list[str]:
+        """Generate the functions for the integration between events."""
+        assert self.model.hybrid
+        lowering = self._make_lowering()
+        lowering.body(self.schedule.indicators)
+        states, rates = self._element_pointers(self.model.states), self._element_pointers(map(derivative_name, self.model.states))
+        if not self.model.states:
+            states, rates = "&m->no_state[0]", "&m->no_state[1]"
+        return [
+            function_definition(
+                "static void derivatives(Model *m, double time)",
+                self._derivatives(),
+            ),
+            crossing_function(self.model.hybrid.relations, values, lowering),
+            function_definition(
+                "static bool advance(Model *m, double from, double to, double *reached)",
+                [
+                    "const Hybrid system = {",
+                    f"    {{{states}}},",
+                    f"    {{{rates}}},",
+                    "};",
+                    "bool event;",
+                    "*reached = advance_hybrid(m, &system, from, to, &event);",
+                    "return event;",
+                ],
+            ),
+        ]
+
+
+def _differs(a: CValue, b: CValue) -> str:
+    return f"memcmp({a.pointer}, {b.pointer}, sizeof {a.pointer}) != 0" if a.shape else f"{a.text.code} != {b.text.code}"
+
+
+def event_functions(
+    model: Model, values: Mapping[str, CValue], evaluation: list[str], endless: str, initial: list[str]
+) -> list[str]:
+    """Generate `evaluate`, `initialize` and `event`.
+
+    Args:
+        model: The flat model.
+        values: The C values of the variables.
+        evaluation: The statements of an evaluation of all equations.
+        endless: The failure code of an event iteration that does not end.
+        initial: The statements of the initialization.
+
+    Returns:
+        The function definitions.
+    """
+    assert model.hybrid
+    pairs = {name: (values[previous_name(name)], values[name]) for name in model.hybrid.remembered}
+    inputs = [name for name in pairs if is_input(model.variables[name])]
+    others = copy_values(pair for name, pair in pairs.items() if name not in inputs)
+    changes = " || ".join(_differs(*pairs[name]) for name in model.hybrid.iterated) or "false"
+    relations = " || ".join(_differs(*pairs[relation.name]) for relation in model.hybrid.relations) or "false"
+    return [
+        "/* Stores the values before an event, or before another evaluation in the same event. */",
+        function_definition("static void remember(Model *m)", others or ["(void)m;"]),
+        function_definition("static void remember_inputs(Model *m)", copy_values(pairs[name] for name in inputs) or ["(void)m;"]),
+        function_definition(
+            "static bool inputs_changed(const Model *m)",
+            ["(void)m;", f"return {' || '.join(_differs(*pairs[name]) for name in inputs) or 'false'};"],
+        ),
+        "/* Evaluates all equations; returns whether they must be evaluated again, since values have changed. */",
+        function_definition(
+            "static bool evaluate(Model *m, double time, const bool *due)",
+            ["(void)time;", "(void)due;", *evaluation, f"return m->failure == 0 && ({changes});"],
+        ),
+        function_definition(
+            "static void event(Model *m, double time, const bool *due)",
+            [
+                "remember(m);",
+                "/* flags of ticks are true in the first evaluation only */",
+                "for (int pass = 0; (evaluate(m, time, due) || due != NO_TICK) && m->failure == 0; pass++) {",
+                f"    if (pass == {MAX_PASSES}) fail(m, {endless});",
+                "    remember(m);",
+                "    remember_inputs(m);",
+                "    due = NO_TICK;",
+                "}",
+                "remember_inputs(m);",
+                "m->changed = false;",
+                "record(m, time);",
+            ],
+        ),
+        function_definition(
+            "static bool initialize(Model *m, double time)",
+            ["(void)time;", *initial, f"return m->failure == 0 && ({relations});"],
+        ),
+    ]
+
+
+def record_function(model: Model, values: Mapping[str, CValue], lowering: StatementLowering, capacity: int) -> str:
+    """Generate `record`, which stores the arguments of delay()."""
+    assert model.hybrid
+    lines = ["(void)m;", "(void)time;"]
+    for k, delay in enumerate(model.hybrid.delays):
+        duration = lowering.scalar_of(delay.duration).parenthesized(11)
+        lines += [
+            *lowering.lines,
+            f"record_value(&m->past[{k}], time, {values[delay.name].text.code}, {duration} / {capacity // 2});",
+        ]
+        lowering.lines = []
+    return function_definition("static void record(Model *m, double time)", lines)
+
+
+def crossing_function(relations: Iterable[Relation], values: Mapping[str, CValue], lowering: StatementLowering) -> str:
+    """Generate `crossed`, which compares the relations with their stored values."""
+    lines = ["bool changed = false;", "(void)m;", "(void)time;", "z[0] = 0;"]
+    for k, relation in enumerate(relations):
+        a, b = (lowering.evaluated_once(lowering.lower(s)).text for s in (relation.condition.left, relation.condition.right))
+        left, right, held = a.parenthesized(9), b.parenthesized(10), values[relation.name].text.code
+        lowering.lines += [
+            f"z[{k}] = {left} - {right};",
+            f"if (({left} {relation.condition.operator} {right}) != {held}) changed = true;",
+        ]
+    return function_definition(
+        "static bool crossed(Model *m, double time, double *z)", [*lines, *lowering.lines, "return changed;"]
+    )
+
+
+def hybrid_step_body(clocks: int, continuous: bool, too_many: str) -> list[str]:
+    """Generate the body of model_step."""
+    lines = ["const double end = time + step_size;", "m->failure = 0;"]
+    tick = ["const bool tick = false;", *["const double target = end;"] * continuous]
+    if clocks:
+        tick = [
+            f"bool due[{clocks}];",
+            f"const double next = next_event(m->clock, {clocks}, due);",
+            f"const bool tick = next < end - TOLERANCE * shortest_period(m->clock, {clocks});",
+            "const double target = tick ? next : end;",
+        ]
+    loop, at_start = [*tick], "count == 0"
+    if clocks:
+        loop.append(f"const bool at_start = tick && next <= time + TOLERANCE * shortest_period(m->clock, {clocks});")
+        at_start += " && !at_start"
+    loop.append(f"if ({at_start} && (m->changed || inputs_changed(m))) event(m, time, NO_TICK);")
+    if continuous:
+        lines.append("double reached = time;")
+        loop += [
+            f"const bool crossing = {'!at_start && ' * bool(clocks)}advance(m, reached, target, &reached);",
+            "if (m->failure != 0) break;",
+            "if (crossing) {",
+            "    event(m, reached, NO_TICK);",
+            f"    if (count == {MAX_EVENTS}) fail(m, {too_many});",
+            "    continue;",
+            "}",
+        ]
+    loop += ["if (!tick) break;"]
+    if clocks:
+        loop += ["event(m, target, due);", f"for (int k = 0; k < {clocks}; k++) m->clock[k].ticks += due[k];"]
+    lines += ["for (int count = 0; m->failure == 0; count++) {", *("    " + line for line in loop), "}"]
+    return [*lines, "if (m->failure == 0) event(m, end, NO_TICK);", "return REASONS[m->failure];"]

@@ -1,0 +1,114 @@
+"""Variables in der() that equations determine, for example the input of a derivative block.
+
+Such a variable is not a continuous state. Its derivative is computed from the derivative of the equation that determines it, and
+of the equations that determine the variables therein (Pantelides' algorithm with dummy derivatives).
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+from ..model.flat_model import Equation, Model, Variable, derivative_name
+from ..model.syntax_tree import Expression, Index, Literal, Name, raise_model_error, referenced_variable
+from ..model.traversal import assigned_references
+from .continuous_states import derivative_variable
+from .differentiation import Differentiation
+from .equation_systems import EquationSystem
+from .matching import ScalarKey, is_input, scalar_keys
+
+_MAX_ROUNDS = 20
+
+
+def reduce_states(model: Model) -> Model:
+    """Return the model with the states that equations determine as ordinary variables.
+
+    Raises:
+        InputError: The derivative of an input is needed, or an expression cannot be differentiated.
+    """
+    for _ in range(_MAX_ROUNDS if model.states else 0):
+        assigned = {referenced_variable(target) for target in assigned_references((model.whens, model.algorithms))}
+        assigned |= model.initialized
+        system = _system(model, assigned)
+        matched = system.matching()
+        dependent = {key for key in matched.values() if key[0] in model.states}
+        if not dependent:
+            break
+        model = _Reduction(model, system, matched, assigned).reduce(dependent)
+    return model
+
+
+def _system(model: Model, assigned: set[str]) -> EquationSystem:
+    known = {v.name for v in model.variables.values() if v.variability in ("constant", "parameter") or is_input(v)} | assigned
+    keys = [key for name in model.variables if name not in known for key in scalar_keys(model.variables, Name(name))]
+    groups: list[list[ScalarKey]] = [[], [], []]
+    for key in keys:
+        if key[0] in model.states:
+            variable = model.variables[key[0]]
+            groups[2 if variable.shape else bool(variable.fixed)].append(key)
+    return EquationSystem(model, model.equations, {key for key in keys if key[0] not in model.states}, groups)
+
+
+class _Reduction:
+    def __init__(self, model: Model, system: EquationSystem, matched: dict[int, ScalarKey], assigned: set[str]):
+        self._model = model
+        self._equation_of = {key: system.scalar_equations[number] for number, key in matched.items()}
+        self._assigned = assigned
+        self._variables = dict(model.variables)
+        self._differentiate = Differentiation(model.functions, self._derivative)
+        self._pending: list[ScalarKey] = []
+
+    def reduce(self, dependent: set[ScalarKey]) -> Model:
+        """Return the model in which the given states are ordinary variables."""
+        names = {name for name, _ in dependent}
+        for name in names:
+            if not scalar_keys(self._model.variables, Name(name)) <= dependent:
+                raise_model_error(
+                    f"only some elements of the state {name} are determined by equations", self._model.variables[name].where
+                )
+        self._pending = sorted(dependent)
+        equations, done = list(self._model.equations), set[ScalarKey]()
+        while self._pending:
+            key = self._pending.pop()
+            if key in done:
+                continue
+            done.add(key)
+            equations.append(self._differentiated(key))
+        states = tuple(name for name in self._model.states if name not in names)
+        return replace(self._model, variables=self._variables, states=states, equations=tuple(equations))
+
+    def _differentiated(self, key: ScalarKey) -> Equation:
+        """Return the derivative of the equation that determines a variable."""
+        equation = self._equation_of.get(key)
+        if equation is None:
+            raise_model_error(
+                f"the derivative of {key[0]} is needed, but no equation gives it", self._model.variables[key[0]].where
+            )
+        return Equation(self._differentiate(equation.left), self._differentiate(equation.right), equation.where)
+
+    def _derivative(self, reference: Name | Index) -> Expression | None:
+        """Return the derivative of a variable with respect to time."""
+        name = referenced_variable(reference)
+        if name == "time":
+            return Literal(1.0, "Real")
+        variable = self._variables.get(name)
+        if variable is None or variable.type != "Real" or variable.variability != "continuous" or name in self._assigned:
+            return None
+        if is_input(variable):
+            raise_model_error(f"the derivative of the input {name} is needed; filter the input", variable.where)
+        whole = derivative_name(name)
+        if whole in self._variables:
+            target = Name(whole, getattr(reference, "where", None))
+            return replace(reference, base=target) if isinstance(reference, Index) else target
+        keys = scalar_keys(self._model.variables, reference)
+        if len(keys) != 1:
+            return Literal(1.0, "Real")  # the caller only needs to know that it changes with time
+        return self._new_derivative(next(iter(keys)), variable)
+
+    def _new_derivative(self, key: ScalarKey, variable: Variable) -> Name:
+        """Return the variable for the derivative of a scalar; its equation is added later."""
+        element = f"{key[0]}[{key[1] + 1}]" if variable.shape else key[0]
+        name = derivative_name(element)
+        if name not in self._variables:
+            self._variables[name] = replace(derivative_variable(variable), name=name, shape=())
+            self._pending.append(key)
+        return Name(name)

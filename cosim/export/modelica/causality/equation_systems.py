@@ -1,0 +1,197 @@
+"""Causality of equations in any form: matching of scalar equations, explicit solution, and systems for algebraic loops."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+
+from ..model.flat_model import Equation, Model
+from ..model.syntax_tree import (
+    Assign,
+    Expression,
+    Index,
+    Literal,
+    Name,
+    Solve,
+    SourceLocation,
+    raise_model_error,
+)
+from ..model.traversal import read_references, rewrite, rewrite_outermost
+from .assignment import match, strongly_connected_components
+from .differentiation import ZERO, Differentiation, divide, negate, subtract
+from .matching import ScalarKey, scalar_keys
+from .scalar_equations import EquationSplitter
+
+_DISCRETE_TYPES = ("Integer", "Boolean", "Enumeration")
+
+
+def reference_of(key: ScalarKey, model: Model) -> Name | Index:
+    """Return the reference of a scalar."""
+    name, number = key
+    shape, position = model.variables[name].shape, list[int]()
+    for size in reversed(shape):
+        position.insert(0, number % size)
+        number //= size
+    return Index(Name(name), tuple(Literal(k + 1, "Integer") for k in position)) if shape else Name(name)
+
+
+@dataclass
+class EquationSystem:
+    """The continuous equations of a model as scalar equations, for one set of unknowns."""
+
+    model: Model
+    equations: Sequence[Equation]
+    unknowns: Collection[ScalarKey]
+    #: groups of unknowns that have a value if no equation is needed for them, for example start values
+    optional: Sequence[Collection[ScalarKey]] = ()
+
+    def __post_init__(self) -> None:
+        splitter = EquationSplitter(self.model)
+        self._scalar = [scalar for equation in self.equations for scalar in splitter.split(equation)]
+        self._all = set(self.unknowns).union(*self.optional)
+        self._incidence = [self._keys(equation) for equation in self._scalar]
+        relations = self.model.hybrid.relations if self.model.hybrid else ()
+        self._relations = {relation.name for relation in relations}
+        #: relations in algebraic loops, which keep their value while the equations are evaluated
+        self.held: set[ScalarKey] = set()
+
+    @property
+    def scalar_equations(self) -> Sequence[Equation]:
+        """The equations, one for each element."""
+        return self._scalar
+
+    def matching(self) -> dict[int, ScalarKey]:
+        """Return the unknown that each scalar equation determines; equations without one are missing."""
+        return match([self._preferences(k) for k in range(len(self._scalar))], self.optional)
+
+    def solve(self) -> list[Assign | Solve]:
+        """Return the equations as assignments and systems of equations, in no particular order.
+
+        Raises:
+            InputError: The system is structurally singular.
+        """
+        matched = self.matching()
+        self._check(matched)
+        numbers = sorted(matched)
+        owner = {matched[number]: k for k, number in enumerate(numbers)}
+        successors = [
+            {owner[key] for key in self._incidence[n] if key in owner and owner[key] != k} for k, n in enumerate(numbers)
+        ]
+        components = strongly_connected_components(successors)
+        if loops := {
+            key for c in components if len(c) > 1 for key in (matched[numbers[k]] for k in c) if key[0] in self._relations
+        }:
+            self.held |= loops
+            successors = [{k for k in nodes if matched[numbers[k]] not in loops} for nodes in successors]
+            components = strongly_connected_components(successors)
+        return [self._solve_component([numbers[k] for k in component], matched) for component in components]
+
+    def _keys(self, equation: Equation) -> list[ScalarKey]:
+        """Return the unknowns that an equation contains."""
+        references = read_references((equation.left, equation.right))
+        keys = {key for reference in references for key in scalar_keys(self.model.variables, reference)}
+        return sorted(keys & self._all)
+
+    def _preferences(self, number: int) -> list[ScalarKey]:
+        """Return the unknowns for which an equation can be solved; those that stand alone on one side are first."""
+        equation = self._scalar[number]
+        alone = [
+            key for side in (equation.left, equation.right) for key in self._key_of(side) if self._is_free_of(key, side, equation)
+        ]
+        others = [key for key in self._incidence[number] if key not in alone and not self._is_discrete(key)]
+        return [*dict.fromkeys(alone), *others]
+
+    def _key_of(self, side: Expression) -> set[ScalarKey]:
+        keys = scalar_keys(self.model.variables, side) if isinstance(side, Name | Index) else set()
+        return keys & self._all if len(keys) == 1 else set()
+
+    def _is_free_of(self, key: ScalarKey, side: Expression, equation: Equation) -> bool:
+        other = equation.right if side is equation.left else equation.left
+        return not any(key in scalar_keys(self.model.variables, reference) for reference in read_references(other))
+
+    def _is_discrete(self, key: ScalarKey) -> bool:
+        return self.model.variables[key[0]].type in _DISCRETE_TYPES
+
+    def _check(self, matched: dict[int, ScalarKey]) -> None:
+        missing = set(self.unknowns) - set(matched.values())
+        surplus = [equation for number, equation in enumerate(self._scalar) if number not in matched]
+        if surplus and missing:
+            names = ", ".join(sorted({name for name, _ in missing}))
+            raise_model_error(f"the equations do not determine {names}, and this equation contradicts others", surplus[0].where)
+        if surplus:
+            raise_model_error("this equation is superfluous: the others determine all its variables", surplus[0].where)
+        if missing:
+            name = min(missing)[0]
+            raise_model_error(f"no equation gives {name} a value", self.model.variables[name].where)
+
+    def _solve_component(self, numbers: list[int], matched: dict[int, ScalarKey]) -> Assign | Solve:
+        if len(numbers) == 1:
+            return self._solve_scalar(self._scalar[numbers[0]], matched[numbers[0]])
+        keys = [matched[number] for number in numbers]
+        if discrete := [key for key in keys if self._is_discrete(key)]:
+            chain = ", ".join(sorted({name for name, _ in keys}))
+            raise_model_error(
+                f"algebraic loop with the discrete variable {discrete[0][0]}: {chain}; break it with pre()",
+                self._scalar[numbers[0]].where,
+            )
+        return self._system([self._scalar[number] for number in numbers], keys)
+
+    def _solve_scalar(self, equation: Equation, key: ScalarKey) -> Assign | Solve:
+        reference = reference_of(key, self.model)
+        for side, other in ((equation.left, equation.right), (equation.right, equation.left)):
+            if self._key_of(side) == {key} and self._is_free_of(key, side, equation):
+                return Assign(reference, other, equation.where)
+        system = self._system([equation], [key])
+        if not system.linear or system.jacobian[0][0] == ZERO:
+            return system
+        constant = self._without(system.residuals[0], key)
+        return Assign(reference, divide(negate(constant), system.jacobian[0][0]), equation.where)
+
+    def _without(self, node: Expression, key: ScalarKey) -> Expression:
+        """Return an expression that is linear in an unknown with zero instead of the unknown."""
+
+        def substitute(item: object) -> object:
+            if not isinstance(item, Name | Index):
+                return None
+            return ZERO if self._key_of(item) == {key} else item
+
+        result: Expression = _simplified(rewrite_outermost(node, substitute))
+        return result
+
+    def _system(self, equations: Sequence[Equation], keys: Sequence[ScalarKey]) -> Solve:
+        residuals = tuple(subtract(equation.left, equation.right) for equation in equations)
+        jacobian = tuple(tuple(self._derivative(residual, key) for key in keys) for residual in residuals)
+        contained = {
+            key for item in read_references(jacobian) for key in scalar_keys(self.model.variables, item) if key in set(keys)
+        }
+        references = tuple(reference_of(key, self.model) for key in keys)
+        return Solve(references, residuals, jacobian, not contained, _first_location(equations))
+
+    def _derivative(self, node: Expression, key: ScalarKey) -> Expression:
+        def leaf(reference: Name | Index) -> Expression | None:
+            keys = scalar_keys(self.model.variables, reference)
+            return Literal(1.0, "Real") if key in keys else None
+
+        return Differentiation(self.model.functions, leaf)(node)
+
+
+def _first_location(equations: Sequence[Equation]) -> SourceLocation | None:
+    return next((equation.where for equation in equations if equation.where), None)
+
+
+def _simplified(node: Expression) -> Expression:
+    """Remove terms and factors that are zero."""
+    from ..model.syntax_tree import Binary, Unary
+    from .differentiation import add, multiply
+
+    operations = {"+": add, "-": subtract, "*": multiply, "/": divide}
+
+    def simplify(item: object) -> object:
+        if isinstance(item, Binary) and item.operator.removeprefix(".") in operations and ZERO in (item.left, item.right):
+            if item.operator == "/" and item.right == ZERO:
+                return item
+            return operations[item.operator.removeprefix(".")](item.left, item.right)
+        return negate(item.operand) if isinstance(item, Unary) and item.operand == ZERO else item
+
+    result: Expression = rewrite(node, simplify)
+    return result

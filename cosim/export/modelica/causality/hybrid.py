@@ -1,0 +1,216 @@
+"""Preparation of models with event iteration.
+
+A model needs it if `pre()` or `sample()` occurs outside when-clauses, or if it has `reinit()`, `delay()`, or comparisons between
+values that change while the states are integrated, or if it has states and uses a library. In such a model
+
+- `pre(x)` becomes a variable with this name, which holds the value of x before the current evaluation of the equations;
+- a comparison becomes a Boolean variable, which keeps its value between events; its change is an event;
+- the argument of `delay()` becomes a variable, whose past values are stored.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from ..model.flat_model import Delay, Equation, Hybrid, Model, Relation, Variable, previous_name
+from ..model.syntax_tree import (
+    Binary,
+    Builtin,
+    Expression,
+    Index,
+    Literal,
+    Name,
+    Reinit,
+    Unary,
+    When,
+    raise_model_error,
+    referenced_variable,
+)
+from ..model.traversal import (
+    PRE_OPERATORS,
+    assigned_references,
+    has_builtin,
+    rewrite,
+    rewrite_outermost,
+    variable_names,
+    walk,
+)
+from .matching import is_input
+
+_SECTIONS = ("equations", "whens", "algorithms", "asserts", "initial_equations", "initial_algorithms")
+_COMPARISONS = ("<", "<=", ">", ">=")
+
+
+def prepare_hybrid(model: Model) -> Model:
+    """Return the model prepared for event iteration, or the model itself if it does not need it."""
+    preparation = _Preparation(model)
+    return preparation.prepare() if preparation.is_needed() else model
+
+
+class _Preparation:
+    def __init__(self, model: Model):
+        self._model = model
+        self._discrete = {referenced_variable(target) for target in assigned_references((model.whens, model.algorithms))}
+        self._discrete |= model.initialized
+        self._discrete |= {v.name for v in model.variables.values() if v.variability != "continuous" or v.type != "Real"}
+        self._variables: dict[str, Variable] = dict(model.variables)
+        self._relations: list[Relation] = []
+        self._delays: list[Delay] = []
+        self._equations: list[Equation] = []
+
+    def is_needed(self) -> bool:
+        """Return whether the model has elements that require event iteration."""
+        outside = tuple(s for body in self._model.algorithms for s in body if not isinstance(s, When))
+        conditions = tuple(
+            c for item in walk((self._model.whens, self._model.algorithms)) if isinstance(item, When) for c, _ in item.branches
+        )
+        if has_builtin((self._model.equations, outside, self._model.asserts), *PRE_OPERATORS, "sample", "delay"):
+            return True
+        if has_builtin(conditions, *PRE_OPERATORS) or any(_is_combined_sample(c) for c in conditions):
+            return True
+        if any(isinstance(item, Reinit) for item in walk((self._model.whens, self._model.algorithms))):
+            return True
+        if self._model.uses_library and self._model.states:
+            return True
+        comparisons = rewrite_outermost((self._model.equations, conditions), _without_events)
+        return bool(self._model.states) and any(self._is_relation(item) for item in walk(comparisons))
+
+    def prepare(self) -> Model:
+        model = self._model
+        sections = {name: rewrite(getattr(model, name), self._replace_delay) for name in _SECTIONS}
+        if model.states or "time" in variable_names((model.equations, model.whens)):
+            sections["equations"] = self._with_relations(sections["equations"])
+            sections["whens"] = self._with_relations_in_conditions(sections["whens"])
+        sections["equations"] = (*sections["equations"], *self._equations)
+        used = {name for section in sections.values() for name in _remembered(section)}
+        used |= {relation.name for relation in self._relations} | {v.name for v in self._variables.values() if is_input(v)}
+        sections = {name: rewrite(section, self._replace_pre) for name, section in sections.items()}
+        reinitialized = {item.name for item in walk((model.whens, model.algorithms)) if isinstance(item, Reinit)}
+        remembered = tuple(
+            n for n, v in self._variables.items() if n in used | reinitialized and v.variability not in ("constant", "parameter")
+        )
+        for name in remembered:
+            self._variables[previous_name(name)] = _internal(self._variables[name], previous_name(name))
+        iterated = tuple(n for n in remembered if n in self._discrete | reinitialized and not (is_input(self._variables[n])))
+        relations = tuple(Relation(r.name, rewrite(r.condition, self._replace_pre)) for r in self._relations)
+        hybrid = Hybrid(relations, tuple(self._delays), remembered, iterated)
+        return replace(model, variables=self._variables, hybrid=hybrid, **sections)
+
+    # comparisons
+
+    def _is_relation(self, node: Any) -> bool:
+        """Return whether a node is a comparison of values that change between events."""
+        if not (isinstance(node, Binary) and node.operator in _COMPARISONS):
+            return False
+        names = variable_names((node.left, node.right))
+        return any(name == "time" or (name in self._variables and name not in self._discrete) for name in names)
+
+    def _with_relations(self, node: Any) -> Any:
+        return rewrite_outermost(node, self._replace_relation)
+
+    def _with_relations_in_conditions(self, whens: tuple[When, ...]) -> tuple[When, ...]:
+        return tuple(
+            replace(when, branches=tuple((self._with_relations(condition), body) for condition, body in when.branches))
+            for when in whens
+        )
+
+    def _replace_relation(self, node: Any) -> Any:
+        if _without_events(node) is not None:
+            return node
+        if not self._is_relation(node):
+            return None
+        for relation in self._relations:
+            if relation.condition == node:
+                return Name(relation.name, node.where)
+        name = f"$relation {len(self._relations) + 1}"
+        self._add_variable(name, "Boolean", node)
+        self._relations.append(Relation(name, node))
+        return Name(name, node.where)
+
+    def _add_variable(self, name: str, type_name: str, value: Expression) -> None:
+        template = next(iter(self._model.variables.values()))
+        self._variables[name] = replace(
+            _internal(template, name),
+            type=type_name,
+            shape=(),
+            variability="discrete" if type_name == "Boolean" else "continuous",
+        )
+        self._equations.append(Equation(Name(name), value, getattr(value, "where", None)))
+
+    # delay() and pre()
+
+    def _replace_delay(self, node: Any) -> Any:
+        if not (isinstance(node, Builtin) and node.name == "delay"):
+            return node
+        name = f"$delayed {len(self._delays) + 1}"
+        self._add_variable(name, "Real", node.arguments[0])
+        self._delays.append(Delay(name, node.arguments[1]))
+        return Builtin("past", (Literal(len(self._delays) - 1, "Integer"), node.arguments[1]), node.where)
+
+    def _replace_pre(self, node: Any) -> Any:
+        if not (isinstance(node, Builtin) and node.name in PRE_OPERATORS):
+            return node
+        (argument,) = node.arguments
+        previous = self._previous(argument, node)
+        if node.name == "pre":
+            return previous
+        return Binary("and", argument, Unary("not", previous)) if node.name == "edge" else Binary("<>", argument, previous)
+
+    def _previous(self, argument: Expression, call: Builtin) -> Expression:
+        if isinstance(argument, Literal):
+            return argument
+        if not isinstance(argument, Name | Index):
+            raise_model_error(f"{call.name}() takes a variable", call.where)
+        name = referenced_variable(argument)
+        variable = self._variables.get(name)
+        if variable is None or variable.variability in ("constant", "parameter"):
+            return argument
+        previous = Name(previous_name(name), call.where)
+        return previous if isinstance(argument, Name) else replace(argument, base=previous)
+
+
+def delay_number(past: Builtin) -> int:
+    """Return the number of the delay() that a call of past() belongs to."""
+    (number, _) = past.arguments
+    assert isinstance(number, Literal)
+    return int(number.number)
+
+
+def _without_events(node: Any) -> Any:
+    """Return the node itself if comparisons in it are no events, else None."""
+    if isinstance(node, Builtin) and (
+        node.name == "noEvent" or (node.name == "smooth" and node.arguments[0] != Literal(0, "Integer"))
+    ):
+        return Literal(True, "Boolean")
+    return None
+
+
+def _is_combined_sample(condition: Expression) -> bool:
+    alternatives = getattr(condition, "elements", (condition,))
+    return any(has_builtin(c, "sample") and not (isinstance(c, Builtin) and c.name == "sample") for c in alternatives)
+
+
+def _remembered(section: Any) -> set[str]:
+    calls = (item for item in walk(section) if isinstance(item, Builtin) and item.name in PRE_OPERATORS)
+    return {referenced_variable(call.arguments[0]) for call in calls if isinstance(call.arguments[0], Name | Index)}
+
+
+def _internal(variable: Variable, name: str) -> Variable:
+    """Return the declaration of an internal variable with the type of another variable."""
+    return replace(
+        variable,
+        name=name,
+        variability="discrete",
+        causality="local",
+        start=variable.start if variable.name == name[4:-1] else None,
+        binding=None,
+        fixed=None,
+        final=False,
+        protected=True,
+        top_level=False,
+        unit="",
+        description="",
+        minimum=None,
+        maximum=None,
+    )

@@ -1,0 +1,287 @@
+"""Interpreter of models with event iteration; it performs the same operations as hybrid.h, past.h and the generated code."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from ....core.errors import ComponentError
+from ..model.arithmetic import EvaluationError, divide
+from ..model.flat_model import Model, derivative_name, is_integrated, previous_name
+from .interpreter import TICK_TOLERANCE, Interpreter
+from .matching import is_input
+from .past_values import PAST_VALUES, PastValues
+
+MAX_PASSES, MAX_EVENTS = 100, 100_000
+RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-7, 1e-9
+
+_NODES = (0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0)
+_WEIGHTS: Sequence[Sequence[float]] = (
+    (),
+    (1 / 5,),
+    (3 / 40, 9 / 40),
+    (44 / 45, -56 / 15, 32 / 9),
+    (19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729),
+    (9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656),
+    (35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84),
+)
+_ERROR = (71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40)
+_COMPARISONS: dict[str, Callable[[float, float], bool]] = {
+    "<": lambda a, b: a < b,
+    "<=": lambda a, b: a <= b,
+    ">": lambda a, b: a > b,
+    ">=": lambda a, b: a >= b,
+}
+
+
+class HybridInterpreter(Interpreter):
+    """An instance of a model with event iteration."""
+
+    def __init__(self, model: Model):
+        assert model.hybrid
+        self._hybrid = model.hybrid
+        super().__init__(model)
+        self._inputs = [name for name in self._hybrid.remembered if is_input(model.variables[name])]
+        self._states = list(_elements(model, model.states))
+        self._rates = list(_elements(model, [derivative_name(name) for name in model.states]))
+        self._past = [PastValues() for _ in self._hybrid.delays]
+        self.evaluate.past = lambda index, time: self._past[index].value(time)
+        self._step = 0.0
+        self._parameters_changed = False
+
+    def set(self, name: str, value: Any) -> None:
+        """Set a parameter or an input; a parameter causes an event at the start of the next step."""
+        super().set(name, value)
+        self._parameters_changed |= self.model.variables[name].variability == "parameter"
+
+    def initialize(self, time: float = 0.0) -> None:
+        """Solve the initial equations, and evaluate the events at the start time (s).
+
+        Raises:
+            ComponentError: The model has failed.
+        """
+        self._step = 0.0
+        self._past[:] = [PastValues() for _ in self._hybrid.delays]
+        self._apply_start_values(inputs=False)
+        self.evaluate.previous_conditions.clear()
+        self._start_clocks(time)
+        self.values["time"] = time
+        with self._as_component_error("initialize", time), np.errstate(all="ignore"):
+            for count in range(MAX_PASSES + 1):
+                self.evaluate.execute(self.schedule.initialization)
+                relations = [r.name for r in self._hybrid.relations]
+                if not self._changed(relations):
+                    break
+                self._remember(relations)
+                _check_passes(count)
+        self._remember(self._inputs)
+        self._record(time)
+        self._event("initialize", time, ())
+        due, tick = self._next_ticks()
+        if due and not self._inputs and tick <= time + TICK_TOLERANCE * self._shortest_period():
+            self._event("initialize", time, due)
+            self._count_ticks(due)
+
+    def step(self, time: float, step_size: float) -> None:
+        """Advance by a communication step.
+
+        Args:
+            time: The current time (s).
+            step_size: The communication step size (s).
+
+        Raises:
+            ComponentError: The model has failed.
+        """
+        end, reached, count = time + step_size, time, 0
+        while True:
+            due, tick = self._next_ticks()
+            slack = TICK_TOLERANCE * self._shortest_period() if due else 0.0
+            is_tick = bool(due) and tick < end - slack
+            at_start = is_tick and tick <= time + slack
+            target = tick if is_tick else end
+            if count == 0 and not at_start and (self._parameters_changed or self._changed(self._inputs)):
+                self._event("step", time, ())
+            crossing = False
+            if is_integrated(self.model) and not at_start:
+                with self._as_component_error("step", reached), np.errstate(all="ignore"):
+                    reached, crossing = self._advance(reached, target)
+            count += 1
+            if crossing:
+                self._event("step", reached, ())
+                if count > MAX_EVENTS:
+                    raise ComponentError(self.model.name, "step", "too many events in one step (chattering)", reached)
+                continue
+            if not is_tick:
+                break
+            self._event("step", target, due)
+            self._count_ticks(due)
+        self._event("step", end, ())
+
+    # events
+
+    def _event(self, function: str, time: float, due: Sequence[int]) -> None:
+        self._remember([name for name in self._hybrid.remembered if name not in self._inputs])
+        self.values["time"] = time
+        with self._as_component_error(function, time), np.errstate(all="ignore"):
+            for count in range(MAX_PASSES + 1):
+                self.evaluate.event_flags.update({("due", k): k in due for k in range(len(self.clocks))})
+                self.evaluate.execute(self.schedule.event)
+                self._check_finite()
+                if not (due or self._changed(self._hybrid.iterated)):
+                    break
+                _check_passes(count)
+                self._remember(self._hybrid.remembered)
+                due = ()
+        self._remember(self._inputs)
+        self._parameters_changed = False
+        self._record(time)
+
+    def _remember(self, names: Sequence[str]) -> None:
+        for name in names:
+            self.values[previous_name(name)] = self.get(name)
+
+    def _changed(self, names: Sequence[str]) -> bool:
+        return any(not np.array_equal(self.values[name], self.values[previous_name(name)]) for name in names)
+
+    def _record(self, time: float) -> None:
+        for past, delay in zip(self._past, self._hybrid.delays, strict=True):
+            past.record(time, self.values[delay.name], self.evaluate(delay.duration) / (PAST_VALUES // 2))
+
+    def _next_ticks(self) -> tuple[Sequence[int], float]:
+        """Return the clocks that tick next, and the time of the tick."""
+        ticks = [start + count * period for start, period, count in self.clocks]
+        if not ticks:
+            return (), math.inf
+        tick = min(ticks)
+        return [k for k, other in enumerate(ticks) if other <= tick + TICK_TOLERANCE * self.clocks[k][1]], tick
+
+    def _shortest_period(self) -> float:
+        return min((period for _, period, _ in self.clocks), default=math.inf)
+
+    def _count_ticks(self, due: Sequence[int]) -> None:
+        for k in due:
+            self.clocks[k][2] += 1
+
+    # integration
+
+    def _get_states(self) -> list[float]:
+        return [_element(self.values, key) for key in self._states]
+
+    def _set_states(self, values: Sequence[float]) -> None:
+        for (name, index), value in zip(self._states, values, strict=True):
+            if index is None:
+                self.values[name] = value
+            else:
+                self.values[name].flat[index] = value
+
+    def _slopes(self, time: float) -> list[float]:
+        self.values["time"] = time
+        self.evaluate.execute(self.schedule.derivatives)
+        return [_element(self.values, key) for key in self._rates]
+
+    def _crossed(self, time: float) -> tuple[bool, list[float]]:
+        """Return whether a relation differs from its stored value, and the differences of the operands of all relations."""
+        self.values["time"] = time
+        self.evaluate.execute(self.schedule.indicators)
+        changed, differences = False, []
+        for relation in self._hybrid.relations:
+            left, right = (float(self.evaluate(side)) for side in (relation.condition.left, relation.condition.right))
+            differences.append(left - right)
+            changed |= _COMPARISONS[relation.condition.operator](left, right) != self.values[relation.name]
+        return changed, differences
+
+    def _dormand_prince(self, time: float, h: float, start: Sequence[float], slopes: list[list[float]]) -> float:
+        """Advance the states from `start` with the slopes in the first row; return the error as a multiple of the tolerance."""
+        del slopes[1:]
+        for node, weights in zip(_NODES[1:], _WEIGHTS[1:], strict=True):
+            self._set_states([x + h * _weighted(weights, slopes, i) for i, x in enumerate(start)])
+            slopes.append(self._slopes(time + node * h))
+        largest = 0.0
+        for i, (x, y) in enumerate(zip(start, self._get_states(), strict=True)):
+            a, b = abs(x), abs(y)
+            scale = ABSOLUTE_TOLERANCE + RELATIVE_TOLERANCE * (a if a > b else b)
+            ratio = abs(h * _weighted(_ERROR, slopes, i)) / scale
+            if not ratio <= largest:
+                largest = ratio
+        return largest
+
+    def _advance(self, start_time: float, end: float) -> tuple[float, bool]:
+        """Integrate to `end` or to the first event; return the time reached, and whether there is an event."""
+        time, slopes = start_time, [self._slopes(start_time)]
+        if not self._step > 0:
+            self._step = end - start_time
+        while time < end:
+            last = not self._step < end - time
+            h = end - time if last else self._step
+            start = self._get_states()
+            error = self._dormand_prince(time, h, start, slopes)
+            factor = 0.9 * math.pow(error, -0.2) if error > 0 else 5.0
+            if not error <= 1:
+                self._set_states(start)
+                self._step = h * (factor if factor > 0.2 else 0.2)
+                if not time + self._step > time:
+                    raise EvaluationError("the integration step has become too small")
+                continue
+            if self._crossed(time + h)[0]:
+                time = self._locate(time, h, start, slopes)
+                self._record(time)
+                return time, True
+            following = h * (factor if factor < 5 else 5.0)
+            self._step = max(self._step, following) if last else following
+            time = end if last else time + h
+            self._record(time)
+            slopes = [slopes[-1]]
+        return time, False
+
+    def _locate(self, time: float, h: float, start: Sequence[float], slopes: list[list[float]]) -> float:
+        """Return the first time in (time, time + h] after which a relation has changed, with the states of this time."""
+        width = max(1e-10, 8 * 2.0**-52 * abs(time + h))
+        left, right, after = 0.0, h, self._crossed(time + h)[1]
+        self._set_states(start)
+        self._slopes(time)
+        before, side, count = self._crossed(time)[1], True, 0
+        while right - left > width and count < 100:
+            at = right
+            for a, b in zip(before, after, strict=True):
+                root = left + (right - left) * divide(a, a - b)
+                if left < root < at:
+                    at = root
+            at = left + (right - left) / 2 if count % 3 == 2 else at + (-width if side else width) / 2
+            at = min(max(at, left + width / 4), right - width / 4)
+            self._dormand_prince(time, at, start, slopes)
+            side, differences = self._crossed(time + at)
+            if side:
+                right, after = at, differences
+            else:
+                left, before = at, differences
+            count += 1
+        self._dormand_prince(time, right, start, slopes)
+        return time + right
+
+
+def _weighted(weights: Sequence[float], slopes: Sequence[Sequence[float]], index: int) -> float:
+    total = 0.0
+    for weight, row in zip(weights, slopes, strict=True):
+        if weight:
+            total += weight * row[index]
+    return total
+
+
+def _elements(model: Model, names: Sequence[str]) -> Iterator[tuple[str, int | None]]:
+    """Yield the elements of variables: the name and the row-major index, or None for a scalar."""
+    for name in names:
+        shape = model.variables[name].shape
+        yield from ((name, k) for k in range(math.prod(shape))) if shape else ((name, None),)
+
+
+def _element(values: Any, key: tuple[str, int | None]) -> float:
+    name, index = key
+    return float(values[name] if index is None else values[name].flat[index])
+
+
+def _check_passes(count: int) -> None:
+    if count == MAX_PASSES:
+        raise EvaluationError("the event iteration does not end")

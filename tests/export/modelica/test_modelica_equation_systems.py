@@ -1,0 +1,154 @@
+"""Equations in any form: algebraic loops, implicit equations, initial equations and derivatives of dependent variables."""
+
+from __future__ import annotations
+
+import math
+
+import pytest
+
+from cosim.core.errors import ComponentError, InputError
+from cosim.export.modelica import load_block
+
+
+def test_a_linear_algebraic_loop_is_solved(compile_both):
+    model = compile_both("""model Loop
+  input Real u;
+  parameter Real k = 2;
+  output Real y;
+  Real e;
+equation
+  e = u - y;
+  y = k*e;
+end Loop;""")
+    model.initialize()
+    for _, inputs in model.run(50):
+        assert model.get("y") == pytest.approx(2 / 3 * inputs["u"], rel=1e-12)
+
+
+def test_a_nonlinear_equation_is_solved_by_newtons_method(compile_both):
+    model = compile_both("""model Kepler
+  input Real m(min = 0, max = 6);
+  output Real e;
+equation
+  m = e - 0.3*sin(e);
+end Kepler;""")
+    model.initialize()
+    for _, inputs in model.run(50):
+        e = model.get("e")
+        assert e - 0.3 * math.sin(e) == pytest.approx(inputs["m"], abs=1e-12)
+
+
+def test_a_system_without_a_solution_is_a_failure_with_its_line(compile_both):
+    model = compile_both("""model None
+  input Real u;
+  output Real y;
+equation
+  y^2 + y*u + 1 = 0;
+end None;""")
+    assert model.c.initialize() == "a system of equations has no solution (None.mo:5)"
+    with pytest.raises(ComponentError, match=r"a system of equations has no solution \(None.mo:5\)"):
+        model.python.initialize()
+
+
+def test_an_implicit_derivative_and_a_loop_of_derivatives_are_solved(compile_both):
+    model = compile_both("""model Implicit
+  output Real x(start = 1, fixed = true);
+  output Real z(start = 0, fixed = true);
+equation
+  2*der(x) + der(z) = -2*x;
+  der(x) - der(z) = -x;
+end Implicit;""")
+    model.initialize()
+    for k in range(100):
+        model.step(k * 0.01)
+    assert model.get("x") == pytest.approx(math.exp(-1), abs=1e-8)
+    assert model.get("z") == pytest.approx(0, abs=1e-8)
+
+
+def test_a_steady_state_start_solves_for_the_states(compile_both):
+    model = compile_both("""model Steady
+  input Real u;
+  parameter Real T = 0.5;
+  output Real x;
+  output Real y(start = 1);
+initial equation
+  der(x) = 0;
+  der(y) = 0;
+equation
+  T*der(x) = u - x;
+  T*der(y) = x - y^3;
+end Steady;""")
+    model.set(u=8.0)
+    model.initialize()
+    assert (model.get("x"), model.get("y")) == (pytest.approx(8.0), pytest.approx(2.0))
+
+
+def test_the_derivative_of_a_variable_that_equations_determine(compile_both):
+    model = compile_both("""model Dependent
+  output Real y;
+  output Real z;
+  Real s;
+  Real x(start = 1, fixed = true);
+  Real w;
+equation
+  s = sin(3*time);
+  y = der(s);
+  der(x) = -x;
+  w = 2*x + time^2;
+  z = der(w);
+end Dependent;""")
+    model.initialize()
+    for k in range(100):
+        model.step(k * 0.01)
+    assert model.get("y") == pytest.approx(3 * math.cos(3), abs=1e-9)
+    assert model.get("z") == pytest.approx(-2 * math.exp(-1) + 2, abs=1e-8)
+
+
+def test_a_relation_in_an_algebraic_loop_is_consistent_after_the_event(compile_both):
+    model = compile_both("""model Limited
+  input Real u;
+  output Real y;
+  output Real x(start = 0, fixed = true);
+equation
+  der(x) = y - x;
+  y = if u - 0.5*y > 1 then 1 else u - 0.5*y;
+end Limited;""")
+    model.initialize()
+    for _, inputs in model.run(100):
+        expected = min(1.0, inputs["u"] / 1.5)
+        assert model.get("y") == pytest.approx(expected, abs=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("equations", "message"),
+    [
+        (
+            "x = u;\n  x = 2*u;\n  when u > 1 then\n  end when;",
+            "the equations do not determine y, and this equation contradicts others",
+        ),
+        ("x = u;\n  sin(x) = u;\n  y = x;\n  z = der(u);", "superfluous|unbalanced|input"),
+    ],
+)
+def test_singular_systems_are_refused_with_a_line(write_model, equations, message):
+    path = write_model(f"""model M
+  input Real u;
+  output Real x;
+  output Real y;
+equation
+  {equations}
+end M;""")
+    with pytest.raises(InputError, match=rf"M.mo.*({message}|unbalanced|unresolved)"):
+        load_block(path)
+
+
+def test_a_loop_without_a_unique_solution_is_a_failure(compile_both):
+    model = compile_both("""model Singular
+  input Real u;
+  output Real x;
+  output Real y;
+equation
+  x + y = u;
+  2*x + 2*y = u;
+end Singular;""")
+    model.set(u=1.0)
+    assert model.c.initialize() == "a system of equations has no solution (Singular.mo:6)"
