@@ -11,10 +11,10 @@ from typing import Any
 from ..core.errors import InputError, Problem
 from ..core.text import acceptable_text, shorten, text_problem
 from . import json_pointer
+from .component_schema import SOURCES
 from .extension import inherited_component
 from .file_paths import change_pointed, relocating
 from .json_document import Document
-from .schema import SOURCES
 
 
 def apply_settings(document: Document, settings: Mapping[str, Any], folder: Path | None) -> tuple[dict[str, Any], list[Problem]]:

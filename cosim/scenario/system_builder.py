@@ -20,12 +20,12 @@ from ..engine.plan import Plan, compile_plan
 from ..engine.settings import Event, Settings
 from ..process.journal import Deadlines, current_journal
 from .component_factory import ComponentFactory
+from .component_schema import SOURCES
 from .function_arguments import FunctionResolver, without_placeholders
 from .name_resolution import SlotIndex, UnknownNameError, check_assignment, resolve_name
 from .named_functions import find_function_problems
 from .nested_systems import Node, Scenario
 from .recorded_signals import SignalSelector
-from .schema import SOURCES
 from .schema_types import accepted
 from .stages import parallel_mode, root_stages
 from .stop_conditions import StopConditionReader
