@@ -30,11 +30,11 @@ def apply_settings(document: Document, settings: Mapping[str, Any], folder: Path
     """
     problems: list[Problem] = []
     variables: dict[str, Any] = {}
-    change = relocating(Path(), None) if folder is None else relocating(folder, document.file.parent)
     for name, value in sorted(settings.items(), key=lambda item: not _is_source(item[0])):
         if text := next(_text_problems([name, value]), ""):
             problems.append(Problem(text, f'setting "{shorten(acceptable_text(name))}"'))
         elif name.startswith("/"):
+            change = relocating(Path(), None) if folder is None else relocating(folder, document.file.parent)
             if text := _set_value(document, name, change_pointed(name, value, change)):
                 problems.append(Problem(text, f'setting "{name}"'))
         else:

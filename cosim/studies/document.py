@@ -44,17 +44,14 @@ class StudyFile(Generic[S]):
         return list(dict.fromkeys(replace(problem, where=self._locate(problem.where, settings)) for problem in problems))
 
     def _locate(self, where: str, settings: Mapping[str, Any]) -> str:
-        _, quote, name = where.partition('setting "')
-        if quote:
-            return self._setting_location(name.removesuffix('"'), settings) or where
+        if where.startswith('setting "'):
+            name, _, path = where.removeprefix('setting "').partition('"')
+            part = path.removeprefix(": $").removeprefix(_json_path(name)) if path else ""
+            return self._setting_location(name, settings, part) or where
         position, _, path = where.partition(": $")
         if Path(position.rsplit(":", 2)[0]).name != self.scenario.name:
             return where
         pointers = {each: _json_path(each) for each in settings if each.startswith("/")}
-        above = [each for each, start in pointers.items() if _is_within(path, start)]
-        if above:
-            nearest = max(above, key=lambda each: len(pointers[each]))
-            return self._setting_location(nearest, settings, path.removeprefix(pointers[nearest])) or where
         below = [
             location
             for each, start in pointers.items()
