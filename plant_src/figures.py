@@ -33,6 +33,7 @@ from .kpis import waypoints
 from .recorded_motion import horizontal_distance, touchdown_row, used_waypoints
 
 TIME_AFTER_TOUCHDOWN = 4.0  # s, shown by default
+MIN_SPAN = 1e-3  # s, of the axis of a run that failed at its start
 MIN_PLOTTED_ERROR = 1e-3  # m, lower end of the logarithmic axis
 
 
@@ -135,7 +136,7 @@ def landing(
     for name, line in _altitudes(vehicle, deck, altitude_reference):
         above.plot(result.time[shown], result[name][shown], **line)
     _draw_error(below, result.time[shown], horizontal_distance(result, vehicle, deck)[shown], limit)
-    above.set(ylabel="z / m", xlim=(start, stop))
+    above.set(ylabel="z / m", xlim=(start, max(stop, start + MIN_SPAN)))
     below.set(xlabel="t / s")
     if mode is not None:
         _shade_phases(figure, result.time[shown], result[mode][shown], phases)
@@ -224,7 +225,7 @@ def tracking_error(
     axes = figure.add_subplot()
     shown = slice(int(np.searchsorted(result.time, start)), None)
     _draw_error(axes, result.time[shown], horizontal_distance(result, vehicle, target)[shown], limit)
-    axes.set(xlabel="t / s", xlim=(start, result.time[-1]))
+    axes.set(xlabel="t / s", xlim=(start, max(result.time[-1], start + MIN_SPAN)))
     if len(waypoint_x):
         vessel = target.removesuffix(".deck")
         _mark_turns(axes, waypoints(result, vessel, waypoint_x, waypoint_y, acceptance_radius, waypoint_count))

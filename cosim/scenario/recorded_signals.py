@@ -37,7 +37,8 @@ class SignalSelector:
         for pattern, where in patterns:
             matches = _matching_names(pattern, self._output_index) or _matching_names(pattern, self._other_index)
             if not matches and not self._may_match_invalid(pattern):
-                self.problems.append(Problem(f'no output matches "{pattern}"{did_you_mean(pattern, self._outputs)}', where))
+                names = {**self._outputs, **self._others}
+                self.problems.append(Problem(f'no variable matches "{pattern}"{did_you_mean(pattern, names)}', where))
             selected.update(matches)
         return {name: end for name, end in {**self._outputs, **self._others}.items() if name in selected}
 

@@ -7,7 +7,7 @@ import math
 import subprocess
 import sys
 import time
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -94,19 +94,19 @@ class Regression:
 
     def _compare(self, run: _FinishedRun) -> RegressionOutcome:
         failed = run.failed_checks()
-        summary = _count_failures(len(run.failed_checks(checks_only=True)), len(run.checks), "check")
+        counts = [(len(run.failed_checks(checks_only=True)), len(run.checks), "check")]
         tubes = self.directory / "tubes.png"
         tubes.unlink(missing_ok=True)
         if run.scenario.get("reference"):
             comparison = run.compare()
-            summary += f", {_count_failures(len(comparison.failures), len(comparison.verdicts), 'signal')}"
+            counts.append((len(comparison.failures), len(comparison.verdicts), "signal"))
             if not comparison.passed:
                 failed += [
                     *str(comparison).splitlines(),
                     *run.reference_changes(),
                     f"see {run.draw_tubes(comparison, tubes)}",
                 ]
-        return RegressionOutcome(self.file.stem, 3 if failed else 0, summary, tuple(failed))
+        return RegressionOutcome(self.file.stem, 3 if failed else 0, _summarize(counts), tuple(failed))
 
     def _update_reference(self, run: _FinishedRun) -> RegressionOutcome:
         from ..results.comparison.reference import write_reference
@@ -119,8 +119,14 @@ class Regression:
         return RegressionOutcome(self.file.stem, 0, f"{amount}, {size:.0f} kB in {run.reference_path}")
 
 
-def _count_failures(failed: int, number: int, noun: str) -> str:
-    return f"{failed} of {count_noun(number, noun)} failed" if failed else count_noun(number, noun)
+def _summarize(counts: Collection[tuple[int, int, str]]) -> str:
+    """Return the numbers of checks and signals from (number of failures, number of all, noun)."""
+    if not any(failed for failed, _, _ in counts):
+        return ", ".join(count_noun(number, noun) for _, number, noun in counts)
+    return ", ".join(
+        f"{failed} of {count_noun(number, noun)} failed" if failed else f"{count_noun(number, noun)} passed"
+        for failed, number, noun in counts
+    )
 
 
 @dataclass(frozen=True)

@@ -228,5 +228,5 @@ def test_a_mistake_hides_no_other_mistake(folder):
     assert [line.partition(": ")[2] for line in refusal(folder, text)] == [
         "$.components.a.parameters.k: NaN is not allowed, expected a finite number",
         '$.deadlines.steps: unknown key; did you mean "step"?',
-        '$.record.signals[1]: no output matches "b.z"; did you mean "b.y"?',
+        '$.record.signals[1]: no variable matches "b.z"; did you mean "b.y"?',
     ]

@@ -52,8 +52,9 @@ def command(
     --modelica-compiler omc exports models that need the Modelica Standard Library or features that cosim's own compiler lacks;
     OpenModelica must be installed (this was written from its documentation and not tried with it).
 
-    Requires a C compiler and the extra "build". --check is for changes of cosim itself: it compares the hashes of all sources
-    with the manifest, and the behaviour of newly built FMUs with those in fmus/ (exit code 3 if they differ).
+    Modelica models, equations and controllers in C require a C compiler, and Modelica models and equations the extra "build".
+    --check is for changes of cosim itself: it compares the hashes of all sources with the manifest, and the behaviour of newly
+    built FMUs with those in fmus/ (exit code 3 if they differ).
     """
     from ...core import resources
     from ...export.build import build

@@ -118,9 +118,9 @@ CHANGES: dict[str, tuple[Change, str]] = {
     "a component in two stages": (add("algorithm/stages", ["a"]), '"a"'),
     "unknown algorithm": (put("algorithm/kind", "jacoby"), "$.algorithm.kind: expected 'staged'"),
     # what is done with the result
-    "nothing to record": (put("record/signals", ["a.z"]), 'no output matches "a.z"; did you mean "a.y"?'),
+    "nothing to record": (put("record/signals", ["a.z"]), 'no variable matches "a.z"; did you mean "a.y"?'),
     "a pipe as profile": (put("inputs/0/file", "pipe"), "pipe: Not a regular file"),
-    "a pattern to hang on": (put("record/signals", ["*" + "a*" * 2000 + "q"]), 'no output matches "*a*a'),
+    "a pattern to hang on": (put("record/signals", ["*" + "a*" * 2000 + "q"]), 'no variable matches "*a*a'),
     "missing profile": (put("inputs/0/file", "profil.csv"), "$.inputs[0]: "),
     "unknown column": (put("inputs/0/to", {"xx": ["a.u"]}), '"xx"'),
     "missing function": (put("kpis/0/python", "kpis.py:lost"), 'defines no function "lost"; did you mean "last"?'),
