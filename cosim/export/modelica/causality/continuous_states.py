@@ -6,7 +6,7 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import Any
 
-from ..model.flat_model import Model, Variable, derivative_name
+from ..model.flat_model import Model, Variable, derivative_name, internal_variable
 from ..model.syntax_tree import Builtin, Expression, Index, Name, raise_model_error, referenced_variable
 from ..model.traversal import rewrite, walk
 from .matching import is_input
@@ -56,20 +56,7 @@ def _check_state(model: Model, name: str, call: Builtin) -> None:
 
 def derivative_variable(state: Variable) -> Variable:
     """Return the declaration of the derivative of a state."""
-    return replace(
-        state,
-        name=derivative_name(state.name),
-        causality="local",
-        start=None,
-        binding=None,
-        fixed=None,
-        protected=True,
-        top_level=False,
-        unit="",
-        description="",
-        minimum=None,
-        maximum=None,
-    )
+    return internal_variable(state, derivative_name(state.name))
 
 
 def _replace_der(node: Any) -> Expression | Any:

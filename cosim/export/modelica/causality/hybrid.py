@@ -13,7 +13,7 @@ from __future__ import annotations
 from dataclasses import replace
 from typing import Any
 
-from ..model.flat_model import Delay, Equation, Hybrid, Model, Relation, Variable, previous_name
+from ..model.flat_model import Delay, Equation, Hybrid, Model, Relation, Variable, internal_variable, previous_name
 from ..model.syntax_tree import (
     Binary,
     Builtin,
@@ -91,7 +91,9 @@ class _Preparation:
             n for n, v in self._variables.items() if n in used | reinitialized and v.variability not in ("constant", "parameter")
         )
         for name in remembered:
-            self._variables[previous_name(name)] = _internal(self._variables[name], previous_name(name))
+            variable = self._variables[name]
+            internal = internal_variable(variable, previous_name(name))
+            self._variables[internal.name] = replace(internal, variability="discrete", start=variable.start)
         iterated = tuple(n for n in remembered if n in self._discrete | reinitialized and not (is_input(self._variables[n])))
         relations = tuple(Relation(r.name, rewrite(r.condition, self._replace_pre)) for r in self._relations)
         hybrid = Hybrid(relations, tuple(self._delays), remembered, iterated)
@@ -131,7 +133,7 @@ class _Preparation:
     def _add_variable(self, name: str, type_name: str, value: Expression) -> None:
         template = next(iter(self._model.variables.values()))
         self._variables[name] = replace(
-            _internal(template, name),
+            internal_variable(template, name),
             type=type_name,
             shape=(),
             variability="discrete" if type_name == "Boolean" else "continuous",
@@ -194,23 +196,3 @@ def _is_combined_sample(condition: Expression) -> bool:
 def _remembered(section: Any) -> set[str]:
     calls = (item for item in walk(section) if isinstance(item, Builtin) and item.name in PRE_OPERATORS)
     return {referenced_variable(call.arguments[0]) for call in calls if isinstance(call.arguments[0], Name | Index)}
-
-
-def _internal(variable: Variable, name: str) -> Variable:
-    """Return the declaration of an internal variable with the type of another variable."""
-    return replace(
-        variable,
-        name=name,
-        variability="discrete",
-        causality="local",
-        start=variable.start if variable.name == name[4:-1] else None,
-        binding=None,
-        fixed=None,
-        final=False,
-        protected=True,
-        top_level=False,
-        unit="",
-        description="",
-        minimum=None,
-        maximum=None,
-    )

@@ -8,7 +8,7 @@ connections and modifiers are resolved, names are dotted ("pid.kp"), and for-equ
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 from typing import Literal as OneOf
 
@@ -162,6 +162,25 @@ class Model:
 def is_integrated(model: Model) -> bool:
     """Return whether a model with event iteration has states, or relations that change with time."""
     return model.hybrid is not None and bool(model.states or model.hybrid.relations)
+
+
+def internal_variable(variable: Variable, name: str) -> Variable:
+    """Return the declaration of a variable that the compiler inserts, with type and shape of another variable."""
+    return replace(
+        variable,
+        name=name,
+        causality="local",
+        start=None,
+        binding=None,
+        fixed=None,
+        final=False,
+        protected=True,
+        top_level=False,
+        unit="",
+        description="",
+        minimum=None,
+        maximum=None,
+    )
 
 
 def derivative_name(state: str) -> str:
