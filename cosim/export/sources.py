@@ -80,7 +80,7 @@ def _load_equations(path: Path, _model: str | None, _library_path: Sequence[Path
 
 
 #: program whose function `vehicle_block` makes the block of a vehicle file
-_VEHICLE_PROGRAM = "plant_src/vehicles/vehicle_block.py"
+_VEHICLE_PROGRAM = "plant_src/vehicle_block.py"
 
 
 def _load_vehicle(path: Path, _model: str | None, _library_path: Sequence[Path]) -> Block:

@@ -74,7 +74,7 @@ class _MultirotorReader(QuantityReader):
         """Read all data; None if the airframe is impossible."""
         data = self.read_data(data, (), _KEYS, (*_OPTIONAL_KEYS, *keys))
         common = self.read_data(data.get("rotor"), ("rotor",), _ROTOR_KEYS, _ROTOR_OPTIONAL_KEYS)
-        values = {
+        values: dict[str, Any] = {
             "mass": self.quantity(data.get("mass", 1.0), ("mass",), "kg", above=0.0),
             "inertia": self.read_inertia(data.get("inertia", [1.0] * 3)),
             "rotors": [self.read_rotor(common, rotor, ("rotors", str(i))) for i, rotor in self.elements(data, "rotors")],

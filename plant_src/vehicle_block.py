@@ -9,8 +9,8 @@ from typing import Any
 from cosim.core.errors import InputError, Problem
 from cosim.export.fmu.block import Block
 
-from ..catalogue import FAMILIES, model_from_data
-from .multirotor.multirotor_equations import multirotor_block
+from .catalogue import FAMILIES, model_from_data
+from .vehicles.multirotor.multirotor_equations import multirotor_block
 
 
 def vehicle_block(path: Path) -> Block:
