@@ -12,8 +12,6 @@ import click
 from ...core import resources
 from ...core.errors import InputError, Problem, did_you_mean
 
-_PATTERN = "plant_src/vehicles/data/*.json"
-
 
 @click.command()
 @click.argument("name")
@@ -43,11 +41,13 @@ def command(name: str, base: str, directory: Path, force: bool) -> None:
 
 def _find_vehicle(base: str) -> Path:
     """Return the path of a vehicle file that is given by its path or by the name of a shipped vehicle."""
+    from ...export.sources import find_sources
+
     if base.endswith(".json"):
         if not (path := Path(base)).is_file():
             raise InputError(f'file "{base}" does not exist')
         return path
-    names = resources.shipped_names(_PATTERN)
-    if base not in names:
-        raise InputError(f'no vehicle file and no shipped vehicle "{base}"{did_you_mean(base, names)}')
-    return next(path for path in resources.root().glob(_PATTERN) if path.stem == base)
+    files = {source.name: source.path for source in find_sources(resources.root()) if source.kind.name == "vehicle file"}
+    if base not in files:
+        raise InputError(f'no vehicle file and no shipped vehicle "{base}"{did_you_mean(base, files)}')
+    return files[base]
