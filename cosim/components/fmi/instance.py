@@ -55,7 +55,7 @@ class FmuInstance(FunctionCaller, Component):
         """
         super().__init__(file, instance_name)
         self.shared_code = file
-        self.description = file.description
+        self.description = file.description.with_structural_parameters(settings.structural_parameters, file.limits)
         self.variables = self.description.variables
         self.has_state = self.description.has_state
         self._variables_by_name = {variable.name: variable for variable in self.variables}
@@ -120,10 +120,14 @@ class FmuInstance(FunctionCaller, Component):
         self._handle: int = self._fmu.component
         self._instance = as_pointer(self._handle)
         self._current_time = ctypes.c_double()
+        self._set_structural_parameters()
         references, functions = self.description.value_references, self._fmu.functions
         self._prepare_transfers(
             AccessorCallFactory(self.major, self._c_prefix, functions, self._handle, references, self.accessors)
         )
+
+    def _set_structural_parameters(self) -> None:
+        """Set the structural parameters, which only FMI 3.0 has, in Configuration Mode."""
 
     def _prepare_transfers(self, factory: AccessorCallFactory) -> None:
         """Prepare the calls that transfer the bound arrays."""
@@ -193,7 +197,7 @@ class FmuInstance(FunctionCaller, Component):
     def set(self, name: str, value: Any) -> None:
         """Call the fmi*Set... function of the variable's type."""
         variable = self._variables_by_name[name]
-        values = list(np.ravel(value)) if variable.shape else [value]
+        values = np.array(value, object).ravel().tolist() if variable.shape else [value]  # keeps all digits of 64-bit integers
         self.call_function(f"set{self.accessors[variable.type]}", [self.description.value_references[name]], values)
 
     def get(self, name: str) -> Any:
