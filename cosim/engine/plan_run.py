@@ -20,7 +20,7 @@ from ..core.recording import Recording
 from ..core.stopwatch import Stopwatch
 from ..process.float_mode import default_float_mode, is_default
 from ..process.forks import attributing_forks, report_forks
-from ..process.journal import MARKER_SIZE, Phase, calling_component, current_journal, suspending_deadline
+from ..process.journal import MARKER_SIZE, OVERWRITTEN, Phase, calling_component, current_journal, suspending_deadline
 from ..process.process_state import call_restoring_process_state, restoring_process_state
 from . import Executor, Plan, Recorder, Termination, executor_class
 from .component_states import ComponentStates, SavedState
@@ -242,6 +242,9 @@ class PlanRun:
         """Terminate the components unless one of them failed, and free them all; later calls do nothing.
 
         A component that fails here changes no result, so its failure is logged as a warning.
+
+        Raises:
+            ComponentError: a component has overwritten memory that is not its own.
         """
         if self._is_closed:
             return
@@ -275,11 +278,17 @@ def free_components(components: Mapping[str, Component]) -> None:
 
 
 def _call_or_warn(component: str, name: str, function: Callable[[], None]) -> None:
-    """Call a function of a component after its last step; log a warning if it fails."""
+    """Call a function of a component after its last step; log a warning if it fails.
+
+    Raises:
+        ComponentError: the component has overwritten memory that is not its own, so the results may be wrong.
+    """
     try:
         with calling_component(component, name, "end"):
             function()
     except ComponentError as error:
+        if error.reason == OVERWRITTEN:
+            raise
         component_log.log_message(component, component_log.WARNING, f"{error.function} failed: {error.reason}")
 
 

@@ -171,11 +171,11 @@ def load_scenario(
 
 def _refuse_study(document: Document) -> None:
     """Raise InputError if a document is a sweep or a tuning."""
-    kinds = {"factors": "sweep", "parameters": "tune"}
     value = document.value if isinstance(document.value, dict) else {}
-    if "scenario" in value and "components" not in value and (command := next((kinds[key] for key in kinds if key in value), None)):
-        text = f"expected a scenario, found a file for `cosim {command}`"
-        raise InputError([Problem(text, document.where(("scenario",)))])
+    for key, command in (("factors", "sweep"), ("parameters", "tune")):
+        if key in value and "scenario" in value and "components" not in value:
+            text = f"expected a scenario, found a file for `cosim {command}`"
+            raise InputError([Problem(text, document.where(("scenario",)))])
 
 
 def _find_seed_problems(document: Document, spec: SystemSpec) -> Iterator[Problem]:
