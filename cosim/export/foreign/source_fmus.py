@@ -24,6 +24,7 @@ from ...core.errors import InputError, Problem, did_you_mean
 from ..cache import cached_file
 from ..fmu.archive import write_archive
 from ..fmu.compiler import compiler_version, find_compiler
+from .windows_fmus import find_wine, has_windows_binary, windows_fmu
 
 _SOURCES, _BUILD_DESCRIPTION = "sources/", "sources/buildDescription.xml"
 _C_SUFFIX, _CPP_SUFFIXES = ".c", (".cpp", ".cc", ".cxx")
@@ -48,17 +49,25 @@ class _Configuration:
 
 
 def usable_fmu(path: Path, interface: Interface | None) -> FmuFile:
-    """Open an FMU; if it has sources but no binary for this machine, compile them.
+    """Open an FMU; if it has no binary for this machine, compile its sources or run its Windows library under Wine.
 
     Args:
         path: The FMU.
         interface: Interface of its instances; None: the preferred one of the FMU.
 
     Raises:
-        InputError: The FMU cannot be read, or its sources cannot be compiled.
+        InputError: The FMU cannot be read, its sources cannot be compiled, or its Windows library cannot be used.
     """
     file = FmuFile(path, interface=interface)
-    return FmuFile(_compiled_fmu(file), interface=interface) if file.must_be_compiled else file
+    if file.has_binary:
+        return file
+    if file.must_be_compiled:
+        try:
+            return FmuFile(_compiled_fmu(file), interface=interface)
+        except InputError:
+            if not has_windows_binary(file) or not find_wine():
+                raise
+    return FmuFile(windows_fmu(file), interface=interface) if has_windows_binary(file) else file
 
 
 def _compiled_fmu(file: FmuFile) -> Path:
@@ -98,7 +107,7 @@ def _compile(file: FmuFile, compiler: Sequence[str], target: Path) -> None:
 def _compile_library(file: FmuFile, compiler: Sequence[str], configuration: _Configuration, sources: Path, library: Path) -> None:
     command = list(compiler)
     if any(name.endswith(_CPP_SUFFIXES) for name in configuration.files):
-        command = [shutil.which("c++") or shutil.which("g++") or "c++"]
+        command = [*compiler[:-2], "c++"] if "ziglang" in compiler else [shutil.which("c++") or shutil.which("g++") or "c++"]
     fmpy = find_spec("fmpy")
     headers = Path(fmpy.origin).parent / "c-code" if fmpy and fmpy.origin else sources
     folders = [*(sources / name for name in ("", *configuration.include_folders)), headers, sources.parent]
