@@ -110,8 +110,8 @@ class FmuFile:
 
     @property
     def must_be_compiled(self) -> bool:
-        """True for an FMU of FMI 2.0 or 3.0 that has sources but no binary for this platform."""
-        return not self.has_binary and can_be_compiled(self.description.major, self.description.platforms)
+        """True for an FMU that has sources but no binary for this platform."""
+        return not self.has_binary and can_be_compiled(self.description.platforms)
 
     @property
     def run_warning(self) -> str:

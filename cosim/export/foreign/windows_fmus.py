@@ -17,8 +17,8 @@ from pathlib import Path
 from ...components.fmi import FmuFile
 from ...components.fmi.preflight import open_regular_file, raise_errors
 from ...components.fmi.preflight.archive import Archive
-from ...components.fmi.preflight.binary import check_binary
-from ...components.fmi.preflight.fmu_platform import FmuPlatform, current_platform
+from ...components.fmi.preflight.binary import WINDOWS, check_binary
+from ...components.fmi.preflight.fmu_platform import current_platform
 from ...core.errors import InputError
 from ...core.resources import cache_directory
 from ...process.output_lock import LOCK_FILE, waiting_for_lock
@@ -26,7 +26,6 @@ from ..cache import cached_file
 from ..fmu.archive import write_archive
 from ..fmu.compiler import compiler_version, find_compiler, ziglang_command
 
-WINDOWS = FmuPlatform("windows", "x86_64", ".dll")
 _SOURCES = Path(__file__).parent / "wine"
 #: the second one is Debian's, whose program `wine` is a script that prints advice
 _WINE_PROGRAMS = ("wine64", "/usr/lib/wine/wine64", "wine")
@@ -74,7 +73,9 @@ def windows_fmu(file: FmuFile) -> Path:
     wine = find_wine()
     if not wine:
         platforms = ", ".join(file.description.platforms)
-        raise InputError(f'"{file.path}": has no binary for this machine; it has: {platforms}; Windows FMUs need Wine (wine64)')
+        raise InputError(
+            f'"{file.path}": has no binary for this machine; it has: {platforms}; Windows libraries need Wine (wine64)'
+        )
     _check_library(file)
     prefix = _prepared_prefix(wine)
     worker, compiler = _built_worker(), find_compiler()
@@ -89,7 +90,7 @@ def _check_library(file: FmuFile) -> None:
     assert model is not None  # the description has been built from it
     with open_regular_file(file.path) as content:
         findings = check_binary(Archive(content, file.limits), model, file.description.interface, WINDOWS, file.limits)
-        raise_errors(file.path, [each for each in findings if "library" not in each.rule.name])
+        raise_errors(file.path, list(findings))
 
 
 def _sources_digest() -> str:

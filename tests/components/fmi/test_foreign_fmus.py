@@ -210,8 +210,8 @@ def test_an_fmu_for_another_platform_is_refused_with_its_platforms(probes, tmp_p
     foreign = tmp_path / "windows.fmu"
     with ZipFile(probes[2]) as source, ZipFile(foreign, "w") as target:
         target.writestr("modelDescription.xml", source.read("modelDescription.xml"))
-        target.writestr("binaries/win64/probe.dll", b"MZ")
-    with pytest.raises(InputError, match=r"has no binary for \S+ \(\S+\); it has: win64"):
+        target.writestr("binaries/win32/probe.dll", b"MZ")
+    with pytest.raises(InputError, match=r"has no binary for \S+ \(\S+\); it has: win32"):
         create_component(FmuFile(foreign), "a")
 
 
