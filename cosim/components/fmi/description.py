@@ -60,6 +60,7 @@ class FmuDescription:
         value_references: Value references by variable name, including aliases.
         negated: Names of the variables of FMI 1.0 whose values have the opposite sign of their value reference's.
         default_experiment: `DefaultExperiment`.
+        capabilities: Names of the capability flags that are set, as the FMU writes them.
         has_state: `canGetAndSetFMUState`.
         variable_step: `canHandleVariableCommunicationStepSize`, always true for Model Exchange.
         once_per_process: `canBeInstantiatedOnlyOncePerProcess`.
@@ -85,6 +86,7 @@ class FmuDescription:
     value_references: Mapping[str, int]
     negated: frozenset[str]
     default_experiment: DefaultExperiment
+    capabilities: Sequence[str]
     has_state: bool
     variable_step: bool
     once_per_process: bool
@@ -177,6 +179,7 @@ def build_description(path: Path, examination: Examination, interface: Interface
         {variable.name: int(by_name[variable.name][0].attributes["valueReference"]) for variable in variables},
         frozenset(source.name for source in model.variables if source.attributes.get("alias") == "negatedAlias"),
         _build_default_experiment(model.default_experiment),
+        [name for name, value in attributes.items() if _is_set(name, value)],
         any(attributes.get(name) in _TRUE for name in ("canGetAndSetFMUstate", "canGetAndSetFMUState")),
         selected == "model-exchange" or attributes.get("canHandleVariableCommunicationStepSize") in _TRUE,
         attributes.get("canBeInstantiatedOnlyOncePerProcess") in _TRUE,
@@ -197,6 +200,11 @@ def _read_sizes(model: ModelDescription, source: ModelVariable) -> Sequence[int 
         return ()
     named = [model.by_reference[text.strip()].name if text else None for text in references]
     return tuple(name or dimension_size(model, size) or 0 for name, size in zip(named, source.dimensions, strict=True))
+
+
+def _is_set(name: str, value: str) -> bool:
+    """Return whether an attribute is a capability flag that is true, or an order of derivatives above zero."""
+    return value in _TRUE or (name.startswith("max") and value.strip().isdigit() and int(value) > 0)
 
 
 def _build_unit(definition: UnitDefinition) -> Unit:

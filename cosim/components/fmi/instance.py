@@ -22,6 +22,7 @@ from ...core.component import SUCCESS_STATUSES, Component, Ports, PreparedCall, 
 from ...core.errors import ComponentError
 from ...process.journal import calling_component
 from ...process.process_state import restoring_process_state
+from . import log_callback
 from .accessor_calls import AccessorCallFactory
 from .c_functions import as_double, as_pointer
 from .file import FmuFile
@@ -60,6 +61,8 @@ class FmuInstance(FunctionCaller, Component):
         self.has_state = self.description.has_state
         self._variables_by_name = {variable.name: variable for variable in self.variables}
         self._is_instantiated, self._has_acquired_file = False, False
+        #: registration of the logger of FMI 1.0 and 2.0
+        self._log_key = 0
         self._settings = settings
         self._logging_on = logging.getLogger(component_log.LOGGER_NAME).isEnabledFor(logging.DEBUG)
         #: relative tolerance that the FMU receives; None: none
@@ -187,6 +190,7 @@ class FmuInstance(FunctionCaller, Component):
             with calling_component(self.name, name, "end"):
                 getattr(self._fmu, name)(self._handle)
         self._is_instantiated = False
+        log_callback.unregister(self._log_key)
         if self._has_acquired_file:
             self._has_acquired_file = False
             with calling_component(self.name, "unloading the binary", "end"):
