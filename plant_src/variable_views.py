@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from cosim.core.component import Variable
+from cosim.core.component import Ports, Variable
 
 
 def variable_views(
@@ -19,3 +19,9 @@ def variable_views(
         first = ends[variable.dtype]
         ends[variable.dtype] = first + len(variable.scalar_names)
         yield variable, arrays[variable.dtype][first : ends[variable.dtype]]
+
+
+def recorded_others(outputs: Ports) -> list[tuple[str, np.ndarray]]:
+    """Return the name of each recorded variable that is no output, and the view to which its value belongs."""
+    views = variable_views(outputs.variables, outputs.arrays)
+    return [(variable.name, view) for variable, view in views if variable.causality != "output"]

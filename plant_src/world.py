@@ -26,7 +26,7 @@ from .physics.contacts import overlap_depths
 from .physics.failures import FLAG_COUNT
 from .physics.fleet import Fleet, FleetState
 from .scene import replay
-from .variable_views import variable_views
+from .variable_views import recorded_others, variable_views
 from .world_settings import INITIAL_PREFIX, WAVE_PREFIX, WorldSettings
 
 if TYPE_CHECKING:
@@ -188,9 +188,11 @@ class World(Component):
             (bound_outputs[: len(own_outputs)], own_outputs),
             (outputs.arrays[_FLAG].data, self._flags.reshape(-1).data),
         ]
+        self._recorded_others = recorded_others(outputs)
         if self._has_environment:
             self._input_copies.append((self._environment.inputs.data, bound_inputs[ends[-1] :]))
-            self._output_copies.append((bound_outputs[len(own_outputs) :], self._environment.outputs.data))
+            end = len(own_outputs) + len(self._environment.outputs)
+            self._output_copies.append((bound_outputs[len(own_outputs) : end], self._environment.outputs.data))
 
     def set_inputs(self) -> None:
         """Copy the bound inputs."""
@@ -201,6 +203,8 @@ class World(Component):
         """Copy the outputs to the bound arrays."""
         for bound, own in self._output_copies:
             bound[:] = own
+        for name, recorded in self._recorded_others:
+            recorded[:] = self.get(name)
 
     def prepare_step_calls(self, clock: ctypes.c_double, step_size: float) -> Sequence[PreparedCall]:
         """Return one call that copies inputs, makes a step and copies outputs."""

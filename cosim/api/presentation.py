@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from ..results import Result
@@ -14,7 +15,7 @@ if TYPE_CHECKING:
 
 def enable() -> None:
     """Make `Result.plot` and the notebook view of results available."""
-    Presentation.plot, Presentation.html = _plot, _html
+    Presentation.plot, Presentation.html, Presentation.write_report = _plot, _html, _write_report
 
 
 def _plot(result: Result, signals: Sequence[str]) -> Figure:
@@ -27,3 +28,9 @@ def _html(result: Result) -> str:
     from ..report.inline import result_as_html
 
     return result_as_html(result)
+
+
+def _write_report(folder: Path) -> None:
+    from ..report.finished_run import write_folder_report
+
+    write_folder_report(folder, folder / "report.html")

@@ -180,7 +180,8 @@ class Component(Protocol):
 
     Attributes:
         variables: All variables; fixed after construction.
-        binds_everything: `bind` gets all inputs and outputs, not only those that are connected or recorded.
+        binds_everything: `bind` gets all inputs and outputs, not only those that are connected or recorded. The outputs are
+            followed by the recorded variables of other causalities.
         shared_code: Components with an equal value other than None never step at the same time, because their common code may
             have static variables.
         runs_foreign_code: Code that is not cosim's runs in this process, where it may change the state of the process.

@@ -225,7 +225,8 @@ def _layout_of_endpoints(system: System, endpoints: Iterable[Endpoint], causalit
 def _variables_to_bind(component: Component, used: Mapping[str, Variable], causality: Causality) -> Sequence[Variable]:
     if not component.binds_everything:
         return _group_by_type(list(used.values()))
-    return [variable for variable in component.variables if variable.causality == causality or variable.name in used]
+    own = [variable for variable in component.variables if variable.causality == causality]
+    return [*own, *(variable for variable in used.values() if variable.causality != causality)]
 
 
 def _group_by_type(variables: Sequence[Variable]) -> list[Variable]:

@@ -54,6 +54,7 @@ class Presentation:
 
     plot: ClassVar[Callable[[Result, Sequence[str]], Figure]]
     html: ClassVar[Callable[[Result], str]]
+    write_report: ClassVar[Callable[[Path], None]]
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -210,6 +211,19 @@ class Result:
     def _repr_html_(self) -> str:
         """Return the table of KPIs and the report with figures and replay, for a cell of a notebook."""
         return Presentation.html(self)
+
+    def write(self, folder: str | Path) -> None:
+        """Write a folder like `cosim run`: result.csv, kpis.json, run.json and report.html.
+
+        Args:
+            folder: The folder; it is created if it is missing, and existing files are replaced.
+
+        Raises:
+            InputError: The folder cannot be written, or a figure cannot be drawn.
+            OutputError: The disk is full or defective.
+        """
+        write_run(self, folder)
+        Presentation.write_report(Path(folder))
 
     def to_mcap(self, path: str | Path, scene: Mapping[str, Any] | None = None) -> None:
         """Write poses, signals and scene to an MCAP file (topics: see `cosim.results.mcap_files`).

@@ -25,7 +25,7 @@ class SignalSelector:
     def __init__(self, components: Mapping[str, Component], aliases: Mapping[str, Endpoint], invalid: Sequence[str]):
         self._outputs = {**_signal_endpoints(components, ("output",)), **aliases}
         self._others = _signal_endpoints(
-            components, ("local", "parameter", "calculatedParameter", "structuralParameter", "independent")
+            components, ("input", "local", "parameter", "calculatedParameter", "structuralParameter", "independent")
         )
         self._output_index, self._other_index = PrefixIndex(self._outputs), PrefixIndex(self._others)
         self._invalid = invalid

@@ -21,6 +21,7 @@ from ..physics.body import create_compound_shape, set_dynamics
 from ..physics.client import connect, pybullet
 from ..placement import Platform, VehiclePlacement
 from ..scene import replay
+from ..variable_views import recorded_others
 from ..vehicles.common.shapes import Box
 from ..vehicles.common.step_status import MAX_STATE_NORM
 from .bodies import Quadcopter, Vessel
@@ -128,6 +129,7 @@ class World(Component):
     def bind(self, inputs: Ports, outputs: Ports) -> None:
         """Take the arrays of the engine."""
         (self._bound_inputs,), (self._bound_outputs,) = inputs.arrays.values(), outputs.arrays.values()
+        self._recorded_others = recorded_others(outputs)
 
     def set_inputs(self) -> None:
         """Read the inputs."""
@@ -135,7 +137,9 @@ class World(Component):
 
     def get_outputs(self) -> None:
         """Write the outputs."""
-        self._bound_outputs[:] = self._outputs
+        self._bound_outputs[: len(OUTPUTS)] = self._outputs
+        for name, recorded in self._recorded_others:
+            recorded[:] = self.get(name)
 
     # -- life cycle ----------------------------------------------------------------------------------------------------
 

@@ -14,6 +14,7 @@ import numpy as np
 from cosim.core.component import DTYPES, Component, Ports, PreparedCall, Variable
 from cosim.core.errors import ComponentError, did_you_mean
 
+from ..variable_views import recorded_others
 from .counter_based_noise import CounterBasedNoise
 
 _FLOAT, _FLAG = DTYPES["Float64"], DTYPES["Boolean"]
@@ -119,6 +120,7 @@ class SignalComponent(Component):
         self._input_data = inputs.arrays.get(_FLOAT, np.empty(0)).data
         self._output_data = outputs.arrays.get(_FLOAT, np.empty(0)).data
         self._flag_data = outputs.arrays.get(_FLAG, np.empty(0, _FLAG)).data
+        self._recorded_others = recorded_others(outputs)
 
     def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
         """Set the initial state and outputs."""
@@ -149,6 +151,8 @@ class SignalComponent(Component):
         """Write the outputs."""
         self._write(self._output_data, 0, *self.outputs)
         self._write_flags(self._flag_data, 0, *self.flags)
+        for name, recorded in self._recorded_others:
+            recorded[:] = self.get(name)
 
     def prepare_step_calls(self, current_time: ctypes.c_double, step_size: float) -> Sequence[PreparedCall]:
         """Return one call that reads the inputs, does a step and writes the outputs."""
@@ -157,8 +161,7 @@ class SignalComponent(Component):
     def _exchange_and_step(self, current_time: ctypes.c_double, step_size: float) -> int:
         self.inputs = self._read(self._input_data)
         self.do_step(current_time.value, step_size)
-        self._write(self._output_data, 0, *self.outputs)
-        self._write_flags(self._flag_data, 0, *self.flags)
+        self.get_outputs()
         return 0
 
     def get_state(self) -> Any:
