@@ -217,7 +217,7 @@ def parse_cell(text: str, variable: Variable | None) -> Any:
 
 def _parse_float(word: str) -> float:
     try:
-        number = float(word)
+        number = math.nan if "_" in word else float(word)  # Python reads "1_0" as 10
     except ValueError:
         number = math.nan
     if not math.isfinite(number):
@@ -229,7 +229,7 @@ def _parse_integer(word: str) -> int | None:
     """Return all digits of an integer, which may be written as "3.0"; None for any other text."""
     whole, _, fraction = word.partition(".")
     try:
-        return None if fraction.strip("0") else int(whole)
+        return None if fraction.strip("0") or "_" in whole else int(whole)
     except ValueError:
         return None
 

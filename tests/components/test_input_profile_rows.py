@@ -17,6 +17,7 @@ from cosim.engine.layout import build_layout
         ("time,u\n0,1\n\n1,x\n", ":4: column \"u\": found 'x', expected a finite number"),
         ("time,u\n0,1\n0,2\n", ":3: expected a time above that of the row before"),
         ("time,u\n0,nan\n", ":2: column \"u\": found 'nan', expected a finite number"),
+        ("time,u\n0,1_0\n", ":2: column \"u\": found '1_0', expected a finite number"),
         ("time,u\n0,1,2\n", ":2: found '0,1,2', expected 2 values"),
         ("time,u\n", ":2: found no rows"),
     ],
