@@ -56,8 +56,8 @@ def simulate(
         fmu: Path of the FMU.
         stop_time: Stop time (s), a number or a fraction such as "1/3"; None: that of the default experiment, else 1 s later.
         step_size: Communication step size (s); None: that of the default experiment, else a hundredth of the duration.
-        input: Values of inputs over time, interpolated linearly: a CSV file, or columns by name as a dict, a pandas DataFrame or
-            a structured array. The column "time" is in s.
+        input: Values of inputs over time: a CSV file, or columns by name as a dict, a pandas DataFrame or a structured array. The
+            column "time" is in s. Floating-point numbers are interpolated linearly, other values are held.
         start_values: Parameters and start values by the names of the variables.
         output: Names of the recorded variables; None: all outputs.
         isolation: "fmu" runs the FMU in a separate process.

@@ -85,7 +85,8 @@ class ComponentSpec(Spec):
         "arguments of the constructor; only for Python components", {"environment": {"seed": 1}}, default={}
     )
     parameters: dict[str, Value] = key(
-        "values of parameters and start values, by variable name; a list sets an array",
+        "values of parameters and start values, by variable name; a list sets an array, nested lists one of several dimensions; "
+        "a Binary is a text of hexadecimal digits",
         {"speed_command": 1.0, "waypoint_x": [3.0, 3.0, -3.0]},
         default={},
     )

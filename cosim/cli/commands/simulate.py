@@ -46,7 +46,7 @@ if TYPE_CHECKING:
 @csv_options
 @supervision.supervision_options
 def command(isolation: str, sandbox: str | None, output_file: Path | None, **options: Any) -> int:
-    """Simulate a single FMU (Co-Simulation or Model Exchange of FMI 2.0 or 3.0) from its default start time."""
+    """Simulate a single FMU (Co-Simulation or Model Exchange of FMI 1.0, 2.0 or 3.0) from its default start time."""
     output = output_file.absolute() if output_file else None
     if strict_sandbox.must_rerun(sandbox):
         return strict_sandbox.rerun_in_bubblewrap(

@@ -61,8 +61,20 @@ def _create_slave(slave_class: type, description: FmuDescription, folder: Path) 
     return slave
 
 
-#: annotations of FMPy's methods -> types of the results in C; most statuses have the annotation c_int
-_RESULT_TYPES = {bytes: ctypes.c_char_p, int: ctypes.c_int}
+#: beginnings of names, without the prefix, and types of the results in C; the other functions return a status
+_RESULT_TYPES = {
+    "Instantiate": ctypes.c_void_p,
+    "Free": None,
+    "FreeFMU": ctypes.c_int,
+    "GetVersion": ctypes.c_char_p,
+    "GetTypesPlatform": ctypes.c_char_p,
+    "GetModelTypesPlatform": ctypes.c_char_p,
+}
+
+
+def _result_type(name: str) -> Any:
+    """Return the type of a function's result; FMPy's annotations declare texts for statuses of FMI 1.0."""
+    return next((kind for begin, kind in reversed(_RESULT_TYPES.items()) if name.startswith(begin)), ctypes.c_int)
 
 
 class _SlaveFunctions(dict[str, Any]):
@@ -83,7 +95,7 @@ class _SlaveFunctions(dict[str, Any]):
         signature = inspect.signature(getattr(self._slave_class, name))
         types = [parameter.annotation for parameter in list(signature.parameters.values())[1:]]
         function.argtypes = [get_args(kind)[0] if isinstance(kind, UnionType) else kind for kind in types]
-        function.restype = _RESULT_TYPES.get(signature.return_annotation, signature.return_annotation)
+        function.restype = _result_type(name[len("fmi1") :])
         if function.restype is ctypes.c_int:
             function.errcheck = _reject_negative_status
         self[name] = function

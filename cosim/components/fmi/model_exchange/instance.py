@@ -107,6 +107,9 @@ class ModelExchangeInstance(FmuInstance):
         """
         for _ in range(MAX_EVENT_ITERATIONS):
             again, terminate, has_next, next_time = self._update_discrete_states()
+            if has_next and math.isnan(next_time):
+                reason = "the next time event is at NaN, expected a time in seconds"
+                raise ComponentError(self.name, self._full_name(self._update_method), reason, self._current_time.value)
             self._next_event_time = next_time if has_next else math.inf
             if terminate:
                 self._terminates = True

@@ -5,7 +5,9 @@
    Integer: 10 i_in (discrete input), 11 i_out = 10 i_in after events, 12 count (one more every 0.25 s), 13 last_count (the
    simulation ends there), 14 fault (parameter): 1 GetDerivatives returns error, 2 the event indicator is NaN, 3 the event
    iteration never ends, 4 the next time event is always now, 5 GetDerivatives crashes, 6 discarded derivatives, 7 an event
-   after every step, 8 nominal values of 0 */
+   after every step, 8 nominal values of 0, 9 derivatives are NaN, 10 the next time event is NaN, 11 the event indicator changes
+   its sign at each call, 12 the states are NaN after events, 13 the number of states changes (FMI 3.0), 100 k + n: function k
+   (see `enum functions`) returns status n, or fails as `enum failures` says */
 #include <math.h>
 #include <stdlib.h>
 #include <string.h>
@@ -35,6 +37,12 @@ enum { U, X, DX, H, DH, V, DV, RESTITUTION, TIME, REALS };
 enum { I_IN = 10, I_OUT, COUNT, LAST_COUNT, FAULT, INTEGERS_END };
 enum { GOOD = 0, BAD = 3, DISCARDED = 2 };
 
+enum functions {
+    GET_STATES = 1, SET_STATES, DERIVATIVES, INDICATORS, SET_TIME, EVENT_MODE, CONTINUOUS_MODE, UPDATE, COMPLETE, EXIT_INITIALIZATION,
+    INITIALIZE, TERMINATE, GET, SET, STEP, NOMINALS
+};
+enum failures { CRASH = 90, ABORT, EXIT };
+
 typedef struct {
     double r[REALS];
     Integer i[INTEGERS_END - I_IN];
@@ -43,6 +51,22 @@ typedef struct {
 } Model;
 
 #define INTEGER(m, name) ((m)->i[name - I_IN])
+
+/* Return the status that the fault makes a function return, after 0.5 s or before the first step. */
+static int failure(Handle c, int function) {
+    Model *m = c;
+    int fault = INTEGER(m, FAULT), early = function == INITIALIZE || function == EXIT_INITIALIZATION;
+    if (fault / 100 != function || !(early || m->time > 0.5)) return GOOD;
+    if (fault % 100 == CRASH) *(volatile int *)8 = 1;
+    if (fault % 100 == ABORT) abort();
+    if (fault % 100 == EXIT) exit(7);
+    return fault % 100;
+}
+#define MAY_FAIL(FUNCTION)                                                                                                 \
+    do {                                                                                                                   \
+        int status = failure(c, FUNCTION);                                                                                 \
+        if (status) return (Status)status;                                                                                 \
+    } while (0)
 
 static Handle create(void) {
     Model *m = calloc(1, sizeof(Model));
@@ -60,7 +84,9 @@ static void compute(Model *m) {
     m->r[TIME] = m->time;
 }
 
-static int update(Model *m, int *again, int *ends) {
+static int update(Handle c, int *again, int *ends) {
+    Model *m = c;
+    MAY_FAIL(UPDATE);
     if (m->r[H] <= 0 && m->r[V] < 0) {
         m->r[H] = 0;
         m->r[V] *= -m->r[RESTITUTION];
@@ -68,7 +94,7 @@ static int update(Model *m, int *again, int *ends) {
     }
     if (m->time >= m->next_event) {
         INTEGER(m, COUNT)++;
-        m->next_event = INTEGER(m, FAULT) == 4 ? m->time : 0.25 * (INTEGER(m, COUNT) + 1);
+        m->next_event = INTEGER(m, FAULT) == 4 ? m->time : INTEGER(m, FAULT) == 10 && m->time > 0.5 ? NAN : 0.25 * (INTEGER(m, COUNT) + 1);
     }
     INTEGER(m, I_OUT) = 10 * INTEGER(m, I_IN);
     *again = INTEGER(m, FAULT) == 3;
@@ -78,11 +104,14 @@ static int update(Model *m, int *again, int *ends) {
 
 Status F(GetContinuousStates)(Handle c, double x[], size_t n) {
     Model *m = c;
+    MAY_FAIL(GET_STATES);
     x[0] = m->r[X], x[1] = m->r[H], x[2] = m->r[V];
+    if (INTEGER(m, FAULT) == 12 && m->time > 0.5) x[1] = NAN;
     return n == 3 ? GOOD : BAD;
 }
 Status F(SetContinuousStates)(Handle c, const double x[], size_t n) {
     Model *m = c;
+    MAY_FAIL(SET_STATES);
     m->r[X] = x[0], m->r[H] = x[1], m->r[V] = x[2];
     return n == 3 ? GOOD : BAD;
 }
@@ -92,36 +121,43 @@ Status F(SetContinuousStates)(Handle c, const double x[], size_t n) {
 #define fmi1_GetNominals F(GetNominalsOfContinuousStates)
 #endif
 Status fmi1_GetNominals(Handle c, double x[], size_t n) {
+    MAY_FAIL(NOMINALS);
     x[0] = x[1] = x[2] = INTEGER((Model *)c, FAULT) == 8 ? 0 : 1;
     return n == 3 ? GOOD : BAD;
 }
-static Status derivatives(Model *m, double dx[]) {
+static Status derivatives(Handle c, double dx[]) {
+    Model *m = c;
+    MAY_FAIL(DERIVATIVES);
     if (INTEGER(m, FAULT) == 1 && m->time > 0.5) return BAD;
     if (INTEGER(m, FAULT) == 6 && m->time > 0.5) return DISCARDED;
     if (INTEGER(m, FAULT) == 5 && m->time > 0.5) *(volatile int *)8 = 1;
     compute(m);
-    dx[0] = m->r[DX], dx[1] = m->r[DH], dx[2] = m->r[DV];
+    dx[0] = INTEGER(m, FAULT) == 9 && m->time > 0.5 ? NAN : m->r[DX], dx[1] = m->r[DH], dx[2] = m->r[DV];
     return GOOD;
 }
 Status F(GetEventIndicators)(Handle c, double z[], size_t n) {
     Model *m = c;
+    MAY_FAIL(INDICATORS);
+    if (INTEGER(m, FAULT) == 11 && m->time > 0.5) return z[0] = m->steps++ % 2 ? 1 : -1, GOOD;
     z[0] = INTEGER(m, FAULT) == 2 && m->time > 0.5 ? NAN : m->r[H] <= 0 && m->r[V] >= 0 ? 1e-9 : m->r[H];
     return n == 1 ? GOOD : BAD;
 }
 Status F(SetTime)(Handle c, double time) {
+    MAY_FAIL(SET_TIME);
     ((Model *)c)->time = time;
     return GOOD;
 }
-Status F(EnterEventMode)(Handle c) { return GOOD; }
-Status F(EnterContinuousTimeMode)(Handle c) { return GOOD; }
-Status F(ExitInitializationMode)(Handle c) { return GOOD; }
-Status F(Terminate)(Handle c) { return GOOD; }
+Status F(EnterEventMode)(Handle c) { return (Status)failure(c, EVENT_MODE); }
+Status F(EnterContinuousTimeMode)(Handle c) { return (Status)failure(c, CONTINUOUS_MODE); }
+Status F(ExitInitializationMode)(Handle c) { return (Status)failure(c, EXIT_INITIALIZATION); }
+Status F(Terminate)(Handle c) { return (Status)failure(c, TERMINATE); }
 Status F(Reset)(Handle c) { return GOOD; }
 void F(FreeInstance)(Handle c) { free(c); }
 const char *F(GetVersion)(void) { return FMI == 3 ? "3.0" : FMI == 2 ? "2.0" : "1.0"; }
 
 #define ACCESS(NAME, TYPE, MEMBER, FIRST, EXTRA)                                                                           \
     Status F(Get##NAME)(Handle c, const Reference vr[], size_t n, TYPE v[] EXTRA) {                                        \
+        MAY_FAIL(GET);                                                                                                     \
         compute(c);                                                                                                        \
         for (size_t k = 0; k < n; k++) v[k] = ((Model *)c)->MEMBER[vr[k] - FIRST];                                         \
         return GOOD;                                                                                                       \
@@ -159,17 +195,19 @@ void *ball_fmiInstantiateModel(const char *name, const char *guid, Callbacks cal
 }
 void ball_fmiFreeModelInstance(void *c) { free(c); }
 int ball_fmiCompletedIntegratorStep(void *c, char *event) {
+    MAY_FAIL(COMPLETE);
     *event = INTEGER((Model *)c, FAULT) == 7;
     return GOOD;
 }
 int ball_fmiEventUpdate(void *c, char intermediate, EventInfo *info) {
-    int again, ends;
-    update(c, &again, &ends);
+    int again, ends, status = update(c, &again, &ends);
+    if (status) return status;
     info->converged = !again, info->values_changed = 1, info->ends = (char)ends, info->has_next = 1;
     info->next_event = ((Model *)c)->next_event;
     return GOOD;
 }
 int ball_fmiInitialize(void *c, char has_tolerance, double tolerance, EventInfo *info) {
+    MAY_FAIL(INITIALIZE);
     return ball_fmiEventUpdate(c, 0, info);
 }
 int ball_fmiGetDerivatives(void *c, double dx[], size_t n) { return derivatives(c, dx); }
@@ -179,17 +217,20 @@ void *ball_fmiInstantiateSlave(const char *name, const char *guid, const char *l
     return strncmp(location, "file:///", 8) ? NULL : create();
 }
 int ball_fmiInitializeSlave(void *c, double start, char has_stop, double stop) {
+    MAY_FAIL(INITIALIZE);
     ((Model *)c)->time = start;
     return GOOD;
 }
-int ball_fmiTerminateSlave(void *c) { return GOOD; }
+int ball_fmiTerminateSlave(void *c) { return failure(c, TERMINATE); }
 void ball_fmiFreeSlaveInstance(void *c) { free(c); }
 int ball_fmiDoStep(void *c, double time, double step, char new_step) {
     Model *m = c;
     int again, ends;
     if (new_step != 1) return BAD;
+    MAY_FAIL(STEP);
     if (INTEGER(m, FAULT) == 6 && time > 0.5) return DISCARDED;
     compute(m);
+    if (INTEGER(m, FAULT) == 9 && time > 0.5) m->r[DX] = NAN;
     m->r[X] += step * m->r[DX], m->r[H] += step * m->r[DH], m->r[V] += step * m->r[DV];
     m->time = time + step;
     update(m, &again, &ends);
@@ -209,20 +250,22 @@ fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi
     return create();
 }
 Status fmi3EnterInitializationMode(Handle c, bool has_tolerance, double tolerance, double start, bool has_stop, double stop) {
+    MAY_FAIL(INITIALIZE);
     ((Model *)c)->time = start;
     return GOOD;
 }
 Status fmi3GetContinuousStateDerivatives(Handle c, double dx[], size_t n) { return derivatives(c, dx); }
-Status fmi3GetNumberOfContinuousStates(Handle c, size_t *n) { return *n = 3, GOOD; }
+Status fmi3GetNumberOfContinuousStates(Handle c, size_t *n) { return *n = INTEGER((Model *)c, FAULT) == 13 ? 4 : 3, GOOD; }
 Status fmi3GetNumberOfEventIndicators(Handle c, size_t *n) { return *n = 1, GOOD; }
 Status fmi3CompletedIntegratorStep(Handle c, bool no_set_state, bool *event, bool *ends) {
+    MAY_FAIL(COMPLETE);
     *event = INTEGER((Model *)c, FAULT) == 7;
     *ends = false;
     return GOOD;
 }
 Status fmi3UpdateDiscreteStates(Handle c, bool *again, bool *ends, bool *nominals, bool *values, bool *has_next, double *next) {
-    int more, last;
-    update(c, &more, &last);
+    int more, last, status = update(c, &more, &last);
+    if (status) return (Status)status;
     *again = more, *ends = last, *nominals = false, *values = true, *has_next = true;
     *next = ((Model *)c)->next_event;
     return GOOD;
@@ -242,16 +285,18 @@ Status fmi2SetupExperiment(Handle c, fmi2Boolean has_tolerance, double tolerance
     ((Model *)c)->time = start;
     return GOOD;
 }
-Status fmi2EnterInitializationMode(Handle c) { return GOOD; }
+Status fmi2EnterInitializationMode(Handle c) { return (Status)failure(c, INITIALIZE); }
 Status fmi2GetDerivatives(Handle c, double dx[], size_t n) { return derivatives(c, dx); }
 Status fmi2CompletedIntegratorStep(Handle c, fmi2Boolean no_set_state, fmi2Boolean *event, fmi2Boolean *ends) {
+    MAY_FAIL(COMPLETE);
     *event = INTEGER((Model *)c, FAULT) == 7;
     *ends = fmi2False;
     return GOOD;
 }
 Status fmi2NewDiscreteStates(Handle c, fmi2EventInfo *info) {
     memset(info, 0, sizeof *info);
-    update(c, &info->newDiscreteStatesNeeded, &info->terminateSimulation);
+    int status = update(c, &info->newDiscreteStatesNeeded, &info->terminateSimulation);
+    if (status) return (Status)status;
     info->valuesOfContinuousStatesChanged = info->nextEventTimeDefined = fmi2True;
     info->nextEventTime = ((Model *)c)->next_event;
     return GOOD;
