@@ -54,7 +54,11 @@ class HybridCode(ModelCode):
         if is_integrated(model):
             definitions += [*self._hybrid_system(values)]
         step = hybrid_step_body(clocks, is_integrated(model), too_many)
-        return [*definitions, function_definition("const char *model_step(Model *m, double time, double step_size)", step)]
+        return [
+            *definitions,
+            function_definition("const char *model_step(Model *m, double time, double step_size)", step),
+            *self._exchange(f"event(m, time, {'tick ? due : ' * bool(clocks)}NO_TICK);", record=bool(model.hybrid.delays)),
+        ]
 
     def _initialize_hybrid(self, endless: str) -> list[str]:
         """Generate the body of model_initialize: the initial equations, repeated until relations are consistent, and an event."""
@@ -81,7 +85,7 @@ class HybridCode(ModelCode):
         assert self.model.hybrid
         stored = {*self.model.hybrid.remembered, *(delay.name for delay in self.model.hybrid.delays)}
         stored |= {derivative_name(name) for name in self.model.states}
-        body = self.schedule.derivatives
+        body = self.schedule.between.derivatives
         targets = [s.target.name for s in body if isinstance(s, Assign) and isinstance(s.target, Name)]
         names = [name for name in targets if name not in stored and not self.model.variables[name].shape]
         lowering = self._make_lowering()
@@ -116,10 +120,10 @@ class HybridCode(ModelCode):
         """Generate the functions for the integration between events."""
         assert self.model.hybrid
         lowering = self._make_lowering()
-        lowering.body(self.schedule.indicators)
+        lowering.body(self.schedule.between.indicators)
         states, rates = self._element_pointers(self.model.states), self._element_pointers(map(derivative_name, self.model.states))
         if not self.model.states:
-            states, rates = "&m->no_state[0]", "&m->no_state[1]"
+            states, rates = ["&m->no_state[0]"], ["&m->no_state[1]"]
         return [
             function_definition(
                 "static void derivatives(Model *m, double time)",
@@ -130,8 +134,8 @@ class HybridCode(ModelCode):
                 "static bool advance(Model *m, double from, double to, double *reached)",
                 [
                     "const Hybrid system = {",
-                    f"    {{{states}}},",
-                    f"    {{{rates}}},",
+                    f"    {{{', '.join(states)}}},",
+                    f"    {{{', '.join(rates)}}},",
                     "};",
                     "bool event;",
                     "*reached = advance_hybrid(m, &system, from, to, &event);",

@@ -179,13 +179,13 @@ class HybridInterpreter(Interpreter):
 
     def _slopes(self, time: float) -> list[float]:
         self.values["time"] = time
-        self.evaluate.execute(self.schedule.derivatives)
+        self.evaluate.execute(self.schedule.between.derivatives)
         return [_element(self.values, key) for key in self._rates]
 
     def _crossed(self, time: float) -> tuple[bool, list[float]]:
         """Return whether a relation differs from its stored value, and the differences of the operands of all relations."""
         self.values["time"] = time
-        self.evaluate.execute(self.schedule.indicators)
+        self.evaluate.execute(self.schedule.between.indicators)
         changed, differences = False, []
         for relation in self._hybrid.relations:
             left, right = (float(self.evaluate(side)) for side in (relation.condition.left, relation.condition.right))
