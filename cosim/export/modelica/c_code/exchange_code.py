@@ -45,7 +45,7 @@ def indicator_lines(relations: Iterable[Relation], lowering: StatementLowering) 
         )
         held = lowering.scope[relation.name].text.code
         signs = ("-1", "1") if relation.condition.operator in ("<", "<=") else ("1", "-1")
-        shift = f"({held} ? {signs[0]} : {signs[1]}) * {_HYSTERESIS} * (1 + fabs({right.code}))"
+        shift = f"({held} ? {signs[0]} : {signs[1]}) * {_HYSTERESIS} * (1 + fabs((double)({right.code})))"
         lowering.lines.append(f"m->indicator[{k}] = {left.parenthesized(9)} - {right.parenthesized(10)} + {shift};")
     return lowering.lines
 
