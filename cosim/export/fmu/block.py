@@ -73,6 +73,10 @@ class BlockVariable:
     maximum: float | None = None
     #: (name, description) of the enumeration literals, whose values are 1, 2, ...
     enumeration: tuple[tuple[str, str], ...] = ()
+    #: name of the enumeration type; by default it is derived from the name of the first variable with the same literals
+    type_name: str = ""
+    #: physical quantity, for example "Mass"
+    quantity: str = ""
 
 
 @dataclass(frozen=True, slots=True)

@@ -164,11 +164,14 @@ def add_units(root: Element, names: Collection[str]) -> None:
 
 
 def _declared_types(block: Block) -> dict[Any, str]:
-    """Return the type name of each enumeration (a tuple of literals), derived from the first variable of this type."""
+    """Return the type name of each enumeration (a tuple of literals), which differs from all other names."""
     names: dict[Any, str] = {}
+    taken = {variable.name for variable in block.variables}
     for variable in block.variables:
-        if variable.enumeration:
-            names.setdefault(variable.enumeration, f"{variable.name}_type")
+        if variable.enumeration and variable.enumeration not in names:
+            name = variable.type_name or f"{variable.name}_type"
+            names[variable.enumeration] = f"{variable.name}_type" if name in taken else name
+            taken.add(name)
     return names
 
 
@@ -210,6 +213,7 @@ def _type_attributes(variable: BlockVariable, declared: dict[Any, str]) -> dict[
     has_start = _initial(variable) != "calculated"
     return {
         "declaredType": declared.get(variable.enumeration),
+        "quantity": variable.quantity or None if variable.type != "Boolean" else None,
         "unit": variable.unit or None if variable.type == "Float64" else None,
         "min": None if minimum is None else number(minimum),
         "max": None if maximum is None else number(maximum),

@@ -217,6 +217,8 @@ def _block_variable(variable: Variable, member: str, role: FmiRole, defaults: In
         minimum=None if variable.minimum is None else float(np.min(defaults.evaluate(variable.minimum))),
         maximum=None if variable.maximum is None else float(np.max(defaults.evaluate(variable.maximum))),
         enumeration=tuple((literal, "") for literal in _literals(variable, defaults.model)),
+        type_name=variable.enumeration,
+        quantity=variable.quantity,
     )
 
 
