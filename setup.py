@@ -39,6 +39,7 @@ def extension(name: str) -> Extension:
 #: modules in C; the last one reads the state of a Linux process
 EXTENSIONS = [
     "cosim.engine._native",
+    "cosim.components.fmi._logger",
     "cosim.components.fmi.model_exchange._fixed_step",
     *(["cosim.process._process_state"] if sys.platform == "linux" else []),
 ]

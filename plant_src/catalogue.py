@@ -1,15 +1,18 @@
-"""Catalogue of the vehicle models."""
+"""Catalogue of the vehicle models: those of the files in `vehicles/data/`, and the vessels."""
 
 from __future__ import annotations
 
-from .vehicles.ar_drone import geometry as ar_drone
-from .vehicles.ar_drone import parameters as ar_drone_parameters
+from collections.abc import Mapping
+from typing import Any
+
+from cosim.core.errors import InputError, Problem, did_you_mean
+
 from .vehicles.common.interface import VESSEL_STATES
-from .vehicles.crazyflie import geometry as crazyflie
-from .vehicles.crazyflie import parameters as crazyflie_parameters
-from .vehicles.model import Boxes, Model
+from .vehicles.data import read_vehicle_files
+from .vehicles.model import Model
 from .vehicles.multirotor import interface as multirotor_interface
-from .vehicles.multirotor.airframe import Airframe
+from .vehicles.multirotor.airframe import MAX_ROTORS
+from .vehicles.multirotor.vehicle_data import read_multirotor
 from .vehicles.otter import geometry as otter
 from .vehicles.otter import interface as otter_interface
 from .vehicles.otter import parameters as otter_parameters
@@ -18,24 +21,55 @@ from .vehicles.strider import interface as strider_interface
 from .vehicles.strider import parameters as strider_parameters
 from .vehicles.strider_6dof import geometry as strider_6dof
 from .vehicles.strider_6dof import interface as strider_6dof_interface
-from .vehicles.survey_hexacopter import geometry as survey_hexacopter
-from .vehicles.survey_hexacopter import parameters as survey_hexacopter_parameters
+
+#: keys of a vehicle file of any family besides those of its family
+COMMON_KEYS = ("family", "name", "description", "sources", "validity", "$schema")
 
 
-def _multirotor(airframe: Airframe, boxes: Boxes, crash_speed: float) -> Model:
-    variables, states = multirotor_interface.variables(airframe), multirotor_interface.states(airframe)
-    constants = multirotor_interface.constant_count(airframe)
-    body = airframe.body(boxes)
-    return Model(airframe.name, variables, states, body, crash_speed, constant_count=constants, airframe=airframe, boxes=boxes)
+def multirotor_model(name: str, data: Mapping[str, Any]) -> Model:
+    """Return the model of a multirotor. Raises InputError with all problems of its data."""
+    vehicle = read_multirotor(name, data, COMMON_KEYS)
+    airframe = vehicle.airframe
+    return Model(
+        name,
+        multirotor_interface.variables(airframe),
+        multirotor_interface.states(MAX_ROTORS),
+        vehicle.body(),
+        vehicle.crash_speed,
+        constant_count=multirotor_interface.constant_count(airframe, MAX_ROTORS),
+        airframe=airframe,
+        boxes=vehicle.boxes_in,
+        equations="multirotor",
+        layout=multirotor_interface.variables(airframe, MAX_ROTORS),
+    )
+
+
+#: family of equations -> function from name and data to the model
+FAMILIES = {"multirotor": multirotor_model}
+
+
+def model_from_data(data: Mapping[str, Any], name: str = "") -> Model:
+    """Return the model of a vehicle that is given by its data.
+
+    Args:
+        data: JSON object (`vehicles/README.md`).
+        name: Name of the vehicle, if the data have none.
+
+    Raises:
+        InputError: With all problems; the subject of each begins with "arguments" and continues with the path in the data.
+    """
+    family = data.get("family")
+    if family not in FAMILIES:
+        hint = did_you_mean(family, FAMILIES) if isinstance(family, str) else f", expected one of: {', '.join(FAMILIES)}"
+        raise InputError([Problem(f"found {family!r}{hint}", "family", ("arguments", "family"))])
+    return FAMILIES[family](str(data.get("name", name)), data)
 
 
 #: name -> model
 MODELS = {
     model.name: model
     for model in (
-        _multirotor(ar_drone_parameters.AIRFRAME, ar_drone.boxes, ar_drone_parameters.CRASH_SPEED),
-        _multirotor(crazyflie_parameters.AIRFRAME, crazyflie.boxes, crazyflie_parameters.CRASH_SPEED),
-        _multirotor(survey_hexacopter_parameters.AIRFRAME, survey_hexacopter.boxes, survey_hexacopter_parameters.CRASH_SPEED),
+        *(model_from_data(data, name) for name, data in read_vehicle_files()),
         Model(
             "strider",
             strider_interface.VARIABLES,
@@ -71,3 +105,25 @@ MODELS = {
 VEHICLE_MODELS: dict[str, dict[str, Model]] = {}
 for _model in MODELS.values():
     VEHICLE_MODELS.setdefault(_model.vehicle or _model.name, {})[_model.motion] = _model
+
+
+def models_of(vehicle: Any) -> Mapping[str, Model]:
+    """Return the models of a vehicle by their motion, as motion to model; the first motion is the default.
+
+    Args:
+        vehicle: Name of a vehicle of the catalogue, or its data.
+
+    Raises:
+        InputError: If there is no such vehicle, or its data are wrong.
+    """
+    if isinstance(vehicle, Mapping):
+        model = model_from_data(vehicle, "vehicle")
+        return {model.motion: model}
+    if not isinstance(vehicle, str):
+        text = f"found {vehicle!r}, expected the name of a vehicle model, or its data: {', '.join(VEHICLE_MODELS)}"
+        raise InputError([Problem(text, "", ("arguments",))])
+    if vehicle not in VEHICLE_MODELS:
+        raise InputError(
+            [Problem(f'unknown vehicle model "{vehicle}"{did_you_mean(vehicle, VEHICLE_MODELS)}', "", ("arguments",))]
+        )
+    return VEHICLE_MODELS[vehicle]

@@ -7,6 +7,7 @@ import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import partial
+from itertools import accumulate
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 import numpy as np
@@ -97,8 +98,8 @@ class World(Component):
     @staticmethod
     def warm() -> None:
         """Unpack the equations of all vehicle models and preconnect a Bullet client."""
-        for model in MODELS:
-            library_path(model)
+        for binary in {model.binary for model in MODELS.values()}:
+            library_path(binary)
         preconnect()
 
     @staticmethod
@@ -177,14 +178,18 @@ class World(Component):
         self._bound_inputs = {variable.name: values for variable, values in variable_views(inputs.variables, inputs.arrays)}
         bound_inputs, bound_outputs = inputs.arrays[_FLOAT].data, outputs.arrays[_FLOAT].data
         # memoryviews: copying a few numbers is faster than with NumPy
-        own_inputs, own_outputs = self._fleet.inputs.data, self._fleet.outputs.data
-        self._input_copies = [(own_inputs, bound_inputs[: len(own_inputs)])]
+        own_outputs = self._fleet.outputs.data
+        ends = list(accumulate(len(body.inputs) for body in self._fleet.bodies))
+        self._input_copies = [
+            (body.inputs.data, bound_inputs[end - len(body.inputs) : end])
+            for body, end in zip(self._fleet.bodies, ends, strict=True)
+        ]
         self._output_copies = [
             (bound_outputs[: len(own_outputs)], own_outputs),
             (outputs.arrays[_FLAG].data, self._flags.reshape(-1).data),
         ]
         if self._has_environment:
-            self._input_copies.append((self._environment.inputs.data, bound_inputs[len(own_inputs) :]))
+            self._input_copies.append((self._environment.inputs.data, bound_inputs[ends[-1] :]))
             self._output_copies.append((bound_outputs[len(own_outputs) :], self._environment.outputs.data))
 
     def set_inputs(self) -> None:

@@ -11,7 +11,7 @@ import numpy as np
 from cosim.core.component import Variable
 from cosim.core.errors import InputError, did_you_mean
 
-from .catalogue import VEHICLE_MODELS
+from .catalogue import models_of
 from .environment import settings
 from .environment.sea import Sea
 from .environment.settings import EnvironmentSettings
@@ -102,16 +102,16 @@ class _WorldSettingsReader(JsonReader):
         return model.body
 
     def find_model(self, spec: Mapping[str, Any], path: JsonPath) -> Model | None:
-        """Return the model with the name and motion of `spec`, or None if it is unknown."""
-        name, path = spec.get("model"), (*path, "model")
-        if isinstance(name, str) and name not in VEHICLE_MODELS:
-            self.add_problem(path, f'unknown vehicle model "{name}"{did_you_mean(name, VEHICLE_MODELS)}')
-        elif name is not None and not isinstance(name, str):
-            self.add_problem(path, f"found {name!r}, expected the name of a vehicle model: {', '.join(VEHICLE_MODELS)}")
-        motions = VEHICLE_MODELS.get(name) if isinstance(name, str) else None
-        if not motions:
+        """Return the model with the name or data and the motion of `spec`, or None if there is none."""
+        if "model" not in spec:
             return None
-        return motions[self.choice(spec.get("motion", next(iter(motions))), (*path[:-1], "motion"), tuple(motions))]
+        try:
+            motions = models_of(spec["model"])
+        except InputError as error:
+            for problem in error.problems:
+                self.add_problem((*path, "model", *problem.subject[1:]), problem.message)
+            return None
+        return motions[self.choice(spec.get("motion", next(iter(motions))), (*path, "motion"), tuple(motions))]
 
     def read_parameters(self, model: Model, initial: Mapping[str, float], spec: Any, path: JsonPath) -> dict[str, float]:
         """Read the object "parameters"; return values of scalar parameters by name.

@@ -39,6 +39,7 @@ PLANT_LAYERS = (
     "vehicles",
     "placement",
     "catalogue",
+    "vehicle_block",
     "physics",
     "environment",
     "world_settings",

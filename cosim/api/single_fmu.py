@@ -11,9 +11,9 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from ..components.fmi import InstanceSettings, Isolation, Method, SolverSettings, create_component
-from ..components.input_table import InputTable, read_input_table
+from ..components.input_table import InputTable, make_input_table, parse_cell, read_input_table
 from ..core import component_log
-from ..core.component import Component
+from ..core.component import Component, Variable
 from ..core.csv_text import read_rows
 from ..core.errors import ComponentError, InputError, Problem, did_you_mean
 from ..core.system import Connection, Endpoint, System
@@ -128,6 +128,7 @@ def compile_fmu(
         InputError: The FMU cannot be simulated in this way.
     """
     file = usable_fmu(fmu, settings.interface)
+    settings = settings.with_structural_parameters(file.description, start_values)
     experiment = file.description.default_experiment
     start = experiment.start_time or Fraction(0)
     stop = experiment.stop_time or start + 1 if stop_time is None else _seconds("stop_time", stop_time)
@@ -181,13 +182,14 @@ def _recorded_names(component: Component, output: Sequence[str] | None) -> list[
 
 def _read_inputs(values: InputValues, component: Component) -> InputTable:
     """Return the table of the inputs of an FMU."""
-    inputs = [slot for v in component.variables if v.causality == "input" for slot in v.scalar_names]
+    inputs = {slot: v for v in component.variables if v.causality == "input" for slot in v.scalar_names}
     file = Path(values) if isinstance(values, str | os.PathLike) else None
     columns = read_rows(file)[0][1:] if file else _column_names(values)
     if unknown := [column for column in columns if column not in inputs]:
         where = str(file or "input")
         raise InputError(Problem(f'the FMU has no input "{column}"{did_you_mean(column, inputs)}', where) for column in unknown)
-    return read_input_table(file, columns, "linear") if file else _table_of_columns(values, columns)
+    targets = {column: inputs[column] for column in columns}
+    return read_input_table(file, targets, "linear") if file else _table_of_columns(values, targets)
 
 
 def _column_names(values: Any) -> list[str]:
@@ -199,16 +201,22 @@ def _column_names(values: Any) -> list[str]:
     return [name for name in names if name != "time"]
 
 
-def _table_of_columns(values: Any, columns: Sequence[str]) -> InputTable:
+def _table_of_columns(values: Any, targets: Mapping[str, Variable]) -> InputTable:
     try:
-        table = {name: np.array(values[name], np.float64) for name in ("time", *columns)}
+        time = np.array(values["time"], np.float64)
+        table = {name: _column_values(values[name], variable) for name, variable in targets.items()}
     except (TypeError, ValueError) as error:
         raise InputError(Problem(f"expected numbers: {error}", "input")) from None
-    time = table.pop("time")
-    sizes_agree = time.ndim == 1 and len(time) and all(each.shape == time.shape for each in table.values())
-    if not sizes_agree or not all(np.isfinite(each).all() for each in (time, *table.values())) or (np.diff(time) <= 0).any():
+    sizes_agree = time.ndim == 1 and len(time) and all(len(each) == len(time) for each in table.values())
+    if not sizes_agree or not np.isfinite(time).all() or (np.diff(time) <= 0).any():
         raise InputError(Problem("expected columns of equal length with finite numbers, and increasing time", "input"))
-    return InputTable(time, table)
+    return make_input_table(time.tolist(), table, targets, "linear")
+
+
+def _column_values(values: Any, variable: Variable) -> list[Any]:
+    """Return the values of one column in the type of the input; a text, as in CSV, is accepted for each type."""
+    column = values.tolist() if hasattr(values, "tolist") else list(values)
+    return [value if isinstance(value, bytes) else parse_cell(str(value), variable) for value in column]
 
 
 def _check_start_values(component: Component, start_values: Mapping[str, Any]) -> dict[str, Any]:

@@ -38,12 +38,14 @@ def _list_documents(pattern: str) -> Iterator[Entry]:
 
 
 def _list_models() -> Iterator[Entry]:
-    """Yield the models that are exported from equations and have a README file, with its title."""
+    """Yield the vehicle files with their "description", and the equations with a README file with its title."""
     from ..export.sources import find_sources
 
     for source in find_sources(resources.root()):
         readme = source.path.parent / "README.md"
-        if source.kind.name == "equations" and readme.is_file():
+        if source.kind.name == "vehicle file":
+            yield Entry(source.name, parse_object(source.path.read_text(encoding="utf-8"))["description"], str(source.path))
+        elif source.kind.name == "equations" and readme.is_file():
             yield Entry(source.name, readme.read_text(encoding="utf-8").partition("\n")[0].lstrip("# "), str(readme))
 
 

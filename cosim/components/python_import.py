@@ -56,11 +56,11 @@ def package_root(path: Path) -> Path:
 
 
 def package_files(paths: Iterable[Path]) -> set[Path]:
-    """Return Python files and all modules that they can import from their folder or their outermost package."""
+    """Return Python files, and all modules and JSON files of their folder or outermost package that they can use."""
     files = {path.resolve() for path in paths}
     packages = {root / path.relative_to(root).parts[0] for path in files if (root := package_root(path)) != path.parent}
     siblings = (_imported_siblings(path) for path in files if package_root(path) == path.parent)
-    return files.union(*siblings, *(package.rglob("*.py") for package in packages))
+    return files.union(*siblings, *(package.rglob(pattern) for package in packages for pattern in ("*.py", "*.json")))
 
 
 def _imported_siblings(path: Path) -> list[Path]:

@@ -29,8 +29,9 @@ def text_cell(text: str) -> str:
 
 
 def quote_cell(text: object) -> str:
-    """Return a text as a quoted cell."""
-    return '"' + text_cell(str(text)).replace('"', '""') + '"'
+    """Return a text, or bytes as hexadecimal digits, as a quoted cell."""
+    text = text.hex() if isinstance(text, bytes) else str(text)
+    return '"' + text_cell(text).replace('"', '""') + '"'
 
 
 def format_header(signals: Iterable[str]) -> str:

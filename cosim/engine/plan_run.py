@@ -20,7 +20,7 @@ from ..core.recording import Recording
 from ..core.stopwatch import Stopwatch
 from ..process.float_mode import default_float_mode, is_default
 from ..process.forks import attributing_forks, report_forks
-from ..process.journal import MARKER_SIZE, Phase, calling_component, current_journal, suspending_deadline
+from ..process.journal import MARKER_SIZE, OVERWRITTEN, Phase, calling_component, current_journal, suspending_deadline
 from ..process.process_state import call_restoring_process_state, restoring_process_state
 from . import Executor, Plan, Recorder, Termination, executor_class
 from .component_states import ComponentStates, SavedState
@@ -241,8 +241,10 @@ class PlanRun:
     def close(self) -> None:
         """Terminate the components unless one of them failed, and free them all; later calls do nothing.
 
+        A component that fails here changes no result, so its failure is logged as a warning.
+
         Raises:
-            ComponentError: a component failed in terminate or free.
+            ComponentError: a component has overwritten memory that is not its own.
         """
         if self._is_closed:
             return
@@ -260,28 +262,34 @@ class PlanRun:
 
 
 def _end_components(components: Mapping[str, Component], terminate: bool) -> None:
-    """Free all components, even if one of them fails; call `terminate` first if requested."""
-    with ExitStack() as stack:
-        stack.callback(free_components, components)
+    """Free all components; call `terminate` of all of them first if requested."""
+    try:
         for name, component in components.items() if terminate else ():
-            with calling_component(name, "terminate", "end"):
-                component.terminate()
+            _call_or_warn(name, "terminate", component.terminate)
+    finally:
+        free_components(components)
 
 
 def free_components(components: Mapping[str, Component]) -> None:
-    """Free all components, even if freeing one of them fails.
-
-    Raises:
-        ComponentError: a component cannot be freed.
-    """
+    """Free all components; a failure is logged as a warning."""
     with ExitStack() as stack:
         for name, component in components.items():
-            stack.callback(_free_component, name, component)
+            stack.callback(_call_or_warn, name, "free", component.free)
 
 
-def _free_component(name: str, component: Component) -> None:
-    with calling_component(name, "free", "end"):
-        component.free()
+def _call_or_warn(component: str, name: str, function: Callable[[], None]) -> None:
+    """Call a function of a component after its last step; log a warning if it fails.
+
+    Raises:
+        ComponentError: the component has overwritten memory that is not its own, so the results may be wrong.
+    """
+    try:
+        with calling_component(component, name, "end"):
+            function()
+    except ComponentError as error:
+        if error.reason == OVERWRITTEN:
+            raise
+        component_log.log_message(component, component_log.WARNING, f"{error.function} failed: {error.reason}")
 
 
 def _space_problems(plan: Plan) -> list[Problem]:

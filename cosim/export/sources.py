@@ -10,6 +10,7 @@ from itertools import pairwise
 from pathlib import Path
 
 from ..components.sibling_imports import with_imported_siblings
+from ..core import resources
 from ..core.errors import CosimError, InputError, Problem
 from .fmu.block import Block
 from .fmu.compiler import compiler_version, find_compiler
@@ -35,6 +36,8 @@ class SourceKind:
     folder: str = ""
     #: write the FMI 2.0 FMU of a source file and return the files that it was made from
     write_fmi2: Callable[[Path, Path], list[Path]] | None = None
+    #: Python file below the project folder that makes the block of a data file; the FMU is also made from what it imports
+    program: str = ""
     #: true if the exporter runs the C compiler
     compiled: bool = True
 
@@ -76,10 +79,22 @@ def _load_equations(path: Path, _model: str | None, _library_path: Sequence[Path
         raise InputError(Problem(f"block() failed: {type(error).__name__}: {error}", str(path))) from error
 
 
+#: program whose function `vehicle_block` makes the block of a vehicle file
+_VEHICLE_PROGRAM = "plant_src/vehicle_block.py"
+
+
+def _load_vehicle(path: Path, _model: str | None, _library_path: Sequence[Path]) -> Block:
+    from ..components.python_import import load_object
+
+    create_block: Callable[[Path], Block] = load_object(f"{_VEHICLE_PROGRAM}:vehicle_block", resources.root())
+    return create_block(path)
+
+
 SOURCE_KINDS = (
     SourceKind("Modelica model", "controllers/modelica/*.mo", "rumoca", _load_modelica),
     SourceKind("PythonFMU class", "controllers/python/*.py", "pythonfmu", None, "python", write_python_fmu, compiled=False),
     SourceKind("equations", "plant_src/**/equations.py", "casadi", _load_equations),
+    SourceKind("vehicle file", "plant_src/vehicles/data/*.json", "casadi", _load_vehicle, program=_VEHICLE_PROGRAM),
     SourceKind("PythonFMU class", "plant_src/*_fmu.py", "pythonfmu", None, "python", write_python_fmu, compiled=False),
     SourceKind("C controller", f"controllers/c/*/{DESCRIPTION_FILE}", "fmpy", None, "c", write_c_fmu),
 )
@@ -122,8 +137,13 @@ def classify_source(path: Path, model: str | None = None) -> Source:
         return Source(path, SOURCE_KINDS[1], snake_case(path.stem))
     if path.name == DESCRIPTION_FILE:
         return Source(path, SOURCE_KINDS[-1], path.resolve().parent.name)
+    if path.suffix == ".json":
+        return Source(path, SOURCE_KINDS[3], path.stem)
     raise InputError(
-        Problem(f"cannot be exported; expected a .mo or .py file, or a C controller's {DESCRIPTION_FILE}", str(path))
+        Problem(
+            f"cannot be exported; expected a .mo or .py file, a vehicle file (.json), or a C controller's {DESCRIPTION_FILE}",
+            str(path),
+        )
     )
 
 
@@ -165,7 +185,8 @@ def export_source(
     block = replace(source.kind.load_block(source.path, model, library_path), identifier=source.name)
     for fmi_version, target in targets.items():
         write_fmu(block, fmi_version, target)
-    return [*with_imported_siblings(source.path), *block.resources.values()]
+    programs = with_imported_siblings(resources.root() / source.kind.program) if source.kind.program else []
+    return [*with_imported_siblings(source.path), *programs, *block.resources.values()]
 
 
 def tool_version(package: str) -> str:

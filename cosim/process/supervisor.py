@@ -250,10 +250,20 @@ class _Supervisor:
 
 def is_stopped(process: int) -> bool:
     """Return whether a process is stopped (SIGSTOP); False on systems that do not report it."""
+    return _process_state(process) == "T"
+
+
+def has_ended(process: int) -> bool:
+    """Return whether a process has ended, waited for or not; False on systems that do not report it."""
+    return _process_state(process) in ("Z", "X", "")
+
+
+def _process_state(process: int) -> str:
+    """Return the letter of a process's state in /proc; "" if it does not exist, "?" on systems without /proc."""
     try:
-        return Path(f"/proc/{process}/stat").read_text().rpartition(") ")[2].startswith("T")
+        return Path(f"/proc/{process}/stat").read_text().rpartition(") ")[2][:1]
     except OSError:
-        return False
+        return "" if Path("/proc/self/stat").exists() else "?"
 
 
 def _child_processes() -> list[int]:

@@ -95,7 +95,8 @@ def _check_table(path: Path, header: Sequence[str], rows: Sequence[Sequence[str]
 
 
 def _parse_column(cells: Sequence[str]) -> np.ndarray:
-    for kind in (np.int64, np.uint64, np.float64):
+    has_underscores = any("_" in cell for cell in cells)  # NumPy reads "1_0" as 10
+    for kind in (np.int64, np.uint64, np.float64) if not has_underscores else ():
         try:
             return np.array(cells, dtype=kind)
         except (ValueError, OverflowError):

@@ -109,8 +109,10 @@ def write_json(data: Mapping[str, Any], path: str | Path) -> None:
 
 
 def to_json_types(value: Any) -> Any:
-    """Convert a value to types that JSON supports: NumPy values and paths are converted, NaN and infinities become None."""
+    """Convert a value to types that JSON supports: bytes become hexadecimal digits, NaN and infinities become None."""
     match value:
+        case bytes():
+            return value.hex()
         case Mapping():
             return {str(key): to_json_types(item) for key, item in value.items()}
         case list() | tuple():

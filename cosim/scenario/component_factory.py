@@ -36,8 +36,13 @@ class ComponentFactory:
         self.python_files: list[Path] = []
         self.modelica_files: list[Path] = []
 
-    def create(self, node: Node, name: str) -> Component:
+    def create(self, node: Node, name: str, values: Mapping[str, Any]) -> Component:
         """Create the component `name` of the system `node`.
+
+        Args:
+            node: The system.
+            name: Name of the component in it.
+            values: Values of variables that the scenario sets, by name; structural parameters among them size the arrays.
 
         Raises:
             InputError: The source of the component does not exist or cannot be used.
@@ -57,6 +62,7 @@ class ComponentFactory:
             self.fmus[key] = loaded or usable_fmu(path, interface)
         elif needs_own_process:  # its process must not inherit the library that is loaded in this one
             self.fmus[key] = usable_fmu(path, interface)
+        settings = settings.with_structural_parameters(self.fmus[key].description, values)
         isolated = self._isolate_fmus or spec.isolation is not None or needs_own_process
         component = create_component(self.fmus[key], full_name, settings, self._isolation if isolated else None)
         if (description := self.fmus[key].description).interface == "model-exchange":

@@ -20,6 +20,7 @@ from ..core.errors import InputError, Problem, did_you_mean
 from ..core.size_limits import MAX_LEVELS
 from .component_schema import SOURCES
 from .file_paths import change_paths, find_scenario, relocating
+from .included_files import include_files
 from .json_document import Document, JsonPath, Origin, read_document
 from .schema import KEYED_LISTS, NOT_INHERITED
 
@@ -34,7 +35,7 @@ def read_system_document(file: Path) -> Document:
 
 
 def expand_document(document: Document, extending: tuple[Path, ...] = ()) -> Document:
-    """Merge a document with those that it extends; a document without "extends" is returned as it is.
+    """Include the files that the arguments of components name, and merge the document with those that it extends.
 
     Args:
         document: A scenario or nested system.
@@ -43,6 +44,7 @@ def expand_document(document: Document, extending: tuple[Path, ...] = ()) -> Doc
     Raises:
         InputError: A base does not exist, is not JSON, or extends itself.
     """
+    document = include_files(document)
     value = document.value
     if not isinstance(value, dict) or "extends" not in value:
         return document
@@ -52,7 +54,7 @@ def expand_document(document: Document, extending: tuple[Path, ...] = ()) -> Doc
     merged = merger.merge_objects((), _inherited(base, document.file.parent), {k: v for k, v in value.items() if k != "extends"})
     invalid = [path for path, origin in merger.origins.items() if origin.path in origin.document.invalid_paths]
     problems = [*document.problems, *base.problems, *merger.problems]
-    bases = (base.file, *base.bases)
+    bases = (*document.bases, base.file, *base.bases)
     origins, removed = merger.origins, merger.removed
     return replace(
         document, value=merged, problems=problems, invalid_paths=invalid, origins=origins, bases=bases, removed=removed

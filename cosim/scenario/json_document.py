@@ -57,20 +57,29 @@ class Document:
     def where(self, path: Sequence[str | int]) -> str:
         """Return "file:line:column: $.json.path", with the position of the deepest part of `path` that exists.
 
+        A text such as "0" is taken as an index where the value is a list.
         File and JSON path are those in which the value was written. For a value that the caller has set it is its JSON pointer.
         """
-        known = tuple(path)
+        known = path = self._with_indices(path)
         if pointer := next((self.settings[known[:n]] for n in range(len(known), 0, -1) if known[:n] in self.settings), None):
             return f'setting "{pointer}"' + ("" if known in self.settings else f": {json_path(path)}")
-        while known and self.origins and known not in self.origins:
+        while known and known not in self.origins and known not in self.offsets:
             known = known[:-1]
-        if origin := self.origins.get(known):
+        if (origin := self.origins.get(known)) and origin.document is not self:
             return origin.document.where((*origin.path, *path[len(known) :]))
         if self.is_dict:
             return f"scenario: {json_path(path)}"
-        while known and known not in self.offsets:
-            known = known[:-1]
         return f"{self.position(self.offsets.get(known, 0))}: {json_path(path)}"
+
+    def _with_indices(self, path: Sequence[str | int]) -> JsonPath:
+        """Return a path whose keys are numbers where the value is a list."""
+        value, keys = self.value, []
+        for key in path:
+            is_index = isinstance(value, list) and isinstance(key, str) and key.isdecimal()
+            keys.append(int(key) if is_index else key)
+            exists = keys[-1] in value if isinstance(value, dict) else isinstance(value, list) and keys[-1] in range(len(value))
+            value = value[keys[-1]] if exists else None
+        return tuple(keys)
 
     def refuse_objects(self, reason: str, classes: bool) -> None:
         """Raise InputError with this reason if components are Python objects, or (if `classes`) Python classes."""

@@ -11,6 +11,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..core.binary_text import parse_binary
 from ..core.component import Component, Variable
 from ..core.errors import did_you_mean
 from ..core.text import shorten, text_problem
@@ -175,17 +176,49 @@ def _check_value(variable: Variable, value: Any, all_elements: bool = False) -> 
         raise ValueError(f'"{variable.name}" is a constant and cannot be set{description}')
     if variable.causality == "structuralParameter" and value != variable.start:
         raise ValueError(
-            f'"{variable.name}" is a structural parameter: it stays {json.dumps(variable.start)}, found {_quote(value)}'
+            f'"{variable.name}" is a structural parameter, which is set before the start to a positive integer: it stays '
+            f"{json.dumps(variable.start)}, found {_quote(value)}"
         )
     if not variable.shape:
         return _scalar_value(variable, value)
     size = len(variable.scalar_names)
     if not isinstance(value, list):
         raise ValueError(f'"{variable.name}" is an array of {size} values, expected a list, found {_quote(value)}')
-    if len(value) > size or (all_elements and len(value) < size):
-        raise ValueError(f'"{variable.name}" takes {"" if all_elements else "at most "}{size} values, found {len(value)}')
-    start = variable.start if isinstance(variable.start, tuple) else (variable.start or 0,) * size
-    return [*(_scalar_value(variable, element) for element in value), *start[len(value) :]]
+    elements = _flatten(variable, value)
+    if len(elements) > size or (all_elements and len(elements) < size):
+        raise ValueError(f'"{variable.name}" takes {"" if all_elements else "at most "}{size} values, found {len(elements)}')
+    return [*(_scalar_value(variable, element) for element in elements), *_start_values(variable)[len(elements) :]]
+
+
+def _flatten(variable: Variable, value: list[Any]) -> list[Any]:
+    """Return the elements of a list in row-major order; nested lists must have the shape of the array."""
+    if not any(isinstance(row, list) for row in value):
+        return value
+    if _nested_shape(value) != variable.shape:
+        text = " x ".join(map(str, variable.shape))
+        raise ValueError(f'"{variable.name}" is an array of {text} values, found {_quote(value)}')
+    rows = value
+    for _ in variable.shape[1:]:
+        rows = [element for row in rows for element in row]
+    return rows
+
+
+def _nested_shape(value: Any) -> tuple[int, ...]:
+    """Return the shape of nested lists; () if they are not rectangular."""
+    if not isinstance(value, list):
+        return ()
+    shapes = {_nested_shape(row) for row in value}
+    return (len(value), *shapes.pop()) if len(shapes) == 1 else ()
+
+
+def _start_values(variable: Variable) -> Sequence[Any]:
+    """Return the start values of all elements of an array."""
+    start, size = variable.start, len(variable.scalar_names)
+    if variable.type == "Binary":
+        start = tuple(map(parse_binary, start)) if isinstance(start, tuple) else parse_binary(start or "")
+    if start is None:
+        start = {"String": "", "Binary": b""}.get(variable.type, 0)
+    return start if isinstance(start, tuple) else (start,) * size
 
 
 def _enumeration_value(variable: Variable, value: Any) -> Any:
@@ -206,6 +239,11 @@ def _scalar_value(variable: Variable, value: Any) -> Any:
         raise ValueError(f'"{variable.name}": {problem}')
     if variable.items:
         return _enumeration_value(variable, value)
+    if variable.type == "Binary" and isinstance(value, str):
+        try:
+            return parse_binary(value)
+        except ValueError as error:
+            raise ValueError(f'"{variable.name}" is of type Binary: {error}') from None
     if not _type_accepts(variable.type, value):
         raise ValueError(f'"{variable.name}" is of type {variable.type}, found {_quote(value)}')
     low, high = _limits(variable)
@@ -238,5 +276,5 @@ def _type_accepts(kind: str, value: Any) -> bool:
     if kind == "Boolean" or isinstance(value, bool):
         return kind == "Boolean" and isinstance(value, bool)
     if kind in ("String", "Binary"):
-        return isinstance(value, str)
+        return isinstance(value, str if kind == "String" else bytes)
     return isinstance(value, int | float) and abs(value) <= sys.float_info.max if kind in _REALS else isinstance(value, int)

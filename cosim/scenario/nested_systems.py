@@ -160,12 +160,22 @@ def load_scenario(
             the result.
     """
     document = open_scenario(scenario)
+    _refuse_study(document)
     variables, problems = apply_settings(document, settings or {}, folder)
     reader = _SystemReader()
     file = reader.read(document, ScenarioSpec, ())
     check_expanded_size(file)
     seeds = _find_seed_problems(document, file.spec)
     return Scenario(_make_node(file), [*problems, *reader.problems, *seeds], variables)
+
+
+def _refuse_study(document: Document) -> None:
+    """Raise InputError if a document is a sweep or a tuning."""
+    value = document.value if isinstance(document.value, dict) else {}
+    for key, command in (("factors", "sweep"), ("parameters", "tune")):
+        if key in value and "scenario" in value and "components" not in value:
+            text = f"expected a scenario, found a file for `cosim {command}`"
+            raise InputError([Problem(text, document.where(("scenario",)))])
 
 
 def _find_seed_problems(document: Document, spec: SystemSpec) -> Iterator[Problem]:

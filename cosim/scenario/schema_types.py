@@ -51,7 +51,8 @@ def _check_not_negative(value: Fraction) -> Fraction:
 
 
 def _check_value(value: Any) -> Any:
-    values = value if isinstance(value, list) else [value]
+    rows = value if isinstance(value, list) else [value]
+    values = [v for row in rows for v in (row if isinstance(row, list) and row else [row])]
     if not values or not all(isinstance(v, bool | int | float | str) for v in values):
         raise ValueError("expected a number, true, false, a text, or a list of these")
     return value
@@ -114,11 +115,17 @@ Integer = Annotated[int, BeforeValidator(_as_integer)]
 BoolOrNumber = Annotated[
     bool | int | float, BeforeValidator(_check_bool_or_number), WithJsonSchema({"type": ["number", "boolean"]})
 ]
-_SCALAR_SCHEMAS = [{"type": kind} for kind in ("number", "boolean", "string")]
+
+
+def _list_of(schemas: list[dict[str, Any]]) -> dict[str, Any]:
+    return {"type": "array", "items": {"anyOf": schemas}, "minItems": 1}
+
+
+_SCALAR_SCHEMAS: list[dict[str, Any]] = [{"type": kind} for kind in ("number", "boolean", "string")]
 Value = Annotated[
     Any,
     BeforeValidator(_check_value),
-    WithJsonSchema({"anyOf": [*_SCALAR_SCHEMAS, {"type": "array", "items": {"anyOf": _SCALAR_SCHEMAS}, "minItems": 1}]}),
+    WithJsonSchema({"anyOf": [*_SCALAR_SCHEMAS, _list_of([*_SCALAR_SCHEMAS, _list_of(_SCALAR_SCHEMAS)])]}),
 ]
 AutoOrBool = Annotated[
     Literal["auto"] | bool, BeforeValidator(_check_auto_or_bool), WithJsonSchema({"enum": ["auto", True, False]})

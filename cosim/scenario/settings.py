@@ -14,6 +14,7 @@ from . import json_pointer
 from .component_schema import SOURCES
 from .extension import inherited_component
 from .file_paths import change_pointed, relocating
+from .included_files import include_in_setting
 from .json_document import Document
 
 
@@ -35,7 +36,14 @@ def apply_settings(document: Document, settings: Mapping[str, Any], folder: Path
             problems.append(Problem(text, f'setting "{shorten(acceptable_text(name))}"'))
         elif name.startswith("/"):
             change = relocating(Path(), None) if folder is None else relocating(folder, document.file.parent)
-            if text := _set_value(document, name, change_pointed(name, value, change)):
+            try:
+                value, files = include_in_setting(json_pointer.pointer_keys(name), value, folder or Path())
+                value = change_pointed(name, value, change)
+            except InputError as error:
+                problems += [Problem(problem.message, problem.where or f'setting "{name}"') for problem in error.problems]
+                continue
+            document.bases += tuple(files)
+            if text := _set_value(document, name, value):
                 problems.append(Problem(text, f'setting "{name}"'))
         else:
             variables[name] = value

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
 from pathlib import Path
@@ -19,6 +20,7 @@ from ..engine.pacer import LatePolicy
 from ..engine.plan import Plan, compile_plan
 from ..engine.settings import Event, Settings
 from ..process.journal import Deadlines, current_journal
+from .assigned_values import iterate_assignments, values_by_component
 from .component_factory import ComponentFactory
 from .component_schema import SOURCES
 from .function_arguments import FunctionResolver, without_placeholders
@@ -118,34 +120,41 @@ class SystemBuilder:
         Raises:
             InputError: The components have too many scalars.
         """
-        scalars = 0
+        scalars, values = 0, values_by_component(self.root, self.assignments)
         for node, name in self.root.leaves():
+            full_name = node.full_name(name)
             try:
-                component = self.components[node.full_name(name)] = self.component_factory.create(node, name)
+                component = self.component_factory.create(node, name, values.get(full_name, {}))
+                self.components[full_name] = component
                 scalars += count_scalars(component.variables)
             except InputError as error:
                 node.invalid_components.add(name)
                 self._add_source_problems(error, node, name)
-            noun = f"variables and elements of arrays up to {node.full_name(name)}"
+            noun = f"variables and elements of arrays up to {full_name}"
             require_at_most(MAX_SCALARS, scalars, noun, node.where("components", name))
         self.profiles = [f"{PROFILE_PREFIX}.{i}" for i, _ in accepted(self.spec.inputs)]
         for i, spec in accepted(self.spec.inputs):
             try:
-                table = read_input_table(self.root.folder / spec.file, list(spec.to), spec.interpolation)
+                table = read_input_table(self.root.folder / spec.file, self._targets(spec.to), spec.interpolation)
                 self.components[f"{PROFILE_PREFIX}.{i}"] = table
             except InputError as error:
                 self.profiles.remove(f"{PROFILE_PREFIX}.{i}")
                 self._add_problems(error, self.root, "inputs", i)
 
+    def _targets(self, columns: Mapping[str, Sequence[str]]) -> dict[str, Variable | None]:
+        """Return the first input that each column of a profile feeds; None if it is unknown, which the wiring reports."""
+        return {column: next(self._inputs_of(names), None) for column, names in columns.items()}
+
+    def _inputs_of(self, names: Sequence[str]) -> Iterator[Variable]:
+        for name in names:
+            with suppress(UnknownNameError):
+                for target in (each for each in resolve_name(self.root, name, ("inputs",)) if each.component in self.components):
+                    variables = self._variables(target.component)
+                    yield from filter(None, map(variables.get, (target.prefix, target.prefix.rpartition("[")[0])))
+
     def _set_start_values(self) -> None:
-        """Collect the start values: outer systems override nested ones, and the caller's values override both."""
-        for node in self.root.walk():
-            for name, spec in node.spec.components.items():
-                for variable, value in spec.parameters.items():
-                    where = node.where("components", name, "parameters", variable)
-                    self._assign(self.start_values, node, f"{name}.{variable}", value, where)
-        for name, value in self.assignments.items():
-            self._assign(self.start_values, self.root, name, value, f'setting "{name}"')
+        for node, name, value, where in iterate_assignments(self.root, self.assignments):
+            self._assign(self.start_values, node, name, value, where)
 
     def _assign(
         self, values: dict[str, dict[str, Any]], node: Node, name: str, value: Any, where: str, all_elements: bool = False

@@ -44,7 +44,8 @@ def _model_section(entry: Entry) -> str:
         f"**{causality.capitalize()}s**\n\n{table(('name', 'unit', 'start', 'meaning'), _variable_rows(variables, causality))}"
         for causality in _CAUSALITIES
     )
-    link = f"[Equations and parameters](../../plant_src/vehicles/{entry.name}/README.md)"
+    file = Path(entry.file).relative_to(resources.root())
+    link = f"[{'Data' if file.suffix == '.json' else 'Equations and parameters'}](../../{file.as_posix()})"
     return "\n\n".join((f"## {entry.description}", f"Model `{entry.name}`. {link}", *tables))
 
 

@@ -95,17 +95,19 @@ class ContactBody:
                 "highest_water" (m).
         """
         self.name, self.model, self._client = vehicle.name, vehicle.model, client
-        constants = vehicle.model.constant_count if vehicle.model.constant_count is not None else len(vehicle.parameters)
-        fixed = {"parameters": np.array(vehicle.parameters), "principal_axes": np.array(vehicle.body.axes)}
+        parameters = np.array(vehicle.model.equation_parameters(vehicle.parameters))
+        constants = vehicle.model.constant_count if vehicle.model.constant_count is not None else len(parameters)
+        fixed = {"parameters": parameters, "principal_axes": np.array(vehicle.body.axes)}
         self._arrays = arrays = {**arrays, **fixed, "constants": np.zeros(constants)}
-        self.inputs, self.outputs, self.parameters = arrays["inputs"], arrays["outputs"], arrays["parameters"]
+        self.inputs, self.outputs = arrays["inputs"][: len(vehicle.model.slots("input"))], arrays["outputs"]
+        self.parameters = np.array(vehicle.parameters)
         self.environment_inputs = arrays["environment_inputs"]
         self.environment_inputs[:] = [variable.start for variable in vehicle.model.environment_inputs]
         # memoryviews: access to a few numbers is faster than with NumPy
         self.bullet_twist: Any = arrays["bullet_twist"].data
         self.commanded_twist: Any = arrays["commanded_twist"].data
         self.compensating_torque: Any = arrays["compensating_torque"].data if "compensating_torque" in arrays else None
-        library = load_library(vehicle.model.name)
+        library = load_library(vehicle.model.binary)
         self.predict = self._bind(library.contact_predict, self.PREDICT_ARRAYS)
         self.correct = self._bind(library.contact_correct, self.CORRECT_ARRAYS)
         self._bind(library.contact_initialize, self.INITIALIZE_ARRAYS)()
@@ -116,7 +118,7 @@ class ContactBody:
     @classmethod
     def array_sizes(cls, model: Model) -> dict[str, int]:
         """Return the arrays of a vehicle in a world, as name to size."""
-        inputs = {"inputs": len(model.slots("input")), "environment_inputs": len(model.environment_inputs)}
+        inputs = {"inputs": model.input_count, "environment_inputs": len(model.environment_inputs)}
         states = dict.fromkeys(("state", "start_state", "predicted_state"), len(model.states))
         clearance = {"endpoints": 6, "reference_position": 3, "safe_distance": 3}
         scalars = {"step_status": 1, "impulse_magnitude": 1}

@@ -7,11 +7,10 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..catalogue import MODELS
 from ..json_reader import Numbers
 from ..physics.body import create_compound_shape, set_dynamics
 from ..physics.client import pybullet
-from ..vehicles.ar_drone import geometry as ar_drone
-from ..vehicles.ar_drone.parameters import AIRFRAME, CENTRE_OF_MASS, ROTOR_SENSES, ROTORS
 from ..vehicles.common.shapes import quaternion_from_matrix
 from ..vehicles.strider import geometry as strider
 from ..vehicles.strider.parameters import RUDDER_ARM
@@ -24,8 +23,17 @@ _FRD_TO_FLU = np.diag([1.0, -1.0, -1.0])
 
 _UP = np.array([0.0, 0.0, 1.0])
 
+_QUADCOPTER = MODELS["ar_drone"]
+assert _QUADCOPTER.airframe is not None
+_ROTORS = np.array([rotor.position for rotor in _QUADCOPTER.airframe.rotors])
+_TORQUE_SIGNS = [rotor.torque_sign for rotor in _QUADCOPTER.airframe.rotors]
+_PRINCIPAL_AXES = _QUADCOPTER.airframe.principal_axes()[1]
+
+#: centre of mass in the body frame of the published model (m)
+CENTRE_OF_MASS = np.array([-0.003329, 0.001981, -0.000577])
+
 #: maps four thrusts (N) and four propeller torques (N m) to the torque about the centre of mass, forward-left-up, (3, 8)
-_TORQUE_MATRIX = np.hstack((np.cross(ROTORS, _UP).T, np.outer(_UP, ROTOR_SENSES)))
+_TORQUE_MATRIX = np.hstack((np.cross(_ROTORS, _UP).T, np.outer(_UP, _TORQUE_SIGNS)))
 
 #: maps the angular velocity to the velocity of the centre of mass relative to the origin of the model frame, (3, 3)
 _LEVER_MATRIX = np.cross(np.eye(3), CENTRE_OF_MASS).T
@@ -41,20 +49,20 @@ class Quadcopter:
     """
 
     def __init__(self, client: int, initial: Numbers):
-        self._client, self._axes = client, AIRFRAME.principal_axes()[1]
+        self._client, self._axes = client, _PRINCIPAL_AXES
         rotation = _rotation_about_z(initial[3])
         centre = np.array(initial[0:3]) + rotation @ CENTRE_OF_MASS
         yaw = pybullet.getQuaternionFromEuler([0.0, 0.0, initial[3]])
         _, orientation = pybullet.multiplyTransforms([0, 0, 0], yaw, [0, 0, 0], quaternion_from_matrix(self._axes))
         self.body = pybullet.createMultiBody(
-            ar_drone.BODY.mass,
-            create_compound_shape(ar_drone.BODY.boxes, client),
+            _QUADCOPTER.body.mass,
+            create_compound_shape(_QUADCOPTER.body.boxes, client),
             -1,
             centre.tolist(),
             orientation,
             physicsClientId=client,
         )
-        set_dynamics(client, self.body, -1, ar_drone.BODY)
+        set_dynamics(client, self.body, -1, _QUADCOPTER.body)
         linear, angular = rotation @ (initial[4:7] + _LEVER_MATRIX @ initial[7:10]), rotation @ initial[7:10]
         pybullet.resetBaseVelocity(self.body, linear.tolist(), angular.tolist(), physicsClientId=client)
 

@@ -11,8 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from ..vehicles.ar_drone.parameters import THRUST_COEFFICIENT
 from .fmu_base import ReplicaFmu
+from .forces.rotor_map.equations import THRUST_COEFFICIENT
 from .pid import Pid
 
 MASS = 0.441  # kg, assumed by the controller

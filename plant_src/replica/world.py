@@ -21,7 +21,6 @@ from ..physics.body import create_compound_shape, set_dynamics
 from ..physics.client import connect, pybullet
 from ..placement import Platform, VehiclePlacement
 from ..scene import replay
-from ..vehicles.ar_drone.parameters import GRAVITY
 from ..vehicles.common.shapes import Box
 from ..vehicles.common.step_status import MAX_STATE_NORM
 from .bodies import Quadcopter, Vessel
@@ -87,7 +86,7 @@ class World(Component):
         return replay.published_simulator_scene(name, scenario)
 
     def _populate(self, vehicles: Mapping[str, VehiclePlacement], platforms: list[Platform]) -> None:
-        pybullet.setGravity(0, 0, -GRAVITY, physicsClientId=self._client)
+        pybullet.setGravity(0, 0, -9.81, physicsClientId=self._client)
         for platform in platforms:
             _add_platform(self._client, platform)
         self._quadcopter = Quadcopter(self._client, vehicles["uav"].parameters)

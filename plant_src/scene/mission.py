@@ -11,7 +11,7 @@ import numpy as np
 from cosim.core.errors import InputError
 from cosim.results import Result
 
-from ..catalogue import MODELS
+from ..catalogue import models_of
 from ..recorded_motion import touchdown_row
 from ..vehicles.common.shapes import Quaternion
 
@@ -20,10 +20,10 @@ APPROACH_TIME = 8.0  # s before touchdown that belong to the landing
 
 @dataclass(frozen=True)
 class Mission:
-    """Result with its vehicles (signal prefix -> model, {"plant.uav": "ar_drone"}) and the platforms of its plant."""
+    """Result with its vehicles (signal prefix -> name or data of the vehicle) and the platforms of its plant."""
 
     result: Result
-    vehicles: Mapping[str, str]
+    vehicles: Mapping[str, Any]
     platforms: Mapping[str, Mapping[str, Sequence[float]]]
 
     def position(self, vehicle: str, row: int) -> list[float]:
@@ -43,7 +43,7 @@ class Mission:
         return np.stack([self._path(vehicle) for vehicle in self.vehicles])
 
     def _first_vehicle(self, is_vessel: bool) -> str:
-        names = [name for name, model in self.vehicles.items() if MODELS[model].is_vessel == is_vessel]
+        names = [name for name, model in self.vehicles.items() if next(iter(models_of(model).values())).is_vessel == is_vessel]
         return names[0] if names else next(iter(self.vehicles))
 
     def vessel_positions(self) -> np.ndarray:

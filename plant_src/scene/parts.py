@@ -11,9 +11,8 @@ from typing import Literal, NamedTuple
 
 import numpy as np
 
-from ..vehicles.ar_drone.geometry import EDGE, FEET_HEIGHT
-from ..vehicles.ar_drone.parameters import ROTORS
 from ..vehicles.common.shapes import Quaternion, Vector
+from ..vehicles.model import Model
 from ..vehicles.strider import geometry as strider_geometry
 from ..vehicles.strider.parameters import DECK_TOP, DECK_X, DECK_Y
 
@@ -53,31 +52,37 @@ class Part(NamedTuple):
                 return self.size[0]
 
 
-def ar_drone_parts() -> list[Part]:
+#: distance of the feet from the middle of the AR.Drone, and length of its legs (m)
+_FOOT_DISTANCE, _LEG = 0.1612, 0.0566
+
+
+def ar_drone_parts(model: Model) -> list[Part]:
     """Return the parts of the AR.Drone relative to its centre of mass: arms along the body axes, hull between two arms."""
+    assert model.airframe is not None
+    rotors = [rotor.position for rotor in model.airframe.rotors]
+    arm = rotors[0][0]
     body = [
         Part("box", (0.26, 0.075, 0.045), (0.0, 0.0, 0.0), ORANGE, BETWEEN_ARMS),
         Part("box", (0.12, 0.10, 0.055), (0.0, 0.0, 0.012), BLACK, BETWEEN_ARMS),
         Part("sphere", (0.025,), (0.092, -0.092, 0.0), BLACK),
-        Part("box", (2 * ROTORS[0, 0], 0.014, 0.014), (0.0, 0.0, 0.0), BLACK),
-        Part("box", (0.014, 2 * ROTORS[1, 1], 0.014), (0.0, 0.0, 0.0), BLACK),
+        Part("box", (2 * arm, 0.014, 0.014), (0.0, 0.0, 0.0), BLACK),
+        Part("box", (0.014, 2 * rotors[1][1], 0.014), (0.0, 0.0, 0.0), BLACK),
     ]
-    for (x, y, z), colour in zip(ROTORS.tolist(), (RED, SILVER, SILVER, RED), strict=True):
-        body += _rotor_parts(x, y, z, colour)
+    for (x, y, z), colour in zip(rotors, (RED, SILVER, SILVER, RED), strict=True):
+        body += _rotor_parts(x, y, z, colour, _FOOT_DISTANCE / arm)
     return body
 
 
-def _rotor_parts(x: float, y: float, z: float, colour: Vector) -> list[Part]:
-    leg, ratio = -FEET_HEIGHT, EDGE / math.sqrt(2) / ROTORS[0, 0]  # the feet are nearer to the centre than the motors
+def _rotor_parts(x: float, y: float, z: float, colour: Vector, ratio: float) -> list[Part]:
     return [
-        Part("cylinder", (0.012, leg), (ratio * x, ratio * y, -leg / 2), GREY),
+        Part("cylinder", (0.012, _LEG), (ratio * x, ratio * y, -_LEG / 2), GREY),
         Part("cylinder", (0.103, 0.004), (x, y, z + 0.012), BLACK, opacity=0.5),
         Part("cylinder", (0.095, 0.006), (x, y, z + 0.012), colour, opacity=0.6),
         Part("cylinder", (0.014, 0.02), (x, y, z + 0.01), BLACK),
     ]
 
 
-def strider_parts() -> list[Part]:
+def strider_parts(_model: Model) -> list[Part]:
     """Return the parts of the Strider relative to its centre of mass: hulls, struts and landing deck."""
     x, y, _ = strider_geometry.DECK_CENTRE
     length, width = DECK_X[1] - DECK_X[0], DECK_Y[1] - DECK_Y[0]

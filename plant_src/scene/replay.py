@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ..catalogue import VEHICLE_MODELS
+from ..catalogue import models_of
 from ..environment import sea
 from ..environment.sea import Sea
 from .parts import platform_parts
@@ -32,7 +32,7 @@ MAX_VIEWS = 3
 ONBOARD_CAMERA = {"eye": (-2.6, 0.0, 1.5), "target": (0.2, 0.0, 0.45)}
 
 
-def world_scene(name: str, scenario: Mapping[str, Any], models: Mapping[str, str] | None = None) -> Scene:
+def world_scene(name: str, scenario: Mapping[str, Any], models: Mapping[str, Any] | None = None) -> Scene:
     """Return the scene of a world.
 
     Args:
@@ -84,7 +84,7 @@ def _waves(components: Sea) -> list[Scene]:
     return [dict(zip(keys, wave, strict=True)) for wave in np.stack(components, axis=1).tolist()]
 
 
-def _scene(vehicles: Mapping[str, str], scenario: Mapping[str, Any]) -> Scene:
+def _scene(vehicles: Mapping[str, Any], scenario: Mapping[str, Any]) -> Scene:
     colours = {False: cycle(MULTIROTOR_COLOURS), True: cycle(VESSEL_COLOURS)}
     bodies = [_body_scene(name, vehicle, next(colours[_is_vessel(vehicle)])) for name, vehicle in vehicles.items()]
     vessels = [name for name, vehicle in vehicles.items() if _is_vessel(vehicle)]
@@ -108,8 +108,8 @@ def _failure_marks(name: str) -> Iterator[Scene]:
         yield {"signal": f"{name}.{failure}", "label": f"{_short_name(name)} {failure}", "colour": FAILURE_COLOUR, "on": name}
 
 
-def _is_vessel(vehicle: str) -> bool:
-    return next(iter(VEHICLE_MODELS[vehicle].values())).is_vessel
+def _is_vessel(vehicle: Any) -> bool:
+    return next(iter(models_of(vehicle).values())).is_vessel
 
 
 def _short_name(name: str) -> str:
@@ -120,7 +120,7 @@ def _view_name(vessel: str, vessels: Sequence[str]) -> str:
     return "Deck" if len(vessels) == 1 else f"Deck {_short_name(vessel)}"
 
 
-def _body_scene(name: str, vehicle: str, colour: str) -> Scene:
+def _body_scene(name: str, vehicle: Any, colour: str) -> Scene:
     return {
         "name": name,
         "title": _short_name(name),

@@ -4,25 +4,29 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Mapping
+from typing import Any
 
-from ..catalogue import VEHICLE_MODELS as CATALOGUE
+from ..catalogue import models_of
 from ..vehicles.common.shapes import Body, Box, Quaternion, Vector
-from ..vehicles.crazyflie.parameters import AIRFRAME as CRAZYFLIE
+from ..vehicles.model import Model
 from ..vehicles.multirotor.airframe import Airframe, Rotor
-from ..vehicles.survey_hexacopter.parameters import AIRFRAME as SURVEY_HEXACOPTER
 from .parts import ALONG_X, BLACK, GREY, ORANGE, RED, SILVER, YELLOW, Part, ar_drone_parts, landing_mark, strider_parts
 
-DETAILED_MODELS: Mapping[str, Callable[[], list[Part]]] = {"ar_drone": ar_drone_parts, "strider": strider_parts}
-AIRFRAMES: Mapping[str, Airframe] = {airframe.name: airframe for airframe in (CRAZYFLIE, SURVEY_HEXACOPTER)}
+#: model -> function that draws it in detail
+DETAILED_MODELS: Mapping[str, Callable[[Model], list[Part]]] = {"ar_drone": ar_drone_parts, "strider": strider_parts}
 
 
-def vehicle_parts(vehicle: str) -> list[Part]:
-    """Return the parts of a vehicle of the catalogue ("crazyflie") in its body frame."""
-    if vehicle in DETAILED_MODELS:
-        return DETAILED_MODELS[vehicle]()
-    model = next(iter(CATALOGUE[vehicle].values()))
-    if vehicle in AIRFRAMES:
-        return list(multirotor_parts(AIRFRAMES[vehicle], model.body))
+def vehicle_parts(vehicle: Any) -> list[Part]:
+    """Return the parts of a vehicle in its body frame.
+
+    Args:
+        vehicle: Name of a vehicle of the catalogue ("crazyflie"), or its data.
+    """
+    model = next(iter(models_of(vehicle).values()))
+    if model.name in DETAILED_MODELS and isinstance(vehicle, str):
+        return DETAILED_MODELS[model.name](model)
+    if model.airframe:
+        return list(multirotor_parts(model.airframe, model.body))
     return list(catamaran_parts(model.body) if model.is_vessel else box_parts(model.body))
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import islice
 
 import numpy as np
 
@@ -35,6 +36,9 @@ class Model:
         constant_count: Number of constants that the equations derive from the parameters, or None if they use the parameters.
         airframe: Data of a multirotor, whose mass and inertia are parameters.
         boxes: Collision shape of a multirotor.
+        equations: Name of the FMU whose binary has the equations, if it is not `name`.
+        layout: Parameters and inputs of these equations, if they have longer arrays than `interface`; the last arrays of inputs
+            are those that are longer.
     """
 
     name: str
@@ -48,6 +52,13 @@ class Model:
     constant_count: int | None = None
     airframe: Airframe | None = None
     boxes: Boxes | None = None
+    equations: str = ""
+    layout: Sequence[Variable] = ()
+
+    @property
+    def binary(self) -> str:
+        """Name of the FMU whose binary has the equations."""
+        return self.equations or self.name
 
     @property
     def rotor_centre(self) -> Vector | None:
@@ -76,6 +87,22 @@ class Model:
     def environment_inputs(self) -> tuple[Variable, ...]:
         """Inputs that the environment writes: the last inputs of the equations."""
         return tuple(variable for variable in self.interface if variable.name in ENVIRONMENT_INPUTS)
+
+    @cached_property
+    def input_count(self) -> int:
+        """Number of inputs of the equations, without those that the environment writes."""
+        inputs = [variable for variable in self.layout or self.interface if variable.causality == "input"]
+        return sum(len(variable.scalar_names) for variable in inputs if variable.name not in ENVIRONMENT_INPUTS)
+
+    def equation_parameters(self, values: Sequence[float]) -> list[float]:
+        """Return the parameters of the equations for the parameters of the interface: arrays are filled up with zeros."""
+        remaining, result = iter(values), list[float]()
+        counts = {variable.name: len(variable.scalar_names) for variable in self.interface}
+        for variable in self.layout or self.interface:
+            if variable.causality == "parameter":
+                count = counts[variable.name]
+                result += [*islice(remaining, count), *[0.0] * (len(variable.scalar_names) - count)]
+        return result
 
     def real_variables(self, causality: Causality) -> list[Variable]:
         """Return the real variables of a causality, in order."""

@@ -8,9 +8,11 @@ import pytest
 from fakes import FakeComponent, clock, counter, gain, inputs, integrator, outputs
 from systems import endpoint, make_system, run_system
 
+from cosim.core import component_log
 from cosim.core.component import StepResult, Variable
 from cosim.core.errors import ComponentError
 from cosim.core.system import Group
+from cosim.core.text import escape_control_characters
 from cosim.core.time_grid import exact_fraction
 from cosim.core.units import parse_unit
 from cosim.engine.run_loop import simulate
@@ -224,16 +226,32 @@ FAILURES = {
 
 
 @pytest.mark.parametrize("name", FAILURES)
-@pytest.mark.parametrize("method", ["do_step", "bind", "exit_initialization_mode", "terminate", "free"])
+@pytest.mark.parametrize("method", ["do_step", "bind", "exit_initialization_mode"])
 def test_an_exception_names_component_and_function(method, name):
     error, words = FAILURES[name]
-    failing = counter()
+    with pytest.raises(ComponentError) as failure:
+        run_system(make_system({"a": counter(), "b": failing_counter(method, error)}), 1, 1)
+    assert str(failure.value).startswith(f"b: {method} failed")
+    assert re.search(words, str(failure.value))
 
+
+@pytest.mark.parametrize("name", FAILURES)
+@pytest.mark.parametrize("method", ["terminate", "free"])
+def test_an_exception_after_the_last_step_is_a_warning(method, name, monkeypatch):
+    error, words = FAILURES[name]
+    messages = []
+    monkeypatch.setattr(component_log, "log_message", lambda *message: messages.append(message))
+    recording = run_system(make_system({"a": counter(), "b": failing_counter(method, error)}), 1, 1)
+    assert len(recording.time) == 2
+    ((component, level, text),) = messages
+    assert (component, level) == ("b", component_log.WARNING)
+    assert re.search(f"{method} failed: .*{words}", escape_control_characters(text))
+
+
+def failing_counter(method, error):
     def fail(*_arguments):
         raise error
 
+    failing = counter()
     setattr(failing, method, fail)
-    with pytest.raises(ComponentError) as failure:
-        run_system(make_system({"a": counter(), "b": failing}), 1, 1)
-    assert str(failure.value).startswith(f"b: {method} failed")
-    assert re.search(words, str(failure.value))
+    return failing

@@ -6,7 +6,7 @@ from pathlib import Path
 from zipfile import ZipFile
 
 import pytest
-from ball_fmus import SOURCE, model_description
+from ball_fmus import SOURCE, description_1, model_description
 from cosim_command import run_cosim
 
 #: macro of the source that sets the FMI version; the prefix is that of tools whose sources add one by themselves
@@ -21,8 +21,20 @@ BUILD = """<?xml version="1.0"?><fmiBuildDescription fmiVersion="3.0">
 <PreprocessorDefinition name="FMI" value="3"/></SourceFileSet></BuildConfiguration></fmiBuildDescription>"""
 
 
+#: sources of FMI 1.0 include the headers of the standard, which add the prefix to the names of functions
+OLD = """#define MODEL_IDENTIFIER ball
+#include "fmiFunctions.h"
+#ifndef FMI_COSIMULATION
+#error no macro
+#endif
+fmiStatus fmiResetSlave(fmiComponent c) { return fmiOK; }
+fmiStatus ball_fmiSetDebugLogging(fmiComponent c, fmiBoolean on) { return on ? fmiResetSlave(c) : fmiWarning; }
+"""
+
+
 def write_source_fmu(path: Path, version: int, sources: dict[str, str], files: str = "") -> Path:
-    description = model_description(version).replace('="true"/>\n<DefaultE', f'="true">{files}</ModelExchange>\n<DefaultE')
+    text = description_1("CS") if version == 1 else model_description(version)
+    description = text.replace('="true"/>\n<DefaultE', f'="true">{files}</ModelExchange>\n<DefaultE')
     with ZipFile(path, "w") as archive:
         archive.writestr("modelDescription.xml", description)
         for name, text in sources.items():
@@ -44,6 +56,7 @@ FMUS = {
         '<SourceFiles><File name="main.c"/></SourceFiles>',
     ),
     "no list": (2, {"main.c": MAIN.format(version=2), "ball.c": SOURCE.read_text()}, ""),
+    "FMI 1.0": (1, {"main.c": MAIN.format(version=1), "ball.c": SOURCE.read_text(), "old.c": OLD}, ""),
     "build description": (3, {"ball.c": SOURCE.read_text(), "buildDescription.xml": BUILD}, ""),
 }
 

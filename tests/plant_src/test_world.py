@@ -26,7 +26,7 @@ def refused(**arguments: Any) -> InputError:
     ("spec", "message"),
     [
         ({**UAV, "model": "ar_dron"}, r'vehicles.uav.model: unknown vehicle model "ar_dron"; did you mean "ar_drone"\?'),
-        ({**UAV, "model": 7}, "vehicles.uav.model: found 7, expected the name of a vehicle model: ar_drone, "),
+        ({**UAV, "model": 7}, "vehicles.uav.model: found 7, expected the name of a vehicle model, or its data: ar_drone, "),
         ({"position": [0.0, 0.0, 2.0]}, 'vehicles.uav: "model" is missing'),
         ({"model": "ar_drone"}, 'vehicles.uav: "position" is missing'),
         ({**UAV, "yow": 1.0}, r'vehicles.uav.yow: unknown key "yow"; did you mean "yaw"\?'),

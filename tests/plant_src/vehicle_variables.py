@@ -9,6 +9,8 @@ import re
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
+
 from cosim.core.component import Variable
 from plant_src.catalogue import VEHICLE_MODELS
 from plant_src.vehicles.model import Model
@@ -64,7 +66,9 @@ def _parameter_rows(label: str, model: Model) -> Iterator[str]:
     for variable in model.real_variables("parameter"):
         if not variable.name.startswith((INITIAL_PREFIX, WAVE_PREFIX)):
             unit = variable.unit.name if variable.unit else ""
-            yield f"| {label} | `{variable.name}` | {unit} | {variable.start:.7g} | {variable.description} |"
+            size = f"[1..{len(variable.scalar_names)}]" if variable.shape else ""
+            default = ", ".join(f"{value:.7g}" for value in np.ravel(variable.start))
+            yield f"| {label} | `{variable.name}{size}` | {unit} | {default} | {variable.description} |"
 
 
 def _rotor_rows() -> Iterator[str]:

@@ -28,6 +28,7 @@ DOCUMENT = TESTS.parent / "docs/validation.md"
 #: the sections of the document, in order
 MODELS = (
     "AR.Drone 2.0",
+    "Multirotors",
     "Crazyflie and survey hexacopter",
     "Strider, planar",
     "Strider, six degrees of freedom",

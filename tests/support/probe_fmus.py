@@ -15,14 +15,22 @@ PROBE_SOURCES = Path(__file__).parents[1] / "components/fmi/foreign"
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 
-def build_probe_fmu(version: int, folder: Path, identifier: str = "probe") -> Path:
-    """Build the probe FMU of an FMI major version; `identifier` is the file name of its library."""
+def build_probe_fmu(version: int, folder: Path, identifier: str = "probe", name: str = "") -> Path:
+    """Build the probe FMU of an FMI major version, or the one of another source.
+
+    Args:
+        version: FMI major version.
+        folder: Folder of the FMU.
+        identifier: File name of its library.
+        name: Name of the C file and of the XML file; by default "probe2" or "probe3".
+    """
+    name = name or f"probe{version}"
     compiler = os.environ.get("CC") or shutil.which("cc") or "gcc"
-    library, target = folder / f"probe{version}.so", folder / f"probe{version}.fmu"
-    source = PROBE_SOURCES / f"probe{version}.c"
+    library, target = folder / f"{name}.so", folder / f"{name}.fmu"
+    source = PROBE_SOURCES / f"{name}.c"
     subprocess.run([compiler, "-shared", "-fPIC", "-O2", f"-I{HEADERS}", source, "-o", library], check=True)
     with ZipFile(target, "w") as archive:
-        archive.write(PROBE_SOURCES / f"probe{version}.xml", "modelDescription.xml")
+        archive.write(PROBE_SOURCES / f"{name}.xml", "modelDescription.xml")
         platform = fmpy.platform if version == 2 else fmpy.platform_tuple
         archive.write(library, f"binaries/{platform}/{identifier}.so")
     return target

@@ -134,8 +134,25 @@ def _tool_findings() -> Iterator[Finding]:
         yield Finding("tools", "C compiler", compiler_version(tuple(find_compiler())))
     except (InputError, OSError) as error:
         yield Finding("tools", "C compiler", str(error), "missing")
+    yield _windows_finding()
     yield _program_finding("OpenModelica", "omc", "--version")
     yield from _library_findings()
+
+
+def _windows_finding() -> Finding:
+    """Return the finding about FMUs for Windows, which need Wine and a compiler for Windows."""
+    from ...export.fmu.compiler import compiler_version
+    from ...export.foreign.windows_fmus import find_windows_compiler, find_wine
+
+    name, wine = "FMUs for Windows", find_wine()
+    if not wine:
+        return Finding("tools", name, "no program wine64 or wine: 64-bit libraries cannot be used", "missing")
+    try:
+        compiler = compiler_version(tuple(find_windows_compiler()))
+    except (InputError, OSError) as error:
+        return Finding("tools", name, str(error), "missing")
+    version = _program_finding(name, wine, "--version").found
+    return Finding("tools", name, f"{version} with {compiler}: 64-bit libraries only")
 
 
 def _library_findings() -> Iterator[Finding]:

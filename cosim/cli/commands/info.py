@@ -24,6 +24,18 @@ _MAX_START_LENGTH = 40
 _INTERFACE_NAMES: Mapping[str, str] = {"co-simulation": "Co-Simulation", "model-exchange": "Model Exchange"}
 
 
+#: capability flags that cosim honours, in lower case (the versions of FMI differ in capitals)
+_USED_CAPABILITIES = {
+    "canhandlevariablecommunicationstepsize",
+    "cangetandsetfmustate",
+    "canbeinstantiatedonlyonceperprocess",
+    "needsexecutiontool",
+    "cannotusememorymanagementfunctions",
+    "needscompletedintegratorstep",
+    "completedintegratorstepnotneeded",
+}
+
+
 @click.command()
 @click.argument("fmu", type=click.Path(path_type=Path))
 @click.option("--locals", "with_locals", is_flag=True, help="Also list local variables.")
@@ -52,12 +64,14 @@ def command(fmu: Path, with_locals: bool, as_json: bool) -> None:
 def _properties(file: FmuFile) -> dict[str, str]:
     about = file.description
     experiment = about.default_experiment
-    capabilities = {
+    used = {
         "variable step size": about.variable_step,
         "state can be saved and restored": about.has_state,
         "one instance per process": about.once_per_process,
         "needs an external tool": about.needs_execution_tool,
+        "own memory management": "canNotUseMemoryManagementFunctions" in about.capabilities,
     }
+    unused = [name for name in about.capabilities if name.lower() not in _USED_CAPABILITIES]
     return {
         "model": about.model_name,
         "description": about.description,
@@ -68,7 +82,8 @@ def _properties(file: FmuFile) -> dict[str, str]:
         "stop time": f"{float(experiment.stop_time):g} s" if experiment.stop_time else "",
         "tolerance": f"{experiment.tolerance:g}" if experiment.tolerance else "",
         "states": str(about.state_count) if about.interface == "model-exchange" else "",
-        "capabilities": ", ".join(name for name, has in capabilities.items() if has),
+        "capabilities": ", ".join(name for name, has in used.items() if has),
+        "not used": ", ".join(unused),
         "sha256": file.sha256,
     }
 

@@ -1,4 +1,4 @@
-"""`cosim new`: a new controller with a scenario in which it runs."""
+"""`cosim new`: a controller with a scenario in which it runs, a scenario, or a vehicle."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ import click
 
 from ...core import resources
 from ...core.errors import InputError, Problem, did_you_mean
-from . import new_scenario
+from . import new_scenario, new_vehicle
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
 _MODELICA_TYPES = ("Real", "Integer", "Boolean", "String")
@@ -72,10 +72,11 @@ LANGUAGES = {
 
 @click.group()
 def command() -> None:
-    """Create a controller with a scenario in which it runs, or a scenario."""
+    """Create a controller with a scenario in which it runs, a scenario, or a vehicle."""
 
 
 command.add_command(new_scenario.command, "scenario")
+command.add_command(new_vehicle.command, "vehicle")
 
 
 @command.command()

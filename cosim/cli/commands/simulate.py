@@ -146,7 +146,7 @@ def _print_final_values(recording: Recording, as_json: bool) -> None:
         return
     click.echo(f"time = {time:.6g} s")
     for name, value in last.items():
-        text = f"{value:.6g}" if isinstance(value, float) else repr(value)
+        text = f"{value:.6g}" if isinstance(value, float) else value.hex() if isinstance(value, bytes) else repr(value)
         unit = "" if recording.units[name] == "1" else recording.units[name]
         print_line(f"{name} = {text} {unit}".rstrip())
 

@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
 from typing import Any, get_args
@@ -14,6 +14,7 @@ import numpy as np
 
 from ...core.component import DTYPES, Causality, Variability, Variable
 from ...core.errors import InputError, join_alternatives
+from ...core.size_limits import require_at_most
 from ...core.time_grid import exact_fraction
 from ...core.units import BASE_UNITS, Unit, named_unit
 from .preflight import DEFAULT_LIMITS, Examination, PreflightLimits, examine, raise_errors
@@ -59,6 +60,7 @@ class FmuDescription:
         value_references: Value references by variable name, including aliases.
         negated: Names of the variables of FMI 1.0 whose values have the opposite sign of their value reference's.
         default_experiment: `DefaultExperiment`.
+        capabilities: Names of the capability flags that are set, as the FMU writes them.
         has_state: `canGetAndSetFMUState`.
         variable_step: `canHandleVariableCommunicationStepSize`, always true for Model Exchange.
         once_per_process: `canBeInstantiatedOnlyOncePerProcess`.
@@ -68,6 +70,8 @@ class FmuDescription:
         needs_completed_step: Model Exchange requires fmi*CompletedIntegratorStep.
         platforms: Platforms with a binary, as the FMU names their folders, and "c-code" if it contains sources.
         error_categories: Those of FMI's log categories of errors that the FMU declares.
+        dimensions: Sizes of the dimensions by name of the variable, a number or the name of a structural parameter; empty unless
+            the shape depends on structural parameters.
     """
 
     fmi_version: str
@@ -82,6 +86,7 @@ class FmuDescription:
     value_references: Mapping[str, int]
     negated: frozenset[str]
     default_experiment: DefaultExperiment
+    capabilities: Sequence[str]
     has_state: bool
     variable_step: bool
     once_per_process: bool
@@ -91,11 +96,37 @@ class FmuDescription:
     needs_completed_step: bool
     platforms: Sequence[str]
     error_categories: Sequence[str]
+    dimensions: Mapping[str, Sequence[int | str]]
 
     @property
     def major(self) -> int:
         """FMI major version: 1, 2 or 3."""
         return int(self.fmi_version.split(".")[0])
+
+    def with_structural_parameters(self, values: Mapping[str, int], limits: PreflightLimits = DEFAULT_LIMITS) -> FmuDescription:
+        """Return the description for other values of structural parameters, which change the shapes of arrays.
+
+        An array that changes its size loses its start value.
+
+        Args:
+            values: Positive values of structural parameters by name.
+            limits: Limits of the size of an array.
+
+        Raises:
+            InputError: An array becomes too large.
+        """
+        if not values:
+            return self
+        sizes = {**{v.name: v.start for v in self.variables if v.causality == "structuralParameter"}, **values}
+        variables = []
+        for variable in self.variables:
+            shape = tuple(sizes[size] if isinstance(size, str) else size for size in self.dimensions.get(variable.name, ()))
+            if shape and shape != variable.shape:
+                require_at_most(limits.max_array_size, math.prod(shape), f'elements of "{variable.name}"', "")
+                variables.append(replace(variable, shape=shape, start=None))
+            else:
+                variables.append(replace(variable, start=values[variable.name]) if variable.name in values else variable)
+        return replace(self, variables=variables)
 
 
 def read_description(path: Path, limits: PreflightLimits = DEFAULT_LIMITS) -> FmuDescription:
@@ -148,6 +179,7 @@ def build_description(path: Path, examination: Examination, interface: Interface
         {variable.name: int(by_name[variable.name][0].attributes["valueReference"]) for variable in variables},
         frozenset(source.name for source in model.variables if source.attributes.get("alias") == "negatedAlias"),
         _build_default_experiment(model.default_experiment),
+        [name for name, value in attributes.items() if _is_set(name, value)],
         any(attributes.get(name) in _TRUE for name in ("canGetAndSetFMUstate", "canGetAndSetFMUState")),
         selected == "model-exchange" or attributes.get("canHandleVariableCommunicationStepSize") in _TRUE,
         attributes.get("canBeInstantiatedOnlyOncePerProcess") in _TRUE,
@@ -157,7 +189,22 @@ def build_description(path: Path, examination: Examination, interface: Interface
         _needs_completed_step(model.major, attributes),
         list_platforms(examination.members),
         [name for name in model.log_categories if name in _ERROR_CATEGORIES],
+        {name: _read_sizes(model, source) for source in model.variables for name in _names_with_aliases(source)},
     )
+
+
+def _read_sizes(model: ModelDescription, source: ModelVariable) -> Sequence[int | str]:
+    """Return the sizes of the dimensions, or the names of the structural parameters; empty if no parameter changes them."""
+    references = [dimension.get("valueReference") for dimension in source.dimensions]
+    if not any(references):
+        return ()
+    named = [model.by_reference[text.strip()].name if text else None for text in references]
+    return tuple(name or dimension_size(model, size) or 0 for name, size in zip(named, source.dimensions, strict=True))
+
+
+def _is_set(name: str, value: str) -> bool:
+    """Return whether an attribute is a capability flag that is true, or an order of derivatives above zero."""
+    return value in _TRUE or (name.startswith("max") and value.strip().isdigit() and int(value) > 0)
 
 
 def _build_unit(definition: UnitDefinition) -> Unit:

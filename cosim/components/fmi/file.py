@@ -104,11 +104,14 @@ class FmuFile:
         return build_description(self.path, self.examination, self._interface)
 
     @property
+    def has_binary(self) -> bool:
+        """True for an FMU with a binary for this platform."""
+        return current_platform().binary_folder(self.description.major) in self.description.platforms
+
+    @property
     def must_be_compiled(self) -> bool:
-        """True for an FMU of FMI 2.0 or 3.0 that has sources but no binary for this platform."""
-        description = self.description
-        has_binary = current_platform().binary_folder(description.major) in description.platforms
-        return not has_binary and can_be_compiled(description.major, description.platforms)
+        """True for an FMU that has sources but no binary for this platform."""
+        return not self.has_binary and can_be_compiled(self.description.platforms)
 
     @property
     def run_warning(self) -> str:

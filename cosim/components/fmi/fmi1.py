@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ...core.component import NativeDoStep, PreparedCall, StepResult
+from . import log_callback
 from .accessor_calls import AccessorCallFactory
 from .c_functions import function_address
 from .function_calls import DISCARD, OK
@@ -46,9 +47,8 @@ class Fmi1Instance(FmuInstance):
     def _instantiate_fmu(self, logging_on: bool) -> None:
         from fmpy import calloc, fmi1, free
 
-        # the logger is variadic in C; with fixed arguments the text arrives unformatted, printf directives are not expanded
         callbacks = fmi1.fmi1CallbackFunctions()
-        callbacks.logger = fmi1.fmi1CallbackLoggerTYPE(lambda _, __, status, ___, text: self.log_message(status, text))
+        self._log_key = log_callback.register(callbacks, self.name, self.log_message)
         callbacks.allocateMemory = fmi1.fmi1CallbackAllocateMemoryTYPE(calloc)
         callbacks.freeMemory = fmi1.fmi1CallbackFreeMemoryTYPE(free)
         self._fmu.instantiate(functions=callbacks, loggingOn=logging_on)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from ...core.component import NativeDoStep, PreparedCall, StepResult
+from . import log_callback
 from .c_functions import function_address
 from .function_calls import DISCARD
 from .instance import FmuInstance
@@ -35,9 +36,8 @@ class Fmi2Instance(FmuInstance):
     def _instantiate_fmu(self, logging_on: bool) -> None:
         from fmpy import calloc, fmi2, free
 
-        # the logger is variadic in C; with fixed arguments the text arrives unformatted, printf directives are not expanded
         callbacks = fmi2.fmi2CallbackFunctions()
-        callbacks.logger = fmi2.fmi2CallbackLoggerTYPE(lambda _, __, status, ___, text: self.log_message(status, text))
+        self._log_key = log_callback.register(callbacks, self.name, self.log_message)
         callbacks.allocateMemory = fmi2.fmi2CallbackAllocateMemoryTYPE(calloc)
         callbacks.freeMemory = fmi2.fmi2CallbackFreeMemoryTYPE(free)
         try:

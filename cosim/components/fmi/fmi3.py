@@ -41,6 +41,19 @@ class Fmi3Instance(FmuInstance):
         except Exception:
             raise self._instantiation_error() from None
 
+    def _set_structural_parameters(self) -> None:
+        if not self._settings.structural_parameters:
+            return
+        self.call_function("enterConfigurationMode")
+        for name, value in self._settings.structural_parameters.items():
+            super().set(name, value)
+        self.call_function("exitConfigurationMode")
+
+    def set(self, name: str, value: Any) -> None:
+        """Set a variable, except structural parameters, which already have their values."""
+        if self._variables_by_name[name].causality != "structuralParameter":
+            super().set(name, value)
+
     def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
         """Call fmi3EnterInitializationMode."""
         self._current_time.value = start_time

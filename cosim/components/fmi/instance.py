@@ -22,6 +22,7 @@ from ...core.component import SUCCESS_STATUSES, Component, Ports, PreparedCall, 
 from ...core.errors import ComponentError
 from ...process.journal import calling_component
 from ...process.process_state import restoring_process_state
+from . import log_callback
 from .accessor_calls import AccessorCallFactory
 from .c_functions import as_double, as_pointer
 from .file import FmuFile
@@ -55,11 +56,13 @@ class FmuInstance(FunctionCaller, Component):
         """
         super().__init__(file, instance_name)
         self.shared_code = file
-        self.description = file.description
+        self.description = file.description.with_structural_parameters(settings.structural_parameters, file.limits)
         self.variables = self.description.variables
         self.has_state = self.description.has_state
         self._variables_by_name = {variable.name: variable for variable in self.variables}
         self._is_instantiated, self._has_acquired_file = False, False
+        #: registration of the logger of FMI 1.0 and 2.0
+        self._log_key = 0
         self._settings = settings
         self._logging_on = logging.getLogger(component_log.LOGGER_NAME).isEnabledFor(logging.DEBUG)
         #: relative tolerance that the FMU receives; None: none
@@ -120,10 +123,14 @@ class FmuInstance(FunctionCaller, Component):
         self._handle: int = self._fmu.component
         self._instance = as_pointer(self._handle)
         self._current_time = ctypes.c_double()
+        self._set_structural_parameters()
         references, functions = self.description.value_references, self._fmu.functions
         self._prepare_transfers(
             AccessorCallFactory(self.major, self._c_prefix, functions, self._handle, references, self.accessors)
         )
+
+    def _set_structural_parameters(self) -> None:
+        """Set the structural parameters, which only FMI 3.0 has, in Configuration Mode."""
 
     def _prepare_transfers(self, factory: AccessorCallFactory) -> None:
         """Prepare the calls that transfer the bound arrays."""
@@ -183,6 +190,7 @@ class FmuInstance(FunctionCaller, Component):
             with calling_component(self.name, name, "end"):
                 getattr(self._fmu, name)(self._handle)
         self._is_instantiated = False
+        log_callback.unregister(self._log_key)
         if self._has_acquired_file:
             self._has_acquired_file = False
             with calling_component(self.name, "unloading the binary", "end"):
@@ -193,7 +201,7 @@ class FmuInstance(FunctionCaller, Component):
     def set(self, name: str, value: Any) -> None:
         """Call the fmi*Set... function of the variable's type."""
         variable = self._variables_by_name[name]
-        values = list(np.ravel(value)) if variable.shape else [value]
+        values = np.array(value, object).ravel().tolist() if variable.shape else [value]  # keeps all digits of 64-bit integers
         self.call_function(f"set{self.accessors[variable.type]}", [self.description.value_references[name]], values)
 
     def get(self, name: str) -> Any:

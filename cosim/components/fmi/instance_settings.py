@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
 from fractions import Fraction
 from typing import Any, Literal
 
-from .description import DefaultExperiment
+from .description import DefaultExperiment, FmuDescription
 from .preflight import Interface
 
 #: integration method: explicit Euler and Runge-Kutta of order 4 at fixed step size, or CVODE with variable step size
@@ -37,10 +38,18 @@ class InstanceSettings:
         tolerance: Relative tolerance that the FMU receives, and that of a solver with variable step size; by default that of the
             default experiment. Without any, the FMU receives none, and the solver uses 1e-6.
         solver: Integration method, which selects Model Exchange; None: Co-Simulation, or cvode if the FMU does not offer it.
+        structural_parameters: Values that are set in Configuration Mode, before the start values.
     """
 
     tolerance: float | None = None
     solver: SolverSettings | None = None
+    structural_parameters: Mapping[str, int] = field(default_factory=dict)
+
+    def with_structural_parameters(self, description: FmuDescription, values: Mapping[str, Any]) -> InstanceSettings:
+        """Return the settings with those of the values that are valid sizes; the check of the start values refuses the others."""
+        names = {variable.name for variable in description.variables if variable.causality == "structuralParameter"}
+        sizes = {name: value for name, value in values.items() if name in names and type(value) is int and value > 0}
+        return replace(self, structural_parameters=sizes)
 
     @property
     def interface(self) -> Interface | None:

@@ -8,25 +8,28 @@ from .c_code import Callee, ElementAccess, StatementGenerator, densify
 
 
 def sum_over_rows(name: str, term: ca.Function, rows: int) -> Callee:
-    """Create a function that sums a term over the first rows of a table.
+    """Create a function that sums a term over the first rows of tables.
 
     Eight terms at a time are computed in one loop, which compilers vectorize if the term is plain arithmetic. They are
     accumulated in eight partial sums, which are added at the end.
 
     Args:
         name: The name of the function, a C identifier.
-        term: (common, row) -> vector; `common` are the arguments that all rows share.
-        rows: The number of rows of the table, a multiple of 8.
+        term: (common, row of the first table, row of the second table, ...) -> vector; `common` are the arguments that all rows
+            share.
+        rows: The number of rows of each table, a multiple of 8.
 
     Returns:
-        The function (common, count, table) -> sum of the terms, where `table` has the shape (rows, columns) and only its first
+        The function (common, count, *tables) -> sum of the terms, where a table has the shape (rows, columns) and only the first
         `count` rows are used.
     """
-    common, table = ca.SX.sym("common", term.size1_in(0)), ca.SX.sym("table", rows, term.size1_in(1))
-    count = ca.SX.sym("count")
-    terms = [ca.if_else(count > k, term(common, table[k, :].T), 0) for k in range(rows)]
-    total = ca.Function(name, [common, count, table], [sum(terms)])
-    access = ElementAccess(lambda i, j: f"row[{rows * j} + k]" if i else f"common[{j}]", lambda _, j: f"value[{j}][k]")
+    common, count = ca.SX.sym("common", term.size1_in(0)), ca.SX.sym("count")
+    tables = [ca.SX.sym("table", rows, term.size1_in(i)) for i in range(1, term.n_in())]
+    terms = [ca.if_else(count > k, term(common, *(table[k, :].T for table in tables)), 0) for k in range(rows)]
+    total = ca.Function(name, [common, count, *tables], [sum(terms)])
+    access = ElementAccess(
+        lambda i, j: f"in[{i + 1}][{rows * j} + first + k]" if i else f"common[{j}]", lambda _, j: f"value[{j}][k]"
+    )
     statements = "".join(f"            {statement};\n" for statement in StatementGenerator(densify(term), access))
     sizes = {"size": term.size1_out(0), "rows": rows, "common": term.size1_in(0)}
     return Callee(total, _SUM_TEMPLATE % {**sizes, "statements": statements}, attributes=_TARGET_CLONES)
@@ -49,7 +52,6 @@ _SUM_TEMPLATE = """{
     double common[%(common)d], sums[%(size)d][8] = {{0}};
     for (int i = 0; i < %(common)d; ++i) common[i] = in[0][i];
     for (int first = 0; first < %(rows)d && first < count; first += 8) {
-        const double *const row = in[2] + first;
         double value[%(size)d][8];
         for (int k = 0; k < 8; ++k) {
 %(statements)s        }

@@ -42,7 +42,7 @@ def write_python_fmu(source: Path, target: Path, include: Sequence[Path] = ()) -
 
     - the source,
     - the files of its folder that it imports (`from .pid import Pid` or `from pid import Pid`),
-    - the JSON file with the same name beside it, if there is one,
+    - the JSON file with the same name beside it, if there is one, and the JSON files of all other folders with imported files,
     - the files of `include`,
     - PythonFMU and its binaries for linux64 and win64.
 
@@ -90,8 +90,9 @@ def _read_files(source: Path, include: Sequence[Path]) -> tuple[dict[Path, bytes
     except SyntaxError as error:
         raise InputError(Problem(f"cannot be exported: {error}", str(source))) from None
     included = {name: file for name, file in _included_files(folder, include) if name not in contents}
-    if data.is_file():
-        included[data.relative_to(folder)] = data
+    subfolders = {file.parent for file in modules} - {folder}
+    for file in (*([data] if data.is_file() else []), *(each for subfolder in subfolders for each in subfolder.glob("*.json"))):
+        included[file.relative_to(folder)] = file
     return contents | {name: file.read_bytes() for name, file in included.items()}, [*modules, *included.values()]
 
 

@@ -24,6 +24,7 @@ from ...core.errors import InputError, Problem, did_you_mean
 from ..cache import cached_file
 from ..fmu.archive import write_archive
 from ..fmu.compiler import compiler_version, find_compiler
+from .windows_fmus import find_wine, has_windows_binary, windows_fmu
 
 _SOURCES, _BUILD_DESCRIPTION = "sources/", "sources/buildDescription.xml"
 _C_SUFFIX, _CPP_SUFFIXES = ".c", (".cpp", ".cc", ".cxx")
@@ -31,9 +32,11 @@ _C_SUFFIX, _CPP_SUFFIXES = ".c", (".cpp", ".cc", ".cxx")
 _NO_PREFIX = ("-DFMI2_FUNCTION_PREFIX=", "-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX")
 _OPTIONS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off", "-w", *_NO_PREFIX)
 #: raised when an FMU has to be compiled again
-_RECIPE = 1
+_RECIPE = 2
 #: headers of Windows that portable sources include (FMU SDK 2.0.4)
 _WINDOWS_HEADERS = {"minmax.h": "#define max(a, b) ((a) > (b) ? (a) : (b))\n#define min(a, b) ((a) < (b) ? (a) : (b))\n"}
+#: headers of FMI 1.0, which FMPy does not contain
+_FMI1_HEADERS = ("fmiFunctions.h", "fmiModelFunctions.h", "fmiPlatformTypes.h", "fmiModelTypes.h")
 _MAX_ERRORS = 5
 
 
@@ -48,24 +51,32 @@ class _Configuration:
 
 
 def usable_fmu(path: Path, interface: Interface | None) -> FmuFile:
-    """Open an FMU; if it has sources but no binary for this machine, compile them.
+    """Open an FMU; if it has no binary for this machine, compile its sources or run its Windows library under Wine.
 
     Args:
         path: The FMU.
         interface: Interface of its instances; None: the preferred one of the FMU.
 
     Raises:
-        InputError: The FMU cannot be read, or its sources cannot be compiled.
+        InputError: The FMU cannot be read, its sources cannot be compiled, or its Windows library cannot be used.
     """
     file = FmuFile(path, interface=interface)
-    return FmuFile(_compiled_fmu(file), interface=interface) if file.must_be_compiled else file
+    if file.has_binary:
+        return file
+    if file.must_be_compiled:
+        try:
+            return FmuFile(_compiled_fmu(file), interface=interface)
+        except InputError:
+            if not has_windows_binary(file) or not find_wine():
+                raise
+    return FmuFile(windows_fmu(file), interface=interface) if has_windows_binary(file) else file
 
 
 def _compiled_fmu(file: FmuFile) -> Path:
     """Return a copy of an FMU that also contains the binaries for this machine, compiled from its sources.
 
     Args:
-        file: An FMU of FMI 2.0 or 3.0 with sources.
+        file: An FMU with sources.
 
     Raises:
         InputError: There is no C compiler, the sources are incomplete, or they cannot be compiled.
@@ -85,7 +96,8 @@ def _compile(file: FmuFile, compiler: Sequence[str], target: Path) -> None:
             path = Path(folder, name)
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(members[name])
-        for name, text in _WINDOWS_HEADERS.items():
+        fmi1_header = Path(__file__).with_name("fmi1.h").read_text()
+        for name, text in {**_WINDOWS_HEADERS, **dict.fromkeys(_FMI1_HEADERS, fmi1_header)}.items():
             Path(folder, name).write_text(text)
         for configuration in _read_configurations(file, members):
             library = Path(folder, f"{configuration.identifier}{machine.suffix}")
@@ -98,7 +110,7 @@ def _compile(file: FmuFile, compiler: Sequence[str], target: Path) -> None:
 def _compile_library(file: FmuFile, compiler: Sequence[str], configuration: _Configuration, sources: Path, library: Path) -> None:
     command = list(compiler)
     if any(name.endswith(_CPP_SUFFIXES) for name in configuration.files):
-        command = [shutil.which("c++") or shutil.which("g++") or "c++"]
+        command = [*compiler[:-2], "c++"] if "ziglang" in compiler else [shutil.which("c++") or shutil.which("g++") or "c++"]
     fmpy = find_spec("fmpy")
     headers = Path(fmpy.origin).parent / "c-code" if fmpy and fmpy.origin else sources
     folders = [*(sources / name for name in ("", *configuration.include_folders)), headers, sources.parent]
@@ -168,7 +180,11 @@ def _read_build_description(root: Any) -> Iterator[_Configuration]:
 
 
 def _read_source_files(root: Any, members: Mapping[str, bytes]) -> Iterator[_Configuration]:
-    """Read the source files of FMI 2.0; without a list, these are all C files that no other one includes."""
+    """Read the source files of FMI 2.0; without a list, as in FMI 1.0, these are all C files that no other one includes."""
+    if root.get("fmiVersion", "").startswith("1"):
+        definitions = () if root.find("Implementation") is None else ("FMI_COSIMULATION",)
+        yield _Configuration(root.get("modelIdentifier", ""), _independent_files(members), (), definitions)
+        return
     found: dict[str, list[str]] = {}
     for interface in (*root.iterfind("CoSimulation"), *root.iterfind("ModelExchange")):
         names = [item.get("name", "") for item in interface.iterfind("SourceFiles/File")]

@@ -14,10 +14,10 @@ import socket
 import sys
 import tempfile
 from collections.abc import Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from importlib import import_module
 from pathlib import Path
-from signal import SIGKILL
+from signal import ITIMER_REAL, SIG_DFL, SIGALRM, SIGKILL, setitimer, signal
 from typing import Any
 
 from ...components.fmi import FmuFile
@@ -80,14 +80,28 @@ def _preload(context: StudyContext) -> Iterator[tuple[Path, FmuFile]]:
 
 
 def _preload_components(scenario: Scenario) -> None:
+    """Import the Python files of a scenario; a file that takes longer than its deadline ends this process."""
     for node, name in scenario.root.leaves():
-        reference = node.spec.components[name].python
-        if reference and (warm := getattr(load_object(reference, node.folder), "warm", None)):
-            warm()
-    for kpi in (*scenario.spec.kpis, *scenario.spec.figures):
-        function_problem(kpi, scenario.root.folder)
-    for kpi in scenario.spec.kpis:
-        load_function(kpi.python, scenario.root.folder)
+        if reference := node.spec.components[name].python:
+            with _ending_after(scenario.spec.deadlines.load):
+                if warm := getattr(load_object(reference, node.folder), "warm", None):
+                    warm()
+    with _ending_after(scenario.spec.deadlines.load):
+        for kpi in (*scenario.spec.kpis, *scenario.spec.figures):
+            function_problem(kpi, scenario.root.folder)
+        for kpi in scenario.spec.kpis:
+            load_function(kpi.python, scenario.root.folder)
+
+
+@contextmanager
+def _ending_after(seconds: float) -> Iterator[None]:
+    """End this process if the block takes longer."""
+    signal(SIGALRM, SIG_DFL)
+    setitimer(ITIMER_REAL, seconds)
+    try:
+        yield
+    finally:
+        setitimer(ITIMER_REAL, 0)
 
 
 def _fork_worker(control: socket.socket, descriptor: int, context: StudyContext, fmu_files: FmuFiles) -> int:

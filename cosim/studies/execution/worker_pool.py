@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from ...core.errors import ComponentError, CosimError, Problem
-from ...process.supervisor import STOP_TIMEOUT, is_stopped
+from ...process.supervisor import STOP_TIMEOUT, has_ended, is_stopped
 from .job import FORK_REQUEST, READY, Job, Record, StudyContext
 
 #: attempts at a run whose worker process is killed
@@ -65,7 +65,11 @@ class Worker:
             raise WorkerLostError("a worker process ended") from None
 
     def _read_line(self) -> bytes:
-        """Return the next line; kill the worker, or the fork server before there is one, if it is stopped for too long."""
+        """Return the next line; kill the worker, or the fork server before there is one, if it is stopped for too long.
+
+        Raises:
+            ConnectionError: if the process has ended.
+        """
         line, stopped_since = b"", math.inf
         while not line.endswith(b"\n"):
             if self._poll.poll(_STOP_CHECK_INTERVAL * 1000):
@@ -74,6 +78,8 @@ class Worker:
                 line += data
                 continue
             process = self._process or self._fork_server
+            if has_ended(process):  # another process, which it has left behind, keeps the connection open
+                raise ConnectionError
             stopped_since = min(stopped_since, time.monotonic()) if is_stopped(process) else math.inf
             if time.monotonic() - stopped_since > STOP_TIMEOUT:
                 os.kill(process, signal.SIGKILL)  # closes the connection
@@ -115,10 +121,17 @@ class _ForkServer:
             "deadline": context.deadline,
             "preload": preload,
         }
-        self._control.settimeout(_STARTUP_TIMEOUT)
         with suppress(OSError):
             self._control.sendall(json.dumps(request).encode())
-            return self._control.recv(16) == READY
+            return self._wait_until_started() and self._control.recv(16) == READY
+        return False
+
+    def _wait_until_started(self) -> bool:
+        """Wait for an answer of the process. Return False if it ends, or takes too long."""
+        deadline = time.monotonic() + _STARTUP_TIMEOUT
+        while time.monotonic() < deadline and self._process.poll() is None:
+            if select.select([self._control], [], [], _STOP_CHECK_INTERVAL)[0]:
+                return True
         return False
 
     def fork_worker(self) -> Worker:

@@ -51,17 +51,23 @@ class Body(NamedTuple):
     axes: Quaternion = (0.0, 0.0, 0.0, 1.0)
 
 
-def level_box(to_body: np.ndarray, edges: tuple[float, float], bottom: float, top: float) -> Box:
-    """Return a box with edges parallel to the axes of the body frame, centred on its z axis.
+def level_box(to_body: np.ndarray, size: Vector, position: Vector, yaw: float = 0.0) -> Box:
+    """Return a box that is level in the body frame, in another frame.
 
     Args:
-        to_body: Rotation matrix from the frame of the result to the body frame, shape (3, 3).
-        edges: Lengths along x and y (m).
-        bottom: Lower face above the centre of mass (m).
-        top: Upper face above the centre of mass (m).
+        to_body: Rotation matrix from the frame of the result to the body frame, shape (3, 3); its angle is less than 120 degrees.
+        size: Edges (m).
+        position: Centre (m, body frame).
+        yaw: Angle of the box about the z axis of the body frame (rad).
     """
-    x, y, z = (to_body.T @ [0.0, 0.0, (top + bottom) / 2]).tolist()
-    return Box((edges[0] / 2, edges[1] / 2, (top - bottom) / 2), (x, y, z), quaternion_from_matrix(to_body.T))
+    quarter = math.remainder(yaw, math.pi)
+    length, width, height = size
+    if abs(quarter) > math.pi / 4:  # the same box with its edges exchanged
+        quarter, length, width = math.remainder(quarter - math.pi / 2, math.pi), width, length
+    cos, sin = math.cos(quarter), math.sin(quarter)
+    turned = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
+    x, y, z = (to_body.T @ position).tolist()
+    return Box((length / 2, width / 2, height / 2), (x, y, z), quaternion_from_matrix(to_body.T @ turned))
 
 
 def quaternion_from_matrix(rotation: np.ndarray) -> Quaternion:

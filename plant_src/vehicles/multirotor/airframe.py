@@ -1,4 +1,4 @@
-"""Data of a multirotor: a rigid body with any number of identical rotors.
+"""Data of a multirotor: a rigid body with rotors.
 
 Body frame: x forward, y left, z up, origin at the centre of mass. SI units.
 """
@@ -18,6 +18,9 @@ from ..common.shapes import Body, Box, Vector, quaternion_from_matrix
 
 BODY_UP = (0.0, 0.0, 1.0)
 
+#: largest number of rotors
+MAX_ROTORS = 16
+
 
 @dataclass(frozen=True)
 class Rotor:
@@ -27,12 +30,16 @@ class Rotor:
         label: Place of the rotor in words, for example "front left".
         position: Hub from the centre of mass (m, body frame).
         torque_sign: Sign (+1 or -1) of the reaction torque on the body about `axis`.
+        thrust_coefficient: Thrust over squared speed (N s2/rad2).
+        torque_coefficient: Reaction torque over squared speed (N m s2/rad2).
         axis: Unit vector of the thrust (body frame), which is also the axis of rotation.
     """
 
     label: str
     position: Vector
     torque_sign: float
+    thrust_coefficient: float
+    torque_coefficient: float
     axis: Vector = BODY_UP
 
 
@@ -63,9 +70,7 @@ class Airframe:
         name: Name of the model.
         mass: Total mass (kg).
         inertia: Inertia tensor about the centre of mass with locked rotors (kg m2, body frame), shape (3, 3).
-        rotors: All rotors.
-        thrust_coefficient: Thrust of a rotor over its squared speed (N s2/rad2).
-        torque_coefficient: Reaction torque of a rotor over its squared speed (N m s2/rad2).
+        rotors: All rotors, at most MAX_ROTORS.
         max_rotor_speed: Upper limit of the rotor speeds (rad/s); the lower limit is 0.
         rotor_radius: Radius of a rotor (m).
         effects: Start values of the further effects.
@@ -79,8 +84,6 @@ class Airframe:
     mass: float
     inertia: np.ndarray
     rotors: Sequence[Rotor]
-    thrust_coefficient: float
-    torque_coefficient: float
     max_rotor_speed: float
     rotor_radius: float
     effects: RotorEffects = field(default_factory=RotorEffects)
@@ -101,7 +104,7 @@ class Airframe:
         return Problem(text, f"airframe {self.name}: {'.'.join(subject)}", subject)
 
     def _number_problems(self) -> Iterator[Problem]:
-        positive = ("mass", "thrust_coefficient", "torque_coefficient", "max_rotor_speed", "rotor_radius", "gravity")
+        positive = ("mass", "max_rotor_speed", "rotor_radius", "gravity")
         for name in positive:
             if not 0 < getattr(self, name) < math.inf:
                 yield self._problem(f"found {getattr(self, name)!r}, expected a finite number greater than 0", name)
@@ -124,10 +127,13 @@ class Airframe:
                 yield self._problem(f"found the principal moments {moments}, {expected}", "inertia")
 
     def _rotor_problems(self) -> Iterator[Problem]:
-        if not self.rotors:
-            yield self._problem("found none, expected at least one", "rotors")
+        if not 1 <= len(self.rotors) <= MAX_ROTORS:
+            yield self._problem(f"found {len(self.rotors) or 'none'}, expected 1 to {MAX_ROTORS}", "rotors")
         for number, rotor in enumerate(self.rotors, 1):
             name = f"rotors[{number}]"
+            for coefficient in ("thrust_coefficient", "torque_coefficient"):
+                if not 0 <= (value := getattr(rotor, coefficient)) < math.inf:
+                    yield self._problem(f"found {value!r}, expected a finite number of at least 0", name, coefficient)
             if rotor.torque_sign not in (1, -1):
                 yield self._problem(f"found {rotor.torque_sign!r}, expected 1 or -1", name, "torque_sign")
             if not math.isclose(math.hypot(*rotor.axis), 1, rel_tol=1e-9):

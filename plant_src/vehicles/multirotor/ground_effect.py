@@ -1,4 +1,4 @@
-"""Ground effect of a multirotor by the method of images, as CasADi expressions.
+"""Ground effect of a multirotor by the method of images.
 
 A hovering rotor is modelled as a source at its hub; its image below the surface reduces its inflow (Cheeseman and Bennett, "The
 Effect of the Ground on a Helicopter Rotor in Forward Flight", ARC R&M 3021, 1955). At the height z a rotor of the radius R has
@@ -6,28 +6,56 @@ Effect of the Ground on a Helicopter Rotor in Forward Flight", ARC R&M 3021, 195
 Heredia and Ollero, "Characterization of the Aerodynamic Ground Effect and Its Influence in Multirotor Control", International
 Journal of Aerospace Engineering 2017, 1823056). An image at the lateral distance d reduces the inflow by
 (R^2 / 2) z / (d^2 + 4 z^2)^(3/2). For d = 0 this is Cheeseman and Bennett's (R / 4z)^2; the sum over the corners of a square is
-eq. 4 of Sanchez-Cuevas et al. Their empirical term for the flow between the rotors is neglected.
+eq. 4 of Sanchez-Cuevas et al. Their empirical term for the flow between the rotors is neglected. The reduction is limited to
+one half, because the images of many close rotors would otherwise reverse the inflow.
 """
 
 from __future__ import annotations
 
-import math
-
 import casadi as ca
 
-from .airframe import Airframe
+from cosim.export.equations.c_code import Callee
 
 #: smallest height in rotor radii; smaller heights are replaced by it, because the method of images is not valid there
 MIN_HEIGHT_RATIO = 0.5
 
-
-def thrust_factors(airframe: Airframe, height: ca.SX) -> list[ca.SX]:
-    """Return the ratio of each rotor's thrust to that in free air, for a height (m) of the rotor centre above the surface."""
-    z = ca.fmax(height, MIN_HEIGHT_RATIO * airframe.rotor_radius)
-    hubs = [rotor.position[:2] for rotor in airframe.rotors]
-    return [1 / (1 - _inflow_reduction(airframe.rotor_radius, z, [math.dist(hub, other) for other in hubs])) for hub in hubs]
+#: largest relative reduction of the inflow
+MAX_REDUCTION = 0.5
 
 
-def _inflow_reduction(radius: float, z: ca.SX, distances: list[float]) -> ca.SX:
-    """Return the relative reduction of a rotor's inflow by images at these lateral distances (m)."""
-    return sum((radius**2 / 2 * z / ca.sqrt(d**2 + 4 * z**2) ** 3 for d in distances), ca.SX(0))
+def create_thrust_factors(slots: int) -> Callee:
+    """Create the function of the ratio of each rotor's thrust to that in free air.
+
+    Args:
+        slots: Number of elements of the arrays of rotors.
+
+    Returns:
+        Function of (height of the rotor centre above the surface, rotor radius, number of rotors) and x and y of the hubs (m),
+        each of the shape (slots,). Its result has the shape (slots,); only the elements with a rotor are of use.
+    """
+    arguments = common, x, y = [ca.SX.sym(name, size) for name, size in (("common", 3), ("x", slots), ("y", slots))]
+    height, radius, count = ca.vertsplit(common)
+    z = ca.fmax(height, MIN_HEIGHT_RATIO * radius)
+    factors = []
+    for i in range(slots):
+        images = ((x[i] - x[j]) ** 2 + (y[i] - y[j]) ** 2 + 4 * z**2 for j in range(slots))
+        reduction = sum(ca.if_else(count > j, radius**2 / 2 * z / (d2 * ca.sqrt(d2)), 0) for j, d2 in enumerate(images))
+        factors.append(1 / (1 - ca.fmin(reduction, MAX_REDUCTION)))
+    function = ca.Function("thrust_factors", arguments, [ca.vertcat(*factors)])
+    return Callee(function, _THRUST_FACTORS_C % {"slots": slots, "min_ratio": MIN_HEIGHT_RATIO, "max_reduction": MAX_REDUCTION})
+
+
+_THRUST_FACTORS_C = """{
+    const double radius = in[0][1], count = in[0][2];
+    const double z = in[0][0] > %(min_ratio)r * radius ? in[0][0] : %(min_ratio)r * radius;
+    for (int i = 0; i < %(slots)d; ++i) out[0][i] = 1;
+    for (int i = 0; i < count; ++i) {
+        double reduction = 0;
+        for (int j = 0; j < count; ++j) {
+            const double x = in[1][i] - in[1][j], y = in[2][i] - in[2][j], d2 = x * x + y * y + 4 * z * z;
+            reduction += radius * radius / 2 * z / (d2 * sqrt(d2));
+        }
+        out[0][i] = 1 / (1 - (reduction < %(max_reduction)r ? reduction : %(max_reduction)r));
+    }
+}
+"""

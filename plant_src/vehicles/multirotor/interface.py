@@ -1,7 +1,12 @@
-"""Variables of a multirotor, in the order of the equations."""
+"""Variables of a multirotor, in the order of the equations.
+
+The arrays of the rotors have as many elements as the airframe has rotors, or more: the equations of all multirotors in a world
+are compiled once, for MAX_ROTORS rotors. Elements without a rotor are 0.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 
 from cosim.core.component import Variable
@@ -21,15 +26,28 @@ from .airframe import Airframe
 #: parameter -> row and column in the symmetric inertia tensor
 INERTIA_INDICES = {f"inertia.{'xyz'[i]}{'xyz'[j]}": (i, j) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))}
 
+#: columns of the table of rotors in the constants of the equations: position, axis, thrust and signed torque coefficient
+ROTOR_TABLE_COLUMNS = 8
 
-def variables(airframe: Airframe) -> tuple[Variable, ...]:
-    """Return parameters, inputs and outputs; parameters other than `initial.*` start at the values of the airframe."""
+#: rows of that table for each rotor are filled up to a multiple of this number
+_TABLE_ROW_MULTIPLE = 8
+
+
+def variables(airframe: Airframe, rotor_slots: int | None = None) -> tuple[Variable, ...]:
+    """Return parameters, inputs and outputs; parameters other than `initial.*` start at the values of the airframe.
+
+    Args:
+        airframe: Data of the multirotor.
+        rotor_slots: Number of elements of the arrays of the rotors. None means the number of rotors.
+    """
+    slots = len(airframe.rotors) if rotor_slots is None else rotor_slots
     return (
         *initial_variables("xyz", "uvw", "pqr"),
         *_rigid_body_variables(airframe),
+        *_rotor_parameters(airframe, slots),
         *_effect_variables(airframe),
-        _rotor_speed_variable(airframe),
         *EXTERNAL_LOADS,
+        _rotor_speed_variable(airframe, slots),
         *WIND_INPUTS,
         *GROUND_DISTANCE_INPUT,
         *MOTION_OUTPUTS,
@@ -37,16 +55,23 @@ def variables(airframe: Airframe) -> tuple[Variable, ...]:
     )
 
 
-def states(airframe: Airframe) -> tuple[str, ...]:
+def states(rotor_slots: int) -> tuple[str, ...]:
     """Return the names of the states: those of the rigid body, then the rotor speeds."""
     groups = {"position": "xyz", "orientation": "wxyz", "velocity": "xyz", "rates": "pqr"}
     rigid = [f"{group}.{axis}" for group, axes in groups.items() for axis in axes]
-    return (*rigid, *(f"rotor_speed[{number}]" for number in range(1, len(airframe.rotors) + 1)))
+    return (*rigid, *(f"rotor_speed[{number}]" for number in range(1, rotor_slots + 1)))
 
 
-def constant_count(airframe: Airframe) -> int:
-    """Return the number of constants of the equations: the parameters and the inverse of the inertia tensor."""
-    return 9 + sum(len(variable.scalar_names) for variable in variables(airframe) if variable.causality == "parameter")
+def table_rows(rotor_slots: int) -> int:
+    """Return the number of rows of the table of rotors."""
+    return -(-rotor_slots // _TABLE_ROW_MULTIPLE) * _TABLE_ROW_MULTIPLE
+
+
+def constant_count(airframe: Airframe, rotor_slots: int) -> int:
+    """Return the number of constants that the equations derive from the parameters (`multirotor_equations.derive_constants`)."""
+    parameters = (variable for variable in variables(airframe, rotor_slots) if variable.causality == "parameter")
+    given = sum(len(variable.scalar_names) for variable in parameters)
+    return given + 9 + ROTOR_TABLE_COLUMNS * table_rows(rotor_slots) + 9 * rotor_slots
 
 
 def _rigid_body_variables(airframe: Airframe) -> tuple[Variable, ...]:
@@ -55,22 +80,46 @@ def _rigid_body_variables(airframe: Airframe) -> tuple[Variable, ...]:
     text = "inertia tensor about the centre of mass, body frame, rotors locked"
     elements = {name: float(airframe.inertia[place]) for name, place in INERTIA_INDICES.items()}
     tensor = (scalar_variable(name, "kg.m2", f"{text}: {name[-2:]}", "parameter", value) for name, value in elements.items())
-    return (mass, *tensor)
+    gravity = scalar_variable("gravity", "m/s2", "gravitational acceleration", "parameter", airframe.gravity)
+    return (mass, *tensor, gravity)
 
 
-def _rotor_speed_variable(airframe: Airframe) -> Variable:
+def _rotor_parameters(airframe: Airframe, slots: int) -> Iterator[Variable]:
+    """Yield the number of rotors, their arrays, and what they have in common."""
+    rotors = airframe.rotors
+    yield replace(_parameter("rotor_count", "1", "number of rotors", float(len(rotors)), float(slots)), minimum=1.0)
+    vectors = (("rotor_position", "m", "position of the hubs"), ("rotor_axis", "1", "unit vectors of the thrusts"))
+    for (name, unit, text), attribute in zip(vectors, ("position", "axis"), strict=True):
+        for k, axis in enumerate("xyz"):
+            values = [getattr(rotor, attribute)[k] for rotor in rotors]
+            yield _rotor_array(f"{name}.{axis}", unit, f"{text}: {axis}, body frame", values, slots)
+    thrust = [rotor.thrust_coefficient for rotor in rotors]
+    yield _rotor_array("thrust_coefficient", "N.s2/rad2", "thrust over squared speed", thrust, slots)
+    torque = [rotor.torque_sign * rotor.torque_coefficient for rotor in rotors]
+    text = "reaction torque on the body about the axis over squared speed"
+    yield _rotor_array("torque_coefficient", "N.m.s2/rad2", text, torque, slots)
+    signs = [rotor.torque_sign for rotor in rotors]
+    yield _rotor_array("torque_sign", "1", "sign of the reaction torque; the rotor turns the other way", signs, slots)
+    yield _parameter("max_rotor_speed", "rad/s", "upper limit of the rotor speeds", airframe.max_rotor_speed)
+    yield _parameter("rotor_radius", "m", "radius of the rotors", airframe.rotor_radius)
+
+
+def _rotor_array(name: str, unit: str, description: str, values: Sequence[float], slots: int) -> Variable:
+    start = (*values, *[0.0] * (slots - len(values)))
+    return Variable(name, "Float64", "parameter", "fixed", start, parse_unit(unit), (slots,), f"rotors: {description}")
+
+
+def _rotor_speed_variable(airframe: Airframe, slots: int) -> Variable:
     labels = ", ".join(rotor.label for rotor in airframe.rotors)
     text = f"commanded rotor speeds ({labels}), limited to 0 ... {airframe.max_rotor_speed:.4g} rad/s"
-    count = len(airframe.rotors)
-    return Variable(
-        "rotor_speed", "Float64", "input", start=(0.0,) * count, unit=parse_unit("rad/s"), shape=(count,), description=text
-    )
+    unit, start = parse_unit("rad/s"), (0.0,) * slots
+    return Variable("rotor_speed", "Float64", "input", start=start, unit=unit, shape=(slots,), description=text)
 
 
 def _effect_variables(airframe: Airframe) -> tuple[Variable, ...]:
     effects = airframe.effects
     return (
-        _parameter("initial_rotor_speed", "rad/s", "initial speed of all rotors, if they lag", 0.0, airframe.max_rotor_speed),
+        _parameter("initial_rotor_speed", "rad/s", "initial speed of all rotors, if they lag", 0.0),
         _parameter("rotor_time_constant", "s", "time constant of the rotor speeds; 0: no lag", effects.rotor_time_constant),
         _parameter(
             "rotor_inertia",

@@ -7,28 +7,32 @@ frame) and rotor speeds n_i (rad/s). With all effects:
     q' = q * (0, w) / 2                        u_i = u + w x r_i                       air-relative velocity at rotor i
     v' = (R F + F_ext) / m - g e_z             F = sum_i F_i - |u| diag(body_drag) u
     w' = I^-1 (T + R^T T_ext - w x (I w + H) - H')
-    F_i = g_i c_T n_i^2 a_i - n_i diag(rotor_drag) u_i
-    T = sum_i (r_i x F_i + s_i c_D n_i^2 a_i)  H = -J sum_i s_i n_i a_i                angular momentum of the rotors
+    F_i = g_i c_T,i n_i^2 a_i - n_i diag(rotor_drag) u_i
+    T = sum_i (r_i x F_i + c_D,i n_i^2 a_i)    H = -J sum_i s_i n_i a_i                angular momentum of the rotors
     n_i' = (command_i - n_i) / rotor_time_constant
 
-r_i is the position of rotor i, a_i its thrust axis, s_i the sign of its reaction torque and g_i its ground-effect factor
-(`ground_effect.py`). Rotor drag, applied at each hub, and body drag follow Folk, Paulos and Kumar, "RotorPy", 2023. The rotor
-drag is the lumped model of Faessler, Franchi and Scaramuzza, "Differential Flatness of Quadrotor Dynamics Subject to Rotor
+r_i is the position of rotor i, a_i its thrust axis, s_i the sign of its reaction torque c_D,i n_i^2 and g_i its ground-effect
+factor (`ground_effect.py`). Rotor drag, applied at each hub, and body drag follow Folk, Paulos and Kumar, "RotorPy", 2023. The
+rotor drag is the lumped model of Faessler, Franchi and Scaramuzza, "Differential Flatness of Quadrotor Dynamics Subject to Rotor
 Drag", 2018, distributed over the rotors. With a rotor time constant of 0 the rotor speeds equal their commands, and H' is
 neglected.
 
 The rotor speeds are the exact solution for held commands. The rigid body is integrated by the classical Runge-Kutta method,
 which evaluates the rotor speeds at the times of its stages; a short time constant therefore does not limit the step. If all
 effects are off, a shorter compiled function is called.
+
+All values are parameters. The equations are generated for a number of rotor slots; slots without a rotor have the coefficients 0.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass, field, fields
 from functools import cached_property
+from typing import NamedTuple
 
 import casadi as ca
 
+from cosim.core.component import Variable
 from cosim.export.equations.c_code import Callee
 from cosim.export.equations.fmu_code import as_block
 from cosim.export.equations.model import ContinuousModel, runge_kutta_4
@@ -39,7 +43,7 @@ from ..common.interface import WORLD_OUTPUTS
 from ..common.named_values import ConstantsMap, NamedValues, values_by_name, variables_of
 from .airframe import Airframe, RotorEffects
 from .interface import states, variables
-from .loads import RotorSpeeds, aerodynamic_loads, gyroscopic_torque, rotor_loads
+from .loads import RotorFunctions, gyroscopic_torque, rotor_table, still_air_loads
 
 #: number of rigid-body states; the rotor speeds follow them in the state vector
 RIGID_BODY_STATE_COUNT = 13
@@ -47,9 +51,12 @@ RIGID_BODY_STATE_COUNT = 13
 _EFFECTS = [effect.name for effect in fields(RotorEffects)]
 
 
-def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
-    """Return the parameters and the inverse of the inertia tensor."""
-    return {**parameters, "inverse_inertia": ca.inv(_symmetric_matrix(parameters["inertia"]))}
+class SpinningRotors(NamedTuple):
+    """Rotors at one time: speeds (rad/s), and their angular momentum (N m s) with its rate (N m), body frame."""
+
+    speed: ca.SX
+    momentum: ca.SX
+    momentum_rate: ca.SX
 
 
 def rigid_body(constants: NamedValues) -> contact_maps.RigidBody:
@@ -64,7 +71,7 @@ def _symmetric_matrix(elements: ca.SX) -> ca.SX:
 
 
 def rigid_body_rate(
-    body: contact_maps.RigidBody, gravity: float, state: ca.SX, inputs: NamedValues, force: ca.SX, torque: ca.SX
+    body: contact_maps.RigidBody, gravity: ca.SX, state: ca.SX, inputs: NamedValues, force: ca.SX, torque: ca.SX
 ) -> ca.SX:
     """Return the time derivative of the rigid-body states.
 
@@ -85,73 +92,115 @@ def rigid_body_rate(
 
 @dataclass(frozen=True)
 class MultirotorEquations:
-    """Equations of an airframe; the vectors hold the variables of `interface.variables(airframe)` in order.
+    """Equations of an airframe; the vectors hold the variables of `interface.variables` in order.
 
     `inputs` and `constants` are vectors in the public methods and named values in the private ones.
+
+    Attributes:
+        airframe: Airframe with the start values.
+        slots: Number of rotor slots.
     """
 
     airframe: Airframe
+    slots: int
+
+    @cached_property
+    def variables(self) -> tuple[Variable, ...]:
+        """Parameters, inputs and outputs."""
+        return variables(self.airframe, self.slots)
 
     @cached_property
     def constants(self) -> ConstantsMap:
         """Map from the parameters to the constants of the equations."""
-        return ConstantsMap(variables(self.airframe), derive_constants)
+        return ConstantsMap(self.variables, self.derive_constants)
+
+    @cached_property
+    def rotor_functions(self) -> RotorFunctions:
+        """Functions of all rotors."""
+        return RotorFunctions(self.slots)
+
+    def derive_constants(self, parameters: NamedValues) -> dict[str, ca.SX]:
+        """Return the parameters, the inverse of the inertia tensor, and the tables of the rotors."""
+        table = rotor_table(parameters, self.slots)
+        axes = table[: self.slots, 3:6].T
+        return {
+            **parameters,
+            "inverse_inertia": ca.inv(_symmetric_matrix(parameters["inertia"])),
+            "rotor_table": table,
+            "still_air_loads": still_air_loads(table, self.slots),
+            "momenta": -parameters["rotor_inertia"] * axes * ca.repmat(parameters["torque_sign"].T, 3, 1),
+        }
 
     def _inputs(self, vector: ca.SX) -> NamedValues:
-        return values_by_name(vector, variables_of(variables(self.airframe), "input"))
+        return values_by_name(vector, variables_of(self.variables, "input"))
 
     def initial_state(self, constants: ca.SX) -> ca.SX:
         """Return the state at the start."""
         initial = self.constants.by_name(constants)
         orientation = kinematics.quaternion_about_z(initial["initial.yaw"])
         velocity = kinematics.rotation_matrix(orientation) @ initial["initial.velocity_body"]
-        rotors = ca.repmat(initial["initial_rotor_speed"], len(self.airframe.rotors))
+        rotors = ca.vertcat(
+            *(ca.if_else(initial["rotor_count"] > k, initial["initial_rotor_speed"], 0) for k in range(self.slots))
+        )
         return ca.vertcat(initial["initial.position"], orientation, velocity, initial["initial.rates"], rotors)
 
     def rate(self, state: ca.SX, inputs: ca.SX, constants: ca.SX) -> ca.SX:
         """Return the time derivative of the state of a multirotor whose rotors lag."""
         given, known = self._inputs(inputs), self.constants.by_name(constants)
-        rotors = self._rotor_speeds(state[RIGID_BODY_STATE_COUNT:], given, known)
-        return ca.vertcat(self._body_rate(state[:RIGID_BODY_STATE_COUNT], rotors, given, known), rotors.rate)
+        speed, lag = state[RIGID_BODY_STATE_COUNT:], known["rotor_time_constant"]
+        target = self._commanded_speeds(given, known)
+        factors = self.rotor_functions.ground_factors(given, known)
+        rotors = _spinning_rotors(speed, target, known)
+        return ca.vertcat(
+            self._body_rate(state[:RIGID_BODY_STATE_COUNT], rotors, factors, given, known),
+            ca.if_else(lag > 0, (target - speed) / lag, 0),
+        )
 
     def step_without_effects(self, state: ca.SX, inputs: ca.SX, constants: ca.SX, step: ca.SX) -> ca.SX:
         """Return the state after a step (s) with all effects off."""
-        given, body = self._inputs(inputs), rigid_body(self.constants.by_name(constants))
-        speed = self._commanded_speeds(given)
-        force, torque = rotor_loads(self.airframe, speed)
+        given, known = self._inputs(inputs), self.constants.by_name(constants)
+        body, speed = rigid_body(known), self._commanded_speeds(given, known)
+        load = known["still_air_loads"] @ speed**2
         end = runge_kutta_4(
-            lambda x: rigid_body_rate(body, self.airframe.gravity, x, given, force, torque), state[:RIGID_BODY_STATE_COUNT], step
+            lambda x: rigid_body_rate(body, known["gravity"], x, given, load[0:3], load[3:6]),
+            state[:RIGID_BODY_STATE_COUNT],
+            step,
         )
         return ca.vertcat(normalised_state(end), speed)
 
     def step_with_effects(self, state: ca.SX, inputs: ca.SX, constants: ca.SX, step: ca.SX) -> ca.SX:
         """Return the state after a step (s) with all effects."""
         given, known = self._inputs(inputs), self.constants.by_name(constants)
-        target, lag = self._commanded_speeds(given), known["rotor_time_constant"]
+        target, lag = self._commanded_speeds(given, known), known["rotor_time_constant"]
         start = ca.if_else(lag > 0, state[RIGID_BODY_STATE_COUNT:], target)
         remaining = ca.exp(-step / 2 / lag)  # fraction of the difference left after half a step; 0 without a lag
         middle, end = (target + fraction * (start - target) for fraction in (remaining, remaining**2))
-        stages = (self._rotor_speeds(speed, given, known) for speed in (start, middle, middle, end))
-        body = runge_kutta_4(lambda x: self._body_rate(x, next(stages), given, known), state[:RIGID_BODY_STATE_COUNT], step)
+        factors = self.rotor_functions.ground_factors(given, known)
+        first, second, last = (_spinning_rotors(speed, target, known) for speed in (start, middle, end))
+        stages = iter((first, second, second, last))
+        body = runge_kutta_4(
+            lambda x: self._body_rate(x, next(stages), factors, given, known), state[:RIGID_BODY_STATE_COUNT], step
+        )
         return ca.vertcat(normalised_state(body), end)
 
-    def _commanded_speeds(self, inputs: NamedValues) -> ca.SX:
+    def _commanded_speeds(self, inputs: NamedValues, constants: NamedValues) -> ca.SX:
         """Return the commanded rotor speeds (rad/s), limited to 0 ... `max_rotor_speed`."""
-        return ca.fmin(ca.fmax(inputs["rotor_speed"], 0), self.airframe.max_rotor_speed)
+        return ca.fmin(ca.fmax(inputs["rotor_speed"], 0), constants["max_rotor_speed"])
 
-    def _rotor_speeds(self, speed: ca.SX, inputs: NamedValues, constants: NamedValues) -> RotorSpeeds:
-        """Return the rotor speeds with their first-order rates towards the commands."""
-        lag = constants["rotor_time_constant"]
-        return RotorSpeeds(speed, ca.if_else(lag > 0, (self._commanded_speeds(inputs) - speed) / lag, 0))
-
-    def _body_rate(self, state: ca.SX, rotors: RotorSpeeds, inputs: NamedValues, constants: NamedValues) -> ca.SX:
+    def _body_rate(
+        self, state: ca.SX, rotors: SpinningRotors, factors: ca.SX, inputs: NamedValues, constants: NamedValues
+    ) -> ca.SX:
         """Return the time derivative of the rigid-body states with all effects."""
-        force, torque = rotor_loads(self.airframe, rotors.speed)
-        more_force, more_torque = aerodynamic_loads(self.airframe, state, rotors.speed, inputs, constants)
-        more_torque += gyroscopic_torque(self.airframe, state[10:13], rotors, constants["rotor_inertia"])
-        return rigid_body_rate(
-            rigid_body(constants), self.airframe.gravity, state, inputs, force + more_force, torque + more_torque
-        )
+        force, torque = self.rotor_functions.aerodynamic_loads(state, rotors.speed, factors, inputs, constants)
+        torque += gyroscopic_torque(state[10:13], rotors.momentum, rotors.momentum_rate)
+        return rigid_body_rate(rigid_body(constants), constants["gravity"], state, inputs, force, torque)
+
+
+def _spinning_rotors(speed: ca.SX, target: ca.SX, constants: NamedValues) -> SpinningRotors:
+    """Return rotors with their first-order rates towards the commands."""
+    lag = constants["rotor_time_constant"]
+    rate = ca.if_else(lag > 0, (target - speed) / lag, 0)
+    return SpinningRotors(speed, constants["momenta"] @ speed, constants["momenta"] @ rate)
 
 
 def normalised_state(state: ca.SX) -> ca.SX:
@@ -179,9 +228,9 @@ class Multirotor(ContinuousModel):
 
 def free_step(equations: MultirotorEquations) -> Callee:
     """Return the function of one step; its C code calls the shorter function if all effects are off."""
-    inputs = sum(len(variable.scalar_names) for variable in variables_of(variables(equations.airframe), "input"))
+    inputs = sum(len(variable.scalar_names) for variable in variables_of(equations.variables, "input"))
     names = [name for name, (rows, columns) in equations.constants.shapes.items() for _ in range(rows * columns)]
-    sizes = {"state": len(states(equations.airframe)), "inputs": inputs, "constants": len(names), "step": 1}
+    sizes = {"state": len(states(equations.slots)), "inputs": inputs, "constants": len(names), "step": 1}
     arguments = [ca.SX.sym(name, size) for name, size in sizes.items()]
     plain = ca.Function("plain_step", arguments, [equations.step_without_effects(*arguments)])
     full = ca.Function("step_with_effects", arguments, [equations.step_with_effects(*arguments)])
@@ -201,20 +250,26 @@ _FREE_STEP_C = """{
 """
 
 
-def multirotor_block(airframe: Airframe, description: str) -> Block:
-    """Return a multirotor for export: its FMU in free flight and the contact functions of the world."""
-    equations = MultirotorEquations(airframe)
-    step = free_step(equations)
+def multirotor_block(airframe: Airframe, description: str, rotor_slots: int | None = None) -> Block:
+    """Return a multirotor for export: its FMU in free flight and the contact functions of the world.
+
+    Args:
+        airframe: Airframe with the start values.
+        description: Description of the FMU.
+        rotor_slots: Number of rotor slots. None means the number of rotors.
+    """
+    equations = MultirotorEquations(airframe, rotor_slots or len(airframe.rotors))
+    step, functions = free_step(equations), equations.rotor_functions
     model = Multirotor(
         airframe.name,
         description,
-        variables(airframe),
-        states(airframe),
+        equations.variables,
+        states(equations.slots),
         equations.initial_state,
         equations.rate,
         lambda state, _inputs, _constants: ca.vertcat(motion_of_state(state), ca.SX.zeros(len(WORLD_OUTPUTS))),
         derived_parameters=equations.constants.vector,
-        callees=[step],
+        callees=[step, functions.thrust_factors, functions.load_sum],
         free_step=step.function,
     )
     maps = contact_maps.FreeContactMaps(model, lambda c: rigid_body(equations.constants.by_name(c)), motion_of_state)

@@ -91,15 +91,24 @@ def test_a_failure_names_component_function_status_time_and_the_fmus_message(mak
     major = 2 if probe.stem.endswith("2") else 3
     with pytest.raises(ComponentError) as failure:
         run_system(built, 1, 0.01)
-    words = f"lag: fmi{major}DoStep failed at t = 0.03 s: status 3 (error): told to fail, 100%s sure"
+    end = ", 0.0 s" if major == 2 else ""
+    words = f"lag: fmi{major}DoStep failed at t = 0.03 s: status 3 (error): told to fail, 100%s sure{end}"
     assert str(failure.value) == words
 
 
-def test_log_messages_are_forwarded_unchanged(make_instances, probe, caplog):
+def test_log_messages_of_fmi_2_are_formatted_and_those_of_fmi_3_unchanged(make_instances, probe, caplog):
     built = make_system(make_instances(probe, "lag"), start_values={"lag": {"fail_time": 0.0}})
     with caplog.at_level(logging.INFO, "cosim"), pytest.raises(ComponentError):
         run_system(built, 1, 0.01)
-    assert [(r.levelname, r.getMessage()) for r in caplog.records] == [("ERROR", "lag: told to fail, 100%s sure")]
+    end = ", 0.0 s" if "2" in probe.name else ""
+    assert [(r.levelname, r.getMessage()) for r in caplog.records] == [("ERROR", f"lag: told to fail, 100%s sure{end}")]
+
+
+def test_messages_go_to_the_instance_that_sends_them(make_instances, probes, caplog):
+    built = make_system(make_instances(probes[2], "one", "two"), start_values={"two": {"fail_time": 0.0}})
+    with caplog.at_level(logging.INFO, "cosim"), pytest.raises(ComponentError, match=r"two: fmi2DoStep failed.*sure, 0.0 s"):
+        run_system(built, 1, 0.01)
+    assert [r.getMessage().split(":")[0] for r in caplog.records] == ["two"]
 
 
 def test_rows_until_a_failure_are_kept(make_instances, probe):
@@ -201,8 +210,8 @@ def test_an_fmu_for_another_platform_is_refused_with_its_platforms(probes, tmp_p
     foreign = tmp_path / "windows.fmu"
     with ZipFile(probes[2]) as source, ZipFile(foreign, "w") as target:
         target.writestr("modelDescription.xml", source.read("modelDescription.xml"))
-        target.writestr("binaries/win64/probe.dll", b"MZ")
-    with pytest.raises(InputError, match=r"has no binary for \S+ \(\S+\); it has: win64"):
+        target.writestr("binaries/win32/probe.dll", b"MZ")
+    with pytest.raises(InputError, match=r"has no binary for \S+ \(\S+\); it has: win32"):
         create_component(FmuFile(foreign), "a")
 
 

@@ -50,8 +50,8 @@ def test_a_binary_is_unpacked_once_and_completely(cache: Path) -> None:
     for _ in range(2):
         WorldHarness({"uav": quadcopter_settings([0.0, 0.0, 2.0])}).step()
     (library,) = cache.iterdir()
-    with ZipFile(resources.root() / "fmus" / "ar_drone.fmu") as archive:
-        (member,) = [name for name in archive.namelist() if name.endswith(f"/ar_drone{library.suffix}")]
+    with ZipFile(resources.root() / "fmus" / "multirotor.fmu") as archive:
+        (member,) = [name for name in archive.namelist() if name.endswith(f"/multirotor{library.suffix}")]
         assert library.read_bytes() == archive.read(member)
 
 

@@ -9,9 +9,10 @@ from typing import Any
 import pytest
 from world_harness import DECK_TOP, PLATFORM, PLATFORM_TOP, REST_HEIGHT, WorldHarness, quadcopter_settings, vessel_settings
 
-from plant_src.vehicles.ar_drone.parameters import CRASH_SPEED
+from plant_src.catalogue import MODELS
 
 STAND = PLATFORM_TOP + REST_HEIGHT
+CRASH_SPEED = MODELS["ar_drone"].crash_speed
 CRASH_HEIGHT = CRASH_SPEED**2 / 2 / 9.81
 
 

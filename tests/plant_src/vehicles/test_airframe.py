@@ -10,8 +10,11 @@ from scipy.spatial.transform import Rotation
 
 from cosim.core.errors import InputError
 from plant_src.catalogue import MODELS
-from plant_src.vehicles.crazyflie.parameters import AIRFRAME
 from plant_src.vehicles.multirotor.airframe import Airframe, Rotor, RotorEffects
+
+assert MODELS["crazyflie"].airframe is not None
+AIRFRAME = MODELS["crazyflie"].airframe
+NOSE = Rotor("nose", (0.1, 0.0, 0.0), 1.0, 1e-5, 1e-7)
 
 FAULTS = [
     ({"mass": -1.0}, "mass: found -1.0, expected a finite number greater than 0"),
@@ -24,8 +27,11 @@ FAULTS = [
     ({"inertia": np.array([[1, 0.5, 0], [0, 1, 0], [0, 0, 1]])}, "expected a symmetric tensor"),
     ({"inertia": np.eye(2)}, "expected 3 rows of 3 finite numbers"),
     ({"rotors": ()}, "rotors: found none"),
-    ({"rotors": (Rotor("nose", (0.1, 0.0, 0.0), 0.5),)}, r"rotors\[1\].torque_sign: found 0.5, expected 1 or -1"),
-    ({"rotors": (Rotor("nose", (0.1, 0.0, 0.0), 1.0, (0.0, 0.0, 2.0)),)}, r"rotors\[1\].axis: .* expected a unit vector"),
+    ({"rotors": (replace(NOSE, torque_sign=0.5),)}, r"rotors\[1\].torque_sign: found 0.5, expected 1 or -1"),
+    (
+        {"rotors": (Rotor("nose", (0.1, 0.0, 0.0), 1.0, 1e-5, 1e-7, (0.0, 0.0, 2.0)),)},
+        r"rotors\[1\].axis: .* expected a unit vector",
+    ),
     ({"effects": RotorEffects(body_drag=(0.0, -0.1, 0.0))}, "effects.body_drag: found .* expected finite numbers of at least 0"),
 ]
 

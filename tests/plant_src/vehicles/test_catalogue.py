@@ -12,6 +12,7 @@ from fmpy import read_model_description
 from cosim.core import resources
 from plant_src.catalogue import MODELS, VEHICLE_MODELS
 from plant_src.vehicles.common.interface import ENVIRONMENT_INPUTS
+from plant_src.vehicles.multirotor.airframe import MAX_ROTORS
 from plant_src.vehicles.multirotor.multirotor_equations import MultirotorEquations
 
 ALL = pytest.mark.parametrize("name", MODELS)
@@ -36,9 +37,11 @@ def test_environment_inputs_come_last_among_the_inputs(name: str) -> None:
 
 @pytest.mark.parametrize("name", [name for name, model in MODELS.items() if model.constant_count is not None])
 def test_the_number_of_constants_is_that_of_the_equations(name: str) -> None:
-    model, module = MODELS[name], equations(name)
-    constants = MultirotorEquations(model.airframe).constants if model.airframe else module.VESSEL.constants
-    assert constants.vector(ca.SX.sym("parameters", len(model.slots("parameter")))).numel() == model.constant_count
+    model = MODELS[name]
+    module = equations(model.binary)
+    constants = MultirotorEquations(model.airframe, MAX_ROTORS).constants if model.airframe else module.VESSEL.constants
+    parameters = model.equation_parameters(model.start_values("parameter"))
+    assert constants.vector(ca.SX(parameters)).numel() == model.constant_count
 
 
 def test_strider_moves_in_the_plane_by_default() -> None:

@@ -9,7 +9,7 @@ from multirotor_reference import GRAVITY, VEHICLES, Vehicle
 from plant_fmu import PlantFmu
 from plant_validation import MeasurementCheck
 
-from plant_src.vehicles.crazyflie.parameters import AIRFRAME
+from plant_src.catalogue import MODELS
 from plant_src.vehicles.multirotor.multirotor_equations import MultirotorEquations
 
 CRAZYFLIE, HEXACOPTER = VEHICLES["crazyflie"], VEHICLES["survey_hexacopter"]
@@ -211,11 +211,12 @@ def test_without_effects_shorter_code_gives_the_same_flight() -> None:
 def test_the_rate_of_the_state_is_the_derivative_of_a_step() -> None:
     random, moment = np.random.default_rng(5), 1e-6
     state = np.concatenate([random.standard_normal(3), [1, 0, 0, 0], random.standard_normal(6), 1500 + random.standard_normal(4)])
-    inputs = np.concatenate([1600 + random.standard_normal(4), 0.01 * random.standard_normal(6), [1, 2, 3], [0.05]])
-    body = [AIRFRAME.mass, *np.diag(AIRFRAME.inertia), 0.0, 0.0, 0.0]
+    inputs = np.concatenate([0.01 * random.standard_normal(6), 1600 + random.standard_normal(4), [1, 2, 3], [0.05]])
+    model = MODELS["crazyflie"]
     effects = [0.07, 5e-8, 1e-6, 2e-6, 1e-6, 0.01, 0.02, 0.03, 1.0]
-    equations = MultirotorEquations(AIRFRAME)
-    constants = ca.DM(equations.constants.vector(ca.SX([*np.zeros(10), *body, 0.0, *effects]))).full().ravel()
+    equations = MultirotorEquations(model.airframe, 4)
+    parameters = ca.SX([*model.start_values("parameter")[: -len(effects)], *effects])
+    constants = ca.DM(equations.constants.vector(parameters)).full().ravel()
     symbols = [ca.SX.sym("", len(vector)) for vector in (state, inputs, constants)]
     rate = ca.Function("rate", symbols, [equations.rate(*symbols)])(state, inputs, constants)
     after = ca.Function("after", symbols, [equations.step_with_effects(*symbols, ca.SX(moment))])(state, inputs, constants)

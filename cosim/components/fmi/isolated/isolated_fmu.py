@@ -60,7 +60,7 @@ class IsolatedFmu(WorkerClient, Component):
         file.check_binary()
         super().__init__(file, instance_name, isolation.deadlines.load)
         self._instance_class, self.isolation = instance_class, isolation
-        self.description = file.description
+        self.description = file.description.with_structural_parameters(settings.structural_parameters, file.limits)
         self.variables, self.has_state = self.description.variables, self.description.has_state
         self._variables_by_name = {variable.name: variable for variable in self.variables}
         self._settings = settings

@@ -18,7 +18,7 @@ from .findings import DESCRIPTION_FILE, FatalFindingError, Finding, Rule, raise_
 from .fmu_platform import current_platform
 from .limits import DEFAULT_LIMITS, PreflightLimits
 from .model_description import Interface, ModelDescription
-from .rules_archive import NAME_FORM, REPEATED_FOLDER
+from .rules_archive import NAME_FORM, REPEATED
 from .xml import parse_xml
 from .xml_reader import check_repeated_elements, read_model
 
@@ -41,7 +41,7 @@ CHANGED = Rule("archive.changed", "limits")
 #: rules whose violations do not prevent a run, but may change its results
 RUN_WARNINGS = frozenset(
     {
-        *(NAME_FORM, REPEATED_FOLDER, rules_structure.OUTPUTS),
+        *(NAME_FORM, REPEATED, rules_structure.OUTPUTS),
         *(rules_model.EMPTY_TOKEN, rules_model.IDENTIFIER, rules_model.EXPERIMENT_VALUE),
         *(
             rules_variables.UNIQUE,

@@ -59,7 +59,7 @@ class Archive:
         for entry in self._entries:
             yield from check_member(entry)
             yield from self._check_size(entry)
-        yield from check_collisions([entry.decoded_name for entry in self._entries])
+        yield from check_collisions([(entry.decoded_name, (entry.crc, entry.size)) for entry in self._entries])
         total = sum(entry.size for entry in self._entries)
         if total > self._limits.max_expanded_size:
             yield SIZE(f"expands to {total} bytes, expected at most {self._limits.max_expanded_size}")
@@ -120,7 +120,7 @@ class Archive:
             FatalFindingError: The data of a member are damaged.
         """
         made = {""}
-        for entry in filter(lambda entry: is_used(entry.decoded_name), self._entries):
+        for entry in filter(lambda entry: is_used(entry.decoded_name), self.members.values()):
             parent, _, name = entry.decoded_name.rpartition("/")
             if parent not in made:
                 (folder / parent).mkdir(parents=True, exist_ok=True)

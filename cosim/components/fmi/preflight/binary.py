@@ -20,6 +20,7 @@ _BINARIES = "FMI 2.0.5 section 2.3, FMI 3.0.2 section 2.5.1"
 _FUNCTIONS = "FMI 2.0.5 sections 2.1 and 4.2, FMI 3.0.2 section 2.5"
 PLATFORM = Rule("binary.platform", _BINARIES)
 SOURCES_ONLY = Rule("binary.sources-only", _BINARIES, "warning")
+WINDOWS_ONLY = Rule("binary.windows-only", _BINARIES, "warning")
 PRESENT = Rule("binary.present", _BINARIES)
 FORMAT = Rule("binary.format", _BINARIES)
 FUNCTIONS = Rule("binary.functions", _FUNCTIONS)
@@ -27,6 +28,9 @@ UNUSED_FUNCTIONS = Rule("binary.unused-functions", _FUNCTIONS, "warning")
 SIZE = Rule("binary.size", "limits")
 NEEDED = Rule("binary.needed", _BINARIES, "warning")
 VERSION = Rule("binary.version", "FMI 2.0.5 section 2.1.4, FMI 3.0.2 section 2.2.4", "warning")
+
+#: platform of the libraries that run under Wine
+WINDOWS = FmuPlatform("windows", "x86_64", ".dll")
 
 _READERS: Mapping[str, Callable[[bytes, str], SharedLibrary]] = {
     ".so": elf.read_library,
@@ -51,14 +55,13 @@ def list_platforms(names: Iterable[str]) -> list[str]:
     return [*sorted(folders), *(["c-code"] if sources else [])]
 
 
-def can_be_compiled(major: int, platforms: Collection[str]) -> bool:
-    """Return whether an FMU without a binary for this machine has sources of an FMI version whose headers are known.
+def can_be_compiled(platforms: Collection[str]) -> bool:
+    """Return whether an FMU without a binary for this machine has sources.
 
     Args:
-        major: FMI major version.
         platforms: Result of `list_platforms`.
     """
-    return major > 1 and "c-code" in platforms
+    return "c-code" in platforms
 
 
 def check_binary(
@@ -80,10 +83,14 @@ def check_binary(
     platforms = list_platforms(archive.members)
     if folder not in platforms:
         names = folder if folder == machine.platform_tuple else f"{machine.platform_tuple} ({folder})"
-        if can_be_compiled(model.major, platforms):
+        if can_be_compiled(platforms):
             yield SOURCES_ONLY(f"has no binary for {names}; its sources are compiled when it is used")
             return
-        yield PLATFORM(f"has no binary for {names}; it has: {', '.join(platforms) or 'no binaries'}")
+        if machine.platform_tuple == "x86_64-linux" and WINDOWS.binary_folder(model.major) in platforms:
+            yield WINDOWS_ONLY(f"has no binary for {names}; its library for Windows runs under Wine")
+            return
+        bits = "; 32-bit libraries for Windows cannot be used" if {"win32", "x86-windows"} & set(platforms) else ""
+        yield PLATFORM(f"has no binary for {names}; it has: {', '.join(platforms) or 'no binaries'}{bits}")
         return
     identifier = model.interfaces[interface].get("modelIdentifier", "")
     member = f"binaries/{folder}/{identifier}{machine.suffix}"

@@ -16,7 +16,7 @@ _ZIP = "FMI 2.0.5 section 2.3, FMI 3.0.2 section 2.5"
 NAME = Rule("archive.name", _ZIP)
 NAME_FORM = Rule("archive.name-form", _ZIP, "warning")
 COLLISION = Rule("archive.collision", _ZIP)
-REPEATED_FOLDER = Rule("archive.repeated-folder", _ZIP, "warning")
+REPEATED = Rule("archive.repeated", _ZIP, "warning")
 KIND = Rule("archive.kind", _ZIP)
 ENCRYPTION = Rule("archive.encryption", _ZIP)
 COMPRESSION = Rule("archive.compression", _ZIP)
@@ -94,16 +94,22 @@ def _check_kind(entry: ZipEntry) -> Iterator[Finding]:
         yield COMPRESSION(f"is compressed by method {entry.method}, expected 0 (stored) or 8 (deflated)", name)
 
 
-def check_collisions(names: Sequence[str]) -> Iterator[Finding]:
-    """Check for members that are the same file on some file system, or that are inside another member that is a file."""
+def check_collisions(members: Sequence[tuple[str, object]]) -> Iterator[Finding]:
+    """Check for members that are the same file on some file system, or that are inside another member that is a file.
+
+    Args:
+        members: Names, each with CRC and size of the content; a member that is repeated without a change is a warning.
+    """
     first_names: dict[str, str] = {}
-    for name in names:
+    contents: dict[str, object] = {}
+    for name, content in members:
         folded = _fold_case(name)
         if folded in first_names:
             first = first_names[folded]
-            rule = REPEATED_FOLDER if first == name and name.endswith("/") else COLLISION
+            rule = REPEATED if first == name and content == contents[name] else COLLISION
             yield rule("occurs twice" if first == name else f'differs only in case or Unicode form from "{first}"', name)
         first_names.setdefault(folded, name)
+        contents.setdefault(name, content)
     files = {folded for folded, name in first_names.items() if not name.endswith("/")}
     for folded, name in first_names.items():
         if parent := next((folder for folder in _parent_folders(folded) if folder in files), None):

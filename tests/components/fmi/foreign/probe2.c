@@ -82,7 +82,7 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_se
     Probe *m = c;
     if (t + h > m->r[3]) {
         m->callbacks->logger(m->callbacks->componentEnvironment, m->name, (fmi2Status)m->i[4], "error",
-                             "told to fail, 100%s sure");
+                             "told to fail, %d%s%s sure, %.1f s", 100, "%", "s", t);
         return (fmi2Status)m->i[4];
     }
     m->r[1] += h * (m->r[0] - m->r[1]) / 0.5;

@@ -154,7 +154,7 @@ typedef struct {
 } EventInfo;
 
 void *ball_fmiInstantiateModel(const char *name, const char *guid, Callbacks callbacks, char logging) {
-    callbacks.logger(NULL, name, 0, "info", "a ball of FMI 1.0");
+    callbacks.logger(NULL, name, 0, "info", "a ball of FMI %.1f", 1.0);
     return create();
 }
 void ball_fmiFreeModelInstance(void *c) { free(c); }

@@ -209,10 +209,19 @@ def test_texts_are_read_from_functions_that_only_return_them(tmp_path, option):
 
 
 def test_another_platform_is_reported_with_the_existing_ones(fmu):
-    path = fmu(b"MZ", "binaries/win64/probe.dll")
+    path = fmu(b"MZ", "binaries/win32/probe.dll")
     this = current_platform()
-    assert f"has no binary for {this.platform_tuple} ({this.fmi2_platform}); it has: win64" in refusal_message(path)
-    assert FmuFile(path).description.platforms == ["win64"]
+    expected = (
+        f"has no binary for {this.platform_tuple} ({this.fmi2_platform}); it has: win32; 32-bit libraries for Windows cannot"
+    )
+    assert expected in refusal_message(path)
+    assert FmuFile(path).description.platforms == ["win32"]
+
+
+@pytest.mark.skipif(current_platform().platform_tuple != "x86_64-linux", reason="Windows libraries run under Wine on Linux only")
+def test_a_library_for_windows_is_a_warning(fmu):
+    problems = find_problems(fmu(b"MZ", "binaries/win64/probe.dll"))
+    assert [(f.rule.name, f.rule.severity) for f in problems] == [("binary.windows-only", "warning")]
 
 
 def test_sources_alone_are_compiled_when_the_fmu_is_used(fmu):

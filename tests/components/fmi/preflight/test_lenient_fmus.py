@@ -58,7 +58,8 @@ DEVIATIONS: dict[str, tuple[int, Change, str]] = {
     "names that begin with ./": (2, renamed(lambda name: f"./{name}"), "archive.name-form"),
     "backslashes": (2, renamed(lambda name: name.replace("/", "\\")), "archive.name-form"),
     "entry ./": (2, lambda files: [("./", b""), *files.items()], "archive.name-form"),
-    "folder twice": (2, lambda files: [("extra/", b""), ("extra/", b""), *files.items()], "archive.repeated-folder"),
+    "folder twice": (2, lambda files: [("extra/", b""), ("extra/", b""), *files.items()], "archive.repeated"),
+    "file twice": (2, lambda files: [("extra/a.txt", b"a"), ("extra/a.txt", b"a"), *files.items()], "archive.repeated"),
 }
 
 

@@ -1,0 +1,105 @@
+"""JSON files that the arguments of components name, for example vehicle files.
+
+A text in "arguments" that ends in ".json" stands for the content of this file. Its path starts from the folder of the file that
+contains the text.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from ..core.errors import InputError, Problem
+from .json_document import Document, JsonPath, Origin, read_document
+
+SUFFIX = ".json"
+
+
+def include_files(document: Document) -> Document:
+    """Replace the names of JSON files in the arguments of all components by the contents of these files.
+
+    Problems of an included value name the file and line in which it was written. A file that cannot be read is a problem of the
+    result.
+    """
+    components = document.value.get("components") if isinstance(document.value, dict) else None
+    if not isinstance(components, dict):
+        return document
+    inclusion = _Inclusion(document)
+    included = {name: inclusion.include_in(name, component) for name, component in components.items()}
+    if not (inclusion.files or inclusion.problems):
+        return document
+    return replace(
+        document,
+        value={**document.value, "components": included},
+        problems=[*document.problems, *inclusion.problems],
+        invalid_paths=[*document.invalid_paths, *inclusion.invalid_paths],
+        origins={**document.origins, **inclusion.origins},
+        bases=(*document.bases, *inclusion.files),
+    )
+
+
+def include_in_setting(keys: Sequence[str], value: Any, folder: Path) -> tuple[Any, list[Path]]:
+    """Return the value of a setting in which the contents of files replace their names, and these files.
+
+    Args:
+        keys: Keys of the JSON pointer that is set.
+        value: Value to set.
+        folder: Folder that its paths start from.
+
+    Raises:
+        InputError: A file cannot be read.
+    """
+    files: list[Path] = []
+
+    def read(text: str, _path: JsonPath) -> Any:
+        file = read_document(folder / text)
+        if file.problems:
+            raise InputError(file.problems)
+        files.append(file.file)
+        return file.value
+
+    is_argument = len(keys) > 2 and keys[0] == "components" and keys[2] == "arguments"
+    return (_replace_names(value, (), read) if is_argument else value), files
+
+
+def _replace_names(value: Any, path: JsonPath, content: Callable[[str, JsonPath], Any]) -> Any:
+    """Return a value in which each name of a JSON file is replaced by content(name, path of the name)."""
+    if isinstance(value, dict):
+        return {key: _replace_names(each, (*path, key), content) for key, each in value.items()}
+    if isinstance(value, list):
+        return [_replace_names(each, (*path, i), content) for i, each in enumerate(value)]
+    return content(value, path) if isinstance(value, str) and value.endswith(SUFFIX) else value
+
+
+class _Inclusion:
+    """Inclusion of files into one document. Results: `files`, `origins`, `problems`, `invalid_paths`."""
+
+    def __init__(self, document: Document) -> None:
+        self._document = document
+        self.files: list[Path] = []
+        self.origins: dict[JsonPath, Origin] = {}
+        self.problems: list[Problem] = []
+        self.invalid_paths: list[JsonPath] = []
+
+    def include_in(self, name: str, component: Any) -> Any:
+        """Return a component whose arguments contain the included files."""
+        if not isinstance(component, dict) or "arguments" not in component:
+            return component
+        path = ("components", name, "arguments")
+        return {**component, "arguments": _replace_names(component["arguments"], path, self._content)}
+
+    def _content(self, text: str, path: JsonPath) -> Any:
+        try:
+            file = read_document(self._document.file.parent / text)
+        except InputError as error:
+            where = self._document.where(path)
+            self.problems += [Problem(problem.message, problem.where or where) for problem in error.problems]
+            self.invalid_paths.append(path)
+            return {}
+        self.files.append(file.file)
+        self.problems += file.problems
+        self.invalid_paths += [(*path, *each) for each in file.invalid_paths]
+        self.origins |= {(*path, *each): Origin(file, each) for each in file.offsets}
+        return file.value

@@ -1,0 +1,36 @@
+"""Export of a vehicle that is given by a file."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from cosim.core.errors import InputError, Problem
+from cosim.export.fmu.block import Block
+
+from .catalogue import FAMILIES, model_from_data
+from .vehicles.multirotor.multirotor_equations import multirotor_block
+
+
+def vehicle_block(path: Path) -> Block:
+    """Return a vehicle for export.
+
+    Raises:
+        InputError: The file is not JSON, or the data are wrong; lists all problems.
+    """
+    try:
+        data: Any = json.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise InputError(Problem(f"cannot be read: {error}", str(path))) from None
+    if not isinstance(data, dict) or "family" not in data:
+        raise InputError(
+            Problem(f'is no vehicle file; expected an object with "family", one of: {", ".join(FAMILIES)}', str(path))
+        )
+    try:
+        model = model_from_data(data, path.stem)
+    except InputError as error:
+        problems = (Problem(each.message, f"{path}: {'.'.join(each.subject[1:])}") for each in error.problems)
+        raise InputError(list(problems)) from None
+    assert model.airframe is not None
+    return multirotor_block(model.airframe, f"{data.get('description', model.name)} in free flight")

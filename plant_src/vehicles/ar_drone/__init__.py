@@ -1,1 +1,0 @@
-"""The AR.Drone 2.0 quadcopter."""

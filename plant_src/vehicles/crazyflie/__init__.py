@@ -1,1 +1,0 @@
-"""The Crazyflie 2.x nano quadcopter."""

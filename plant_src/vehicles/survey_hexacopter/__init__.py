@@ -1,1 +1,0 @@
-"""A survey hexacopter of the Tarot FY680 class."""
