@@ -83,6 +83,22 @@ def test_degrees_become_radians():
     assert (180 * factor, offset) == (math.pi, 0.0)
 
 
+@pytest.mark.parametrize(
+    ("text", "like", "value", "expected"),
+    [
+        ("bar", "Pa", 1, 1e5),
+        ("degF", "degC", 212, 100),
+        ("degRk", "K", 1.8, 1),
+        ("kW.h", "J", 1, 3.6e6),
+        ("d", "h", 1, 24),
+        ("l", "m3", 1000, 1),
+    ],
+)
+def test_units_of_the_modelica_standard_library_are_converted(text, like, value, expected):
+    factor, offset = parse_unit(text).conversion(parse_unit(like))
+    assert factor * value + offset == pytest.approx(expected, rel=1e-12)
+
+
 def test_celsius_becomes_kelvin():
     factor, offset = parse_unit("degC").conversion(parse_unit("K"))
     assert factor * 20 + offset == 293.15

@@ -60,6 +60,9 @@ ROLES = {
     "vessel_autopilot": Role("waypoint_follower", "WaypointFollower", ("fmus/strider.fmu",)),
     "uav_controller": Role("deck_follower", "DeckFollower", ("fmus/ar_drone.fmu", "fmus/strider.fmu")),
 }
+#: role of a controller from a Modelica library (`--library`)
+LIBRARY_ROLE = "vessel_speed"
+_ALL_ROLES = ROLES | {LIBRARY_ROLE: Role("speed_pid", "SpeedPid", ("fmus/waypoint_guidance.fmu", "fmus/heading_controller.fmu"))}
 LANGUAGES = {
     "python": Language("python", "SNAKE.py:CAMEL", "SNAKE.py"),
     "modelica": Language("modelica", "CAMEL.mo:CAMEL", "CAMEL.mo"),
@@ -83,13 +86,18 @@ command.add_command(new_vehicle.command, "vehicle")
     "--role", default=next(iter(ROLES)), show_default=True, help=f"Role, which determines the variables: {', '.join(ROLES)}."
 )
 @click.option(
+    "--library",
+    is_flag=True,
+    help="With --language modelica: a speed controller of a vessel around the Standard Library's LimPID.",
+)
+@click.option(
     "--directory",
     type=click.Path(path_type=Path),
     default=Path(),
     help="Parent of the folder NAME; default: the working directory.",
 )
 @click.option("--force", is_flag=True, help="Overwrite existing files.")
-def controller(name: str, language: str, role: str, directory: Path, force: bool) -> None:
+def controller(name: str, language: str, role: str, library: bool, directory: Path, force: bool) -> None:
     """Create the folder NAME with a controller, a scenario in which it runs, and a test.
 
     A vessel_autopilot passes waypoints. A uav_controller is a quadcopter controller that follows the deck of a vessel. The
@@ -98,15 +106,20 @@ def controller(name: str, language: str, role: str, directory: Path, force: bool
     for kind, chosen, known in (("language", language, LANGUAGES), ("role", role, ROLES)):
         if chosen not in known:
             raise InputError(f'there is no {kind} "{chosen}"{did_you_mean(chosen, known)}')
+    if library and language != "modelica":
+        raise InputError(f"--library needs --language modelica, found --language {language}")
+    role = LIBRARY_ROLE if library else role
     names, texts = _controller_files(name, role, language)
     folder = directory / names["SNAKE"]
-    _write_files({folder / file: text for file, text in texts.items()}, [folder / plant for plant in ROLES[role].plants], force)
+    _write_files(
+        {folder / file: text for file, text in texts.items()}, [folder / plant for plant in _ALL_ROLES[role].plants], force
+    )
     _print_next_steps(LANGUAGES[language], folder, names)
 
 
 def _controller_files(name: str, role: str, language: str) -> tuple[dict[str, str], dict[str, str]]:
     """Return the names of a controller (SNAKE and CAMEL), and the texts of its files by file name."""
-    template, chosen = ROLES[role], LANGUAGES[language]
+    template, chosen = _ALL_ROLES[role], LANGUAGES[language]
     texts = _read_texts(TEMPLATES / role / language) | _read_texts(TEMPLATES / chosen.shared)
     test = texts.pop("test_controller.py")
     names = _controller_names(name, template, texts.values())
@@ -115,7 +128,8 @@ def _controller_files(name: str, role: str, language: str) -> tuple[dict[str, st
     source = {"SOURCE": chosen.key, "FILE": _substitute(chosen.component, names)}
     files[f"{names['SNAKE']}.json"] = _substitute((TEMPLATES / role / "scenario.json").read_text(), replaced | source)
     files[f"test_{names['SNAKE']}.py"] = _substitute(test, {_TEST_NAME: names["SNAKE"]})
-    files[_FIGURES_FILE] = (TEMPLATES / role / _FIGURES_FILE).read_text()
+    if (TEMPLATES / role / _FIGURES_FILE).exists():
+        files[_FIGURES_FILE] = (TEMPLATES / role / _FIGURES_FILE).read_text()
     return names, files
 
 

@@ -18,9 +18,22 @@ The source files define these functions:
         Advance from `time` by `step_size` with constant inputs. Afterwards the outputs of a continuous model belong to the
         new time; those of a sampled model were computed at the last tick in [time, time + step_size).
 
+If `model.h` defines MODEL_EXCHANGE, the block is also exported for Model Exchange. Then `model.h` defines MODEL_STATES and
+MODEL_INDICATORS, the numbers of continuous states and event indicators; with indicators, `Model` has a member
+`double indicator[MODEL_INDICATORS]`. The source files define these functions:
+
+    void model_states(Model *m, double **states, double **rates);
+        Return the addresses of the states and of their derivatives.
+    const char *model_continuous(Model *m, double time);
+        Compute all continuous variables, the derivatives and the indicators from states, inputs and the time.
+    const char *model_update(Model *m, double time, double *next);
+        Execute an event with its iteration; `next` is the time of the next time event, or infinite.
+    void model_accept(Model *m, double time);
+        Accept the states as part of the solution, after an integration step.
+
 If `model.h` defines MODEL_FREE, `void model_free(Model *m);` is called before the memory of a model is freed.
 
-The functions `model_initialize` and `model_step` return NULL on success, else the reason for the failure, a text that is valid
+Functions with the result `const char *` return NULL on success, else the reason for the failure, a text that is valid
 until the next call. It is logged, and the FMI function returns fmi2Error or fmi3Error.
 Functions that other programs load from the binary are marked `MODEL_EXPORT`
 (defined in `export.h` of the shell).
@@ -60,6 +73,25 @@ class BlockVariable:
     maximum: float | None = None
     #: (name, description) of the enumeration literals, whose values are 1, 2, ...
     enumeration: tuple[tuple[str, str], ...] = ()
+    #: name of the enumeration type; by default it is derived from the name of the first variable with the same literals
+    type_name: str = ""
+    #: physical quantity, for example "Mass"
+    quantity: str = ""
+
+
+@dataclass(frozen=True, slots=True)
+class Exchange:
+    """Description of a block for Model Exchange.
+
+    Attributes:
+        states: Name of each continuous state -> name of its derivative.
+        indicators: Variables of the event indicators.
+        stores_values: True if accepted integration steps must be reported, because the model stores past values.
+    """
+
+    states: Mapping[str, str]
+    indicators: Sequence[BlockVariable]
+    stores_values: bool
 
 
 @dataclass(frozen=True)
@@ -76,3 +108,5 @@ class Block:
     files: Mapping[str, str]
     #: name in the FMU's `resources/` folder -> file, for the original sources
     resources: Mapping[str, Path] = field(default_factory=dict)
+    #: None if the block is only exported for Co-Simulation
+    exchange: Exchange | None = None

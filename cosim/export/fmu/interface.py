@@ -29,15 +29,21 @@ class TableRow(NamedTuple):
 
 
 def variable_table(block: Block, fmi_version: int) -> list[TableRow]:
-    """Return the table of variables for an FMI version; for FMI 2.0 each element of an array is a scalar variable."""
+    """Return the table of variables for an FMI version.
+
+    In FMI 2.0 each element of an array is a scalar variable. In FMI 3.0 event indicators are variables.
+    """
     if fmi_version == 3:
-        return [TableRow(variable) for variable in block.variables]
+        indicators = block.exchange.indicators if block.exchange else ()
+        return [TableRow(variable) for variable in (*block.variables, *indicators)]
     return [row for variable in block.variables for row in _scalar_rows(variable)]
 
 
 def _scalar_rows(variable: BlockVariable) -> Iterator[TableRow]:
-    names = Variable(variable.name, shape=variable.shape).scalar_names
-    for element, (name, start) in enumerate(zip(names, start_values(variable), strict=True)):
+    inner = variable.name.removeprefix("der(").removesuffix(")") if variable.name.startswith("der(") else ""
+    names = Variable(inner or variable.name, shape=variable.shape).scalar_names
+    for element, (scalar, start) in enumerate(zip(names, start_values(variable), strict=True)):
+        name = f"der({scalar})" if inner else scalar
         yield TableRow(replace(variable, name=name, shape=(), start=start), element)
 
 

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any
 from xml.etree import ElementTree
 
@@ -49,25 +49,35 @@ def to_bytes(root: Element) -> bytes:
 
 def _fmi2_description(block: Block, token: str, c_files: Sequence[str]) -> Element:
     root = _root_element(block, "2.0", guid=token)
-    interface = _add_element(
-        root,
-        "CoSimulation",
-        modelIdentifier=block.identifier,
-        canHandleVariableCommunicationStepSize=True,
-        canNotUseMemoryManagementFunctions=True,
-        canGetAndSetFMUstate=True,
-        canSerializeFMUstate=True,
-    )
-    files = _add_element(interface, "SourceFiles")
-    for name in c_files:
-        _add_element(files, "File", name=name)
-    table = variable_table(block, 2)
+    common = {
+        "modelIdentifier": block.identifier,
+        "canNotUseMemoryManagementFunctions": True,
+        "canGetAndSetFMUstate": True,
+        "canSerializeFMUstate": True,
+    }
+    interfaces = []
+    if block.exchange:
+        root.set("numberOfEventIndicators", str(len(block.exchange.indicators)))
+        unneeded = not block.exchange.stores_values
+        interfaces.append(_add_element(root, "ModelExchange", completedIntegratorStepNotNeeded=unneeded, **common))
+    interfaces.append(_add_element(root, "CoSimulation", canHandleVariableCommunicationStepSize=True, **common))
+    for interface in interfaces:
+        files = _add_element(interface, "SourceFiles")
+        for name in c_files:
+            _add_element(files, "File", name=name)
+    table, declared = variable_table(block, 2), _declared_types(block)
+    states = _states_of_derivatives(block, table)
     _add_common_elements(root, block, 2)
     variables = _add_element(root, "ModelVariables")
     for reference, row in enumerate(table):
-        _add_fmi2_variable(variables, reference, row.variable, _declared_types(block))
+        _add_fmi2_variable(variables, reference, row.variable, declared, states.get(reference))
     structure = _add_element(root, "ModelStructure")
-    for name, unknowns in (("Outputs", _output_indices(table)), ("InitialUnknowns", _initial_unknown_indices(table))):
+    groups = {
+        "Outputs": _output_indices(table),
+        "Derivatives": list(states),
+        "InitialUnknowns": _initial_unknown_indices(table, states),
+    }
+    for name, unknowns in groups.items():
         if unknowns:
             group = _add_element(structure, name)
             for reference in unknowns:
@@ -75,9 +85,12 @@ def _fmi2_description(block: Block, token: str, c_files: Sequence[str]) -> Eleme
     return root
 
 
-def _add_fmi2_variable(parent: Element, reference: int, variable: BlockVariable, declared: dict[Any, str]) -> None:
+def _add_fmi2_variable(
+    parent: Element, reference: int, variable: BlockVariable, declared: dict[Any, str], state: int | None
+) -> None:
     scalar = _add_element(parent, "ScalarVariable", **_common_attributes(reference, variable))
-    _add_element(scalar, _FMI2_TYPES.get(variable.type, variable.type), **_type_attributes(variable, declared))
+    derivative = {"derivative": None if state is None else state + 1}
+    _add_element(scalar, _FMI2_TYPES.get(variable.type, variable.type), **_type_attributes(variable, declared), **derivative)
 
 
 # -- FMI 3.0 ---------------------------------------------------------------------------------------------------------------
@@ -85,26 +98,31 @@ def _add_fmi2_variable(parent: Element, reference: int, variable: BlockVariable,
 
 def _fmi3_description(block: Block, token: str) -> Element:
     root = _root_element(block, "3.0", instantiationToken=token)
-    _add_element(
-        root,
-        "CoSimulation",
-        modelIdentifier=block.identifier,
-        canHandleVariableCommunicationStepSize=True,
-        canGetAndSetFMUState=True,
-        canSerializeFMUState=True,
-    )
-    table = variable_table(block, 3)
+    common = {"modelIdentifier": block.identifier, "canGetAndSetFMUState": True, "canSerializeFMUState": True}
+    if block.exchange:
+        _add_element(root, "ModelExchange", needsCompletedIntegratorStep=block.exchange.stores_values, **common)
+    _add_element(root, "CoSimulation", canHandleVariableCommunicationStepSize=True, **common)
+    table, declared = variable_table(block, 3), _declared_types(block)
+    states = _states_of_derivatives(block, table)
     _add_common_elements(root, block, 3)
     variables = _add_element(root, "ModelVariables")
     time = {"name": "time", "valueReference": 0, "causality": "independent", "variability": "continuous", "unit": "s"}
     _add_element(variables, "Float64", **time)
-    for reference, row in enumerate(table, start=1):
-        attributes = _common_attributes(reference, row.variable) | _type_attributes(row.variable, _declared_types(block))
-        element = _add_element(variables, row.variable.type, **attributes)
+    for index, row in enumerate(table):
+        attributes = _common_attributes(index + 1, row.variable) | _type_attributes(row.variable, declared)
+        derivative = states[index] + 1 if index in states else None
+        element = _add_element(variables, row.variable.type, **attributes, derivative=derivative)
         for size in row.variable.shape:
             _add_element(element, "Dimension", start=size)
     structure = _add_element(root, "ModelStructure")
-    for name, unknowns in (("Output", _output_indices(table)), ("InitialUnknown", _initial_unknown_indices(table))):
+    count = len(block.exchange.indicators) if block.exchange else 0
+    groups = {
+        "Output": _output_indices(table),
+        "ContinuousStateDerivative": list(states),
+        "InitialUnknown": _initial_unknown_indices(table, states),
+        "EventIndicator": range(len(table) - count, len(table)),
+    }
+    for name, unknowns in groups.items():
         for reference in unknowns:
             _add_element(structure, name, valueReference=reference + 1)
     return root
@@ -146,11 +164,14 @@ def add_units(root: Element, names: Collection[str]) -> None:
 
 
 def _declared_types(block: Block) -> dict[Any, str]:
-    """Return the type name of each enumeration (a tuple of literals), derived from the first variable of this type."""
+    """Return the type name of each enumeration (a tuple of literals), which differs from all other names."""
     names: dict[Any, str] = {}
+    taken = {variable.name for variable in block.variables}
     for variable in block.variables:
-        if variable.enumeration:
-            names.setdefault(variable.enumeration, f"{variable.name}_type")
+        if variable.enumeration and variable.enumeration not in names:
+            name = variable.type_name or f"{variable.name}_type"
+            names[variable.enumeration] = f"{variable.name}_type" if name in taken else name
+            taken.add(name)
     return names
 
 
@@ -192,6 +213,7 @@ def _type_attributes(variable: BlockVariable, declared: dict[Any, str]) -> dict[
     has_start = _initial(variable) != "calculated"
     return {
         "declaredType": declared.get(variable.enumeration),
+        "quantity": variable.quantity or None if variable.type != "Boolean" else None,
         "unit": variable.unit or None if variable.type == "Float64" else None,
         "min": None if minimum is None else number(minimum),
         "max": None if maximum is None else number(maximum),
@@ -207,12 +229,25 @@ def _output_indices(table: Sequence[TableRow]) -> list[int]:
     return [reference for reference, row in enumerate(table) if row.variable.causality == "output"]
 
 
-def _initial_unknown_indices(table: Sequence[TableRow]) -> list[int]:
+def _initial_unknown_indices(table: Sequence[TableRow], states: Mapping[int, int]) -> list[int]:
+    others = {*states, *states.values()}
     return [
         reference
         for reference, (variable, _) in enumerate(table)
-        if variable.causality in ("output", "calculatedParameter") and _initial(variable) == "calculated"
+        if (variable.causality in ("output", "calculatedParameter") and _initial(variable) == "calculated") or reference in others
     ]
+
+
+def _states_of_derivatives(block: Block, table: Sequence[TableRow]) -> dict[int, int]:
+    """Return the index of each derivative in the table -> the index of its state, in the order of the states."""
+    rows: dict[str, list[int]] = {}
+    for index, row in enumerate(table):
+        rows.setdefault(row.variable.member, []).append(index)
+    members = {variable.name: variable.member for variable in block.variables}
+    pairs = block.exchange.states.items() if block.exchange else ()
+    return {
+        derivative: state for names in pairs for state, derivative in zip(*(rows[members[name]] for name in names), strict=True)
+    }
 
 
 def _add_element(parent: Element, tag: str, **attributes: Any) -> Element:

@@ -16,6 +16,7 @@ from .model_description import build_description_xml, model_description_xml
 
 SHELL_FOLDER = Path(__file__).parents[1] / "shell"
 _SHELL_FILES = {2: ("fmi2.c", "common.h", "export.h"), 3: ("fmi3.c", "common.h", "export.h")}
+_EXCHANGE_FILES = {2: ("exchange.h", "exchange2.h"), 3: ("exchange.h", "exchange3.h")}
 _FMI_HEADERS = {
     2: ("fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"),
     3: ("fmi3Functions.h", "fmi3FunctionTypes.h", "fmi3PlatformTypes.h"),
@@ -23,7 +24,9 @@ _FMI_HEADERS = {
 
 
 def write_fmu(block: Block, fmi_version: int, target: Path) -> Path:
-    """Write the Co-Simulation FMU of a block; the same block and compiler give the same bytes.
+    """Write the FMU of a block, for Co-Simulation and, if the block supports it, for Model Exchange.
+
+    The same block and compiler give the same bytes.
 
     Args:
         block: The block.
@@ -61,7 +64,8 @@ def _description_and_sources(block: Block, fmi_version: int) -> dict[str, bytes]
 def _collect_sources(block: Block, fmi_version: int) -> dict[str, bytes]:
     """Return all source files and headers that are needed to compile the FMU, without the instantiation token."""
     sources = {name: text.encode() for name, text in block.files.items()}
-    sources |= {name: (SHELL_FOLDER / name).read_bytes() for name in _SHELL_FILES[fmi_version]}
+    shell = _SHELL_FILES[fmi_version] + (_EXCHANGE_FILES[fmi_version] if block.exchange else ())
+    sources |= {name: (SHELL_FOLDER / name).read_bytes() for name in shell}
     sources |= fmi_headers(fmi_version)
     sources["variables.h"] = c_variable_table(block, fmi_version).encode()
     return sources

@@ -16,11 +16,11 @@ The package rumoca parses, checks and flattens a model. The order of computation
 |              | `hybrid`: variables for pre(), relations and delay(); `continuous_equations`: solve the equations, with    |
 |              | `matching` if each has a variable alone on one side, else with `equation_systems` (`scalar_equations`,     |
 |              | `assignment`, `differentiation`); `when_conditions`: clocks and edge detectors; `topological_sort`;        |
-|              | `schedule`: the order of computation; `parameter_roles`: which parameters can be set; `interpreter`,       |
-|              | `hybrid_interpreter` (`past_values`): simulation of a model in Python                                      |
+|              | `schedule` (`nodes`, `between_events`): the order of computation; `parameter_roles`: which parameters can  |
+|              | be set; `interpreter`, `hybrid_interpreter` (`past_values`): simulation of a model in Python               |
 | `c_code/`    | `emit`: the files; `model_code`: model.c; `hybrid_code`: model.c with event iteration; `header`: model.h;  |
-|              | `model_step`: clock ticks and integration; `functions`, `statements`, `expressions`, `subscripts`,         |
-|              | `builtin_functions`, `lowering`, `c_values`, `formatting`: parts of model.c                                |
+|              | `model_step`: clock ticks and integration; `exchange_code`: Model Exchange; `functions`, `statements`,     |
+|              | `expressions`, `subscripts`, `builtin_functions`, `lowering`, `c_values`, `formatting`: parts of model.c   |
 | `external/`  | `sources`: C files of external functions; `calls`: C functions that call them; `library`: evaluation in     |
 |              | Python; `external.c`: errors, messages, Strings and external objects                                       |
 | (here)       | `assemble`: a Modelica file to a block, with the FMI variables                                             |

@@ -15,8 +15,9 @@ import numpy as np
 from ...core import units
 from ...core.component import Causality, Variability
 from ...core.errors import InputError, Problem
-from ..fmu.block import Block, BlockVariable
+from ..fmu.block import Block, BlockVariable, Exchange
 from .c_code.emit import generate_c
+from .c_code.exchange_code import has_exchange, indicator_count
 from .c_code.header import struct_members
 from .causality.continuous_states import introduce_derivatives
 from .causality.dependent_states import reduce_states
@@ -31,7 +32,7 @@ from .frontend.reader import ModelReader
 from .frontend.rumoca_frontend import ModelicaSources, flatten_model
 from .frontend.strings import fold_strings, string_parameters
 from .model.arithmetic import EvaluationError
-from .model.flat_model import Model, Variable
+from .model.flat_model import Model, Variable, derivative_name
 from .model.syntax_tree import raise_model_error
 from .model.traversal import variable_names
 
@@ -70,7 +71,19 @@ def _load_block(path: Path, model: str | None, library_path: Sequence[Path]) -> 
         step_size=min((float(defaults.evaluate(clock.period)) for clock in defaults.schedule.clocks), default=_DEFAULT_STEP_SIZE),
         files=generate_c(defaults, sorted(names), sources.packages),
         resources=names,
+        exchange=_exchange(defaults.model) if has_exchange(defaults.model) else None,
     )
+
+
+def _exchange(model: Model) -> Exchange:
+    indicators = [
+        BlockVariable(
+            f"_event_indicator_{k + 1}", f"indicator[{k}]", "Float64", "local", "continuous", description="For Model Exchange"
+        )
+        for k in range(indicator_count(model))
+    ]
+    stores_values = model.hybrid is not None and bool(model.hybrid.delays)
+    return Exchange({state: derivative_name(state) for state in model.states}, indicators, stores_values)
 
 
 def load_interpreter(path: Path, model: str | None = None, library_path: Sequence[Path] = ()) -> Interpreter:
@@ -164,8 +177,8 @@ def _fmi_role(variable: Variable, defaults: Interpreter) -> FmiRole | None:
     """Return causality and variability of a variable in the FMU, or None if the FMU does not contain it.
 
     The FMU contains the inputs and outputs of the model itself, and all parameters that are neither protected nor set by a
-    modifier. Structural parameters are constants. The FMU of a model with event iteration or with a library contains all other
-    variables too.
+    modifier. Structural parameters are constants. The FMU of a model with states, event iteration or a library contains all
+    other variables too.
     """
     roles = defaults.parameter_roles
     if variable.type == "ExternalObject":
@@ -182,7 +195,7 @@ def _fmi_role(variable: Variable, defaults: Interpreter) -> FmiRole | None:
     if variable.causality == "output" and variable.top_level:
         return "output", "continuous" if continuous else "discrete"
     if (
-        (defaults.model.hybrid or defaults.model.uses_library)
+        (defaults.model.hybrid or defaults.model.uses_library or defaults.model.states)
         and not variable.name.startswith(("$", "pre("))
         and 0 not in variable.shape
     ):
@@ -204,6 +217,8 @@ def _block_variable(variable: Variable, member: str, role: FmiRole, defaults: In
         minimum=None if variable.minimum is None else float(np.min(defaults.evaluate(variable.minimum))),
         maximum=None if variable.maximum is None else float(np.max(defaults.evaluate(variable.maximum))),
         enumeration=tuple((literal, "") for literal in _literals(variable, defaults.model)),
+        type_name=variable.enumeration,
+        quantity=variable.quantity,
     )
 
 

@@ -31,7 +31,10 @@ const char *model_step(Model *m, double time, double step_size);
 /* ---- instances ------------------------------------------------------------------------------------------------------- */
 
 /* Phases of the life cycle of an instance; bits, so that an integer represents a set of phases. */
-typedef enum { INSTANTIATED = 1, INITIALIZING = 2, STEPPING = 4, TERMINATED = 8, FAILED = 16 } Phase;
+typedef enum { INSTANTIATED = 1, INITIALIZING = 2, STEPPING = 4, TERMINATED = 8, FAILED = 16, EVENT = 32, CONTINUOUS = 64 } Phase;
+
+/* Phases between initialization and termination; the last two are those of Model Exchange. */
+enum { RUNNING = STEPPING | EVENT | CONTINUOUS };
 
 /* The FMU state; it contains no pointers, so that it is saved by a copy. */
 typedef struct {
@@ -39,7 +42,7 @@ typedef struct {
     double time;      /* current communication point */
     double stop_time; /* infinite if undefined */
     Phase phase;
-    bool stale;       /* a variable was set in initialization mode after model_initialize */
+    bool stale;       /* a variable was set after the variables that depend on it were computed */
 } State;
 
 typedef struct {
@@ -47,6 +50,7 @@ typedef struct {
     Logger logger;
     void *environment;
     char *name;
+    bool exchange; /* an instance for Model Exchange */
 } Instance;
 
 /* ---- the table of variables ------------------------------------------------------------------------------------------ */
@@ -93,6 +97,8 @@ static const char *phase_name(Phase phase)
     case INSTANTIATED: return "after instantiation";
     case INITIALIZING: return "in initialization mode";
     case STEPPING: return "while stepping";
+    case EVENT: return "in event mode";
+    case CONTINUOUS: return "in continuous-time mode";
     case TERMINATED: return "after termination";
     default: return "after an error";
     }
@@ -188,11 +194,18 @@ static bool enter_initialization(Instance *instance, const char *function)
     return true;
 }
 
-/* In initialization mode, computes the model before a variable is read if another one was set before. */
+/* Computes the model before a variable is read if another one was set before; not between communication steps. */
 static bool refresh(Instance *instance, const char *function)
 {
     State *state = &instance->state;
-    if (state->phase != INITIALIZING || !state->stale) return true;
+    if (!state->stale) return true;
+#ifdef MODEL_EXCHANGE
+    if (state->phase & (EVENT | CONTINUOUS)) {
+        state->stale = false;
+        return succeeded(instance, function, model_continuous(&state->model, state->time));
+    }
+#endif
+    if (state->phase != INITIALIZING) return true;
     state->stale = false;
     if (!succeeded(instance, function, model_initialize(&state->model, state->time))) return false;
     report_warnings(instance);
@@ -202,7 +215,7 @@ static bool refresh(Instance *instance, const char *function)
 static bool exit_initialization(Instance *instance, const char *function)
 {
     if (!expect(instance, function, INITIALIZING) || !refresh(instance, function)) return false;
-    instance->state.phase = STEPPING;
+    instance->state.phase = instance->exchange ? EVENT : STEPPING;
     return true;
 }
 
@@ -225,7 +238,7 @@ static bool step(Instance *instance, const char *function, double time, double s
 
 static bool terminate(Instance *instance, const char *function)
 {
-    if (!expect(instance, function, STEPPING)) return false;
+    if (!expect(instance, function, RUNNING)) return false;
     instance->state.phase = TERMINATED;
     return true;
 }
@@ -259,7 +272,7 @@ static bool not_writable(Instance *instance, const char *function, const Variabl
 static inline bool writable(Instance *instance, const char *function, const Variable *variable)
 {
     const Role role = variable->role;
-    if (role > FIXED_PARAMETER || (role == FIXED_PARAMETER && instance->state.phase != STEPPING)) return true;
+    if (role > FIXED_PARAMETER || (role == FIXED_PARAMETER && !(instance->state.phase & RUNNING))) return true;
     return not_writable(instance, function, variable);
 }
 
@@ -320,7 +333,7 @@ static bool after_writing(Instance *instance, bool parameters)
     {                                                                                                                       \
         size_t done = 0;                                                                                                    \
         bool parameters = false;                                                                                            \
-        if (!expect(instance, function, INSTANTIATED | INITIALIZING | STEPPING)) return false;                              \
+        if (!expect(instance, function, INSTANTIATED | INITIALIZING | RUNNING)) return false;                              \
         for (size_t i = 0; i < count; ++i) {                                                                                \
             const Variable *variable = find(instance, function, references[i], TYPE);                                       \
             if (!variable || !writable(instance, function, variable)) return false;                                         \
@@ -351,7 +364,7 @@ static bool save_state(Instance *instance, const char *function, const State *st
 
 static bool get_state(Instance *instance, const char *function, void **saved)
 {
-    if (!expect(instance, function, INSTANTIATED | INITIALIZING | STEPPING | TERMINATED)) return false;
+    if (!expect(instance, function, INSTANTIATED | INITIALIZING | RUNNING | TERMINATED)) return false;
     return save_state(instance, function, &instance->state, saved);
 }
 

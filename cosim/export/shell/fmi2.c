@@ -1,4 +1,4 @@
-/* FMI 2.0 Co-Simulation interface of a model. */
+/* FMI 2.0 interface of a model: Co-Simulation, and Model Exchange if the model offers it. */
 #include "fmi2Functions.h"
 
 typedef fmi2CallbackLogger Logger;
@@ -46,11 +46,15 @@ fmi2Component fmi2Instantiate(fmi2String name, fmi2Type type, fmi2String guid, f
                               const fmi2CallbackFunctions *functions, fmi2Boolean visible, fmi2Boolean logging_on)
 {
     if (functions == NULL || functions->logger == NULL) return NULL;
+#ifndef MODEL_EXCHANGE
     if (type != fmi2CoSimulation) {
         Instance nobody = {.logger = functions->logger, .environment = functions->componentEnvironment, .name = ""};
         return refuse(&nobody, "fmi2Instantiate", "only Co-Simulation is offered"), NULL;
     }
-    return create("fmi2Instantiate", name, guid, functions->logger, functions->componentEnvironment);
+#endif
+    Instance *instance = create("fmi2Instantiate", name, guid, functions->logger, functions->componentEnvironment);
+    if (instance != NULL) instance->exchange = type == fmi2ModelExchange;
+    return instance;
 }
 
 void fmi2FreeInstance(fmi2Component c)
@@ -207,3 +211,7 @@ fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReferenc
 {
     return status(refuse(c, "fmi2GetRealOutputDerivatives", "not offered"));
 }
+
+#ifdef MODEL_EXCHANGE
+#include "exchange2.h"
+#endif

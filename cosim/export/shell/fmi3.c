@@ -1,4 +1,4 @@
-/* FMI 3.0 Co-Simulation interface of a model. */
+/* FMI 3.0 interface of a model: Co-Simulation, and Model Exchange if the model offers it. */
 #include "fmi3Functions.h"
 
 typedef fmi3LogMessageCallback Logger;
@@ -151,14 +151,6 @@ fmi3Status fmi3DeserializeFMUState(fmi3Instance instance, const fmi3Byte bytes[]
 #define NOT_OFFERED(function, ...)                                                                                          \
     fmi3Status function(__VA_ARGS__) { return status(refuse(instance, #function, "not offered")); }
 
-fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
-                                          fmi3Boolean logging_on, fmi3InstanceEnvironment environment,
-                                          fmi3LogMessageCallback logger)
-{
-    Instance nobody = {.logger = logger, .environment = environment};
-    return refuse(&nobody, "fmi3InstantiateModelExchange", "only Co-Simulation is offered"), NULL;
-}
-
 fmi3Instance fmi3InstantiateScheduledExecution(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
                                                fmi3Boolean logging_on, fmi3InstanceEnvironment environment,
                                                fmi3LogMessageCallback logger, fmi3ClockUpdateCallback clock_update,
@@ -177,12 +169,8 @@ NOT_OFFERED(fmi3SetClock, fmi3Instance instance, const fmi3ValueReference vr[], 
 
 NOT_OFFERED(fmi3EnterConfigurationMode, fmi3Instance instance)
 NOT_OFFERED(fmi3ExitConfigurationMode, fmi3Instance instance)
-NOT_OFFERED(fmi3EnterEventMode, fmi3Instance instance)
 NOT_OFFERED(fmi3EnterStepMode, fmi3Instance instance)
-NOT_OFFERED(fmi3EnterContinuousTimeMode, fmi3Instance instance)
 NOT_OFFERED(fmi3EvaluateDiscreteStates, fmi3Instance instance)
-NOT_OFFERED(fmi3UpdateDiscreteStates, fmi3Instance instance, fmi3Boolean *again, fmi3Boolean *terminate_requested,
-            fmi3Boolean *nominals_changed, fmi3Boolean *states_changed, fmi3Boolean *has_next_event, fmi3Float64 *next_event)
 
 NOT_OFFERED(fmi3GetNumberOfVariableDependencies, fmi3Instance instance, fmi3ValueReference dependent, size_t *count)
 NOT_OFFERED(fmi3GetVariableDependencies, fmi3Instance instance, fmi3ValueReference dependent, size_t dependent_elements[],
@@ -208,6 +196,24 @@ NO_CLOCK(fmi3SetShiftDecimal, const fmi3Float64 shifts[])
 NO_CLOCK(fmi3SetShiftFraction, const fmi3UInt64 counters[], const fmi3UInt64 resolutions[])
 NOT_OFFERED(fmi3ActivateModelPartition, fmi3Instance instance, fmi3ValueReference clock, fmi3Float64 time)
 
+/* ---- Model Exchange -------------------------------------------------------------------------------------------------- */
+
+#ifdef MODEL_EXCHANGE
+#include "exchange3.h"
+#else
+
+fmi3Instance fmi3InstantiateModelExchange(fmi3String name, fmi3String token, fmi3String resources, fmi3Boolean visible,
+                                          fmi3Boolean logging_on, fmi3InstanceEnvironment environment,
+                                          fmi3LogMessageCallback logger)
+{
+    Instance nobody = {.logger = logger, .environment = environment};
+    return refuse(&nobody, "fmi3InstantiateModelExchange", "only Co-Simulation is offered"), NULL;
+}
+
+NOT_OFFERED(fmi3EnterEventMode, fmi3Instance instance)
+NOT_OFFERED(fmi3EnterContinuousTimeMode, fmi3Instance instance)
+NOT_OFFERED(fmi3UpdateDiscreteStates, fmi3Instance instance, fmi3Boolean *again, fmi3Boolean *terminate_requested,
+            fmi3Boolean *nominals_changed, fmi3Boolean *states_changed, fmi3Boolean *has_next_event, fmi3Float64 *next_event)
 NOT_OFFERED(fmi3SetTime, fmi3Instance instance, fmi3Float64 time)
 NOT_OFFERED(fmi3SetContinuousStates, fmi3Instance instance, const fmi3Float64 states[], size_t count)
 NOT_OFFERED(fmi3GetContinuousStates, fmi3Instance instance, fmi3Float64 states[], size_t count)
@@ -218,3 +224,5 @@ NOT_OFFERED(fmi3GetNumberOfContinuousStates, fmi3Instance instance, size_t *coun
 NOT_OFFERED(fmi3GetNumberOfEventIndicators, fmi3Instance instance, size_t *count)
 NOT_OFFERED(fmi3CompletedIntegratorStep, fmi3Instance instance, fmi3Boolean no_rollback, fmi3Boolean *enter_event_mode,
             fmi3Boolean *terminate_requested)
+
+#endif

@@ -25,6 +25,18 @@ end Loop;""")
         assert model.get("y") == pytest.approx(2 / 3 * inputs["u"], rel=1e-12)
 
 
+def test_equations_between_joined_arrays_are_split_into_their_elements(compile_both):
+    model = compile_both("""model Joined
+  input Real u[3];
+  output Real first[2], last;
+equation
+  [u] = [first; last];
+end Joined;""")
+    model.initialize()
+    for _, inputs in model.run(20):
+        assert [*model.get("first"), model.get("last")] == list(inputs["u"])
+
+
 def test_a_nonlinear_equation_is_solved_by_newtons_method(compile_both):
     model = compile_both("""model Kepler
   input Real m(min = 0, max = 6);

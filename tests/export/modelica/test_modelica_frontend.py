@@ -5,8 +5,10 @@ from __future__ import annotations
 from pathlib import Path
 
 import pytest
+from lxml import etree
 
 from cosim.core.errors import InputError
+from cosim.export.fmu.model_description import model_description_xml
 from cosim.export.modelica import load_block
 from cosim.export.modelica.frontend import rumoca_frontend
 
@@ -131,3 +133,26 @@ equation
 end M;""")
     with pytest.raises(InputError, match=r"M.mo:5: unevaluable array dimensions for 'v'"):
         load_block(path)
+
+
+def test_attributes_of_types_reach_the_fmu(write_model):
+    block = load_block(
+        write_model("""block Typed
+  type Mass = Real(quantity = "Mass", unit = "kg", min = 0, max = 10);
+  type Mode = enumeration(Off, On);
+  parameter Mass m = 3 "Load";
+  parameter Mode mode = Mode.On;
+  output Mass y;
+equation
+  y = if mode == Mode.On then m else 0;
+end Typed;""")
+    )
+    for version, enumeration in ((2, "SimpleType"), (3, "EnumerationType")):
+        root = etree.fromstring(model_description_xml(block, version, "token", ["model.c"]))
+        variables = {element.get("name"): element for element in root.find("ModelVariables")}
+        attributes = [variables[name] if version == 3 else variables[name][0] for name in ("m", "y", "mode")]
+        for mass in attributes[:2]:
+            assert [mass.get(key) for key in ("quantity", "unit", "min", "max")] == ["Mass", "kg", "0.0", "10.0"]
+        assert variables["m"].get("description") == "Load"
+        (type_name,) = [element.get("name") for element in root.iter(enumeration)]
+        assert attributes[2].get("declaredType") == type_name == "Mode"

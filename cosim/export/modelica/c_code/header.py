@@ -12,12 +12,13 @@ from ..causality.schedule import Schedule
 from ..model.flat_model import Model, Variable, derivative_name, is_integrated
 from ..model.traversal import composed_asserts
 from .c_values import C_TYPES, CValue, c_identifier, variable_value
+from .exchange_code import exchange_declarations, has_exchange
 
 
 def struct_members(model: Model) -> dict[str, str]:
     """Return the struct member of each variable: its name as a unique C identifier."""
     members: dict[str, str] = {}
-    used = {"clock", "held", "failure", "past", "step", "no_state", "changed", "reason", "warning", "warned"}
+    used = {"clock", "held", "failure", "past", "step", "no_state", "changed", "reason", "warning", "warned", "indicator"}
     for name in model.variables:
         member = c_identifier(name)
         while member in used:
@@ -73,14 +74,19 @@ class HeaderWriter:
             "void model_parameters(Model *m);",
             "const char *model_initialize(Model *m, double time);",
             "const char *model_step(Model *m, double time, double step_size);",
+            *exchange_declarations(self.model, self._state_count),
             *["#define MODEL_FREE", "void model_free(Model *m);"] * has_objects,
             "",
             "#endif",
         ]
         return "\n".join(lines) + "\n"
 
+    @property
+    def _state_count(self) -> int:
+        return sum(struct_member(self.model.variables[name], name).size for name in self.model.states)
+
     def _states(self) -> list[str]:
-        count = sum(struct_member(self.model.variables[name], name).size for name in self.model.states)
+        count = self._state_count
         hybrid = self.model.hybrid
         if not (hybrid and is_integrated(self.model)):
             return [f"enum {{ STATES = {count} }};", ""] if count else []
@@ -128,6 +134,8 @@ class HeaderWriter:
         yield from [f"bool held[{self.schedule.edge_detector_count}];"] * bool(self.schedule.edge_detector_count)
         if self.model.hybrid:
             yield from [f"Past past[{len(self.model.hybrid.delays)}];"] * bool(self.model.hybrid.delays)
+            if has_exchange(self.model) and self.model.hybrid.relations:
+                yield f"double indicator[{len(self.model.hybrid.relations)}];"
             yield "bool changed; /* a parameter was set after the last event */"
             yield from ["double step; /* next integration step (s) */"] * is_integrated(self.model)
             yield from ["double no_state[2];"] * (is_integrated(self.model) and not self.model.states)

@@ -20,6 +20,9 @@ static void record(Model *m, double time);
 
 enum { STAGES = 7 };
 
+/* The error below which the step size grows by the factor 5, the largest one: (0.9/5)^5. */
+#define LARGEST_GROWTH_BELOW 0.0001889568
+
 /* One stage of the method of Dormand and Prince of order 5, whose last stage is the first one of the next step. */
 #define STAGE(NUMBER, NODE, SLOPE)                                                                                          \
     for (int i = 0; i < STATES; i++) *s->x[i] = start[i] + h * (SLOPE);                                                     \
@@ -81,12 +84,11 @@ static inline double locate(Model *m, const Hybrid *s, double time, double h, co
     return time + right;
 }
 
-/* Integrates from `from` to `to` or to the first event; returns the time reached. */
+/* Integrates from `from` to `to` or to the first event; returns the time reached. The event before has computed the derivatives. */
 static inline double advance_hybrid(Model *m, const Hybrid *s, double from, double to, bool *event)
 {
     double time = from, start[STATES], k[STAGES][STATES], z[RELATIONS];
     *event = false;
-    derivatives(m, time);
     for (int i = 0; i < STATES; i++) k[0][i] = *s->dx[i];
     if (!(m->step > 0)) m->step = to - from;
     while (time < to && m->failure == 0) {
@@ -94,8 +96,8 @@ static inline double advance_hybrid(Model *m, const Hybrid *s, double from, doub
         const double h = last ? to - time : m->step;
         for (int i = 0; i < STATES; i++) start[i] = *s->x[i];
         const double error = dormand_prince(m, s, time, h, start, k);
-        const double factor = error > 0 ? 0.9 * pow(error, -0.2) : 5;
         if (!(error <= 1)) {
+            const double factor = 0.9 * pow(error, -0.2);
             set_states(s, start);
             m->step = h * (factor > 0.2 ? factor : 0.2);
             if (!(time + m->step > time)) fail(m, STEP_SIZE_TOO_SMALL);
@@ -107,8 +109,10 @@ static inline double advance_hybrid(Model *m, const Hybrid *s, double from, doub
             record(m, time);
             return time;
         }
-        const double next = h * smaller(factor, 5);
-        m->step = last ? larger(m->step, next) : next;
+        if (!last || m->step < 5 * h) {
+            const double next = h * (error > LARGEST_GROWTH_BELOW ? smaller(0.9 * pow(error, -0.2), 5) : 5);
+            m->step = last ? larger(m->step, next) : next;
+        }
         time = last ? to : time + h;
         record(m, time);
         memcpy(k[0], k[STAGES - 1], sizeof k[0]);

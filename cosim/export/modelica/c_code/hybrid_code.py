@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from ..causality.hybrid_interpreter import MAX_EVENTS, MAX_PASSES
@@ -15,8 +15,11 @@ from .formatting import function_definition
 from .model_code import ModelCode
 from .statements import StatementLowering
 
+#: the value of a variable before an event, and the present one
+ValuePair = tuple[CValue, CValue]
 
-def copy_values(variables: Iterable[tuple[CValue, CValue]]) -> list[str]:
+
+def copy_values(variables: Iterable[ValuePair]) -> list[str]:
     """Generate the assignments `target = source` of scalars and arrays."""
     return [
         f"memcpy({target.pointer}, {source.pointer}, sizeof {target.pointer});"
@@ -54,7 +57,11 @@ class HybridCode(ModelCode):
         if is_integrated(model):
             definitions += [*self._hybrid_system(values)]
         step = hybrid_step_body(clocks, is_integrated(model), too_many)
-        return [*definitions, function_definition("const char *model_step(Model *m, double time, double step_size)", step)]
+        return [
+            *definitions,
+            function_definition("const char *model_step(Model *m, double time, double step_size)", step),
+            *self._exchange(f"event(m, time, {'tick ? due : ' * bool(clocks)}NO_TICK);", record=bool(model.hybrid.delays)),
+        ]
 
     def _initialize_hybrid(self, endless: str) -> list[str]:
         """Generate the body of model_initialize: the initial equations, repeated until relations are consistent, and an event."""
@@ -81,7 +88,7 @@ class HybridCode(ModelCode):
         assert self.model.hybrid
         stored = {*self.model.hybrid.remembered, *(delay.name for delay in self.model.hybrid.delays)}
         stored |= {derivative_name(name) for name in self.model.states}
-        body = self.schedule.derivatives
+        body = self.schedule.between.derivatives
         targets = [s.target.name for s in body if isinstance(s, Assign) and isinstance(s.target, Name)]
         names = [name for name in targets if name not in stored and not self.model.variables[name].shape]
         lowering = self._make_lowering()
@@ -116,10 +123,10 @@ class HybridCode(ModelCode):
         """Generate the functions for the integration between events."""
         assert self.model.hybrid
         lowering = self._make_lowering()
-        lowering.body(self.schedule.indicators)
+        lowering.body(self.schedule.between.indicators)
         states, rates = self._element_pointers(self.model.states), self._element_pointers(map(derivative_name, self.model.states))
         if not self.model.states:
-            states, rates = "&m->no_state[0]", "&m->no_state[1]"
+            states, rates = ["&m->no_state[0]"], ["&m->no_state[1]"]
         return [
             function_definition(
                 "static void derivatives(Model *m, double time)",
@@ -130,8 +137,8 @@ class HybridCode(ModelCode):
                 "static bool advance(Model *m, double from, double to, double *reached)",
                 [
                     "const Hybrid system = {",
-                    f"    {{{states}}},",
-                    f"    {{{rates}}},",
+                    f"    {{{', '.join(states)}}},",
+                    f"    {{{', '.join(rates)}}},",
                     "};",
                     "bool event;",
                     "*reached = advance_hybrid(m, &system, from, to, &event);",
@@ -145,10 +152,25 @@ def _differs(a: CValue, b: CValue) -> str:
     return f"memcmp({a.pointer}, {b.pointer}, sizeof {a.pointer}) != 0" if a.shape else f"{a.text.code} != {b.text.code}"
 
 
+def memory_functions(inputs: Sequence[ValuePair], others: Sequence[ValuePair]) -> list[str]:
+    """Generate `remember`, `remember_inputs` and `inputs_changed`.
+
+    Args:
+        inputs: The values before the event and the present values of inputs.
+        others: Those of all other remembered variables.
+    """
+    return [
+        "/* Stores the values before an event, or before another evaluation in the same event. */",
+        function_definition("static void remember(Model *m)", copy_values(others) or ["(void)m;"]),
+        function_definition("static void remember_inputs(Model *m)", copy_values(inputs) or ["(void)m;"]),
+        function_definition("static bool inputs_changed(const Model *m)", ["(void)m;", f"return {_any_differs(inputs)};"]),
+    ]
+
+
 def event_functions(
     model: Model, values: Mapping[str, CValue], evaluation: list[str], endless: str, initial: list[str]
 ) -> list[str]:
-    """Generate `evaluate`, `initialize` and `event`.
+    """Generate `evaluate`, `initialize` and `event`, and the functions that they use.
 
     Args:
         model: The flat model.
@@ -163,42 +185,40 @@ def event_functions(
     assert model.hybrid
     pairs = {name: (values[previous_name(name)], values[name]) for name in model.hybrid.remembered}
     inputs = [name for name in pairs if is_input(model.variables[name])]
-    others = copy_values(pair for name, pair in pairs.items() if name not in inputs)
-    changes = " || ".join(_differs(*pairs[name]) for name in model.hybrid.iterated) or "false"
-    relations = " || ".join(_differs(*pairs[relation.name]) for relation in model.hybrid.relations) or "false"
+    changes = _any_differs(pairs[name] for name in model.hybrid.iterated)
+    relations = _any_differs(pairs[relation.name] for relation in model.hybrid.relations)
     return [
-        "/* Stores the values before an event, or before another evaluation in the same event. */",
-        function_definition("static void remember(Model *m)", others or ["(void)m;"]),
-        function_definition("static void remember_inputs(Model *m)", copy_values(pairs[name] for name in inputs) or ["(void)m;"]),
-        function_definition(
-            "static bool inputs_changed(const Model *m)",
-            ["(void)m;", f"return {' || '.join(_differs(*pairs[name]) for name in inputs) or 'false'};"],
-        ),
+        *memory_functions([pairs[name] for name in inputs], [pair for name, pair in pairs.items() if name not in inputs]),
         "/* Evaluates all equations; returns whether they must be evaluated again, since values have changed. */",
         function_definition(
             "static bool evaluate(Model *m, double time, const bool *due)",
             ["(void)time;", "(void)due;", *evaluation, f"return m->failure == 0 && ({changes});"],
         ),
-        function_definition(
-            "static void event(Model *m, double time, const bool *due)",
-            [
-                "remember(m);",
-                "/* flags of ticks are true in the first evaluation only */",
-                "for (int pass = 0; (evaluate(m, time, due) || due != NO_TICK) && m->failure == 0; pass++) {",
-                f"    if (pass == {MAX_PASSES}) fail(m, {endless});",
-                "    remember(m);",
-                "    remember_inputs(m);",
-                "    due = NO_TICK;",
-                "}",
-                "remember_inputs(m);",
-                "m->changed = false;",
-                "record(m, time);",
-            ],
-        ),
+        function_definition("static void event(Model *m, double time, const bool *due)", _event_lines(endless)),
         function_definition(
             "static bool initialize(Model *m, double time)",
             ["(void)time;", *initial, f"return m->failure == 0 && ({relations});"],
         ),
+    ]
+
+
+def _any_differs(pairs: Iterable[ValuePair]) -> str:
+    return " || ".join(_differs(*pair) for pair in pairs) or "false"
+
+
+def _event_lines(endless: str) -> list[str]:
+    return [
+        "remember(m);",
+        "/* flags of ticks are true in the first evaluation only */",
+        "for (int pass = 0; (evaluate(m, time, due) || due != NO_TICK) && m->failure == 0; pass++) {",
+        f"    if (pass == {MAX_PASSES}) fail(m, {endless});",
+        "    remember(m);",
+        "    remember_inputs(m);",
+        "    due = NO_TICK;",
+        "}",
+        "remember_inputs(m);",
+        "m->changed = false;",
+        "record(m, time);",
     ]
 
 

@@ -16,6 +16,7 @@ from ..model.flat_model import Variable, derivative_name, owning_component
 from ..model.syntax_tree import Body, Name, Solve, SourceLocation, Statement, referenced_variable
 from ..model.traversal import assigned_references, walk
 from .c_values import C_TYPES, CExpression, CValue, c_literal, scalar_value
+from .exchange_code import exchange_functions, has_exchange, indicator_lines
 from .formatting import function_definition, uses_variable
 from .functions import FunctionTranslator
 from .header import has_messages, struct_member, struct_members
@@ -78,7 +79,7 @@ class ModelCode:
 
     def headers(self) -> list[str]:
         """Return the names of the C headers that model.c includes besides model.h and runtime.h."""
-        bodies = (self.schedule.initialization, self.schedule.event, self.schedule.derivatives, self.schedule.indicators)
+        bodies = (self.schedule.initialization, self.schedule.event, self.schedule.between.continuous)
         solved = any(isinstance(item, Solve) for item in walk(bodies))
         return [*["messages.h"] * self.has_messages, *["newton.h"] * solved, *["runge_kutta.h"] * bool(self.model.states)]
 
@@ -97,6 +98,7 @@ class ModelCode:
             function_definition(
                 "const char *model_step(Model *m, double time, double step_size)", step(len(self.schedule.clocks), call)
             ),
+            *self._exchange(call.replace("now", "time"), record=False),
         ]
 
     def _common_definitions(self) -> list[str]:
@@ -203,10 +205,16 @@ class ModelCode:
         """Generate the functions `derivatives` and `advance` (integration) of a model with continuous states."""
         if not self.model.states:
             return []
-        lines = self._body(self.schedule.derivatives, initial=False)
+        lines = self._body(self.schedule.between.derivatives, initial=False)
         unused = [] if uses_variable("time", lines) else ["(void)time;"]
         states, rates = self._element_pointers(self.model.states), self._element_pointers(map(derivative_name, self.model.states))
-        system = ["const System system = {", f"    {{{states}}},", f"    {{{rates}}},", "    derivatives,", "};"]
+        system = [
+            "const System system = {",
+            f"    {{{', '.join(states)}}},",
+            f"    {{{', '.join(rates)}}},",
+            "    derivatives,",
+            "};",
+        ]
         return [
             function_definition("static void derivatives(Model *m, double time)", [*unused, *lines]),
             function_definition(
@@ -214,10 +222,20 @@ class ModelCode:
             ),
         ]
 
-    def _element_pointers(self, names: Iterable[str]) -> str:
+    def _exchange(self, event: str, record: bool) -> list[str]:
+        """Generate the functions of Model Exchange, if the model offers it."""
+        if not has_exchange(self.model):
+            return []
+        continuous = self._body(self.schedule.between.continuous, initial=False)
+        if self.model.hybrid:
+            continuous += indicator_lines(self.model.hybrid.relations, self._make_lowering())
+        states, rates = self._element_pointers(self.model.states), self._element_pointers(map(derivative_name, self.model.states))
+        return exchange_functions(continuous, states, rates, len(self.schedule.clocks), event, record)
+
+    def _element_pointers(self, names: Iterable[str]) -> list[str]:
         """Return C pointers to all elements of variables."""
         values = (struct_member(self.model.variables[name], f"m->{self.members[name]}") for name in names)
-        return ", ".join(f"&{value.element(k).code}" for value in values for k in range(value.size))
+        return [f"&{value.element(k).code}" for value in values for k in range(value.size)]
 
 
 def _owning_component(statement: Statement) -> str:

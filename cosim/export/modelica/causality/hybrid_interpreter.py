@@ -179,13 +179,13 @@ class HybridInterpreter(Interpreter):
 
     def _slopes(self, time: float) -> list[float]:
         self.values["time"] = time
-        self.evaluate.execute(self.schedule.derivatives)
+        self.evaluate.execute(self.schedule.between.derivatives)
         return [_element(self.values, key) for key in self._rates]
 
     def _crossed(self, time: float) -> tuple[bool, list[float]]:
         """Return whether a relation differs from its stored value, and the differences of the operands of all relations."""
         self.values["time"] = time
-        self.evaluate.execute(self.schedule.indicators)
+        self.evaluate.execute(self.schedule.between.indicators)
         changed, differences = False, []
         for relation in self._hybrid.relations:
             left, right = (float(self.evaluate(side)) for side in (relation.condition.left, relation.condition.right))
@@ -209,8 +209,11 @@ class HybridInterpreter(Interpreter):
         return largest
 
     def _advance(self, start_time: float, end: float) -> tuple[float, bool]:
-        """Integrate to `end` or to the first event; return the time reached, and whether there is an event."""
-        time, slopes = start_time, [self._slopes(start_time)]
+        """Integrate to `end` or to the first event; return the time reached, and whether there is an event.
+
+        The event before has computed the derivatives.
+        """
+        time, slopes = start_time, [[_element(self.values, key) for key in self._rates]]
         if not self._step > 0:
             self._step = end - start_time
         while time < end:
@@ -218,8 +221,8 @@ class HybridInterpreter(Interpreter):
             h = end - time if last else self._step
             start = self._get_states()
             error = self._dormand_prince(time, h, start, slopes)
-            factor = 0.9 * math.pow(error, -0.2) if error > 0 else 5.0
             if not error <= 1:
+                factor = 0.9 * math.pow(error, -0.2)
                 self._set_states(start)
                 self._step = h * (factor if factor > 0.2 else 0.2)
                 if not time + self._step > time:
@@ -229,7 +232,7 @@ class HybridInterpreter(Interpreter):
                 time = self._locate(time, h, start, slopes)
                 self._record(time)
                 return time, True
-            following = h * (factor if factor < 5 else 5.0)
+            following = h * (min(0.9 * math.pow(error, -0.2), 5.0) if error > 0 else 5.0)
             self._step = max(self._step, following) if last else following
             time = end if last else time + h
             self._record(time)

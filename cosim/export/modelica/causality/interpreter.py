@@ -148,7 +148,7 @@ class Interpreter:
             self._assign(name, value)
         self.values["time"] = time
         with self._as_component_error("step", time), np.errstate(all="ignore"):
-            self.evaluate.execute(self.schedule.derivatives)
+            self.evaluate.execute(self.schedule.between.derivatives)
         return [self.get(derivative_name(name)) for name in self.model.states]
 
     def _declared_value(self, name: str) -> Any:

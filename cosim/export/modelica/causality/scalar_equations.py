@@ -123,9 +123,22 @@ class EquationSplitter:
             return Literal(float(position[0] == position[1]), "Real")
         if node.name == "transpose":
             return self.element(arguments[0], position[::-1])
+        if node.name in ("rows", "columns"):
+            return self._joined(arguments, position, axis=("rows", "columns").index(node.name))
         if node.name == "sum" and not position:
             return _total([self.element(arguments[0], p) for p in product(*map(range, self.shape(arguments[0])))])
         return None
+
+    def _joined(self, parts: Sequence[Expression], position: Position, axis: int) -> Expression:
+        """Select from `[a, b]` or `[a; b]`; a vector is a column, and a scalar a matrix with one element."""
+        index = list(position)
+        for part in parts:
+            shape = self.shape(part)
+            size = (*shape, 1, 1)[axis]
+            if index[axis] < size:
+                return self.element(part, tuple(index[: len(shape)]))
+            index[axis] -= size
+        raise AssertionError(position)
 
     def _call(self, node: Call, position: Position) -> Expression | None:
         return None if position else node

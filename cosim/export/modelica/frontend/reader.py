@@ -83,6 +83,7 @@ class ModelReader(StatementReader):
             protected=node["is_protected"],
             top_level=self._is_top_level(name),
             unit=self._text(node["unit"]),
+            quantity=self._text(node["quantity"]),
             description=self._text(node["description"]),
             minimum=self._optional(node["min"]),
             maximum=self._optional(node["max"]),

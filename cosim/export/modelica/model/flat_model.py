@@ -42,6 +42,8 @@ class Variable:
     #: name of the enumeration type, or ""
     enumeration: str
     where: SourceLocation | None = field(default=None, compare=False)
+    #: physical quantity, for example "Mass", or ""
+    quantity: str = ""
 
 
 @dataclass(frozen=True, slots=True)
@@ -177,6 +179,7 @@ def internal_variable(variable: Variable, name: str) -> Variable:
         protected=True,
         top_level=False,
         unit="",
+        quantity="",
         description="",
         minimum=None,
         maximum=None,
