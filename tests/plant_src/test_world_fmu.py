@@ -126,7 +126,7 @@ def test_it_is_the_plant_of_demo1() -> None:
 def test_demo1_lands_with_it(fmu: Path, tmp_path: Path) -> None:
     text = DEMO.read_text().replace('"../', f'"{ROOT}/').replace('"systems/', f'"{ROOT}/scenarios/systems/')
     demo = json.loads(text)
-    for key in ("reference", "figures", "checks", "kpis"):
+    for key in ("reference", "figures", "checks", "kpis", "seeds"):
         demo.pop(key)
     demo["components"]["plant"] = {"fmu": str(fmu)}
     (tmp_path / "demo.json").write_text(json.dumps(demo))
