@@ -5,12 +5,13 @@
 - The lists `connections`, `kpis`, `figures` and `checks` of the base are changed by an object whose keys are the names of
   elements: `to`, `name`, `name` and `kpi`. New names are appended.
 - A component that gets a source of another kind inherits only `period`, and `isolation` where it is valid.
+- With a component that `null` removes go its connections, its place in the stages and its recorded signals.
 - `name`, `description`, `reference` and `$schema` describe the base alone and are not inherited.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence, Set
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -51,7 +52,9 @@ def expand_document(document: Document, extending: tuple[Path, ...] = ()) -> Doc
     extending = (*extending, paths.resolve_path(document.file))
     base = expand_document(_read_base(document, value["extends"], extending), extending)
     merger = _Merger(document, base)
-    merged = merger.merge_objects((), _inherited(base, document.file.parent), {k: v for k, v in value.items() if k != "extends"})
+    inherited = _inherited(base, document.file.parent)
+    changes = {key: each for key, each in value.items() if key != "extends"}
+    merged = merger.merge_objects((), inherited, {**changes, **_removals_with_components(inherited, changes)})
     invalid = [path for path, origin in merger.origins.items() if origin.path in origin.document.invalid_paths]
     problems = [*document.problems, *base.problems, *merger.problems]
     bases = (*document.bases, base.file, *base.bases)
@@ -86,6 +89,39 @@ def _inherited(base: Document, folder: Path) -> dict[str, Any]:
     if paths.resolve_path(base.file.parent) == paths.resolve_path(folder):
         return value
     return change_paths(value, relocating(base.file.parent, folder))
+
+
+def _removals_with_components(inherited: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the changes, each with its key, that remove what belongs to the components that `changes` remove by `null`.
+
+    What the extending file replaces itself is not among them.
+    """
+    components = changes.get("components")
+    removed = {name for name, each in components.items() if each is None} if isinstance(components, dict) else set()
+    if not removed:
+        return {}
+    result: dict[str, Any] = {}
+    connections, own = inherited.get("connections"), changes.get("connections", {})
+    if isinstance(connections, list) and isinstance(own, dict):
+        ends = [each for each in connections if isinstance(each, dict) and isinstance(each.get("to"), str)]
+        gone = [each["to"] for each in ends if {_component_of(each["to"]), _component_of(each.get("from"))} & removed]
+        result["connections"] = {**dict.fromkeys(gone), **own}
+    for key, entry in (("algorithm", "stages"), ("record", "signals")):
+        old, own = inherited.get(key), changes.get(key, {})
+        if isinstance(old, dict) and isinstance(old.get(entry), list) and isinstance(own, dict) and entry not in own:
+            result[key] = {**own, entry: _without_components(old[entry], removed)}
+    return result
+
+
+def _without_components(names: Sequence[Any], removed: Set[str]) -> list[Any]:
+    """Return a list of names, or of lists of names, without those of removed components and without lists that become empty."""
+    kept = [_without_components(each, removed) if isinstance(each, list) else each for each in names]
+    return [each for each in kept if each != [] and _component_of(each) not in removed]
+
+
+def _component_of(name: Any) -> str:
+    """Return the component of a name as "component.variable"."""
+    return name.partition(".")[0] if isinstance(name, str) else ""
 
 
 class _Merger:

@@ -56,6 +56,21 @@ def test_null_removes(extend):
     assert value["components"]["a"]["parameters"] == {}
 
 
+def test_a_removed_component_takes_its_connections_stages_and_signals(folder, extend):
+    connections = [connection("a.y", "b.u"), connection("b.y", "c.u"), connection("a.y", "d.u")]
+    components = {name: folder.block("Gain") for name in "abcd"}
+    record = {"signals": ["a.y", "b.*", "c.y", "d.y"], "interval": 1}
+    algorithm = {"kind": "staged", "stages": [["a"], ["b"], ["c", "d"]]}
+    folder.scenario(components, connections, record=record, algorithm=algorithm).rename(folder.path / "four.json")
+    value = expanded(extend(extends="four.json", components={"b": None}, connections={"d.u": {"delay": 1}}))
+    assert list(value["components"]) == ["a", "c", "d"]
+    assert value["connections"] == [{**connection("a.y", "d.u"), "delay": 1}]
+    assert value["algorithm"]["stages"] == [["a"], ["c", "d"]]
+    assert value["record"] == {"signals": ["a.y", "c.y", "d.y"], "interval": 1}
+    kept = expanded(extend("own.json", "four.json", components={"b": None}, record={"signals": ["b.y"]}, connections=connections))
+    assert (kept["record"]["signals"], kept["connections"]) == (["b.y"], connections)
+
+
 def test_named_elements_of_lists_are_changed_by_an_object(extend):
     file = extend(
         connections={"b.u": {"delay": 1}, "a.u": {"from": "b.y"}},
@@ -130,8 +145,9 @@ def test_problems_name_the_file_that_contains_the_value(folder, base, extend):
 
 
 def test_a_removed_component_is_not_mistaken_for_another(folder, extend):
-    """The base connects a.y; the remaining component has a similar name."""
-    (problem,) = folder.problems_of(extend(components={"a": None, "aa": folder.block("Gain")}))
+    """The file itself connects a.y; the remaining component has a similar name."""
+    file = extend(components={"a": None, "aa": folder.block("Gain")}, connections=[connection("a.y", "b.u")])
+    (problem,) = folder.problems_of(file)
     assert problem.endswith('$.connections[0].from: unknown component "a", which was removed')
 
 

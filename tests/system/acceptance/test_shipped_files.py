@@ -24,7 +24,11 @@ def label(path):
     return str(path.relative_to(resources.root()))
 
 
-@pytest.mark.parametrize("path", FMUS, ids=label)
+#: every third FMU always, the others with `pytest -m long`
+CHECKED_BY_FMPY = [pytest.param(path, marks=[] if i % 3 == 0 else [pytest.mark.long]) for i, path in enumerate(FMUS)]
+
+
+@pytest.mark.parametrize("path", CHECKED_BY_FMPY, ids=label)
 def test_fmpy_finds_no_problem(path):
     from fmpy.validation import validate_fmu
 
@@ -96,10 +100,17 @@ def test_a_scenario_can_be_ended_earlier():
     assert cosim.run(SCENARIOS[0], stop_time=2).time[-1] == 2.0
 
 
-@pytest.mark.parametrize("path", [*SCENARIOS, *SYSTEMS], ids=label)
-def test_scenarios_satisfy_the_published_schema(path):
-    import jsonschema
+@pytest.fixture(scope="module")
+def validators():
+    """Validators of the published schemas: of scenarios (False) and of nested systems (True)."""
+    from jsonschema.validators import validator_for
 
     from cosim.scenario.extension_schema import editor_schema
 
-    jsonschema.validate(json.loads(path.read_text()), editor_schema(nested=path.parent.name == "systems"))
+    schemas = {nested: editor_schema(nested=nested) for nested in (False, True)}
+    return {nested: validator_for(schema)(schema) for nested, schema in schemas.items()}
+
+
+@pytest.mark.parametrize("path", [*SCENARIOS, *SYSTEMS], ids=label)
+def test_scenarios_satisfy_the_published_schema(path, validators):
+    validators[path.parent.name == "systems"].validate(json.loads(path.read_text()))
