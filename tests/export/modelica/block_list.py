@@ -162,7 +162,7 @@ def _shorten(message: str, folder: Path) -> str:
     """Return the first line of a message, with file names instead of paths."""
     line = message.strip().splitlines()[0]
     line = re.sub(rf"{re.escape(str(folder))}/\w+/(\w+\.mo)(:\d+)?", "", line)
-    return re.sub(r"/\S*/", "", line).replace("|", "\\|").strip(" :")
+    return re.sub(r"/\S*/", "", line).replace("|", "\\|").replace("[", "\\[").strip(" :")
 
 
 def page(library: Library, states: Sequence[State]) -> str:
