@@ -3,10 +3,26 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 from .json_reader import Numbers
 from .vehicles.common.shapes import Body
 from .vehicles.model import Model
+
+
+class ContactSurface(NamedTuple):
+    """Surface of a body in contact; Bullet multiplies the values of the two bodies.
+
+    Attributes:
+        friction: Friction coefficient (1).
+        restitution: Coefficient of restitution (1).
+    """
+
+    friction: float = 1.0
+    restitution: float = 0.0
+
+
+DRY = ContactSurface()
 
 
 @dataclass(frozen=True)
@@ -19,6 +35,7 @@ class VehiclePlacement:
         parameters: Values of the model's scalar parameters in order; the initial state is among them.
         body: Rigid body in Bullet, with the mass and inertia of these parameters.
         crash_speed: Change of velocity by a collision above which the vehicle has crashed (m/s).
+        surface: Friction and restitution in contact.
     """
 
     name: str
@@ -26,6 +43,7 @@ class VehiclePlacement:
     parameters: Numbers
     body: Body
     crash_speed: float
+    surface: ContactSurface
 
     def parameter(self, name: str) -> float:
         """Return the value of a scalar parameter."""
@@ -40,8 +58,10 @@ class Platform:
         name: Name of the platform.
         size: Lengths of the edges along x, y and z (m).
         position: Centre (m, world frame).
+        surface: Friction and restitution in contact.
     """
 
     name: str
     size: Numbers
     position: Numbers
+    surface: ContactSurface = DRY

@@ -58,8 +58,10 @@ class World(Component):
         vehicles: Name to object with the keys "model" (in `catalogue.VEHICLE_MODELS`), "position" of the centre of mass
             ([x, y, z], of vessels [x, y], m) and, optionally, "motion" ("planar" or "6dof"), "yaw" (rad), "velocity_body"
             ([u, v, w], m/s), "rates" ([p, q, r], rad/s), "parameters" (name to value) and "crash_speed" (m/s), the change of
-            velocity by a collision above which the vehicle has crashed.
-        platforms: Name to object with the keys "size" (edges [x, y, z], m) and "position" (centre [x, y, z], m).
+            velocity by a collision above which the vehicle has crashed. "friction" (default 1) and "restitution" (default 0) are
+            those of its surface; the values of two bodies in contact are multiplied.
+        platforms: Name to object with the keys "size" (edges [x, y, z], m), "position" (centre [x, y, z], m) and, optionally,
+            "friction" and "restitution".
         environment: Object that `environment/settings.py` describes; waves and gusts start with the run.
 
     Raises:

@@ -16,7 +16,7 @@ from .environment import settings
 from .environment.sea import Sea
 from .environment.settings import EnvironmentSettings
 from .json_reader import JsonPath, JsonReader, Numbers
-from .placement import Platform, VehiclePlacement
+from .placement import ContactSurface, Platform, VehiclePlacement
 from .vehicles.common.shapes import Body
 from .vehicles.model import Model
 
@@ -24,7 +24,7 @@ from .vehicles.model import Model
 WAVE_PREFIX, INITIAL_PREFIX = "wave.", "initial."
 
 #: keys of a vehicle besides "model" and "position"
-OPTIONAL_KEYS = ("motion", "yaw", "velocity_body", "rates", "parameters", "crash_speed")
+OPTIONAL_KEYS = ("motion", "yaw", "velocity_body", "rates", "parameters", "crash_speed", *ContactSurface._fields)
 
 
 @dataclass(frozen=True)
@@ -76,7 +76,12 @@ class _WorldSettingsReader(JsonReader):
         valid = len(self.problems) == problem_count
         body = self.collision_body(model, parameters, (*path, "parameters")) if valid else model.body
         crash_speed = self.number(spec.get("crash_speed", model.crash_speed), (*path, "crash_speed"), 0.0)
-        return VehiclePlacement(name, model, tuple(parameters.values()), body, crash_speed)
+        return VehiclePlacement(name, model, tuple(parameters.values()), body, crash_speed, self.read_surface(spec, path))
+
+    def read_surface(self, spec: Mapping[str, Any], path: JsonPath) -> ContactSurface:
+        """Read friction and restitution."""
+        friction = self.number(spec.get("friction", 1.0), (*path, "friction"), 0.0)
+        return ContactSurface(friction, self.number(spec.get("restitution", 0.0), (*path, "restitution"), 0.0, 1.0))
 
     def read_initial_state(self, model: Model, spec: Mapping[str, Any], path: JsonPath) -> dict[str, float]:
         """Read position, yaw, velocity and rates; return the parameters `initial.*`."""
@@ -145,11 +150,12 @@ class _WorldSettingsReader(JsonReader):
     def read_platform(self, name: str, spec: Any) -> Platform:
         """Read one platform."""
         path = ("platforms", name)
-        spec = self.read_object(spec, path, ("size", "position"), ())
+        spec = self.read_object(spec, path, ("size", "position"), ContactSurface._fields)
         size = self.vector(spec.get("size", [1.0] * 3), (*path, "size"), "xyz")
         if not all(edge > 0 for edge in size):
             self.add_problem((*path, "size"), f"found {list(size)}, expected edges greater than 0")
-        return Platform(name, size, self.vector(spec.get("position", [0.0] * 3), (*path, "position"), "xyz"))
+        position = self.vector(spec.get("position", [0.0] * 3), (*path, "position"), "xyz")
+        return Platform(name, size, position, self.read_surface(spec, path))
 
 
 def _with_waves(sea: Sea, vehicle: VehiclePlacement) -> VehiclePlacement:

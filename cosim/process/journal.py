@@ -122,8 +122,9 @@ class Journal:
 
     @property
     def phase(self) -> Phase:
-        """Present phase."""
-        return Phase(self[PHASE])
+        """Present phase; IDLE if foreign code has overwritten it (`is_valid` is then false)."""
+        phase = self[PHASE]
+        return Phase(phase) if phase in _PHASES else Phase.IDLE
 
     def enter_phase(self, phase: Phase, deadline: float = math.inf) -> None:
         """Begin a phase with a maximum duration of each call (s); wait for the end of an update of the result file."""

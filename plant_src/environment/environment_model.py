@@ -32,6 +32,11 @@ _unpack_pose = struct.Struct("7d").unpack_from
 
 #: function of the time since the start (s)
 UpdateFunction = Callable[[float], None]
+#: function of x, y (m) and the time since the start (s) to the height of the water surface (m)
+WaterLevel = Callable[[float, float, float], float]
+
+#: distance (m) above all crests within which a multirotor needs the water level; more than the way of a step
+WATER_MARGIN = 1.0
 
 
 class EnvironmentModel:
@@ -82,6 +87,8 @@ class EnvironmentModel:
         self._elevation = sea.elevation_function()
         self._highest_water: Any = highest_water.data
         self._highest_elevation = sea.highest_elevation
+        for body in _bodies_with_input(bodies, "water_level"):
+            _input_data(body, "water_level")[0] = 0.0
         self.update_functions = list(self._create_updates(environment, bodies))
         if affected := _multirotors_in_ground_effect(vehicles, bodies):
             vessels = [body for body in bodies if body.model.is_vessel]
@@ -108,6 +115,8 @@ class EnvironmentModel:
             yield _CurrentUpdate(current, seed, self._input_view("current.x"), _bodies_with_input(bodies, "current.x")).update
         if environment.waves:
             yield self._update_highest_water
+            if multirotors := _bodies_with_input(bodies, "water_level"):
+                yield _WaterLevelUpdate(multirotors, self.water_level, self._highest_water).update
         if self._wave_vessels:
             gains = [_input_data(body, "wave_gain") for body in self._wave_vessels]
             yield lambda _time: _set_all(gains, self._wave_gain[0])
@@ -225,6 +234,23 @@ class _CurrentUpdate:
         return changes
 
 
+class _WaterLevelUpdate:
+    """Update of the height of the water surface at multirotors; those above all crests need none."""
+
+    def __init__(self, multirotors: Sequence[ContactBody], water_level: WaterLevel, highest_water: Any):
+        self._water_level, self._highest_water = water_level, highest_water
+        self._vehicles = [
+            (_input_data(body, "water_level"), body.outputs.data, max(body.bounding_box(body.model.body).high) + WATER_MARGIN)
+            for body in multirotors
+        ]
+
+    def update(self, time: float) -> None:
+        """Write the water levels at a time (s)."""
+        highest = self._highest_water[0]
+        for level, outputs, reach in self._vehicles:
+            level[0] = self._water_level(outputs[0], outputs[1], time) if outputs[2] - reach < highest else -highest
+
+
 def _multirotors_in_ground_effect(vehicles: Sequence[VehiclePlacement], bodies: Sequence[ContactBody]) -> list[ContactBody]:
     """Return the multirotors with the ground effect switched on."""
     return [
@@ -240,16 +266,16 @@ class _GroundDistanceUpdate:
     def __init__(self, multirotors: Sequence[ContactBody], ground_distance: GroundDistance, wave_gain: Any):
         self._ground_distance, self._gain = ground_distance, wave_gain
         self._vehicles = [
-            (_input_data(body, "ground_distance"), body.outputs.data, body.model.rotor_centre or (0.0, 0.0, 0.0))
+            (_input_data(body, "ground_distance"), body.outputs.data, *(body.model.rotor_disc or ((0.0, 0.0, 0.0), 0.0)))
             for body in multirotors
         ]
 
     def update(self, time: float) -> None:
-        """Write the ground distances at a time (s)."""
-        for distance, outputs, centre in self._vehicles:
+        """Write the ground distances and shares at a time (s)."""
+        for surface, outputs, centre, radius in self._vehicles:
             x, y, z, *q = _unpack_pose(outputs)
             dx, dy, dz = _rotate(q, centre)
-            distance[0] = self._ground_distance.distance(x + dx, y + dy, z + dz, time, self._gain[0])
+            surface[0], surface[1] = self._ground_distance.distance_and_share(x + dx, y + dy, z + dz, radius, time, self._gain[0])
 
 
 def _rotate(q: Sequence[float], vector: Sequence[float]) -> tuple[float, float, float]:

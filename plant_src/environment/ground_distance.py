@@ -1,10 +1,16 @@
-"""Distance from a multirotor to the surface vertically below it: deck, platform or water."""
+"""Distance from a multirotor to the surface vertically below it: deck, platform or water; and its share of the rotors' area.
+
+The area is that of a disc around the centre of the rotors. An edge at the distance d from the centre leaves the share
+1/2 + (c sqrt(1 - c^2) + asin c) / pi of a disc of the radius R, with c = d / R limited to -1 ... 1. The share of a strip is the
+sum of those of its edges minus 1. The share of a rectangle is the product of those of its two strips, which is exact beside one
+edge.
+"""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any
+from collections.abc import Iterator, Sequence
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .sea import Sea
 
@@ -14,6 +20,13 @@ if TYPE_CHECKING:
 
 #: height above the still water (m) from which waves are ignored, because they do not affect a rotor
 MAX_WAVE_EFFECT_HEIGHT = 5.0
+
+
+class Surface(NamedTuple):
+    """A surface below a point: its height (m, world frame) and its share of the disc around the point (1)."""
+
+    height: float
+    share: float
 
 
 class DeckSurface:
@@ -26,11 +39,12 @@ class DeckSurface:
         self._outputs: Any = vessel.outputs.data
         self._centre, self._orientation = slots.index("deck.position.x"), slots.index("orientation.w")
 
-    def height(self, x: float, y: float) -> float | None:
-        """Return the height of the deck (m, world frame) at (x, y), or None beside the deck."""
+    def below(self, x: float, y: float, radius: float) -> Surface | None:
+        """Return the plane of the deck at (x, y), or None if a disc of this radius (m) is beside the deck."""
         c, q, outputs = self._centre, self._orientation, self._outputs
         dx, dy = x - outputs[c], y - outputs[c + 1]
-        if abs(dx) > self._bounding_radius or abs(dy) > self._bounding_radius:
+        reach = self._bounding_radius + radius
+        if abs(dx) > reach or abs(dy) > reach:
             return None
         qw, qx, qy, qz = outputs[q], outputs[q + 1], outputs[q + 2], outputs[q + 3]
         normal_x, normal_y, normal_z = 2 * (qx * qz + qw * qy), 2 * (qy * qz - qw * qx), 1 - 2 * (qx * qx + qy * qy)
@@ -39,8 +53,21 @@ class DeckSurface:
         dz = -(normal_x * dx + normal_y * dy) / normal_z
         forward = (1 - 2 * (qy * qy + qz * qz)) * dx + 2 * (qx * qy + qw * qz) * dy + 2 * (qx * qz - qw * qy) * dz
         left = 2 * (qx * qy - qw * qz) * dx + (1 - 2 * (qx * qx + qz * qz)) * dy + 2 * (qy * qz + qw * qx) * dz
-        inside = abs(forward) <= self._half_x and abs(left) <= self._half_y
-        return outputs[c + 2] + dz if inside else None
+        share = _share_of_strip(self._half_x, forward, radius) * _share_of_strip(self._half_y, left, radius)
+        return Surface(outputs[c + 2] + dz, share) if share > 0 else None
+
+
+def _share_of_strip(half_width: float, position: float, radius: float) -> float:
+    """Return the share of a disc at a position (m) above a strip around 0."""
+    return max(_share_of_half_plane(half_width - position, radius) + _share_of_half_plane(half_width + position, radius) - 1, 0.0)
+
+
+def _share_of_half_plane(distance: float, radius: float) -> float:
+    """Return the share of a disc whose centre is at a distance (m) inside the edge of a half-plane."""
+    if abs(distance) >= radius:
+        return 1.0 if distance >= 0 else 0.0
+    ratio = distance / radius
+    return 0.5 + (ratio * math.sqrt(1 - ratio * ratio) + math.asin(ratio)) / math.pi
 
 
 class GroundDistance:
@@ -51,30 +78,38 @@ class GroundDistance:
         self._platforms = [(platform.position, platform.size) for platform in platforms]
         self._elevation = sea.elevation_function() if len(sea.amplitude) else None
 
-    def distance(self, x: float, y: float, z: float, time: float, wave_gain: float) -> float:
-        """Return the distance (m) below a point, 0 under water.
+    def distance_and_share(
+        self, x: float, y: float, z: float, radius: float, time: float, wave_gain: float
+    ) -> tuple[float, float]:
+        """Return the distance (m) below a point, 0 under water, and the share of a disc that is above this surface.
 
         Args:
             x: East position (m, world frame).
             y: North position (m, world frame).
             z: Height (m, world frame).
+            radius: Radius of the disc (m).
             time: Time of the waves (s).
             wave_gain: Factor on all amplitudes (1).
         """
-        solid = self._solid_height(x, y, z)
-        if solid > -math.inf:  # decks and platforms hide the water
-            return z - solid
+        solid = self._solid_surface(x, y, z, radius)
+        if solid:  # decks and platforms hide the water
+            return z - solid.height, solid.share
         surface = wave_gain * self._elevation(x, y, time) if z < MAX_WAVE_EFFECT_HEIGHT and self._elevation else 0.0
-        return max(z - surface, 0.0)
+        return max(z - surface, 0.0), 1.0
 
-    def _solid_height(self, x: float, y: float, z: float) -> float:
-        """Return the height (m) of the highest deck or platform at (x, y) that is not above z, or -inf."""
-        highest = -math.inf
-        for deck in self._decks:
-            height = deck.height(x, y)
-            if height is not None and highest < height <= z:
-                highest = height
-        for (px, py, pz), (ex, ey, ez) in self._platforms:
-            if highest < pz + ez / 2 <= z and abs(x - px) <= ex / 2 and abs(y - py) <= ey / 2:
-                highest = pz + ez / 2
+    def _solid_surface(self, x: float, y: float, z: float, radius: float) -> Surface | None:
+        """Return the highest deck or platform below a disc that is not above its centre."""
+        highest: Surface | None = None
+        for surface in self._solid_surfaces(x, y, radius):
+            if surface.height <= z and (highest is None or surface.height > highest.height):
+                highest = surface
         return highest
+
+    def _solid_surfaces(self, x: float, y: float, radius: float) -> Iterator[Surface]:
+        for deck in self._decks:
+            if surface := deck.below(x, y, radius):
+                yield surface
+        for (px, py, pz), (ex, ey, ez) in self._platforms:
+            share = _share_of_strip(ex / 2, x - px, radius) * _share_of_strip(ey / 2, y - py, radius)
+            if share > 0:
+                yield Surface(pz + ez / 2, share)

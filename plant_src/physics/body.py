@@ -20,6 +20,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
+from ..placement import DRY, ContactSurface
 from ..vehicles.common.shapes import Body, Box
 from ..vehicles.common.step_status import MAX_STATE_NORM
 from .clearance import BoundingBox
@@ -31,9 +32,6 @@ if TYPE_CHECKING:
 
     from ..placement import Platform, VehiclePlacement
     from ..vehicles.model import Model
-
-#: friction coefficient of every surface (1); Bullet multiplies those of the two bodies in contact
-FRICTION = 1.0
 
 #: first x coordinate of inactive bodies (m), beyond the reach of any vehicle, and distance between them (m)
 INACTIVE_POSITION, INACTIVE_SPACING = 2 * MAX_STATE_NORM, 100.0
@@ -112,7 +110,7 @@ class ContactBody:
         self.correct = self._bind(library.contact_correct, self.CORRECT_ARRAYS)
         self._bind(library.contact_initialize, self.INITIALIZE_ARRAYS)()
         self.correct()
-        self.body_id = self._create_body(vehicle.body)
+        self.body_id = self._create_body(vehicle)
         self.reset_pose()
 
     @classmethod
@@ -128,11 +126,12 @@ class ContactBody:
         arguments, results = ([self._arrays[name] for name in side] for side in names)
         return bind_arrays(function, arguments, results)
 
-    def _create_body(self, body: Body) -> int:
+    def _create_body(self, vehicle: VehiclePlacement) -> int:
         """Create the body in Bullet and return its number."""
+        body = vehicle.body
         shape, maximal = create_compound_shape(body.boxes, self._client), self.USE_MAXIMAL_COORDINATES
         number = pybullet.createMultiBody(body.mass, shape, -1, useMaximalCoordinates=maximal, physicsClientId=self._client)
-        set_dynamics(self._client, number, -1, body)
+        set_dynamics(self._client, number, -1, vehicle.surface, body)
         return int(number)
 
     @staticmethod
@@ -193,17 +192,17 @@ def create_platform(client: int, platform: Platform) -> int:
     x, y, z = platform.size
     shape = create_compound_shape([Box((x / 2, y / 2, z / 2), (0.0, 0.0, 0.0))], client)
     number = pybullet.createMultiBody(0, shape, -1, platform.position, physicsClientId=client)
-    set_dynamics(client, number, -1)
+    set_dynamics(client, number, -1, platform.surface)
     return int(number)
 
 
-def set_dynamics(client: int, number: int, link: int, body: Body | None = None) -> None:
-    """Set mass and inertia of `body`, the common friction, no restitution, no damping and no sleeping for a Bullet body."""
+def set_dynamics(client: int, number: int, link: int, surface: ContactSurface = DRY, body: Body | None = None) -> None:
+    """Set mass and inertia of `body`, friction and restitution, no damping and no sleeping for a Bullet body."""
     pybullet.changeDynamics(
         number,
         link,
-        lateralFriction=FRICTION,
-        restitution=0,
+        lateralFriction=surface.friction,
+        restitution=surface.restitution,
         linearDamping=0,
         angularDamping=0,
         maxJointVelocity=_MAX_VELOCITY,

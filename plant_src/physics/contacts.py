@@ -31,6 +31,11 @@ def overlap_depths(client: int) -> dict[tuple[int, int], float]:
     return depths
 
 
+def touching_pairs(client: int) -> frozenset[tuple[int, int]]:
+    """Return the pairs of bodies between which Bullet keeps contact points."""
+    return frozenset(point[_BODY_A:_BODY_END] for point in pybullet.getContactPoints(*_ALL_BODIES, client))
+
+
 class _Pair(NamedTuple):
     """Two bodies in contact.
 

@@ -15,7 +15,7 @@ from ..vehicles.common.step_status import INVALID_STATE, LEAVES_SAFE_BOX, MAY_FA
 from .body import ContactBody, InvalidStateError
 from .clearance import BoundingBox, Clearance
 from .client import pybullet
-from .contacts import Contacts
+from .contacts import Contacts, touching_pairs
 from .failures import Failures
 from .vehicle_arrays import VehicleArrays
 from .vessel_bodies import PlanarBody, body_class
@@ -37,12 +37,14 @@ class FleetState:
         memory: Copy of the arrays of all vehicles.
         flags: Copy of the flags.
         is_near: For each vehicle whether Bullet steps its body.
+        touching_pairs: Pairs of bodies between which Bullet keeps contact points.
     """
 
     bullet: int
     memory: np.ndarray
     flags: np.ndarray
     is_near: Sequence[bool]
+    touching_pairs: frozenset[tuple[int, int]]
 
 
 class Fleet:
@@ -190,10 +192,13 @@ class Fleet:
 
     def get_state(self) -> FleetState:
         """Return a copy of the state, which also takes memory in Bullet until `free_state`."""
-        return FleetState(pybullet.saveState(self._client), self._memory.buffer.copy(), self._flags.copy(), self._is_near)
+        pairs = touching_pairs(self._client)
+        return FleetState(pybullet.saveState(self._client), self._memory.buffer.copy(), self._flags.copy(), self._is_near, pairs)
 
     def set_state(self, state: FleetState) -> None:
         """Restore a state."""
+        if not touching_pairs(self._client) <= state.touching_pairs:
+            self._remove_contact_points()
         pybullet.restoreState(state.bullet, physicsClientId=self._client)
         self._memory.buffer[:], self._flags[:] = state.memory, state.flags
         self.failures.restore(state.flags)
@@ -201,6 +206,12 @@ class Fleet:
         self.clearance.invalidate()
         self._near_vehicles_outdated = True
         self.contacts.has_contacts = bool(state.flags.any())
+
+    def _remove_contact_points(self) -> None:
+        """Separate all vehicles, because Bullet keeps the points of a pair that has none in the state to restore."""
+        for body in self._active_bodies:
+            body.set_active(False)
+        pybullet.performCollisionDetection(self._client)
 
     def free_state(self, state: FleetState) -> None:
         """Release the memory of a state in Bullet."""

@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 import struct
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -15,6 +16,7 @@ from .clearance import BoundingBox
 from .compiled_equations import bind_arrays, load_library
 
 if TYPE_CHECKING:
+    from ..placement import VehiclePlacement
     from ..vehicles.model import Model
 
 #: tolerated vertical speed of a planar vessel in Bullet (m/s), and tolerated change of its height before a reset (m)
@@ -85,12 +87,13 @@ class PlanarBody(ContactBody):
         low, high = float(corners[:, 2].min()), float(corners[:, 2].max())
         return BoundingBox((-radius, -radius, low), (radius, radius, high))
 
-    def _create_body(self, body: Body) -> int:
+    def _create_body(self, vehicle: VehiclePlacement) -> int:
         self._previous_vertical_load: Any = self._arrays["previous_vertical_load"].data
         #: lift and sink rate (m/s) of the previous attempt
         self._last_attempt = 0.0, 0.0
         infinite = 0.0  # Bullet's convention for an infinite moment of inertia
-        return super()._create_body(body._replace(inertia=(infinite, infinite, body.inertia[2])))
+        body = vehicle.body._replace(inertia=(infinite, infinite, vehicle.body.inertia[2]))
+        return super()._create_body(replace(vehicle, body=body))
 
     def height_converged(self, repeats: int) -> bool:
         """Return whether the vessel keeps its height in Bullet's step; if not, improve the lift for the next attempt.

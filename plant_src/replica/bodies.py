@@ -62,7 +62,7 @@ class Quadcopter:
             orientation,
             physicsClientId=client,
         )
-        set_dynamics(client, self.body, -1, _QUADCOPTER.body)
+        set_dynamics(client, self.body, -1, body=_QUADCOPTER.body)
         linear, angular = rotation @ (initial[4:7] + _LEVER_MATRIX @ initial[7:10]), rotation @ initial[7:10]
         pybullet.resetBaseVelocity(self.body, linear.tolist(), angular.tolist(), physicsClientId=client)
 
@@ -113,7 +113,7 @@ class Vessel:
             pybullet.changeDynamics(self.body, joint, jointDamping=0, physicsClientId=client)
         for link in (-1, 0, 1):
             set_dynamics(client, self.body, link)
-        set_dynamics(client, self.body, 2, strider.BODY)
+        set_dynamics(client, self.body, 2, body=strider.BODY)
 
     def apply(self, loads: np.ndarray) -> None:
         """Apply propeller thrust, rudder X and Y, water X and Y (N) and water N (N m) in the next step of Bullet."""

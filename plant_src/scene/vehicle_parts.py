@@ -59,7 +59,7 @@ def _hull_parts(hull: Box, aft: float, fore: float, deck: float) -> Iterator[Par
 
 def multirotor_parts(airframe: Airframe, body: Body) -> Iterator[Part]:
     """Yield a hull, legs, and for each rotor an arm, a motor and a propeller disc; discs in front are red."""
-    _, _, height = airframe.rotor_centre
+    (_, _, height), _ = airframe.rotor_disc
     arm = max(math.hypot(*rotor.position[:2]) for rotor in airframe.rotors)
     hull = 0.42 * arm
     yield Part("cylinder", (hull, 0.28 * arm), (0.0, 0.0, height - 0.16 * arm), BLACK)

@@ -61,9 +61,9 @@ class Model:
         return self.equations or self.name
 
     @property
-    def rotor_centre(self) -> Vector | None:
-        """Mean position of the rotors of a multirotor (m, body frame)."""
-        return self.airframe.rotor_centre if self.airframe else None
+    def rotor_disc(self) -> tuple[Vector, float] | None:
+        """Centre (m, body frame) and radius (m) of the disc that contains all rotors of a multirotor."""
+        return self.airframe.rotor_disc if self.airframe else None
 
     def body_with(self, parameters: Mapping[str, float]) -> Body:
         """Return the rigid body of a vehicle with these parameters.

@@ -2,7 +2,8 @@
 
 The attitude is a rotation matrix, the body frame is forward-right-down at the centre of mass, and the rotor speeds are states
 that lag behind their commands. The ground effect is the published formula for a square of rotors and its counterpart for a
-hexagon. The equations are integrated with an eighth-order method and tight tolerances.
+hexagon; the air speed in the plane of a rotor over its induced velocity in hover reduces it (Cheeseman and Bennett). The
+equations are integrated with an eighth-order method and tight tolerances.
 """
 
 from __future__ import annotations
@@ -14,6 +15,7 @@ import numpy as np
 from scipy.integrate import solve_ivp
 
 GRAVITY = 9.81
+AIR_DENSITY = 1.225
 FLIP = np.diag([1.0, -1.0, -1.0])  # forward-right-down <-> forward-left-up
 RPM = 2 * np.pi / 60
 
@@ -149,10 +151,12 @@ def _rate(vehicle: Vehicle, state: np.ndarray, held: HeldInputs) -> np.ndarray:
     velocity, to_world, rates, speeds = state[3:6], state[6:15].reshape(3, 3), state[15:18], state[18:]
     speed_rates = (np.clip(held.command, 0, vehicle.max_rotor_speed) - speeds) / vehicle.time_constant
     air = to_world.T @ (held.wind - velocity)  # velocity of the air over the body
-    gain = 1 / (1 - vehicle.inflow_reduction(max(held.height, vehicle.radius / 2)))
     places, turning, spin = vehicle.rotors @ FLIP, np.array(vehicle.spin_directions), _cross(rates)
-    loads = speeds[:, None] * vehicle.rotor_drag * (air - places @ spin.T)
-    loads[:, 2] -= gain * vehicle.thrust * speeds**2
+    flow, thrust = air - places @ spin.T, vehicle.thrust * speeds**2
+    carried_away = 1 + (flow[:, 0] ** 2 + flow[:, 1] ** 2) * 2 * AIR_DENSITY * np.pi * vehicle.radius**2 / thrust
+    gain = 1 / (1 - vehicle.inflow_reduction(max(held.height, vehicle.radius / 2)) / carried_away)
+    loads = speeds[:, None] * vehicle.rotor_drag * flow
+    loads[:, 2] -= gain * thrust
     force = loads.sum(axis=0) + np.sqrt(air @ air) * vehicle.body_drag * air
     swirl = places.T @ loads  # its antisymmetric part is the sum of the moments of the rotors' loads
     torque = np.array([swirl[1, 2] - swirl[2, 1], swirl[2, 0] - swirl[0, 2], swirl[0, 1] - swirl[1, 0]])

@@ -72,9 +72,19 @@ WAVE_GAIN_INPUT = (scalar_variable("wave_gain", "1", "factor on the amplitudes o
 GROUND_DISTANCE_INPUT = (
     scalar_variable("ground_distance", "m", "height of the rotor centre above the surface below", start=1e3),
 )
+GROUND_SHARE_INPUT = (scalar_variable("ground_share", "1", "share of the rotors' area above this surface", start=1.0),)
+WATER_LEVEL_INPUT = (scalar_variable("water_level", "m", "height of the water surface, world frame", start=-1e9),)
 #: names of all environment inputs
 ENVIRONMENT_INPUTS = frozenset(
-    variable.name for variable in (*WIND_INPUTS, *CURRENT_INPUTS, *WAVE_GAIN_INPUT, *GROUND_DISTANCE_INPUT)
+    variable.name
+    for variable in (
+        *WIND_INPUTS,
+        *CURRENT_INPUTS,
+        *WAVE_GAIN_INPUT,
+        *GROUND_DISTANCE_INPUT,
+        *GROUND_SHARE_INPUT,
+        *WATER_LEVEL_INPUT,
+    )
 )
 
 

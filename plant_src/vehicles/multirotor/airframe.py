@@ -53,6 +53,7 @@ class RotorEffects:
         rotor_drag: Force per rotor speed and air speed along x, y and z (kg/rad, body frame).
         body_drag: Force per squared air speed along x, y and z (kg/m, body frame).
         ground_effect: Fraction of the ground effect's thrust that is applied (0 to 1).
+        translational_lift: Thrust of a rotor over the square of the air speed in its plane (kg/m).
     """
 
     rotor_time_constant: float = 0.0
@@ -60,6 +61,22 @@ class RotorEffects:
     rotor_drag: Vector = (0.0, 0.0, 0.0)
     body_drag: Vector = (0.0, 0.0, 0.0)
     ground_effect: float = 0.0
+    translational_lift: float = 0.0
+
+
+@dataclass(frozen=True)
+class Hull:
+    """The body in water; a hull without volume and size is not affected by water.
+
+    Attributes:
+        size: Edges of the box around the body (m, body frame).
+        volume: Volume of water that the submerged vehicle displaces (m3).
+        drag_coefficient: Drag coefficient of the box (1).
+    """
+
+    size: Vector = (0.0, 0.0, 0.0)
+    volume: float = 0.0
+    drag_coefficient: float = 1.0
 
 
 @dataclass(frozen=True)
@@ -75,6 +92,7 @@ class Airframe:
         rotor_radius: Radius of a rotor (m).
         effects: Start values of the further effects.
         gravity: Gravitational acceleration (m/s2).
+        hull: The body in water.
 
     Raises:
         InputError: For physically impossible values, all together; a problem's subject begins with the name of the attribute.
@@ -88,6 +106,7 @@ class Airframe:
     rotor_radius: float
     effects: RotorEffects = field(default_factory=RotorEffects)
     gravity: float = 9.81
+    hull: Hull = field(default_factory=Hull)
 
     def __post_init__(self) -> None:
         problems = [*self._number_problems(), *self._inertia_problems(), *self._rotor_problems()]
@@ -95,10 +114,11 @@ class Airframe:
             raise InputError(problems)
 
     @property
-    def rotor_centre(self) -> Vector:
-        """Mean position of the rotors (m, body frame)."""
-        x, y, z = np.mean([rotor.position for rotor in self.rotors], axis=0).tolist()
-        return x, y, z
+    def rotor_disc(self) -> tuple[Vector, float]:
+        """Mean position of the rotors (m, body frame), and radius (m) of the disc around it that contains their discs."""
+        hubs = np.array([rotor.position for rotor in self.rotors])
+        x, y, z = hubs.mean(axis=0).tolist()
+        return (x, y, z), float(np.hypot(hubs[:, 0] - x, hubs[:, 1] - y).max()) + self.rotor_radius
 
     def _problem(self, text: str, *subject: str) -> Problem:
         return Problem(text, f"airframe {self.name}: {'.'.join(subject)}", subject)
@@ -108,9 +128,10 @@ class Airframe:
         for name in positive:
             if not 0 < getattr(self, name) < math.inf:
                 yield self._problem(f"found {getattr(self, name)!r}, expected a finite number greater than 0", name)
-        for name, value in vars(self.effects).items():
-            if not all(0 <= number < math.inf for number in np.ravel(value)):
-                yield self._problem(f"found {value!r}, expected finite numbers of at least 0", "effects", name)
+        for part in ("effects", "hull"):
+            for name, value in vars(getattr(self, part)).items():
+                if not all(0 <= number < math.inf for number in np.ravel(value)):
+                    yield self._problem(f"found {value!r}, expected finite numbers of at least 0", part, name)
 
     def _inertia_problems(self) -> Iterator[Problem]:
         tensor = np.asarray(self.inertia, float)

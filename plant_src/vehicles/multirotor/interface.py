@@ -13,9 +13,12 @@ from cosim.core.component import Variable
 from cosim.core.units import parse_unit
 
 from ..common.interface import (
+    CURRENT_INPUTS,
     EXTERNAL_LOADS,
     GROUND_DISTANCE_INPUT,
+    GROUND_SHARE_INPUT,
     MOTION_OUTPUTS,
+    WATER_LEVEL_INPUT,
     WIND_INPUTS,
     WORLD_OUTPUTS,
     initial_variables,
@@ -44,12 +47,16 @@ def variables(airframe: Airframe, rotor_slots: int | None = None) -> tuple[Varia
     return (
         *initial_variables("xyz", "uvw", "pqr"),
         *_rigid_body_variables(airframe),
+        *_hull_parameters(airframe),
         *_rotor_parameters(airframe, slots),
         *_effect_variables(airframe),
         *EXTERNAL_LOADS,
         _rotor_speed_variable(airframe, slots),
         *WIND_INPUTS,
         *GROUND_DISTANCE_INPUT,
+        *GROUND_SHARE_INPUT,
+        *WATER_LEVEL_INPUT,
+        *CURRENT_INPUTS,
         *MOTION_OUTPUTS,
         *WORLD_OUTPUTS,
     )
@@ -71,7 +78,7 @@ def constant_count(airframe: Airframe, rotor_slots: int) -> int:
     """Return the number of constants that the equations derive from the parameters (`multirotor_equations.derive_constants`)."""
     parameters = (variable for variable in variables(airframe, rotor_slots) if variable.causality == "parameter")
     given = sum(len(variable.scalar_names) for variable in parameters)
-    return given + 9 + ROTOR_TABLE_COLUMNS * table_rows(rotor_slots) + 9 * rotor_slots
+    return given + 11 + ROTOR_TABLE_COLUMNS * table_rows(rotor_slots) + 9 * rotor_slots
 
 
 def _rigid_body_variables(airframe: Airframe) -> tuple[Variable, ...]:
@@ -82,6 +89,15 @@ def _rigid_body_variables(airframe: Airframe) -> tuple[Variable, ...]:
     tensor = (scalar_variable(name, "kg.m2", f"{text}: {name[-2:]}", "parameter", value) for name, value in elements.items())
     gravity = scalar_variable("gravity", "m/s2", "gravitational acceleration", "parameter", airframe.gravity)
     return (mass, *tensor, gravity)
+
+
+def _hull_parameters(airframe: Airframe) -> tuple[Variable, ...]:
+    hull = airframe.hull
+    return (
+        *_axis_parameters("hull_size", "m", "edge of the box around the body, for forces in water", hull.size),
+        _parameter("displaced_volume", "m3", "volume of water that the submerged vehicle displaces", hull.volume),
+        _parameter("water_drag_coefficient", "1", "drag coefficient of the body in water", hull.drag_coefficient),
+    )
 
 
 def _rotor_parameters(airframe: Airframe, slots: int) -> Iterator[Variable]:
@@ -130,6 +146,12 @@ def _effect_variables(airframe: Airframe) -> tuple[Variable, ...]:
         *_axis_parameters("rotor_drag", "kg/rad", "drag of a rotor over its speed and air speed", effects.rotor_drag),
         *_axis_parameters("body_drag", "kg/m", "drag of the body over squared air speed", effects.body_drag),
         _parameter("ground_effect", "1", "fraction of the ground effect; 0: none", effects.ground_effect, 1.0),
+        _parameter(
+            "translational_lift",
+            "kg/m",
+            "thrust of a rotor over the squared air speed in its plane",
+            effects.translational_lift,
+        ),
     )
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from functools import cached_property
 
@@ -12,7 +13,7 @@ from cosim.export.equations.simd_sum import sum_over_rows
 
 from ..common import kinematics
 from ..common.named_values import NamedValues
-from .ground_effect import create_thrust_factors
+from .ground_effect import AIR_DENSITY, create_reductions, thrust_factor
 from .interface import ROTOR_TABLE_COLUMNS, table_rows
 
 
@@ -32,16 +33,26 @@ def still_air_loads(table: ca.SX, slots: int) -> ca.SX:
     return ca.horzcat(*loads)
 
 
+#: largest ratio of the air speed in the plane of a rotor to the speed of its tips for which the translational lift grows
+MAX_ADVANCE_RATIO = 0.5
+
+
 def _rotor_term() -> ca.Function:
-    """Return the function of one rotor: (air velocity, rates, rotor drag), (speed, thrust factor) and its row to its load."""
-    common, moving, row = ca.SX.sym("common", 9), ca.SX.sym("moving", 2), ca.SX.sym("row", ROTOR_TABLE_COLUMNS)
-    (air, rates, drag), (speed, factor), (position, axis) = (
-        ca.vertsplit(common, 3),
-        ca.vertsplit(moving),
-        ca.vertsplit(row[0:6], 3),
-    )
+    """Return the function of one rotor to its load.
+
+    Its arguments are (air velocity, rates, rotor drag, gain of the ground effect, 2 rho A, translational lift, rotor radius),
+    (speed, reduction of the inflow by the ground effect) and the row of the rotor.
+    """
+    common, moving, row = ca.SX.sym("common", 13), ca.SX.sym("moving", 2), ca.SX.sym("row", ROTOR_TABLE_COLUMNS)
+    (air, rates, drag), (gain, wake, lift, radius) = ca.vertsplit(common[0:9], 3), ca.vertsplit(common[9:13])
+    (speed, reduction), (position, axis) = ca.vertsplit(moving), ca.vertsplit(row[0:6], 3)
     squared = speed**2
-    force = factor * row[6] * squared * axis - speed * drag * (air + ca.cross(rates, position))
+    local_air = air + ca.cross(rates, position)
+    in_plane = ca.dot(local_air, local_air) - ca.dot(local_air, axis) ** 2
+    thrust = row[6] * squared
+    pull = thrust_factor(reduction, gain, thrust, in_plane, wake) * thrust
+    pull += lift * ca.fmin(in_plane, (MAX_ADVANCE_RATIO * radius) ** 2 * squared)
+    force = pull * axis - speed * drag * local_air
     torque = ca.cross(position, force) + row[7] * squared * axis
     return ca.Function("rotor_load", [common, moving, row], [ca.vertcat(force, torque)])
 
@@ -57,37 +68,39 @@ class RotorFunctions:
     slots: int
 
     @cached_property
-    def thrust_factors(self) -> Callee:
-        """Factors of the ground effect."""
-        return create_thrust_factors(self.slots)
+    def inflow_reductions(self) -> Callee:
+        """Reductions of the inflow by the ground effect."""
+        return create_reductions(self.slots)
 
     @cached_property
     def load_sum(self) -> Callee:
         """Sum of the loads of all rotors in moving air."""
         return sum_over_rows("rotor_loads", _rotor_term(), table_rows(self.slots))
 
-    def ground_factors(self, inputs: NamedValues, constants: NamedValues) -> ca.SX:
-        """Return the ratio of each rotor's thrust to that in free air, shape (slots,)."""
+    def ground_reductions(self, inputs: NamedValues, constants: NamedValues) -> ca.SX:
+        """Return the relative reduction of each hovering rotor's inflow by the surface below, shape (slots,)."""
         common = ca.vertcat(inputs["ground_distance"], constants["rotor_radius"], constants["rotor_count"])
-        factors = self.thrust_factors(common, constants["rotor_position.x"], constants["rotor_position.y"])
-        return 1 + constants["ground_effect"] * (factors - 1)
+        return self.inflow_reductions(common, constants["rotor_position.x"], constants["rotor_position.y"])
 
     def aerodynamic_loads(
-        self, state: ca.SX, speed: ca.SX, factors: ca.SX, inputs: NamedValues, constants: NamedValues
+        self, state: ca.SX, speed: ca.SX, reductions: ca.SX, inputs: NamedValues, constants: NamedValues
     ) -> tuple[ca.SX, ca.SX]:
         """Return force (N) and torque (N m) of rotors and body in moving air, body frame.
 
         Args:
             state: States of the rigid body.
             speed: Rotor speeds (rad/s), shape (slots,).
-            factors: Result of `ground_factors`.
+            reductions: Result of `ground_reductions`.
             inputs: Inputs of the model.
             constants: Constants of the equations.
         """
         air = kinematics.rotation_matrix(state[3:7]).T @ (state[7:10] - inputs["wind"])
         padding = ca.SX.zeros(table_rows(self.slots) - self.slots)
-        moving = ca.vertcat(speed, padding, factors, padding)
-        common = ca.vertcat(air, state[10:13], constants["rotor_drag"])
+        moving = ca.vertcat(speed, padding, reductions, padding)
+        gain, radius = constants["ground_effect"] * inputs["ground_share"], constants["rotor_radius"]
+        wake = 2 * math.pi * AIR_DENSITY * radius**2
+        rotors = (gain, wake, constants["translational_lift"], radius)
+        common = ca.vertcat(air, state[10:13], constants["rotor_drag"], *rotors)
         rows = table_rows(self.slots)
         load = self.load_sum(common, constants["rotor_count"], ca.reshape(moving, rows, 2), constants["rotor_table"])
         return load[0:3] - ca.norm_2(air) * constants["body_drag"] * air, load[3:6]

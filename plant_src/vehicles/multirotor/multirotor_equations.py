@@ -7,25 +7,30 @@ frame) and rotor speeds n_i (rad/s). With all effects:
     q' = q * (0, w) / 2                        u_i = u + w x r_i                       air-relative velocity at rotor i
     v' = (R F + F_ext) / m - g e_z             F = sum_i F_i - |u| diag(body_drag) u
     w' = I^-1 (T + R^T T_ext - w x (I w + H) - H')
-    F_i = g_i c_T,i n_i^2 a_i - n_i diag(rotor_drag) u_i
+    F_i = (g_i c_T,i n_i^2 + l_i) a_i - n_i diag(rotor_drag) u_i
     T = sum_i (r_i x F_i + c_D,i n_i^2 a_i)    H = -J sum_i s_i n_i a_i                angular momentum of the rotors
     n_i' = (command_i - n_i) / rotor_time_constant
 
 r_i is the position of rotor i, a_i its thrust axis, s_i the sign of its reaction torque c_D,i n_i^2 and g_i its ground-effect
-factor (`ground_effect.py`). Rotor drag, applied at each hub, and body drag follow Folk, Paulos and Kumar, "RotorPy", 2023. The
-rotor drag is the lumped model of Faessler, Franchi and Scaramuzza, "Differential Flatness of Quadrotor Dynamics Subject to Rotor
-Drag", 2018, distributed over the rotors. With a rotor time constant of 0 the rotor speeds equal their commands, and H' is
-neglected.
+factor (`ground_effect.py`). l_i = translational_lift min(|u_p|^2, (R n_i / 2)^2) is the additional thrust by the air speed u_p
+in the plane of the rotor. Together with the rotor drag along the axis, which is the loss of thrust by axial inflow, it is the
+reduced blade-element momentum model of Svacha, Mohta and Kumar, "Improving Quadrotor Trajectory Tracking by Compensating for
+Aerodynamic Effects", ICUAS 2017, limited to the advance ratio 1/2. Rotor drag, applied at each hub, and body drag follow Folk,
+Paulos and Kumar, "RotorPy", 2023. The rotor drag is the lumped model of Faessler, Franchi and Scaramuzza, "Differential
+Flatness of Quadrotor Dynamics Subject to Rotor Drag", 2018, distributed over the rotors. With a rotor time constant of 0 the
+rotor speeds equal their commands, and H' is neglected.
 
 The rotor speeds are the exact solution for held commands. The rigid body is integrated by the classical Runge-Kutta method,
 which evaluates the rotor speeds at the times of its stages; a short time constant therefore does not limit the step. If all
-effects are off, a shorter compiled function is called.
+effects are off, a shorter compiled function is called. A step that begins or ends with a part of the vehicle in the water is
+divided into shorter ones with the loads of `water.py`.
 
 All values are parameters. The equations are generated for a number of rotor slots; slots without a rotor have the coefficients 0.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass, field, fields
 from functools import cached_property
 from typing import NamedTuple
@@ -41,6 +46,7 @@ from cosim.export.fmu.block import Block
 from ..common import contact_maps, kinematics
 from ..common.interface import WORLD_OUTPUTS
 from ..common.named_values import ConstantsMap, NamedValues, values_by_name, variables_of
+from . import water
 from .airframe import Airframe, RotorEffects
 from .interface import states, variables
 from .loads import RotorFunctions, gyroscopic_torque, rotor_table, still_air_loads
@@ -50,13 +56,20 @@ RIGID_BODY_STATE_COUNT = 13
 
 _EFFECTS = [effect.name for effect in fields(RotorEffects)]
 
+#: integration steps in water per step in air
+WATER_SUB_STEPS = 5
+
 
 class SpinningRotors(NamedTuple):
-    """Rotors at one time: speeds (rad/s), and their angular momentum (N m s) with its rate (N m), body frame."""
+    """Rotors at one time: speeds (rad/s) that act on air, angular momentum (N m s) and its rate (N m), body frame."""
 
-    speed: ca.SX
+    aerodynamic_speed: ca.SX
     momentum: ca.SX
     momentum_rate: ca.SX
+
+
+#: function of (state, rotors, reductions of the inflow, inputs, constants) to the rate of the rigid-body states
+BodyRate = Callable[[ca.SX, SpinningRotors, ca.SX, NamedValues, NamedValues], ca.SX]
 
 
 def rigid_body(constants: NamedValues) -> contact_maps.RigidBody:
@@ -120,14 +133,19 @@ class MultirotorEquations:
         return RotorFunctions(self.slots)
 
     def derive_constants(self, parameters: NamedValues) -> dict[str, ca.SX]:
-        """Return the parameters, the inverse of the inertia tensor, and the tables of the rotors."""
+        """Return the parameters, the inverse of the inertia tensor, the tables of the rotors and their largest distances.
+
+        The distances (m) are those of the hubs from the z axis and from the plane z = 0.
+        """
         table = rotor_table(parameters, self.slots)
+        x, y, z = (parameters[f"rotor_position.{axis}"] for axis in "xyz")
         axes = table[: self.slots, 3:6].T
         return {
             **parameters,
             "inverse_inertia": ca.inv(_symmetric_matrix(parameters["inertia"])),
             "rotor_table": table,
             "still_air_loads": still_air_loads(table, self.slots),
+            "rotor_reach": ca.vertcat(ca.sqrt(ca.mmax(x**2 + y**2)), ca.mmax(ca.fabs(z))),
             "momenta": -parameters["rotor_inertia"] * axes * ca.repmat(parameters["torque_sign"].T, 3, 1),
         }
 
@@ -145,14 +163,14 @@ class MultirotorEquations:
         return ca.vertcat(initial["initial.position"], orientation, velocity, initial["initial.rates"], rotors)
 
     def rate(self, state: ca.SX, inputs: ca.SX, constants: ca.SX) -> ca.SX:
-        """Return the time derivative of the state of a multirotor whose rotors lag."""
+        """Return the time derivative of the state of a multirotor whose rotors lag, in air and water."""
         given, known = self._inputs(inputs), self.constants.by_name(constants)
         speed, lag = state[RIGID_BODY_STATE_COUNT:], known["rotor_time_constant"]
         target = self._commanded_speeds(given, known)
-        factors = self.rotor_functions.ground_factors(given, known)
+        reductions = self.rotor_functions.ground_reductions(given, known)
         rotors = _spinning_rotors(speed, target, known)
         return ca.vertcat(
-            self._body_rate(state[:RIGID_BODY_STATE_COUNT], rotors, factors, given, known),
+            self._rate_in_water(state[:RIGID_BODY_STATE_COUNT], rotors, reductions, given, known),
             ca.if_else(lag > 0, (target - speed) / lag, 0),
         )
 
@@ -169,18 +187,23 @@ class MultirotorEquations:
         return ca.vertcat(normalised_state(end), speed)
 
     def step_with_effects(self, state: ca.SX, inputs: ca.SX, constants: ca.SX, step: ca.SX) -> ca.SX:
-        """Return the state after a step (s) with all effects."""
+        """Return the state after a step (s) in air with all effects."""
+        return self._step(self._body_rate, state, inputs, constants, step)
+
+    def step_in_water(self, state: ca.SX, inputs: ca.SX, constants: ca.SX, step: ca.SX) -> ca.SX:
+        """Return the state after a step (s) with all effects and the loads of water."""
+        return self._step(self._rate_in_water, state, inputs, constants, step)
+
+    def _step(self, body_rate: BodyRate, state: ca.SX, inputs: ca.SX, constants: ca.SX, step: ca.SX) -> ca.SX:
         given, known = self._inputs(inputs), self.constants.by_name(constants)
         target, lag = self._commanded_speeds(given, known), known["rotor_time_constant"]
         start = ca.if_else(lag > 0, state[RIGID_BODY_STATE_COUNT:], target)
         remaining = ca.exp(-step / 2 / lag)  # fraction of the difference left after half a step; 0 without a lag
         middle, end = (target + fraction * (start - target) for fraction in (remaining, remaining**2))
-        factors = self.rotor_functions.ground_factors(given, known)
+        reductions = self.rotor_functions.ground_reductions(given, known)
         first, second, last = (_spinning_rotors(speed, target, known) for speed in (start, middle, end))
         stages = iter((first, second, second, last))
-        body = runge_kutta_4(
-            lambda x: self._body_rate(x, next(stages), factors, given, known), state[:RIGID_BODY_STATE_COUNT], step
-        )
+        body = runge_kutta_4(lambda x: body_rate(x, next(stages), reductions, given, known), state[:RIGID_BODY_STATE_COUNT], step)
         return ca.vertcat(normalised_state(body), end)
 
     def _commanded_speeds(self, inputs: NamedValues, constants: NamedValues) -> ca.SX:
@@ -188,12 +211,21 @@ class MultirotorEquations:
         return ca.fmin(ca.fmax(inputs["rotor_speed"], 0), constants["max_rotor_speed"])
 
     def _body_rate(
-        self, state: ca.SX, rotors: SpinningRotors, factors: ca.SX, inputs: NamedValues, constants: NamedValues
+        self, state: ca.SX, rotors: SpinningRotors, reductions: ca.SX, inputs: NamedValues, constants: NamedValues
     ) -> ca.SX:
-        """Return the time derivative of the rigid-body states with all effects."""
-        force, torque = self.rotor_functions.aerodynamic_loads(state, rotors.speed, factors, inputs, constants)
+        """Return the time derivative of the rigid-body states in air with all effects."""
+        force, torque = self.rotor_functions.aerodynamic_loads(state, rotors.aerodynamic_speed, reductions, inputs, constants)
         torque += gyroscopic_torque(state[10:13], rotors.momentum, rotors.momentum_rate)
         return rigid_body_rate(rigid_body(constants), constants["gravity"], state, inputs, force, torque)
+
+    def _rate_in_water(
+        self, state: ca.SX, rotors: SpinningRotors, reductions: ca.SX, inputs: NamedValues, constants: NamedValues
+    ) -> ca.SX:
+        """Return the time derivative of the rigid-body states with all effects and the loads of water."""
+        emerged = water.emerged_fractions(state, inputs, constants)
+        wet = rotors._replace(aerodynamic_speed=rotors.aerodynamic_speed * emerged)
+        rate = self._body_rate(state, wet, reductions, inputs, constants)
+        return water.add_water_loads(rate, state, inputs, constants)
 
 
 def _spinning_rotors(speed: ca.SX, target: ca.SX, constants: NamedValues) -> SpinningRotors:
@@ -227,25 +259,44 @@ class Multirotor(ContinuousModel):
 
 
 def free_step(equations: MultirotorEquations) -> Callee:
-    """Return the function of one step; its C code calls the shorter function if all effects are off."""
+    """Return the function of one step; its C code calls the function for the effects that are on and the water."""
     inputs = sum(len(variable.scalar_names) for variable in variables_of(equations.variables, "input"))
     names = [name for name, (rows, columns) in equations.constants.shapes.items() for _ in range(rows * columns)]
     sizes = {"state": len(states(equations.slots)), "inputs": inputs, "constants": len(names), "step": 1}
     arguments = [ca.SX.sym(name, size) for name, size in sizes.items()]
     plain = ca.Function("plain_step", arguments, [equations.step_without_effects(*arguments)])
     full = ca.Function("step_with_effects", arguments, [equations.step_with_effects(*arguments)])
+    wet = ca.Function("step_in_water", arguments, [equations.step_in_water(*arguments)])
     either = ca.Function("free_step", arguments, [full(*arguments)], {"never_inline": True})
     effects = [k for k, name in enumerate(names) if name.partition(".")[0] in _EFFECTS]
-    return Callee(either, _FREE_STEP_C % {"first": effects[0], "end": effects[-1] + 1}, [plain, full])
+    input_names = [slot for variable in variables_of(equations.variables, "input") for slot in variable.scalar_names]
+    indices = {"height": names.index("hull_size.z"), "reach": names.index("rotor_reach"), "radius": names.index("rotor_radius")}
+    values = {"first": effects[0], "end": effects[-1] + 1, "level": input_names.index("water_level"), **indices}
+    body = _FREE_STEP_C % {**values, "states": sizes["state"], "sub_steps": WATER_SUB_STEPS}
+    return Callee(either, body, [plain, full, wet])
 
 
+#: the lowest point is not above the bottom of the hull or a quarter turn of the rotors' discs below their hubs
 _FREE_STEP_C = """{
-    for (int i = %(first)d; i < %(end)d; ++i)
-        if (in[2][i] != 0) {
-            step_with_effects(in, out);
-            return;
-        }
-    plain_step(in, out);
+    const double *const ends[2] = {in[0], out[0]}, *const constants = in[2];
+    int effects = 0, wet = 0;
+    for (int i = %(first)d; i < %(end)d; ++i) effects |= constants[i] != 0;
+    if (effects) step_with_effects(in, out);
+    else plain_step(in, out);
+    for (int i = 0; i < 2; ++i) {
+        const double *const x = ends[i], up = 1 - 2 * (x[4] * x[4] + x[5] * x[5]), tilt = up * up < 1 ? sqrt(1 - up * up) : 0;
+        const double rotors = tilt * constants[%(reach)d] + constants[%(reach)d + 1] + constants[%(radius)d] / 2;
+        const double hull = constants[%(height)d] / 2;
+        wet |= x[2] - (rotors > hull ? rotors : hull) < in[1][%(level)d];
+    }
+    if (!wet) return;
+    double state[%(states)d];
+    const double part = in[3][0] / %(sub_steps)d, *const arguments[4] = {state, in[1], constants, &part};
+    for (int i = 0; i < %(states)d; ++i) state[i] = in[0][i];
+    for (int k = 0; k < %(sub_steps)d; ++k) {
+        step_in_water(arguments, out);
+        for (int i = 0; i < %(states)d; ++i) state[i] = out[0][i];
+    }
 }
 """
 
@@ -269,7 +320,7 @@ def multirotor_block(airframe: Airframe, description: str, rotor_slots: int | No
         equations.rate,
         lambda state, _inputs, _constants: ca.vertcat(motion_of_state(state), ca.SX.zeros(len(WORLD_OUTPUTS))),
         derived_parameters=equations.constants.vector,
-        callees=[step, functions.thrust_factors, functions.load_sum],
+        callees=[step, functions.inflow_reductions, functions.load_sum],
         free_step=step.function,
     )
     maps = contact_maps.FreeContactMaps(model, lambda c: rigid_body(equations.constants.by_name(c)), motion_of_state)

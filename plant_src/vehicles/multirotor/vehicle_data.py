@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -14,15 +15,21 @@ from cosim.core.errors import InputError
 from ...json_reader import JsonPath
 from ..common.quantities import QuantityReader
 from ..common.shapes import Body, Box, Vector, level_box
-from .airframe import BODY_UP, Airframe, Rotor, RotorEffects
+from .airframe import BODY_UP, Airframe, Hull, Rotor, RotorEffects
 
 #: sense of rotation seen from the tip of the thrust's axis -> sign of the reaction torque about this axis
 TORQUE_SIGNS = {"clockwise": 1.0, "counter-clockwise": -1.0}
 
 _KEYS = ("mass", "inertia", "rotor", "rotors", "boxes", "crash_speed")
-_OPTIONAL_KEYS = ("body_drag", "ground_effect", "gravity")
+_OPTIONAL_KEYS = ("body_drag", "ground_effect", "gravity", "displaced_volume", "water_drag_coefficient")
 _COEFFICIENTS = {"thrust_coefficient": "N.s2/rad2", "torque_coefficient": "N.m.s2/rad2"}
-_ROTOR_KEYS, _ROTOR_OPTIONAL_KEYS = ("radius", "max_speed"), (*_COEFFICIENTS, "time_constant", "inertia", "drag")
+_ROTOR_KEYS, _ROTOR_OPTIONAL_KEYS = (
+    ("radius", "max_speed"),
+    (*_COEFFICIENTS, "time_constant", "inertia", "drag", "translational_lift"),
+)
+
+#: density (kg/m3) of a vehicle whose file does not say what volume it displaces; it sinks
+DEFAULT_DENSITY = 1200.0
 
 
 @dataclass(frozen=True)
@@ -32,6 +39,12 @@ class CollisionBox:
     size: Vector
     position: Vector
     yaw: float
+
+    def corners(self) -> np.ndarray:
+        """Return the corners (m, body frame), shape (8, 3)."""
+        x, y, z = (np.array(list(product((-0.5, 0.5), repeat=3))) * self.size).T
+        cosine, sine = math.cos(self.yaw), math.sin(self.yaw)
+        return np.column_stack([cosine * x - sine * y, sine * x + cosine * y, z]) + self.position
 
 
 @dataclass(frozen=True)
@@ -84,6 +97,7 @@ class _MultirotorReader(QuantityReader):
             "effects": self.read_effects(data, common),
         }
         boxes = tuple(self.read_box(box, ("boxes", str(i))) for i, box in self.elements(data, "boxes"))
+        values["hull"] = self.read_hull(data, boxes, values["mass"])
         crash_speed = self.quantity(data.get("crash_speed", 1.0), ("crash_speed",), "m/s", above=0.0)
         if self.problems:
             return None
@@ -93,6 +107,14 @@ class _MultirotorReader(QuantityReader):
             for problem in error.problems:
                 self.add_problem(problem.subject, problem.message)
             return None
+
+    def read_hull(self, data: Mapping[str, Any], boxes: Sequence[CollisionBox], mass: float) -> Hull:
+        """Read what water acts on: the box around all boxes, the displaced volume and the drag coefficient."""
+        corners = np.concatenate([box.corners() for box in boxes or (CollisionBox((1.0,) * 3, (0.0,) * 3, 0.0),)])
+        length, width, height = np.ptp(corners, axis=0).tolist()
+        volume = self.quantity(data.get("displaced_volume", mass / DEFAULT_DENSITY), ("displaced_volume",), "m3", low=0.0)
+        drag = data.get("water_drag_coefficient", 1.0)
+        return Hull((length, width, height), volume, self.quantity(drag, ("water_drag_coefficient",), "1", low=0.0))
 
     def elements(self, data: Mapping[str, Any], key: str) -> list[tuple[int, Any]]:
         """Read a list with at least one element; return its elements with their indices."""
@@ -145,6 +167,7 @@ class _MultirotorReader(QuantityReader):
             (rotor_drag[0], rotor_drag[1], rotor_drag[2]),
             (body_drag[0], body_drag[1], body_drag[2]),
             self.quantity(data.get("ground_effect", 0.0), ("ground_effect",), "1", 0.0, 1.0),
+            self.quantity(common.get("translational_lift", 0.0), ("rotor", "translational_lift"), "kg/m", low=0.0),
         )
 
     def read_box(self, value: Any, path: JsonPath) -> CollisionBox:

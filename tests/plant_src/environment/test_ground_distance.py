@@ -39,6 +39,13 @@ def ray(point: np.ndarray, centre: np.ndarray, attitude: Rotation) -> float | No
     return float(centre[2] + s * forward[2] + t * left[2]) if inside else None
 
 
+def distance(below: GroundDistance, x: float, y: float, z: float, time: float = 0.0, gain: float = 1.0) -> float:
+    """Return the distance of a point, which is a disc without radius."""
+    height, share = below.distance_and_share(x, y, z, 0.0, time, gain)
+    assert share == 1.0
+    return height
+
+
 def test_a_tilting_deck_is_where_a_ray_meets_it(measured: MeasurementCheck) -> None:
     random, met = np.random.default_rng(1), 0
     for _ in range(300):
@@ -48,7 +55,7 @@ def test_a_tilting_deck_is_where_a_ray_meets_it(measured: MeasurementCheck) -> N
         below = GroundDistance([vessel(centre, attitude)], [], CALM)
         height = ray(point, centre, attitude)
         met += height is not None
-        error = below.distance(*point, 0.0, 1.0) - (point[2] - (height or 0.0))
+        error = distance(below, *point) - (point[2] - (height or 0.0))
         measured(
             "Wind and current", "height above a tilting deck, for ground effect", error, 0.0, "m", "ray and plane", within=1e-12
         )
@@ -57,25 +64,41 @@ def test_a_tilting_deck_is_where_a_ray_meets_it(measured: MeasurementCheck) -> N
 
 def test_a_platform_is_below_when_it_is_under_and_lower() -> None:
     below = GroundDistance([], [PLATFORM], CALM)
-    assert below.distance(5.9, -0.4, 2.0, 0.0, 1.0) == pytest.approx(0.75)
-    assert below.distance(6.1, 0.0, 2.0, 0.0, 1.0) == 2.0
-    assert below.distance(5.0, 0.0, 0.5, 0.0, 1.0) == 0.5
+    assert distance(below, 5.9, -0.4, 2.0) == pytest.approx(0.75)
+    assert distance(below, 6.1, 0.0, 2.0) == 2.0
+    assert distance(below, 5.0, 0.0, 0.5) == 0.5
 
 
 def test_the_next_surface_counts() -> None:
     level = Rotation.identity()
     decks = [vessel((5.0, 0.0, height), level) for height in (0.3, 1.4, 3.0)]
-    assert GroundDistance(decks, [PLATFORM], CALM).distance(5.0, 0.0, 2.0, 0.0, 1.0) == pytest.approx(0.6)
+    assert distance(GroundDistance(decks, [PLATFORM], CALM), 5.0, 0.0, 2.0) == pytest.approx(0.6)
 
 
 def test_an_upside_down_vessel_has_no_deck() -> None:
     below = GroundDistance([vessel((0.0, 0.0, 0.3), Rotation.from_euler("x", np.pi))], [], CALM)
-    assert below.distance(0.0, 0.0, 1.0, 0.0, 1.0) == 1.0
+    assert distance(below, 0.0, 0.0, 1.0) == 1.0
 
 
 def test_the_water_has_waves_where_they_matter() -> None:
     waves = sea({"sea_state": 3})
     below = GroundDistance([], [], waves)
-    assert below.distance(3.0, 4.0, 2.0, 5.0, 0.5) == pytest.approx(2.0 - 0.5 * waves.elevation(3.0, 4.0, 5.0))
-    assert below.distance(3.0, 4.0, MAX_WAVE_EFFECT_HEIGHT + 1.0, 5.0, 0.5) == MAX_WAVE_EFFECT_HEIGHT + 1.0
-    assert below.distance(3.0, 4.0, -5.0, 5.0, 1.0) == 0.0
+    assert distance(below, 3.0, 4.0, 2.0, 5.0, 0.5) == pytest.approx(2.0 - 0.5 * waves.elevation(3.0, 4.0, 5.0))
+    assert distance(below, 3.0, 4.0, MAX_WAVE_EFFECT_HEIGHT + 1.0, 5.0, 0.5) == MAX_WAVE_EFFECT_HEIGHT + 1.0
+    assert distance(below, 3.0, 4.0, -5.0, 5.0, 1.0) == 0.0
+
+
+def test_a_deck_is_below_the_share_of_a_disc_that_its_edges_leave(measured: MeasurementCheck) -> None:
+    """The level deck turned by 0.7 rad under discs beside one edge or far from all; points at random in each disc."""
+    turned, random = Rotation.from_euler("z", 0.7), np.random.default_rng(3)
+    below, radius = GroundDistance([vessel((0.0, 0.0, 0.3), turned)], [], CALM), 0.25
+    angles, lengths = random.uniform(0, 2 * np.pi, 200_000), radius * np.sqrt(random.uniform(0, 1, 200_000))
+    disc = np.stack([lengths * np.cos(angles), lengths * np.sin(angles)])
+    for forward in (0.0, 0.12, 0.25, 0.35, 0.5, 0.59):
+        inside = (np.abs(forward + disc[0]) <= PLATE[0]) & (np.abs(disc[1]) <= PLATE[1])
+        x, y, _ = turned.apply([forward, 0.0, 0.0])
+        found = below.distance_and_share(x, y, 1.0, radius, 0.0, 1.0)
+        assert found[0] == pytest.approx(0.7)
+        what = "share of a rotor disc above the edge of a deck"
+        measured("Wind and current", what, found[1], inside.mean(), "1", "points at random", within=3e-3)
+    assert below.distance_and_share(0.7, 0.7, 1.0, radius, 0.0, 1.0) == (1.0, 1.0)

@@ -166,3 +166,22 @@ def test_a_vessel_stops_at_a_platform() -> None:
     assert trial["usv.position.x"] == pytest.approx(0.95 - 0.4895, abs=2e-3)
     assert trial["usv.contact.force"] == pytest.approx(2.0, rel=1e-3)
     assert abs(trial["usv.velocity.x"]) < 1e-6
+
+
+def test_a_wet_platform_lets_the_quadcopter_slide_and_a_springy_one_lets_it_bounce() -> None:
+    """Coulomb friction stops it after v^2 / (2 mu g); restitution e gives back e times the speed of the impact.
+
+    Bullet's correction of the penetration in the step of the impact adds up to 7 % of the speed without and 13 % with restitution.
+    """
+    for friction in (0.1, 0.4):
+        slippery = {"start": {**PLATFORM, "friction": friction}}
+        vehicle = quadcopter_settings([0.0, 0.0, PLATFORM_TOP + REST_HEIGHT], velocity_body=[0.8, 0.0, 0.0])
+        trial = WorldHarness({"uav": vehicle}, slippery)
+        trial.step(300)
+        assert trial["uav.position.x"] == pytest.approx(0.8**2 / (2 * friction * 9.81), rel=0.1)
+    for restitution in (0.0, 0.5):
+        vehicle = quadcopter_settings([0.0, 0.0, PLATFORM_TOP + REST_HEIGHT + 0.2], restitution=1.0, crash_speed=9.0)
+        trial = WorldHarness({"uav": vehicle}, {"start": {**PLATFORM, "restitution": restitution}})
+        speeds = [trial.step()["uav.velocity.z"] for _ in range(40)]
+        impact = np.sqrt(2 * 9.81 * 0.2)
+        assert max(speeds) == pytest.approx(restitution * impact, abs=0.25)

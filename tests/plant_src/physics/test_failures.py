@@ -85,7 +85,7 @@ def test_a_quadcopter_below_the_still_water_is_ditched_for_good(caplog: pytest.L
     trial["uav.external_force.z"] = 40.0
     assert trial.step(100)["uav.position.z"] > 0
     assert failures(trial) == (False, True)
-    assert caplog.messages == ["plant: t = 0.32 s: uav ditched: 0.00 m below the water"]
+    assert caplog.messages == ["plant: t = 0.33 s: uav ditched: 0.02 m below the water"]
 
 
 def test_a_quadcopter_is_ditched_by_the_wave_at_its_place() -> None:

@@ -42,7 +42,7 @@ def deviation(found: Sequence[np.ndarray], expected: np.ndarray) -> float:
     return float(np.linalg.norm(np.array(found) - expected, axis=1).max())
 
 
-QUADCOPTER_START = {"position": [1.0, -2.0, 50.0], "yaw": 0.7, "velocity_body": [1.0, 0.5, -0.2], "rates": [0.3, -0.2, 0.5]}
+QUADCOPTER_START = {"position": [1.0, -2.0, 1000.0], "yaw": 0.7, "velocity_body": [1.0, 0.5, -0.2], "rates": [0.3, -0.2, 0.5]}
 VESSEL_START = {"position": [1.0, -2.0], "yaw": 0.4, "velocity_body": [0.6, 0.05, 0.0], "rates": [0.0, 0.0, 0.1]}
 
 

@@ -66,6 +66,6 @@ def test_principal_axes_make_the_inertia_diagonal(seed: int) -> None:
 def test_a_standing_vehicle_has_its_rotors_above_its_feet(name: str) -> None:
     model = MODELS[name]
     (box,) = model.body.boxes
-    assert model.rotor_centre is not None
-    assert box.corners()[:, 2].min() < 0 < model.rotor_centre[2]
+    assert model.rotor_disc is not None
+    assert box.corners()[:, 2].min() < 0 < model.rotor_disc[0][2]
     assert np.ptp(box.corners()[:, :2], axis=0).min() < 1.0

@@ -5,7 +5,7 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 import pytest
-from multirotor_reference import GRAVITY, VEHICLES, Vehicle
+from multirotor_reference import GRAVITY, VEHICLES, Vehicle, square_ground_effect
 from plant_fmu import PlantFmu
 from plant_validation import MeasurementCheck
 
@@ -13,6 +13,7 @@ from plant_src.catalogue import MODELS
 from plant_src.vehicles.multirotor.multirotor_equations import MultirotorEquations
 
 CRAZYFLIE, HEXACOPTER = VEHICLES["crazyflie"], VEHICLES["survey_hexacopter"]
+MULTIROTORS = "Multirotors"
 IMAGES = "Sanchez-Cuevas et al. 2017"
 HIGH = {"initial.position.z": 100.0}
 NO_DRAG = {f"{kind}_drag.{axis}": 0.0 for kind in ("rotor", "body") for axis in "xyz"}
@@ -208,12 +209,49 @@ def test_without_effects_shorter_code_gives_the_same_flight() -> None:
     assert found[0] == pytest.approx(found[1], rel=1e-12, abs=1e-12)
 
 
+def test_wind_carries_the_ground_effect_away(measured: MeasurementCheck) -> None:
+    """Cheeseman and Bennett in forward flight: the reduction of the inflow over 1 + (V / v)^2."""
+    fmu = PlantFmu("ar_drone", {**HIGH, "ground_effect": 1.0})
+    thrust = 9.148e-6 * 350.0**2
+    induced = np.sqrt(thrust / (2 * 1.225 * np.pi * 0.1016**2))
+    for wind in (0.0, 3.0, 7.0):
+        sums = []
+        for distance in (0.15, 1e3):
+            fmu = PlantFmu("ar_drone", {**HIGH, "ground_effect": 1.0})
+            fmu.set({f"rotor_speed[{k}]": 350.0 for k in range(1, 5)} | {"wind.x": wind, "ground_distance": distance})
+            fmu.step(1e-4)
+            sums.append((fmu.get("velocity.z").item() / 1e-4 + GRAVITY) * 0.443892)
+        reduction = square_ground_effect(0.1016, 0.181777 * np.sqrt(2))(0.15) / (1 + (wind / induced) ** 2)
+        measured(
+            MULTIROTORS,
+            "ratio of thrust in ground effect, in wind",
+            sums[0] / sums[1],
+            1 / (1 - reduction),
+            "1",
+            "Cheeseman and Bennett 1955",
+            relative=2e-3,
+            case=f"{wind} m/s",
+        )
+
+
+def test_translational_lift_grows_with_the_air_speed_up_to_half_the_tip_speed(measured: MeasurementCheck) -> None:
+    for wind, square in ((4.0, 16.0), (30.0, (0.5 * 0.1016 * 350.0) ** 2)):
+        fmu = PlantFmu("ar_drone", {**HIGH, "translational_lift": 0.01})
+        fmu.set({f"rotor_speed[{k}]": 350.0 for k in range(1, 5)} | {"wind.y": wind})
+        fmu.step(1e-4)
+        thrust = (fmu.get("velocity.z").item() / 1e-4 + GRAVITY) * 0.443892
+        expected = 4 * (9.148e-6 * 350.0**2 + 0.01 * square)
+        measured(
+            MULTIROTORS, "thrust with translational lift", thrust, expected, "N", "closed form", relative=1e-6, case=f"{wind} m/s"
+        )
+
+
 def test_the_rate_of_the_state_is_the_derivative_of_a_step() -> None:
     random, moment = np.random.default_rng(5), 1e-6
     state = np.concatenate([random.standard_normal(3), [1, 0, 0, 0], random.standard_normal(6), 1500 + random.standard_normal(4)])
-    inputs = np.concatenate([0.01 * random.standard_normal(6), 1600 + random.standard_normal(4), [1, 2, 3], [0.05]])
+    inputs = np.concatenate([0.01 * random.standard_normal(6), 1600 + random.standard_normal(4), [1, 2, 3, 0.05, 0.9, -9, 0, 0]])
     model = MODELS["crazyflie"]
-    effects = [0.07, 5e-8, 1e-6, 2e-6, 1e-6, 0.01, 0.02, 0.03, 1.0]
+    effects = [0.07, 5e-8, 1e-6, 2e-6, 1e-6, 0.01, 0.02, 0.03, 1.0, 1e-3]
     equations = MultirotorEquations(model.airframe, 4)
     parameters = ca.SX([*model.start_values("parameter")[: -len(effects)], *effects])
     constants = ca.DM(equations.constants.vector(parameters)).full().ravel()
