@@ -99,6 +99,8 @@ def test_a_deck_is_below_the_share_of_a_disc_that_its_edges_leave(measured: Meas
         x, y, _ = turned.apply([forward, 0.0, 0.0])
         found = below.distance_and_share(x, y, 1.0, radius, 0.0, 1.0)
         assert found[0] == pytest.approx(0.7)
-        what = "share of a rotor disc above the edge of a deck"
-        measured("Wind and current", what, found[1], inside.mean(), "1", "points at random", within=3e-3)
+        share = found[1]
+        measured(
+            "Wind and current", "share of a rotor disc above a deck", share, inside.mean(), "1", "points at random", within=3e-3
+        )
     assert below.distance_and_share(0.7, 0.7, 1.0, radius, 0.0, 1.0) == (1.0, 1.0)

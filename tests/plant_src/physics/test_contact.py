@@ -171,7 +171,7 @@ def test_a_vessel_stops_at_a_platform() -> None:
 def test_a_wet_platform_lets_the_quadcopter_slide_and_a_springy_one_lets_it_bounce() -> None:
     """Coulomb friction stops it after v^2 / (2 mu g); restitution e gives back e times the speed of the impact.
 
-    Bullet's correction of the penetration in the step of the impact adds up to 7 % of the speed without and 13 % with restitution.
+    Bullet's correction of the penetration in the step of the impact adds up to 13 % of the speed.
     """
     for friction in (0.1, 0.4):
         slippery = {"start": {**PLATFORM, "friction": friction}}

@@ -13,7 +13,6 @@ from plant_src.catalogue import MODELS
 from plant_src.vehicles.multirotor.multirotor_equations import MultirotorEquations
 
 CRAZYFLIE, HEXACOPTER = VEHICLES["crazyflie"], VEHICLES["survey_hexacopter"]
-MULTIROTORS = "Multirotors"
 IMAGES = "Sanchez-Cuevas et al. 2017"
 HIGH = {"initial.position.z": 100.0}
 NO_DRAG = {f"{kind}_drag.{axis}": 0.0 for kind in ("rotor", "body") for axis in "xyz"}
@@ -223,7 +222,7 @@ def test_wind_carries_the_ground_effect_away(measured: MeasurementCheck) -> None
             sums.append((fmu.get("velocity.z").item() / 1e-4 + GRAVITY) * 0.443892)
         reduction = square_ground_effect(0.1016, 0.181777 * np.sqrt(2))(0.15) / (1 + (wind / induced) ** 2)
         measured(
-            MULTIROTORS,
+            "Multirotors",
             "ratio of thrust in ground effect, in wind",
             sums[0] / sums[1],
             1 / (1 - reduction),
@@ -242,7 +241,14 @@ def test_translational_lift_grows_with_the_air_speed_up_to_half_the_tip_speed(me
         thrust = (fmu.get("velocity.z").item() / 1e-4 + GRAVITY) * 0.443892
         expected = 4 * (9.148e-6 * 350.0**2 + 0.01 * square)
         measured(
-            MULTIROTORS, "thrust with translational lift", thrust, expected, "N", "closed form", relative=1e-6, case=f"{wind} m/s"
+            "Multirotors",
+            "thrust with translational lift",
+            thrust,
+            expected,
+            "N",
+            "closed form",
+            relative=1e-6,
+            case=f"{wind} m/s",
         )
 
 
