@@ -81,7 +81,13 @@ def test_the_world_has_water_everywhere(measured: MeasurementCheck) -> None:
     trial.step(2000)
     depth = AR_DRONE_HEIGHT * (AR_DRONE_MASS / (WATER * AR_DRONE_VOLUME) - 0.5)
     measured(
-        MODEL, "depth of an AR.Drone that fell into the sea", -trial["uav.position.z"], depth, "m", "Archimedes", within=0.01
+        "Multirotors",
+        "depth of an AR.Drone that fell into the sea",
+        -trial["uav.position.z"],
+        depth,
+        "m",
+        "Archimedes",
+        within=0.01,
     )
 
 
