@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ...core.text import count_noun
-from ...process.output_lock import LockKeeper
+from ...process.output_lock import LOCK_FILE, LockKeeper
 from ...process.temporary_folders import temporary_run_folder
 from .. import current_command_line, report_error, strict_sandbox, supervision
 from ..csv_options import csv_options
@@ -98,6 +98,8 @@ def _simulate(
     plan, warnings = compile_fmu(fmu, *times, input_file, values, None, fmu_isolation, settings)
     messages.log_problems(map(Problem, warnings))
     if output and shown:
+        if (run_lock := output.parent / LOCK_FILE).exists():  # the folder of a run, whose files are locked together
+            locks.lock(run_lock, shown.parent)
         locks.lock(OutputFiles.of_file(output).lock, shown)
         replaced = output.stat().st_size if output.is_file() else 0
         if problems := find_space_problems(plan, output.parent, csv=True, replaced=replaced):

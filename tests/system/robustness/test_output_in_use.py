@@ -76,6 +76,17 @@ def test_one_file_of_two_simulations(workplace):
     assert workplace.leftovers() == []
 
 
+def test_a_simulation_into_the_folder_of_a_run_is_refused(workplace, running):
+    """Whatever the name of its file: result.csv would be replaced."""
+    words = ("simulate", FMU, "--step-size", "0.01", "--stop-time", "0.1", "--output-file")
+    for name in ("result.csv", "other.csv"):
+        assert refused(workplace.run(*words, f"out/{name}"), "out", running.pid)
+    running.send_signal(signal.SIGINT)
+    running.communicate(timeout=30)
+    assert workplace.run(*words, "out/other.csv").returncode == 0
+    assert workplace.leftovers() == []
+
+
 def test_six_runs_into_one_folder_at_once(workplace):
     workplace.scenario(2.0, arguments={"pause": 0.005})
     runs = [workplace.start(*RUN) for _ in range(6)]
