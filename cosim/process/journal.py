@@ -49,13 +49,8 @@ class Phase(IntEnum):
     #: a call or the stepping loop waits for something that is not a component
     WAITING = 5
 
-    @property
-    def in_loop(self) -> bool:
-        """True while rows are recorded."""
-        return self in (Phase.STEPPING, Phase.WAITING)
 
-
-_PHASES = frozenset(Phase)
+_PHASES, _LOOP_PHASES = frozenset(Phase), frozenset((Phase.STEPPING, Phase.WAITING))
 #: longest deadline (ms)
 _MAX_DEADLINE = 10**15
 
@@ -122,9 +117,13 @@ class Journal:
 
     @property
     def phase(self) -> Phase:
-        """Present phase; IDLE if foreign code has overwritten it (`is_valid` is then false)."""
-        phase = self[PHASE]
-        return Phase(phase) if phase in _PHASES else Phase.IDLE
+        """Present phase. Raises ValueError if foreign code has overwritten it."""
+        return Phase(self[PHASE])
+
+    @property
+    def in_loop(self) -> bool:
+        """True while rows are recorded; false if foreign code has overwritten the phase."""
+        return self[PHASE] in _LOOP_PHASES
 
     def enter_phase(self, phase: Phase, deadline: float = math.inf) -> None:
         """Begin a phase with a maximum duration of each call (s); wait for the end of an update of the result file."""
@@ -139,7 +138,7 @@ class Journal:
         """Yield whether the supervisor may replace the result file; the run does not write it during the block."""
         self[CSV_UPDATE] = 1
         try:
-            yield self.phase.in_loop
+            yield self.in_loop
         finally:
             self[CSV_UPDATE] = 0
 

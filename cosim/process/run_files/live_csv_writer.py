@@ -44,7 +44,7 @@ class LiveCsvWriter:
     def update(self) -> None:
         """Append new rows if an update is due; stop updating after a write error, which the run itself reports."""
         now = time.monotonic()
-        if not self._journal.phase.in_loop or now < self._next_update:
+        if not self._journal.in_loop or now < self._next_update:
             return
         try:
             if self._lines is None and not self._open_copies(now):

@@ -37,6 +37,25 @@ end Joined;""")
         assert [*model.get("first"), model.get("last")] == list(inputs["u"])
 
 
+@pytest.mark.parametrize(
+    ("equation", "start", "solution"),
+    [
+        ("exp(y) + y = 1e4*u", 5.0, 9.209419005748),  # a full first step leads to exp(71)
+        ("atan(y) = 0.1*u", 20.0, math.tan(0.1)),  # full steps diverge
+        ("sqrt(y) = 0.2*u", 4.0, 0.04),  # full steps leave the domain
+    ],
+)
+def test_steps_that_increase_the_residual_are_shortened(compile_both, equation, start, solution):
+    model = compile_both(f"""model Damped
+  parameter Real u = 1;
+  output Real y(start = {start});
+equation
+  {equation};
+end Damped;""")
+    model.initialize()
+    assert model.get("y") == pytest.approx(solution, rel=1e-11)
+
+
 def test_a_nonlinear_equation_is_solved_by_newtons_method(compile_both):
     model = compile_both("""model Kepler
   input Real m(min = 0, max = 6);

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 
+import numpy as np
 import pytest
 
 from cosim.core.errors import ComponentError
@@ -163,3 +164,33 @@ end Endless;""")
     assert model.c.step(0.0, 0.01) == "the event iteration does not end"
     with pytest.raises(ComponentError, match="the event iteration does not end"):
         model.python.step(0.0, 0.01)
+
+
+def test_rounded_values_change_at_located_events(compile_both):
+    """Integrals of rounded values of a rising and a falling time, against their exact sums; modulo and rest have both signs."""
+    model = compile_both("""model Rounded
+  Real x(start = 0, fixed = true);
+  output Real y[6](each start = 0, each fixed = true);
+equation
+  der(x) = 1;
+  der(y[1]) = floor(3.1*x);
+  der(y[2]) = ceil(-2.3*x);
+  der(y[3]) = integer(1 - 4.7*x);
+  der(y[4]) = div(0.9 - 2.2*x, 0.3);
+  der(y[5]) = mod(1 - 1.7*x, 0.45);
+  der(y[6]) = rem(1 - 1.7*x, 0.45);
+end Rounded;""")
+    model.initialize()
+    for k in range(10):
+        model.step(k * 0.1, 0.1)
+    middles = (np.arange(1_000_000) + 0.5) / 1e6
+    quotient = (1 - 1.7 * middles) / 0.45
+    expected = [
+        np.floor(3.1 * middles),
+        np.ceil(-2.3 * middles),
+        np.floor(1 - 4.7 * middles),
+        np.trunc((0.9 - 2.2 * middles) / 0.3),
+        0.45 * (quotient - np.floor(quotient)),
+        0.45 * (quotient - np.trunc(quotient)),
+    ]
+    assert list(model.get("y")) == pytest.approx([values.mean() for values in expected], abs=2e-6)

@@ -197,8 +197,10 @@ class StatementLowering(ExpressionLowering):
                 self.lines.append(f"residual[{k}] = {self.scalar_of(residual).code};")
             for k, derivative in enumerate(item for row in node.jacobian for item in row):
                 self.lines.append(f"jacobian[{k}] = {self.scalar_of(derivative).code};")
-            self.lines.append(f"if (newton(m, {n}, (double *[]){{{unknowns}}}, residual, jacobian, iteration, {failure})) break;")
-        self.lines += ["for (int iteration = 0;; iteration++) {", *lines, "}"]
+            arguments = f"m, {n}, (double *[]){{{unknowns}}}, residual, jacobian, step, scale, &search, iteration, {failure}"
+            self.lines.append(f"if (newton({arguments})) break;")
+        state = [f"double step[{n}], scale[{n}];", "NewtonSearch search;"]
+        self.lines += ["{", *state, "for (int iteration = 0;; iteration++) {", *lines, "}", "}"]
 
     def _externalcall(self, node: syntax_tree.ExternalCall) -> None:
         """Lower the body of an external function."""

@@ -5,19 +5,24 @@ values that change while the states are integrated, or if it has states and uses
 
 - `pre(x)` becomes a variable with this name, which holds the value of x before the current evaluation of the equations;
 - a comparison becomes a Boolean variable, which keeps its value between events; its change is an event;
+- a value that floor(), ceil(), integer(), div(), mod() or rem() rounds becomes a variable, which a when-clause changes;
 - the argument of `delay()` becomes a variable, whose past values are stored.
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
 from ..model.flat_model import Delay, Equation, Hybrid, Model, Relation, Variable, internal_variable, previous_name
 from ..model.syntax_tree import (
+    Array,
+    Assign,
     Binary,
     Builtin,
     Expression,
+    If,
     Index,
     Literal,
     Name,
@@ -40,6 +45,7 @@ from .matching import is_input
 
 _SECTIONS = ("equations", "whens", "algorithms", "asserts", "initial_equations", "initial_algorithms")
 _COMPARISONS = ("<", "<=", ">", ">=")
+_ROUNDINGS = ("floor", "ceil", "integer", "div", "mod", "rem")
 
 
 def prepare_hybrid(model: Model) -> Model:
@@ -58,6 +64,8 @@ class _Preparation:
         self._relations: list[Relation] = []
         self._delays: list[Delay] = []
         self._equations: list[Equation] = []
+        self._rounded: dict[Expression, Name] = {}
+        self._whens: list[When] = []
 
     def is_needed(self) -> bool:
         """Return whether the model has elements that require event iteration."""
@@ -74,14 +82,16 @@ class _Preparation:
         if self._model.uses_library and self._model.states:
             return True
         comparisons = rewrite_outermost((self._model.equations, conditions), _without_events)
-        return bool(self._model.states) and any(self._is_relation(item) for item in walk(comparisons))
+        return bool(self._model.states) and any(self._is_relation(item) or self._is_rounding(item) for item in walk(comparisons))
 
     def prepare(self) -> Model:
         model = self._model
         sections = {name: rewrite(getattr(model, name), self._replace_delay) for name in _SECTIONS}
         if model.states or "time" in variable_names((model.equations, model.whens)):
-            sections["equations"] = self._with_relations(sections["equations"])
-            sections["whens"] = self._with_relations_in_conditions(sections["whens"])
+            sections["equations"] = rewrite_outermost(sections["equations"], self._replace_rounding)
+            sections["whens"] = self._in_conditions(sections["whens"], self._replace_rounding)
+            sections["equations"] = rewrite_outermost(sections["equations"], self._replace_relation)
+            sections["whens"] = self._in_conditions((*sections["whens"], *self._whens), self._replace_relation)
         sections["equations"] = (*sections["equations"], *self._equations)
         used = {name for section in sections.values() for name in _remembered(section)}
         used |= {relation.name for relation in self._relations} | {v.name for v in self._variables.values() if is_input(v)}
@@ -105,15 +115,19 @@ class _Preparation:
         """Return whether a node is a comparison of values that change between events."""
         if not (isinstance(node, Binary) and node.operator in _COMPARISONS):
             return False
-        names = variable_names((node.left, node.right))
-        return any(name == "time" or (name in self._variables and name not in self._discrete) for name in names)
+        return self._changes_between_events((node.left, node.right))
 
-    def _with_relations(self, node: Any) -> Any:
-        return rewrite_outermost(node, self._replace_relation)
+    def _changes_between_events(self, node: Any) -> bool:
+        return any(name == "time" or (name in self._variables and name not in self._discrete) for name in variable_names(node))
 
-    def _with_relations_in_conditions(self, whens: tuple[When, ...]) -> tuple[When, ...]:
+    @staticmethod
+    def _in_conditions(whens: tuple[When, ...], replacement: Callable[[Any], Any]) -> tuple[When, ...]:
+        """Return when-clauses with conditions in which nodes are replaced."""
         return tuple(
-            replace(when, branches=tuple((self._with_relations(condition), body) for condition, body in when.branches))
+            replace(
+                when,
+                branches=tuple((rewrite_outermost(condition, replacement), body) for condition, body in when.branches),
+            )
             for when in whens
         )
 
@@ -131,14 +145,54 @@ class _Preparation:
         return Name(name, node.where)
 
     def _add_variable(self, name: str, type_name: str, value: Expression) -> None:
-        template = next(iter(self._model.variables.values()))
-        self._variables[name] = replace(
-            internal_variable(template, name),
-            type=type_name,
-            shape=(),
-            variability="discrete" if type_name == "Boolean" else "continuous",
-        )
+        self._declare(name, type_name, is_discrete=type_name == "Boolean")
         self._equations.append(Equation(Name(name), value, getattr(value, "where", None)))
+
+    def _declare(self, name: str, type_name: str, is_discrete: bool) -> None:
+        template = next(iter(self._model.variables.values()))
+        variable = replace(
+            internal_variable(template, name), type=type_name, shape=(), variability="discrete" if is_discrete else "continuous"
+        )
+        self._variables[name] = variable
+
+    # rounding
+
+    def _is_rounding(self, node: Any) -> bool:
+        """Return whether a node rounds a value that changes between events."""
+        return isinstance(node, Builtin) and node.name in _ROUNDINGS and self._changes_between_events(node.arguments)
+
+    def _replace_rounding(self, node: Any) -> Any:
+        if _without_events(node) is not None:
+            return node
+        if not self._is_rounding(node):
+            return None
+        first, *others = rewrite_outermost(node.arguments, self._replace_rounding)
+        if node.name in ("floor", "integer"):
+            value = self._floor(first, node)
+            return value if node.name == "floor" else replace(node, arguments=(value,))
+        if node.name == "ceil":
+            return Unary("-", self._floor(Unary("-", first), node))
+        (divisor,) = others
+        quotient = Binary("/", first, divisor, node.where)
+        whole: Expression = self._floor(quotient, node)
+        if node.name != "mod":
+            positive = Binary(">=", quotient, Literal(0.0, "Real"), node.where)
+            whole = If(((positive, whole),), Unary("-", self._floor(Unary("-", quotient), node)))
+        return whole if node.name == "div" else Binary("-", first, Binary("*", whole, divisor, node.where), node.where)
+
+    def _floor(self, value: Expression, call: Builtin) -> Name:
+        """Return the variable with the largest whole number that is not greater than a value."""
+        if value in self._rounded:
+            return self._rounded[value]
+        rounded = self._rounded[value] = Name(f"$rounded {len(self._rounded) + 1}", call.where)
+        self._declare(rounded.name, "Real", is_discrete=True)
+        self._discrete.add(rounded.name)
+        before = Builtin("pre", (rounded,), call.where)
+        above = Binary(">=", value, Binary("+", before, Literal(1.0, "Real")), call.where)
+        below = Binary("<", value, before, call.where)
+        body = (Assign(rounded, Builtin("floor", (value,), call.where), call.where),)
+        self._whens.append(When(((Array((Builtin("initial", ()), above, below)), body),), call.where))
+        return rounded
 
     # delay() and pre()
 

@@ -88,6 +88,15 @@ def solve_linear(a: list[list[float]], b: list[float]) -> list[float] | None:
     return b
 
 
+def largest_ratio(residual: list[float], scale: list[float]) -> float:
+    """Return the largest residual over its scale, as newton.h."""
+    largest = 0.0
+    for value, unit in zip(residual, scale, strict=True):
+        if not (ratio := divide(abs(value), unit)) <= largest:
+            largest = ratio
+    return largest
+
+
 def divide(a: float, b: float) -> float:
     """Return `a / b` as defined by IEEE 754, also for b = 0."""
     if b != 0:

@@ -19,6 +19,7 @@ from .arithmetic import (
     check_int32,
     divide,
     elementwise,
+    largest_ratio,
     matrix_product,
     solve_linear,
     to_python_scalar,
@@ -26,7 +27,8 @@ from .arithmetic import (
 from .flat_model import Function, FunctionVariable
 from .syntax_tree import Body, Expression
 
-NEWTON_ITERATIONS = 50
+#: constants of newton.h
+NEWTON_ITERATIONS, SMALLEST_FRACTION, RESIDUAL_ROUNDING = 100, 1e-6, 1e-13
 DTYPES = {"Real": np.float64, "Integer": np.int64, "Enumeration": np.int64, "Boolean": np.bool_}
 
 
@@ -41,6 +43,14 @@ def convert_to_type(value: Any, type_name: str, shape: tuple[int, ...]) -> Any:
     if type_name == "String":
         return str(value or "")
     return float(value) if type_name == "Real" else bool(value) if type_name == "Boolean" else int(value)
+
+
+def _scale_of(derivatives: list[float], values: list[float]) -> float:
+    """Return the scale of a residual, the sum of |derivative| (1 + |unknown|) in the order of newton.h."""
+    scale = 0.0
+    for derivative, value in zip(derivatives, values, strict=True):
+        scale += abs(derivative) * (1 + abs(value))
+    return scale
 
 
 @dataclass
@@ -104,14 +114,26 @@ class Evaluator:
 
     def _solve(self, node: syntax_tree.Solve) -> None:
         """Solve a system of equations as in newton.h."""
+        fraction, merit, scale, changes = 1.0, math.inf, [math.inf] * len(node.unknowns), None
         for _ in range(NEWTON_ITERATIONS):
             residual = [float(self(item)) for item in node.residuals]
-            changes = solve_linear([[float(self(item)) for item in row] for row in node.jacobian], residual)
+            if changes and not (largest_ratio(residual, scale) <= merit or largest_ratio(residual, scale) <= RESIDUAL_ROUNDING):
+                fraction /= 2
+                for unknown, change in zip(node.unknowns, changes, strict=True):
+                    self._store(unknown, float(self(unknown)) + fraction * change)
+                if not fraction > SMALLEST_FRACTION:
+                    break
+                continue
+            jacobian = [[float(self(item)) for item in row] for row in node.jacobian]
+            values = [float(self(unknown)) for unknown in node.unknowns]
+            scale = [_scale_of(row, values) for row in jacobian]
+            merit, fraction = largest_ratio(residual, scale), 1.0
+            changes = solve_linear(jacobian, residual)
             if changes is None:
                 break
             largest = 0.0
-            for unknown, change in zip(node.unknowns, changes, strict=True):
-                value = float(self(unknown)) - change
+            for unknown, before, change in zip(node.unknowns, values, changes, strict=True):
+                value = before - change
                 self._store(unknown, value)
                 ratio = divide(abs(change), 1 + abs(value))
                 if not ratio <= largest:
