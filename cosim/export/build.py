@@ -75,6 +75,7 @@ def build_to(
     *,
     include: Sequence[Path] = (),
     library_path: Sequence[Path] = (),
+    values: Mapping[str, Any] | None = None,
 ) -> Path:
     """Export one source file to one FMU.
 
@@ -85,18 +86,24 @@ def build_to(
         fmi_version: 2 or 3.
         include: Further files of the FMU of a Python source, see `write_python_fmu`.
         library_path: Folders of Modelica libraries, which are searched before those of MODELICAPATH.
+        values: Values of parameters of a Modelica model by name, also of structural parameters.
 
     Returns:
         `target`.
 
     Raises:
-        InputError: The file cannot be exported, or not for this FMI version, or files are included in another kind of FMU.
+        InputError: The file cannot be exported, or not for this FMI version, or files or values are given for another kind of
+            FMU.
     """
     classified = classify_source(source, model)
     if fmi_version not in classified.fmi_versions:
         raise InputError(Problem(f"a {classified.kind.name} cannot be exported as FMI {fmi_version}.0", str(source)))
     if not include:
-        export_source(classified, {fmi_version: target}, model, library_path)
+        from .modelica import ModelicaOptions
+
+        if values and classified.kind.package != "rumoca":
+            raise InputError(Problem("only parameters of Modelica models can be set when building", str(source)))
+        export_source(classified, {fmi_version: target}, model, ModelicaOptions(library_path, values or {}))
     elif classified.kind.package == "pythonfmu":
         write_python_fmu(classified.path, target, include)
     else:

@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from itertools import pairwise
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 from ..components.sibling_imports import with_imported_siblings
 from ..core import resources
@@ -19,6 +20,9 @@ from .fmu.validation import DESCRIPTION_FILE
 from .foreign.c_sources import write_c_fmu
 from .foreign.python_class import write_python_fmu
 
+if TYPE_CHECKING:
+    from .modelica import ModelicaOptions
+
 
 @dataclass(frozen=True, slots=True)
 class SourceKind:
@@ -29,9 +33,8 @@ class SourceKind:
     pattern: str
     #: distribution package that the exporter needs
     package: str
-    #: read a source file (and the named model in it) as a block, which is exported for FMI 2.0 and 3.0; the last argument are
-    #: folders of libraries
-    load_block: Callable[[Path, str | None, Sequence[Path]], Block] | None
+    #: read a source file (and the named model in it) as a block, which is exported for FMI 2.0 and 3.0
+    load_block: Callable[[Path, str | None, ModelicaOptions | None], Block] | None
     #: folder of the FMUs below `fmus/`
     folder: str = ""
     #: write the FMI 2.0 FMU of a source file and return the files that it was made from
@@ -61,13 +64,13 @@ class Source:
         return (2, 3) if self.kind.load_block else (2,)
 
 
-def _load_modelica(path: Path, model: str | None, library_path: Sequence[Path]) -> Block:
-    from .modelica import load_block
+def _load_modelica(path: Path, model: str | None, options: ModelicaOptions | None) -> Block:
+    from .modelica import ModelicaOptions, load_block
 
-    return load_block(path, model, library_path)
+    return load_block(path, model, options or ModelicaOptions())
 
 
-def _load_equations(path: Path, _model: str | None, _library_path: Sequence[Path]) -> Block:
+def _load_equations(path: Path, _model: str | None, _options: ModelicaOptions | None) -> Block:
     from ..components.python_import import load_object
 
     create_block: Callable[[], Block] = load_object(f"{path.name}:block", path.parent)
@@ -83,7 +86,7 @@ def _load_equations(path: Path, _model: str | None, _library_path: Sequence[Path
 _VEHICLE_PROGRAM = "plant_src/vehicle_block.py"
 
 
-def _load_vehicle(path: Path, _model: str | None, _library_path: Sequence[Path]) -> Block:
+def _load_vehicle(path: Path, _model: str | None, _options: ModelicaOptions | None) -> Block:
     from ..components.python_import import load_object
 
     create_block: Callable[[Path], Block] = load_object(f"{_VEHICLE_PROGRAM}:vehicle_block", resources.root())
@@ -162,7 +165,7 @@ def snake_case(name: str) -> str:
 
 
 def export_source(
-    source: Source, targets: Mapping[int, Path], model: str | None = None, library_path: Sequence[Path] = ()
+    source: Source, targets: Mapping[int, Path], model: str | None = None, options: ModelicaOptions | None = None
 ) -> list[Path]:
     """Export a source to one FMU per FMI version.
 
@@ -170,7 +173,7 @@ def export_source(
         source: The source.
         targets: The FMU to write for each FMI version.
         model: Name of the Modelica model. None selects the model with the name of the file.
-        library_path: Folders of Modelica libraries, which are searched before those of MODELICAPATH.
+        options: Libraries and values of parameters of a Modelica model.
 
     Returns:
         All files that the FMUs were made from.
@@ -182,7 +185,7 @@ def export_source(
     if source.kind.load_block is None:
         assert source.kind.write_fmi2 is not None
         return source.kind.write_fmi2(source.path, targets[2])
-    block = replace(source.kind.load_block(source.path, model, library_path), identifier=source.name)
+    block = replace(source.kind.load_block(source.path, model, options), identifier=source.name)
     for fmi_version, target in targets.items():
         write_fmu(block, fmi_version, target)
     programs = with_imported_siblings(resources.root() / source.kind.program) if source.kind.program else []

@@ -37,6 +37,13 @@ if TYPE_CHECKING:
     metavar="DIR",
     help="Folder of Modelica libraries for --output, searched before those of MODELICAPATH; repeatable.",
 )
+@click.option(
+    "--set",
+    "values",
+    multiple=True,
+    metavar="NAME=VALUE",
+    help="Parameter of a Modelica model for --output, also one that selects equations or array sizes; repeatable.",
+)
 def command(
     sources: tuple[Path, ...],
     check: bool,
@@ -44,6 +51,7 @@ def command(
     modelica_compiler: str,
     include: tuple[Path, ...],
     library: tuple[Path, ...],
+    values: tuple[str, ...],
 ) -> int:
     """Export controllers and plants to fmus/.
 
@@ -71,7 +79,9 @@ def command(
         click.echo("every FMU is up to date with its source")
         return 0
     if output is not None:
-        _build_one(sources, output, modelica_compiler, include, library)
+        _build_one(sources, output, modelica_compiler, include, library, values)
+    elif values:
+        raise InputError("--set requires --output: the FMUs in fmus/ have the values of their sources")
     elif include:
         raise InputError("--include requires --output: the FMUs in fmus/ contain the files that their sources import")
     elif modelica_compiler != "cosim":
@@ -82,10 +92,16 @@ def command(
 
 
 def _build_one(
-    sources: tuple[Path, ...], output: Path, modelica_compiler: str, include: tuple[Path, ...], library: tuple[Path, ...]
+    sources: tuple[Path, ...],
+    output: Path,
+    modelica_compiler: str,
+    include: tuple[Path, ...],
+    library: tuple[Path, ...],
+    values: tuple[str, ...],
 ) -> None:
     from ...export.build import build_to
     from ...export.modelica.frontend.openmodelica import export_with_omc
+    from ...scenario.settings import parse_settings
 
     if len(sources) != 1:
         raise InputError(f"--output requires one source, found {len(sources)}")
@@ -94,7 +110,7 @@ def _build_one(
     if modelica_compiler == "omc":
         export_with_omc(sources[0], output)
     else:
-        build_to(sources[0], None, output, include=include, library_path=library)
+        build_to(sources[0], None, output, include=include, library_path=library, values=parse_settings(values))
     click.echo(f"{sources[0]} -> {output}")
 
 

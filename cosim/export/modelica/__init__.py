@@ -69,5 +69,6 @@ Equations in any form:
 """
 
 from .assemble import load_block, load_interpreter
+from .frontend.rumoca_frontend import ModelicaOptions
 
-__all__ = ["load_block", "load_interpreter"]
+__all__ = ["ModelicaOptions", "load_block", "load_interpreter"]

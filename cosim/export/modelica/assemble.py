@@ -29,7 +29,7 @@ from .external.library import callable_functions
 from .frontend.constants import fold_constants
 from .frontend.folded_branches import folded_parameters
 from .frontend.reader import ModelReader
-from .frontend.rumoca_frontend import ModelicaSources, flatten_model
+from .frontend.rumoca_frontend import DEFAULT_OPTIONS, ModelicaOptions, ModelicaSources, flatten_model
 from .frontend.strings import fold_strings, string_parameters
 from .model.arithmetic import EvaluationError
 from .model.flat_model import Model, Variable, derivative_name
@@ -45,23 +45,23 @@ MAX_MODEL_SIZE = 1_000_000
 FmiRole = tuple[Causality, Variability]
 
 
-def load_block(path: Path, model: str | None = None, library_path: Sequence[Path] = ()) -> Block:
+def load_block(path: Path, model: str | None = None, options: ModelicaOptions = DEFAULT_OPTIONS) -> Block:
     """Compile a Modelica model to a block.
 
     Args:
         path: The Modelica file. It may use the packages in folders beside it.
         model: Name of the model. None selects the model with the name of the file.
-        library_path: Folders of libraries, which are searched before those of MODELICAPATH.
+        options: Libraries and values of parameters.
 
     Raises:
         InputError: The model has errors or uses unsupported features; the error contains the file and line.
     """
     with _refusing_deep_nesting(path):
-        return _load_block(path, model, library_path)
+        return _load_block(path, model, options)
 
 
-def _load_block(path: Path, model: str | None, library_path: Sequence[Path]) -> Block:
-    defaults, sources = _flatten(path, model, library_path)
+def _load_block(path: Path, model: str | None, options: ModelicaOptions) -> Block:
+    defaults, sources = _flatten(path, model, options)
     folder = _source_root(sources.files)
     names = {str(file.relative_to(folder)): file for file in sources.files}
     return Block(
@@ -86,19 +86,19 @@ def _exchange(model: Model) -> Exchange:
     return Exchange({state: derivative_name(state) for state in model.states}, indicators, stores_values)
 
 
-def load_interpreter(path: Path, model: str | None = None, library_path: Sequence[Path] = ()) -> Interpreter:
+def load_interpreter(path: Path, model: str | None = None, options: ModelicaOptions = DEFAULT_OPTIONS) -> Interpreter:
     """Create an interpreter of a Modelica model with default parameters.
 
     Args:
         path: The Modelica file.
         model: Name of the model. None selects the model with the name of the file.
-        library_path: Folders of libraries, which are searched before those of MODELICAPATH.
+        options: Libraries and values of parameters.
 
     Raises:
         InputError: The model has errors or uses unsupported features.
     """
     with _refusing_deep_nesting(path):
-        return _flatten(path, model, library_path)[0]
+        return _flatten(path, model, options)[0]
 
 
 @contextmanager
@@ -110,8 +110,8 @@ def _refusing_deep_nesting(path: Path) -> Iterator[None]:
         raise InputError(Problem("an expression or statement is nested too deeply; divide it into several", str(path))) from None
 
 
-def _flatten(path: Path, model: str | None, library_path: Sequence[Path]) -> tuple[Interpreter, ModelicaSources]:
-    json, sources = flatten_model(Path(path), model, library_path)
+def _flatten(path: Path, model: str | None, options: ModelicaOptions) -> tuple[Interpreter, ModelicaSources]:
+    json, sources = flatten_model(Path(path), model, options)
     return analyse(json, sources, model or Path(path).stem), sources
 
 

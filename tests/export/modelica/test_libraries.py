@@ -12,7 +12,7 @@ from fmpy import simulate_fmu
 import cosim
 from cosim.cli import cli
 from cosim.core.errors import InputError
-from cosim.export.modelica import load_interpreter
+from cosim.export.modelica import ModelicaOptions, load_interpreter
 from cosim.export.modelica.frontend import rumoca_frontend
 from cosim.export.modelica.frontend.libraries import find_libraries, libraries_in
 
@@ -73,7 +73,7 @@ def model(tmp_path):
 
 
 def gain_of(path: Path, *folders: Path) -> float:
-    interpreter = load_interpreter(path, None, folders)
+    interpreter = load_interpreter(path, None, ModelicaOptions(folders))
     interpreter.set("u", 3.0)
     interpreter.initialize()
     return float(interpreter.get("y")) / 3

@@ -2,9 +2,15 @@
 
 from __future__ import annotations
 
-import numpy as np
+import re
 
-from cosim.export.modelica import load_block
+import numpy as np
+import pytest
+
+import cosim
+from cosim.core.errors import InputError
+from cosim.export.build import build_to
+from cosim.export.modelica import ModelicaOptions, load_block
 
 OWNERS = """package P
   block Gain
@@ -193,3 +199,62 @@ def test_the_same_source_gives_the_same_c(write_model):
     path = write_model(OWNERS)
     assert load_block(path).files == load_block(path).files
     assert str(path.parent) not in "".join(load_block(path).files.values())
+
+
+STRUCTURE = """block Structure
+  block Part
+    parameter Boolean twice = false;
+    parameter Real gains[2] = {1, 1};
+    input Real u;
+    output Real y;
+  equation
+    y = if twice then 2*gains[1]*u else gains[2]*u;
+  end Part;
+  parameter Integer n = 2;
+  input Real u;
+  output Real y[n];
+  Part part[n](each u = u);
+  Part single(u = u);
+equation
+  y[1] = single.y;
+  for i in 2:n loop
+    y[i] = i*part[i].y;
+  end for;
+end Structure;"""
+
+
+def test_parameters_can_be_set_when_building(write_model, tmp_path):
+    """Also structural ones, those of components and arrays; the model keeps its name and its other values."""
+    values = {"n": 3, "single.twice": True, "single.gains": [2.5, 1]}
+    fmu = build_to(write_model(STRUCTURE), None, tmp_path / "structure.fmu", values=values)
+    result = cosim.simulate(fmu, stop_time=0.02, start_values={"u": 2.0})
+    assert [result[f"y[{k}]"][-1] for k in (1, 2, 3)] == [10.0, 4.0, 6.0]
+
+
+@pytest.mark.parametrize(
+    ("values", "message"),
+    [
+        ({"m": 3}, 'the model Structure has no parameter "m"; valid: '),
+        ({"single.twise": 1}, 'the model Structure has no parameter "single.twise"; did you mean "single.twice"?'),
+        ({"n; end": 3}, "n; end: expected the name of a parameter"),
+        ({"n": {"a": 1}}, "n: found {'a': 1}, expected a number, true, false, a text or a list"),
+    ],
+)
+def test_values_of_something_else_are_refused(write_model, values, message):
+    with pytest.raises(InputError, match=re.escape(message)):
+        load_block(write_model(STRUCTURE), options=ModelicaOptions(values=values))
+
+
+def test_values_reach_a_member_of_a_package(tmp_path):
+    (tmp_path / "Lib").mkdir()
+    (tmp_path / "Lib" / "package.mo").write_text("package Lib end Lib;")
+    member = tmp_path / "Lib" / "Wide.mo"
+    member.write_text("within Lib; block Wide parameter Integer n = 1; output Real y[n] = fill(1.0, n); end Wide;")
+    sizes = [v.shape for v in load_block(member, options=ModelicaOptions(values={"n": 4})).variables if v.name == "y"]
+    assert sizes == [(4,)]
+
+
+def test_only_models_have_values_when_building(tmp_path):
+    (tmp_path / "a.py").write_text("")
+    with pytest.raises(InputError, match="only parameters of Modelica models can be set"):
+        build_to(tmp_path / "a.py", None, tmp_path / "a.fmu", values={"n": 3})

@@ -23,7 +23,7 @@ _OUT_OF_MEMORY = b"memory allocation of"
 
 
 def run_rumoca(
-    version: str, files: Sequence[Path], packages: Sequence[Path], model: str, display_name: str | None
+    version: str, files: Sequence[Path], packages: Sequence[Path], model: str, display_name: str | None, declaration: str = ""
 ) -> dict[str, Any]:
     """Run rumoca in a child process.
 
@@ -33,6 +33,7 @@ def run_rumoca(
         packages: Folders of packages.
         model: Full name of the model.
         display_name: Name under which the model's file is loaded; None for a member of a package.
+        declaration: Text of a further class, which is that of the model.
 
     Returns:
         The answer of `rumoca_process`.
@@ -46,6 +47,7 @@ def run_rumoca(
         "packages": [str(package) for package in packages],
         "model": model,
         "display_name": display_name,
+        "declaration": declaration,
         "memory": MEMORY_LIMIT,
         "output_size": OUTPUT_LIMIT,
         "seconds": TIMEOUT,

@@ -10,13 +10,13 @@ from __future__ import annotations
 import json
 import re
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from functools import cached_property
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from ....core.errors import InputError, Problem
+from ....core.errors import InputError, Problem, did_you_mean
 from ..model.syntax_tree import SourceLocation
 from .flat_cache import link_libraries, read_document, store_document
 from .libraries import Library, find_libraries, library_folders
@@ -26,6 +26,10 @@ RUMOCA_VERSION = "0.10.2"
 #: largest Modelica file (bytes)
 MAX_SOURCE_SIZE = 1 << 24
 
+#: name of a model with values of parameters; it extends the model of the file
+MODIFIED_MODEL = "CosimModifiedModel"
+
+_REFERENCE = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
 _WITHIN = re.compile(r"^\s*within\s+([\w.]+)\s*;", re.MULTILINE)
 _QUOTED = re.compile(r"['`]([\w.]+)['`]")
 _CLASS = r"^[^/\n]*\b(?:model|block|class|function|package|record|connector|type)\s+{}\b"
@@ -95,13 +99,31 @@ class ModelicaSources:
         return SourceLocation(path, path.read_bytes().count(b"\n", 0, span["start"]) + 1)
 
 
-def flatten_model(path: Path, model: str | None, library_path: Sequence[Path] = ()) -> tuple[dict[str, Any], ModelicaSources]:
+@dataclass(frozen=True)
+class ModelicaOptions:
+    """Options of the compilation of a Modelica model.
+
+    Attributes:
+        library_path: Folders that are searched for libraries before those of MODELICAPATH.
+        values: Values of parameters by name, as JSON values or texts of Modelica expressions; also of structural parameters.
+    """
+
+    library_path: Sequence[Path] = ()
+    values: Mapping[str, Any] = field(default_factory=dict)
+
+
+DEFAULT_OPTIONS = ModelicaOptions()
+
+
+def flatten_model(
+    path: Path, model: str | None, options: ModelicaOptions = DEFAULT_OPTIONS
+) -> tuple[dict[str, Any], ModelicaSources]:
     """Flatten a Modelica model with rumoca.
 
     Args:
         path: The Modelica file.
         model: Name of the model. None selects the model with the name of the file.
-        library_path: Folders that are searched for libraries before those of MODELICAPATH.
+        options: Libraries and values of parameters.
 
     Returns:
         The flat model as rumoca's JSON, and its sources.
@@ -113,23 +135,73 @@ def flatten_model(path: Path, model: str | None, library_path: Sequence[Path] = 
     text = read_source(path)
     packages, name = find_packages(path, text), model_name(path, text, model)
     files = [path, *(file for package in packages for file in sorted(package.rglob("*.mo")) if file != path)]
-    libraries = find_libraries(files, library_folders(library_path), [package.name for package in packages])
+    libraries = find_libraries(files, library_folders(options.library_path), [package.name for package in packages])
+    declaration = modified_model(name, options.values)
     sources = ModelicaSources(files, libraries, link_libraries(libraries) if libraries else None)
     if not libraries:
-        return json.loads(_flatten(sources, packages, name, text)), sources
-    contents = [(str(file), sha256(file.read_bytes()).hexdigest()) for file in files]
-    key = [RUMOCA_VERSION, name, contents, [(str(library.path), library.digest) for library in libraries]]
-    flat = read_document(key)
-    if flat is None:
-        flat = _flatten(sources, packages, name, text)
-        store_document(key, flat)
-    return json.loads(flat), sources
+        flat = json.loads(_flatten(sources, packages, name, text, declaration))
+    else:
+        contents = [(str(file), sha256(file.read_bytes()).hexdigest()) for file in files]
+        key = [RUMOCA_VERSION, name, declaration, contents, [(str(library.path), library.digest) for library in libraries]]
+        document = read_document(key)
+        if document is None:
+            document = _flatten(sources, packages, name, text, declaration)
+            store_document(key, document)
+        flat = json.loads(document)
+    _check_names(flat, options.values, name)
+    return flat, sources
 
 
-def _flatten(sources: ModelicaSources, packages: Sequence[Path], name: str, text: str) -> str:
+def _check_names(flat: Mapping[str, Any], values: Mapping[str, Any], model: str) -> None:
+    """Raise InputError if the model has no such parameters; the front end ignores modifiers without a component."""
+    known = [name for name, variable in flat["variables"].items() if "Parameter" in variable["variability"]]
+    problems = [
+        Problem(f'the model {model} has no parameter "{name}"{did_you_mean(name, known)}')
+        for name in values
+        if name not in known and not any(each.startswith(f"{name}.") for each in known)
+    ]
+    if problems:
+        raise InputError(problems)
+
+
+def modified_model(name: str, values: Mapping[str, Any]) -> str:
+    """Return the declaration of the model MODIFIED_MODEL with values of parameters, "" without values.
+
+    Raises:
+        InputError: A name is not that of a component, or a value cannot be one of a parameter.
+    """
+    problems = [Problem("expected the name of a parameter", each) for each in values if not _REFERENCE.fullmatch(each)]
+    if problems:
+        raise InputError(problems)
+    modifiers = ", ".join(_modifier(*each) for each in values.items())
+    return f"model {MODIFIED_MODEL} extends {name}({modifiers}); end {MODIFIED_MODEL};" if modifiers else ""
+
+
+def _modifier(name: str, value: Any) -> str:
+    """Return a modifier: `a(b = 1)` for the parameter b of the component a."""
+    first, dot, rest = name.partition(".")
+    return f"{first}({_modifier(rest, value)})" if dot else f"{first} = {_expression(name, value)}"
+
+
+def _expression(name: str, value: Any) -> str:
+    """Return the Modelica expression of a JSON value; a text that is a name in Modelica stands for itself."""
+    if isinstance(value, bool):
+        return str(value).lower()
+    if isinstance(value, int | float):
+        return repr(value)
+    if isinstance(value, list) and value:
+        return "{" + ", ".join(_expression(name, each) for each in value) + "}"
+    if isinstance(value, str):
+        return value if _REFERENCE.fullmatch(value) and "." in value else json.dumps(value, ensure_ascii=False)
+    raise InputError(Problem(f"found {value!r}, expected a number, true, false, a text or a list", name))
+
+
+def _flatten(sources: ModelicaSources, packages: Sequence[Path], name: str, text: str, declaration: str) -> str:
     """Return the flat model as JSON text."""
     path, roots = sources.files[0], [*packages, *([sources.links] if sources.links else [])]
-    answer = run_rumoca(RUMOCA_VERSION, sources.files, roots, name, None if _WITHIN.search(text) else _display_name(path))
+    display_name = None if _WITHIN.search(text) else _display_name(path)
+    flattened = MODIFIED_MODEL if declaration else name
+    answer = run_rumoca(RUMOCA_VERSION, sources.files, roots, flattened, display_name, declaration)
     if "version" in answer:
         raise InputError(_version_problem(answer["version"]))
     if "syntax_errors" in answer:
