@@ -16,6 +16,7 @@ from ..core.component import NativeDoStep, PreparedCall
 from ..core.errors import join_alternatives
 from ..core.processors import available_processors
 from ..core.system import Parallel
+from ..process.journal import calling_several_components
 from .component_step import ScheduledStep, run_due
 from .plan import Phase, Step
 from .schedule import Schedule
@@ -126,7 +127,8 @@ class ParallelSteps:
     def _run_group(self, group: ParallelGroup) -> int:
         assert self._threads is not None
         run_partition = partial(run_due, n=self._runner.completed_steps)
-        failures = [failure for found in self._threads.map(run_partition, group.partitions) for failure in found]
+        with calling_several_components():
+            failures = [failure for found in self._threads.map(run_partition, group.partitions) for failure in found]
         for failure in sorted(failures, key=lambda failure: failure.step.first_call):
             if failure.status is None:
                 self._runner.restore_float_mode(failure.step.step.name)

@@ -88,6 +88,8 @@ class Journal:
         self.memory = memory
         self._integers = memoryview(memory)[:_TIME_OFFSET].cast("q")
         self.deadlines = Deadlines()
+        #: several components are being called at the same time; their calls are not recorded one by one
+        self.is_shared = False
         self.enter_phase(Phase.IDLE)
 
     def __getitem__(self, field: int) -> int:
@@ -198,6 +200,20 @@ def current_journal() -> Journal | None:
 
 
 @contextmanager
+def calling_several_components() -> Iterator[None]:
+    """Keep the recorded call, which names several components, while threads call them in the block."""
+    journal = _current
+    if journal is None:
+        yield
+        return
+    journal.is_shared = True
+    try:
+        yield
+    finally:
+        journal.is_shared = False
+
+
+@contextmanager
 def calling_component(component: str, function: str, deadline_name: str, time: float = math.nan) -> Iterator[None]:
     """Record a call into a component, outside the stepping loop, for the duration of the block.
 
@@ -211,7 +227,7 @@ def calling_component(component: str, function: str, deadline_name: str, time: f
         ComponentError: The block raised an exception, see `as_component_error`.
     """
     journal = _current
-    if journal is None:
+    if journal is None or journal.is_shared:
         with attributing_forks(lambda: (component, function)), as_component_error(component, function, time):
             yield
         return
