@@ -120,6 +120,16 @@ static bool succeeded(Instance *instance, const char *function, const char *reas
     return reason == NULL || refuse(instance, function, "%s", reason);
 }
 
+/* Whether the model has requested the end of the simulation. */
+static inline bool requests_termination(const Instance *instance)
+{
+#ifdef MODEL_TERMINATES
+    return instance->state.model.terminated;
+#else
+    return false;
+#endif
+}
+
 /* Logs the warnings of the model since the last call. */
 static void report_warnings(Instance *instance)
 {

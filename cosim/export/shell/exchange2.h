@@ -17,6 +17,7 @@ fmi2Status fmi2NewDiscreteStates(fmi2Component c, fmi2EventInfo *info)
     double next = INFINITY;
     const bool ok = update_discrete(c, "fmi2NewDiscreteStates", &changed, &next);
     *info = (fmi2EventInfo){
+        .terminateSimulation = requests_termination(c),
         .valuesOfContinuousStatesChanged = changed,
         .nextEventTimeDefined = isfinite(next),
         .nextEventTime = isfinite(next) ? next : 0,

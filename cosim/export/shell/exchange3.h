@@ -25,8 +25,9 @@ fmi3Status fmi3UpdateDiscreteStates(fmi3Instance instance, fmi3Boolean *again, f
                                     fmi3Float64 *next_event)
 {
     *next_event = INFINITY;
-    *again = *terminate_requested = *nominals_changed = *states_changed = false;
+    *again = *nominals_changed = *states_changed = false;
     const bool ok = update_discrete(instance, "fmi3UpdateDiscreteStates", states_changed, next_event);
+    *terminate_requested = requests_termination(instance);
     *has_next_event = isfinite(*next_event);
     return status(ok);
 }

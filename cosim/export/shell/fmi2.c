@@ -91,7 +91,8 @@ fmi2Status fmi2Reset(fmi2Component c)
 
 fmi2Status fmi2DoStep(fmi2Component c, fmi2Real time, fmi2Real step_size, fmi2Boolean no_rollback)
 {
-    return status(step(c, "fmi2DoStep", time, step_size));
+    const bool ok = step(c, "fmi2DoStep", time, step_size);
+    return ok && requests_termination(c) ? fmi2Discard : status(ok);
 }
 
 /* ---- access to variables --------------------------------------------------------------------------------------------- */
@@ -182,7 +183,7 @@ fmi2Status fmi2GetIntegerStatus(fmi2Component c, const fmi2StatusKind kind, fmi2
 fmi2Status fmi2GetBooleanStatus(fmi2Component c, const fmi2StatusKind kind, fmi2Boolean *value)
 {
     if (kind != fmi2Terminated) return fmi2Discard;
-    *value = fmi2False;
+    *value = requests_termination(c);
     return fmi2OK;
 }
 

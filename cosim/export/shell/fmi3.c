@@ -75,7 +75,8 @@ fmi3Status fmi3DoStep(fmi3Instance instance, fmi3Float64 time, fmi3Float64 step_
                       fmi3Float64 *time_reached)
 {
     const bool ok = step(instance, "fmi3DoStep", time, step_size);
-    *event_needed = *terminate_requested = *early_return = false;
+    *event_needed = *early_return = false;
+    *terminate_requested = requests_termination(instance);
     *time_reached = ((Instance *)instance)->state.time;
     return status(ok);
 }

@@ -8,6 +8,7 @@ import pytest
 from fmpy import extract, read_model_description
 from fmpy.fmi2 import FMU2Slave
 
+import cosim
 from cosim.core.errors import ComponentError
 from cosim.export.build import build_to
 
@@ -55,3 +56,25 @@ def test_a_warning_is_logged_when_its_condition_becomes_false(write_model, tmp_p
         "[WARNING] u is 0.7, above 100% of 0.5 (Guarded.mo:7)",
         "[WARNING] u is 0.9, above 100% of 0.5 (Guarded.mo:7)",
     ]
+
+
+TIMER = """model Timer
+  output Real y(start = 0, fixed = true);
+equation
+  der(y) = 2;
+  when y > 0.513 then
+    terminate("y has reached " + String(y));
+  end when;
+end Timer;"""
+
+
+@pytest.mark.parametrize("version", [2, 3])
+@pytest.mark.parametrize("solver", [None, "cvode"])
+def test_terminate_ends_the_run_without_an_error(write_model, tmp_path, caplog, version, solver):
+    """Co-Simulation ends after the communication step, Model Exchange before the one with the located event."""
+    fmu = build_to(write_model(TIMER), None, tmp_path / f"timer{version}.fmu", version)
+    with caplog.at_level("WARNING", "cosim.component"):
+        result = cosim.simulate(fmu, stop_time=1.0, step_size=0.01, **({"solver": solver} if solver else {}))
+    assert result.time[-1] == pytest.approx(0.26 if solver is None else 0.25, abs=1e-6)
+    assert result["y"][-1] == pytest.approx(2 * result.time[-1], abs=1e-6)
+    assert caplog.messages == ["timer: y has reached 0.513 (Timer.mo:5)"]

@@ -10,7 +10,7 @@ from ..causality.matching import is_input
 from ..causality.parameter_roles import ParameterRoles
 from ..causality.schedule import Schedule
 from ..model.flat_model import Model, Variable, derivative_name, is_integrated
-from ..model.traversal import composed_asserts
+from ..model.traversal import composed_asserts, has_terminate
 from .c_values import C_TYPES, CValue, c_identifier, variable_value
 from .exchange_code import exchange_declarations, has_exchange
 
@@ -70,6 +70,7 @@ class HeaderWriter:
             "} Model;",
             "",
             *["#define MODEL_WARNINGS"] * has_messages(self.model),
+            *["#define MODEL_TERMINATES"] * has_terminate(_asserts(self.model)),
             "void model_start(Model *m);",
             "void model_parameters(Model *m);",
             "const char *model_initialize(Model *m, double time);",
@@ -142,6 +143,7 @@ class HeaderWriter:
         if has_messages(self.model):
             yield "char reason[512], warning[512];"
             yield f"bool warned[{max(self.warnings, 1)}];"
+        yield from ["bool terminated;"] * has_terminate(_asserts(self.model))
         yield "int32_t failure;"
 
 

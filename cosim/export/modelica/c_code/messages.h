@@ -32,6 +32,21 @@ static inline void warn(Model *m, bool violated, bool *before, const char *forma
     *before = violated;
 }
 
+#ifdef MODEL_TERMINATES
+/* Requests the end of the simulation; the message is that of a warning. */
+static inline void request_termination(Model *m, const char *format, ...)
+{
+    const size_t length = strlen(m->warning);
+    va_list arguments;
+    if (m->terminated) return;
+    va_start(arguments, format);
+    snprintf(m->warning + length, sizeof m->warning - length, "%s", length > 0 ? "; " : "");
+    vsnprintf(m->warning + strlen(m->warning), sizeof m->warning - strlen(m->warning), format, arguments);
+    va_end(arguments);
+    m->terminated = true;
+}
+#endif
+
 static inline const char *truth(bool value) { return value ? "true" : "false"; }
 
 #endif

@@ -162,7 +162,7 @@ class StatementLowering(ExpressionLowering):
         self.lines.append(f"if (!{condition.parenthesized(13)}) fail(m, {failure});")
 
     def _composed_assert(self, node: syntax_tree.Assert) -> None:
-        """Lower an assertion whose message contains values, or whose level is warning."""
+        """Lower an assertion whose message contains values, whose level is warning, or which is a `terminate`."""
         condition = self.scalar_of(node.condition).parenthesized(13)
         with self.collect_lines() as lines:
             texts, values = zip(*map(self._message_part, node.message), strict=True)
@@ -170,7 +170,7 @@ class StatementLowering(ExpressionLowering):
             arguments = "".join(f", {value}" for value in values if value)
             text = json.dumps("".join(texts) + location.replace("%", "%%"), ensure_ascii=False) + arguments
             if not node.warning:
-                self.lines.append(f"fail_with(m, {text});")
+                self.lines.append(f"{'request_termination' if node.terminates else 'fail_with'}(m, {text});")
         if node.warning:
             number = self.translation_unit.warning_number(node)
             self.lines += [line.removeprefix("    ") for line in lines]

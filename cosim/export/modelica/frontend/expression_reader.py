@@ -20,7 +20,7 @@ _OPERATORS = {
     "Lt": "<", "Le": "<=", "Gt": ">", "Ge": ">=", "Eq": "==", "Neq": "<>", "And": "and", "Or": "or",
 }  # fmt: skip
 _UNSUPPORTED_BUILTINS = {
-    "terminate": "terminate() is not supported; use assert()",
+    "terminate": "terminate() is supported in when-equations only",
 }
 _INTEGER_OPERATORS = {"+": operator.add, "-": operator.sub, "*": operator.mul}
 _MODELICA_SPELLING = {"noevent": "noEvent", "outerproduct": "outerProduct"}

@@ -9,7 +9,7 @@ from typing import Any
 from ..model import flat_model, syntax_tree
 from ..model.syntax_tree import Body, Expression, SourceLocation, Statement, raise_model_error
 from .expression_reader import Json, split_tagged
-from .statement_reader import StatementReader
+from .statement_reader import StatementReader, message_parts
 from .unrolling import unroll_equations
 
 
@@ -204,6 +204,9 @@ class ModelReader(StatementReader):
         if kind == "Assert":
             return self._assert(node)
         where = self.locate(node)
+        if kind == "Terminate":
+            message = tuple(message_parts(self.read_expression(node["message"])))
+            return syntax_tree.Assert(syntax_tree.Literal(False, "Boolean"), message, where, terminates=True)
         if kind not in ("Assign", "Reinit"):
             raise_model_error(f"{kind} in a when-equation is not supported", where)
         target = self._parse_target(node["target" if kind == "Assign" else "state"], where)

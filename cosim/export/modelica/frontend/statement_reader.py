@@ -79,7 +79,7 @@ class StatementReader(ExpressionReader):
         level = None if node["level"] is None else self.read_expression(node["level"])
         if level is not None and not isinstance(level, syntax_tree.Literal):
             raise_model_error("the level of an assert() must be a literal of AssertionLevel", where)
-        message = tuple(_message_parts(self.read_expression(node["message"])))
+        message = tuple(message_parts(self.read_expression(node["message"])))
         return syntax_tree.Assert(
             self.read_expression(node["condition"]), message, where, warning=level is not None and level.value == 1
         )
@@ -126,13 +126,13 @@ class StatementReader(ExpressionReader):
         return flat_model.FunctionVariable(node["name"], kind, dimensions, self._optional(node["default"]), where)
 
 
-def _message_parts(message: Expression) -> list[Expression]:
+def message_parts(message: Expression) -> list[Expression]:
     """Return the terms of a concatenation of Strings; adjacent literals become one literal."""
     if isinstance(message, syntax_tree.Builtin) and message.name == "String":
         return [message.arguments[0]]
     if not (isinstance(message, syntax_tree.Binary) and message.operator == "+"):
         return [message]
-    left, right = _message_parts(message.left), _message_parts(message.right)
+    left, right = message_parts(message.left), message_parts(message.right)
     if isinstance(left[-1], syntax_tree.Literal) and isinstance(right[0], syntax_tree.Literal):
         joined = syntax_tree.Literal(f"{left[-1].value}{right[0].value}", "String")
         return [*left[:-1], joined, *right[1:]]

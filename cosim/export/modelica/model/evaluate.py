@@ -149,7 +149,7 @@ class Evaluator:
             self.execute(node.body)
 
     def _assert(self, node: syntax_tree.Assert) -> None:
-        if not self(node.condition) and not node.warning:
+        if not self(node.condition) and not (node.warning or node.terminates):
             raise EvaluationError("".join(map(self._as_text, node.message)), node.where)
 
     def _as_text(self, node: Expression) -> str:

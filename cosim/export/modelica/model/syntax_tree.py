@@ -240,13 +240,15 @@ class ExternalCall:
 
 @dataclass(frozen=True, slots=True)
 class Assert:
-    """An `assert`; the message consists of String literals and of expressions whose values are inserted as text."""
+    """An `assert` or `terminate`; the message consists of String literals and of expressions whose values become text."""
 
     condition: Expression
     message: tuple[Expression, ...]
     where: SourceLocation | None = field(default=None, compare=False)
     #: true for the level warning, false for the level error
     warning: bool = False
+    #: true for a `terminate`, which ends the simulation without an error
+    terminates: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -119,9 +119,16 @@ def pre_references(node: Any) -> Iterator[tuple[str, Builtin]]:
 
 
 def composed_asserts(node: Any) -> list[Assert]:
-    """Return the assertions whose message is composed at run time or is a warning."""
+    """Return the assertions whose message is composed at run time, a warning or that of a `terminate`."""
     asserts = [item for item in walk(node) if isinstance(item, Assert)]
-    return [item for item in asserts if item.warning or not all(isinstance(part, Literal) for part in item.message)]
+    return [
+        item for item in asserts if item.warning or item.terminates or not all(isinstance(part, Literal) for part in item.message)
+    ]
+
+
+def has_terminate(node: Any) -> bool:
+    """Return whether a tree contains a `terminate`."""
+    return any(isinstance(item, Assert) and item.terminates for item in walk(node))
 
 
 def has_builtin(node: Any, *builtins: str) -> bool:
