@@ -151,7 +151,7 @@ class World(Component):
             prefixed = [replace(variable, name=f"{body.name}.{variable.name}") for variable in body.model.variables]
             yield from variable_views([v for v in prefixed if v.causality == "input"], {_FLOAT: body.inputs})
             yield from variable_views([v for v in prefixed if v.causality == "output"], {_FLOAT: body.outputs, _FLAG: flags})
-            yield from _constants(body)
+            yield from _constants(body, f"/components/{self._name}/arguments/vehicles/{body.name}/parameters")
         environment = self._environment
         yield from variable_views(environment.input_variables, {_FLOAT: environment.inputs})
         yield from variable_views(environment.output_variables, {_FLOAT: environment.outputs})
@@ -289,12 +289,12 @@ class World(Component):
             self._fleet.free_state(state.fleet)
 
 
-def _constants(body: ContactBody) -> Iterator[tuple[Variable, np.ndarray]]:
-    """Yield the parameters of a vehicle as constants with their values, except those of its initial state and of the waves."""
+def _constants(body: ContactBody, pointer: str) -> Iterator[tuple[Variable, np.ndarray]]:
+    """Yield the parameters of a vehicle, except those of initial state and waves, as constants that `pointer` sets."""
     for variable, values in variable_views(body.model.real_variables("parameter"), {_FLOAT: body.parameters}):
         if not variable.name.startswith((INITIAL_PREFIX, WAVE_PREFIX)):
             value = values.tolist() if variable.shape else values.item()
             name = f"{body.name}.{variable.name}"
-            text = f"{variable.description}; set by the argument vehicles/{body.name}/parameters/{variable.name}"
+            text = f"{variable.description}; set by {pointer}/{variable.name}"
             constant = replace(variable, name=name, causality="local", variability="constant", start=value, description=text)
             yield constant, values

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -14,6 +15,10 @@ from ..export.foreign.source_fmus import usable_fmu
 from ..process.journal import calling_component
 from .component_schema import ComponentSpec
 from .nested_systems import Node
+
+#: end of a source that "fmu" cannot name, and the keys that name it
+_OTHER_SOURCE = re.compile(r"\.(py|mo)(?::\w+)?$")
+_SOURCE_KEYS = {"py": "python", "mo": "modelica"}
 
 
 class ComponentFactory:
@@ -50,6 +55,8 @@ class ComponentFactory:
         spec, full_name = node.spec.components[name], node.full_name(name)
         if spec.python is not None:
             return self._load_python(node, name, spec, full_name)
+        if spec.fmu and (other := _OTHER_SOURCE.search(spec.fmu)):
+            raise InputError(f'"{spec.fmu}" is not an FMU; it is named by "{_SOURCE_KEYS[other[1]]}" instead of "fmu"')
         path = self._build_modelica(node.folder, spec) if spec.fmu is None else node.folder / spec.fmu
         solver = SolverSettings(spec.solver.method, spec.solver.step_size) if spec.solver else None
         settings = InstanceSettings(spec.tolerance, solver)

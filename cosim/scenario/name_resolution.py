@@ -16,6 +16,7 @@ from ..core.component import Component, Variable
 from ..core.errors import did_you_mean
 from ..core.text import shorten, text_problem
 from .nested_systems import Node
+from .schema import ScenarioSpec
 
 _REALS = ("Float64", "Float32")
 
@@ -51,6 +52,8 @@ def resolve_name(node: Node, text: str, ports: Sequence[str], include_inner: boo
             raise UnknownNameError
         is_removed = ("components", component) in node.document.removed
         hint = ", which was removed" if is_removed else did_you_mean(component, node.spec.components)
+        if component in ScenarioSpec.model_fields:
+            hint = f'; "{component}" is an entry of the scenario, name it by a JSON pointer: "/{component}/..."'
         raise UnknownNameError(f'unknown component "{component}"{hint}')
     child = node.children.get(component)
     if child is None:

@@ -96,8 +96,8 @@ def test_impossible_bodies_are_refused_with_their_path(parameters: dict[str, Any
 
 
 def test_a_scenario_sets_the_mass_at_the_place_that_the_message_names() -> None:
-    place = "vehicles/uav/parameters/mass"
-    with pytest.raises(InputError, match=f"is a constant and cannot be set: total mass .*; set by the argument {place}"):
+    place = "/components/plant/arguments/vehicles/uav/parameters/mass"
+    with pytest.raises(InputError, match=f"is a constant and cannot be set: total mass .*; set by {place}"):
         cosim.load("demo1_box", parameters={"plant.uav.mass": 0.5})
-    with cosim.load("demo1_box", parameters={f"/components/plant/arguments/{place}": 0.5}) as simulation:
+    with cosim.load("demo1_box", parameters={place: 0.5}) as simulation:
         assert simulation.get("plant.uav.mass") == 0.5

@@ -111,3 +111,15 @@ def test_problems_of_a_python_component_are_located_at_its_arguments(folder):
         '$.components.plant.arguments.vehicles.uav.model: unknown vehicle model "ar_dron"; did you mean "ar_drone"?',
         "$.components.plant.arguments.vehicles.usv.position: found [0], expected a list of 2 numbers [x, y]",
     ]
+
+
+@pytest.mark.parametrize(("source", "key"), [("x.py:Class", "python"), ("plant.mo:Plant", "modelica"), ("plant.mo", "modelica")])
+def test_a_source_that_is_no_fmu_names_its_key(folder, source, key):
+    (problem,) = folder.problems_of(folder.scenario({"a": {"fmu": source}}))
+    assert problem.endswith(f'{source}" is not an FMU; it is named by "{key}" instead of "fmu"')
+
+
+def test_an_entry_of_the_scenario_is_named_by_a_pointer(folder):
+    file = folder.scenario({"a": folder.block("Gain")})
+    with pytest.raises(cosim.InputError, match='name it by a JSON pointer: "/components'):
+        cosim.load(file, {"components.a": None})
