@@ -88,7 +88,7 @@ class World(Component):
         self._flags = np.zeros((len(settings.vehicles), FLAG_COUNT), _FLAG)
         self._flags_data = self._flags.reshape(-1).data
         self._bound_inputs: dict[str, np.ndarray] = {}
-        self._client, self._disconnect = connect(self)
+        self._client, self._release = connect(self)
         try:
             self._populate(settings)
         except BaseException:
@@ -271,8 +271,8 @@ class World(Component):
         """Do nothing."""
 
     def free(self) -> None:
-        """Disconnect the Bullet client."""
-        self._disconnect()
+        """Release the Bullet client."""
+        self._release()
 
     def get_state(self) -> WorldState:
         """Return a copy of the state, which also takes memory in Bullet until `free_state`."""
@@ -285,7 +285,7 @@ class World(Component):
 
     def free_state(self, state: WorldState) -> None:
         """Release the memory of a state in Bullet."""
-        if self._disconnect.alive:
+        if self._release.alive:
             self._fleet.free_state(state.fleet)
 
 

@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
-from functools import cached_property
+from functools import cached_property, lru_cache
 from hashlib import sha256
 from os.path import relpath
 from pathlib import Path
@@ -145,7 +145,7 @@ class PreparedRun:
         factory, folder = self.component_factory, self.root.folder.resolve()
         data = {file.resolve() for file in (*own, *(path for path, _ in factory.fmus), *factory.modelica_files)}
         files = data | package_files((*functions, *factory.python_files))
-        return {relpath(file, folder).replace(os.sep, "/"): file for file in sorted(files, key=str)}
+        return {_relative_name(str(file), str(folder)): file for file in sorted(files, key=str)}
 
     @property
     def sources(self) -> dict[str, str]:
@@ -157,6 +157,11 @@ class PreparedRun:
     def free(self) -> None:
         """Free the components of a scenario that is not simulated."""
         free_components(self.system.components)
+
+
+@lru_cache(1024)  # a run names over a hundred files, and runs in one process name the same ones
+def _relative_name(file: str, folder: str) -> str:
+    return relpath(file, folder).replace(os.sep, "/")
 
 
 @default_float_mode()

@@ -74,7 +74,7 @@ class World(Component):
         self._name, self._sub_steps, self._step_size = instance_name, sub_steps, math.nan
         self._inputs, self._outputs = np.zeros(len(INPUTS)), np.zeros(len(OUTPUTS))
         self._bound_inputs, self._bound_outputs = np.zeros(len(INPUTS)), np.zeros(len(OUTPUTS))
-        self._client, self._disconnect = connect(self)
+        self._client, self._release = connect(self)
         try:
             self._populate(placements, boxes)
         except BaseException:
@@ -183,8 +183,8 @@ class World(Component):
         """Do nothing: there is nothing to end."""
 
     def free(self) -> None:
-        """Disconnect the Bullet client."""
-        self._disconnect()
+        """Release the Bullet client."""
+        self._release()
 
     # -- state ---------------------------------------------------------------------------------------------------------
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 import inspect
+from functools import cache
 from pathlib import Path
 from types import UnionType
 from typing import Any, get_args
@@ -92,14 +93,20 @@ class _SlaveFunctions(dict[str, Any]):
             function: Any = self._library[self._prefix + name[len("fmi1") :]]
         except AttributeError:
             raise MissingFunctionError(name) from None
-        signature = inspect.signature(getattr(self._slave_class, name))
-        types = [parameter.annotation for parameter in list(signature.parameters.values())[1:]]
-        function.argtypes = [get_args(kind)[0] if isinstance(kind, UnionType) else kind for kind in types]
+        function.argtypes = _argument_types(self._slave_class, name)
         function.restype = _result_type(name[len("fmi1") :])
         if function.restype is ctypes.c_int:
             function.errcheck = _reject_negative_status
         self[name] = function
         return function
+
+
+@cache
+def _argument_types(slave_class: type, name: str) -> list[type]:
+    """Return the types of a function's arguments in C."""
+    signature = inspect.signature(getattr(slave_class, name))
+    types = [parameter.annotation for parameter in list(signature.parameters.values())[1:]]
+    return [get_args(kind)[0] if isinstance(kind, UnionType) else kind for kind in types]
 
 
 def _reject_negative_status(status: int, function: Any, _: Any) -> int:
