@@ -67,7 +67,7 @@ def test_failures_are_reported_without_a_traceback(folder, run_pytest):
     scenario(folder, "broken", block="FailingBlock", checks=[{"kpi": "y.value", "min": 4.0}])
     code, out = run_pytest()
     assert code == 1
-    assert "y.value is 3, expected min 4.0" in out
+    assert "y.value is 3, expected at least 4.0" in out
     assert "a: do_step failed at t = 2 s: ValueError: tilt beyond limit" in out
     assert "2 failed" in out
     assert "regression.py" not in out

@@ -9,7 +9,7 @@ from typing import NamedTuple
 
 from ..core.errors import InputError
 from ..results import Result
-from ..results.comparison import Comparison, Tolerance
+from ..results.comparison import Comparison, Tolerance, needed_share
 from ..results.comparison import compare as compare_results
 from ..scenario import find_scenario, load_scenario
 from .arguments import expect, is_number
@@ -48,6 +48,10 @@ class ComparisonTask(NamedTuple):
     def compare(self) -> Comparison:
         """Return the verdict on each signal of the reference."""
         return compare_results(*self)
+
+    def needed_share(self) -> float:
+        """Return the share of all tolerances (1) with which a comparison that passes would still pass; 0 if all are equal."""
+        return needed_share(*self)
 
 
 def compare(

@@ -194,7 +194,9 @@ def _print_summary(outcome: RunOutcome) -> None:
     result = outcome.result
     loop, simulated = result.timing["loop_seconds"], float(result.time[-1] - result.time[0])
     seconds = time.perf_counter() - outcome.began
-    click.echo(f"\n{simulated:g} s simulated in {loop:.2f} s: {simulated / loop:.0f} times real time")
+    click.echo(
+        f"\n{_summarize_checks(outcome.checks)}{simulated:g} s simulated in {loop:.2f} s: {simulated / loop:.0f} times real time"
+    )
     click.echo(f"{', '.join(outcome.files)} in {outcome.shown_folder} ({seconds:.1f} s in all)")
     if pacing := result.metadata["real_time"]:
         click.echo(_format_pacing(pacing))
@@ -206,6 +208,15 @@ def _print_summary(outcome: RunOutcome) -> None:
     if current_command_line().verbosity > 0:
         for name, value in result.timing.items():
             click.echo(f"{name:24} {value:.3f}")
+
+
+def _summarize_checks(checks: Sequence[CheckOutcome]) -> str:
+    """Return a line that says how many checks are met, and which ones are not; "" if there are none."""
+    if not checks:
+        return ""
+    unmet = "".join(f"\n  {check}" for check in checks if not check.passed)
+    met = sum(check.passed for check in checks)
+    return f"{met} of {count_noun(len(checks), 'check')} met{unmet and ', not met:'}{unmet}\n"
 
 
 def _print_termination(outcome: RunOutcome) -> None:

@@ -31,6 +31,11 @@ def log_message(component: str, level: int, text: str) -> None:
     logging.getLogger(LOGGER_NAME).log(level, "%s: %s", component, text)
 
 
+def discard_messages() -> None:
+    """Discard all messages of components in this process."""
+    logging.getLogger(LOGGER_NAME).disabled = True
+
+
 def _is_within_rate_limit() -> bool:
     """Return whether one more message is permitted in this second; report the dropped ones when a new second begins."""
     global _current_second, _passed_count, _dropped_count

@@ -13,6 +13,8 @@ Number = float | int | bool
 
 LIMIT_OPERATORS: Mapping[str, Callable[[Any, Any], bool]] = {"min": operator.ge, "max": operator.le, "equals": operator.eq}
 
+_LIMIT_WORDS = {"min": "at least ", "max": "at most ", "equals": ""}
+
 
 class CheckOutcome(NamedTuple):
     """Outcome of a check.
@@ -34,7 +36,9 @@ class CheckOutcome(NamedTuple):
 
     def __str__(self) -> str:
         value = str(self.value).lower() if isinstance(self.value, bool) else f"{self.value:.6g}"
-        return f"{self.check['kpi']} is {value}, expected {self.limits}"
+        found = "has no value" if math.isnan(self.value) else f"is {value}"
+        limits = (f"{_LIMIT_WORDS[key]}{str(limit).lower()}" for key, limit in self.check.items() if key != "kpi")
+        return f"{self.check['kpi']} {found}, expected {' and '.join(limits)}"
 
 
 def evaluate_checks(kpis: Mapping[str, Number], checks: Iterable[Mapping[str, Any]]) -> list[CheckOutcome]:

@@ -84,7 +84,9 @@ class Regression:
                 self.file.stem, 1, "did not run to its end", (f"cosim run: ended by signal {-done.returncode}",)
             )
         if done.returncode not in (0, 3):
-            return RegressionOutcome(self.file.stem, done.returncode, "did not run to its end", tuple(done.stderr.splitlines()))
+            report = self._write_report() if done.returncode == 1 and (self.directory / "result.csv").is_file() else []
+            details = (*done.stderr.splitlines(), *report)
+            return RegressionOutcome(self.file.stem, done.returncode, "did not run to its end", details)
         try:
             run = _FinishedRun.read(self.file, self.directory)
             outcome = self._update_reference(run) if self.update else self._compare(run)
@@ -97,8 +99,10 @@ class Regression:
         counts = [(len(run.failed_checks(checks_only=True)), len(run.checks), "check")]
         tubes = self.directory / "tubes.png"
         tubes.unlink(missing_ok=True)
+        margin = ""
         if run.scenario.get("reference"):
             comparison = run.compare()
+            margin = run.margin if comparison.passed else ""
             counts.append((len(comparison.failures), len(comparison.verdicts), "signal"))
             if not comparison.passed:
                 failed += [
@@ -106,7 +110,15 @@ class Regression:
                     *run.reference_changes(),
                     f"see {run.draw_tubes(comparison, tubes)}",
                 ]
-        return RegressionOutcome(self.file.stem, 3 if failed else 0, _summarize(counts), tuple(failed))
+        if failed:
+            failed += self._write_report()
+        return RegressionOutcome(self.file.stem, 3 if failed else 0, _summarize(counts, margin), tuple(failed))
+
+    def _write_report(self) -> list[str]:
+        """Write the report of the run by `cosim report` in a separate process, and return a line that names it."""
+        command = [sys.executable, "-m", "cosim", "report", str(self.directory)]
+        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)  # noqa: S603
+        return [f"see {self.directory / 'report.html'}"] if done.returncode == 0 else [f"no report: {done.stderr.strip()}"]
 
     def _update_reference(self, run: _FinishedRun) -> RegressionOutcome:
         from ..results.comparison.reference import write_reference
@@ -119,10 +131,10 @@ class Regression:
         return RegressionOutcome(self.file.stem, 0, f"{amount}, {size:.0f} kB in {run.reference_path}")
 
 
-def _summarize(counts: Collection[tuple[int, int, str]]) -> str:
-    """Return the numbers of checks and signals from (number of failures, number of all, noun)."""
+def _summarize(counts: Collection[tuple[int, int, str]], margin: str) -> str:
+    """Return the numbers of checks and signals from (number of failures, number of all, noun), and the margin of the signals."""
     if not any(failed for failed, _, _ in counts):
-        return ", ".join(count_noun(number, noun) for _, number, noun in counts)
+        return ", ".join(count_noun(number, noun) for _, number, noun in counts) + (f" ({margin})" if margin else "")
     return ", ".join(
         f"{failed} of {count_noun(number, noun)} failed" if failed else f"{count_noun(number, noun)} passed"
         for failed, number, noun in counts
@@ -179,6 +191,13 @@ class _FinishedRun:
         from ..results.comparison import compare
 
         return compare(self.result, self.reference, self.tolerances)
+
+    @property
+    def margin(self) -> str:
+        """The share of the tolerances that a passed comparison needs."""
+        from ..results.comparison import needed_share
+
+        return f"{needed_share(self.result, self.reference, self.tolerances):.0%} of the tolerances"
 
     def reference_changes(self) -> Iterator[str]:
         """Yield one line that lists what has changed since the reference was made."""

@@ -117,7 +117,7 @@ def test_worse_and_better_controllers_are_marked(folder):
     worse = bench(folder, path, "--verbose")
     assert worse.returncode == 3
     assert "FAILED  sail" in worse.stdout
-    assert "waypoints.all_reached is false, expected equals true" in worse.stdout
+    assert "waypoints.all_reached is false, expected true" in worse.stdout
     assert words(worse, "waypoints.reached")[1:] == ["1", "2", "worse"]
     assert words(worse, "waypoints.time[2]")[1:] == ["s", "-", words(worse, "waypoints.time[2]")[3], "worse"]
     assert "last run" not in worse.stdout

@@ -74,12 +74,12 @@ def test_quiet_prints_only_what_is_wrong(tmp_path):
     good = run_cosim("run", talker(tmp_path), "--quiet", cwd=tmp_path)
     assert (good.returncode, good.stdout, good.stderr) == (0, "", "")
     bad = run_cosim("run", talker(tmp_path, largest=1.0), "--quiet", cwd=tmp_path)
-    assert (bad.returncode, bad.stdout, bad.stderr) == (3, "", "check not met: end.value is 2, expected max 1.0\n")
+    assert (bad.returncode, bad.stdout, bad.stderr) == (3, "", "check not met: end.value is 2, expected at most 1.0\n")
     both = run_cosim("run", tmp_path / "talk.json", "--quiet", "--json", cwd=tmp_path)
     assert json.loads(both.stdout)["exit_code"] == 3
     regressed = run_cosim("regress", tmp_path / "talk.json", "-q", cwd=tmp_path)
     assert (regressed.returncode, regressed.stdout) == (3, "")
-    assert regressed.stderr == "talk: end.value is 2, expected max 1.0\n"
+    assert regressed.stderr == "talk: end.value is 2, expected at most 1.0\ntalk: see runs/talk/report.html\n"
 
 
 def test_verbose_prints_timings(tmp_path):

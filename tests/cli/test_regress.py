@@ -1,6 +1,7 @@
 """`cosim regress` on small scenarios with a cooling body, its reference and its checks."""
 
 import json
+from pathlib import Path
 
 import pytest
 from cosim_command import run_cosim
@@ -64,6 +65,7 @@ def test_a_reference_is_written_and_met(folder):
     assert json.loads((folder / "scenarios/references/cooling.json").read_text())["versions"]["numpy"]
     again = regress(folder)
     assert (again.returncode, again.stdout.splitlines()[-1]) == (0, "1 scenario, all passed")
+    assert "1 signal (25% of the tolerances)" in again.stdout  # the deviation of the decimated reference
 
 
 def test_a_changed_result_fails_with_signal_time_and_changes(folder):
@@ -75,6 +77,8 @@ def test_a_changed_result_fails_with_signal_time_and_changes(folder):
     assert "body.temperature leaves its tube at t = 0.0" in done.stdout
     assert "changed since the reference was made: cooling.json\n" in done.stdout
     assert (folder / "runs/cooling/tubes.png").stat().st_size > 10_000
+    assert f"see {Path('runs/cooling/report.html')}\n" in done.stdout
+    assert "body.temperature" in (folder / "runs/cooling/report.html").read_text()
     suite = etree.parse(folder / "out/junit.xml").getroot().find("testsuite")
     assert (suite.get("tests"), suite.get("failures"), suite.get("errors")) == ("1", "1", "0")
     assert "leaves its tube" in suite.find("testcase[@name='cooling']/failure").text

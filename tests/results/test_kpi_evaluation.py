@@ -152,7 +152,7 @@ def test_a_check_of_a_missing_kpi_fails():
         {"landing.error": 0.0}, [{"kpi": "landing.eror", "max": 1}, {"kpi": "landing.error", "max": 1}]
     )
     assert (eror.passed, error.passed) == (False, True)
-    assert str(eror) == "landing.eror is nan, expected max 1"
+    assert str(eror) == "landing.eror has no value, expected at most 1"
 
 
 def test_repr_of_a_result_lists_failed_checks():
@@ -160,4 +160,4 @@ def test_repr_of_a_result_lists_failed_checks():
     failed = {outcome.check["kpi"] for outcome in result.checks if not outcome.passed}
     assert len(result.checks) == 5
     assert "landing.landed_at_end" in failed
-    assert "  landing.landed_at_end is false, expected equals true" in repr(result).splitlines()
+    assert "  landing.landed_at_end is false, expected true" in repr(result).splitlines()

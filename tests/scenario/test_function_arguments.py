@@ -101,7 +101,7 @@ def test_an_optional_function_is_left_out_with_one_line(write, tmp_path, functio
     assert "failed" in done.stdout
     regressed = run_cosim("regress", str(file), cwd=tmp_path)
     assert regressed.returncode == 3
-    assert "is nan, expected max 1.0" in regressed.stdout
+    assert "has no value, expected at most 1.0" in regressed.stdout
 
 
 def test_an_optional_function_with_a_mistake_is_refused(folder, write):

@@ -185,3 +185,13 @@ def test_the_command_says_when_no_point_has_a_value(lag):
         "tune", lag.write("tune", parameters=[PARAMETER], minimize="own.y", method=SEARCH | {"evaluations": 3})
     )
     assert (done.code, done.err) == (3, "the value of own.y is nan at every point\n")
+    again = lag.run_command("tune", "tune.json", "--json")
+    assert (again.code, json.loads(again.out)["failure"]) == (3, "the value of own.y is nan at every point")
+
+
+def test_json_is_the_content_of_the_file(lag):
+    file = lag.write("tune", parameters=[PARAMETER], minimize="end.value", method=SEARCH | {"evaluations": 3})
+    done = lag.run_command("tune", file, "--json")
+    assert (done.code, done.err) == (0, "")
+    written = json.loads((lag.folder / "runs/tune/best.json").read_text())
+    assert json.loads(done.out) == {**written, "failure": None}

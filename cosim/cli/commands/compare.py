@@ -59,7 +59,9 @@ def command(
         verdicts = [{**verdict._asdict(), "passed": verdict.passed} for verdict in comparison.verdicts]
         print_json({"passed": comparison.passed, "signals": verdicts})
     else:
-        click.echo(str(comparison), err=not comparison.passed)
+        share = task.needed_share() if comparison.passed else 0
+        margin = f"; {share:.0%} of the tolerances would suffice" if share else ""
+        click.echo(f"{comparison}{margin}", err=not comparison.passed)
     return 0 if comparison.passed else 3
 
 

@@ -1,6 +1,6 @@
 """Comparison of a result with a reference: every signal has to stay in a tube around the reference."""
 
-from .comparison import Comparison, Verdict, compare
+from .comparison import Comparison, Verdict, compare, needed_share
 from .tube import Tolerance, Tube
 
-__all__ = ["Comparison", "Tolerance", "Tube", "Verdict", "compare"]
+__all__ = ["Comparison", "Tolerance", "Tube", "Verdict", "compare", "needed_share"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 import re
+from bisect import bisect_left
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
@@ -18,6 +19,8 @@ from .tube import ComparisonPoints, TimeWindows, Tolerance, Tube, UniformTimeWin
 
 #: share of all points up to which it is faster to compute the tube only at these points
 DENSE_FRACTION = 0.1
+#: resolution of `needed_share`
+SHARE_STEPS = 16
 
 
 class Verdict(NamedTuple):
@@ -101,6 +104,25 @@ def compare(result: Result, reference: Result, tolerances: Mapping[str, Toleranc
         return Comparison((*general, Verdict("the reference" if not len(reference.time) else "the result", "has no rows")))
     comparer = Comparer(result, reference)
     return Comparison((*general, *(comparer.compare_signal(name, tolerance) for name, tolerance in selected.items())))
+
+
+def needed_share(result: Result, reference: Result, tolerances: Mapping[str, Tolerance]) -> float:
+    """Return the share of all tolerances (1) with which a comparison that passes would still pass.
+
+    Args:
+        result: The result.
+        reference: The reference.
+        tolerances: Tolerance by pattern, see `compare`.
+
+    Returns:
+        A multiple of 1/SHARE_STEPS, found by bisection; 0 if the result equals the reference.
+    """
+
+    def passes(step: int) -> bool:
+        share = step / SHARE_STEPS
+        return compare(result, reference, {pattern: tolerance.scaled(share) for pattern, tolerance in tolerances.items()}).passed
+
+    return bisect_left(range(SHARE_STEPS), True, key=passes) / SHARE_STEPS
 
 
 def _find_tolerance_problems(tolerances: Mapping[str, Tolerance]) -> Iterator[str]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from pathlib import Path
+from typing import Any
 
 from ...results.files import write_json
 from ..execution.bundle import cosim_fingerprint
@@ -17,7 +18,13 @@ def write_tuning_files(tuning: Tuning, folder: Path) -> Trial:
     lines = ([*trial.parameters.values(), trial.value, trial.violation, trial.failure] for trial in tuning.trials)
     write_csv_rows([*names, *TRIAL_COLUMNS], lines, folder / "trials.csv")
     best = min(tuning.trials, key=lambda trial: trial.rank)
-    description = {
+    write_json(describe_best(tuning, best), folder / "best.json")
+    return best
+
+
+def describe_best(tuning: Tuning, best: Trial) -> dict[str, Any]:
+    """Return the best trial with everything that its evaluation depends on, as a JSON value."""
+    return {
         "name": tuning.spec.name,
         "tuning": tuning.study_file.document.value,
         "parameters": best.parameters,
@@ -28,5 +35,3 @@ def write_tuning_files(tuning: Tuning, folder: Path) -> Trial:
         "cosim": cosim_fingerprint(),
         "sha256": dict(tuning.study.bundle.files),
     }
-    write_json(description, folder / "best.json")
-    return best

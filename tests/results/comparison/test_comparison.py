@@ -5,7 +5,7 @@ import pytest
 
 from cosim.core.recording import Recording
 from cosim.results import Result
-from cosim.results.comparison import Tolerance, compare
+from cosim.results.comparison import Tolerance, compare, needed_share
 
 TIME = np.arange(101) / 10
 EXACT = {"*": Tolerance()}
@@ -107,6 +107,11 @@ def test_time_tolerance_permits_a_late_switch():
     late = changed(b__x=TIME > 5.3)
     assert compare(late, REFERENCE, {"*": Tolerance(time=0.3)}).passed
     assert failures(late, {"*": Tolerance(time=0.1)})[0].startswith("b.x leaves its tube at t = 5.2 s: 0 is 1 below its limit 1;")
+
+
+@pytest.mark.parametrize(("offset", "share"), [(0.0, 0.0), (0.01, 1 / 16), (0.052, 3 / 8), (0.2, 1.0)])
+def test_the_needed_share_of_the_tolerances_is_known_to_a_sixteenth(offset, share):
+    assert needed_share(changed(a__y=TIME + offset), REFERENCE, {"*": Tolerance(absolute=0.16)}) == share
 
 
 def test_a_coarse_result_is_compared_at_rows_of_the_reference():
