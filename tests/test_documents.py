@@ -75,6 +75,16 @@ def test_the_example_scenario_runs(tmp_path, keeper):
     assert "course.value" in done.stdout
 
 
+def test_the_loop_of_two_fmus_runs(tmp_path):
+    (scenario,) = re.findall(r"```json\n(.*?)```", (ROOT / "README.md").read_text(), re.DOTALL)
+    (tmp_path / "loop.json").write_text(scenario.replace("fmus/", f"{ROOT}/fmus/"))
+    done = run_cosim("run", "loop.json", "--no-report", cwd=tmp_path)
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "1 of 1 check met" in done.stdout
+    checked = run_cosim("check", "loop.json", cwd=tmp_path)
+    assert "nothing feeds" not in checked.stdout + checked.stderr
+
+
 def test_the_readme_shows_what_a_run_prints(tmp_path):
     done = subprocess.run(
         [sys.executable, "-m", "cosim", "run", "demo1_box", "--no-report"],
