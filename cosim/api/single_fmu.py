@@ -225,7 +225,7 @@ def _check_start_values(component: Component, start_values: Mapping[str, Any]) -
     problems = []
     for name, value in start_values.items():
         try:
-            values |= check_assignment(FMU_NAME, variables, name, value)
+            values |= check_assignment(FMU_NAME, variables, name, value, current=values.get)
         except (UnknownNameError, ValueError) as error:
             problems.append(Problem(str(error), f"start value {name}"))
     if problems:

@@ -43,8 +43,9 @@ class VariableAccess:
         expect("name", name, isinstance(name, str), "the name of a variable")
         for target in self._find_targets(name):
             component = target.component
+            read = self._system.components[component].get
             try:
-                values = check_assignment(component, self._variables_of(component), target.prefix, value, all_elements=True)
+                values = check_assignment(component, self._variables_of(component), target.prefix, value, True, read)
             except (UnknownNameError, ValueError) as error:
                 raise InputError(Problem(str(error), f'set("{name}")')) from None
             for variable in values:

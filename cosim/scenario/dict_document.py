@@ -25,13 +25,36 @@ def document_of_dict(scenario: Mapping[str, Any]) -> Document:
     Raises:
         InputError: The dict contains values that JSON cannot express.
     """
-    objects = {
-        name: spec["python"]
-        for name, spec in _mapping(_mapping(scenario).get("components")).items()
-        if isinstance(spec, Mapping) and not isinstance(spec.get("python", ""), str | None)
-    }
+    objects = _objects_of(_mapping(scenario).get("components"))
     text = json.dumps(_to_json(scenario, (), objects), indent=1)
     return parse_document(Document(Path.cwd() / DICT_FILE, text, objects=objects, is_dict=True))
+
+
+def move_objects(document: Document, path: Sequence[str], value: Any) -> Any:
+    """Move the Python class or object in the new value of a component, or of its key "python", to the objects of a document.
+
+    Args:
+        document: The scenario in which the value will be set; an object of the component that it replaces is forgotten.
+        path: Keys of the value.
+        value: The value that a caller sets.
+
+    Returns:
+        The value with a text in place of the class or object. Values at other paths are unchanged.
+    """
+    if path[0] != "components" or len(path) not in (2, 3) or (len(path) == 3 and path[2] != "python"):
+        return value
+    found = _objects_of({path[1]: value if len(path) == 2 else {"python": value}})
+    document.objects = {name: target for name, target in document.objects.items() if name != path[1]} | found
+    return _to_json(value, tuple(path), found) if found else value
+
+
+def _objects_of(components: Any) -> dict[str, Any]:
+    """Return the Python classes and objects by the names of their components."""
+    return {
+        name: spec["python"]
+        for name, spec in _mapping(components).items()
+        if isinstance(spec, Mapping) and not isinstance(spec.get("python", ""), str | None)
+    }
 
 
 def describe_object(target: Any) -> str:

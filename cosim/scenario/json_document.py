@@ -45,7 +45,7 @@ class Document:
     origins: Mapping[JsonPath, Origin] = field(default_factory=dict)
     #: the other files from which the value is merged
     bases: tuple[Path, ...] = ()
-    #: Python classes and objects by the names of the components that they implement; only in a scenario that is a dict
+    #: Python classes and objects by the names of the components that they implement; from a dict or from settings
     objects: Mapping[str, Any] = field(default_factory=dict)
     #: paths of the values of other files that are removed
     removed: set[JsonPath] = field(default_factory=set)

@@ -6,7 +6,7 @@ import json
 import re
 import sys
 from bisect import bisect_left
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -124,11 +124,17 @@ class SlotIndex:
 
 
 def check_assignment(
-    name: str, variables: Mapping[str, Variable], text: str, value: Any, all_elements: bool = False
+    name: str,
+    variables: Mapping[str, Variable],
+    text: str,
+    value: Any,
+    all_elements: bool = False,
+    current: Callable[[str], Sequence[Any] | None] | None = None,
 ) -> dict[str, Any]:
     """Check the assignment `text` = `value` to a component and return the checked values by variable name.
 
     A list sets an array variable, the scalar variables text[1], text[2], ..., or a vector: text.x, text.y, ...
+    A scalar sets a variable or one element of an array variable.
 
     Args:
         name: The component's name, for messages.
@@ -136,12 +142,17 @@ def check_assignment(
         text: The name of a variable, or of a list of variables without their indices.
         value: The value from the scenario or from a Python caller.
         all_elements: Refuse a list that is shorter than the array. By default the other elements keep their start values.
+        current: Returns the present elements of an array variable, which the assignment of one element keeps; None stands for
+            the start values. Without it, elements are refused (events).
 
     Raises:
         UnknownNameError: The component has no such variable.
         ValueError: The variable does not accept the value.
     """
     value = value.tolist() if hasattr(value, "tolist") else value
+    array = text.rpartition("[")[0]
+    if array in variables and text not in variables and text in variables[array].scalar_names:
+        return {array: _with_element(variables[array], text, value, current)}
     if text in variables:
         return {text: _check_value(variables[text], value, all_elements)}
     if f"{text}[1]" in variables:
@@ -158,6 +169,18 @@ def check_assignment(
         return {each: _check_value(variables[each], element) for each, element in zip(names, value, strict=True)}
     settable = [v.name for v in variables.values() if v.causality in ("parameter", "input")]
     raise UnknownNameError(f'component "{name}" has no variable "{text}"{did_you_mean(text, settable)}')
+
+
+def _with_element(
+    variable: Variable, element: str, value: Any, current: Callable[[str], Sequence[Any] | None] | None
+) -> list[Any]:
+    """Return the elements of an array of which one is assigned."""
+    if current is None:
+        raise ValueError(f'"{element}" is an element, an event sets the whole array: expected a list for "{variable.name}"')
+    elements = current(variable.name)
+    elements = list(_start_values(variable) if elements is None else elements)
+    elements[variable.scalar_names.index(element)] = value
+    return list(_check_value(variable, elements, all_elements=True))
 
 
 def vector_names(variables: Mapping[str, Variable], prefix: str) -> list[str]:

@@ -12,6 +12,7 @@ from ..core.errors import InputError, Problem
 from ..core.text import acceptable_text, shorten, text_problem
 from . import json_pointer
 from .component_schema import SOURCES
+from .dict_document import move_objects
 from .extension import inherited_component
 from .file_paths import change_pointed, relocating
 from .included_files import include_in_setting
@@ -37,7 +38,8 @@ def apply_settings(document: Document, settings: Mapping[str, Any], folder: Path
         elif name.startswith("/"):
             change = relocating(Path(), None) if folder is None else relocating(folder, document.file.parent)
             try:
-                value, files = include_in_setting(json_pointer.pointer_keys(name), value, folder or Path())
+                keys = json_pointer.pointer_keys(name)
+                value, files = include_in_setting(keys, move_objects(document, keys, value), folder or Path())
                 value = change_pointed(name, value, change)
             except InputError as error:
                 problems += [Problem(problem.message, problem.where or f'setting "{name}"') for problem in error.problems]

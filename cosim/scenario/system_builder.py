@@ -163,7 +163,10 @@ class SystemBuilder:
             for target in resolve_name(node, name, ("parameters", "inputs"), include_inner=True):
                 if target.component in self.components:
                     variables = self._variables(target.component)
-                    values[target.component] |= check_assignment(target.component, variables, target.prefix, value, all_elements)
+                    known = values[target.component]
+                    known |= check_assignment(
+                        target.component, variables, target.prefix, value, all_elements, None if all_elements else known.get
+                    )
         except (UnknownNameError, ValueError) as error:
             self._refused_values.append((node, name))
             if str(error):

@@ -163,7 +163,9 @@ def _error_message(kind: type[BaseModel], path: Sequence[str | int], detail: Any
         case "value_error":
             return f"{detail['ctx']['error']}; found {found}"
         case "dict_type" | "model_type":
-            return f"expected an object; found {found}"
+            is_removal = detail["input"] is None and len(path) == 2 and path[0] == "components"
+            hint = '; a scenario that "extends" this one removes a component by null' if is_removal else ""
+            return f"expected an object; found {found}{hint}"
         case "string_pattern_mismatch":
             return f"expected a name of letters, digits and underscores; found {found}"
     return f"{detail['msg'].replace('Input should be', 'expected')}; found {found}"

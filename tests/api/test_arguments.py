@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from python_blocks import Gain, scenario
+from python_blocks import Gain, Stateless, scenario
 
 import cosim
 
@@ -61,6 +61,26 @@ def test_a_dict_may_contain_numbers_of_numpy_and_objects():
     result = cosim.run(scenario(gain, stop_time=np.float64(0.5), events=[{"time": 0, "set": {"g.u": np.int64(1)}}]))
     assert result["g.y"].tolist() == pytest.approx([0, 3, 6, 9, 12, 15])
     assert result.metadata["scenario"]["components"] == {"g": {"python": "python_blocks:Gain object"}}
+
+
+@pytest.mark.parametrize(
+    "parameters",
+    [{"/components/g/python": Stateless}, {"/components/g": {"python": Gain, "arguments": {"k": 3.0}}, "g.u": np.float64(1)}],
+    ids=["class", "component"],
+)
+def test_a_parameter_may_be_a_class(parameters):
+    with cosim.load(scenario(Gain("g", 5.0)), parameters) as simulation:
+        new = simulation.prepared.system.components["g"]
+        assert type(new) is (Stateless if "/components/g/python" in parameters else Gain)
+        assert new.k == (2.0 if type(new) is Stateless else 3.0)
+        simulation.reset()  # no object is left of which reset() could not make a new one
+
+
+def test_a_text_replaces_an_object(tmp_path, monkeypatch):
+    (tmp_path / "blocks.py").write_text("from python_blocks import Gain\nclass Own(Gain): pass\n")
+    monkeypatch.chdir(tmp_path)
+    with cosim.load(scenario(Gain("g")), {"/components/g/python": "blocks.py:Own"}) as simulation:
+        assert type(simulation.prepared.system.components["g"]).__name__ == "Own"
 
 
 def test_a_dict_may_extend_a_scenario():

@@ -106,6 +106,23 @@ def test_what_cannot_be_set_is_refused_with_the_reason(demo, name, value, reason
     assert reason in refusal(demo.set, name, value)
 
 
+def test_an_element_of_an_array_is_set_alone():
+    route = {
+        "name": "route",
+        "stop_time": 1,
+        "step_size": 0.1,
+        "components": {"a": {"fmu": f"{ROOT}/fmus/fmi3/strider_autopilot.fmu", "parameters": {"waypoint_x[2]": 7.0}}},
+    }
+    with cosim.load(route, {"a.waypoint_x[3]": 8.0}) as simulation:
+        assert simulation.get("a.waypoint_x")[:4] == [0.0, 7.0, 8.0, 0.0]
+        simulation.set("a.waypoint_x[1]", 5.0)
+        assert simulation.get("a.waypoint_x")[:4] == [5.0, 7.0, 8.0, 0.0]
+        assert "expected" not in refusal(simulation.set, "a.waypoint_x[33]", 1.0)
+        assert "Float64" in refusal(simulation.set, "a.waypoint_x[1]", "far")
+    event = {"time": 0.5, "set": {"a.waypoint_x[1]": 1.0}}
+    assert 'an event sets the whole array: expected a list for "waypoint_x"' in refusal(cosim.load, {**route, "events": [event]})
+
+
 def test_fixed_parameters_belong_to_load_and_reset(simulation):
     line = refusal(simulation.set, "g.mass", 2.0)
     assert "g.mass is neither a tunable parameter nor an input" in line

@@ -71,6 +71,12 @@ def test_a_removed_component_takes_its_connections_stages_and_signals(folder, ex
     assert (kept["record"]["signals"], kept["connections"]) == (["b.y"], connections)
 
 
+def test_a_setting_cannot_remove_a_component(folder):
+    file = folder.scenario({"a": folder.block("Gain")}, [])
+    with pytest.raises(cosim.InputError, match='found null; a scenario that "extends" this one removes a component by null'):
+        cosim.load(file, {"/components/a": None})
+
+
 def test_named_elements_of_lists_are_changed_by_an_object(extend):
     file = extend(
         connections={"b.u": {"delay": 1}, "a.u": {"from": "b.y"}},
