@@ -11,13 +11,16 @@ from typing import TYPE_CHECKING, Any
 from .core.version import __version__
 
 if TYPE_CHECKING:
+    from .analysis.linearization import linearize
+    from .analysis.loop_margins import margins
+    from .analysis.trimming import trim
     from .api import Result, Simulation, load, run
     from .api.comparison import compare
     from .api.single_fmu import simulate
     from .core.component import Component, Variable
     from .core.errors import CheckError, ComponentError, CosimError, InputError
     from .results.kpi import Prefix, Signal, better, units
-    from .studies.functions import regress, sweep, tune
+    from .studies.functions import regress, sweep, tune, worst_case
 
 __all__ = [
     "CheckError",
@@ -33,13 +36,17 @@ __all__ = [
     "__version__",
     "better",
     "compare",
+    "linearize",
     "load",
+    "margins",
     "regress",
     "run",
     "simulate",
     "sweep",
+    "trim",
     "tune",
     "units",
+    "worst_case",
 ]
 
 #: module of each name that is imported on first use, because `import cosim` must be fast
@@ -48,9 +55,12 @@ _MODULES = {
     **dict.fromkeys(("Component", "Variable"), "core.component"),
     **dict.fromkeys(("CheckError", "ComponentError", "CosimError", "InputError"), "core.errors"),
     **dict.fromkeys(("Prefix", "Signal", "better", "units"), "results.kpi"),
-    **dict.fromkeys(("regress", "sweep", "tune"), "studies.functions"),
+    **dict.fromkeys(("regress", "sweep", "tune", "worst_case"), "studies.functions"),
     "compare": "api.comparison",
+    "linearize": "analysis.linearization",
+    "margins": "analysis.loop_margins",
     "simulate": "api.single_fmu",
+    "trim": "analysis.trimming",
 }
 
 

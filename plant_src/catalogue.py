@@ -21,6 +21,9 @@ from .vehicles.strider import interface as strider_interface
 from .vehicles.strider import parameters as strider_parameters
 from .vehicles.strider_6dof import geometry as strider_6dof
 from .vehicles.strider_6dof import interface as strider_6dof_interface
+from .vehicles.submerged import interface as submerged_interface
+from .vehicles.submerged.craft import MAX_THRUSTERS
+from .vehicles.submerged.vehicle_data import read_submerged
 
 #: keys of a vehicle file of any family besides those of its family
 COMMON_KEYS = ("family", "name", "description", "sources", "validity", "$schema")
@@ -34,18 +37,36 @@ def multirotor_model(name: str, data: Mapping[str, Any]) -> Model:
         name,
         multirotor_interface.variables(airframe),
         multirotor_interface.states(MAX_ROTORS),
-        vehicle.body(),
+        airframe.body(vehicle.boxes_in),
         vehicle.crash_speed,
         constant_count=multirotor_interface.constant_count(airframe, MAX_ROTORS),
         airframe=airframe,
-        boxes=vehicle.boxes_in,
+        body_of=vehicle.body_with,
         equations="multirotor",
         layout=multirotor_interface.variables(airframe, MAX_ROTORS),
     )
 
 
+def submerged_model(name: str, data: Mapping[str, Any]) -> Model:
+    """Return the model of a submerged vehicle. Raises InputError with all problems of its data."""
+    vehicle = read_submerged(name, data, COMMON_KEYS)
+    craft = vehicle.craft
+    return Model(
+        name,
+        submerged_interface.variables(craft),
+        submerged_interface.states(MAX_THRUSTERS),
+        craft.body(vehicle.boxes_in),
+        vehicle.crash_speed,
+        constant_count=submerged_interface.constant_count(craft, MAX_THRUSTERS),
+        craft=craft,
+        body_of=vehicle.body_with,
+        equations="submerged",
+        layout=submerged_interface.variables(craft, MAX_THRUSTERS),
+    )
+
+
 #: family of equations -> function from name and data to the model
-FAMILIES = {"multirotor": multirotor_model}
+FAMILIES = {"multirotor": multirotor_model, "submerged": submerged_model}
 
 
 def model_from_data(data: Mapping[str, Any], name: str = "") -> Model:
@@ -78,6 +99,8 @@ MODELS = {
             strider_parameters.CRASH_SPEED,
             is_vessel=True,
             motion="planar",
+            constant_count=strider_interface.CONSTANT_COUNT,
+            hulls=strider_interface.HULLS,
         ),
         Model(
             "strider_6dof",
@@ -88,6 +111,7 @@ MODELS = {
             is_vessel=True,
             vehicle="strider",
             constant_count=strider_6dof_interface.CONSTANT_COUNT,
+            hulls=strider_interface.HULLS,
         ),
         Model(
             "otter",

@@ -20,7 +20,7 @@ TOUCHDOWN_MARKER: Mapping[str, Any] = {
     "markeredgecolor": "white",
 }
 LEGEND_STYLE: Mapping[str, Any] = {
-    "ncols": 4,
+    "ncols": 5,
     "columnspacing": 0.7,
     "handlelength": 1.4,
     "handletextpad": 0.4,

@@ -131,7 +131,7 @@ def landing(
         stop = result.time[-1] if row is None else min(result.time[-1], result.time[row] + TIME_AFTER_TOUCHDOWN)
     shown = slice(*np.searchsorted(result.time, (start, stop + 1e-9)))
     figure = Figure(figsize=(COLUMN_WIDTH, 3.4))
-    figure.subplots_adjust(left=0.185, right=0.965, bottom=0.11, top=0.88, hspace=0.1)
+    figure.subplots_adjust(left=0.185, right=0.965, bottom=0.17, top=0.88, hspace=0.1)
     above, below = figure.subplots(2, sharex=True, height_ratios=(3, 2))
     for name, line in _altitudes(vehicle, deck, altitude_reference):
         above.plot(result.time[shown], result[name][shown], **line)
@@ -142,9 +142,7 @@ def landing(
         _shade_phases(figure, result.time[shown], result[mode][shown], phases)
     if row is not None:
         _mark_touchdown(figure, result.time[row], result[f"{vehicle}.position.z"][row])
-    lowest, highest = above.get_ylim()
-    above.set_ylim(lowest, highest + 0.12 * (highest - lowest))  # room for the legend
-    above.legend(loc="upper right", **LEGEND_STYLE)
+    figure.legend(loc="lower center", **LEGEND_STYLE)
     figure.align_ylabels()
     return figure
 
@@ -162,7 +160,6 @@ def _draw_error(axes: Axes, time: np.ndarray, error: np.ndarray, limit: float | 
     axes.yaxis.set_major_formatter("{x:g}")
     if limit is not None:
         axes.axhline(limit, color=REFERENCE_COLOUR, linestyle="--", linewidth=0.9, label=f"limit {limit:g} m")
-        axes.legend(loc="upper right")
 
 
 def _shade_phases(figure: Figure, time: np.ndarray, mode: np.ndarray, phases: Sequence[str]) -> None:
@@ -187,8 +184,8 @@ def _label_span(axes: Axes, first: float, last: float, name: str) -> None:
 
 
 def _mark_touchdown(figure: Figure, time: float, altitude: float) -> None:
-    for axes, top in zip(figure.axes, (0.88, 1.0), strict=True):
-        axes.axvline(time, ymax=top, color=TOUCHDOWN_COLOUR, linewidth=0.8, linestyle=":")
+    for axes in figure.axes:
+        axes.axvline(time, color=TOUCHDOWN_COLOUR, linewidth=0.8, linestyle=":")
     figure.axes[0].plot(time, altitude, **TOUCHDOWN_MARKER, label="touchdown", zorder=5)
 
 
@@ -226,6 +223,8 @@ def tracking_error(
     shown = slice(int(np.searchsorted(result.time, start)), None)
     _draw_error(axes, result.time[shown], horizontal_distance(result, vehicle, target)[shown], limit)
     axes.set(xlabel="t / s", xlim=(start, max(result.time[-1], start + MIN_SPAN)))
+    if limit is not None:
+        figure.legend(loc="outside lower right")
     if len(waypoint_x):
         vessel = target.removesuffix(".deck")
         _mark_turns(axes, waypoints(result, vessel, waypoint_x, waypoint_y, acceptance_radius, waypoint_count))

@@ -11,6 +11,7 @@ from cosim.export.fmu.block import Block
 
 from .catalogue import FAMILIES, model_from_data
 from .vehicles.multirotor.multirotor_equations import multirotor_block
+from .vehicles.submerged.submerged_equations import submerged_block
 
 
 def vehicle_block(path: Path) -> Block:
@@ -32,5 +33,8 @@ def vehicle_block(path: Path) -> Block:
     except InputError as error:
         problems = (Problem(each.message, f"{path}: {'.'.join(each.subject[1:])}") for each in error.problems)
         raise InputError(list(problems)) from None
-    assert model.airframe is not None
-    return multirotor_block(model.airframe, f"{data.get('description', model.name)} in free flight")
+    description = str(data.get("description", model.name))
+    if model.airframe:
+        return multirotor_block(model.airframe, f"{description} in free flight")
+    assert model.craft is not None
+    return submerged_block(model.craft, f"{description} in open water")

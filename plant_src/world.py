@@ -56,7 +56,8 @@ class World(Component):
     Args:
         instance_name: Name of the component.
         vehicles: Name to object with the keys "model" (in `catalogue.VEHICLE_MODELS`), "position" of the centre of mass
-            ([x, y, z], of vessels [x, y], m) and, optionally, "motion" ("planar" or "6dof"), "yaw" (rad), "velocity_body"
+            ([x, y, z], of vessels [x, y], m) and, optionally, "motion" ("planar" or "6dof"), "hull" ("paper" for the
+            Strider of the paper), "yaw" (rad), "velocity_body"
             ([u, v, w], m/s), "rates" ([p, q, r], rad/s), "parameters" (name to value) and "crash_speed" (m/s), the change of
             velocity by a collision above which the vehicle has crashed. "friction" (default 1) and "restitution" (default 0) are
             those of its surface; the values of two bodies in contact are multiplied.

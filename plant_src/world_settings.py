@@ -24,7 +24,7 @@ from .vehicles.model import Model
 WAVE_PREFIX, INITIAL_PREFIX = "wave.", "initial."
 
 #: keys of a vehicle besides "model" and "position"
-OPTIONAL_KEYS = ("motion", "yaw", "velocity_body", "rates", "parameters", "crash_speed", *ContactSurface._fields)
+OPTIONAL_KEYS = ("motion", "hull", "yaw", "velocity_body", "rates", "parameters", "crash_speed", *ContactSurface._fields)
 
 
 @dataclass(frozen=True)
@@ -70,13 +70,23 @@ class _WorldSettingsReader(JsonReader):
             return None
         initial = self.read_initial_state(model, spec, path)
         problem_count = len(self.problems)
-        given = self.read_parameters(model, initial, spec.get("parameters", {}), (*path, "parameters"))
+        given = self.read_hull(model, spec, path)
+        given |= self.read_parameters(model, initial, spec.get("parameters", {}), (*path, "parameters"))
         starts = zip(model.slots("parameter"), model.start_values("parameter"), strict=True)
         parameters = {slot: (initial | given).get(slot, start) for slot, start in starts}
         valid = len(self.problems) == problem_count
         body = self.collision_body(model, parameters, (*path, "parameters")) if valid else model.body
         crash_speed = self.number(spec.get("crash_speed", model.crash_speed), (*path, "crash_speed"), 0.0)
         return VehiclePlacement(name, model, tuple(parameters.values()), body, crash_speed, self.read_surface(spec, path))
+
+    def read_hull(self, model: Model, spec: Mapping[str, Any], path: JsonPath) -> dict[str, float]:
+        """Return the parameters of the hull with the name "hull", none if the vehicle has its default one."""
+        if "hull" not in spec:
+            return {}
+        if not model.hulls:
+            self.add_problem((*path, "hull"), f"found {spec['hull']!r}; {model.name} has one hull only, remove the key")
+            return {}
+        return dict(model.hulls[self.choice(spec["hull"], (*path, "hull"), tuple(model.hulls))])
 
     def read_surface(self, spec: Mapping[str, Any], path: JsonPath) -> ContactSurface:
         """Read friction and restitution."""

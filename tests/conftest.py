@@ -4,6 +4,7 @@ from pathlib import Path
 
 import pytest
 from ball_fmus import ball, balls
+from chromium import open_browser
 from plant_validation import MeasurementCheck, ValidationReport
 from probe_fmus import probe, probes
 
@@ -32,6 +33,13 @@ def pytest_xdist_auto_num_workers():
 def pytest_collection_modifyitems(config, items):
     if config.getoption("--validation"):
         items[:] = [item for item in items if "measured" in getattr(item, "fixturenames", ())]
+
+
+@pytest.fixture(scope="session")
+def chromium():
+    """One browser per process: Playwright's synchronous interface cannot be started twice."""
+    with open_browser() as opened:
+        yield opened
 
 
 @pytest.fixture

@@ -43,8 +43,8 @@ def literal(node: ast.expr, constants: dict[str, str]) -> str | float:
 
 
 def listed(text: str) -> Iterator[tuple[Statement, str, list[float]]]:
-    """The statements of a page, each with its case and numbers."""
-    parts = re.split(r"^## (.*)$", text, flags=re.MULTILINE)
+    """The statements of the tables that tests write on a page, each with its case and numbers."""
+    parts = re.split(r"^## (.*)$", text.partition("## Against measurements")[0], flags=re.MULTILINE)
     for model, table in zip(parts[1::2], parts[2::2], strict=True):
         for row in table.strip().splitlines()[2:]:
             quantity, unit, *numbers, limit, source, test = row.removeprefix("| ").removesuffix(" |").split(" | ")

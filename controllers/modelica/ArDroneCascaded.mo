@@ -55,6 +55,7 @@ equation
   vtol.target.velocity.y = target.velocity.y;
   vtol.altitude_command = altitude_command;
   vtol.yaw_command = yaw_command;
+  vtol.calm = true;
 
   position.vehicle.position.x = vehicle.position.x;
   position.vehicle.position.y = vehicle.position.y;

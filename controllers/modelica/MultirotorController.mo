@@ -35,7 +35,7 @@ block MultirotorController "Holds a multirotor of any layout at a position: from
   parameter Real rotor_x[8](each unit = "m") = {0.1815, 0, -0.1815, 0, 0, 0, 0, 0} "Places ahead of the centre; they balance: sums of x, y,";
   parameter Real rotor_y[8](each unit = "m") = {0, 0.1815, 0, -0.1815, 0, 0, 0, 0} "x y and of these times the sense are zero";
   parameter Real rotor_sense[8](each unit = "1") = {1, -1, 1, -1, 0, 0, 0, 0} "In which the reaction of a rotor turns the body; 0: no rotor";
-  parameter Real thrust_coefficient(unit = "N.s2/rad2") = 9.148e-6 "Thrust of a rotor over its squared speed";
+  parameter Real thrust_coefficient(unit = "N.s2/rad2") = 8.24e-6 "Thrust of a rotor over its squared speed";
   parameter Real torque_coefficient(unit = "N.m.s2/rad2") = 2.38e-7 "Reaction torque of a rotor over its squared speed";
   parameter Real rotor_speed_max(unit = "rad/s") = 523.5988;
   input Vehicle vehicle;

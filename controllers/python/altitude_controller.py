@@ -27,7 +27,7 @@ class AltitudeController(SampledController):
         self.parameter("throttle_min", 35.0, "%")
         self.parameter("throttle_max", 90.0, "%")
         self.parameter("mass", 0.441, "kg", "Of the quadcopter, as the controller believes it")
-        self.parameter("thrust_coefficient", 9.148e-6, "N.s2/rad2", "Thrust of a rotor over its squared speed")
+        self.parameter("thrust_coefficient", 8.24e-6, "N.s2/rad2", "Thrust of a rotor over its squared speed")
         self.calculated_parameter(
             "hover_throttle", self._hover_throttle, "%", "Throttle that carries the weight: the integral starts there"
         )

@@ -45,7 +45,7 @@ class InverseKinematics(SampledController):
         self.parameter("force_max", 7.0, "N", "Of the vertical force")
         self.parameter("filter_frequency", 20.0, "Hz", "Of the low-pass on the vertical force")
         self.parameter("mass", 0.441, "kg", "Of the quadcopter, as the controller believes it")
-        self.parameter("thrust_coefficient", 9.148e-6, "N.s2/rad2", "Thrust of a rotor over its squared speed")
+        self.parameter("thrust_coefficient", 8.24e-6, "N.s2/rad2", "Thrust of a rotor over its squared speed")
 
     def tick(self, time: float) -> None:
         """Compute the commands from the force t = m (x'', y'', z'' + g) (equation 15), its z component from the altitude PID."""

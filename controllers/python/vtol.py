@@ -41,6 +41,7 @@ class Vtol(SampledController):
         self.local("home_yaw", 0.0, "rad", "Last heading before take-off")
         self.local("steady", 0.0, "s", "Time spent in the window that allows the descent")
         self.local("touching", 0.0, "s", "Time spent in contact with the vessel")
+        self.local("committed", False, description="To the touchdown: a calm deck at the waiting height")
 
     def _declare_parameters(self) -> None:
         self.parameter("take_off_time", 0.0, "s", "Earliest start of the motors")
@@ -51,6 +52,7 @@ class Vtol(SampledController):
         self.parameter("clearance", 0.4, "m", "Climb above the starting point before the pursuit begins")
         self.parameter("resting_height", 0.056, "m", "Of the centre of mass above the deck when landed")
         self.parameter("approach_height", 0.675, "m", "Above the resting height")
+        self.parameter("waiting_height", 0.15, "m", "Above the resting height: the descent waits there until the deck is calm")
         self.parameter("press_depth", 0.1, "m", "Below the resting height: end of the descent, which keeps the contact")
         self.parameter("approach_band", 0.1, "m", "Altitude error that allows the descent")
         self.parameter("landing_error", 0.05, "m", "Horizontal error that allows the descent to begin and to go on")
@@ -70,6 +72,7 @@ class Vtol(SampledController):
         self.input("target.velocity.y", 0.0, "m/s", "North")
         self.input("altitude_command", 2.0, "m", "Of the centre of mass, for the pursuit")
         self.input("yaw_command", 0.0, "rad", "Counter-clockwise from east, for the pursuit")
+        self.input("calm", True, description="Quiescent window: the deck permits a touchdown")
 
     def _declare_outputs(self) -> None:
         for name, unit in (("position_reference", "m"), ("velocity_reference", "m/s")):
@@ -97,6 +100,7 @@ class Vtol(SampledController):
         self.mode = int(self._next_mode(time))
         self._update_motor_share()
         self._set_horizontal_references()
+        self.committed = self._is_committed()
         self._set_altitude_reference()
 
     def _horizontal_distance(self) -> float:
@@ -154,6 +158,11 @@ class Vtol(SampledController):
         self.aborts += 1
         return FlightMode.APPROACH
 
+    def _is_committed(self) -> bool:
+        """Return True from a calm deck at the waiting height until the end of the descent."""
+        lowest = self._landed_altitude + self.waiting_height + self.descent_rate * SAMPLE_PERIOD
+        return self.mode == FlightMode.DESCEND and (self.committed or (self.calm and self.altitude_reference <= lowest))
+
     # -- outputs ---------------------------------------------------------------------------------------------------------------
 
     def _update_motor_share(self) -> None:
@@ -186,7 +195,7 @@ class Vtol(SampledController):
             case FlightMode.APPROACH:
                 return self._landed_altitude + self.approach_height
             case FlightMode.DESCEND:
-                return self._landed_altitude - self.press_depth
+                return self._landed_altitude + (-self.press_depth if self.committed else self.waiting_height)
         return self.altitude_command
 
     def _altitude_rate(self) -> float:

@@ -13,7 +13,7 @@ from typing import Any, TextIO
 
 import click
 
-from ..core.errors import CosimError
+from ..core.errors import CosimError, did_you_mean
 from ..core.version import __version__
 from ..process.standard_streams import open_closed_streams, protected_stream
 
@@ -28,6 +28,9 @@ COMMANDS = {
     "bench-controller": ("bench_controller", "Benchmark a controller in every scenario with its role."),
     "sweep": ("sweep", "Run a scenario at many points: parameter studies and Monte Carlo."),
     "tune": ("tune", "Find the parameters that minimise a KPI."),
+    "trim": ("trim", "Find values with which a scenario starts in equilibrium."),
+    "linearize": ("linearize", "Linearise a scenario, or some of its components, at a point in time."),
+    "margins": ("margins", "Print the stability margins at the inputs and outputs of a controller."),
     "plot": ("plot", "Draw the figures of finished runs again."),
     "report": ("report", "Write the report of a finished run again."),
     "replay": ("replay", "Write a page with the 3-D replay of one run, or of two runs to compare."),
@@ -60,6 +63,12 @@ class _LazyGroup(click.Group):
         command: click.Command = import_module(f".commands.{COMMANDS[name][0]}", __name__).command
         import_module(".output_options", __name__).add_verbosity_options(command)
         return command
+
+    def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return name, command and remaining arguments; the error of an unknown command names the nearest valid one."""
+        if args and args[0] not in COMMANDS and not args[0].startswith("-"):
+            ctx.fail(f"No such command '{args[0]}'{did_you_mean(args[0], COMMANDS)}")
+        return super().resolve_command(ctx, args)
 
     def format_commands(self, _ctx: click.Context, formatter: click.HelpFormatter) -> None:
         """Write the list of commands without importing them."""

@@ -29,11 +29,12 @@ _view = click.option(
 _port = click.option(
     "--view-port", type=click.IntRange(0, 65535), default=0, help="Port of the live page; default: any free port."
 )
+_wait = click.option("--wait", is_flag=True, help="With --view: begin when the live page has been opened.")
 
 
 def view_options(command: Callable[..., Any]) -> Callable[..., Any]:
-    """Add the options `--view` and `--view-port` to a command."""
-    return _view(_port(command))
+    """Add the options `--view`, `--wait` and `--view-port` to a command."""
+    return _view(_wait(_port(command)))
 
 
 def check_view_options(isolation: str, sandbox: str | None, late: str) -> None:
@@ -51,7 +52,12 @@ def check_view_options(isolation: str, sandbox: str | None, late: str) -> None:
 
 
 def run_with_view(
-    run: Callable[[Connection], int], isolation: str, save_partial: Callable[[SupervisedOutcome], None], port: int
+    run: Callable[[Connection], int],
+    isolation: str,
+    save_partial: Callable[[SupervisedOutcome], None],
+    port: int,
+    *,
+    wait: bool = False,
 ) -> int:
     """Run a command in a supervised child process while this process serves the live page.
 
@@ -60,11 +66,12 @@ def run_with_view(
         isolation: value of `--isolation`.
         save_partial: see `run_supervised_command`.
         port: port of the page; 0: any free port.
+        wait: begin the run when the page has been opened.
     """
     from ..process.temporary_folders import temporary_run_folder
     from ..report.live.live_view import LiveView, has_display, open_browser
 
-    view = LiveView(port)
+    view = LiveView(port, wait)
     click.echo(f"live view: {view.url}")
     with temporary_run_folder() as folder:
         if has_display():

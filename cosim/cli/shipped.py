@@ -10,8 +10,8 @@ from pathlib import Path
 from ..core import resources
 from ..core.json_values import parse_object
 
-#: module of the KPIs of any signal
-_KPI_MODULE = "cosim.kpis"
+#: modules of the KPIs of any signal and of control loops, with their files in the package
+_KPI_MODULES = {"cosim.kpis": "kpis.py", "cosim.analysis.kpis": "analysis/kpis.py"}
 
 
 @dataclass(frozen=True)
@@ -61,7 +61,10 @@ def _list_kpis() -> Iterator[Entry]:
 
 def _kpi_files() -> dict[str, Path]:
     """Return the files of KPI functions by their names relative to the folder of shipped files, or as modules."""
-    folder, files = resources.root() / "scenarios", {_KPI_MODULE: resources.package_folder() / "kpis.py"}
+    folder, files = (
+        resources.root() / "scenarios",
+        {name: resources.package_folder() / file for name, file in _KPI_MODULES.items()},
+    )
     for scenario in folder.glob("*.json"):
         kpis = parse_object(scenario.read_text(encoding="utf-8")).get("kpis", [])
         for kpi in kpis if isinstance(kpis, list) else ():  # a scenario that extends another may change single KPIs

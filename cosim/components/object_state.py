@@ -1,14 +1,16 @@
-"""Snapshot and restore a Python object's state in place, so references into it stay valid."""
+"""Snapshot and restore a Python object's state in place, so references into it stay valid.
+
+Exported FMUs contain a copy of this file. It imports only the standard library; NumPy objects exist only if NumPy is imported.
+"""
 
 from __future__ import annotations
 
 import copy
 import random
+import sys
 from collections.abc import Callable, Collection
 from types import BuiltinFunctionType, FunctionType, MethodType, ModuleType
 from typing import Any
-
-import numpy as np
 
 Restore = Callable[[], object]
 
@@ -44,7 +46,8 @@ def _snapshot_object(target: Any, restores: list[Restore], visited: set[int], ex
         return
     visited.add(id(target))
     parts: list[Any] = []
-    if isinstance(target, np.ndarray):
+    numpy: Any = sys.modules.get("numpy")
+    if numpy and isinstance(target, numpy.ndarray):
         if target.flags.writeable:
             values = target.copy()
             restores.append(lambda: target.__setitem__(..., values))
@@ -52,7 +55,7 @@ def _snapshot_object(target: Any, restores: list[Restore], visited: set[int], ex
     elif isinstance(target, random.Random):
         state = target.getstate()
         restores.append(lambda: target.setstate(state))
-    elif isinstance(target, np.random.Generator):
+    elif numpy and isinstance(target, numpy.random.Generator):
         bit_generator, bit_state = target.bit_generator, copy.deepcopy(target.bit_generator.state)
         restores.append(lambda: setattr(bit_generator, "state", bit_state))
     elif isinstance(target, tuple):

@@ -13,11 +13,12 @@ from pythonfmu.variables import Boolean, Integer, Real, ScalarVariable, String
 
 from ..core import component_log
 from ..core.component import Component, Ports, Variable
-from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, describe_exception
+from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, InputError, describe_exception
 from ..core.text import shorten, text_problem
 from ..core.units import named_unit
 from .object_state import snapshot
 from .python_units import checked_units
+from .slave_protection import PYTHONFMU_ATTRIBUTES
 
 _TYPES = {Real: "Float64", Integer: "Int32", Boolean: "Boolean", String: "String"}
 _CASTS: Mapping[str, Callable[[Any], Any]] = {"Float64": float, "Int32": int, "Boolean": bool, "String": str}
@@ -57,8 +58,8 @@ _OUTPUT_TYPES: Mapping[str, tuple[type, Callable[[Any], Any]]] = {
 class PythonFmuComponent(Component):
     """Component that runs a `pythonfmu.Fmi2Slave` in the importer's process, without export as an FMU.
 
-    Its state is the whole state of the Python object (see `object_state`), or the result of an overridden `_get_fmu_state`.
-    The state of an FMU exported by PythonFMU contains only the registered variables.
+    Its state is the whole state of the Python object (see `object_state`), or the result of an overridden `_get_fmu_state`, as
+    in an FMU that `cosim build` exports. The state of an FMU exported by PythonFMU contains only the registered variables.
     """
 
     binds_everything = False
@@ -133,7 +134,7 @@ class PythonFmuComponent(Component):
 
     def get_state(self) -> Any:
         """Return the slave's own state, or a snapshot of its attributes."""
-        return self._slave._get_fmu_state() if self._has_custom_state else snapshot(self._slave, {"vars", "log_queue"})
+        return self._slave._get_fmu_state() if self._has_custom_state else snapshot(self._slave, PYTHONFMU_ATTRIBUTES)
 
     def set_state(self, state: Any) -> None:
         """Restore a state that `get_state` returned."""
@@ -182,10 +183,17 @@ def _to_variable(registered: ScalarVariable, unit: str | None) -> Variable:
         _fmi_type(registered),
         causality,
         registered.variability.name if registered.variability else "continuous",
-        registered.getter() if causality in ("parameter", "input") else None,
+        _start_value(registered) if causality in ("parameter", "input") else None,
         named_unit(unit) if unit else None,
         description=registered.description or "",
     )
+
+
+def _start_value(registered: ScalarVariable) -> Any:
+    try:
+        return registered.getter()
+    except AttributeError as error:
+        raise InputError(f'the variable "{registered.name}" is registered, but has no value: {error}') from None
 
 
 def _array_elements(ports: Ports) -> list[tuple[Variable, tuple[np.ndarray, int]]]:

@@ -43,7 +43,7 @@ def load_object(reference: str, folder: Path) -> Any:
         raise InputError(f'file "{file}" does not exist')
     module = _import_file(path)
     if not hasattr(module, name):
-        public_names = [key for key in vars(module) if not key.startswith("_")]
+        public_names = [key for key, value in vars(module).items() if getattr(value, "__module__", None) == module.__name__]
         raise InputError(Problem(f'"{file}" defines no "{name}"{did_you_mean(name, public_names)}'))
     return getattr(module, name)
 

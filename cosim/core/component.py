@@ -20,6 +20,7 @@ import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
 from itertools import product
+from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
@@ -67,6 +68,7 @@ class Variable:
         items: Names and values of an enumeration.
         relative_quantity: The value is a difference, to which the offset of a unit does not apply.
         dtype: NumPy type of a value in memory, by default that of `type`. FMI 2.0 stores Boolean and Enumeration as C int.
+        derivative_of: Name of the input whose time derivative (per s) this value is; only in `bind`, see `interpolates_inputs`.
     """
 
     name: str
@@ -82,6 +84,7 @@ class Variable:
     items: tuple[tuple[str, int], ...] = ()
     relative_quantity: bool = False
     dtype: np.dtype[Any] = field(default=None)  # type: ignore[arg-type]  # None only until __post_init__
+    derivative_of: str = ""
 
     def __post_init__(self) -> None:
         if self.type not in DTYPES:
@@ -185,14 +188,24 @@ class Component(Protocol):
         shared_code: Components with an equal value other than None never step at the same time, because their common code may
             have static variables.
         runs_foreign_code: Code that is not cosim's runs in this process, where it may change the state of the process.
+        continuous_states: Names of the derivatives by the names of the states, if `get_directional_derivative` accepts both.
         has_state: `get_state` and `set_state` are supported (FMI: canGetAndSetFMUState).
+        dependencies: Names of the inputs on which an output depends directly, by the name of the output (FMI: ModelStructure).
+            An output without an entry may depend on every input.
+        initial_dependencies: The same in initialization mode.
+        interpolates_inputs: Inputs may change linearly within a step (FMI 2.0: canInterpolateInputs). The inputs of `bind` end
+            with the time derivatives of those that do, see `Variable.derivative_of`.
     """
 
     variables: Sequence[Variable]
     binds_everything: bool
     shared_code: object = None
     runs_foreign_code: bool = True
+    continuous_states: Mapping[str, str] = MappingProxyType({})
     has_state: bool
+    dependencies: Mapping[str, frozenset[str]] = MappingProxyType({})
+    initial_dependencies: Mapping[str, frozenset[str]] = MappingProxyType({})
+    interpolates_inputs: bool = False
 
     def set(self, name: str, value: Any) -> None:
         """Set a variable to a Python value, an array to nested lists; not called while stepping through a macro step."""
@@ -229,6 +242,18 @@ class Component(Protocol):
 
     def get_outputs(self) -> None:
         """Write the present values into the bound output arrays."""
+
+    def get_directional_derivative(self, outputs: Sequence[str], input_name: str) -> Sequence[float] | None:  # noqa: ARG002
+        """Return the partial derivatives of outputs with respect to one input, at the present values.
+
+        Args:
+            outputs: Names of scalar outputs or derivatives, or of elements of arrays.
+            input_name: Name of a scalar input or state, or of an element of an array.
+
+        Returns:
+            None if the component does not offer them for these variables.
+        """
+        return None
 
     def prepare_step_calls(self, current_time: ctypes.c_double, step_size: float) -> Sequence[PreparedCall] | None:  # noqa: ARG002
         """Return `set_inputs`, `do_step` and `get_outputs` of one step as prepared calls; called once, in step mode.

@@ -184,7 +184,8 @@ def _did_you_mean(name: str, names: tuple[str, ...]) -> str:
     if len(name) > MAX_QUOTATION_LENGTH:  # no slip of the pen, and the search takes quadratic time
         return ""
     swapped = {name[:i] + name[i + 1] + name[i] + name[i + 2 :] for i in range(len(name) - 1)}
-    if near := [other for other in names if other in swapped] or _close_matches(name, names):
+    same = [other for other in names if other.lower() == name.lower()]
+    if near := same or [other for other in names if other in swapped] or _close_matches(name, names):
         return f'; did you mean "{near[0]}"?'
     if 0 < len(names) <= 8:
         return f"; valid: {', '.join(names)}"

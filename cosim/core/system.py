@@ -27,6 +27,10 @@ class Endpoint(NamedTuple):
         return f"{self.component}.{self.scalar}"
 
 
+#: course of an input within a step
+Interpolation = Literal["hold", "linear"]
+
+
 @dataclass(frozen=True, slots=True)
 class Connection:
     """Connection of an output to an input.
@@ -38,6 +42,9 @@ class Connection:
         where: Location in the scenario file, for messages.
         gain: Factor that is applied after the conversion of units.
         offset: Value that is added after `gain`, in the unit of the input.
+        term: Number, from 1, of the value among those that are added at the input; 0: it is the only one.
+        convert: Booleans and all integers are converted to floating-point numbers.
+        interpolation: Course of the input within a step: constant, or linear through the last two values of the output.
     """
 
     source: Endpoint
@@ -46,15 +53,21 @@ class Connection:
     where: str = ""
     gain: float = 1.0
     offset: float = 0.0
+    term: int = 0
+    convert: bool = False
+    interpolation: Interpolation = "hold"
 
     @property
     def is_mapped(self) -> bool:
-        """True if a gain or an offset changes the value."""
-        return (self.gain, self.offset) != (1.0, 0.0)
+        """True if a gain, an offset or an addition changes the value."""
+        return (self.gain, self.offset, self.term) != (1.0, 0.0, 0)
 
 
 #: parallel execution of the components of a stage on threads: if it is faster, always, or never
 Parallel = Literal["auto", True, False]
+
+
+IterationMethod = Literal["fixed-point", "newton"]
 
 
 @dataclass(frozen=True, slots=True)
@@ -63,11 +76,13 @@ class Iteration:
 
     Attributes:
         tolerance: A value y has converged if it differs from its previous value by at most tolerance * (1 + |y|).
-        max_rounds: Number of rounds without convergence after which the run fails.
+        max_rounds: Number of rounds without convergence after which the run fails; of Newton's method, number of its steps.
+        method: Fixed point, or Newton's method, whose Jacobian takes one more round for each connected output and step.
     """
 
     tolerance: float
     max_rounds: int
+    method: IterationMethod = "fixed-point"
 
 
 @dataclass(frozen=True, slots=True)
@@ -188,16 +203,31 @@ class System:
             if source or target:
                 yield from (Problem(text, connection.where) for text in (source, target) if text)
                 continue
-            if connection.target in by_target:
-                first = by_target[connection.target].source
-                yield Problem(f"input {connection.target} is connected twice: it is already fed by {first}", connection.where)
-            by_target.setdefault(connection.target, connection)
+            other = by_target.setdefault(connection.target, connection)
+            if other is not connection and not 0 < other.term < connection.term:
+                text = f"input {connection.target} is connected twice: it is already fed by {other.source}"
+                yield Problem(text, connection.where)
             source_variable, target_variable = (self.find_element(end).variable for end in (connection.source, connection.target))
-            text = incompatibility(source_variable, target_variable)
+            text = incompatibility(source_variable, target_variable, connection.convert)
             if connection.is_mapped and not text and target_variable.type not in FLOAT_TYPES:
-                text = f'"gain" and "offset" are for inputs of floating-point numbers, found {target_variable.type}'
+                text = f"gains, offsets and sums are for inputs of floating-point numbers, found {target_variable.type}"
+            if connection.interpolation == "linear" and not text:
+                text = self._linear_problem(connection)
             if text:
                 yield Problem(f"{connection.source} cannot feed {connection.target}: {text}", connection.where)
+
+    def _linear_problem(self, connection: Connection) -> str:
+        """Return the reason why an input cannot change linearly within a step; "" if it can."""
+        name = connection.target.component
+        if not self.components[name].interpolates_inputs:
+            return f'"interpolation" is "linear", but "{name}" does not interpolate its inputs (FMI: canInterpolateInputs)'
+        if connection.delay or connection.term:
+            return '"interpolation" is "linear", so it cannot have a delay or be part of a sum'
+        if {self.find_element(end).variable.type for end in (connection.source, connection.target)} != {"Float64"}:
+            return '"interpolation" is "linear", expected two variables of the type Float64'
+        if {name, connection.source.component} & self.periods.keys():
+            return '"interpolation" is "linear", so both components must step in every macro step'
+        return ""
 
     def _find_endpoint_problem(self, end: Endpoint, causality: str) -> str:
         if end.component not in self.components:
@@ -211,10 +241,18 @@ class System:
         return ""
 
 
-def incompatibility(source: Variable, target: Variable) -> str:
-    """Return the reason why values of `source` cannot be converted to `target`; "" if they can."""
-    if not _is_convertible(source, target):
-        return f"type {source.type} cannot be converted to {target.type}"
+def incompatibility(source: Variable, target: Variable, convert: bool = False) -> str:
+    """Return the reason why values of `source` cannot be converted to `target`; "" if they can.
+
+    Args:
+        source: The output.
+        target: The input.
+        convert: Booleans and all integers are converted to floating-point numbers.
+    """
+    on_request = target.type in FLOAT_TYPES and source.type in INTEGER_TYPES | {"Boolean"}
+    if not (_is_convertible(source, target) or (convert and on_request)):
+        hint = ' unless the connection has "convert": true' if on_request else ""
+        return f"type {source.type} cannot be converted to {target.type}{hint}"
     if source.unit and target.unit and not source.unit.converts_to(target.unit):
         return f'units "{source.unit.name}" and "{target.unit.name}" measure different quantities'
     return ""

@@ -28,7 +28,7 @@ static unsigned x87_control(void) {
     return word;
 }
 
-enum { INTERFACE = 4 };                              /* also in native_executor.py, where it is described */
+enum { INTERFACE = 6 };                              /* also in native_executor.py, where it is described */
 enum { WARNING = 1, DISCARD = 2 };                   /* FMI statuses; 0 is OK, everything but OK and WARNING is bad */
 /* Codes passed to `on_status` like an FMI status. They exceed 32 bits, so no FMU can return them. */
 #define FLOAT_MODE_CHANGED (INT64_C(1) << 33)
@@ -56,6 +56,10 @@ typedef struct {                /* target[i] = factor[i] * source[i] + offset[i]
     const double *factor, *offset;                     /* NULL: no unit conversion */
     char *ring;                                        /* `delay` rows of source values */
     Py_ssize_t delay, oldest;                          /* oldest: index of the oldest row */
+    Py_ssize_t terms;                                  /* not 0: rows of source_indices, whose double values are added */
+    const Py_ssize_t *slope_indices;                   /* not NULL: see `run_linear_transfer` */
+    int interpolates;
+    double step_size;                                  /* s */
 } Transfer;
 
 typedef struct {
@@ -69,8 +73,8 @@ typedef enum {
     BLOCK_COPY, INDEXED_COPY, TRANSFER, STEP_BEGIN, PACKED_STEPS, GET_SET2, GET_SET3, DO_STEP2, DO_STEP3, FLAG_CHECK, PYTHON_CALL
 } OperationKind;
 
-/* The most frequent step in compact form: set, doStep and get of one FMU. Consecutive instances of an FMU whose variables are the
-   same share their `StepCalls`, which then stay in the cache. */
+/* The most frequent step in compact form: set, doStep and get of one FMU; `set` is NULL without connected inputs. Consecutive
+   instances of an FMU whose variables are the same share their `StepCalls`, which then stay in the cache. */
 typedef struct {
     void *set, *do_step, *get;
     const uint32_t *set_references, *get_references;
@@ -82,7 +86,10 @@ typedef struct {
 typedef struct {
     const StepCalls *calls;
     void *instance, *set_values, *get_values;
-    bool *flags;                /* FMI 3.0 only, like the next member */
+    union {
+        void *stepped;          /* FMI 2.0: instance for doStep, that of the integrator of a Model Exchange FMU */
+        bool *flags;            /* FMI 3.0, like the next member */
+    };
     double *last_successful_time;
     int first_call;
 } PackedStep;
@@ -206,7 +213,40 @@ static void convert_values(const Transfer *transfer, char *target, const Py_ssiz
                       source_indices ? source_indices[i] : i);
 }
 
+static void add_terms(const Transfer *transfer) {
+    const double *source = (const double *)transfer->source;
+    for (Py_ssize_t i = 0; i < transfer->count; i++) {
+        double sum = source[transfer->source_indices[i]];
+        for (Py_ssize_t k = 1; k < transfer->terms; k++) sum += source[transfer->source_indices[k * transfer->count + i]];
+        Py_ssize_t to = transfer->target_indices ? transfer->target_indices[i] : i;
+        if (transfer->target_kind == 'd') ((double *)transfer->target)[to] = sum;
+        else ((float *)transfer->target)[to] = (float)sum;
+    }
+}
+
+/* Inputs that change linearly within the next step. The slopes are those of the outputs since the last transfer, whose values
+   are in `ring`. `interpolates`: the outputs already have their values of the end of the step.                                */
+static void run_linear_transfer(Transfer *transfer) {
+    const double *source = (const double *)transfer->source, *factor = transfer->factor;
+    double *target = (double *)transfer->target, *before = (double *)transfer->ring;
+    for (Py_ssize_t i = 0; i < transfer->count; i++) {
+        double now = source[transfer->source_indices[i]], value = transfer->interpolates ? before[i] : now;
+        double slope = (now - before[i]) / transfer->step_size;
+        target[transfer->target_indices[i]] = factor ? factor[i] * value + transfer->offset[i] : value;
+        target[transfer->slope_indices[i]] = factor ? factor[i] * slope : slope;
+        before[i] = now;
+    }
+}
+
 static void run_transfer(Transfer *transfer) {
+    if (transfer->slope_indices) {
+        run_linear_transfer(transfer);
+        return;
+    }
+    if (transfer->terms) {
+        add_terms(transfer);
+        return;
+    }
     if (!transfer->delay) {
         convert_values(transfer, transfer->target, transfer->target_indices, transfer->source, transfer->source_indices);
         return;
@@ -346,16 +386,20 @@ static int report_bad_status(Program *p, int call_number, int64_t status) {
 static inline int run_packed_step2(Program *p, const PackedStep *s, double time) {
     volatile int64_t *marker = p->marker;
     const StepCalls *c = s->calls;
-    marker[MARKER_CALL] = s->first_call;
-    int status = ((Fmi2GetSet *)c->set)(s->instance, c->set_references, c->set_reference_count, s->set_values);
-    if (is_bad(status) && report_bad_status(p, s->first_call, status) < 0) return -1;
-    marker[MARKER_CALL] = s->first_call + 1;
-    status = ((Fmi2DoStep *)c->do_step)(s->instance, time, c->step_size, 1);
-    if (is_bad(status) && report_bad_status(p, s->first_call + 1, status) < 0) return -1;
-    marker[MARKER_CALL] = s->first_call + 2;
+    int status, call = s->first_call;
+    if (c->set) {
+        marker[MARKER_CALL] = call;
+        status = ((Fmi2GetSet *)c->set)(s->instance, c->set_references, c->set_reference_count, s->set_values);
+        if (is_bad(status) && report_bad_status(p, call, status) < 0) return -1;
+        call++;
+    }
+    marker[MARKER_CALL] = call;
+    status = ((Fmi2DoStep *)c->do_step)(s->stepped, time, c->step_size, 1);
+    if (is_bad(status) && report_bad_status(p, call, status) < 0) return -1;
+    marker[MARKER_CALL] = call + 1;
     status = ((Fmi2GetSet *)c->get)(s->instance, c->get_references, c->get_reference_count, s->get_values);
-    if (is_bad(status) && report_bad_status(p, s->first_call + 2, status) < 0) return -1;
-    return rounds_as_usual(p) ? 0 : report_float_mode(p, s->first_call + 1);
+    if (is_bad(status) && report_bad_status(p, call + 1, status) < 0) return -1;
+    return rounds_as_usual(p) ? 0 : report_float_mode(p, call);
 }
 
 static inline int run_packed_step3(Program *p, const PackedStep *s, double time) {
@@ -445,25 +489,35 @@ static int report_changed_values(Program *p, int64_t n) {
 
 /* ---- packing steps, after their durations have been measured --------------------------------------------------------- */
 
-/* The get operation of a packable step that begins at `op`. */
-static const Operation *get_operation(const Operation *op) { return op[2].kind == DO_STEP2 ? op + 3 : op + 4; }
+/* The operations of a packable step that begins at `op`; an FMI 2.0 FMU without connected inputs has no set operation. */
+static const Operation *do_step_operation(const Operation *op) { return op[1].kind == DO_STEP2 ? op + 1 : op + 2; }
+static const Operation *get_operation(const Operation *op) {
+    const Operation *do_step = do_step_operation(op);
+    return do_step->kind == DO_STEP2 ? do_step + 1 : do_step + 2;
+}
 
 static int is_packable(const Program *p, const Operation *op) {
     Py_ssize_t calls = op->kind == STEP_BEGIN && op->divisor == 1 ? op->end - (op - p->operations) - 1 : 0;
+    if (calls == 2) return op[1].kind == DO_STEP2 && op[2].kind == GET_SET2;
     if (calls == 3) return op[1].kind == GET_SET2 && op[2].kind == DO_STEP2 && op[3].kind == GET_SET2;
     if (calls == 4) return op[1].kind == GET_SET3 && op[2].kind == DO_STEP3 && op[4].kind == GET_SET3;
     return 0;
 }
 
 static StepCalls step_calls(const Operation *op) {
-    const Operation *set = op + 1, *do_step = op + 2, *get = get_operation(op);
-    return (StepCalls){
-        .set = set->function, .do_step = do_step->function, .get = get->function,
-        .set_references = set->get_set.references, .get_references = get->get_set.references,
-        .set_reference_count = set->get_set.reference_count, .get_reference_count = get->get_set.reference_count,
-        .set_value_count = set->get_set.value_count, .get_value_count = get->get_set.value_count,
+    const Operation *do_step = do_step_operation(op), *get = get_operation(op);
+    StepCalls calls = {
+        .do_step = do_step->function, .get = get->function, .get_references = get->get_set.references,
+        .set_references = get->get_set.references, /* not NULL, of count 0 */
+        .get_reference_count = get->get_set.reference_count, .get_value_count = get->get_set.value_count,
         .step_size = do_step->do_step.step_size, .fmi_version = do_step->kind == DO_STEP2 ? 2 : 3,
     };
+    if (do_step == op + 1) return calls;
+    calls.set = op[1].function;
+    calls.set_references = op[1].get_set.references;
+    calls.set_reference_count = op[1].get_set.reference_count;
+    calls.set_value_count = op[1].get_set.value_count;
+    return calls;
 }
 
 static bool is_same_list(const uint32_t *a, size_t a_count, const uint32_t *b, size_t b_count) {
@@ -496,17 +550,20 @@ static const StepCalls *append_step_calls(const Program *p, StepCalls **next, ui
 }
 
 static PackedStep pack_step(const Operation *op, const StepCalls *calls) {
-    const Operation *set = op + 1, *do_step = op + 2, *get = get_operation(op);
-    return (PackedStep){
-        .calls = calls, .instance = do_step->instance, .set_values = set->get_set.values, .get_values = get->get_set.values,
-        .flags = do_step->do_step.data->flags, .last_successful_time = do_step->do_step.data->last_successful_time,
-        .first_call = set->call_number,
+    const Operation *do_step = do_step_operation(op), *get = get_operation(op);
+    PackedStep step = {
+        .calls = calls, .instance = get->instance, .set_values = calls->set ? op[1].get_set.values : NULL,
+        .get_values = get->get_set.values, .last_successful_time = do_step->do_step.data->last_successful_time,
+        .first_call = op[1].call_number,
     };
+    if (calls->fmi_version == 2) step.stepped = do_step->instance;
+    else step.flags = do_step->do_step.data->flags;
+    return step;
 }
 
 static int all_steps_measured(const Program *p) {
     for (const Operation *op = p->operations; op < p->operations + p->count; op++)
-        if (is_packable(p, op) && op[2].do_step.data->measurements_left) return 0;
+        if (is_packable(p, op) && do_step_operation(op)->do_step.data->measurements_left) return 0;
     return 1;
 }
 
@@ -517,7 +574,8 @@ static int pack_steps(Program *p) {
     for (op = p->operations; op < end; op++)
         if (is_packable(p, op)) {
             step_count++;
-            reference_count += op[1].get_set.reference_count + get_operation(op)->get_set.reference_count;
+            const StepCalls calls = step_calls(op);
+            reference_count += calls.set_reference_count + calls.get_reference_count;
         }
     p->packed_steps = PyMem_Calloc(step_count + 1, sizeof *p->packed_steps);
     p->step_calls = PyMem_Calloc(step_count + 1, sizeof *p->step_calls);
@@ -632,18 +690,23 @@ static Operation *append_operation(Program *p, OperationKind kind, int call_numb
 static PyObject *add_transfer(Program *p, PyObject *arguments) {
     unsigned long long target, target_indices, source, source_indices, factor, offset, ring;
     int target_kind, source_kind;
-    Py_ssize_t count, delay;
-    if (!PyArg_ParseTuple(arguments, "KCKKCKnKKKn", &target, &target_kind, &target_indices, &source, &source_kind,
-                          &source_indices, &count, &factor, &offset, &ring, &delay))
+    Py_ssize_t count, delay, terms;
+    unsigned long long slope_indices;
+    int interpolates;
+    double step_size;
+    if (!PyArg_ParseTuple(arguments, "KCKKCKnKKKnnKpd", &target, &target_kind, &target_indices, &source, &source_kind,
+                          &source_indices, &count, &factor, &offset, &ring, &delay, &terms, &slope_indices,
+                          &interpolates, &step_size))
         return NULL;
     Operation *op = append_operation(p, TRANSFER, -1);
     if (!op || !(op->transfer = PyMem_Calloc(1, sizeof(Transfer)))) return PyErr_NoMemory();
     *op->transfer = (Transfer){
         .target = pointer(target), .source = pointer(source), .target_kind = (char)target_kind, .source_kind = (char)source_kind,
         .target_indices = pointer(target_indices), .source_indices = pointer(source_indices), .count = count,
-        .factor = pointer(factor), .offset = pointer(offset), .ring = pointer(ring), .delay = delay,
+        .factor = pointer(factor), .offset = pointer(offset), .ring = pointer(ring), .delay = delay, .terms = terms,
+        .slope_indices = pointer(slope_indices), .interpolates = interpolates, .step_size = step_size,
     };
-    bool is_plain = target_kind == source_kind && !target_indices && !factor && !delay;
+    bool is_plain = target_kind == source_kind && !target_indices && !factor && !delay && !terms;
     if (is_plain && item_size((char)target_kind) == 8) op->kind = INDEXED_COPY;
     Py_RETURN_NONE;
 }

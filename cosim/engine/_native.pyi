@@ -33,6 +33,10 @@ class Program:
         offset: int,
         ring: int,
         delay: int,
+        terms: int,
+        slope_indices: int,
+        interpolates: bool,
+        step_size: float,
         /,
     ) -> None: ...
     def add_block_copy(self, target: int, source: int, size: int, /) -> None: ...

@@ -25,6 +25,8 @@ class FiniteCheck:
         connections = plan.system.connections if policy != "allow" else ()
         reader_of = {connection.source: connection.target for connection in reversed(connections)}
         checked = [*dict.fromkeys(connection.source for connection in connections), *(recorded if policy == "fail" else ())]
+        order = {step.name: k for k, step in enumerate(step for phase in plan.all_phases for step in phase.steps)}
+        checked.sort(key=lambda endpoint: order.get(endpoint.component, 0))  # the cause before those that depend on it
         positions = [(endpoint, plan.outputs.positions[endpoint], reader_of.get(endpoint)) for endpoint in dict.fromkeys(checked)]
         self._checked = [each for each in positions if each[1].dtype in _FLOAT_DTYPES]
 

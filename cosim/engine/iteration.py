@@ -1,4 +1,4 @@
-"""Fixed-point iteration of macro steps, with rollback of the components' states.
+"""Iteration of macro steps by fixed point or Newton's method, with rollback of the components' states.
 
 All components of a loop step from the same state in every iteration. Their inputs are the outputs of the previous iteration, or
 of this iteration if the source is in an earlier stage. After convergence the inputs belong to the end of the macro step.
@@ -16,6 +16,7 @@ import numpy as np
 from ..core.component import Component
 from ..core.errors import ComponentError, abbreviate_names
 from ..process.journal import calling_component
+from . import newton
 from .component_step import ScheduledStep
 from .convergence import exceeds_tolerance
 from .layout import Dtype, Layout
@@ -38,11 +39,19 @@ class FixedPointIteration:
         loop: its components and connections.
         outputs: layout of the outputs of the system.
         phases: the phases of the loop in order.
+        prepare: functions that store the values at the start of the macro step.
         run_step: runs one scheduled step.
     """
 
-    def __init__(self, loop: Loop, outputs: Layout, phases: Sequence[IterationPhase], run_step: Callable[[ScheduledStep], None]):
-        self._loop, self._phases, self._run_step = loop, phases, run_step
+    def __init__(
+        self,
+        loop: Loop,
+        outputs: Layout,
+        phases: Sequence[IterationPhase],
+        prepare: Sequence[Callable[[], None]],
+        run_step: Callable[[ScheduledStep], None],
+    ):
+        self._loop, self._phases, self._prepare, self._run_step = loop, phases, prepare, run_step
         self._components = loop.components
         sources: dict[Dtype, dict[int, str]] = defaultdict(dict)
         for connection in loop.connections:
@@ -61,18 +70,56 @@ class FixedPointIteration:
         Raises:
             ComponentError: a component failed, or the outputs did not converge within the allowed iterations.
         """
+        for store_values in self._prepare:
+            store_values()
         with ExitStack() as stack:
             states = {name: self._get_state(name, component, time, stack) for name, component in self._components.items()}
-            for iteration in range(self._loop.iteration.max_rounds):
-                if iteration:
+            is_first = True
+
+            def run_round() -> list[np.ndarray]:
+                """Repeat the macro step, and return the masks of the outputs that have changed by it."""
+                nonlocal is_first
+                if not is_first:
                     discard_requests()
                     self._restore_states(states, time)
                 before = self._output_values()
-                self._iterate_once(first=iteration == 0)
-                changed = [self._changed(old, new) for old, new in zip(before, self._output_values(), strict=True)]
+                self._iterate_once(is_first)
+                is_first = False
+                return [self._changed(old, new) for old, new in zip(before, self._output_values(), strict=True)]
+
+            if self._loop.iteration.method == "newton":
+                self._solve_by_newton(run_round)
+            for _ in range(self._loop.iteration.max_rounds):
+                changed = run_round()
                 if not any(mask.any() for mask in changed):
                     return
         raise ComponentError(self._loop.name, "iteration", self._divergence_message(changed), time)
+
+    def _solve_by_newton(self, run_round: Callable[[], object]) -> None:
+        """Store the solution for the outputs that are floating-point numbers; all others have the values of the round before."""
+        floats = [(array, offsets) for array, offsets in self._coupled_outputs if array.dtype.kind == "f"]
+
+        def read() -> np.ndarray:
+            return np.concatenate([array[offsets].astype(np.float64) for array, offsets in floats])
+
+        def write(values: np.ndarray) -> None:
+            parts = np.split(values, np.cumsum([len(offsets) for _, offsets in floats])[:-1])
+            for (array, offsets), part in zip(floats, parts, strict=True):
+                array[offsets] = part
+
+        def residuals(values: np.ndarray) -> np.ndarray:
+            write(values)
+            run_round()
+            difference: np.ndarray = read() - values
+            return difference
+
+        if floats:
+            iteration = self._loop.iteration
+            start = read()
+            if len(floats) < len(self._coupled_outputs):
+                residuals(start)  # the differences of the Jacobian need the integers and texts that belong to these values
+            jacobian = newton.difference_jacobian(residuals)
+            write(newton.solve(residuals, jacobian, start, iteration.tolerance, iteration.max_rounds).values)
 
     def _get_state(self, name: str, component: Component, time: float, stack: ExitStack) -> Any:
         """Return the component's state, which is freed when `stack` is closed."""

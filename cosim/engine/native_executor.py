@@ -23,7 +23,7 @@ except ImportError:  # installed without a C compiler
     _native = None  # type: ignore[assignment]  # a module cannot be declared optional
 
 #: number of the interface of `_native.c`; raised with every change of a function, an argument, a code or the marker
-INTERFACE = 4
+INTERFACE = 6
 #: average number of values in contiguous runs from which a run is copied as a block of memory
 MIN_BLOCK_VALUES = 8
 #: most macro steps per call; the first call is shorter, because it measures the durations of the steps
@@ -86,7 +86,9 @@ class NativeExecutor(Executor):
                 self._program.add_block_copy(_address(np.asarray(target)), _address(np.asarray(source)), target.nbytes)
             return
         first, count = int(transfer.target_indices[0]), len(transfer.target_indices)
-        is_contiguous = np.array_equal(transfer.target_indices, np.arange(first, first + count))
+        is_contiguous = transfer.slope_indices is None and np.array_equal(
+            transfer.target_indices, np.arange(first, first + count)
+        )
         self._program.add_transfer(
             _address(transfer.target[first:] if is_contiguous else transfer.target),
             transfer.target.dtype.char.translate(_STRUCT_CODES),
@@ -99,6 +101,10 @@ class NativeExecutor(Executor):
             _address(transfer.offset),
             _address(self._delay_lines[transfer].ring) if transfer.delay else 0,
             transfer.delay,
+            transfer.term_count,
+            _address(transfer.slope_indices),
+            transfer.interpolates,
+            transfer.step_size,
         )
 
     def _add_object_transfer(self, transfer_call: Callable[[], object]) -> None:

@@ -18,7 +18,7 @@ from ..core.time_grid import TimeGrid
 from .layout import Layout, build_layout
 from .run_checks import check_run
 from .settings import Event, Settings
-from .transfer_plan import Transfer, TransferPlanner
+from .transfer_plan import Transfer, TransferPlanner, slope_variable, term_endpoint
 
 
 @dataclass(frozen=True, eq=False)
@@ -53,7 +53,12 @@ class Loop:
     @property
     def components(self) -> dict[str, Component]:
         """Components of the loop, by name."""
-        return {step.name: step.component for phase in _flatten_phases(self.phases) for step in phase.steps}
+        return {step.name: step.component for phase in self.all_phases for step in phase.steps}
+
+    @property
+    def all_phases(self) -> Iterator[Phase]:
+        """All phases of the loop, each followed by the phases of its inner loop."""
+        return _flatten_phases(self.phases)
 
 
 @dataclass(frozen=True, eq=False)
@@ -115,16 +120,20 @@ def compile_plan(system: System, settings: Settings) -> Plan:
     phases = list(_split_into_phases(system))
     connections = [connection for phase in phases for connection in _connections_of(phase)]
     inputs, outputs = _input_layout(system, connections), _output_layout(system, connections, settings.columns.values())
-    planner = TransferPlanner(system, inputs, outputs)
+    planner = TransferPlanner(system, inputs, outputs, float(grid.step))
+    stepped: set[str] = set()
 
     def make_phase(draft: _PhaseDraft) -> Phase:
         steps = tuple(_make_step(system, grid, name) for name in draft.names)
-        return Phase(tuple(planner.plan_transfers(draft.connections)), steps, draft.parallel, make_loop(draft.group, draft.inner))
+        transfers = tuple(planner.plan_transfers(draft.connections, stepped))
+        stepped.update(draft.names)
+        return Phase(transfers, steps, draft.parallel, make_loop(draft.group, draft.inner))
 
     def make_loop(group: Group | None, inner: Sequence[_PhaseDraft]) -> Loop | None:
         if not group or not group.iteration:
             return None
         connections = [connection for phase in inner for connection in _connections_of(phase)]
+        stepped.update(component_names(group.stages))  # a repeated step knows the values at its end
         return Loop(group.name, group.iteration, tuple(map(make_phase, inner)), connections)
 
     record_every = int((settings.record_interval or grid.step) / grid.step)
@@ -206,7 +215,10 @@ def _phases_of_stages(
 
 def _input_layout(system: System, connections: Iterable[Connection]) -> Layout:
     """Lay out the inputs in the order of the transfers, so that the targets of a transfer are consecutive."""
-    return _layout_of_endpoints(system, (connection.target for connection in connections), "input")
+    connections = list(connections)
+    terms = [Variable(term_endpoint(connection).scalar) for connection in connections if connection.term]
+    linear = [connection.target for connection in connections if connection.interpolation == "linear"]
+    return _layout_of_endpoints(system, (connection.target for connection in connections), "input", terms, linear)
 
 
 def _output_layout(system: System, connections: Iterable[Connection], recorded: Iterable[Endpoint]) -> Layout:
@@ -214,12 +226,24 @@ def _output_layout(system: System, connections: Iterable[Connection], recorded: 
     return _layout_of_endpoints(system, (*(connection.source for connection in connections), *recorded), "output")
 
 
-def _layout_of_endpoints(system: System, endpoints: Iterable[Endpoint], causality: Causality) -> Layout:
+def _layout_of_endpoints(
+    system: System,
+    endpoints: Iterable[Endpoint],
+    causality: Causality,
+    terms: Sequence[Variable] = (),
+    linear: Iterable[Endpoint] = (),
+) -> Layout:
     used: dict[str, dict[str, Variable]] = {name: {} for name in component_names(system.stages)}
     for endpoint in endpoints:
         variable = system.find_element(endpoint).variable
         used[endpoint.component][variable.name] = variable
-    return build_layout({name: _variables_to_bind(system.components[name], some, causality) for name, some in used.items()})
+    bound = {name: _variables_to_bind(system.components[name], some, causality) for name, some in used.items()}
+    slopes: dict[str, dict[str, Variable]] = defaultdict(dict)
+    for endpoint in linear:
+        variable = system.find_element(endpoint).variable
+        slopes[endpoint.component][variable.name] = slope_variable(variable)
+    bound |= {name: [*bound[name], *own.values()] for name, own in slopes.items()}
+    return build_layout({**bound, "": terms} if terms else bound)
 
 
 def _variables_to_bind(component: Component, used: Mapping[str, Variable], causality: Causality) -> Sequence[Variable]:

@@ -20,7 +20,7 @@ from ..core.recording import Recording
 from ..core.stopwatch import Stopwatch
 from ..process.float_mode import default_float_mode, is_default
 from ..process.forks import attributing_forks, report_forks
-from ..process.journal import MARKER_SIZE, OVERWRITTEN, Phase, calling_component, current_journal, suspending_deadline
+from ..process.journal import MARKER_SIZE, OVERWRITTEN, Journal, Phase, calling_component, current_journal, suspending_deadline
 from ..process.process_state import call_restoring_process_state, restoring_process_state
 from . import Executor, Plan, Recorder, Termination, executor_class
 from .component_states import ComponentStates, SavedState
@@ -75,21 +75,23 @@ class PlanRun:
         is_finished: true at the last communication point, and after a component has requested termination.
     """
 
-    def __init__(self, plan: Plan, step_hook: StepHook | None = None):
+    def __init__(self, plan: Plan, step_hook: StepHook | None = None, executor: type[Executor] | None = None):
         """Create the executor of a plan.
 
         Args:
             plan: the compiled system. The run owns its components, and frees them also if it cannot be created.
             step_hook: called before every macro step.
+            executor: class of the executor; None: as the settings of the plan choose it.
 
         Raises:
             InputError: the recorded rows are larger than the free disk space.
         """
         self._components, settings = plan.system.components, plan.settings
         try:
-            if problems := _space_problems(plan):
+            self._journal = _claim_journal()
+            if problems := _space_problems(plan, self._journal):
                 raise InputError(problems)
-            self.executor = _create_executor(plan)
+            self.executor = _create_executor(plan, executor, self._journal)
         except BaseException:
             free_components(self._components)
             raise
@@ -134,7 +136,7 @@ class PlanRun:
             ComponentError: a component failed.
             LateError: the run fell behind real time.
         """
-        journal, began = current_journal(), perf_counter()
+        journal, began = self._journal, perf_counter()
         if journal:
             journal.enter_phase(Phase.STEPPING, journal.deadlines.step)
         try:
@@ -292,17 +294,23 @@ def _call_or_warn(component: str, name: str, function: Callable[[], None]) -> No
         component_log.log_message(component, component_log.WARNING, f"{error.function} failed: {error.reason}")
 
 
-def _space_problems(plan: Plan) -> list[Problem]:
-    journal, settings = current_journal(), plan.settings
+def _claim_journal() -> Journal | None:
+    """Return the journal of this process for its first run; None for a later one, such as that of a KPI that simulates."""
+    journal = current_journal()
+    return journal if journal and journal.claim() else None
+
+
+def _space_problems(plan: Plan, journal: Journal | None) -> list[Problem]:
+    settings = plan.settings
     rows = (journal and journal.folder) or (settings.rows_file and settings.rows_file.parent)
     return find_space_problems(plan, rows or Path(tempfile.gettempdir()), csv=bool(journal and journal.csv_path))
 
 
-def _create_executor(plan: Plan) -> Executor:
-    journal, settings = current_journal(), plan.settings
+def _create_executor(plan: Plan, executor: type[Executor] | None, journal: Journal | None) -> Executor:
+    settings = plan.settings
     if journal and journal.folder and not settings.rows_file:
         recorder: Recorder = SavingRecorder(plan, journal.folder)
     else:
         recorder = Recorder(plan, settings.rows_file)
     marker = None if journal is None else np.frombuffer(journal.memory, np.int64, MARKER_SIZE)
-    return executor_class(settings.executor)(plan, recorder, marker)
+    return (executor or executor_class(settings.executor))(plan, recorder, marker)

@@ -9,7 +9,7 @@ from .component_step import ScheduledStep
 from .iteration import FixedPointIteration, IterationPhase
 from .plan import Loop, Phase, Plan, Step
 from .step_runner import StepRunner
-from .transfer_calls import DelayLine, compile_transfer
+from .transfer_calls import DelayLine, TransferCall, compile_transfer
 from .transfer_plan import Transfer
 
 
@@ -45,23 +45,31 @@ class Schedule:
         """(component, function) of every call, by number."""
         return [(step.step.name, call.name) for step in self._steps for call in step.calls]
 
-    def _schedule_phase(self, phase: Phase) -> list[ScheduledStep]:
+    def _schedule_phase(self, phase: Phase, is_outermost: bool = True) -> list[ScheduledStep]:
         steps = [self.add_step(step, self._step_calls(step)) for step in phase.steps]
-        return [*steps, self._schedule_loop(phase.loop)] if phase.loop else steps
+        return [*steps, self._schedule_loop(phase.loop, is_outermost)] if phase.loop else steps
 
     def _step_calls(self, step: Step) -> Sequence[PreparedCall]:
         return step.component.prepare_step_calls(self._runner.current_time, step.step_size) or [
             PreparedCall(self._runner.run_python_component, (step,), "do_step")
         ]
 
-    def _schedule_loop(self, loop: Loop) -> ScheduledStep:
-        """Schedule all iterations of a loop as one call."""
+    def _schedule_loop(self, loop: Loop, is_outermost: bool) -> ScheduledStep:
+        """Schedule all iterations of a loop as one call.
+
+        The outermost loop stores the values at the start of the macro step for the linear transfers of all inner loops.
+        """
         phases = [self._iteration_phase(phase) for phase in loop.phases]
-        iteration = FixedPointIteration(loop, self._plan.outputs, phases, self._runner.run_step)
+        linear = [t for phase in loop.all_phases for t in phase.transfers if t.slope_indices is not None]
+        prepare = [self._delay_lines[transfer].fill for transfer in linear] if is_outermost else []
+        iteration = FixedPointIteration(loop, self._plan.outputs, phases, prepare, self._runner.run_step)
         step = Step(loop.name, next(iter(loop.components.values())), 1, 0.0)
         return self.add_step(step, [PreparedCall(self._runner.run_iteration, (iteration,), "iterated step")])
 
     def _iteration_phase(self, phase: Phase) -> IterationPhase:
-        every_iteration = [compile_transfer(transfer) for transfer in phase.transfers if not transfer.delay]
-        first_iteration = [self._delay_lines[transfer].apply for transfer in phase.transfers if transfer.delay]
-        return IterationPhase(every_iteration, first_iteration, self._schedule_phase(phase))
+        linear = [transfer for transfer in phase.transfers if transfer.slope_indices is not None]
+        delayed = [transfer for transfer in phase.transfers if transfer.delay and transfer.slope_indices is None]
+        every_iteration: list[TransferCall] = [compile_transfer(transfer) for transfer in phase.transfers if not transfer.delay]
+        every_iteration += [self._delay_lines[transfer].deliver_line for transfer in linear]
+        first_iteration = [self._delay_lines[transfer].apply for transfer in delayed]
+        return IterationPhase(every_iteration, first_iteration, self._schedule_phase(phase, False))

@@ -24,6 +24,7 @@ def contiguous_views(transfer: Transfer) -> list[tuple[memoryview, memoryview]] 
         or transfer.factor is not None
         or transfer.source.dtype != transfer.target.dtype
         or transfer.source.dtype.hasobject
+        or transfer.term_count
     ):
         return None
     targets, sources = transfer.target_indices, transfer.source_indices
@@ -40,6 +41,8 @@ def _contiguous_view(array: np.ndarray, indices: np.ndarray) -> memoryview:
 
 def compile_transfer(transfer: Transfer) -> TransferCall:
     """Return a function that performs the transfer without its delay, with as few memory allocations as possible."""
+    if transfer.term_count:
+        return partial(_add_terms, transfer)
     first, count = int(transfer.target_indices[0]), len(transfer.target_indices)
     is_contiguous = np.array_equal(transfer.target_indices, np.arange(first, first + count))
     if count <= MAX_SINGLE_COPIES and transfer.factor is None and _is_safe_cast(transfer.source.dtype, transfer.target.dtype):
@@ -67,8 +70,16 @@ def _scatter(transfer: Transfer, source: np.ndarray, indices: np.ndarray) -> Non
     transfer.target[transfer.target_indices] = values
 
 
+def _add_terms(transfer: Transfer) -> None:
+    first, *others = transfer.source_indices
+    values = transfer.source[first]
+    for indices in others:
+        values += transfer.source[indices]
+    transfer.target[transfer.target_indices] = values
+
+
 class DelayLine:
-    """Ring buffer of a delayed transfer; during the first `delay` macro steps it delivers the initial outputs."""
+    """Ring buffer of a delayed or linear transfer; during the first `delay` macro steps it delivers the initial outputs."""
 
     def __init__(self, transfer: Transfer):
         self.transfer = transfer
@@ -90,9 +101,20 @@ class DelayLine:
         self.ring[:] = np.roll(self.ring, -(self._oldest + transfers), 0)
         self._oldest = 0
 
+    def deliver_line(self) -> None:
+        """Deliver values and slopes of a linear transfer, without storing the current source values."""
+        transfer, (before,) = self.transfer, self.ring
+        now = transfer.source[transfer.source_indices]
+        slopes = (now - before) / transfer.step_size
+        transfer.target[transfer.slope_indices] = slopes if transfer.factor is None else transfer.factor * slopes
+        _scatter(transfer, before if transfer.interpolates else now, self._all)
+
     def apply(self) -> None:
         """Deliver the oldest values and replace them by the current source values."""
         oldest = self.ring[self._oldest]
-        _scatter(self.transfer, oldest, self._all)
+        if self.transfer.slope_indices is None:
+            _scatter(self.transfer, oldest, self._all)
+        else:
+            self.deliver_line()
         oldest[:] = self.transfer.source[self.transfer.source_indices]
         self._oldest = (self._oldest + 1) % len(self.ring)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterable, Iterator, Sequence, Set
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
 
 from ..core.component import Variable
-from ..core.system import Connection, System
+from ..core.system import Connection, Endpoint, System
 from .layout import ArrayPosition, Dtype, Layout
 
 
@@ -18,7 +18,12 @@ from .layout import ArrayPosition, Dtype, Layout
 class Transfer:
     """Values of one dtype that are copied together: target = factor * source + offset, `delay` macro steps late.
 
-    Without `factor` and `offset` the values are copied, and converted to the dtype of the target.
+    Without `factor` and `offset` the values are copied, and converted to the dtype of the target. `source_indices` has the shape
+    (values,), or (terms, values) for sums of terms.
+
+    With `slope_indices` the inputs change linearly within the next step of `step_size` (s): the slope of the output since the
+    last transfer is stored at these indices of `target`. The values are those of the last transfer if the output already has its
+    value of the end of the step (`interpolates`). The delay is then 1.
     """
 
     source: np.ndarray
@@ -28,6 +33,30 @@ class Transfer:
     delay: int = 0
     factor: np.ndarray | None = None
     offset: np.ndarray | None = None
+    slope_indices: np.ndarray | None = None
+    interpolates: bool = False
+    step_size: float = 0.0
+
+    @property
+    def term_count(self) -> int:
+        """Number of source values that are added to each target value; 0: the transfer makes no sums."""
+        return len(self.source_indices) if self.source_indices.ndim == 2 else 0
+
+
+def term_endpoint(connection: Connection) -> Endpoint:
+    """Return the name of the value of one term of a sum in the layout of the inputs; no component has the name ""."""
+    return Endpoint("", f"{connection.target}+{connection.term}")
+
+
+def slope_variable(variable: Variable) -> Variable:
+    """Return the variable with the time derivative of an input."""
+    return Variable(f"slope of {variable.name}", causality="input", shape=variable.shape, derivative_of=variable.name)
+
+
+def slope_endpoint(system: System, end: Endpoint) -> Endpoint:
+    """Return the name of the time derivative of an input in the layout of the inputs."""
+    variable, element = system.find_element(end)
+    return Endpoint(end.component, slope_variable(variable).scalar_names[element])
 
 
 def unit_conversion(source: Variable, target: Variable) -> tuple[float, float]:
@@ -41,6 +70,13 @@ def unit_conversion(source: Variable, target: Variable) -> tuple[float, float]:
     return factor, 0.0 if source.relative_quantity or target.relative_quantity else offset
 
 
+def connection_conversion(system: System, connection: Connection) -> tuple[float, float]:
+    """Return (factor, offset) of the conversion of units, followed by the connection's own gain and offset."""
+    ends = (connection.source, connection.target)
+    factor, offset = unit_conversion(*(system.find_element(end).variable for end in ends))
+    return connection.gain * factor, connection.gain * offset + connection.offset
+
+
 class TransferPlanner:
     """Groups connections into as few and as long transfers as possible.
 
@@ -48,39 +84,48 @@ class TransferPlanner:
         system: its connections and variables.
         inputs: layout of the inputs.
         outputs: layout of the outputs.
+        step_size: size of a macro step (s).
     """
 
-    def __init__(self, system: System, inputs: Layout, outputs: Layout):
-        self._system, self._inputs, self._outputs = system, inputs, outputs
+    def __init__(self, system: System, inputs: Layout, outputs: Layout, step_size: float):
+        self._system, self._inputs, self._outputs, self._step_size = system, inputs, outputs, step_size
         #: (dtype of source, position of target) -> offset of source, for connections without delay and conversion
         self._copies: dict[tuple[Dtype, ArrayPosition], int] = {}
         for connection in system.connections:
-            if not connection.delay and self._conversion(connection) == (1.0, 0.0):
+            is_copy = not connection.delay and connection.interpolation == "hold"
+            if is_copy and self._conversion(connection) == (1.0, 0.0):
                 source, target = self._positions(connection)
                 self._copies[source.dtype, target] = source.offset
+        #: terms of each sum, in order
+        self._terms: dict[Endpoint, list[Connection]] = defaultdict(list)
+        for connection in system.connections:
+            if connection.term:
+                self._terms[connection.target].append(connection)
         #: targets of the connections of this phase and of earlier ones, which must not be overwritten with newer values
         self._targets_read: set[ArrayPosition] = set()
 
     def _positions(self, connection: Connection) -> tuple[ArrayPosition, ArrayPosition]:
-        return self._outputs.positions[connection.source], self._inputs.positions[connection.target]
+        target = term_endpoint(connection) if connection.term else connection.target
+        return self._outputs.positions[connection.source], self._inputs.positions[target]
 
     def _conversion(self, connection: Connection) -> tuple[float, float]:
-        """Return (factor, offset) of the conversion of units, followed by the connection's own gain and offset."""
-        factor, offset = unit_conversion(
-            self._system.find_element(connection.source).variable, self._system.find_element(connection.target).variable
-        )
-        return connection.gain * factor, connection.gain * offset + connection.offset
+        return connection_conversion(self._system, connection)
 
-    def plan_transfers(self, connections: Iterable[Connection]) -> Iterator[Transfer]:
-        """Yield the transfers of one phase, grouped by dtypes, delay and conversion.
+    def plan_transfers(self, connections: Iterable[Connection], stepped: Set[str] = frozenset()) -> Iterator[Transfer]:
+        """Yield the transfers of one phase, grouped by dtypes, delay and conversion; then the sums of the transferred terms.
 
         Args:
             connections: those that are read in this phase; call this method in the order of the phases.
+            stepped: components that have already made the present macro step.
         """
         connections = list(connections)
         self._targets_read |= {self._positions(connection)[1] for connection in connections}
         groups: dict[tuple[Dtype, Dtype, int, bool], list[Connection]] = defaultdict(list)
-        for connection in connections:
+        linear = [connection for connection in connections if connection.interpolation == "linear"]
+        for interpolates in (False, True):
+            if group := [c for c in linear if (c.source.component in stepped) == interpolates]:
+                yield self._linear_transfer(group, interpolates)
+        for connection in (connection for connection in connections if connection.interpolation == "hold"):
             source, target = self._positions(connection)
             converted = self._conversion(connection) != (1.0, 0.0)
             groups[source.dtype, target.dtype, connection.delay, converted].append(connection)
@@ -89,6 +134,27 @@ class TransferPlanner:
                 yield self._delayed_or_converted(group, delay, converted)
             else:
                 yield from self._contiguous_copies(group)
+        yield from self._sums(dict.fromkeys(connection.target for connection in connections if connection.term))
+
+    def _sums(self, targets: Iterable[Endpoint]) -> Iterator[Transfer]:
+        """Yield the transfers that add up the terms of these inputs, grouped by dtype and number of terms."""
+        groups: dict[tuple[Dtype, int], list[Endpoint]] = defaultdict(list)
+        for target in targets:
+            groups[self._inputs.positions[target].dtype, len(self._terms[target])].append(target)
+        for (dtype, _), group in groups.items():
+            terms = [[self._inputs.positions[term_endpoint(term)] for term in self._terms[target]] for target in group]
+            yield Transfer(
+                self._inputs.arrays[terms[0][0].dtype],
+                np.ascontiguousarray(np.transpose([[position.offset for position in row] for row in terms]), np.intp),
+                self._inputs.arrays[dtype],
+                np.array([self._inputs.positions[target].offset for target in group], np.intp),
+            )
+
+    def _linear_transfer(self, connections: Sequence[Connection], interpolates: bool) -> Transfer:
+        converted = any(self._conversion(connection) != (1.0, 0.0) for connection in connections)
+        slopes = [self._inputs.positions[slope_endpoint(self._system, connection.target)].offset for connection in connections]
+        plain = self._delayed_or_converted(list(connections), 1, converted)
+        return replace(plain, slope_indices=np.array(slopes, np.intp), interpolates=interpolates, step_size=self._step_size)
 
     def _delayed_or_converted(self, connections: list[Connection], delay: int, converted: bool) -> Transfer:
         sources, targets = zip(*map(self._positions, connections), strict=True)

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..components.sibling_imports import with_imported_siblings
 from ..core import resources
@@ -84,6 +84,8 @@ def _load_equations(path: Path, _model: str | None, _options: ModelicaOptions | 
 
 #: program whose function `vehicle_block` makes the block of a vehicle file
 _VEHICLE_PROGRAM = "plant_src/vehicle_block.py"
+_URDF_READER = "plant_src/urdf.py:vehicle_from_urdf"
+_VEHICLE_SCHEMA = "plant_src/vehicle_schema.py:vehicle_schema"
 
 
 def _load_vehicle(path: Path, _model: str | None, _options: ModelicaOptions | None) -> Block:
@@ -91,6 +93,30 @@ def _load_vehicle(path: Path, _model: str | None, _options: ModelicaOptions | No
 
     create_block: Callable[[Path], Block] = load_object(f"{_VEHICLE_PROGRAM}:vehicle_block", resources.root())
     return create_block(path)
+
+
+def vehicle_file_schema() -> dict[str, Any]:
+    """Return the JSON Schema of vehicle files."""
+    from ..components.python_import import load_object
+
+    create_schema: Callable[[], dict[str, Any]] = load_object(_VEHICLE_SCHEMA, resources.root())
+    return create_schema()
+
+
+def vehicle_from_urdf(urdf: Path, data: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the data of a vehicle with mass, inertia and collision shape of a URDF file.
+
+    Args:
+        urdf: URDF file.
+        data: Further data of the vehicle; its rotors and thrusters may name links of the URDF file.
+
+    Raises:
+        InputError: The URDF file cannot be read, or does not describe one rigid body.
+    """
+    from ..components.python_import import load_object
+
+    read: Callable[[Path, Mapping[str, Any]], dict[str, Any]] = load_object(_URDF_READER, resources.root())
+    return read(urdf, data)
 
 
 SOURCE_KINDS = (

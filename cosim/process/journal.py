@@ -90,6 +90,7 @@ class Journal:
         self.deadlines = Deadlines()
         #: several components are being called at the same time; their calls are not recorded one by one
         self.is_shared = False
+        self._is_claimed = False
         self.enter_phase(Phase.IDLE)
 
     def __getitem__(self, field: int) -> int:
@@ -103,6 +104,11 @@ class Journal:
         """True if the content is plausible; foreign code in the process can overwrite it."""
         deadline, counts = self[DEADLINE], (self[STEP_COUNT], self[ROW_COUNT], self[CHANGE_COUNT])
         return self[PHASE] in _PHASES and self[CSV_UPDATE] in (0, 1) and -1 <= deadline <= _MAX_DEADLINE and min(counts) >= 0
+
+    def claim(self) -> bool:
+        """Return True at the first call: the journal records one run of the process, and not those that its KPIs make."""
+        first, self._is_claimed = not self._is_claimed, True
+        return first
 
     def exclude_from_forks(self) -> None:
         """Make later forks of this process crash at their first access to the journal (Linux); see `process.forks`."""

@@ -36,7 +36,8 @@ def draw_tubes(
     panels = figure.subplots(len(worst), sharex=True, squeeze=False)[:, 0]
     for axes, verdict in zip(panels, worst, strict=True):
         _draw_panel(axes, comparer, verdict, chosen[verdict.signal], result, reference)
-    panels[0].legend(loc="best", ncols=4)
+    handles = {label: handle for axes in panels for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    figure.legend(handles.values(), handles, loc="outside upper right", ncols=4)
     panels[-1].set_xlabel("time (s)")
     return figure
 

@@ -91,7 +91,7 @@ def plot_signals(result: Result, patterns: Sequence[str]) -> Figure:
             for name in (name for name in names if result.units.get(name, "") == unit):
                 axes.plot(result.time, result[name], label=name)
             axes.set_ylabel(unit)
-            axes.legend()
+            axes.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0))
         axes.set_xlabel("time (s)")
     return figure
 

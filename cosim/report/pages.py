@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -19,14 +20,40 @@ CONTENT_SECURITY_POLICY = (
     "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; form-action 'none'"
 )
 
+_ABSOLUTE_PATH = re.compile(r"(?<![\w./:])(?:/[\w.+@ -]*[\w.+@-])+")
+
 
 @cache
 def _jinja_environment() -> Environment:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
     return Environment(
-        loader=FileSystemLoader(TEMPLATE_FOLDER), autoescape=True, undefined=StrictUndefined, trim_blocks=True, lstrip_blocks=True
+        loader=FileSystemLoader(TEMPLATE_FOLDER),
+        autoescape=True,
+        undefined=StrictUndefined,
+        trim_blocks=True,
+        lstrip_blocks=True,
+        finalize=_hide_folders,
     )
+
+
+def _hide_folders(value: Any) -> Any:
+    """Return a text of a page without folders of this machine, because pages are shared; other values are returned unchanged.
+
+    A path below the working directory becomes relative, another one is replaced by its file name.
+    """
+    from markupsafe import Markup
+
+    if isinstance(value, Markup) or not isinstance(value, str | Path):
+        return value
+    return _ABSOLUTE_PATH.sub(lambda found: _shown_path(Path(found[0])), str(value))
+
+
+def _shown_path(path: Path) -> str:
+    folder = Path.cwd()
+    if path.is_relative_to(folder):
+        return str(path.relative_to(folder))
+    return path.name if len(path.parts) > 2 and Path(*path.parts[:2]).is_dir() else str(path)
 
 
 @cache
@@ -47,7 +74,7 @@ def safe_markup(text: str) -> str:
 
 
 def render_page(template: str, **values: Any) -> str:
-    """Return a page as HTML; all `values` are escaped except those of `safe_markup`."""
+    """Return a page as HTML; all `values` are escaped, and freed from folders of this machine, except those of `safe_markup`."""
     return _jinja_environment().get_template(template).render(**{**_page_assets(), **values})
 
 

@@ -7,6 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
+from ..core.errors import InputError
+from ..core.units import parse_unit
 from .result import Result
 
 
@@ -53,13 +55,28 @@ def control_error(result: Result, signal: str, target: str | float, start: float
     Args:
         result: The run.
         signal: Name of the signal.
-        target: A number, or the name of another signal, which is subtracted.
+        target: A number, or the name of another signal, which is converted to the unit of `signal` and subtracted.
         start: Time (s) of the first row that counts.
         stop: Time (s) of the last row that counts.
+
+    Raises:
+        InputError: The units of both signals measure different quantities.
     """
     rows = row_slice(result, start, stop)
-    reference = result[target] if isinstance(target, str) else target
+    reference = _converted(result, target, signal) if isinstance(target, str) else target
     return result.time[rows], (result[signal].astype(np.float64) - reference)[rows]
+
+
+def _converted(result: Result, name: str, to_unit_of: str) -> np.ndarray:
+    """Return the values of a signal in the unit of another one; a signal without unit is not converted."""
+    found, expected = (result.units.get(each, "") for each in (name, to_unit_of))
+    if not (found and expected) or found == expected:
+        return result[name]
+    unit, target_unit = parse_unit(found), parse_unit(expected)
+    if not unit.converts_to(target_unit):
+        raise InputError(f'"{name}" ({found}) cannot be compared with "{to_unit_of}" ({expected})')
+    factor, offset = unit.conversion(target_unit)
+    return factor * result[name] + offset
 
 
 def integrate(time: np.ndarray, values: np.ndarray) -> float:

@@ -48,7 +48,7 @@ class SystemFile:
     @cached_property
     def connections(self) -> int:
         """Number of connections and output ports; a connection to an input port counts once for each of its readers."""
-        targets = [spec.target for _, spec in accepted(self.spec.connections)]
+        targets = [spec.target for _, spec in accepted(self.spec.connections) for _ in spec.sources]
         if isinstance(self.spec, ScenarioSpec):
             targets += [name for _, spec in accepted(self.spec.inputs) for names in spec.to.values() for name in names]
         own = sum(self._count_targets(target, CONNECTION_PORTS) for target in targets)
@@ -57,7 +57,7 @@ class SystemFile:
     @cached_property
     def delayed_values(self) -> int:
         """Number of values that all delays store, if every delayed connection is one of scalars."""
-        own = sum(spec.delay for _, spec in accepted(self.spec.connections))
+        own = sum(spec.delay * len(spec.sources) for _, spec in accepted(self.spec.connections))
         return own + sum(child.delayed_values for child in self.children.values())
 
     @cached_property

@@ -104,13 +104,26 @@ def _removals_with_components(inherited: Mapping[str, Any], changes: Mapping[str
     connections, own = inherited.get("connections"), changes.get("connections", {})
     if isinstance(connections, list) and isinstance(own, dict):
         ends = [each for each in connections if isinstance(each, dict) and isinstance(each.get("to"), str)]
-        gone = [each["to"] for each in ends if {_component_of(each["to"]), _component_of(each.get("from"))} & removed]
-        result["connections"] = {**dict.fromkeys(gone), **own}
+        gone = {each["to"]: change for each in ends if (change := _without_sources(each, removed)) != each}
+        result["connections"] = {**gone, **own}
     for key, entry in (("algorithm", "stages"), ("record", "signals")):
         old, own = inherited.get(key), changes.get(key, {})
         if isinstance(old, dict) and isinstance(old.get(entry), list) and isinstance(own, dict) and entry not in own:
             result[key] = {**own, entry: _without_components(old[entry], removed)}
     return result
+
+
+def _without_sources(connection: Mapping[str, Any], removed: Set[str]) -> Mapping[str, Any] | None:
+    """Return a connection without the outputs of removed components, or None if nothing remains that is connected."""
+    sources, gain = connection.get("from"), connection.get("gain")
+    names = sources if isinstance(sources, list) else [sources]
+    kept = [i for i, name in enumerate(names) if _component_of(name) not in removed]
+    if not kept or _component_of(connection["to"]) in removed:
+        return None
+    if len(kept) == len(names):
+        return connection
+    gains = {"gain": [gain[i] for i in kept]} if isinstance(gain, list) and len(gain) == len(names) else {}
+    return {**connection, "from": [names[i] for i in kept], **gains}
 
 
 def _without_components(names: Sequence[Any], removed: Set[str]) -> list[Any]:

@@ -67,7 +67,7 @@ class FunctionResolver:
             self.problems += [problem for problem in found if problem.message]
             return INVALID if found else resolved
         if self.signals is not None:
-            unknown = unknown_signals(resolved, self.root.folder, self.signals)
+            unknown = unknown_signals(resolved, self.root, self.signals)
             found += [Problem(text, self.root.where(kind, i, "arguments", argument)) for argument, text in unknown]
         if found and found[0].message:
             noun = "KPI" if kind == "kpis" else "figure"

@@ -100,21 +100,29 @@ def signal_problems(root: Node, kind: str, signals: Collection[str]) -> Iterator
     """
     for i, spec in accepted(getattr(root.spec, kind)):
         if not spec.optional and not definition_problem(spec, root.folder):
-            for argument, text in unknown_signals(spec, root.folder, signals):
+            for argument, text in unknown_signals(spec, root, signals):
                 yield Problem(text, root.where(kind, i, "arguments", argument))
 
 
-def unknown_signals(spec: CallSpec, folder: Path, signals: Collection[str]) -> Iterator[tuple[str, str]]:
+def unknown_signals(spec: CallSpec, root: Node, signals: Collection[str]) -> Iterator[tuple[str, str]]:
     """Yield (parameter, message) of every argument that names no recorded signal."""
-    declared = _function_definition(spec, folder).args
+    declared = _function_definition(spec, root.folder).args
     for parameter in (*declared.posonlyargs, *declared.args, *declared.kwonlyargs):
         value, kinds = spec.arguments.get(parameter.arg), _annotation_names(parameter.annotation)
         if not isinstance(value, str):
             continue
         if "Signal" in kinds and value not in signals:
-            yield parameter.arg, f'no signal "{value}" is recorded{did_you_mean(value, signals)}'
+            yield parameter.arg, f'no signal "{value}" is recorded{_reason(value, root, signals)}'
         if "Prefix" in kinds and not any(name.startswith((f"{value}.", f"{value}[")) for name in signals):
-            yield parameter.arg, f'no signal below "{value}" is recorded{did_you_mean(value, _signal_prefixes(signals))}'
+            yield parameter.arg, f'no signal below "{value}" is recorded{_reason(value, root, _signal_prefixes(signals))}'
+
+
+def _reason(value: str, root: Node, names: Collection[str]) -> str:
+    """Return the most probable reason for which a signal is not recorded."""
+    component = value.partition(".")[0]
+    if component not in root.spec.components:
+        return f': the scenario has no component "{component}"{did_you_mean(component, root.spec.components)}'
+    return f'{did_you_mean(value, names)} (inputs are recorded if "record" names them)'
 
 
 def _kpi_name_problem(kpi: str, kpis: Sequence[FunctionSpec], folder: Path) -> str:

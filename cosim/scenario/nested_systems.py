@@ -170,9 +170,9 @@ def load_scenario(
 
 
 def _refuse_study(document: Document) -> None:
-    """Raise InputError if a document is a sweep or a tuning."""
+    """Raise InputError if a document is a sweep, a tuning or a search for the worst case."""
     value = document.value if isinstance(document.value, dict) else {}
-    for key, command in (("factors", "sweep"), ("parameters", "tune")):
+    for key, command in (("factors", "sweep"), ("minimize", "tune"), ("parameters", "tune --worst")):
         if key in value and "scenario" in value and "components" not in value:
             text = f"expected a scenario, found a file for `cosim {command}`"
             raise InputError([Problem(text, document.where(("scenario",)))])

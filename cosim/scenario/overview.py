@@ -89,10 +89,15 @@ def connection_notes(system: System, connection: Connection) -> str:
     """Return the delay and all conversions of a connection as text, such as "delay 1, deg to rad"; "" for a plain copy."""
     source, target = system.find_element(connection.source).variable, system.find_element(connection.target).variable
     notes = [f"delay {connection.delay}"] if connection.delay else []
+    notes += [connection.interpolation] if connection.interpolation != "hold" else []
     if source.unit and target.unit and unit_conversion(source, target) != (1.0, 0.0):
         notes.append(f"{source.unit.name} to {target.unit.name}")
+    elif source.unit and not target.unit and source.unit.exponents and any(source.unit.exponents):
+        notes.append(f"{source.unit.name}, the input has no unit")
     if source.type != target.type:
         notes.append(f"{source.type} to {target.type}")
     if connection.is_mapped:
-        notes += [f"gain {connection.gain:g}", *([f"offset {connection.offset:g}"] if connection.offset else [])]
+        notes += [f"term {connection.term} of a sum"] if connection.term else []
+        notes += [f"gain {connection.gain:g}"] if connection.gain != 1.0 or not connection.term else []
+        notes += [f"offset {connection.offset:g}"] if connection.offset else []
     return ", ".join(notes)

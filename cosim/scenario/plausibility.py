@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
-from ..core.component import Variable
+from ..core.component import Component, Variable
 from ..core.errors import Problem
 from ..core.paths import is_file
 from ..core.system import Endpoint, System, incompatibility
@@ -34,16 +34,26 @@ def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
 
 
 def _missing_connections(prepared: PreparedRun) -> Iterator[Problem]:
-    """Yield at most one warning: unconnected inputs for which another component has an output of the same name."""
+    """Yield a warning for the first output with the name of an unconnected input, or for components without connected input."""
     system, inputs = prepared.system, unconnected_inputs(prepared)
     outputs = _outputs_by_name(system) if inputs else {}
     sources = {end: source for end, variable in inputs.items() if (source := _matching_output(end, variable, outputs))}
+    texts = []
     if sources:
         (end, source), more = next(iter(sources.items())), len(sources) - 1
         others = f" and {count_noun(more, 'more input')}" if more else ""
         shown_source = next((port for port, inner in system.aliases.items() if inner == source), source)
-        text = f"nothing feeds or sets {end}{others}, but there is an output {shown_source}: is a connection missing?"
-        yield Problem(text, prepared.root.where("connections"))
+        texts.append(f"nothing feeds or sets {end}{others}, but there is an output {shown_source}: is a connection missing?")
+    elif len(system.components) > 1:
+        isolated = [name for name, component in system.components.items() if _has_no_fed_input(name, component, inputs)]
+        texts += [f"nothing feeds or sets an input of {name}: are connections missing?" for name in isolated]
+    yield from (Problem(text, prepared.root.where("connections")) for text in texts)
+
+
+def _has_no_fed_input(name: str, component: Component, unconnected: VariablesByEndpoint) -> bool:
+    """Return whether a component has inputs and all of them are unconnected."""
+    slots = [slot for variable in component.variables if variable.causality == "input" for slot in variable.scalar_names]
+    return bool(slots) and all(Endpoint(name, slot) in unconnected for slot in slots)
 
 
 def unconnected_inputs(prepared: PreparedRun) -> VariablesByEndpoint:

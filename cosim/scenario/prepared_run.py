@@ -56,6 +56,8 @@ class PreparedRun:
     component_factory: ComponentFactory
     #: reasons why optional KPIs and figures are left out; `spec` does not contain these
     left_out: Sequence[Problem]
+    #: values of variables that the caller sets, by name
+    assignments: Mapping[str, Any]
     #: wall time (s) of the preparation "load_seconds" and its parts "parse_seconds", "instantiate_seconds", "wiring_seconds"
     timing: Mapping[str, float]
 
@@ -118,12 +120,20 @@ class PreparedRun:
     def metadata(self) -> dict[str, Any]:
         """Metadata of the run that are known before it: scenario, system, versions, hashes of all files."""
         return {
-            "name": self.spec.name,
-            "scenario": self._resolved_document(),
-            "scenario_file": str(self.document.file.resolve()),
+            **self.origin,
             "system": describe_system(self.system, self.sources, self.component_factory.solvers),
             **describe_software(),
             "sha256": {name: sha256(file.read_bytes()).hexdigest() for name, file in self.files().items()},
+        }
+
+    @property
+    def origin(self) -> dict[str, Any]:
+        """Name, content and file of the scenario, and the values of variables that the caller sets."""
+        return {
+            "name": self.spec.name,
+            "scenario": self._resolved_document(),
+            "scenario_file": str(self.document.file.resolve()),
+            "parameters": dict(self.assignments),
         }
 
     def _resolved_document(self) -> dict[str, Any]:
@@ -223,7 +233,9 @@ def load(
         except BaseException:
             free_components(builder.components)
             raise
-    return PreparedRun(loaded.root, builder.spec, plan, builder.component_factory, builder.left_out, watch.seconds)
+    return PreparedRun(
+        loaded.root, builder.spec, plan, builder.component_factory, builder.left_out, loaded.assignments, watch.seconds
+    )
 
 
 def _check_choices(**options: tuple[object, Any]) -> None:

@@ -10,6 +10,8 @@ from typing import Annotated, Any, Literal
 
 from pydantic import ConfigDict, StringConstraints, model_validator
 
+from ..core.system import Interpolation, IterationMethod
+from ..core.text import count_noun
 from ..engine.settings import NonFinitePolicy, StopOutcome
 from .component_schema import ComponentSpec
 from .evaluation_schema import CallSpec, CheckSpec, FunctionSpec, ReferenceSpec
@@ -46,7 +48,8 @@ NOT_INHERITED = ("$schema", "name", "description", "reference")
 #: the rules of the validators below that JSON Schema can express
 _CONNECTION_RULES: dict[str, Any] = {
     "anyOf": [
-        {"properties": {end: {"pattern": pattern} for end in ("from", "to")}} for pattern in (r"^[^*]*$", r"^[^*]*\*[^*]*$")
+        {"properties": {end: {"pattern": pattern, "items": {"pattern": pattern}, "minItems": 1} for end in ("from", "to")}}
+        for pattern in (r"^[^*]*$", r"^[^*]*\*[^*]*$")
     ]
 }
 
@@ -55,27 +58,64 @@ class ConnectionSpec(Spec):
     """A connection of an output to an input, of two prefixes, or of two patterns with one "*" each.
 
     Variables below prefixes match if their names after the prefixes are equal; those of patterns, if the texts at "*" are equal.
+    The outputs of a list are added: input = gain * output + gain * output + ... + offset.
     """
 
     model_config = ConfigDict(json_schema_extra=_CONNECTION_RULES)
 
-    source: str = key('output "component.variable", a prefix of outputs, or a pattern', "plant.uav", alias="from")
+    sources: NameList = key(
+        'output "component.variable", a prefix of outputs, or a pattern; the outputs of a list are added',
+        "plant.uav",
+        alias="from",
+    )
     target: str = key('input "component.variable", a prefix of inputs, or a pattern', "uav.vehicle", alias="to")
-    gain: float = key("factor that is applied after the conversion of units", -1.0, default=1.0)
+    gain: float | list[float] = key(
+        "factor that is applied after the conversion of units; a list has one for each output of a sum", -1.0, default=1.0
+    )
     offset: float = key("value that is added after the gain", 0.5, unit="that of the input", default=0.0)
+    convert: bool = key(
+        "convert Booleans (0 or 1) and all integers to floating-point numbers; above 2^53 they are rounded", True, default=False
+    )
+    interpolation: Interpolation = key(
+        "course of the input within a step. hold: constant; linear: through the last two values of the output, for components "
+        "that interpolate their inputs (FMI 2.0: canInterpolateInputs)",
+        "linear",
+        default="hold",
+    )
     delay: Integer = key(
         "delay; the input keeps the initial output until then", 1, unit="macro steps", default=0, ge=0, le=1_000_000
     )
 
     @model_validator(mode="after")
     def _same_wildcards(self) -> ConnectionSpec:
-        if self is not INVALID and (self.source.count("*"), self.target.count("*")) not in ((0, 0), (1, 1)):
+        if self is not INVALID and {name.count("*") for name in (*self.sources, self.target)} not in ({0}, {1}):
             raise ValueError('expected one "*" in each of "from" and "to", or none')
         return self
 
+    @model_validator(mode="after")
+    def _one_gain_per_source(self) -> ConnectionSpec:
+        if self is not INVALID and not self.sources:
+            raise ValueError('expected at least one output in "from"')
+        if self is not INVALID and len(self.gains) != len(self.sources):
+            outputs = count_noun(len(self.sources), "output")
+            raise ValueError(f'expected a number or one "gain" for each of {outputs}, found {len(self.gains)}')
+        return self
+
+    @property
+    def gains(self) -> list[float]:
+        """Gain of each source."""
+        return self.gain if isinstance(self.gain, list) else [self.gain] * len(self.sources)
+
 
 class IterationSpec(Spec):
-    """Fixed-point iteration: every macro step is repeated from the same state until the connected outputs converge."""
+    """Iteration: every macro step is repeated from the same state until the connected outputs converge."""
+
+    method: IterationMethod = key(
+        "fixed-point: the outputs of a repetition are the inputs of the next one; newton: converges also where this diverges, "
+        "with one more repetition for each connected output",
+        "newton",
+        default="fixed-point",
+    )
 
     tolerance: float = key("an output y has converged if it changes by at most tolerance * (1 + |y|)", 1e-6, default=1e-9, gt=0)
     limit: Integer = key("largest number of iterations in a macro step; more are an error", 20, default=50, ge=2)
@@ -88,7 +128,11 @@ class AlgorithmSpec(Spec):
     """
 
     kind: Literal["staged"] = key("the stages step one after the other", "staged", default="staged")
-    stages: list[list[Name]] = key("names of components, each in exactly one stage", [["usv", "uav"], ["plant"]])
+    stages: list[list[Name]] | None = key(
+        "names of components, each in exactly one stage; default: one stage for each component, ordered by their dependencies",
+        [["usv", "uav"], ["plant"]],
+        default=None,
+    )
     parallel: AutoOrBool = key(
         "run the FMUs of a stage in parallel threads, with identical results. true: always; false: never; auto: if "
         'their measured steps are long enough. With "auto", instances of the same FMU file never run in parallel',
@@ -176,7 +220,7 @@ class SystemSpec(Spec):
         "connections of outputs to inputs", [{"from": "plant.usv", "to": "usv.vehicle"}], default=[]
     )
     algorithm: AlgorithmSpec | None = key(
-        "order of execution; default: the components step one after the other in the order of this file",
+        "order of execution; default: the components step one after the other, ordered by their dependencies",
         {"kind": "staged", "stages": [["usv", "uav"], ["plant"]]},
         default=None,
     )

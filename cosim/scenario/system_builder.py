@@ -29,7 +29,7 @@ from .named_functions import find_function_problems
 from .nested_systems import Node, Scenario
 from .recorded_signals import SignalSelector
 from .schema_types import accepted
-from .stages import parallel_mode, root_stages
+from .stages import StagePlanner, parallel_mode
 from .stop_conditions import StopConditionReader
 from .wiring import Wiring
 
@@ -76,7 +76,10 @@ class SystemBuilder:
         system = System(
             self.components,
             connections,
-            (*root_stages(self.root, self.spec), *([tuple(self.profiles)] if self.profiles else [])),
+            (
+                *StagePlanner(self.components, connections).root_stages(self.root, self.spec),
+                *([tuple(self.profiles)] if self.profiles else []),
+            ),
             dict(self._periods(self.root)),
             self.start_values,
             aliases,

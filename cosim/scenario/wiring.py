@@ -17,10 +17,23 @@ from .schema_types import INVALID, accepted
 
 
 class _Candidate(NamedTuple):
-    """Connection to an input, and whether the scenario names its two variables instead of prefixes."""
+    """Connections to an input, several for a sum, and whether the scenario names their variables instead of prefixes."""
 
-    connection: Connection
+    connections: Sequence[Connection]
     is_variable: bool
+
+
+class _Source(NamedTuple):
+    """Prefix or pattern of outputs, and the outputs by their names after the prefix."""
+
+    target: Target
+    outputs: Mapping[str, str]
+
+    def expected_name(self, rest: str) -> str:
+        """Return the name of the output that matches an input with this name after the prefix."""
+        component, prefix = self.target
+        name = prefix.replace("*", rest) if "*" in prefix else prefix + rest
+        return f"{component}.{name}".replace("..", ".")
 
 
 class Wiring:
@@ -57,7 +70,7 @@ class Wiring:
     def connect_output(self, node: Node, output: Endpoint, name: str, where: str) -> None:
         """Connect one output to the inputs that a name refers to; `where` is its location in the scenario file."""
         for target in self._resolve(node, name, "inputs", where):
-            self._add(_Candidate(Connection(output, Endpoint(*target), 0, where), True))
+            self._add(_Candidate([Connection(output, Endpoint(*target), 0, where)], True))
 
     def excuse(self, node: Node, name: str) -> None:
         """Do not report missing outputs for the inputs that a name refers to, because another problem is the reason."""
@@ -72,50 +85,60 @@ class Wiring:
         if not self._has_invalid_connections:
             explained = self._by_input.keys() | self._excused
             self.problems += [problem for end, problem in self._unmatched_inputs.items() if end not in explained]
-        return (candidate.connection for candidate in self._by_input.values())
+        return (connection for candidate in self._by_input.values() for connection in candidate.connections)
 
     def _expand(self, node: Node, i: int, spec: ConnectionSpec) -> None:
-        where_from, where_to = (node.where("connections", i, key) for key in ("from", "to"))
-        sources = self._resolve(node, spec.source, "outputs", where_from)
-        targets = self._resolve(node, spec.target, "inputs", where_to)
-        outputs = self._slots_of_targets(sources, "output", where_from)
-        inputs = self._slots_of_targets(targets, "input", where_to)
-        if not outputs:
+        path, where_to = ("connections", i, "from"), node.where("connections", i, "to")
+        indices = [(k,) if len(spec.sources) > 1 else () for k in range(len(spec.sources))]
+        sources = [self._find_source(node, name, node.where(*path, *k)) for name, k in zip(spec.sources, indices, strict=True)]
+        inputs = self._slots_of_targets(self._resolve(node, spec.target, "inputs", where_to), "input", where_to)
+        found = [source for source in sources if source]
+        if len(found) < len(sources):
             self.excuse(node, spec.target)
-        for source, own_outputs in outputs:
-            for target, own_inputs in inputs:
-                self._match(source, own_outputs, target, own_inputs, spec, node.where("connections", i))
+            return
+        for target, slots in inputs:
+            for rest, slot in slots.items():
+                self._match(found, Endpoint(target.component, slot), rest, spec, node.where("connections", i))
 
-    def _match(
-        self,
-        source: Target,
-        outputs: Mapping[str, str],
-        target: Target,
-        inputs: Mapping[str, str],
-        spec: ConnectionSpec,
-        where: str,
-    ) -> None:
-        """Connect every input to the output with the same name after the prefix, or at the "*" of a pattern."""
-        for rest, slot in inputs.items():
-            end = Endpoint(target.component, slot)
-            if rest in outputs:
-                output = Endpoint(source.component, outputs[rest])
-                connection = Connection(output, end, spec.delay, where, spec.gain, spec.offset)
-                self._add(_Candidate(connection, is_variable=rest == ""))
-            elif end not in self._inputs_with_values:
-                name = source.prefix.replace("*", rest) if "*" in source.prefix else source.prefix + rest
-                expected = f"{source.component}.{name}".replace("..", ".")
-                hint = did_you_mean(expected, (f"{source.component}.{name}" for name in outputs.values()))
-                self._unmatched_inputs[end] = Problem(f"input {end} has no matching output {expected}{hint}", where)
+    def _find_source(self, node: Node, name: str, where: str) -> _Source | None:
+        """Return the outputs that a name refers to; None if there are none."""
+        found = self._slots_of_targets(self._resolve(node, name, "outputs", where), "output", where)
+        return _Source(*found[0]) if found else None
+
+    def _match(self, sources: Sequence[_Source], end: Endpoint, rest: str, spec: ConnectionSpec, where: str) -> None:
+        """Connect an input to the output of each source with the same name after the prefix, or at the "*" of a pattern."""
+        unmatched = [source for source in sources if rest not in source.outputs]
+        if unmatched and end not in self._inputs_with_values:
+            expected, (component, _) = unmatched[0].expected_name(rest), unmatched[0].target
+            hint = did_you_mean(expected, (f"{component}.{name}" for name in unmatched[0].outputs.values()))
+            self._unmatched_inputs[end] = Problem(f"input {end} has no matching output {expected}{hint}", where)
+        if unmatched:
+            return
+        connections = [
+            Connection(
+                Endpoint(source.target.component, source.outputs[rest]),
+                end,
+                spec.delay,
+                where,
+                gain,
+                0.0 if i else spec.offset,
+                i + 1 if len(sources) > 1 else 0,
+                spec.convert,
+                spec.interpolation,
+            )
+            for i, (source, gain) in enumerate(zip(sources, spec.gains, strict=True))
+        ]
+        self._add(_Candidate(connections, is_variable=rest == ""))
 
     def _add(self, new: _Candidate) -> None:
-        self._count += 1
-        require_at_most(MAX_CONNECTIONS, self._count, "connections of scalars up to here", new.connection.where)
-        end = new.connection.target
+        first = new.connections[0]
+        self._count += len(new.connections)
+        require_at_most(MAX_CONNECTIONS, self._count, "connections of scalars up to here", first.where)
+        end = first.target
         old = self._by_input.get(end)
         if old and old.is_variable == new.is_variable:
-            text = f"input {end} is connected twice: it is already fed by {old.connection.source}"
-            self.problems.append(Problem(text, new.connection.where))
+            text = f"input {end} is connected twice: it is already fed by {old.connections[0].source}"
+            self.problems.append(Problem(text, first.where))
         elif old is None or new.is_variable:
             self._by_input[end] = new
 

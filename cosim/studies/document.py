@@ -96,7 +96,7 @@ def read_study(file: str | Path | Mapping[str, Any], kind: type[S], max_runs: in
 
     Args:
         file: path of the file, name of a shipped study, or content of a study file.
-        kind: schema of the file: SweepSpec or TuneSpec.
+        kind: schema of the file: SweepSpec, TuneSpec or WorstCaseSpec.
         max_runs: largest accepted number of runs, and of cells of a map.
 
     Raises:

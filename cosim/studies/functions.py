@@ -1,4 +1,4 @@
-"""Functions that run studies from Python: `cosim.sweep`, `cosim.tune` and `cosim.regress`."""
+"""Functions that run studies from Python: `cosim.sweep`, `cosim.tune`, `cosim.worst_case` and `cosim.regress`."""
 
 from __future__ import annotations
 
@@ -18,8 +18,10 @@ from .regression import RegressionOutcome
 from .regression_runs import default_folder, run_regressions
 from .summary.sweep_files import SweepSummary, write_sweep_files
 from .summary.tuning_files import write_tuning_files
+from .summary.worst_case_files import write_worst_case_files
 from .sweep import Sweep, SweepRow
 from .tune import Trial, Tuning
+from .worst_case import Attempt, WorstCase
 
 #: a study file, the name of a shipped study, or the content of a study file
 StudySource = str | Path | Mapping[str, Any]
@@ -72,6 +74,21 @@ class TuningResult:
     folder: Path
 
 
+@dataclass(frozen=True)
+class WorstCaseResult:
+    """Finished search for the worst case.
+
+    Attributes:
+        worst: The worst run, with its `parameters`, `severity`, `reason` and whether it `passed`.
+        attempts: All runs.
+        counterexamples: Scenario files of the worst runs that miss a check.
+    """
+
+    worst: Attempt
+    attempts: Sequence[Attempt]
+    counterexamples: Sequence[Path]
+
+
 def sweep(
     study: StudySource,
     *,
@@ -101,12 +118,12 @@ def sweep(
     loaded = Sweep.from_file(study, max_runs)
     folder = Path(output_dir) if output_dir else Path("runs") / loaded.study_file.spec.name
     check_writable(folder)
-    run_store = RunStore(folder, retry_failed)
-    if any(key not in run_store for key in loaded.keys):
-        with LocalRunner(loaded.study.context, workers or available_processors()) as runner:
-            loaded.run(run_store, runner, lambda _: None)
-    loaded.check_names(run_store)
-    return SweepResult(list(loaded.rows(run_store)), write_sweep_files(loaded, run_store, folder, parquet=False), folder)
+    with RunStore(folder, retry_failed) as run_store:
+        if any(key not in run_store for key in loaded.keys):
+            with LocalRunner(loaded.study.context, workers or available_processors()) as runner:
+                loaded.run(run_store, runner, lambda _: None)
+        loaded.check_names(run_store)
+        return SweepResult(list(loaded.rows(run_store)), write_sweep_files(loaded, run_store, folder, parquet=False), folder)
 
 
 def tune(
@@ -136,10 +153,44 @@ def tune(
     loaded = Tuning.from_file(study, max_runs)
     folder = Path(output_dir) if output_dir else Path("runs") / loaded.spec.name
     check_writable(folder)
-    with LocalRunner(loaded.study.context, workers or available_processors()) as runner:
-        best = loaded.run(RunStore(folder, retry_failed), runner, lambda _: None)
+    runner = LocalRunner(loaded.study.context, workers or available_processors())
+    with RunStore(folder, retry_failed) as run_store, runner:
+        best = loaded.run(run_store, runner, lambda _: None)
     write_tuning_files(loaded, folder)
     return TuningResult(best, loaded.trials, folder)
+
+
+def worst_case(
+    study: StudySource,
+    *,
+    output_dir: str | Path | None = None,
+    workers: int | None = None,
+    max_runs: int = MAX_RUNS,
+    retry_failed: bool = False,
+) -> WorstCaseResult:
+    """Search for the run that breaks a controller, as `cosim tune --worst`.
+
+    Args:
+        study: Path of the file of a search, name of a shipped search, or the content of such a file as a dict.
+        output_dir: Folder of the results; None: runs/NAME.
+        workers: Number of runs at a time; None: one for each processor.
+        max_runs: Largest accepted number of runs.
+        retry_failed: Repeat the runs that failed in an earlier call.
+
+    Returns:
+        The worst run, and the runs that miss a check.
+
+    Raises:
+        InputError: The search cannot be run, or an argument is of a wrong type.
+    """
+    _check_arguments(study, output_dir, workers, max_runs)
+    search = WorstCase.from_file(study, max_runs)
+    folder = Path(output_dir) if output_dir else Path("runs") / search.spec.name
+    check_writable(folder)
+    runner = LocalRunner(search.study.context, workers or available_processors())
+    with RunStore(folder, retry_failed) as run_store, runner:
+        search.run(run_store, runner, lambda _: None)
+    return WorstCaseResult(search.worst, search.attempts, write_worst_case_files(search, folder))
 
 
 def regress(

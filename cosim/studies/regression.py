@@ -23,6 +23,9 @@ if TYPE_CHECKING:
     from ..results.comparison import Comparison, Tolerance
 
 
+#: number of names in the line that lists what has changed since a reference was made
+MAX_LISTED_CHANGES = 5
+
 #: keys of a scenario that state expectations of its results
 EXPECTATION_KEYS = ("checks", "reference")
 
@@ -208,7 +211,8 @@ class _FinishedRun:
         except (OSError, ValueError):
             return
         if changes := describe_provenance_changes(made_by, self.result.metadata):
-            yield f"changed since the reference was made: {', '.join(changes)}"
+            more = f" and {len(changes) - MAX_LISTED_CHANGES} more" if len(changes) > MAX_LISTED_CHANGES else ""
+            yield f"changed since the reference was made: {', '.join(changes[:MAX_LISTED_CHANGES])}{more}"
 
     def draw_tubes(self, comparison: Comparison, path: Path) -> Path:
         """Draw the worst signals in their tubes to a file and return its path."""

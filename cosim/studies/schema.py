@@ -163,6 +163,7 @@ class ParameterSpec(Spec):
     max: float = key("upper bound", 10.0)
     start: float | None = key("first value; default: the middle of the bounds", 1.5, default=None)
     scale: Scale = key("scale on which the method searches", "log", default="linear")
+    whole: bool = key("only whole numbers, for example for a seed", True, default=False)
 
     @model_validator(mode="after")
     def _possible(self) -> ParameterSpec:
@@ -170,6 +171,8 @@ class ParameterSpec(Spec):
         check_log_scale(self.scale, self.min)
         if self.start is not None and not self.min <= self.start <= self.max:
             raise ValueError('expected "start" between "min" and "max"')
+        if self.whole and math.ceil(self.min) > math.floor(self.max):
+            raise ValueError('expected a whole number between "min" and "max"')
         return self
 
 
@@ -183,6 +186,12 @@ class MethodSpec(Spec):
     generations: Integer = key("generations after the first (differential_evolution)", 40, default=20, ge=1)
     evaluations: Integer = key("points at most (nelder_mead, powell)", 100, default=200, ge=1)
     seed: Integer = key("seed of the method", 7, default=1, ge=0)
+
+    def run_counts(self) -> dict[CountPath, int]:
+        """Return the factors of the largest number of points."""
+        if self.kind == "differential_evolution":
+            return {("method", "population"): self.population, ("method", "generations"): self.generations + 1}
+        return {("method", "evaluations"): self.evaluations}
 
 
 class TuneSpec(StudySpec):
@@ -216,11 +225,36 @@ class TuneSpec(StudySpec):
 
     def run_counts(self) -> dict[CountPath, int]:
         """Return the numbers of points and cases."""
-        method = self.method
-        counts: dict[CountPath, int] = {("method", "evaluations"): method.evaluations}
-        if method.kind == "differential_evolution":
-            counts = {("method", "population"): method.population, ("method", "generations"): method.generations + 1}
-        return counts | {("cases",): len(self.cases)}
+        return self.method.run_counts() | {("cases",): len(self.cases)}
+
+
+class WorstCaseSpec(StudySpec):
+    """A search for the run that breaks a controller: the disturbances, and the limits that a run must meet."""
+
+    parameters: list[ParameterSpec] = key(
+        "what is searched: wind, waves, times of faults, seeds",
+        [{"name": "wind", "set": "/components/plant/arguments/environment/wind/speed", "min": 0.5, "max": 8.0}],
+        min_length=1,
+    )
+    success: list[CheckSpec] | None = key(
+        "limits on KPIs; default: the checks of the scenario", [{"kpi": "landing.lateral_error", "max": 0.2}], default=None
+    )
+    keep: Integer = key("largest number of counterexamples that are written, the worst ones", 5, default=3, ge=1)
+    method: MethodSpec = key(
+        "optimization method and its limits",
+        {"kind": "differential_evolution", "population": 16, "generations": 5},
+        default=MethodSpec(population=16, generations=20, evaluations=200, seed=1),
+    )
+
+    @model_validator(mode="after")
+    def _consistent(self) -> WorstCaseSpec:
+        _check_unique("parameters", [parameter.name for parameter in self.parameters])
+        check_conflicts(self.settings, [(each.name, [(path, None) for path in each.set]) for each in self.parameters])
+        return self
+
+    def run_counts(self) -> dict[CountPath, int]:
+        """Return the number of points."""
+        return self.method.run_counts()
 
 
 def _check_unique(what: str, names: Iterable[str]) -> None:

@@ -26,13 +26,13 @@ import numpy as np
 from ..core.errors import InputError, Problem
 from ..core.expressions import Expression, parse_expression
 from ..core.size_limits import MAX_RUNS
-from .design import interpolate
 from .document import StudyFile, read_study
 from .execution.job import Job
 from .execution.run_store import RunStore
 from .objective import Constraint, parse_constraint
 from .optimizers import INFEASIBLE_RANK, METHODS
-from .schema import ParameterSpec, TuneSpec
+from .schema import TuneSpec
+from .search_space import parameter_settings, parameter_values, start_coordinates
 from .study import CheckingRunner, ObservedKpis, RecordObserver, Study, run_pending
 
 #: ranks of points worse than any feasible value, beside INFEASIBLE_RANK; small enough for optimizers to square and add them
@@ -130,10 +130,11 @@ class Tuning:
             InputError: before the first run for a parameter or case that cannot be set; after the first runs for unknown names
                 in the objective or a constraint.
         """
-        self.study.check_jobs(runner, self._jobs([_start_parameters(self.spec)]))
+        start = start_coordinates(self.spec.parameters)
+        self.study.check_jobs(runner, self._jobs([parameter_values(self.spec.parameters, start)]))
 
         def evaluate(points: Sequence[Sequence[float]]) -> list[float]:
-            parameters = [self._parameters(point) for point in points]
+            parameters = [parameter_values(self.spec.parameters, point) for point in points]
             run_pending((job for each in parameters for job in self._jobs([each])), run_store, runner, observe)
             trials = [self._trial(each, run_store) for each in parameters]
             self.trials += trials
@@ -141,19 +142,16 @@ class Tuning:
                 self._check_names()
             return [trial.rank for trial in trials]
 
-        METHODS[self.spec.method.kind](evaluate, _start_coordinates(self.spec), self.spec.method)
+        METHODS[self.spec.method.kind](evaluate, start, self.spec.method)
         self._check_names()
         return min(self.trials, key=lambda trial: trial.rank)
 
     def settings(self, parameters: Mapping[str, float]) -> dict[str, float]:
         """Return the settings of the scenario for these parameters."""
-        return {path: parameters[each.name] for each in self.spec.parameters for path in each.set}
+        return parameter_settings(self.spec.parameters, parameters)
 
     def _jobs(self, points: Iterable[Mapping[str, float]]) -> list[Job]:
         return [self.study.job({**case, **self.settings(point)}) for point in points for case in self.spec.cases]
-
-    def _parameters(self, point: Sequence[float]) -> dict[str, float]:
-        return {spec.name: _parameter_value(spec, float(x)) for spec, x in zip(self.spec.parameters, point, strict=True)}
 
     def _trial(self, parameters: Mapping[str, float], run_store: RunStore) -> Trial:
         records = [run_store[job.key] for job in self._jobs([parameters])]
@@ -179,24 +177,3 @@ class Tuning:
         ]
         if problems and self.observed_kpis.runs:
             raise InputError(problems)
-
-
-def _parameter_value(spec: ParameterSpec, coordinate: float) -> float:
-    """Return the parameter at a coordinate in [0, 1], within its bounds and rounded to 12 digits, equal on all machines."""
-    rounded = float(f"{interpolate(coordinate, spec.min, spec.max, spec.scale == 'log'):.12g}")
-    return min(max(rounded, spec.min), spec.max)
-
-
-def _start_parameters(spec: TuneSpec) -> dict[str, float]:
-    return {each.name: _parameter_value(each, x) for each, x in zip(spec.parameters, _start_coordinates(spec), strict=True)}
-
-
-def _start_coordinates(spec: TuneSpec) -> list[float]:
-    """Return the start of the search in the unit cube; a parameter without a start value begins in the middle."""
-    return [0.5 if each.start is None else _unit_coordinate(each, each.start) for each in spec.parameters]
-
-
-def _unit_coordinate(spec: ParameterSpec, value: float) -> float:
-    if spec.scale == "log":
-        return math.log(value / spec.min) / math.log(spec.max / spec.min)
-    return (value - spec.min) / (spec.max - spec.min)

@@ -103,7 +103,8 @@ def scenarios_page() -> str:
     scenarios, studies = CATALOGUE["scenarios"](), CATALOGUE["sweeps"]()
     return page(
         "Shipped scenarios",
-        "`cosim run NAME` runs a scenario, `cosim sweep NAME` and `cosim tune NAME` a study. `cosim list` prints these lists.",
+        "`cosim run NAME` runs a scenario, `cosim sweep NAME`, `cosim tune NAME` and `cosim tune --worst NAME` a study. "
+        "`cosim list` prints these lists.",
         *(
             table((kind, "content"), ((code(each.name), plain(each.description)) for each in entries))
             for kind, entries in (("scenario", scenarios), ("study", studies))

@@ -10,7 +10,7 @@ from typing import Any
 from markdown_parts import code, page, plain, table
 
 from cosim.scenario import json_schema
-from cosim.studies.schema import SweepSpec, TuneSpec, study_json_schema
+from cosim.studies.schema import SweepSpec, TuneSpec, WorstCaseSpec, study_json_schema
 
 Schema = Mapping[str, Any]
 
@@ -28,13 +28,14 @@ def scenario_keys_page() -> str:
 
 def study_keys_page() -> str:
     """Return the page with the keys of sweeps and tunings."""
-    sweep, tuning = study_json_schema(SweepSpec), study_json_schema(TuneSpec)
+    sweep, tuning, worst = study_json_schema(SweepSpec), study_json_schema(TuneSpec), study_json_schema(WorstCaseSpec)
     return page(
         "Sweep and tuning keys",
-        "`cosim schema --sweep` and `cosim schema --tune` print the schemas of this page. [Sweeps and tuning](../sweeps.md) "
+        "`cosim schema --sweep`, `--tune` and `--worst` print the schemas of this page. [Sweeps and tuning](../sweeps.md) "
         "explains how the keys work together.",
         *_sections("Sweep", sweep),
         *_sections("Tuning", tuning, sweep["$defs"]),
+        *_sections("Search for the worst case", worst, {**sweep["$defs"], **tuning["$defs"]}),
     )
 
 

@@ -60,6 +60,21 @@ class FloatingBody(ContactBody):
         return elevation
 
 
+class SubmergedBody(ContactBody):
+    """A submerged vehicle; its frame in Bullet has the principal axes, and it predicts with the previous contact impulse."""
+
+    ARRAY_SIZES = FloatingBody.ARRAY_SIZES
+    INITIALIZE_ARRAYS = FreeBody.INITIALIZE_ARRAYS
+    PREDICT_ARRAYS = (
+        (*PREDICT_ARGUMENTS, "principal_axes", "contact_impulse"),
+        FloatingBody.PREDICT_ARRAYS[1],
+    )
+    CORRECT_ARRAYS = (
+        (*ContactBody.CORRECT_ARRAYS[0], "environment_inputs", "previous_contact_impulse"),
+        FloatingBody.CORRECT_ARRAYS[1],
+    )
+
+
 class PlanarBody(ContactBody):
     """A vessel in the horizontal plane: heave, roll and pitch are zero under any load.
 
@@ -120,4 +135,6 @@ def body_class(model: Model) -> type[ContactBody]:
     """Return the contact body class for the motion of `model`."""
     if model.motion == "planar":
         return PlanarBody
+    if model.craft:
+        return SubmergedBody
     return FloatingBody if model.is_vessel else FreeBody

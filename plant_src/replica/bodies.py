@@ -11,6 +11,7 @@ from ..catalogue import MODELS
 from ..json_reader import Numbers
 from ..physics.body import create_compound_shape, set_dynamics
 from ..physics.client import pybullet
+from ..vehicles.common.inertia import principal_axes
 from ..vehicles.common.shapes import quaternion_from_matrix
 from ..vehicles.strider import geometry as strider
 from ..vehicles.strider.parameters import RUDDER_ARM
@@ -27,7 +28,7 @@ _QUADCOPTER = MODELS["ar_drone"]
 assert _QUADCOPTER.airframe is not None
 _ROTORS = np.array([rotor.position for rotor in _QUADCOPTER.airframe.rotors])
 _TORQUE_SIGNS = [rotor.torque_sign for rotor in _QUADCOPTER.airframe.rotors]
-_PRINCIPAL_AXES = _QUADCOPTER.airframe.principal_axes()[1]
+_PRINCIPAL_AXES = principal_axes(_QUADCOPTER.airframe.inertia)[1]
 
 #: centre of mass in the body frame of the published model (m)
 CENTRE_OF_MASS = np.array([-0.003329, 0.001981, -0.000577])

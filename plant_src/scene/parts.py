@@ -14,7 +14,7 @@ import numpy as np
 from ..vehicles.common.shapes import Quaternion, Vector
 from ..vehicles.model import Model
 from ..vehicles.strider import geometry as strider_geometry
-from ..vehicles.strider.parameters import DECK_TOP, DECK_X, DECK_Y
+from ..vehicles.strider.parameters import DECK_TOP, DECK_X, DECK_Y, HULL_BOTTOM, HULL_LENGTH, HULL_OFFSET
 
 IDENTITY_QUATERNION: Quaternion = (0.0, 0.0, 0.0, 1.0)
 ALONG_X: Quaternion = (0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5))  # turns a cylinder's axis from z to x
@@ -97,7 +97,7 @@ def strider_parts(_model: Model) -> list[Part]:
         *landing_mark(x, y, DECK_TOP),
     ]
     for side in (-1.0, 1.0):
-        parts += _hull_parts(side * strider_geometry.HULL_OFFSET)
+        parts += _hull_parts(side * HULL_OFFSET)
         parts += [_strut(end * 0.24, side, width / 2) for end in (-1.0, 1.0)]
     return parts
 
@@ -113,8 +113,8 @@ _RINGS = ((0.24, 0.001, WHITE), (0.21, 0.002, GREY))
 
 
 def _hull_parts(y: float) -> list[Part]:
-    radius, half = 0.055, strider_geometry.HULL_LENGTH / 2
-    z = strider_geometry.HULL_BOTTOM + radius - 0.03
+    radius, half = 0.055, HULL_LENGTH / 2
+    z = HULL_BOTTOM + radius - 0.03
     straight = 2 * (half - radius)
     ends = [Part("sphere", (radius,), (end * (half - radius), y, z), YELLOW) for end in (-1.0, 1.0)]
     stripe = Part("box", (straight, 0.03, 0.02), (0.0, y, z + radius), GREY)
@@ -123,7 +123,7 @@ def _hull_parts(y: float) -> list[Part]:
 
 def _strut(x: float, side: float, deck_edge: float) -> Part:
     """Return a strut from a hull to the edge of the deck."""
-    outer, low, inner, high = strider_geometry.HULL_OFFSET, -0.07, deck_edge - 0.02, DECK_TOP - 0.03
+    outer, low, inner, high = HULL_OFFSET, -0.07, deck_edge - 0.02, DECK_TOP - 0.03
     run, rise = inner - outer, high - low
     angle = side * math.atan2(-run, rise)  # about x, from z towards the middle
     turn = (math.sin(angle / 2), 0.0, 0.0, math.cos(angle / 2))

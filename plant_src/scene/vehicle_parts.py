@@ -10,7 +10,8 @@ from ..catalogue import models_of
 from ..vehicles.common.shapes import Body, Box, Quaternion, Vector
 from ..vehicles.model import Model
 from ..vehicles.multirotor.airframe import Airframe, Rotor
-from .parts import ALONG_X, BLACK, GREY, ORANGE, RED, SILVER, YELLOW, Part, ar_drone_parts, landing_mark, strider_parts
+from ..vehicles.submerged.craft import Craft
+from .parts import ALONG_X, BLACK, BLUE, GREY, ORANGE, RED, SILVER, YELLOW, Part, ar_drone_parts, landing_mark, strider_parts
 
 #: model -> function that draws it in detail
 DETAILED_MODELS: Mapping[str, Callable[[Model], list[Part]]] = {"ar_drone": ar_drone_parts, "strider": strider_parts}
@@ -27,6 +28,8 @@ def vehicle_parts(vehicle: Any) -> list[Part]:
         return DETAILED_MODELS[model.name](model)
     if model.airframe:
         return list(multirotor_parts(model.airframe, model.body))
+    if model.craft:
+        return list(submerged_parts(model.craft, model.body))
     return list(catamaran_parts(model.body) if model.is_vessel else box_parts(model.body))
 
 
@@ -79,6 +82,31 @@ def _arm_parts(rotor: Rotor, radius: float, arm: float) -> Iterator[Part]:
     colour: Vector = RED if x > 1e-6 else SILVER
     yield Part("cylinder", (0.98 * radius, 0.012 * arm), (x, y, z + 0.02 * arm), BLACK, opacity=0.5)
     yield Part("cylinder", (0.9 * radius, 0.02 * arm), (x, y, z + 0.02 * arm), colour, opacity=0.6)
+
+
+def submerged_parts(craft: Craft, body: Body) -> Iterator[Part]:
+    """Yield the skids and the float of each collision box, an electronics tube, and the thrusters with their ducts."""
+    for box in body.boxes:
+        (x, y, z), (length, width, height) = box.position, box.half_extents
+        yield Part("box", (1.8 * length, 1.4 * width, 0.7 * height), (x, y, z + 0.6 * height), BLUE, box.orientation)
+        yield Part("cylinder", (0.4 * height, 1.6 * length), (x, y, z - 0.2 * height), BLACK, ALONG_X)
+        yield Part("sphere", (0.38 * height,), (x + 0.8 * length, y, z - 0.2 * height), SILVER)
+        for side in (-0.9, 0.9):
+            yield Part("box", (2 * length, 0.06 * width, 1.6 * height), (x, y + side * width, z - 0.2 * height), BLACK)
+    radius = craft.thruster_radius
+    for thruster in craft.thrusters:
+        turn = rotation_from_z(thruster.axis)
+        yield Part("cylinder", (1.25 * radius, 1.3 * radius), thruster.position, GREY, turn)
+        yield Part("cylinder", (0.45 * radius, 2.6 * radius), thruster.position, BLACK, turn)
+
+
+def rotation_from_z(axis: Vector) -> Quaternion:
+    """Return the shortest rotation (x, y, z, w) from the z axis to a unit vector."""
+    x, y, z = axis
+    if z < -1 + 1e-9:
+        return 1.0, 0.0, 0.0, 0.0
+    w = math.sqrt((1 + z) / 2)
+    return -y / (2 * w), x / (2 * w), 0.0, w
 
 
 def _leg_parts(body: Body, radius: float, top: float) -> Iterator[Part]:

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field
 from functools import cached_property
 from itertools import islice
 
@@ -11,13 +11,11 @@ import numpy as np
 
 from cosim.core.component import Causality, Variable
 
+from .common.inertia import inertia_of
 from .common.interface import ENVIRONMENT_INPUTS
-from .common.shapes import Body, Box, Vector
+from .common.shapes import Body, Vector
 from .multirotor.airframe import Airframe
-from .multirotor.interface import INERTIA_INDICES
-
-#: function from the rotation matrix (3, 3) principal axes to body frame to the collision shape in principal axes
-Boxes = Callable[[np.ndarray], tuple[Box, ...]]
+from .submerged.craft import Craft
 
 
 @dataclass(frozen=True)
@@ -34,11 +32,13 @@ class Model:
         vehicle: Name of the vehicle in scenarios if it differs from `name`.
         motion: "planar" or "6dof"; distinguishes models of the same vehicle.
         constant_count: Number of constants that the equations derive from the parameters, or None if they use the parameters.
-        airframe: Data of a multirotor, whose mass and inertia are parameters.
-        boxes: Collision shape of a multirotor.
+        airframe: Data of a multirotor.
+        craft: Data of a submerged vehicle.
+        body_of: Function from mass (kg) and inertia tensor (kg m2) to the rigid body, if they are parameters. Raises InputError.
         equations: Name of the FMU whose binary has the equations, if it is not `name`.
         layout: Parameters and inputs of these equations, if they have longer arrays than `interface`; the last arrays of inputs
             are those that are longer.
+        hulls: Name of each further hull of a vessel -> its parameters.
     """
 
     name: str
@@ -51,9 +51,11 @@ class Model:
     motion: str = "6dof"
     constant_count: int | None = None
     airframe: Airframe | None = None
-    boxes: Boxes | None = None
+    craft: Craft | None = None
+    body_of: Callable[[float, np.ndarray], Body] | None = None
     equations: str = ""
     layout: Sequence[Variable] = ()
+    hulls: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
 
     @property
     def binary(self) -> str:
@@ -71,12 +73,7 @@ class Model:
         Raises:
             InputError: If mass and inertia are physically impossible; a problem's subject begins with "mass" or "inertia".
         """
-        if self.airframe is None or self.boxes is None:
-            return self.body
-        inertia = np.zeros((3, 3))
-        for name, (i, j) in INERTIA_INDICES.items():
-            inertia[i, j] = inertia[j, i] = parameters[name]
-        return replace(self.airframe, mass=parameters["mass"], inertia=inertia).body(self.boxes)
+        return self.body_of(parameters["mass"], inertia_of(parameters)) if self.body_of else self.body
 
     @cached_property
     def variables(self) -> tuple[Variable, ...]:

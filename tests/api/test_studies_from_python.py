@@ -1,6 +1,7 @@
 """`cosim.compare`, `cosim.sweep`, `cosim.tune` and `cosim.regress` from Python."""
 
 import json
+from pathlib import Path
 
 import pytest
 from python_blocks import scenario
@@ -15,6 +16,8 @@ SWEEP = {
     "settings": {"/stop_time": 0.5},
     "factors": [{"name": "speed", "set": "/components/vessel_control/parameters/speed_command", "values": [0.5, 1.0]}],
 }
+BLOCKS = Path(__file__).parents[1] / "support/python_blocks.py"
+END = {"name": "end", "python": "cosim.kpis:final", "arguments": {"signal": "g.y"}}
 
 
 @pytest.fixture(scope="module")
@@ -51,7 +54,28 @@ def test_a_scenario_is_regressed(tmp_path):
         assert (outcome.code, outcome.name) == (0, "regressed"), outcome.details
 
 
-@pytest.mark.parametrize("function", [cosim.sweep, cosim.tune])
+def test_a_sweep_and_a_tuning_run(tmp_path):
+    """The second call finds all runs in the folder."""
+    base = {**scenario(f"{BLOCKS}:Gain"), "kpis": [END], "stop_time": 0.2}
+    (tmp_path / "base.json").write_text(json.dumps(base))
+    common = {"name": "gains", "scenario": str(tmp_path / "base.json"), "settings": {"g.u": 1.0}}
+    success = [{"kpi": "end.value", "max": 5}]
+    swept = {**common, "factors": [{"name": "k", "set": "g.k", "values": [1.0, 3.0]}], "success": success}
+    for _ in range(2):
+        found = cosim.sweep(swept, output_dir=tmp_path / "sweep", workers=1)
+        assert found.success_rate == 0.5
+        assert [row.record.kpis["end.value"] for row in found.rows] == [2, 6]
+    parameters = [{"name": "k", "set": "g.k", "min": 0.5, "max": 4}]
+    tuned = {
+        **common,
+        "parameters": parameters,
+        "minimize": "abs(end.value - 4)",
+        "method": {"kind": "powell", "evaluations": 15},
+    }
+    assert cosim.tune(tuned, output_dir=tmp_path / "tune", workers=1).best.parameters["k"] == pytest.approx(2, rel=0.01)
+
+
+@pytest.mark.parametrize("function", [cosim.sweep, cosim.tune, cosim.worst_case])
 def test_a_study_of_a_wrong_type_is_refused(function):
     with pytest.raises(cosim.InputError, match="study: expected the path of a study file"):
         function(3)

@@ -32,6 +32,21 @@ def scenario(folder, block="Gain", **more):
     return path
 
 
+OWN_CONTROLLER = """
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+
+
+class Own(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.yaw = 0.0
+        self.register_variable(Real("yaw", causality=Fmi2Causality.input))
+
+    def do_step(self, current_time, step_size):
+        return True
+"""
+
+
 def test_help_names_every_command():
     done = cosim("--help")
     assert done.returncode == 0
@@ -181,6 +196,20 @@ def test_wrong_usage_gives_exit_code_2(arguments, tmp_path):
     assert "Traceback" not in done.stderr
 
 
+def test_an_unknown_command_is_refused_with_the_nearest_one(tmp_path):
+    assert "No such command 'rnu'; did you mean \"run\"?" in cosim("rnu", cwd=tmp_path).stderr
+
+
+def test_a_signal_with_a_unit_into_an_input_without_is_marked(tmp_path):
+    (tmp_path / "own.py").write_text(OWN_CONTROLLER)
+    components = {"own": {"python": "own.py:Own"}, "ship": {"fmu": str(ROOT / "fmus/strider.fmu")}}
+    file = scenario(tmp_path, components=components, connections=[{"from": "ship.attitude.yaw", "to": "own.yaw"}])
+    assert "ship.attitude.yaw -> own.yaw  (rad, the input has no unit)" in cosim("check", file).stdout
+    (tmp_path / "own.py").write_text(OWN_CONTROLLER.replace("self.yaw = 0.0", "pass"))
+    done = cosim("run", file, cwd=tmp_path)
+    assert 'the variable "yaw" is registered, but has no value: ' in done.stderr
+
+
 def test_a_check_of_an_unknown_kpi_value_is_reported_with_its_position(tmp_path):
     """The values of this KPI are unknown before the run."""
     (tmp_path / "kpis.py").write_text("def last(result):\n    values = {'value': 1.0}\n    return values\n")
@@ -198,8 +227,8 @@ def test_a_figure_of_unrecorded_signals_is_refused_only_with_a_report(tmp_path):
         done = cosim(command, file, cwd=tmp_path)
         assert done.returncode == 2
         assert [line.split("$.figures[0].arguments.")[1] for line in done.stderr.splitlines()] == [
-            'vehicle: no signal below "a.y" is recorded; valid: a',
-            'deck: no signal below "b" is recorded; valid: a',
+            'vehicle: no signal below "a.y" is recorded; valid: a (inputs are recorded if "record" names them)',
+            'deck: no signal below "b" is recorded: the scenario has no component "b"; valid: a',
         ]
     assert cosim("run", file, "--no-report", cwd=tmp_path).returncode == 0
 

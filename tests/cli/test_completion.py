@@ -70,5 +70,5 @@ def test_commands_scenarios_roles_and_files_are_completed(terminal):
     terminal.wait_for("my_mission.json")
     terminal.send("\x15cosim bench-controller x.fmu --role uav_mi\t")
     terminal.wait_for("uav_mixer")
-    terminal.send("\x15cosim sweep landing_e\t")
-    terminal.wait_for("landing_envelope")
+    terminal.send("\x15cosim sweep demo1_l\t")
+    terminal.wait_for("demo1_landing")

@@ -28,7 +28,7 @@ GAINS: dict[str, dict[str, float]] = {
         "throttle_min": 35.0,
         "throttle_max": 90.0,
         "mass": 0.441,
-        "thrust_coefficient": 9.148e-6,
+        "thrust_coefficient": 8.24e-6,
     },
     "attitude_controller": {
         "roll_P": 0.3217,
@@ -161,7 +161,7 @@ def test_gains_can_be_tuned_while_running(controller: Any) -> None:
 
 
 def test_hover_throttle_follows_the_mass(controller: Any) -> None:
-    assert controller("altitude_controller").get("hover_throttle") == pytest.approx(65.67, abs=0.01)
+    assert controller("altitude_controller").get("hover_throttle") == pytest.approx(69.19, abs=0.01)
     heavier = controller("altitude_controller", {"mass": 4 * 0.441, "throttle_max": 200.0})
-    assert heavier.get("hover_throttle") == pytest.approx(2 * 65.67, abs=0.01)
+    assert heavier.get("hover_throttle") == pytest.approx(2 * 69.19, abs=0.01)
     assert heavier.step({"reset": True})["throttle"] == heavier.get("hover_throttle")

@@ -26,7 +26,7 @@ GAINS = {
     "force_max": 7.0,
     "filter_frequency": 20.0,
     "mass": 0.441,
-    "thrust_coefficient": 9.148e-6,
+    "thrust_coefficient": 8.24e-6,
 }
 
 
@@ -91,7 +91,7 @@ def test_it_starts_at_hover(controller: Callable[..., ControllerFmu]) -> None:
     for _ in range(50):
         found = fmu.step({"altitude_command": 2.0, "vehicle.position.z": 2.0})
         assert found["thrust"] == pytest.approx(0.441 * 9.81, rel=1e-12)
-        assert found["throttle"] == pytest.approx(65.67, abs=0.01)
+        assert found["throttle"] == pytest.approx(69.19, abs=0.01)
         assert (found["roll_command"], found["pitch_command"]) == (0.0, 0.0)
 
 

@@ -27,8 +27,10 @@ TWINS = {
     "mixer": "Mixer",
     "inverse_kinematics": "InverseKinematics",
     "waypoint_guidance": "WaypointGuidance",
+    "path_guidance": "PathGuidance",
     "speed_controller": "SpeedController",
     "heading_controller": "HeadingController",
+    "heading_autopilot": "HeadingAutopilot",
     "strider_autopilot": "StriderAutopilot",
 }
 TICKS = 2500

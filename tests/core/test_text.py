@@ -40,6 +40,10 @@ def test_a_similar_signal_of_the_same_component_comes_first():
     assert did_you_mean("uva.altitude_command", names) == '; did you mean "uav.altitude_command"?'
 
 
+def test_a_name_in_other_case_comes_first():
+    assert did_you_mean("PI", ["P", "Pi", "Pid"]) == '; did you mean "Pi"?'
+
+
 def test_a_long_name_has_no_similar_one():
     assert did_you_mean(LONG, ["x" * 100, LONG[:-1]]) == ""
     assert did_you_mean("x" * 99, ["x" * 100]) == f'; did you mean "{"x" * 100}"?'

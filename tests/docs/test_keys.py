@@ -4,13 +4,14 @@ import pytest
 from jsonschema import Draft202012Validator
 
 from cosim.scenario import json_schema
-from cosim.studies.schema import SweepSpec, TuneSpec, study_json_schema
+from cosim.studies.schema import SweepSpec, TuneSpec, WorstCaseSpec, study_json_schema
 
 SCHEMAS = {
     "scenario": json_schema(),
     "nested system": json_schema(nested=True),
     "sweep": study_json_schema(SweepSpec),
     "tuning": study_json_schema(TuneSpec),
+    "search for the worst case": study_json_schema(WorstCaseSpec),
 }
 
 

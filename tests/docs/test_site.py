@@ -6,7 +6,6 @@ import sys
 from pathlib import Path
 
 import pytest
-from chromium import open_browser
 
 from cosim.cli import COMMANDS
 from cosim.scenario import json_schema
@@ -43,17 +42,16 @@ def test_the_reference_is_complete(site):
     assert "cosim.run" in text_of(reference / "python.html")
 
 
-def test_pages_are_read_and_searched_as_files_without_a_network(site):
+def test_pages_are_read_and_searched_as_files_without_a_network(site, chromium):
     """The browser has no network and opens no other address than files."""
     for page in site.rglob("*.html"):
         assert not re.search(r'<(script|link|img)[^>]*(src|href)="?(https?:)?//', page.read_text()), page
-    with open_browser(flags=()) as browser:
-        context = browser.new_context(offline=True, viewport={"width": 1300, "height": 700})
-        page, requests = context.new_page(), []
-        page.on("request", lambda request: requests.append(request.url))
-        page.goto((site / "index.html").as_uri())
-        page.click("input[name=query]")
-        page.keyboard.type("waypoint_count", delay=20)
-        page.wait_for_function("document.querySelector('.md-search-result__meta').innerText.includes('matching')")
-        assert page.locator(".md-search-result__link").count() > 0
+    context = chromium.new_context(offline=True, viewport={"width": 1300, "height": 700})
+    page, requests = context.new_page(), []
+    page.on("request", lambda request: requests.append(request.url))
+    page.goto((site / "index.html").as_uri())
+    page.click("input[name=query]")
+    page.keyboard.type("waypoint_count", delay=20)
+    page.wait_for_function("document.querySelector('.md-search-result__meta').innerText.includes('matching')")
+    assert page.locator(".md-search-result__link").count() > 0
     assert {url.partition(":")[0] for url in requests} <= {"file", "data", "blob"}

@@ -175,6 +175,26 @@ def test_an_output_that_is_not_finite_is_named_with_its_source(kind):
 
 
 @pytest.mark.parametrize("kind", EXECUTORS)
+def test_of_several_outputs_that_are_not_finite_the_first_in_the_order_of_steps_is_named(kind):
+    """The plant passes the controller's NaN on, and its connection comes first."""
+
+    def control(values, t, _h):
+        values["y"] = float("nan") if t > 0.045 else 1.0
+
+    def plant(values, _t, _h):
+        values["x"] = values["u"]
+
+    def block(read, written, step):
+        variables = [Variable(read, causality="input", start=0.0), Variable(written, causality="output")]
+        return FakeComponent(variables, step)
+
+    connections = [Connection(endpoint("plant.x"), endpoint("pi.e")), Connection(endpoint("pi.y"), endpoint("plant.u"))]
+    system = System({"plant": block("u", "x", plant), "pi": block("e", "y", control)}, connections, [("pi",), ("plant",)])
+    outcome = simulate(system, Settings(exact_fraction(0), exact_fraction(1), exact_fraction(0.01), {}, executor=kind))
+    assert str(outcome.failure).startswith('pi: do_step failed at t = 0.05 s: the output "y" is nan')
+
+
+@pytest.mark.parametrize("kind", EXECUTORS)
 @pytest.mark.parametrize("copies", [1, 300])
 @pytest.mark.parametrize(("type_", "largest"), [("Float64", np.finfo(np.float64).max), ("Float32", np.finfo(np.float32).max)])
 def test_the_largest_floats_are_finite_and_the_next_ones_are_not(kind, copies, type_, largest):

@@ -20,6 +20,7 @@ from cosim.engine.settings import Settings
 from cosim.scenario import load
 
 TIGHT = Iteration(1e-13, 100)
+NEWTON = Iteration(1e-12, 20, "newton")
 FMUS = resources.root() / "fmus"
 
 
@@ -51,6 +52,31 @@ def test_the_iteration_solves_the_implicit_equations_in_any_order_of_stages(stag
     )
     found = np.column_stack([recording.columns["x.y"], recording.columns["v.y"]])[1:]
     np.testing.assert_allclose(found, implicit_euler(20, 0.1), rtol=0, atol=1e-11)
+
+
+@pytest.mark.usefixtures("executor")
+@pytest.mark.parametrize("stages", [(("x", "v", "f"),), (("f",), ("v",), ("x",))], ids=["Jacobi", "Gauss-Seidel"])
+def test_newtons_method_solves_a_coupling_for_which_the_fixed_point_diverges(stages):
+    """The step of 3 s is beyond the natural period, so that each repetition is farther from the solution."""
+    names, h = ["x.y", "v.y"], 3.0
+    with pytest.raises(ComponentError, match="no convergence"):
+        run_system(make_system(oscillator(), CONNECTIONS, [(Group("all", stages, "auto", TIGHT),)]), 6, "3", names)
+    recording = run_system(make_system(oscillator(), CONNECTIONS, [(Group("all", stages, "auto", NEWTON),)]), 15, "3", names)
+    found = np.column_stack([recording.columns[name] for name in names])[1:]
+    np.testing.assert_allclose(found, implicit_euler(5, h), rtol=0, atol=1e-10)
+
+
+@pytest.mark.usefixtures("executor")
+def test_newtons_method_passes_integers_on():
+    """a = 3 a + n - 1 with the integer n = 4, which another component of the loop counts: a = -1.5."""
+    count = FakeComponent([*inputs("u"), *outputs("n", type="Int32")], lambda values, _t, _h: values.update(n=4))
+    one = FakeComponent(
+        [*inputs("u"), *inputs("n", type="Int32"), *outputs("y")],
+        lambda values, _t, _h: values.update(y=3 * values["u"] + values["n"] - 1),
+    )
+    group = Group("all", (("a", "c"),), "auto", NEWTON)
+    recording = run_system(make_system({"a": one, "c": count}, "a.y > a.u, c.n > a.n, a.y > c.u", [(group,)]), 2, 1, ["a.y"])
+    np.testing.assert_allclose(recording.columns["a.y"][1:], -1.5, atol=1e-10)
 
 
 @pytest.mark.usefixtures("executor")

@@ -45,7 +45,7 @@ def in_stages(draw, members):
 
 
 def random_system(seed):
-    """Return a random system of mixers with units, delays, periods, stages and a group; and the units by component."""
+    """Return a random system of mixers with units, delays, sums, periods, stages and a group; and the units by component."""
     draw = random.Random(seed)  # noqa: S311
     names = [f"m{i}" for i in range(draw.randint(2, 5))]
     units = {name: [draw.choice(list(UNITS)) for _ in range(draw.randint(1, 6))] for name in names}
@@ -54,8 +54,10 @@ def random_system(seed):
     for name in names:
         for j, unit in enumerate(units[name]):
             sources = [source for source, other in outs if _fits(other, unit)]
-            if draw.random() < 0.8:
-                connections.append(Connection(draw.choice(sources), Endpoint(name, f"u{j}"), draw.choice([0, 0, 0, 1, 2, 5])))
+            count = draw.choice([0, 1, 1, 1, 2, 3])
+            for term in range(count):
+                delay, numbers = draw.choice([0, 0, 0, 1, 2, 5]), (draw.choice([1.0, -2.5]), 0.5, term + 1) if count > 1 else ()
+                connections.append(Connection(draw.choice(sources), Endpoint(name, f"u{j}"), delay, "", *numbers))
     grouped = draw.sample(names, draw.choice([0, 0, 1, 2]))
     outside = [name for name in names if name not in grouped]
     stages = in_stages(draw, outside + ([Group("g", in_stages(draw, grouped))] if grouped else []))
@@ -76,6 +78,7 @@ class ReferenceImporter:
         self.seeds = {name: i for i, name in enumerate(units)}
         self.y = {name: [self.seeds[name] + 0.1 * j for j in range(len(units[name]))] for name in units}
         self.u = {name: [0.0] * len(units[name]) for name in units}
+        self.terms = {(c.target, c.term): 0.0 for c in system.connections if c.term}
         self.delayed = {c: [self.y[c.source.component][int(c.source.scalar[1:])]] * c.delay for c in system.connections}
 
     def rows(self):
@@ -107,7 +110,18 @@ class ReferenceImporter:
         queue.append(self.y[source][i])
         value, one, other = queue.pop(0), UNITS[self.units[source][i]], UNITS[self.units[target][j]]
         factor, offset = one.conversion(other) if one and other else (1.0, 0.0)
-        self.u[target][j] = value if (factor, offset) == (1.0, 0.0) else factor * value + offset
+        factor, offset = connection.gain * factor, connection.gain * offset + connection.offset
+        value = value if (factor, offset) == (1.0, 0.0) else factor * value + offset
+        if connection.term:
+            self.terms[connection.target, connection.term] = value
+            value = self.sum(connection.target)
+        self.u[target][j] = value
+
+    def sum(self, target):
+        first, *others = (value for (end, _), value in self.terms.items() if end == target)
+        for value in others:
+            first += value
+        return first
 
     def step(self, name, n):
         count = int(self.system.periods.get(name, exact_fraction("1/10")) / exact_fraction("1/10"))
@@ -118,7 +132,7 @@ class ReferenceImporter:
 
 
 @pytest.mark.parametrize("first", range(0, 120, 10))
-def test_random_systems_follow_stages_units_delays_and_periods(first):
+def test_random_systems_follow_stages_units_delays_sums_and_periods(first):
     for seed in range(first, first + 10):
         system, units = random_system(seed)
         names = [f"{name}.y{j}" for name in units for j in range(len(units[name]))]

@@ -26,6 +26,7 @@ class LeakyIntegrator(Fmi2Slave):
     def __init__(self, **kwargs):
         super().__init__(**kwargs)
         self.gain, self.y, self.steps, self.moving = 2.0, 0.0, 0, False
+        self.history = [0.0]
         self.vehicle = SimpleNamespace(x=1.0)
         self.register_variable(Real("vehicle.x", causality=Fmi2Causality.input))
         self.register_variable(Real("gain", causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable))
@@ -35,7 +36,8 @@ class LeakyIntegrator(Fmi2Slave):
 
     def do_step(self, time, step_size):
         rate = self.gain * (self.vehicle.x - self.y)
-        self.y += step_size * rate
+        self.y = self.history[-1] + step_size * rate
+        self.history.append(self.y)
         self.steps += 1
         self.moving = rate != 0
         return True
@@ -86,7 +88,7 @@ def test_the_description_is_completed(python_fmu):
     assert model.coSimulation.canGetAndSetFMUstate
 
 
-def test_its_state_can_be_restored(python_fmu):
+def test_its_state_with_variables_that_are_not_registered_can_be_restored(python_fmu):
     component = create_component(FmuFile(python_fmu), "one")
     try:
         component.bind(Ports((), {}), Ports((), {}))
@@ -115,7 +117,11 @@ def test_it_runs_on_linux_and_windows(python_fmu):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("x = 1\n", r"empty\.py: cannot be exported: .*No child class of Fmi2Slave"),
+        ("x = 1\n", r"empty\.py: cannot be exported: ValueError: No child class of Fmi2Slave found in module empty\.py"),
+        (
+            SOURCE.replace("self.history = ", "del self.gain\n        self.history = "),
+            r"empty\.py: cannot be exported: AttributeError: ",
+        ),
         ("import no_such_package\n", "No module named 'no_such_package'"),
         (
             SOURCE.replace('Integer("steps",', 'Integer("no way", getter=lambda: 1,'),

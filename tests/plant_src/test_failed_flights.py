@@ -46,16 +46,16 @@ def test_a_first_controller_that_falls_into_the_sea_ends_with_its_cause(tmp_path
     options = [f"--set={name}={json.dumps(value)}" for name, value in settings.items()]
     done = run_cosim("run", "demo1_box", *options, "--output-dir", "out", cwd=tmp_path)
     assert done.returncode == 3, done.stderr
-    assert "WARNING plant: t = 1.33 s: uav ditched: 0.05 m below the water\n" in done.stderr
-    line = "crashed at t = 1.33 s, ended at t = 1.83 s: crash (plant.uav.ditched)"
+    assert "WARNING plant: t = 1.27 s: uav ditched: 0.02 m below the water\n" in done.stderr
+    line = "crashed at t = 1.27 s, ended at t = 1.77 s: crash (plant.uav.ditched)"
     assert f"\n{line}\n" in done.stdout
     run = json.loads((tmp_path / "out/run.json").read_text())
     assert run["terminated_by"] == {
         "condition": "crash",
         "outcome": "crash",
         "cause": "plant.uav.ditched",
-        "since": 1.33,
-        "time": 1.83,
+        "since": 1.27,
+        "time": 1.77,
     }
     assert f"✗ {line}" in (tmp_path / "out/report.html").read_text()
 
@@ -65,4 +65,4 @@ def test_without_the_condition_the_quadcopter_floats_and_kpis_tell_it(settings: 
     result = cosim.run("demo1_box", {**settings, "/stop_when": [], "/kpis": [kpi], "/checks": []})
     assert result.time[-1] == 40.0
     assert result["plant.uav.position.z"][-1] == pytest.approx(0.0866 * (0.5 - 0.443892 / (1025 * 7.5e-4)), abs=1e-3)  # afloat
-    assert result.kpis == {"uav.crashed": False, "uav.ditched": True, "uav.time": 1.33}
+    assert result.kpis == {"uav.crashed": False, "uav.ditched": True, "uav.time": 1.27}

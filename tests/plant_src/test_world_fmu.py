@@ -22,7 +22,7 @@ ROOT = Path(__file__).parents[2]
 DEMO = ROOT / "scenarios/demo1_box.json"
 ARGUMENTS = json.loads((ROOT / "plant_src/world_fmu.json").read_text())
 AGAIN = "30 steps from platform, flight, touchdown and rest, repeated"
-HOVER = 345.0
+HOVER = 363.5
 #: take-off from the platform, flight, motors off, touchdown, rest: (steps, rotor speed)
 FLIGHT = ((10, 0.0), (40, 1.1 * HOVER), (30, HOVER), (100, 0.9 * HOVER), (60, 0.0))
 

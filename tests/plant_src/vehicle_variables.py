@@ -48,26 +48,24 @@ def make_tables() -> str:
         *_rotor_rows(),
         "",
         "### Parameters\n",
-        "The argument `vehicles/NAME/parameters` of the world sets these parameters of a vehicle.\n",
+        "The argument `vehicles/NAME/parameters` of the world sets these parameters of a vehicle. The parameters of vehicles",
+        "that are given by files are those of their family; the file contains their values.\n",
         "| vehicle | parameter | unit | default | meaning |",
         "|---|---|---|---|---|",
     ]
     models = [each for motions in VEHICLE_MODELS.values() for each in motions.values()]
-    return "\n".join(
-        [
-            *parts,
-            *(row for label, model in zip(labels.values(), models, strict=True) for row in _parameter_rows(label, model)),
-            "",
-        ]
-    )
+    described = {model.equations or label: model for label, model in reversed([*zip(labels.values(), models, strict=True)])}
+    rows = [row for label, model in sorted(described.items()) for row in _parameter_rows(label, model)]
+    return "\n".join([*parts, *rows, ""])
 
 
 def _parameter_rows(label: str, model: Model) -> Iterator[str]:
     for variable in model.real_variables("parameter"):
         if not variable.name.startswith((INITIAL_PREFIX, WAVE_PREFIX)):
             unit = variable.unit.name if variable.unit else ""
-            size = f"[1..{len(variable.scalar_names)}]" if variable.shape else ""
-            default = ", ".join(f"{value:.7g}" for value in np.ravel(variable.start))
+            lengths = ["n"] if model.equations and len(variable.shape) == 1 else variable.shape
+            size = f"[{','.join(f'1..{length}' for length in lengths)}]" if lengths else ""
+            default = "" if model.equations else ", ".join(f"{value:.7g}" for value in np.ravel(variable.start))
             yield f"| {label} | `{variable.name}{size}` | {unit} | {default} | {variable.description} |"
 
 

@@ -1,9 +1,8 @@
-"""A real flight, and a real browser to look at pages with."""
+"""A real flight, and visits of its pages in a real browser."""
 
 import time
 
 import pytest
-from chromium import open_browser
 
 import cosim
 
@@ -12,12 +11,6 @@ import cosim
 def flight_result():
     """Demo 1 until shortly after the landing: one of its five checks is not met, it has not been round the box."""
     return cosim.run("demo1_box", stop_time=16)
-
-
-@pytest.fixture(scope="session")
-def chromium():
-    with open_browser() as opened:
-        yield opened
 
 
 class PageVisit:

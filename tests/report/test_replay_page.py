@@ -2,6 +2,7 @@
 
 from copy import deepcopy
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -61,6 +62,74 @@ def test_scrubber_keys_and_plots_change_the_time(opened, flight_result):
     assert opened.page.locator(".plot b").first.inner_text() == f"{altitude:.4g} m"
 
 
+def test_the_space_bar_plays_at_once_whatever_was_clicked(open_page, shared):
+    fresh = open_page(Path(shared.url.removeprefix("file://")))
+    fresh.page.keyboard.press("Space")
+    fresh.until("cosimReplay.player.playing && cosimReplay.player.time > 0")
+    fresh.page.get_by_role("button", name="Chase", exact=True).click()
+    fresh.page.keyboard.press("Space")
+    assert fresh("!cosimReplay.player.playing && cosimReplay.view.cameras.mode === 'chase'")
+
+
+def scale(opened, axis="x"):
+    return opened(f"cosimReplay.plots.list.map(({{chart}}) => [chart.scales.{axis}.min, chart.scales.{axis}.max])")
+
+
+def test_plots_are_zoomed_and_panned_by_pointer_and_buttons(opened):
+    """Dragging from a quarter to a half of a plot shows this part of the time in all plots."""
+    over = opened.page.locator(".u-over").first
+    over.scroll_into_view_if_needed()
+    box = over.bounding_box()
+
+    def drag(first, last):
+        opened.page.mouse.move(box["x"] + first * box["width"], box["y"] + 20)
+        opened.page.mouse.down()
+        opened.page.mouse.move(box["x"] + last * box["width"], box["y"] + 25, steps=3)
+        opened.page.mouse.up()
+
+    drag(0.25, 0.5)
+    assert np.array(scale(opened)) == pytest.approx(np.tile([4.0, 8.0], (len(scale(opened)), 1)), abs=0.1)
+    opened.page.keyboard.down("Shift")
+    drag(0.75, 0.5)
+    opened.page.keyboard.up("Shift")
+    assert scale(opened)[0] == pytest.approx([5.0, 9.0], abs=0.15)
+    over.dblclick(position={"x": 5, "y": 20})
+    assert scale(opened)[-1] == [0, 16]
+    opened.seek(8)
+    for button, expected in (("Zoom in", [4, 12]), ("Later", [6, 14]), ("Later", [8, 16]), ("Later", [8, 16]), ("All", [0, 16])):
+        opened.page.get_by_role("button", name=button, exact=True).click()
+        assert scale(opened)[0] == expected
+
+
+def test_a_change_of_theme_keeps_cursors_and_zoom(opened):
+    opened.seek(4)
+    opened("cosimReplay.plots.look([2, 10])")
+    cursors = "[...document.querySelectorAll('.plot .now')].map((line) => line.style.transform)"
+    opened.page.wait_for_timeout(50)
+    before = opened(cursors)
+    opened.page.locator("[data-toggle-theme]").click()
+    opened.page.wait_for_timeout(50)
+    assert opened(cursors) == before
+    assert scale(opened)[0] == [2, 10]
+    opened.page.locator("[data-toggle-theme]").click()
+    opened("cosimReplay.plots.look(null)")
+
+
+def test_axes_have_units_and_angles_have_no_jumps(open_page, tmp_path):
+    time = np.linspace(0, 20, 401)
+    turned = np.pi - 0.9 * time
+    columns = {"yaw": np.arctan2(np.sin(turned), np.cos(turned)), "rest": np.zeros(401)}
+    result = Result(Recording(time, columns, {"yaw": "rad", "rest": "m"}), metadata={"name": "turns"})
+    write_replay([result], tmp_path / "turns.html")
+    opened = open_page(tmp_path / "turns.html")
+    charts = "cosimReplay.plots.list.map(({chart}) => chart.axes.map((axis) => axis.label))"
+    assert ["time (s)", "rad"] in opened(charts)
+    opened.seek(20)
+    assert float(opened.page.locator(".plot b").first.inner_text().removesuffix(" rad")) == pytest.approx(turned[-1], abs=0.01)
+    low, _ = scale(opened, "y")[0]
+    assert low < turned[-1]
+
+
 def test_it_plays_at_its_speed_to_the_end_and_restarts(opened):
     opened.page.select_option(".speed", "8")
     opened.seek(12.0)
@@ -75,7 +144,7 @@ def test_it_plays_at_its_speed_to_the_end_and_restarts(opened):
 
 def test_cameras_show_their_targets(opened):
     camera = "cosimReplay.view.cameras.camera"
-    opened.page.get_by_role("button", name="Chase", exact=True).click()
+    opened.page.get_by_role("button", name="uav", exact=True).click()
     distances = []
     for time in (2.0, 9.0):
         opened.seek(time)
@@ -124,19 +193,36 @@ def test_ghosts_can_be_switched_on(opened):
 
 
 def test_something_is_drawn(opened):
-    """The vessel in the middle of the picture is grey, the water beside it is blue."""
+    """The deck is grey, the water beside the vessel blue, and the shore behind it green."""
     opened.page.click("text=usv")
     colours = opened(
         """() => { const {view} = cosimReplay, gl = view.renderer.getContext(), pixel = new Uint8Array(4);
+        const {x, y} = view.actors[1].object.position.clone().setZ(0.27).project(view.cameras.camera);
         view.show("trails", false);
         view.renderer.render(view.scene, view.cameras.camera);
         view.show("trails", true);
-        return [0.5, 0.97].map((x) => (gl.readPixels(gl.drawingBufferWidth * x, gl.drawingBufferHeight / 2, 1, 1, gl.RGBA,
-          gl.UNSIGNED_BYTE, pixel), [...pixel.slice(0, 3)])); }"""
+        const {drawingBufferWidth: width, drawingBufferHeight: height} = gl;
+        return [[0.5 + 0.5 * x, 0.5 + 0.5 * y], [0.97, 0.4], [0.03, 0.9]].map(([right, up]) => {
+          gl.readPixels(width * right, height * up, 1, 1, gl.RGBA, gl.UNSIGNED_BYTE, pixel);
+          return [...pixel.slice(0, 3)]; }); }"""
     )
-    deck, water = np.array(colours, float)
-    assert np.ptp(deck) < 30  # grey
-    assert water[2] > water[0] + 30  # blue
+    deck, water, trees = np.array(colours, float)
+    assert np.ptp(deck) < 30
+    assert water[2] > water[0] + 30
+    assert trees[1] > max(trees[0], trees[2]) + 10
+
+
+def test_the_vehicles_are_large_at_the_start_and_stay_in_the_picture(opened):
+    """The camera of the start follows all vehicles; the vessel is at least a tenth as wide as the picture."""
+    opened.page.get_by_role("button", name="Group", exact=True).click()
+    camera = "cosimReplay.view.cameras.camera"
+    project = f"({{object: {{position}}}}) => position.clone().project({camera}).toArray().slice(0, 2)"
+    width = f"2 * Math.tan({camera}.fov * Math.PI / 360) * {camera}.aspect"
+    vessel = "cosimReplay.view.actors[1]"
+    for time in (0.0, 4.0, 8.0, 16.0):
+        opened.seek(time)
+        assert np.abs(opened(f"cosimReplay.view.actors.map({project})")).max() < 0.95
+        assert opened(f"2 * {vessel}.reach / ({vessel}.position.distanceTo({camera}.position) * {width})") > 0.1
 
 
 ENVIRONMENT = {"seed": 5, "waves": {"spectrum": "jonswap", "significant_height": 0.3, "peak_period": 3.0, "spreading": 2}}

@@ -2,7 +2,9 @@
 
 import json
 import re
+from dataclasses import replace
 from html.parser import HTMLParser
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -15,6 +17,7 @@ from cosim.core import resources
 from cosim.core.errors import InputError
 from cosim.core.recording import Recording
 from cosim.report import pages
+from cosim.report.run_page import write_report
 from cosim.results import Result, write_run
 from cosim.scenario import load
 
@@ -185,3 +188,17 @@ def test_run_json_contains_units_and_connections(directory):
     assembly.free()
     assert len(about["system"]["connections"]) == len(assembly.system.connections)
     assert {one["name"] for one in about["system"]["components"]} == set(assembly.system.components)
+
+
+def test_a_page_shows_no_folder_of_this_machine(flight_result, tmp_path, monkeypatch):
+    """Paths below the working directory are relative, others are file names; JSON paths and addresses stay."""
+    monkeypatch.chdir(tmp_path)
+    texts = [f"{tmp_path}/own/pilot.fmu is late", "/components/uav: see https://example.org/a/b", f"in {Path(__file__)}"]
+    metadata = {**flight_result.metadata, "warnings": texts}
+    write_report(replace(flight_result, metadata=metadata), [], [], tmp_path / "report.html")
+    page = (tmp_path / "report.html").read_text()
+    assert "<li>own/pilot.fmu is late</li>" in page
+    assert f"<li>{texts[1]}</li>" in page
+    assert f"<li>in {Path(__file__).name}</li>" in page
+    assert str(tmp_path) not in page
+    assert str(Path(__file__).parents[2]) not in page

@@ -8,6 +8,7 @@ import pytest
 from cosim_command import run_cosim
 
 from cosim import kpis
+from cosim.core.errors import InputError
 from cosim.core.recording import Recording
 from cosim.results import Result
 from cosim.results.kpi import kpi_senses, kpi_units
@@ -225,3 +226,12 @@ def test_units_are_those_of_the_signals():
 def test_better_is_declared():
     named = [("rms", kpis.rms, {}), ("mean", kpis.mean, {})]
     assert kpi_senses(named, ["rms.value", "mean.value"]) == {"rms.value": "lower"}
+
+
+def test_a_target_is_converted_to_the_unit_of_the_signal():
+    values = {"tank": np.array([20.0, 30.0]), "setpoint": np.array([293.15, 300.15]), "power": np.array([1.0, 2.0])}
+    units = {"tank": "degC", "setpoint": "K", "power": "W"}
+    result = Result(Recording(np.array([0.0, 1.0]), values, units))
+    assert value(kpis.final, "tank", "setpoint", result=result) == pytest.approx(3.0)
+    with pytest.raises(InputError, match=r'"power" \(W\) cannot be compared with "tank" \(degC\)'):
+        kpis.final(result, "tank", "power")

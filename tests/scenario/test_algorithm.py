@@ -3,6 +3,7 @@
 import json
 
 import pytest
+from systems import connection
 
 from cosim.core.errors import InputError
 from cosim.scenario import load
@@ -52,3 +53,52 @@ def test_any_other_value_of_parallel_is_an_error_of_one_line(tmp_path, probe):
     (problem,) = refusal.value.problems
     assert problem.message == 'expected "auto", true or false; found "sometimes"'
     assert problem.where.endswith("$.algorithm.parallel")
+
+
+def stage_order(folder, components, connections=(), **more):
+    prepared = load(folder.scenario(components, list(connections), **more))
+    prepared.free()
+    return prepared.system.stages
+
+
+CLASS = """
+from cosim.core.component import Component, Variable
+
+
+class {name}(Component):
+    binds_everything, has_state = False, False
+
+    def __init__(self, instance_name):
+        self.variables = [Variable("u", causality="input", start=0.0), Variable("y", causality="output")]
+        self.dependencies = {{"y": frozenset({direct})}}
+
+    def bind(self, inputs, outputs): ...
+    def set(self, name, value): ...
+    def get(self, name): return 0.0
+    def set_inputs(self): ...
+    def get_outputs(self): ...
+    def do_step(self, time, step_size): ...
+"""
+
+
+@pytest.fixture
+def loop(folder):
+    """A component without direct feed-through, and one with it."""
+    for name, direct in (("Plant", []), ("Controller", ["u"])):
+        (folder.path / f"{name}.py").write_text(CLASS.format(name=name, direct=direct))
+    return {name.lower(): {"python": f"{name}.py:{name}"} for name in ("Controller", "Plant")}
+
+
+def test_without_stages_components_step_after_those_that_feed_them(folder):
+    gains = {name: folder.block("Gain") for name in "cba"}
+    chain = [connection("a.y", "b.u"), connection("b.y", "c.u")]
+    assert stage_order(folder, gains, chain) == (("a",), ("b",), ("c",))
+    assert stage_order(folder, gains, [connection("a.y", "b.u", delay=1)]) == (("c",), ("b",), ("a",))
+    assert stage_order(folder, gains, [*chain, connection("c.y", "a.u")]) == (("c",), ("b",), ("a",))  # unknown dependencies
+
+
+def test_in_a_loop_the_component_with_direct_feedthrough_steps_last(folder, loop):
+    wires = [connection("controller.y", "plant.u"), connection("plant.y", "controller.u")]
+    assert stage_order(folder, loop, wires) == (("plant",), ("controller",))
+    ((group,),) = stage_order(folder, {name: folder.block("Gain") for name in "ab"}, algorithm={"iteration": {}})
+    assert group.stages == (("a",), ("b",))

@@ -22,11 +22,12 @@ def test_incompatible_units_and_types_are_refused(folder, probes):
         connection("b.uint64_out", "a.u"),
         connection("a.i_out", "b.f_in"),
     ]
+    hint = ' unless the connection has "convert": true'
     assert [line.split(": ", 2)[2] for line in folder.problems(xml, wires)] == [
         "a.s_out cannot feed b.u: type String cannot be converted to Float64",
         "a.b_out cannot feed b.int8_in: type Boolean cannot be converted to Int8",
-        "b.uint64_out cannot feed a.u: type UInt64 cannot be converted to Float64",
-        "a.i_out cannot feed b.f_in: type Int32 cannot be converted to Float32",
+        f"b.uint64_out cannot feed a.u: type UInt64 cannot be converted to Float64{hint}",
+        f"a.i_out cannot feed b.f_in: type Int32 cannot be converted to Float32{hint}",
     ]
 
 

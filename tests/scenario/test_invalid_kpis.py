@@ -37,10 +37,13 @@ def test_arguments_of_kpis_are_checked_before_the_run(folder, arguments, line):
 @pytest.mark.parametrize(
     ("arguments", "line"),
     [
-        ({"vehicle": "a.shpi"}, 'vehicle: no signal below "a.shpi" is recorded; did you mean "a.ship"?'),
+        (
+            {"vehicle": "a.shpi"},
+            'vehicle: no signal below "a.shpi" is recorded; did you mean "a.ship"? (inputs are recorded ',
+        ),
         (
             {"vehicle": "a.ship", "target": "a.ship"},
-            'target: no signal "a.ship" is recorded; valid: a.ship.position.x, a.ship.position.y',
+            'target: no signal "a.ship" is recorded; valid: a.ship.position.x, a.ship.position.y (inputs are ',
         ),
     ],
 )
@@ -48,7 +51,7 @@ def test_signals_in_arguments_of_functions_are_checked_before_the_run(folder, ar
     (folder.path / "f.py").write_text(FUNCTIONS)
     kpi = {"name": "k", "python": "f.py:error", "arguments": arguments}
     (found,) = folder.problems({"a": folder.block("Plant")}, kpis=[kpi])
-    assert found.endswith(f"$.kpis[0].arguments.{line}")
+    assert f"$.kpis[0].arguments.{line}" in found
 
 
 def test_missing_signals_of_an_invalid_component_are_not_reported(folder):

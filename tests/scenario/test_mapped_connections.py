@@ -73,5 +73,5 @@ def test_wrong_mappings_are_refused(folder, pair):
     assert 'expected one "*" in each of "from" and "to", or none' in problem
     assert not others
     problem, *others = folder.problems(pair, [connection("pilot.turns", "pilot.count", gain=2.0)])
-    assert problem.endswith('"gain" and "offset" are for inputs of floating-point numbers, found Int32')
+    assert problem.endswith("gains, offsets and sums are for inputs of floating-point numbers, found Int32")
     assert not others

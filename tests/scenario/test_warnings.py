@@ -35,6 +35,13 @@ def test_a_missing_connection_is_recognized_by_matching_names(folder, left, line
     assert ship(folder, [BOTH[left]]) == [f"connections: {line}: is a connection missing?"]
 
 
+def test_components_without_any_connected_input_cause_warnings(folder):
+    components = {"one": folder.block("Plant"), "other": folder.block("Plant", parameters={"ship.motor[1]": 1.0})}
+    line = "connections: nothing feeds or sets an input of one: are connections missing?"
+    assert warnings_of(folder.scenario(components)) == [line]
+    assert warnings_of(folder.scenario({"alone": folder.block("Plant")})) == []
+
+
 def test_inputs_with_a_value_or_without_a_matching_output_cause_no_warning(folder):
     assert ship(folder, BOTH) == []
     assert ship(folder, BOTH[1:], {"vehicle.position.x": 1.0}) == []

@@ -15,27 +15,48 @@ from plant_src.environment.sea import CALM, Sea
 from plant_src.vehicles.strider_6dof import parameters as p
 
 GRAVITY, DENSITY, MASS, INERTIA, FLOAT_HEIGHT = 9.81, 998.0, 4.11, np.array([0.4957, 0.2478, 0.6391]), 0.1245
+LENGTH, BEAM, OFFSET, DRAUGHT, VISCOSITY = 0.979, 0.126, 0.533, 0.144 - 0.1245, 1.0034e-6
 BODY = np.diag([*[MASS] * 3, *INERTIA])
 INVERSE = np.linalg.inv(BODY + p.ADDED_MASS)
-RADII_SQUARED = p.LONGITUDINAL_MOMENT / p.WATERPLANE_AREA, p.TRANSVERSE_MOMENT / p.WATERPLANE_AREA
+
+FULLNESS = (1 + 2 * MASS / DENSITY / (2 * LENGTH * BEAM * DRAUGHT)) / 3
+AREA = 2 * FULLNESS * LENGTH * BEAM
+BOX_DRAUGHT, BOX_DEPTH, PROPELLER_DISC = MASS / DENSITY / AREA, BEAM, np.pi * 0.04**2
+#: x, y of ten points with the area moments of the waterplane, y^2 = b^2 + B^2 / 12 and x^2 = C L^2 / 12 in the mean
+STATION = np.sqrt(FULLNESS * LENGTH**2 / 12 / 2)
+POINTS = np.array([(n * STATION, side * np.sqrt(OFFSET**2 + BEAM**2 / 12)) for side in (1, -1) for n in (2, 1, 0, -1, -2)])
+MIDDLE = -FLOAT_HEIGHT - BOX_DRAUGHT + BOX_DEPTH / 2
 
 
 def skew(v: np.ndarray) -> np.ndarray:
     return np.array([[0, -v[2], v[1]], [v[2], 0, -v[0]], [-v[1], v[0], 0]])
 
 
-def wave_kinematics(sea: Sea, x: float, y: float, yaw: float, time: float) -> tuple[float, np.ndarray, np.ndarray, np.ndarray]:
-    """Return elevation, slopes, velocity and acceleration of the water averaged over the hull."""
-    k = sea.frequency**2 / GRAVITY
-    kx, ky = k * np.cos(sea.direction), k * np.sin(sea.direction)
-    ahead, abeam = k * np.cos(sea.direction - yaw), k * np.sin(sea.direction - yaw)
-    attenuation = np.exp(-(ahead**2 * RADII_SQUARED[0] + abeam**2 * RADII_SQUARED[1]) / 2 - k * p.DRAUGHT)
-    a, angle, w = sea.amplitude * attenuation, kx * x + ky * y - sea.frequency * time + sea.phase, sea.frequency
+@dataclass
+class Water:
+    """Elevation at the strips; linear velocity and acceleration; roll, pitch and yaw rate and acceleration."""
+
+    elevations: np.ndarray
+    velocity: np.ndarray
+    rates: np.ndarray
+    acceleration: np.ndarray
+    turning: np.ndarray
+
+
+def water_at(sea: Sea, points: np.ndarray, time: float, offsets: np.ndarray, beam: float, draught: float) -> Water:
+    """Motion of the water at points (n, 2) of the still surface; `offsets` are their places (n, 2) in the hull."""
+    k, w = sea.frequency**2 / GRAVITY, sea.frequency
     along = np.array([np.cos(sea.direction), np.sin(sea.direction)])
-    velocity = np.array([*(along * (a * w * np.cos(angle))).sum(axis=1), (a * w * np.sin(angle)).sum()])
-    acceleration = np.array([*(along * (a * w**2 * np.sin(angle))).sum(axis=1), -(a * w**2 * np.cos(angle)).sum()])
-    slopes = np.array([-(a * kx * np.sin(angle)).sum(), -(a * ky * np.sin(angle)).sum()])
-    return float((a * np.cos(angle)).sum()), slopes, velocity, acceleration
+    wave = sea.amplitude * np.exp(1j * (points @ (k * along) - w * time + sea.phase) - (k * beam) ** 2 / 24)
+    elevations = wave.real.sum(axis=1)
+    below = wave * np.exp(-k * draught / 2)
+    flow = np.array([along[0] * w * below, along[1] * w * below, -1j * w * below])
+    change = -1j * w * flow
+    linear, accelerating = flow.real.sum(axis=2), change.real.sum(axis=2)
+    x, y = offsets.T
+    fit = np.array([y / (y @ y), -x / (x @ x)])
+    rates, turning = (np.append(fit @ field[2], 0.0) for field in (linear, accelerating))
+    return Water(elevations, linear.mean(axis=1), rates, accelerating.mean(axis=1), turning)
 
 
 def rigid_coriolis(spin: np.ndarray) -> np.ndarray:
@@ -60,46 +81,71 @@ class Catamaran:
     rudder: float = 0.0
     current: tuple[float, float] = (0.0, 0.0)
     wind: tuple[float, float, float] = (0.0, 0.0, 0.0)
+    drag: float = 1.0
+    race: bool = True
 
     def rate(self, time: float, state: np.ndarray) -> np.ndarray:
         """Return the time derivatives of position, rotation matrix and nu."""
         place, to_world, nu = state[:3], state[3:12].reshape(3, 3), state[12:]
-        yaw = np.arctan2(to_world[1, 0], to_world[0, 0])
-        elevation, slopes, orbital, flow = wave_kinematics(self.sea, place[0], place[1], yaw, time)
+        surface = np.column_stack([POINTS, np.full(10, -FLOAT_HEIGHT)]) @ to_world.T + place
+        water = water_at(self.sea, surface[:, :2], time, POINTS, BEAM, BOX_DRAUGHT)
         spin, current = nu[3:], to_world.T @ [*self.current, 0.0]
+        orbital, flow = to_world.T @ water.velocity, to_world.T @ water.acceleration
         drifting = nu - [*current, 0, 0, 0]
-        relative = drifting - [*(to_world.T @ orbital), 0, 0, 0]
-        load = self.loads(relative, nu[:3] - to_world.T @ self.wind)
-        load += self.buoyancy(to_world, place[2], yaw, elevation, slopes)
+        relative = drifting - [*orbital, 0, 0, 0]
+        lift, wetness = self.buoyancy(to_world, place[2], water.elevations)
+        inertia_of_water = MASS * np.array([(POINTS[:, 1] ** 2).mean(), (POINTS[:, 0] ** 2).mean(), 0])
+        pressure = MASS * np.concatenate([flow, np.cross([0, 0, -FLOAT_HEIGHT - BOX_DRAUGHT / 2], flow)])
+        pressure[3:] += inertia_of_water * water.turning
+        load = lift + wetness * (self.loads(relative, water.rates) + pressure) + self.driving(nu[:3] - to_world.T @ self.wind)
         load -= rigid_coriolis(spin) @ drifting + flow_coriolis(relative) @ relative
-        pull, swell = to_world.T @ [*flow[:2], 0], to_world.T @ flow - skew(spin) @ (to_world.T @ orbital)
-        load += BODY @ [*pull, 0, 0, 0] + p.ADDED_MASS @ [*swell, 0, 0, 0]
+        load += p.ADDED_MASS @ [*(flow - skew(spin) @ orbital), *water.turning]
         acceleration = INVERSE @ load - [*(skew(spin) @ current), 0, 0, 0]
         return np.concatenate([to_world @ nu[:3], (to_world @ skew(spin)).ravel(), acceleration])
 
-    def buoyancy(self, to_world: np.ndarray, height: float, yaw: float, elevation: float, slopes: np.ndarray) -> np.ndarray:
+    def buoyancy(self, to_world: np.ndarray, height: float, elevations: np.ndarray) -> tuple[np.ndarray, float]:
+        """Sum over the boxes of buoyancy and its moment, with the weight, and the wetness."""
         up = to_world[2]
-        cos, sin = np.cos(yaw), np.sin(yaw)
-        ahead, abeam = cos * slopes[0] + sin * slopes[1], cos * slopes[1] - sin * slopes[0]
-        k_heave, k_roll, k_pitch = p.STIFFNESS
-        lever = np.array([-k_pitch * (up[0] - ahead), -k_roll * (up[1] - abeam), 0])
-        return np.concatenate([k_heave * (FLOAT_HEIGHT + elevation - height) * up, skew(lever) @ up])
+        load, wetness = np.concatenate([-MASS * GRAVITY * up, np.zeros(3)]), 0.0
+        extent = max(BOX_DEPTH * abs(up[2]), BEAM * abs(up[1]), STATION * abs(up[0]))
+        for (x, y), elevation in zip(POINTS, elevations, strict=True):
+            box = np.array([x, y, MIDDLE])
+            share = np.clip((elevation - height - up @ box) / extent + 0.5, 0, 1)
+            centre = box - [0, 0, (1 - share) * BOX_DEPTH / 2 * BOX_DEPTH * up[2] / extent]
+            force = DENSITY * GRAVITY * AREA / 10 * BOX_DEPTH * share * up
+            load += np.concatenate([force, np.cross(centre, force)])
+            wet = min(1.0, share * BOX_DEPTH / (BOX_DRAUGHT / 2))
+            wetness += (1 - (1 - wet) ** 2) / 10
+        return load, wetness
 
-    def loads(self, relative: np.ndarray, air: np.ndarray) -> np.ndarray:
-        u, v, w, roll, pitch, r = relative
-        load = np.array([self.thrust, 0, 0, 0, 0, 0.0])
+    def driving(self, air: np.ndarray) -> np.ndarray:
+        return np.array([self.thrust, 0, 0, 0, 0, 0]) - [*(0.1 * np.abs(air[:2]) * air[:2]), 0, 0, 0, 0]
+
+    def loads(self, relative: np.ndarray, rates: np.ndarray) -> np.ndarray:
+        u, v, w, _, _, r = relative
+        roll, pitch, _ = relative[3:] - rates
+        load = np.zeros(6)
         load[2:5] -= np.array(p.DAMPING) * [w, roll, pitch]
         for x, y in p.DRAG_POINTS:
             speed = w + roll * y - pitch * x
             load += np.array([0, 0, 1, y, -x, 0]) * -p.POINT_DRAG * speed * abs(speed)
         side, moment = 2 * (-3.899501881 * v + 1.774273356 * r), 2 * (-1.774273356 * v - 0.807294377 * r)
-        load += [0, side, 0, -p.HULL_FORCE_HEIGHT * side, 0, moment]
-        load[:2] -= 0.1 * np.abs(air[:2]) * air[:2]
-        angle = self.rudder - np.arctan2(np.sign(u) * (v - 0.34727 * r), abs(u))
-        lift = DENSITY / 2 * 1.2 * 0.0064 * u * abs(u) * np.sin(np.pi / 2 * max(-1.0, min(1.0, angle / np.deg2rad(30))))
+        drag = self.resistance(u)
+        load += [drag, side, 0, -p.HULL_FORCE_HEIGHT * side, p.HULL_FORCE_HEIGHT * drag, moment]
+        square = u * abs(u) + (2 * max(self.thrust, 0.0) / DENSITY / PROPELLER_DISC if self.race else 0.0)
+        angle = self.rudder - np.arctan2(np.sign(square) * (v - 0.34727 * r), np.sqrt(abs(square)))
+        lift = DENSITY / 2 * 1.2 * 0.0064 * square * np.sin(np.pi / 2 * max(-1.0, min(1.0, angle / np.deg2rad(30))))
         ahead, abeam = -lift * np.sin(self.rudder), lift * np.cos(self.rudder)
         load += [ahead, abeam, 0, -p.RUDDER_HEIGHT * abeam, p.RUDDER_HEIGHT * ahead, -0.34727 * abeam]
         return load
+
+    def resistance(self, u: float) -> float:
+        """ITTC-57 and the residuary curve, on bottoms and sides of both hulls."""
+        friction = 0.075 / (np.log10(max(abs(u) * LENGTH / VISCOSITY, 1e4)) - 2) ** 2
+        froude = u / np.sqrt(GRAVITY * LENGTH)
+        residuary = 2 * 4.6e-3 / ((froude / 0.4) ** 2 + (0.4 / froude) ** 2) if froude else 0.0
+        wetted = 2 * LENGTH * (FULLNESS * BEAM + 2 * DRAUGHT)
+        return self.drag * -DENSITY / 2 * wetted * (friction + residuary) * u * abs(u)
 
     def simulate(self, nu: np.ndarray, times: np.ndarray) -> np.ndarray:
         """Positions at these times, from rest attitude in the origin."""

@@ -33,7 +33,9 @@ _ROTORS = np.array(
 )
 _UP_TORQUE = (1, -1, 1, -1)
 MAX_ROTOR_SPEED = 5000 * 0.10471976
-HOVER_SPEED = np.sqrt(QUADCOPTER_MASS * GRAVITY / 4 / 9.148e-6)
+#: N s2/rad2, identified from a flight (docs/validation.md); the original system has 9.148e-6
+THRUST_COEFFICIENT = 8.24e-6
+HOVER_SPEED = np.sqrt(QUADCOPTER_MASS * GRAVITY / 4 / THRUST_COEFFICIENT)
 
 Segments = Sequence[tuple[float, np.ndarray]]  # (duration, held inputs)
 
@@ -60,7 +62,7 @@ def quadcopter_rate(state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
     squared = np.clip(inputs[:4], 0, MAX_ROTOR_SPEED) ** 2
     force, torque = np.zeros(3), np.zeros(3)
     for arm, sense, square in zip(_ROTORS, _UP_TORQUE, squared, strict=True):
-        thrust = np.array([0, 0, -9.148e-6 * square])
+        thrust = np.array([0, 0, -THRUST_COEFFICIENT * square])
         force += thrust
         torque += np.cross(arm, thrust) + np.array([0, 0, -sense * 2.38e-7 * square])
     acceleration = (to_world @ force + inputs[4:7]) / QUADCOPTER_MASS - np.array([0, 0, GRAVITY])

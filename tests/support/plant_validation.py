@@ -30,6 +30,7 @@ MODELS = (
     "AR.Drone 2.0",
     "Multirotors",
     "Crazyflie and survey hexacopter",
+    "Submerged vehicles",
     "Strider, planar",
     "Strider, six degrees of freedom",
     "Otter",
@@ -52,8 +53,9 @@ written by this command:
 pytest tests -m "" --validation docs/validation.md
 ```
 
-Do not edit this page by hand. A comparison that exceeds its limit fails its test. `tests/test_validation_document.py` fails if
-this page and the tests list different comparisons. Speed is documented in [performance.md](performance.md).
+Do not edit this page by hand; its last part, "Against measurements", is `tests/support/validation_against_measurements.md`.
+A comparison that exceeds its limit fails its test. `tests/test_validation_document.py` fails if this page and the tests list
+different comparisons. Speed is documented in [performance.md](performance.md).
 
 * *Reference* and *measured* are empty if the quantity is itself a deviation. If a
   quantity has several values, the worst one is listed.
@@ -62,6 +64,8 @@ this page and the tests list different comparisons. Speed is documented in [perf
 * *DOP853* is the eighth-order Runge-Kutta method of SciPy with tolerances of 1e-11 or less, applied to an independent
   implementation of the equations in NumPy.
 """
+#: last part of the page, written by hand: comparisons with data that the project does not contain
+MEASUREMENTS = Path(__file__).with_name("validation_against_measurements.md")
 COLUMNS = ("quantity", "unit", "reference", "measured", "deviation", "limit", "source", "test")
 
 
@@ -129,7 +133,7 @@ def render_document(records: Sequence[dict[str, Any]]) -> str:
     for model, section in sections.items():
         if section:
             lines += [f"## {model}", "", table_line(COLUMNS), table_line(["---"] * len(COLUMNS)), *map(table_line, section), ""]
-    return "\n".join(lines)
+    return "\n".join([*lines, MEASUREMENTS.read_text()])
 
 
 def table_line(cells: Iterable[str]) -> str:

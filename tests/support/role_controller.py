@@ -5,7 +5,7 @@ from math import cos, hypot, sin
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Real
 
 MASS, GRAVITY, ARM = 0.443892, 9.81, 0.178  # kg, m/s2, m
-THRUST, TORQUE = 8.048e-6, 2.423e-7  # N.s2 and N.m.s2: force and torque of a rotor by its speed squared
+THRUST, TORQUE = 7.25e-6, 2.423e-7  # N.s2 and N.m.s2: force and torque of a rotor by its speed squared
 DESCENT, CLIMB = 0.3, 0.6  # m/s
 REALS = [
     *(f"{owner}.{quantity}.{axis}" for owner in ("vehicle", "target") for quantity in ("position", "velocity") for axis in "xyz"),

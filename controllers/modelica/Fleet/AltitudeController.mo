@@ -15,7 +15,7 @@ block AltitudeController "Altitude loop: from altitude reference to the common t
   parameter Real throttle_min(unit = "%") = 35;
   parameter Real throttle_max(unit = "%") = 90;
   parameter Real mass(unit = "kg") = 0.441 "Of the quadcopter, as the controller believes it";
-  parameter Real thrust_coefficient(unit = "N.s2/rad2") = 9.148e-6 "Thrust of a rotor over its squared speed";
+  parameter Real thrust_coefficient(unit = "N.s2/rad2") = 8.24e-6 "Thrust of a rotor over its squared speed";
   final parameter Real hover_throttle(unit = "%") = 100/rotor_speed_max*sqrt(mass*gravity/(4*thrust_coefficient))
     "Throttle that carries the weight: the integral starts there";
   input Vehicle vehicle;

@@ -1,98 +1,33 @@
 within Fleet;
-block GeometricController "Tracking of a path on SE(3): from position, velocity and acceleration references to rotor speeds"
-  // T. Lee, M. Leok, N. H. McClamroch: Geometric tracking control of a quadrotor UAV on SE(3), CDC 2010, equations 10 to 16
-  record Orientation "Unit quaternion, body to world"
-    Real w(start = 1, unit = "1");
-    Real x(unit = "1");
-    Real y(unit = "1");
-    Real z(unit = "1");
-  end Orientation;
-
-  record Rates "Angular velocity in the body frame"
-    Real p(unit = "rad/s");
-    Real q(unit = "rad/s");
-    Real r(unit = "rad/s");
-  end Rates;
-
-  record Vehicle "Measurements of the quadcopter"
-    Spatial.Position position "Centre of mass";
-    Spatial.Velocity velocity "Of the centre of mass";
-    Orientation orientation;
-    Rates rates;
-  end Vehicle;
-
-  parameter Real position_P(unit = "1/s") = 1.6 "Speed per horizontal position error";
-  parameter Real velocity_P(unit = "1/s") = 4 "Acceleration per horizontal velocity error";
+block GeometricController "Tracking of a path on SE(3): cascade of position and velocity with integral action"
+  extends TrackingController;
+  parameter Real position_P(unit = "1/s") = 2.5 "Speed per horizontal position error";
+  parameter Real velocity_P(unit = "1/s") = 6 "Acceleration per horizontal velocity error";
   parameter Real altitude_P(unit = "1/s") = 3 "Speed per altitude error";
   parameter Real climb_P(unit = "1/s") = 8 "Acceleration per error of the vertical velocity";
-  parameter Real position_I(unit = "1/s3") = 1.5 "Rate of the acceleration per position error";
+  parameter Real position_I(unit = "1/s3") = 4 "Rate of the acceleration per position error";
   parameter Real speed_limit(unit = "m/s") = 2 "Of the horizontal speed that makes up for a position error";
-  parameter Real trim_limit(unit = "m/s2") = 3 "Of the integrals";
-  parameter Real attitude_P(unit = "1/s2") = 150 "Angular acceleration per attitude error";
-  parameter Real attitude_D(unit = "1/s") = 20 "Angular acceleration per error of the rates";
-  parameter Real yaw_share(unit = "1", min = 0, max = 1) = 0.1 "Of these gains about the vertical body axis";
-  parameter Real mass(unit = "kg") = 0.441 "Of the quadcopter, as the controller believes it";
-  parameter Real inertia[3, 3](each unit = "kg.m2") = {
-      {0.002835, 0.000978, 0.000116},
-      {0.000978, 0.002821, -0.000111},
-      {0.000116, -0.000111, 0.005131}};
-  parameter Real arm(unit = "m") = 0.1815 "Distance of a rotor from the centre";
-  parameter Real thrust_coefficient(unit = "N.s2/rad2") = 9.148e-6 "Thrust of a rotor over its squared speed";
-  parameter Real torque_coefficient(unit = "N.m.s2/rad2") = 2.38e-7 "Reaction torque of a rotor over its squared speed";
-  input Vehicle vehicle;
-  input Spatial.Position position_reference;
-  input Spatial.Velocity velocity_reference;
-  input Spatial.Acceleration acceleration_reference;
-  input Real tilt_limit(start = 25, unit = "deg");
-  input Real yaw_reference(start = 0, unit = "rad") "Counter-clockwise from east";
-  input Real motor_share(start = 0, unit = "1") "Share of the commanded rotor speeds; 0: motors stopped";
-  input Boolean reset(start = false) "Holds the start state of the integrals";
-  output Real rotor_speed[4](each start = 0, each unit = "rad/s") "Front, left, rear, right";
+  parameter Real trim_limit(unit = "m/s2") = 6 "Of the integrals";
 protected
-  constant Real sink(unit = "m/s2") = 5 "Largest downward acceleration";
   discrete Real error[3](each start = 0, each fixed = true) "Position";
   discrete Real speed[3](each start = 0, each fixed = true) "That makes up for it";
-  discrete Real shrink(start = 1, fixed = true) "Of a vector that is too long";
+  discrete Real ease(start = 1, fixed = true) "Of a speed that is too high";
   discrete Real trim[3](each start = 0, each fixed = true) "Integrals";
-  discrete Real force[3](each start = 0, each fixed = true) "Wanted, over the mass";
-  discrete Real R[3, 3](each start = 0, each fixed = true) "Attitude: columns are the body axes in the world frame";
-  discrete Real E[3, 3](each start = 0, each fixed = true) "From the attitude to the wanted one";
-  discrete Real omega[3](each start = 0, each fixed = true) "Angular velocity, body frame";
-  discrete Real alpha[3](each start = 0, each fixed = true) "Wanted angular acceleration, body frame";
-  discrete Real torque[3](each start = 0, each fixed = true);
-  discrete Real thrust(start = 0, fixed = true, unit = "N");
-  discrete Real share[4](each start = 0, each fixed = true) "Thrust of each rotor";
 algorithm
   when sample(0, sample_period) then
     error := {
       position_reference.x - vehicle.position.x,
       position_reference.y - vehicle.position.y,
       position_reference.z - vehicle.position.z};
-    shrink := min(1, speed_limit/max(1e-9, position_P*sqrt(error[1]^2 + error[2]^2)));
-    speed := {shrink*position_P*error[1], shrink*position_P*error[2], altitude_P*error[3]};
+    ease := min(1, speed_limit/max(1e-9, position_P*sqrt(error[1]^2 + error[2]^2)));
+    speed := {ease*position_P*error[1], ease*position_P*error[2], altitude_P*error[3]};
     for i in 1:3 loop
-      trim[i] := if reset then 0.0 elseif shrink < 1 then pre(trim[i])
+      trim[i] := if reset then 0.0 elseif ease < 1 then pre(trim[i])
         else limit(pre(trim[i]) + sample_period*position_I*error[i], -trim_limit, trim_limit);
     end for;
-    force := {
+    wanted := {
       acceleration_reference.x + velocity_P*(velocity_reference.x + speed[1] - vehicle.velocity.x) + trim[1],
       acceleration_reference.y + velocity_P*(velocity_reference.y + speed[2] - vehicle.velocity.y) + trim[2],
       gravity + max(-sink, acceleration_reference.z + climb_P*(velocity_reference.z + speed[3] - vehicle.velocity.z) + trim[3])};
-    shrink := min(1, tan(tilt_limit/degrees)*force[3]/max(1e-9, sqrt(force[1]^2 + force[2]^2)));
-    force := {shrink*force[1], shrink*force[2], force[3]};
-
-    R := Spatial.rotation(vehicle.orientation.w, vehicle.orientation.x, vehicle.orientation.y, vehicle.orientation.z);
-    thrust := mass*max(0, force*R[:, 3]);
-    E := transpose(Spatial.heading_frame(force/sqrt(force*force), yaw_reference))*R;
-    omega := {vehicle.rates.p, vehicle.rates.q, vehicle.rates.r};
-    alpha := -attitude_P/2*{E[3, 2] - E[2, 3], E[1, 3] - E[3, 1], E[2, 1] - E[1, 2]} - attitude_D*omega;
-    alpha[3] := yaw_share*alpha[3];
-    torque := inertia*alpha + cross(omega, inertia*omega);
-
-    share := thrust/4*{1, 1, 1, 1} + torque[1]/(2*arm)*{0, 1, 0, -1} + torque[2]/(2*arm)*{-1, 0, 1, 0}
-      + torque[3]*thrust_coefficient/(4*torque_coefficient)*{1, -1, 1, -1};
-    for i in 1:4 loop
-      rotor_speed[i] := motor_share*min(rotor_speed_max, sqrt(max(0, share[i])/thrust_coefficient));
-    end for;
   end when;
 end GeometricController;

@@ -21,7 +21,7 @@ block InverseKinematics "From horizontal acceleration and altitude commands to t
   parameter Real force_max(unit = "N") = 7 "Of the vertical force";
   parameter Real filter_frequency(unit = "Hz", min = 0.01, max = 49) = 20 "Of the low-pass on the vertical force";
   parameter Real mass(unit = "kg") = 0.441 "Of the quadcopter, as the controller believes it";
-  parameter Real thrust_coefficient(unit = "N.s2/rad2") = 9.148e-6 "Thrust of a rotor over its squared speed";
+  parameter Real thrust_coefficient(unit = "N.s2/rad2") = 8.24e-6 "Thrust of a rotor over its squared speed";
   input Vehicle vehicle;
   input Acceleration acceleration_command "In the world frame, whatever the heading";
   input Real altitude_command(start = 2, unit = "m") "Of the centre of mass";

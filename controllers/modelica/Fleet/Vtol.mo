@@ -33,6 +33,7 @@ block Vtol "Path command of the quadcopter: take-off, pursuit of a vessel and la
   parameter Real clearance(unit = "m") = 0.4 "Climb above the starting point before the pursuit begins";
   parameter Real resting_height(unit = "m") = 0.056 "Of the centre of mass above the deck when landed";
   parameter Real approach_height(unit = "m") = 0.675 "Above the resting height";
+  parameter Real waiting_height(unit = "m") = 0.15 "Above the resting height: the descent waits there until the deck is calm";
   parameter Real press_depth(unit = "m") = 0.1 "Below the resting height: end of the descent, which keeps the contact";
   parameter Real approach_band(unit = "m") = 0.1 "Altitude error that allows the descent";
   parameter Real landing_error(unit = "m") = 0.05 "Horizontal error that allows the descent to begin and to go on";
@@ -45,6 +46,7 @@ block Vtol "Path command of the quadcopter: take-off, pursuit of a vessel and la
   input Deck target;
   input Real altitude_command(start = 2, unit = "m") "Of the centre of mass, for the pursuit";
   input Real yaw_command(start = 0, unit = "rad") "Counter-clockwise from east, for the pursuit";
+  input Boolean calm(start = true) "Quiescent window: the deck permits a touchdown";
   output Horizontal.Position position_reference;
   output Horizontal.Velocity velocity_reference;
   output Real altitude_reference(start = 0, unit = "m");
@@ -66,6 +68,7 @@ protected
   discrete Real touching(start = 0, fixed = true) "Time spent in contact with the vessel";
   discrete Boolean centred(start = false, fixed = true) "Horizontal error inside that window";
   discrete Boolean level(start = false, fixed = true) "Altitude inside that window";
+  discrete Boolean committed(start = false, fixed = true) "To the touchdown: a calm deck at the waiting height";
   discrete Boolean flying(start = false, fixed = true);
   discrete Real destination(start = 0, fixed = true) "Of the altitude reference";
   discrete Real rate(start = 0, fixed = true) "Of the altitude reference";
@@ -135,12 +138,14 @@ algorithm
       yaw_reference := yaw_command;
     end if;
 
+    committed := mode == FlightMode.descend and (pre(committed)
+      or calm and pre(altitude_reference) <= landed_altitude + waiting_height + descent_rate*sample_period);
     if mode == FlightMode.take_off then
       destination := max(altitude_command, home_z + 2*clearance);
     elseif mode == FlightMode.approach then
       destination := landed_altitude + approach_height;
     elseif mode == FlightMode.descend then
-      destination := landed_altitude - press_depth;
+      destination := landed_altitude + (if committed then -press_depth else waiting_height);
     else
       destination := altitude_command;
     end if;

@@ -49,9 +49,13 @@ class WaypointGuidanceBase(SampledController):
             self._select_next_waypoint()
         ahead_x, ahead_y = self._vector_to_waypoint()
         self.distance = horizontal_norm(ahead_x, ahead_y)
+        self.update_heading(ahead_x, ahead_y)
+        return 0.0 if self.finished and self.end_policy == EndPolicy.STOP else self.speed_command
+
+    def update_heading(self, ahead_x: float, ahead_y: float) -> None:
+        """Set the heading reference from the vector to the active waypoint (m); it is constant after the last waypoint."""
         if not self.finished:
             self.heading_reference = math.atan2(ahead_y, ahead_x)
-        return 0.0 if self.finished and self.end_policy == EndPolicy.STOP else self.speed_command
 
     def _vector_to_waypoint(self) -> tuple[float, float]:
         """Return the vector from the vessel to the active waypoint (m, east and north)."""

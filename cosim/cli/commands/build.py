@@ -16,7 +16,8 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("sources", nargs=-1, type=click.Path(path_type=Path))
 @click.option("--check", is_flag=True, help="Build nothing; check that the fmus/ of cosim are up to date.")
-@click.option("--output", type=click.Path(path_type=Path), help="Export a single source, in any folder, to this FMI 2.0 FMU.")
+@click.option("--output", type=click.Path(path_type=Path), help="Export a single source, in any folder, to this FMU.")
+@click.option("--fmi", "fmi_version", type=click.Choice(["2", "3"]), default="2", help="FMI version of --output; default: 2.")
 @click.option(
     "--modelica-compiler",
     type=click.Choice(["cosim", "omc"]),
@@ -48,6 +49,7 @@ def command(
     sources: tuple[Path, ...],
     check: bool,
     output: Path | None,
+    fmi_version: str,
     modelica_compiler: str,
     include: tuple[Path, ...],
     library: tuple[Path, ...],
@@ -55,10 +57,11 @@ def command(
 ) -> int:
     """Export controllers and plants to fmus/.
 
-    SOURCES are .mo or .py files, or folders of controllers in C; default: all controllers and plants. The FMUs are written to
-    fmus/ (FMI 2.0) and fmus/fmi3/, and their hashes to fmus/manifest.json. --output exports a single source of your own. There,
-    --modelica-compiler omc exports models that need the Modelica Standard Library or features that cosim's own compiler lacks;
-    OpenModelica must be installed (this was written from its documentation and not tried with it).
+    SOURCES are .mo or .py files, vehicle files, or folders of controllers in C; default: all controllers and plants. The FMUs are
+    written to fmus/ (FMI 2.0) and fmus/fmi3/, and their hashes to fmus/manifest.json. --output exports a single source of your
+    own. There, --fmi selects the FMI version, and --modelica-compiler omc exports models that need the Modelica Standard Library
+    or features that cosim's own compiler lacks; OpenModelica must be installed (this was written from its documentation and not
+    tried with it).
 
     Modelica models, equations and controllers in C require a C compiler, and Modelica models and equations the extra "build".
     --check is for changes of cosim itself: it compares the hashes of all sources with the manifest, and the behaviour of newly
@@ -79,7 +82,9 @@ def command(
         click.echo("every FMU is up to date with its source")
         return 0
     if output is not None:
-        _build_one(sources, output, modelica_compiler, include, library, values)
+        _build_one(sources, output, int(fmi_version), modelica_compiler, include, library, values)
+    elif fmi_version != "2":
+        raise InputError("--fmi requires --output: fmus/ contains FMUs of both FMI versions")
     elif values:
         raise InputError("--set requires --output: the FMUs in fmus/ have the values of their sources")
     elif include:
@@ -94,6 +99,7 @@ def command(
 def _build_one(
     sources: tuple[Path, ...],
     output: Path,
+    fmi_version: int,
     modelica_compiler: str,
     include: tuple[Path, ...],
     library: tuple[Path, ...],
@@ -108,9 +114,19 @@ def _build_one(
     if not sources[0].exists():
         raise InputError(Problem("does not exist", str(sources[0])))
     if modelica_compiler == "omc":
+        if fmi_version != 2:
+            raise InputError("--modelica-compiler omc exports FMI 2.0 only")
         export_with_omc(sources[0], output)
     else:
-        build_to(sources[0], None, output, include=include, library_path=library, values=parse_settings(values))
+        build_to(
+            sources[0],
+            None,
+            output,
+            fmi_version=fmi_version,
+            include=include,
+            library_path=library,
+            values=parse_settings(values),
+        )
     click.echo(f"{sources[0]} -> {output}")
 
 

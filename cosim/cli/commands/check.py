@@ -26,7 +26,7 @@ if TYPE_CHECKING:
 @click.option("--expanded", is_flag=True, help="Print the scenario as JSON instead, with what it extends and --set applied.")
 @json_option(
     "an object with name, start_time, stop_time and step_size (s), steps, signals, components, stages, connections (source, "
-    "target, unit, notes), unconnected_inputs and warnings; with --expanded the scenario"
+    "target, unit, notes), unconnected_inputs, recommendations and warnings; with --expanded the scenario"
 )
 @supervision.supervision_options
 def command(
@@ -41,7 +41,8 @@ def command(
     """Check SCENARIO without running it and print the expanded system.
 
     SCENARIO is a JSON file or the name of a shipped scenario. Prints components, processes, stages, connections and unit
-    conversions. Probable mistakes are warnings: a forgotten connection, a missing reference, an event after the end.
+    conversions, and recommends an algorithm. Probable mistakes are warnings: a forgotten connection, a missing reference, an
+    event after the end.
     --isolation and --sandbox only affect the printed processes. The JSON of --expanded has absolute paths: a file with it is a
     scenario that runs anywhere on this machine.
     """
@@ -67,6 +68,7 @@ def command(
         if connections:
             _print_connections(prepared)
             _print_unconnected_inputs(prepared)
+        _print_recommendation(prepared)
         _print_verdict(prepared, find_warnings(prepared))
     finally:
         prepared.free()
@@ -74,6 +76,8 @@ def command(
 
 def _describe(prepared: PreparedRun, warnings: Sequence[Problem]) -> dict[str, Any]:
     """Return the expanded system as JSON."""
+    from ...scenario.recommendation import recommend
+
     times = prepared.settings
     return {
         "name": prepared.spec.name,
@@ -82,6 +86,7 @@ def _describe(prepared: PreparedRun, warnings: Sequence[Problem]) -> dict[str, A
         "signals": list(times.columns),
         **prepared.metadata["system"],
         "unconnected_inputs": _unconnected_inputs(prepared),
+        "recommendations": recommend(prepared.system),
         "warnings": list(map(str, warnings)),
     }
 
@@ -136,6 +141,14 @@ def _print_nested_stages(stages: Sequence[Stage], indent: str) -> None:
         for member in stage:
             if isinstance(member, Group):
                 _print_nested_stages(member.stages, indent + "   ")
+
+
+def _print_recommendation(prepared: PreparedRun) -> None:
+    from ...scenario.recommendation import recommend
+
+    click.echo("\nrecommended algorithm")
+    for line in recommend(prepared.system):
+        click.echo(f"  {line}")
 
 
 def _print_connections(prepared: PreparedRun) -> None:

@@ -33,6 +33,9 @@ _USED_CAPABILITIES = {
     "cannotusememorymanagementfunctions",
     "needscompletedintegratorstep",
     "completedintegratorstepnotneeded",
+    "caninterpolateinputs",
+    "providesdirectionalderivative",
+    "providesdirectionalderivatives",
 }
 
 
@@ -67,6 +70,8 @@ def _properties(file: FmuFile) -> dict[str, str]:
     used = {
         "variable step size": about.variable_step,
         "state can be saved and restored": about.has_state,
+        "inputs can be linear within a step": about.interpolates_inputs,
+        "directional derivatives": about.directional_derivatives,
         "one instance per process": about.once_per_process,
         "needs an external tool": about.needs_execution_tool,
         "own memory management": "canNotUseMemoryManagementFunctions" in about.capabilities,
@@ -102,9 +107,11 @@ def _print_variables(causality: str, variables: list[Variable]) -> None:
     for variable in variables:
         dimensions = f"[{','.join(map(str, variable.shape))}]" if variable.shape else ""
         unit = variable.unit.name if variable.unit else "-"
-        start = "" if variable.start is None else f" = {_start_text(variable.start)}"
-        start += "".join(f", {number}: {name}" for name, number in variable.items).replace(", ", "; ", 1)
-        print_line(f"  {variable.name:{width}} {variable.type + dimensions:12} {unit:8} {variable.description}{start}".rstrip())
+        start = "" if variable.start is None else f"= {_start_text(variable.start)}"
+        items = ", ".join(f"{number}: {name}" for name, number in variable.items)
+        value = "; ".join(filter(None, (start, items)))
+        columns = (f"{variable.name:{width}} {variable.type + dimensions:12} {unit:8}", variable.description, value)
+        print_line(f"  {' '.join(filter(None, columns))}".rstrip())
 
 
 def _start_text(start: object) -> str:

@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import os
 import re
 import shlex
 from pathlib import Path
@@ -25,7 +24,7 @@ def command(name: str, base: str, directory: Path, force: bool) -> None:
 
     A shipped scenario is extended by its name, so that the new file runs wherever cosim is installed.
     """
-    from ...core import resources
+    from ...scenario.extending_file import extending_scenario
     from ...scenario.file_paths import find_scenario
     from ...scenario.nested_systems import load_scenario
     from ...scenario.schema import SCENARIO_NAME
@@ -35,9 +34,7 @@ def command(name: str, base: str, directory: Path, force: bool) -> None:
     file, found = directory / f"{name}.json", find_scenario(base)
     if file.exists() and not force:
         raise InputError([Problem("exists; --force overwrites it", str(file))])
-    is_shipped = found.resolve().parent == (resources.root() / "scenarios").resolve()
-    extended = found.stem if is_shipped else os.path.relpath(found, directory)
-    content = {"extends": extended, "name": name, "description": f"{found.stem} with changes"}
+    content = extending_scenario(base, directory, name, f"{found.stem} with changes")
     directory.mkdir(parents=True, exist_ok=True)
     file.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
     if problems := load_scenario(file).problems:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import re
 import shlex
 import shutil
@@ -11,6 +12,7 @@ import click
 
 from ...core import resources
 from ...core.errors import InputError, Problem, did_you_mean
+from ...core.json_values import parse_object
 
 
 @click.command()
@@ -19,11 +21,17 @@ from ...core.errors import InputError, Problem, did_you_mean
 @click.option(
     "--directory", type=click.Path(path_type=Path), default=Path(), help="Folder of the file; default: the working directory."
 )
+@click.option(
+    "--urdf",
+    type=click.Path(path_type=Path),
+    help="URDF file with the mass, inertia and collision shape, unless the file of --from has them.",
+)
 @click.option("--force", is_flag=True, help="Overwrite an existing file.")
-def command(name: str, base: str, directory: Path, force: bool) -> None:
+def command(name: str, base: str, directory: Path, urdf: Path | None, force: bool) -> None:
     """Create NAME.json, a copy of a vehicle file. Change its numbers, and name it in a scenario as "model".
 
-    The file contains geometry, mass and coefficients with their units and sources. No compiler is needed.
+    The file contains geometry, mass and coefficients with their units and sources. No compiler is needed. With --urdf, the
+    rotors or thrusters in the file of --from may have a "link" of the URDF file in place of position and axis.
     """
     if not re.fullmatch(r"[A-Za-z_]\w*", name):
         raise InputError(f'"{name}" is not a name of a vehicle: expected letters, digits and "_"')
@@ -31,7 +39,13 @@ def command(name: str, base: str, directory: Path, force: bool) -> None:
     if file.exists() and not force:
         raise InputError([Problem("exists; --force overwrites it", str(file))])
     directory.mkdir(parents=True, exist_ok=True)
-    shutil.copyfile(source, file)
+    if urdf:
+        from ...export.sources import vehicle_from_urdf
+
+        data = vehicle_from_urdf(urdf, parse_object(source.read_text(encoding="utf-8")))
+        file.write_text(json.dumps(data, indent=4) + "\n", encoding="utf-8")
+    else:
+        shutil.copyfile(source, file)
     setting = f"/components/plant/arguments/vehicles/uav/model={file}"
     click.echo(
         f"{file}\n\nFly Demo 1 with it:\n  cosim run demo1_box --set {shlex.quote(setting)}\n"

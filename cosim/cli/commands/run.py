@@ -71,7 +71,7 @@ RESULT_FILES = ("result.csv", "result.parquet", "result.mcap", "kpis.json", "run
 @csv_options
 @live.view_options
 @supervision.supervision_options
-def command(isolation: str, sandbox: str | None, view: bool, view_port: int, **options: Any) -> int:
+def command(isolation: str, sandbox: str | None, view: bool, wait: bool, view_port: int, **options: Any) -> int:
     """Run SCENARIO and write results, figures and a report.
 
     SCENARIO is a JSON file or the name of a shipped scenario. Writes result.csv, kpis.json, run.json, figures and report.html
@@ -79,6 +79,8 @@ def command(isolation: str, sandbox: str | None, view: bool, view_port: int, **o
     are kept; 2: the scenario was refused; 3: a check failed, or a condition with the outcome "crash" ended the run.
     """
     run_options = RunOptions(**options, isolation="fmu" if isolation == "fmu" else "none", sandbox=bool(sandbox))
+    if wait and not view:
+        raise click.UsageError("--wait requires --view")
     if view:
         live.check_view_options(isolation, sandbox, run_options.late)
     if strict_sandbox.must_rerun(sandbox):
@@ -86,7 +88,7 @@ def command(isolation: str, sandbox: str | None, view: bool, view_port: int, **o
     save = partial(save_after_crash, options=run_options)
     with LockKeeper() as locks:
         if view:
-            return live.run_with_view(lambda link: _run_scenario(run_options, locks, link), isolation, save, view_port)
+            return live.run_with_view(lambda link: _run_scenario(run_options, locks, link), isolation, save, view_port, wait=wait)
         return supervision.run_supervised_command(lambda: _run_scenario(run_options, locks), isolation, save)
 
 

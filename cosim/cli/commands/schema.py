@@ -1,4 +1,4 @@
-"""`cosim schema`: JSON Schema of scenarios, sweeps and tunings."""
+"""`cosim schema`: JSON Schema of scenarios, sweeps, tunings and vehicle files."""
 
 from __future__ import annotations
 
@@ -12,8 +12,10 @@ import click
 @click.option("--nested", "kind", flag_value="nested", help="Print the schema of nested systems.")
 @click.option("--sweep", "kind", flag_value="sweep", help="Print the schema of sweeps.")
 @click.option("--tune", "kind", flag_value="tune", help="Print the schema of tunings.")
+@click.option("--worst", "kind", flag_value="worst", help="Print the schema of searches for the worst case.")
+@click.option("--vehicle", "kind", flag_value="vehicle", help="Print the schema of vehicle files.")
 def command(kind: str | None) -> None:
-    """Print the JSON Schema of scenarios, sweeps or tunings.
+    """Print the JSON Schema of scenarios, sweeps, tunings or vehicle files.
 
     An editor completes and checks a file that names its schema: "$schema": "scenario.schema.json".
     """
@@ -21,10 +23,16 @@ def command(kind: str | None) -> None:
 
 
 def _schema(kind: str | None) -> dict[str, Any]:
-    if kind in ("sweep", "tune"):
-        from ...studies.schema import SweepSpec, TuneSpec, study_json_schema
+    if kind in ("sweep", "tune", "worst"):
+        from ...studies.schema import SweepSpec, TuneSpec, WorstCaseSpec, study_json_schema
 
+        if kind == "worst":
+            return study_json_schema(WorstCaseSpec)
         return study_json_schema(SweepSpec if kind == "sweep" else TuneSpec)
+    if kind == "vehicle":
+        from ...export.sources import vehicle_file_schema
+
+        return vehicle_file_schema()
     from ...scenario.extension_schema import editor_schema
 
     return editor_schema(kind == "nested")

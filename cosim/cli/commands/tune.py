@@ -18,20 +18,29 @@ from ..output_options import json_option
 if TYPE_CHECKING:
     from ...studies.execution.run_store import RunStore
     from ...studies.tune import Trial, Tuning
+    from ...studies.worst_case import WorstCase
 
 
 @click.command()
 @click.argument("tuning", metavar="TUNE", shell_complete=complete_study)
 @click.option("--output-dir", type=click.Path(path_type=Path), help="Folder for the results; default: runs/NAME.")
-@json_option("the object of best.json, with failure, the reason why no point is feasible, or null")
+@json_option(
+    "the object of best.json, with failure, the reason why no point is feasible, or null; with --worst that of worst.json"
+)
+@click.option("--worst", is_flag=True, help="Search for the run that breaks a controller; TUNE is then a file of such a search.")
 @study_options.study_options
-def command(tuning: str, output_dir: Path | None, as_json: bool, **study: Any) -> int:
-    """Find the parameters that minimise a KPI.
+def command(tuning: str, output_dir: Path | None, as_json: bool, worst: bool, **study: Any) -> int:
+    """Find the parameters that minimise a KPI, or with --worst the run that breaks a controller.
 
     TUNE is a JSON file or the name of a shipped tuning. Writes trials.csv (all evaluated points) and best.json to the output
     directory. Called again, the command continues an interrupted tuning. Exit code 0: a point was found; 1: a run failed at
     every point; 2: the tuning was refused; 3: no point meets the constraints, or none has a value; 130: interrupted.
+
+    --worst searches wind, waves, faults and seeds for the run that misses its checks the most. Writes trials.csv, worst.json and
+    the worst runs as scenarios to the output directory. Exit code 0: all runs meet the checks; 3: a run does not.
     """
+    if worst:
+        return _find_worst(tuning, output_dir, as_json, **study)
     from ...studies.tune import Tuning
 
     loaded = Tuning.from_file(tuning, study.pop("max_runs"))
@@ -64,6 +73,49 @@ def _run_tuning(
     else:
         _print_best(tuning, best, folder, failure)
     return 0 if best.feasible else 1 if best.failure else 3
+
+
+def _find_worst(
+    file: str,
+    output_dir: Path | None,
+    as_json: bool,
+    workers: int | None,
+    scheduler: str | None,
+    max_runs: int,
+    retry_failed: bool,
+) -> int:
+    """Search for the run that breaks a controller."""
+    from ...process.supervisor import interrupt_on_termination
+    from ...studies.summary.worst_case_files import describe_worst_case, write_worst_case_files
+    from ...studies.worst_case import WorstCase
+
+    search = WorstCase.from_file(file, max_runs)
+    folder = output_dir or Path("runs") / search.spec.name
+    with (
+        study_options.open_run_store(folder, retry_failed) as run_store,
+        interrupt_on_termination(),
+        study_options.show_progress(search.spec.max_runs) as progress,
+        study_options.create_runner(search.study, workers, scheduler) as runner,
+    ):
+        search.run(run_store, runner, progress)
+    files = write_worst_case_files(search, folder)
+    if as_json:
+        print_json({**describe_worst_case(search), "files": [str(each) for each in files]})
+    else:
+        _print_worst(search, files)
+    return 3 if files else 0
+
+
+def _print_worst(search: WorstCase, files: list[Path]) -> None:
+    shown = search.counterexamples or [search.worst]
+    names = list(shown[0].parameters)
+    rows = [[f"{each.severity:.3g}", *(f"{each.parameters[name]:.6g}" for name in names)] for each in shown]
+    study_options.print_table(["severity", *names], rows)
+    for each, file in zip(shown, files, strict=False):
+        click.echo(f"{each.reason}\n  cosim run {file}")
+    broken = sum(not each.passed for each in search.attempts)
+    verdict = f"{broken} miss a check" if files else f"all meet the checks; closest: {shown[0].reason}"
+    click.echo(f"{count_noun(len(search.attempts), 'run')}: {verdict}")
 
 
 def _print_best(tuning: Tuning, best: Trial, folder: Path, failure: str | None) -> None:

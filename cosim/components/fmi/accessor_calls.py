@@ -16,7 +16,7 @@ from .c_functions import FunctionTable, as_pointer, as_size, function_address
 
 @dataclass(frozen=True, slots=True)
 class AccessorCallFactory:
-    """Factory of the prepared get and set calls of one FMU instance.
+    """Factory of the prepared get and set calls of one FMU instance; slopes are set by fmi*SetRealInputDerivatives.
 
     Attributes:
         fmi_major: FMI major version.
@@ -58,6 +58,8 @@ class AccessorCallFactory:
                 end = begin + sum(len(variable.scalar_names) for variable in variables)
                 if not selected:
                     pass
+                elif variables[0].derivative_of:
+                    calls.append(self._prepare_slopes(variables, array[begin:end]))
                 elif dtype.hasobject:
                     indexed = enumerate(variables, begin)
                     calls += [PreparedCall(transfer_object, (v.name, array, index), function) for index, v in indexed]
@@ -65,6 +67,20 @@ class AccessorCallFactory:
                     calls.append(self._prepare_numeric(function, variables, array[begin:end]))
                 begin = end
         return calls
+
+    def _prepare_slopes(self, variables: Sequence[Variable], slopes: np.ndarray) -> PreparedCall:
+        """Prepare the call that sets the first time derivatives of inputs.
+
+        For the native executor it is a call with the arguments of FMI 3.0, whose last one has the size of a pointer.
+        """
+        count, name = len(variables), f"{self.prefix}SetRealInputDerivatives"
+        references = (ctypes.c_uint32 * count)(*(self.value_references[variable.derivative_of] for variable in variables))
+        orders = (ctypes.c_int * count)(*[1] * count)
+        function, addresses = self.functions[name], [ctypes.addressof(references), ctypes.addressof(orders), slopes.ctypes.data]
+        pointers = [as_pointer(address) for address in addresses]
+        arguments = (as_pointer(self.instance), pointers[0], as_size(count), *pointers[1:])
+        native = NativeGetSet(3, function_address(function), self.instance, addresses[0], count, *addresses[1:])
+        return PreparedCall(function, arguments, name, native, (references, orders, slopes))
 
     def _prepare_numeric(self, name: str, variables: Sequence[Variable], values: np.ndarray) -> PreparedCall:
         references = (ctypes.c_uint32 * len(variables))(*(self.value_references[variable.name] for variable in variables))

@@ -34,6 +34,10 @@ class FunctionTable(dict[str, CFuncPtr]):
         super().__init__()
         self._library = library
 
+    def __contains__(self, name: object) -> bool:
+        """Return whether the library exports a function."""
+        return hasattr(self._library, str(name))
+
     def __missing__(self, name: str) -> CFuncPtr:
         function_class = GilReleasingFunction if name.endswith("DoStep") else GilHoldingFunction
         self[name] = function_class((name, self._library))

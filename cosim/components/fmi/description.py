@@ -70,6 +70,11 @@ class FmuDescription:
         needs_completed_step: Model Exchange requires fmi*CompletedIntegratorStep.
         platforms: Platforms with a binary, as the FMU names their folders, and "c-code" if it contains sources.
         error_categories: Those of FMI's log categories of errors that the FMU declares.
+        dependencies: Inputs on which each output depends directly, by name; only outputs with declared dependencies.
+        initial_dependencies: The same in Initialization Mode.
+        directional_derivatives: `providesDirectionalDerivatives`.
+        continuous_states: Names of the derivatives by the names of the scalar states, as the model structure lists them.
+        interpolates_inputs: `canInterpolateInputs` of FMI 1.0 and 2.0.
         dimensions: Sizes of the dimensions by name of the variable, a number or the name of a structural parameter; empty unless
             the shape depends on structural parameters.
     """
@@ -96,6 +101,11 @@ class FmuDescription:
     needs_completed_step: bool
     platforms: Sequence[str]
     error_categories: Sequence[str]
+    dependencies: Mapping[str, frozenset[str]]
+    initial_dependencies: Mapping[str, frozenset[str]]
+    directional_derivatives: bool
+    continuous_states: Mapping[str, str]
+    interpolates_inputs: bool
     dimensions: Mapping[str, Sequence[int | str]]
 
     @property
@@ -189,6 +199,11 @@ def build_description(path: Path, examination: Examination, interface: Interface
         _needs_completed_step(model.major, attributes),
         list_platforms(examination.members),
         [name for name in model.log_categories if name in _ERROR_CATEGORIES],
+        _read_dependencies(model, "Output"),
+        _read_dependencies(model, "Output") | _read_dependencies(model, "InitialUnknown"),
+        any(attributes.get(name) in _TRUE for name in ("providesDirectionalDerivative", "providesDirectionalDerivatives")),
+        _read_continuous_states(model),
+        attributes.get("canInterpolateInputs") in _TRUE,
         {name: _read_sizes(model, source) for source in model.variables for name in _names_with_aliases(source)},
     )
 
@@ -200,6 +215,33 @@ def _read_sizes(model: ModelDescription, source: ModelVariable) -> Sequence[int 
         return ()
     named = [model.by_reference[text.strip()].name if text else None for text in references]
     return tuple(name or dimension_size(model, size) or 0 for name, size in zip(named, source.dimensions, strict=True))
+
+
+def _read_dependencies(model: ModelDescription, element: str) -> dict[str, frozenset[str]]:
+    """Return the inputs on which each output depends, by name with aliases, from the elements that declare them."""
+    inputs = {
+        reference: _names_with_aliases(variable)
+        for reference, variable in model.by_reference.items()
+        if variable.causality == "input"
+    }
+    return {
+        name: frozenset(each for reference in unknown.dependencies for each in inputs.get(reference, ()))
+        for unknown in model.model_structure
+        if unknown.element == element and unknown.dependencies is not None and unknown.reference.strip() in model.by_reference
+        for name in _names_with_aliases(model.by_reference[unknown.reference.strip()])
+    }
+
+
+def _read_continuous_states(model: ModelDescription) -> dict[str, str]:
+    """Return the names of the derivatives by the names of their scalar states."""
+    found = {}
+    for unknown in model.model_structure:
+        derivative = model.by_reference.get(unknown.reference.strip())
+        if unknown.element == "ContinuousStateDerivative" and derivative and not derivative.dimensions:
+            state = model.by_reference.get((derivative.attribute("derivative") or "").strip())
+            if state and not state.dimensions:
+                found[state.name] = derivative.name
+    return found
 
 
 def _is_set(name: str, value: str) -> bool:

@@ -27,7 +27,7 @@ from .accessor_calls import AccessorCallFactory
 from .c_functions import as_double, as_pointer
 from .file import FmuFile
 from .fmpy_library import MissingFunctionError, load_library
-from .function_calls import OK, FunctionCaller
+from .function_calls import DISCARD, OK, FunctionCaller
 from .instance_settings import InstanceSettings
 from .preflight.binary import version_deviations
 from .preflight.library import EXPECTED_TEXTS
@@ -59,6 +59,10 @@ class FmuInstance(FunctionCaller, Component):
         self.description = file.description.with_structural_parameters(settings.structural_parameters, file.limits)
         self.variables = self.description.variables
         self.has_state = self.description.has_state
+        self.continuous_states = self.description.continuous_states
+        self.dependencies = self.description.dependencies
+        self.initial_dependencies = self.description.initial_dependencies
+        self.interpolates_inputs = self.description.interpolates_inputs
         self._variables_by_name = {variable.name: variable for variable in self.variables}
         self._is_instantiated, self._has_acquired_file = False, False
         #: registration of the logger of FMI 1.0 and 2.0
@@ -134,7 +138,8 @@ class FmuInstance(FunctionCaller, Component):
 
     def _prepare_transfers(self, factory: AccessorCallFactory) -> None:
         """Prepare the calls that transfer the bound arrays."""
-        self._set_calls = factory.prepare("Set", self._inputs, self._set_object)
+        self._set_calls = factory.prepare("Set", self._inputs, self._set_object, lambda v: not v.derivative_of)
+        self._slope_calls = factory.prepare("Set", self._inputs, self._set_object, lambda v: bool(v.derivative_of))
         self._get_calls = factory.prepare("Get", self._outputs, self._get_object)
 
     def _copy_fmpy_slave(self, folder: Path) -> Any:
@@ -240,7 +245,7 @@ class FmuInstance(FunctionCaller, Component):
     def prepare_step_calls(self, current_time: ctypes.c_double, step_size: float) -> Sequence[PreparedCall]:
         """Prepare the fmi*Set..., fmi*DoStep and fmi*Get... calls of one step from `current_time` (s)."""
         self._current_time = current_time
-        return [*self._set_calls, *self._prepare_do_step(as_double(step_size), step_size), *self._get_calls]
+        return [*self._set_calls, *self._slope_calls, *self._prepare_do_step(as_double(step_size), step_size), *self._get_calls]
 
     def set_inputs(self) -> None:
         """Call fmi*Set... for all bound inputs."""
@@ -249,11 +254,22 @@ class FmuInstance(FunctionCaller, Component):
     def do_step(self, time: float, step_size: float) -> StepResult | None:
         """Call fmi*DoStep."""
         self._current_time.value = time
-        return self._execute_calls(self._prepare_do_step(as_double(step_size), step_size))
+        return self._execute_calls([*self._slope_calls, *self._prepare_do_step(as_double(step_size), step_size)])
 
     def get_outputs(self) -> None:
         """Call fmi*Get... for all bound outputs."""
         self._execute_calls(self._get_calls)
+
+    def get_directional_derivative(self, outputs: Sequence[str], input_name: str) -> Sequence[float] | None:
+        """Call fmi*GetDirectionalDerivative; None for an FMU that does not provide it and for elements of arrays."""
+        names = {input_name, *outputs}
+        if not self.description.directional_derivatives or not names <= self.description.value_references.keys():
+            return None
+        unknowns, known = ([self.description.value_references[name] for name in group] for group in (outputs, [input_name]))
+        found: Sequence[float] | None = self.call_function(
+            "getDirectionalDerivative", unknowns, known, [1.0], unavailable_status=DISCARD
+        )
+        return found
 
     def _execute_calls(self, calls: Sequence[PreparedCall]) -> StepResult | None:
         for call in calls:

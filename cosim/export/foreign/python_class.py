@@ -30,7 +30,8 @@ from ..fmu.model_description import Element, add_units, to_bytes
 from ..fmu.validation import DESCRIPTION_FILE, validate_description
 
 _PROGRAM = Path(__file__).with_name("pythonfmu_program.py")
-_PROTECTION = Path(__file__).with_name("slave_protection.py")
+#: files of cosim that the FMU contains beside the source
+_PROTECTION = tuple(Path(__file__).parents[2] / "components" / name for name in ("slave_protection.py", "object_state.py"))
 #: FMI 2.0 type -> FMI 3.0 type, as far as PythonFMU supports them
 _TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "String": "String"}
 
@@ -108,7 +109,9 @@ def _included_files(folder: Path, include: Sequence[Path]) -> Iterator[tuple[Pat
 
 def _build_with_pythonfmu(source: Path, contents: Mapping[Path, bytes]) -> tuple[dict[str, bytes], Any]:
     """Return the members of the FMU that PythonFMU builds (name -> contents), and the attribute `units` of the class."""
-    contents = {**contents, Path(_PROTECTION.name): _PROTECTION.read_bytes()}
+    if taken := [file.name for file in _PROTECTION if Path(file.name) in contents]:
+        raise InputError(Problem(f"is the name of a file that cosim adds to the FMU; rename it: {source.parent}", taken[0]))
+    contents = {**contents, **{Path(file.name): file.read_bytes() for file in _PROTECTION}}
     package = f"{source.stem}_{sha256(repr(sorted(contents.items())).encode()).hexdigest()[:12]}"
     with TemporaryDirectory(prefix="cosim-build-") as folder, TemporaryDirectory(prefix="cosim-build-") as target:
         for path, content in contents.items():
@@ -119,6 +122,7 @@ def _build_with_pythonfmu(source: Path, contents: Mapping[Path, bytes]) -> tuple
         built = list(Path(target).glob("*.fmu"))
         if process.returncode or not built:
             reason = (process.stderr.strip() or "PythonFMU has built no FMU").splitlines()[-1]
+            reason = reason.removeprefix(f"{package}.slave_protection.SlaveError: ").replace(f"{package}.", "")
             raise InputError(Problem(f"cannot be exported: {reason}", str(source)))
         with ZipFile(built[0]) as archive:
             units = json.loads((Path(target) / "units.json").read_text())

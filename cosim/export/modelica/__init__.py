@@ -12,7 +12,8 @@ The package rumoca parses, checks and flattens a model. The order of computation
 |              | OpenModelica instead                                                                                       |
 | `model/`     | `flat_model`, `syntax_tree`: the data structure; `traversal`; `evaluate`, `arithmetic`: evaluation in      |
 |              | Python                                                                                                     |
-| `causality/` | `continuous_states`: replace der(x) by a variable; `dependent_states`: derivatives of other variables;     |
+| `causality/` | `clocked_partitions` (`clock_inference`): replace clocked equations by sampled ones;                       |
+|              | `continuous_states`: replace der(x) by a variable; `dependent_states`: derivatives of other variables;     |
 |              | `hybrid`: variables for pre(), relations and delay(); `continuous_equations`: solve the equations, with    |
 |              | `matching` if each has a variable alone on one side, else with `equation_systems` (`scalar_equations`,     |
 |              | `assignment`, `differentiation`); `when_conditions`: clocks and edge detectors; `topological_sort`;        |

@@ -19,6 +19,8 @@ from ..fmu.block import Block, BlockVariable, Exchange
 from .c_code.emit import generate_c
 from .c_code.exchange_code import has_exchange, indicator_count
 from .c_code.header import struct_members
+from .causality.clock_inference import clock_parameters
+from .causality.clocked_partitions import resolve_clocks
 from .causality.continuous_states import introduce_derivatives
 from .causality.dependent_states import reduce_states
 from .causality.hybrid import prepare_hybrid
@@ -118,7 +120,7 @@ def _flatten(path: Path, model: str | None, options: ModelicaOptions) -> tuple[I
 def analyse(json: Mapping[str, Any], sources: ModelicaSources, name: str) -> Interpreter:
     """Convert the document of the front end to an interpreter of the model."""
     flat = ModelReader(json, sources).read_model(name)
-    structural = flat.structural | folded_parameters(json, sources) | string_parameters(flat)
+    structural = flat.structural | folded_parameters(json, sources) | string_parameters(flat) | clock_parameters(flat)
     flat = replace(
         flat,
         structural=structural,
@@ -126,7 +128,7 @@ def analyse(json: Mapping[str, Any], sources: ModelicaSources, name: str) -> Int
         uses_library=bool(sources.libraries),
     )
     flat = _without_unused_connectors(flat)
-    flat = prepare_hybrid(reduce_states(introduce_derivatives(fold_strings(fold_constants(flat)))))
+    flat = prepare_hybrid(reduce_states(introduce_derivatives(resolve_clocks(fold_strings(fold_constants(flat))))))
     _check_types(flat)
     try:
         return HybridInterpreter(flat) if flat.hybrid else Interpreter(flat)

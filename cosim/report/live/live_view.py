@@ -31,16 +31,18 @@ class LiveView:
 
     Args:
         port: The port of the server on this machine; 0 for any free one.
+        wait: Begin the simulation when a page has been opened.
 
     Raises:
         InputError: The port is not available.
     """
 
-    def __init__(self, port: int) -> None:
+    def __init__(self, port: int, wait: bool = False) -> None:
         try:
             self._server = LiveServer(port, token_urlsafe(24))
         except OSError as error:
             raise InputError(f"--view cannot listen on {HOST}:{port}: {error.strerror}") from None
+        self._wait = wait
         self._parent_end, self._child_end = Pipe()
 
     @property
@@ -64,7 +66,7 @@ class LiveView:
             journal: The journal that the simulation process shares with the supervising process.
         """
         self._child_end.close()
-        session = self._server.session = LiveSession(self._parent_end, journal)
+        session = self._server.session = LiveSession(self._parent_end, journal, self._wait)
         session.start()
         thread = Thread(target=self._server.serve_forever, args=(0.05,), daemon=True)
         thread.start()

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import time
 from collections.abc import Mapping
+from contextlib import suppress
 from multiprocessing.connection import Connection
 from queue import Empty, Queue
 from threading import Condition, Lock, Thread
@@ -32,10 +33,12 @@ class LiveSession:
     Args:
         connection: The pipe to the simulation process.
         journal: The journal that the simulation process shares, with the number of recorded rows.
+        wait: Let the simulation begin when a page fetches rows for the first time; otherwise it begins at once.
     """
 
-    def __init__(self, connection: Connection, journal: Journal) -> None:
+    def __init__(self, connection: Connection, journal: Journal, wait: bool = False) -> None:
         self._connection, self._journal = connection, journal
+        self._wait, self._begun, self._begin_lock = wait, False, Lock()
         self._replies: Queue[dict[str, Any]] = Queue()
         self._command_lock, self._changed = Lock(), Condition()
         self._commands = 0
@@ -64,7 +67,8 @@ class LiveSession:
         folder = self._journal.folder
         if "about" in message and folder and (header := read_header(folder)):
             self.feed = RowFeed(folder, header, message["about"]["rows"])
-            self._connection.send_bytes(b"{}")  # completes the handshake; commands come later
+            if not self._wait:
+                self._begin()
         changes: dict[str, Any] = {key: message[key] for key in ("paused", "speed", "time", "ended") if key in message}
         with self._changed:
             self._run_info = message.get("about", self._run_info)
@@ -72,6 +76,13 @@ class LiveSession:
             self._changed.notify_all()
         if "id" in message:
             self._replies.put(message)
+
+    def _begin(self) -> None:
+        """Let the simulation begin, once: complete its handshake, before any command is sent."""
+        with self._begin_lock, suppress(OSError):
+            if self.feed and not self._begun:
+                self._connection.send_bytes(b"{}")
+                self._begun = True
 
     def mark_ended(self) -> None:
         """Record that the run has ended, and wake all waiting requests."""
@@ -99,6 +110,7 @@ class LiveSession:
 
         Waits until there are such rows, the version of the state is not `version`, or LONG_POLL_TIMEOUT has passed.
         """
+        self._begin()
         self.last_viewed = until = time.monotonic() + LONG_POLL_TIMEOUT
         while True:
             state, available = self._state, self._available()
@@ -118,6 +130,7 @@ class LiveSession:
     def send_command(self, message: Mapping[str, Any]) -> dict[str, Any]:
         """Send a command to the simulation process and return its reply (see `control`)."""
         self._wait_until_started()
+        self._begin()
         with self._command_lock:
             self._commands += 1
             try:

@@ -106,7 +106,7 @@ def _run_job(context: StudyContext, job: Job, fmu_files: FmuFiles, reply: IO[str
     with keeping_run_files(Path(tempfile.gettempdir()) / "run"), simulating(prepared.plan) as outcome:
         if outcome.failure:
             raise outcome.failure
-        kpis = evaluate_kpis(Result(outcome.recording), prepared.kpis())
+        kpis = evaluate_kpis(Result(outcome.recording, metadata=prepared.origin), prepared.kpis())
         _write_reply(reply, {"kpis": kpis})
         _results_written()
 

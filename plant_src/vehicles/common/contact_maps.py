@@ -24,7 +24,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import NamedTuple
 
 import casadi as ca
 
@@ -32,6 +31,7 @@ from cosim.export.equations.model import ContinuousModel
 
 from . import kinematics
 from .interface import ENVIRONMENT_INPUTS
+from .rigid_body import RigidBody
 from .step_status import INVALID_STATE, LEAVES_SAFE_BOX, MAX_STATE_NORM, MAY_FAIL
 
 #: integration steps per step of the world, which is at most 10 ms long
@@ -42,19 +42,6 @@ TWIST_SIZE = 6
 
 #: largest impulse (N s) that counts as rounding; rounding errors are below 1e-14
 IMPULSE_TOLERANCE = 1e-12
-
-
-class RigidBody(NamedTuple):
-    """Mass (kg), inertia about the centre of mass (kg m2, body frame, shape (3, 3)) and the inverse of the inertia."""
-
-    mass: ca.SX
-    inertia: ca.SX
-    inverse_inertia: ca.SX
-
-    def inertia_in_world(self, orientation: ca.SX) -> ca.SX:
-        """Return the inertia (kg m2) in world axes."""
-        to_world = kinematics.rotation_matrix(orientation)
-        return to_world @ self.inertia @ to_world.T
 
 
 @dataclass(frozen=True)
@@ -76,14 +63,7 @@ class FreeContactMaps:
 
     def functions(self) -> list[ca.Function]:
         """Return the functions to export."""
-        return [self._initialize_function(), self._predict_function(), self._correct_function()]
-
-    def _initialize_function(self) -> ca.Function:
-        parameters, constants = parameters_and_constants(self.model)
-        (axes,) = create_symbols(principal_axes=4)
-        state = self.model.initial_state(constants)
-        twist = ca.vertcat(state[7:10], kinematics.rotation_matrix(state[3:7]) @ state[10:13])
-        return ca.Function("contact_initialize", [parameters, axes], [constants, state, twist, twist, _bullet_pose(state, axes)])
+        return [free_initialize_function(self.model), self._predict_function(), self._correct_function()]
 
     def _predict_function(self) -> ca.Function:
         arguments = predict_symbols(self.model)
@@ -96,7 +76,7 @@ class FreeContactMaps:
         twist, endpoints = ca.vertcat(linear, angular), ca.vertcat(state[0:3], end[0:3])
         may_fail = ca.logic_or(end[2] < highest_water, is_upside_down(end[3:7]))
         status = step_status(end, endpoints, arguments, may_fail)
-        results = [state, end, twist, twist, torque, _bullet_pose(state, axes), endpoints, status]
+        results = [state, end, twist, twist, torque, principal_pose(state, axes), endpoints, status]
         return ca.Function("contact_predict", [*arguments, axes, highest_water], results)
 
     def _correct_function(self) -> ca.Function:
@@ -112,6 +92,16 @@ class FreeContactMaps:
         published = ca.vertcat(pose, bullet_twist[0:3], kinematics.rotation_matrix(orientation).T @ bullet_twist[3:6], others)
         corrected = ca.vertcat(pose, velocity, others)
         return correct_function(arguments, impulse, predicted, corrected, self.observe, published)
+
+
+def free_initialize_function(model: ContinuousModel) -> ca.Function:
+    """Return `contact_initialize` of a body whose state begins with that of a free rigid body."""
+    parameters, constants = parameters_and_constants(model)
+    (axes,) = create_symbols(principal_axes=4)
+    state = model.initial_state(constants)
+    twist = ca.vertcat(state[7:10], kinematics.rotation_matrix(state[3:7]) @ state[10:13])
+    results = [constants, state, twist, twist, principal_pose(state, axes)]
+    return ca.Function("contact_initialize", [parameters, axes], results)
 
 
 def parameters_and_constants(model: ContinuousModel) -> tuple[ca.SX, ca.SX]:
@@ -196,6 +186,7 @@ def contact_impulse(impulse: ca.SX) -> ca.SX:
     return ca.if_else(impulse <= IMPULSE_TOLERANCE, 0, impulse)
 
 
-def _bullet_pose(state: ca.SX, axes: ca.SX) -> ca.SX:
+def principal_pose(state: ca.SX, axes: ca.SX) -> ca.SX:
+    """Return the pose in Bullet of a body whose principal axes have the orientation `axes` in the body frame."""
     orientation = kinematics.quaternion_product(state[3:7], ca.vertcat(axes[3], axes[0:3]))
     return ca.vertcat(state[0:3], orientation[1:4], orientation[0])

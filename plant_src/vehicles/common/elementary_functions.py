@@ -1,4 +1,4 @@
-"""Sine, cosine, arctangent and exponential in plain arithmetic, as CasADi expressions.
+"""Sine, cosine, arctangent, exponential and logarithm in plain arithmetic, as CasADi expressions.
 
 They are accurate to 1e-13 or better. Unlike those of the C library they are bit-identical on all machines, and the compiler
 vectorizes them.
@@ -16,6 +16,7 @@ _SINE = tuple((-1) ** k / math.factorial(2 * k + 1) for k in range(12))
 _COSINE = tuple((-1) ** k / math.factorial(2 * k) for k in range(9))
 _ARCTANGENT = tuple((-1) ** k / (2 * k + 1) for k in range(20))
 _EXPONENTIAL = tuple(1 / math.factorial(k) for k in range(7))
+_AREA_TANGENT = tuple(2 / (2 * k + 1) for k in range(11))
 
 #: 2 pi as the sum of two numbers; the multiples of the first one are exact in binary
 _TWO_PI_HIGH = 6.28125
@@ -64,6 +65,16 @@ def exponential(x: ca.SX) -> ca.SX:
     for _ in range(_SQUARINGS):
         power = power * power
     return power
+
+
+def logarithm(x: ca.SX) -> ca.SX:
+    """Return ln(x) for 0.7 <= x <= 2^31, accurate to 1e-15: halve x to about 1, then evaluate the series of 2 artanh."""
+    halvings = ca.SX(0)
+    for power in (16, 8, 4, 2, 1):
+        large = x > 2.0**power / math.sqrt(2)
+        x, halvings = x * ca.if_else(large, 2.0**-power, 1), halvings + ca.if_else(large, power, 0)
+    ratio = (x - 1) / (x + 1)
+    return halvings * math.log(2) + ratio * _polynomial(_AREA_TANGENT, ratio * ratio)
 
 
 def _polynomial(coefficients: Sequence[float], x: ca.SX) -> ca.SX:

@@ -32,6 +32,13 @@ def scalar_variable(name: str, unit: str, description: str, causality: Causality
     return Variable(name, "Float64", causality, variability, start, parse_unit(unit), description=description)
 
 
+def parameter(
+    name: str, unit: str, start: float, description: str, minimum: float | None = None, maximum: float | None = None
+) -> Variable:
+    """Return a real scalar parameter with a range."""
+    return Variable(name, "Float64", "parameter", "fixed", start, parse_unit(unit), (), description, minimum, maximum)
+
+
 EULER_ANGLES = ("roll", "pitch", "yaw")
 
 #: motion of a vehicle
@@ -100,22 +107,19 @@ def _wave_parameter(name: str, unit: str, description: str, minimum: float | Non
 
 #: wave components; those after the first `wave.count` are not used
 WAVE_PARAMETERS = (
-    Variable(
-        "wave.count",
-        "Float64",
-        "parameter",
-        "fixed",
-        0.0,
-        parse_unit("1"),
-        (),
-        "number of wave components",
-        0.0,
-        float(MAX_WAVE_COMPONENTS),
-    ),
+    parameter("wave.count", "1", 0.0, "number of wave components", 0.0, float(MAX_WAVE_COMPONENTS)),
     _wave_parameter("wave.amplitude", "m", "amplitude of each wave component", 0.0),
     _wave_parameter("wave.frequency", "rad/s", "angular frequency of each wave component", 0.0),
     _wave_parameter("wave.direction", "rad", "direction of propagation of each wave component, counter-clockwise from x"),
     _wave_parameter("wave.phase", "rad", "phase of each wave component at the origin"),
+)
+
+#: states of a free rigid body: position and velocity in the world frame; actuator states follow them
+FREE_STATES = (
+    *(f"position.{axis}" for axis in "xyz"),
+    *(f"orientation.{axis}" for axis in "wxyz"),
+    *(f"velocity.{axis}" for axis in "xyz"),
+    *(f"rates.{axis}" for axis in "pqr"),
 )
 
 #: states of a vessel in six degrees of freedom; actuator states follow them
@@ -133,6 +137,7 @@ FLOATING_INITIAL_PARAMETERS = (
     scalar_variable("initial.roll", "rad", "initial roll angle relative to the equilibrium", "parameter"),
     scalar_variable("initial.pitch", "rad", "initial pitch angle relative to the equilibrium", "parameter"),
     scalar_variable("initial.time", "s", "time of the waves at the start of the simulation", "parameter"),
+    parameter("initial.on_waves", "1", 1.0, "1: start on the waves and with their velocity; 0: as in still water", 0.0, 1.0),
 )
 
 

@@ -51,6 +51,11 @@ def values_by_name(vector: ca.SX, variables: Sequence[Variable]) -> NamedValues:
     return _split(vector, {variable.name: (len(variable.scalar_names), 1) for variable in variables})
 
 
+def initial_parameters(parameters: NamedValues) -> dict[str, ca.SX]:
+    """Return the parameters `initial.*`."""
+    return {name: value for name, value in parameters.items() if name.startswith("initial.")}
+
+
 def _split(vector: ca.SX, shapes: Mapping[str, tuple[int, int]]) -> NamedValues:
     """Cut a vector into consecutive matrices of these shapes."""
     parts = ca.vertsplit(vector, [0, *accumulate(rows * columns for rows, columns in shapes.values())])

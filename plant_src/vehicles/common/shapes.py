@@ -11,6 +11,8 @@ import numpy as np
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
 
+BODY_UP: Vector = (0.0, 0.0, 1.0)
+
 
 class Box(NamedTuple):
     """A box in the frame of its body.

@@ -6,17 +6,15 @@ Body frame: x forward, y left, z up, origin at the centre of mass. SI units.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
-from itertools import permutations, product
 
 import numpy as np
 
 from cosim.core.errors import InputError, Problem
 
-from ..common.shapes import Body, Box, Vector, quaternion_from_matrix
-
-BODY_UP = (0.0, 0.0, 1.0)
+from ..common.inertia import Boxes, inertia_problems, principal_body
+from ..common.shapes import BODY_UP, Body, Vector
 
 #: largest number of rotors
 MAX_ROTORS = 16
@@ -134,18 +132,7 @@ class Airframe:
                     yield self._problem(f"found {value!r}, expected finite numbers of at least 0", part, name)
 
     def _inertia_problems(self) -> Iterator[Problem]:
-        tensor = np.asarray(self.inertia, float)
-        if tensor.shape != (3, 3) or not np.isfinite(tensor).all():
-            yield self._problem(f"found {tensor.tolist()}, expected 3 rows of 3 finite numbers", "inertia")
-        elif not np.allclose(tensor, tensor.T, rtol=1e-12, atol=0):
-            yield self._problem(f"found {tensor.tolist()}, expected a symmetric tensor", "inertia")
-        else:
-            small, middle, large = moments = np.linalg.eigvalsh(tensor).tolist()  # in ascending order
-            if small <= 0:
-                yield self._problem(f"found the principal moments {moments}, expected all greater than 0", "inertia")
-            elif large > (small + middle) * (1 + 1e-9):
-                expected = "expected none greater than the sum of the other two"
-                yield self._problem(f"found the principal moments {moments}, {expected}", "inertia")
+        return (self._problem(text, "inertia") for text in inertia_problems(self.inertia))
 
     def _rotor_problems(self) -> Iterator[Problem]:
         if not 1 <= len(self.rotors) <= MAX_ROTORS:
@@ -162,28 +149,6 @@ class Airframe:
             if not all(map(math.isfinite, rotor.position)):
                 yield self._problem(f"found {rotor.position}, expected finite numbers", name, "position")
 
-    def principal_axes(self) -> tuple[np.ndarray, np.ndarray]:
-        """Return the principal moments of inertia and their axes.
-
-        Returns:
-            Moments of inertia (kg m2), shape (3,), and the rotation matrix from the principal axes to the body frame, shape
-            (3, 3). Its angle is less than 120 degrees; subject to that, the moments ascend.
-        """
-        moments, axes = np.linalg.eigh(self.inertia)
-        for order in permutations(range(3)):
-            ordered = axes[:, order] * np.where(np.diag(axes[:, order]) < 0, -1.0, 1.0)
-            for signs in product((1.0, -1.0), repeat=3):
-                to_body = ordered * signs[::-1]
-                if np.linalg.det(to_body) > 0 and np.trace(to_body) > 0:
-                    return moments[list(order)], to_body
-        raise AssertionError("one of the 24 frames of the principal axes is rotated by less than 63 degrees")
-
-    def body(self, boxes: Callable[[np.ndarray], tuple[Box, ...]]) -> Body:
-        """Return the rigid body for Bullet, in the principal axes.
-
-        Args:
-            boxes: Function from the rotation matrix (3, 3) principal axes to body frame to the boxes in the principal axes.
-        """
-        moments, to_body = self.principal_axes()
-        x, y, z = moments.tolist()
-        return Body(self.mass, (x, y, z), boxes(to_body), axes=quaternion_from_matrix(to_body))
+    def body(self, boxes: Boxes) -> Body:
+        """Return the rigid body for Bullet, in the principal axes."""
+        return principal_body(self.mass, self.inertia, boxes)

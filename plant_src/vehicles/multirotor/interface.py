@@ -12,9 +12,11 @@ from dataclasses import replace
 from cosim.core.component import Variable
 from cosim.core.units import parse_unit
 
+from ..common.inertia import inertia_variables
 from ..common.interface import (
     CURRENT_INPUTS,
     EXTERNAL_LOADS,
+    FREE_STATES,
     GROUND_DISTANCE_INPUT,
     GROUND_SHARE_INPUT,
     MOTION_OUTPUTS,
@@ -25,9 +27,6 @@ from ..common.interface import (
     scalar_variable,
 )
 from .airframe import Airframe
-
-#: parameter -> row and column in the symmetric inertia tensor
-INERTIA_INDICES = {f"inertia.{'xyz'[i]}{'xyz'[j]}": (i, j) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))}
 
 #: columns of the table of rotors in the constants of the equations: position, axis, thrust and signed torque coefficient
 ROTOR_TABLE_COLUMNS = 8
@@ -64,9 +63,7 @@ def variables(airframe: Airframe, rotor_slots: int | None = None) -> tuple[Varia
 
 def states(rotor_slots: int) -> tuple[str, ...]:
     """Return the names of the states: those of the rigid body, then the rotor speeds."""
-    groups = {"position": "xyz", "orientation": "wxyz", "velocity": "xyz", "rates": "pqr"}
-    rigid = [f"{group}.{axis}" for group, axes in groups.items() for axis in axes]
-    return (*rigid, *(f"rotor_speed[{number}]" for number in range(1, rotor_slots + 1)))
+    return (*FREE_STATES, *(f"rotor_speed[{number}]" for number in range(1, rotor_slots + 1)))
 
 
 def table_rows(rotor_slots: int) -> int:
@@ -83,12 +80,8 @@ def constant_count(airframe: Airframe, rotor_slots: int) -> int:
 
 def _rigid_body_variables(airframe: Airframe) -> tuple[Variable, ...]:
     """Return mass and inertia; `airframe.Airframe` checks their values."""
-    mass = scalar_variable("mass", "kg", "total mass with rotors and payload", "parameter", airframe.mass)
-    text = "inertia tensor about the centre of mass, body frame, rotors locked"
-    elements = {name: float(airframe.inertia[place]) for name, place in INERTIA_INDICES.items()}
-    tensor = (scalar_variable(name, "kg.m2", f"{text}: {name[-2:]}", "parameter", value) for name, value in elements.items())
     gravity = scalar_variable("gravity", "m/s2", "gravitational acceleration", "parameter", airframe.gravity)
-    return (mass, *tensor, gravity)
+    return (*inertia_variables(airframe.mass, airframe.inertia, "total mass with rotors and payload"), gravity)
 
 
 def _hull_parameters(airframe: Airframe) -> tuple[Variable, ...]:

@@ -43,16 +43,22 @@ from cosim.export.equations.fmu_code import as_block
 from cosim.export.equations.model import ContinuousModel, runge_kutta_4
 from cosim.export.fmu.block import Block
 
-from ..common import contact_maps, kinematics
+from ..common import contact_maps
 from ..common.interface import WORLD_OUTPUTS
 from ..common.named_values import ConstantsMap, NamedValues, values_by_name, variables_of
+from ..common.rigid_body import (
+    RIGID_BODY_STATE_COUNT,
+    initial_rigid_state,
+    motion_of_state,
+    normalised_state,
+    rigid_body,
+    rigid_body_rate,
+    symmetric_matrix,
+)
 from . import water
 from .airframe import Airframe, RotorEffects
 from .interface import states, variables
 from .loads import RotorFunctions, gyroscopic_torque, rotor_table, still_air_loads
-
-#: number of rigid-body states; the rotor speeds follow them in the state vector
-RIGID_BODY_STATE_COUNT = 13
 
 _EFFECTS = [effect.name for effect in fields(RotorEffects)]
 
@@ -70,37 +76,6 @@ class SpinningRotors(NamedTuple):
 
 #: function of (state, rotors, reductions of the inflow, inputs, constants) to the rate of the rigid-body states
 BodyRate = Callable[[ca.SX, SpinningRotors, ca.SX, NamedValues, NamedValues], ca.SX]
-
-
-def rigid_body(constants: NamedValues) -> contact_maps.RigidBody:
-    """Return mass and inertia."""
-    return contact_maps.RigidBody(constants["mass"], _symmetric_matrix(constants["inertia"]), constants["inverse_inertia"])
-
-
-def _symmetric_matrix(elements: ca.SX) -> ca.SX:
-    """Return the symmetric matrix (3, 3) with the elements xx, yy, zz, xy, xz, yz."""
-    xx, yy, zz, xy, xz, yz = ca.vertsplit(elements)
-    return ca.vertcat(ca.horzcat(xx, xy, xz), ca.horzcat(xy, yy, yz), ca.horzcat(xz, yz, zz))
-
-
-def rigid_body_rate(
-    body: contact_maps.RigidBody, gravity: ca.SX, state: ca.SX, inputs: NamedValues, force: ca.SX, torque: ca.SX
-) -> ca.SX:
-    """Return the time derivative of the rigid-body states.
-
-    Args:
-        body: Mass and inertia.
-        gravity: Gravitational acceleration (m/s2).
-        state: Position, quaternion, velocity (world frame) and rates (body frame), shape (13,).
-        inputs: Inputs by name; the external force and torque are used.
-        force: Force without weight and external force (N, body frame).
-        torque: Torque about the centre of mass without external torque (N m, body frame).
-    """
-    orientation, velocity, rates = state[3:7], state[7:10], state[10:13]
-    to_world = kinematics.rotation_matrix(orientation)
-    acceleration = (to_world @ force + inputs["external_force"]) / body.mass - ca.vertcat(0, 0, gravity)
-    moment = torque + to_world.T @ inputs["external_torque"] - ca.cross(rates, body.inertia @ rates)
-    return ca.vertcat(velocity, kinematics.quaternion_rate(orientation, rates), acceleration, body.inverse_inertia @ moment)
 
 
 @dataclass(frozen=True)
@@ -142,7 +117,7 @@ class MultirotorEquations:
         axes = table[: self.slots, 3:6].T
         return {
             **parameters,
-            "inverse_inertia": ca.inv(_symmetric_matrix(parameters["inertia"])),
+            "inverse_inertia": ca.inv(symmetric_matrix(parameters["inertia"])),
             "rotor_table": table,
             "still_air_loads": still_air_loads(table, self.slots),
             "rotor_reach": ca.vertcat(ca.sqrt(ca.mmax(x**2 + y**2)), ca.mmax(ca.fabs(z))),
@@ -155,12 +130,10 @@ class MultirotorEquations:
     def initial_state(self, constants: ca.SX) -> ca.SX:
         """Return the state at the start."""
         initial = self.constants.by_name(constants)
-        orientation = kinematics.quaternion_about_z(initial["initial.yaw"])
-        velocity = kinematics.rotation_matrix(orientation) @ initial["initial.velocity_body"]
         rotors = ca.vertcat(
             *(ca.if_else(initial["rotor_count"] > k, initial["initial_rotor_speed"], 0) for k in range(self.slots))
         )
-        return ca.vertcat(initial["initial.position"], orientation, velocity, initial["initial.rates"], rotors)
+        return ca.vertcat(initial_rigid_state(initial), rotors)
 
     def rate(self, state: ca.SX, inputs: ca.SX, constants: ca.SX) -> ca.SX:
         """Return the time derivative of the state of a multirotor whose rotors lag, in air and water."""
@@ -233,16 +206,6 @@ def _spinning_rotors(speed: ca.SX, target: ca.SX, constants: NamedValues) -> Spi
     lag = constants["rotor_time_constant"]
     rate = ca.if_else(lag > 0, (target - speed) / lag, 0)
     return SpinningRotors(speed, constants["momenta"] @ speed, constants["momenta"] @ rate)
-
-
-def normalised_state(state: ca.SX) -> ca.SX:
-    """Return the rigid-body states with a unit quaternion."""
-    return ca.vertcat(state[0:3], kinematics.normalised_quaternion(state[3:7]), state[7:RIGID_BODY_STATE_COUNT])
-
-
-def motion_of_state(state: ca.SX) -> ca.SX:
-    """Return the published motion (`interface.MOTION_OUTPUTS`)."""
-    return kinematics.motion_outputs(state[0:3], state[3:7], state[7:10], state[10:RIGID_BODY_STATE_COUNT])
 
 
 @dataclass(frozen=True)

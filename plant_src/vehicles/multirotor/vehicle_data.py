@@ -2,10 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-from itertools import product
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,38 +11,25 @@ import numpy as np
 from cosim.core.errors import InputError
 
 from ...json_reader import JsonPath
-from ..common.quantities import QuantityReader
-from ..common.shapes import Body, Box, Vector, level_box
-from .airframe import BODY_UP, Airframe, Hull, Rotor, RotorEffects
+from ..common.shapes import BODY_UP, Body, Box
+from ..common.vehicle_reader import CollisionBox, VehicleReader, boxes_in, edges_around
+from .airframe import Airframe, Hull, Rotor, RotorEffects
 
 #: sense of rotation seen from the tip of the thrust's axis -> sign of the reaction torque about this axis
 TORQUE_SIGNS = {"clockwise": 1.0, "counter-clockwise": -1.0}
 
-_KEYS = ("mass", "inertia", "rotor", "rotors", "boxes", "crash_speed")
+#: required keys of the file
+KEYS = ("mass", "inertia", "rotor", "rotors", "boxes", "crash_speed")
 _OPTIONAL_KEYS = ("body_drag", "ground_effect", "gravity", "displaced_volume", "water_drag_coefficient")
 _COEFFICIENTS = {"thrust_coefficient": "N.s2/rad2", "torque_coefficient": "N.m.s2/rad2"}
-_ROTOR_KEYS, _ROTOR_OPTIONAL_KEYS = (
+#: required and optional keys of all rotors
+ROTOR_KEYS, _ROTOR_OPTIONAL_KEYS = (
     ("radius", "max_speed"),
     (*_COEFFICIENTS, "time_constant", "inertia", "drag", "translational_lift"),
 )
 
 #: density (kg/m3) of a vehicle whose file does not say what volume it displaces; it sinks
 DEFAULT_DENSITY = 1200.0
-
-
-@dataclass(frozen=True)
-class CollisionBox:
-    """A box of the collision shape in the body frame: edges and centre (m), and its angle about the z axis (rad)."""
-
-    size: Vector
-    position: Vector
-    yaw: float
-
-    def corners(self) -> np.ndarray:
-        """Return the corners (m, body frame), shape (8, 3)."""
-        x, y, z = (np.array(list(product((-0.5, 0.5), repeat=3))) * self.size).T
-        cosine, sine = math.cos(self.yaw), math.sin(self.yaw)
-        return np.column_stack([cosine * x - sine * y, sine * x + cosine * y, z]) + self.position
 
 
 @dataclass(frozen=True)
@@ -55,13 +40,13 @@ class MultirotorData:
     boxes: tuple[CollisionBox, ...]
     crash_speed: float
 
-    def body(self) -> Body:
-        """Return the rigid body for Bullet, in the principal axes."""
-        return self.airframe.body(self.boxes_in)
+    def body_with(self, mass: float, inertia: np.ndarray) -> Body:
+        """Return the rigid body for Bullet with another mass (kg) and inertia tensor (kg m2). Raises InputError."""
+        return replace(self.airframe, mass=mass, inertia=inertia).body(self.boxes_in)
 
     def boxes_in(self, to_body: np.ndarray) -> tuple[Box, ...]:
         """Return the boxes in the frame from which `to_body` (3, 3) rotates into the body frame."""
-        return tuple(level_box(to_body, box.size, box.position, box.yaw) for box in self.boxes)
+        return boxes_in(self.boxes, to_body)
 
 
 def read_multirotor(name: str, data: Mapping[str, Any], keys: tuple[str, ...]) -> MultirotorData:
@@ -82,11 +67,11 @@ def read_multirotor(name: str, data: Mapping[str, Any], keys: tuple[str, ...]) -
     return vehicle
 
 
-class _MultirotorReader(QuantityReader):
+class _MultirotorReader(VehicleReader):
     def read_multirotor(self, name: str, data: Any, keys: tuple[str, ...]) -> MultirotorData | None:
         """Read all data; None if the airframe is impossible."""
-        data = self.read_data(data, (), _KEYS, (*_OPTIONAL_KEYS, *keys))
-        common = self.read_data(data.get("rotor"), ("rotor",), _ROTOR_KEYS, _ROTOR_OPTIONAL_KEYS)
+        data = self.read_data(data, (), KEYS, (*_OPTIONAL_KEYS, *keys))
+        common = self.read_data(data.get("rotor"), ("rotor",), ROTOR_KEYS, _ROTOR_OPTIONAL_KEYS)
         values: dict[str, Any] = {
             "mass": self.quantity(data.get("mass", 1.0), ("mass",), "kg", above=0.0),
             "inertia": self.read_inertia(data.get("inertia", [1.0] * 3)),
@@ -96,7 +81,7 @@ class _MultirotorReader(QuantityReader):
             "gravity": self.quantity(data.get("gravity", 9.81), ("gravity",), "m/s2", above=0.0),
             "effects": self.read_effects(data, common),
         }
-        boxes = tuple(self.read_box(box, ("boxes", str(i))) for i, box in self.elements(data, "boxes"))
+        boxes = self.read_boxes(data)
         values["hull"] = self.read_hull(data, boxes, values["mass"])
         crash_speed = self.quantity(data.get("crash_speed", 1.0), ("crash_speed",), "m/s", above=0.0)
         if self.problems:
@@ -110,27 +95,10 @@ class _MultirotorReader(QuantityReader):
 
     def read_hull(self, data: Mapping[str, Any], boxes: Sequence[CollisionBox], mass: float) -> Hull:
         """Read what water acts on: the box around all boxes, the displaced volume and the drag coefficient."""
-        corners = np.concatenate([box.corners() for box in boxes or (CollisionBox((1.0,) * 3, (0.0,) * 3, 0.0),)])
-        length, width, height = np.ptp(corners, axis=0).tolist()
+        length, width, height = edges_around(boxes)
         volume = self.quantity(data.get("displaced_volume", mass / DEFAULT_DENSITY), ("displaced_volume",), "m3", low=0.0)
         drag = data.get("water_drag_coefficient", 1.0)
         return Hull((length, width, height), volume, self.quantity(drag, ("water_drag_coefficient",), "1", low=0.0))
-
-    def elements(self, data: Mapping[str, Any], key: str) -> list[tuple[int, Any]]:
-        """Read a list with at least one element; return its elements with their indices."""
-        value = data.get(key, [{}])
-        if not isinstance(value, list) or not value:
-            self.add_problem((key,), f"found {value!r}, expected a list with at least one element")
-            return []
-        return list(enumerate(value)) if key in data else []
-
-    def read_inertia(self, value: Any) -> np.ndarray:
-        """Read three moments of inertia, or three rows of a tensor."""
-        numbers = self.si_value(value, ("inertia",), "kg.m2")
-        rows = isinstance(numbers, list) and len(numbers) == 3 and all(isinstance(row, list) for row in numbers)
-        if rows:
-            return np.array([self.vector(row, ("inertia", str(i)), "xyz") for i, row in enumerate(numbers)])
-        return np.diag(self.vector(numbers, ("inertia",), ("xx", "yy", "zz")))
 
     def read_rotor(self, common: Mapping[str, Any], value: Any, path: JsonPath) -> Rotor:
         """Read one rotor; its coefficients replace those of all rotors."""
@@ -147,15 +115,6 @@ class _MultirotorReader(QuantityReader):
         axis = self.read_axis(data["axis"], (*path, "axis")) if "axis" in data else BODY_UP
         return Rotor(label, (x, y, z), TORQUE_SIGNS[turns], axis=axis, **coefficients)
 
-    def read_axis(self, value: Any, path: JsonPath) -> Vector:
-        """Read the direction of a thrust and return it as a unit vector."""
-        x, y, z = self.vector_quantity(value, path, "1", "xyz")
-        length = math.hypot(x, y, z)
-        if not length:
-            self.add_problem(path, "found the zero vector, expected a direction")
-            return BODY_UP
-        return x / length, y / length, z / length
-
     def read_effects(self, data: Mapping[str, Any], common: Mapping[str, Any]) -> RotorEffects:
         """Read the effects beyond thrust and torque; those that are missing are off."""
         zero = [0.0] * 3
@@ -169,12 +128,3 @@ class _MultirotorReader(QuantityReader):
             self.quantity(data.get("ground_effect", 0.0), ("ground_effect",), "1", 0.0, 1.0),
             self.quantity(common.get("translational_lift", 0.0), ("rotor", "translational_lift"), "kg/m", low=0.0),
         )
-
-    def read_box(self, value: Any, path: JsonPath) -> CollisionBox:
-        """Read one box of the collision shape."""
-        data = self.read_data(value, path, ("size",), ("position", "yaw"))
-        length, width, height = self.vector_quantity(data.get("size", [1.0] * 3), (*path, "size"), "m", "xyz")
-        if not min(length, width, height) > 0:
-            self.add_problem((*path, "size"), f"found {[length, width, height]}, expected edges greater than 0")
-        x, y, z = self.vector_quantity(data.get("position", [0.0] * 3), (*path, "position"), "m", "xyz")
-        return CollisionBox((length, width, height), (x, y, z), self.quantity(data.get("yaw", 0.0), (*path, "yaw"), "rad"))

@@ -13,17 +13,20 @@ from cosim.export.fmu.block import Block
 
 from ..common import kinematics
 from ..common.interface import VESSEL_STATES
-from ..common.named_values import NamedValues, values_by_name, variables_of
+from ..common.named_values import NamedValues, initial_parameters, values_by_name, variables_of
 from ..vessel import floating_maps, vessel_equations
 from ..vessel import hull as vessel
 from ..vessel.hull import Frame, Hull, LoadArguments, load_of_force_at, transformation_matrix
-from ..vessel.wave_loads import Footprint
+from ..vessel.strips import TwinHull, equivalent_strips
 from . import hydrostatics
 from . import parameters as p
 from .geometry import BODY
 from .interface import PROPELLER_STATES, VARIABLES
 
 _CENTRE_OF_FLOTATION = ca.SX(p.CENTRE_OF_FLOTATION)
+_STRIPS = equivalent_strips(
+    _CENTRE_OF_FLOTATION, (ca.SX(p.TRANSVERSE_MOMENT), ca.SX(p.LONGITUDINAL_MOMENT)), ca.SX(p.WATERPLANE_AREA)
+)
 
 
 def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
@@ -39,7 +42,7 @@ def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
     mass_matrix = vessel.rigid_body_mass_matrix(mass, centre, inertia) + ca.diag(added)
     floating = hydrostatics.hydrostatics(mass, centre)
     constants = {
-        **vessel_equations.initial_parameters(parameters),
+        **initial_parameters(parameters),
         "mass": mass,
         "centre_of_mass": centre,
         "inertia": inertia,
@@ -48,14 +51,13 @@ def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
         "draught": floating.draught,
         "stiffness": floating.stiffness,
         "compliance": floating.compliance,
-        "footprint": floating.footprint,
         "damping": hydrostatics.linear_damping(ca.diag(mass_matrix), floating.stiffness),
         "drag": hydrostatics.cross_flow_drag(floating.draught),
         "payload_force": -payload * p.GRAVITY,
         "payload_position": position,
         "propeller_time_constant": parameters["propeller_time_constant"],
         "wave.count": parameters["wave.count"],
-        "wave_table": vessel_equations.wave_table_of(parameters, _unpack_footprint(floating.footprint)),
+        "wave_table": vessel_equations.wave_table_of(parameters, _twin_hull(floating.mean_draught)),
     }
     return constants | {"equilibrium": _equilibrium(constants)}
 
@@ -106,19 +108,25 @@ def hull(constants: NamedValues) -> Hull:
         added_mass=added,
         coriolis_added_mass=added,
         inverse_mass_matrix=constants["inverse_mass_matrix"],
-        centre_of_flotation=_CENTRE_OF_FLOTATION,
         deck_centre=ca.SX(p.DECK_CENTRE),
         equilibrium=constants["equilibrium"],
-        footprint=_unpack_footprint(constants["footprint"]),
+        strips=_STRIPS,
         wave_count=constants["wave.count"],
         wave_table=constants["wave_table"],
-        loads=lambda now: propulsion(constants, now) + damping(constants, now) + restoring(constants, now) + wind(now),
+        loads=lambda now: (
+            propulsion(constants, now)
+            + damping(constants, now)
+            + restoring(constants, now)
+            + wind(now)
+            + now.froude_krylov_load(constants["mass"], constants["centre_of_mass"], _STRIPS)
+        ),
         frame=lambda orientation: frame(constants, orientation),
     )
 
 
-def _unpack_footprint(values: ca.SX) -> Footprint:
-    return Footprint(*ca.vertsplit(values))
+def _twin_hull(draught: ca.SX) -> TwinHull:
+    """Return the pontoons for a mean draught (m)."""
+    return TwinHull(_STRIPS, ca.SX(p.PONTOON_BEAM), draught, ca.SX(p.PONTOON_TOP - p.PONTOON_BOTTOM), ca.SX(p.WATERPLANE_AREA))
 
 
 def restoring(constants: NamedValues, now: LoadArguments) -> ca.SX:
@@ -126,7 +134,7 @@ def restoring(constants: NamedValues, now: LoadArguments) -> ca.SX:
     angles = kinematics.euler_angles(now.orientation)[0:2]
     displacement = ca.vertcat(now.height, angles) - trim(constants, now.frame.attitude)
     to_flotation = transformation_matrix(_CENTRE_OF_FLOTATION)[2:5, 2:5]
-    surface = ca.vertcat(now.elevation, now.slopes[1], -now.slopes[0])
+    surface = ca.vertcat(now.water.heave, now.water.slopes)
     load = -to_flotation.T @ (constants["stiffness"] * (to_flotation @ displacement - surface))
     return ca.vertcat(0, 0, load, 0)
 
@@ -134,8 +142,9 @@ def restoring(constants: NamedValues, now: LoadArguments) -> ca.SX:
 def damping(constants: NamedValues, now: LoadArguments) -> ca.SX:
     """Return tau of the linear damping, which grows with the yaw rate in yaw, and of the cross-flow drag along the hull."""
     growth = ca.vertcat(ca.SX.ones(5), 1 + p.YAW_DAMPING_GROWTH * ca.fabs(now.relative_velocity[5]))
-    load = -constants["damping"] * growth * now.relative_velocity
-    _, v, w, _, q, r = ca.vertsplit(now.relative_velocity)
+    relative = ca.vertcat(now.relative_velocity[0:3], now.rates_in_water, now.relative_velocity[5])
+    load = -constants["damping"] * growth * relative
+    _, v, w, _, q, r = ca.vertsplit(relative)
     for x in np.linspace(-p.LENGTH / 2, p.LENGTH / 2, p.STATION_COUNT).tolist():
         across, down = v + x * r, w - x * q
         drag = -constants["drag"] * ca.vertcat(0, ca.fabs(across) * across, ca.fabs(down) * down)

@@ -18,30 +18,27 @@ class Hydrostatics:
         draught: Draught (m).
         stiffness: Restoring stiffness of heave (N/m), roll and pitch (N m/rad) at the centre of flotation, shape (3,).
         compliance: Heave (m), roll and pitch (rad) over heave force (N), roll and pitch moment (N m) at O, shape (3, 3).
-        footprint: Values of `wave_loads.Footprint`, shape (3,).
+        mean_draught: Volume over waterplane (m).
     """
 
     draught: ca.SX
     stiffness: ca.SX
     compliance: ca.SX
-    footprint: ca.SX
+    mean_draught: ca.SX
 
 
 def hydrostatics(mass: ca.SX, centre: ca.SX) -> Hydrostatics:
     """Return the hydrostatics for a mass (kg) and a centre of mass (m, body frame)."""
     volume = mass / p.WATER_DENSITY
     draught = volume / (2 * p.BLOCK_COEFFICIENT * p.PONTOON_BEAM * p.LENGTH)
-    area = 2 * p.WATERLINE_COEFFICIENT * p.LENGTH * p.PONTOON_BEAM
-    c = p.WATERLINE_COEFFICIENT
-    own = 2 * p.LENGTH * p.PONTOON_BEAM**3 / 12 * 6 * c**3 / ((1 + c) * (1 + 2 * c))
-    moments = ca.SX([own + area * p.PONTOON_OFFSET**2, 0.8 * 2 * p.PONTOON_BEAM * p.LENGTH**3 / 12])
+    moments = ca.SX([p.TRANSVERSE_MOMENT, p.LONGITUDINAL_MOMENT])
     buoyancy_height = (5 * draught / 2 - volume / (2 * p.LENGTH * p.PONTOON_BEAM)) / 3
     metacentric_heights = buoyancy_height + moments / volume - (draught + centre[2])
     weight = p.WATER_DENSITY * p.GRAVITY
-    stiffness = ca.vertcat(weight * area, weight * volume * metacentric_heights)
+    stiffness = ca.vertcat(weight * p.WATERPLANE_AREA, weight * volume * metacentric_heights)
     to_flotation = transformation_matrix(ca.SX(p.CENTRE_OF_FLOTATION))[2:5, 2:5]
     compliance = ca.inv(to_flotation.T @ ca.diag(stiffness) @ to_flotation)
-    return Hydrostatics(draught, stiffness, compliance, ca.vertcat(moments[1] / area, moments[0] / area, draught))
+    return Hydrostatics(draught, stiffness, compliance, volume / p.WATERPLANE_AREA)
 
 
 def linear_damping(mass: ca.SX, stiffness: ca.SX) -> ca.SX:

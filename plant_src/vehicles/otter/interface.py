@@ -16,6 +16,7 @@ from ..common.interface import (
     WIND_INPUTS,
     WORLD_OUTPUTS,
     initial_variables,
+    parameter,
 )
 
 PROPELLER_SPEED = Variable(
@@ -28,20 +29,13 @@ PROPELLER_SPEED = Variable(
     description="commanded propeller speeds (port, starboard), limited to -101.7 ... 103.9 rad/s",
 )
 
-
-def _parameter(name: str, unit: str, start: float, description: str, minimum: float | None, maximum: float | None) -> Variable:
-    return Variable(name, "Float64", "parameter", "fixed", start, parse_unit(unit), (), description, minimum, maximum)
-
-
 PAYLOAD_PARAMETERS = (
-    _parameter("payload_mass", "kg", 25.0, "mass of the payload", 0.0, 45.0),
-    _parameter("payload_position.x", "m", 0.05, "payload ahead of midships", -1.0, 1.0),
-    _parameter("payload_position.y", "m", 0.0, "payload to port of the centre line", -0.5, 0.5),
-    _parameter("payload_position.z", "m", 0.35, "payload above the waterline", -0.2, 1.0),
+    parameter("payload_mass", "kg", 25.0, "mass of the payload", 0.0, 45.0),
+    parameter("payload_position.x", "m", 0.05, "payload ahead of midships", -1.0, 1.0),
+    parameter("payload_position.y", "m", 0.0, "payload to port of the centre line", -0.5, 0.5),
+    parameter("payload_position.z", "m", 0.35, "payload above the waterline", -0.2, 1.0),
 )
-PROPELLER_TIME_CONSTANT = _parameter(
-    "propeller_time_constant", "s", 0.1, "time constant of the propeller speeds; 0: no lag", 0.0, None
-)
+PROPELLER_TIME_CONSTANT = parameter("propeller_time_constant", "s", 0.1, "time constant of the propeller speeds; 0: no lag", 0.0)
 
 PARAMETERS = (
     *initial_variables("xy", "uvw", "pqr"),
@@ -57,4 +51,4 @@ VARIABLES = (*PARAMETERS, *INPUTS, *MOTION_OUTPUTS, *DECK_OUTPUTS, *WORLD_OUTPUT
 PROPELLER_STATES = ("propeller_speed[1]", "propeller_speed[2]")
 
 #: number of constants that the equations derive from the parameters
-CONSTANT_COUNT = 484
+CONSTANT_COUNT = 610

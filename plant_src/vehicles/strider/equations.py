@@ -6,6 +6,8 @@ and sway force (N) and yaw moment (N m), body frame forward-left-up.
 
 from __future__ import annotations
 
+import math
+
 import casadi as ca
 
 from cosim.export.equations.fmu_code import as_block
@@ -15,21 +17,24 @@ from cosim.export.fmu.block import Block
 from ..common import kinematics
 from ..common.elementary_functions import arctangent, sine_and_cosine, sine_of_right_angle_share
 from ..common.interface import WORLD_OUTPUTS
-from ..common.named_values import NamedValues, values_by_name
+from ..common.named_values import ConstantsMap, NamedValues, initial_parameters, values_by_name
 from ..vessel import planar_maps
 from . import parameters as p
 from .geometry import DECK_CENTRE
 from .interface import INPUTS, STATES, VARIABLES
+from .resistance import resistance
 
 
-def rate(state: ca.SX, inputs: NamedValues) -> ca.SX:
+def rate(state: ca.SX, inputs: NamedValues, constants: NamedValues) -> ca.SX:
     """Return the time derivative of the state (x, y, yaw, u, v, r); u, v and r are surge, sway and yaw rate."""
     yaw, u, v, r = ca.vertsplit(state[2:6])
     external_force, wind, current = inputs["external_force"], inputs["wind"], inputs["current"]
     sin, cos = sine_and_cosine(yaw)
     u_water, v_water = u - (cos * current[0] + sin * current[1]), v - (cos * current[1] - sin * current[0])
     u_air, v_air = u - (cos * wind[0] + sin * wind[1]), v - (cos * wind[1] - sin * wind[0])
-    loads = hull_loads(v_water, r) + air_drag(u_air, v_air) + rudder_loads(u_water, v_water, r, inputs["rudder_angle"])
+    race = race_velocity_squared(inputs["thrust"], constants["race_factor"])
+    loads = hull_loads(v_water, r) + air_drag(u_air, v_air) + rudder_loads(u_water, v_water, r, race, inputs["rudder_angle"])
+    loads[0] += constants["resistance"] * resistance(u_water)
     surge_force = loads[0] + inputs["thrust"] + cos * external_force[0] + sin * external_force[1]
     side_force = loads[1] - sin * external_force[0] + cos * external_force[1]
     moment = loads[2] + inputs["external_torque.z"]
@@ -48,27 +53,52 @@ def air_drag(u: ca.SX, v: ca.SX) -> ca.SX:
     return -p.AIR_DRAG * ca.vertcat(ca.fabs(u) * u, ca.fabs(v) * v, 0)
 
 
-def rudder_loads(u: ca.SX, v: ca.SX, r: ca.SX, rudder_angle: ca.SX) -> ca.SX:
+def hull_constants(parameters: NamedValues) -> dict[str, ca.SX]:
+    """Return the constants of resistance and propeller race."""
+    return {"resistance": parameters["resistance"], "race_factor": race_factor(parameters["propeller_diameter"])}
+
+
+def race_factor(diameter: ca.SX) -> ca.SX:
+    """Return 2 / (rho A) (m2/s2/N) of a propeller with this diameter (m), and 0 for the diameter 0."""
+    area = math.pi / 4 * diameter * diameter
+    return ca.if_else(area > 0, 2 / p.WATER_DENSITY / ca.fmax(area, 1e-9), 0)
+
+
+def race_velocity_squared(thrust: ca.SX, factor: ca.SX) -> ca.SX:
+    """Return what the propeller adds to the squared velocity at the rudder (m2/s2), in its fully developed race.
+
+    The momentum theory of the actuator disc gives u_race^2 = u^2 + 2 T / (rho A). Astern, the race leaves the rudder.
+
+    Args:
+        thrust: Thrust (N).
+        factor: Value of `race_factor` (m2/s2/N).
+    """
+    return factor * ca.fmax(thrust, 0)
+
+
+def rudder_loads(u: ca.SX, v: ca.SX, r: ca.SX, race: ca.SX, rudder_angle: ca.SX) -> ca.SX:
     """Return (X, Y, N) of the rudder; the lift is a sine of the angle of attack up to the stall angle.
 
     Args:
         u: Surge velocity relative to the water (m/s); the lift changes its sign when going astern.
         v: Sway velocity relative to the water (m/s).
         r: Yaw rate (rad/s).
+        race: Value of `race_velocity_squared` (m2/s2).
         rudder_angle: Rudder angle (rad).
     """
-    ahead = ca.sign(u)
-    inflow_angle = arctangent(ahead * (v - p.RUDDER_ARM * r), ca.fabs(u))
+    pressure = ca.fabs(u) * u + race
+    ahead = ca.sign(pressure)
+    inflow_angle = arctangent(ahead * (v - p.RUDDER_ARM * r), ca.sqrt(ca.fabs(pressure)))
     attack = ca.fmin(1, ca.fmax(-1, (rudder_angle - inflow_angle) / p.STALL_ANGLE))
-    max_lift = p.WATER_DENSITY / 2 * p.RUDDER_MAX_LIFT_COEFFICIENT * p.RUDDER_AREA * ahead * u**2
+    max_lift = p.WATER_DENSITY / 2 * p.RUDDER_MAX_LIFT_COEFFICIENT * p.RUDDER_AREA * pressure
     lift = max_lift * sine_of_right_angle_share(attack)
     side_force = lift * ca.cos(rudder_angle)
     return ca.vertcat(-lift * ca.sin(rudder_angle), side_force, -p.RUDDER_ARM * side_force)
 
 
-def initial_state(parameters: ca.SX) -> ca.SX:
-    """Return the state: the parameters are initial position, yaw angle, velocity and yaw rate in the order of the state."""
-    return parameters
+def initial_state(constants: ca.SX) -> ca.SX:
+    """Return the state: the first constants are position, yaw angle, velocity and yaw rate in the order of the state."""
+    return constants[: len(STATES)]
 
 
 def observe(state: ca.SX) -> ca.SX:
@@ -83,16 +113,26 @@ def observe(state: ca.SX) -> ca.SX:
     return ca.vertcat(kinematics.motion_outputs(position, orientation, velocity, rates), deck)
 
 
-def block() -> Block:
-    """Return the catamaran for export."""
-    model = ContinuousModel(
+#: map from the parameters to the constants of the equations
+CONSTANTS = ConstantsMap(VARIABLES, lambda parameters: {**initial_parameters(parameters), **hull_constants(parameters)})
+
+
+def model() -> ContinuousModel:
+    """Return the equations of the catamaran."""
+    return ContinuousModel(
         "strider",
         "Strider V1.0 catamaran on calm water",
         VARIABLES,
         STATES,
         initial_state,
-        lambda state, inputs, _parameters: rate(state, values_by_name(inputs, INPUTS)),
-        lambda state, _inputs, _parameters: ca.vertcat(observe(state), ca.SX.zeros(len(WORLD_OUTPUTS))),
+        lambda state, inputs, constants: rate(state, values_by_name(inputs, INPUTS), CONSTANTS.by_name(constants)),
+        lambda state, _inputs, _constants: ca.vertcat(observe(state), ca.SX.zeros(len(WORLD_OUTPUTS))),
+        derived_parameters=CONSTANTS.vector,
     )
-    maps = planar_maps.PlanarContactMaps(model, p.MASS, p.INERTIA[2], p.CENTRE_OF_MASS_HEIGHT, observe)
-    return as_block(model, maps.functions())
+
+
+def block() -> Block:
+    """Return the catamaran for export."""
+    equations = model()
+    maps = planar_maps.PlanarContactMaps(equations, p.MASS, p.INERTIA[2], p.CENTRE_OF_MASS_HEIGHT, observe)
+    return as_block(equations, maps.functions())

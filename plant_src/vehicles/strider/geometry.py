@@ -3,7 +3,19 @@
 from __future__ import annotations
 
 from ..common.shapes import Body, Box
-from .parameters import CENTRE_OF_MASS_HEIGHT, DECK_TOP, DECK_X, DECK_Y, INERTIA, MASS
+from .parameters import (
+    CENTRE_OF_MASS_HEIGHT,
+    DECK_TOP,
+    DECK_X,
+    DECK_Y,
+    HULL_BEAM,
+    HULL_BOTTOM,
+    HULL_LENGTH,
+    HULL_OFFSET,
+    HULL_TOP,
+    INERTIA,
+    MASS,
+)
 
 #: centre of the top of the landing deck (m)
 DECK_CENTRE = (sum(DECK_X) / 2, sum(DECK_Y) / 2, DECK_TOP)
@@ -11,8 +23,6 @@ DECK_CENTRE = (sum(DECK_X) / 2, sum(DECK_Y) / 2, DECK_TOP)
 #: dimensions from the published simulation model (m)
 PLATE_THICKNESS = 0.023
 HOUSING_SIZE = (0.30, 0.30, 0.05)  # edges of the box under the deck plate
-HULL_LENGTH, HULL_BEAM, HULL_OFFSET = 0.979, 0.126, 0.533  # distance of each hull's centre line from the middle
-HULL_BOTTOM, HULL_TOP = -0.144, -0.109
 
 
 def _hull_box(side: float) -> Box:

@@ -24,6 +24,10 @@ CRASH_SPEED = 0.6
 
 HULL_COUNT = 2
 
+#: dimensions of a hull from [model] (m), and distance of its centre line from the middle
+HULL_LENGTH, HULL_BEAM, HULL_OFFSET = 0.979, 0.126, 0.533
+HULL_BOTTOM, HULL_TOP = -0.144, -0.109
+
 #: hydrodynamic derivatives of sway force Y and yaw moment N of one hull at about 1 m/s [model, paper]
 Y_V = -3.899501881  # kg/s
 Y_R = 1.774273356  # kg m/s
@@ -34,7 +38,33 @@ N_R = -0.807294377  # kg m2/s
 AIR_DRAG = 0.1
 
 WATER_DENSITY = 998.0  # kg/m3 [paper]
+VISCOSITY = 1.0034e-6  # kinematic, of fresh water at 20 degrees (m2/s)
+GRAVITY = 9.81  # m/s2
+
+DRAUGHT = -HULL_BOTTOM - CENTRE_OF_MASS_HEIGHT  # m
+VOLUME = MASS / WATER_DENSITY  # displaced, m3
+
+#: block coefficient C_B = 0.86: the hulls are nearly boxes
+BLOCK_COEFFICIENT = VOLUME / (HULL_COUNT * HULL_LENGTH * HULL_BEAM * DRAUGHT)
+
+#: waterplane coefficient of U-shaped sections, (1 + 2 C_B) / 3
+#: (Schneekluth and Bertram 1998, Ship Design for Efficiency and Economy, section 1.6)
+WATERPLANE_COEFFICIENT = (1 + 2 * BLOCK_COEFFICIENT) / 3
+
+#: wetted surface of both hulls: bottoms and sides [estimated] (m2)
+WETTED_SURFACE = HULL_COUNT * HULL_LENGTH * (WATERPLANE_COEFFICIENT * HULL_BEAM + 2 * DRAUGHT)
+
+#: Reynolds number below which the friction coefficient is constant; here the hull moves at 0.01 m/s
+MIN_REYNOLDS_NUMBER = 1e4
+
+#: maximum of the residuary coefficient and its Froude number [estimated]: Michell's integral for one wall-sided hull of these
+#: dimensions with waterlines 1 - |2 x / L|^6, within 12 % for Froude numbers of 0.4 to 1.2. Below them the theory of thin ships
+#: exaggerates the waves of blunt ends.
+RESIDUARY_PEAK, RESIDUARY_PEAK_FROUDE_NUMBER = 4.6e-3, 0.4
 RUDDER_AREA = 0.0064  # m2 [paper]
+
+#: diameter of the propeller ahead of the rudder [assumed] (m): the height of a square rudder
+PROPELLER_DIAMETER = 0.08
 
 #: lift coefficient at and beyond the stall angle [paper]
 RUDDER_MAX_LIFT_COEFFICIENT = 1.2

@@ -8,21 +8,25 @@ import numpy as np
 from cosim.export.equations.fmu_code import as_block
 from cosim.export.fmu.block import Block
 
-from ..common.named_values import NamedValues
-from ..strider.equations import air_drag, hull_loads, rudder_loads
+from ..common.named_values import NamedValues, initial_parameters
+from ..strider.equations import air_drag, hull_constants, hull_loads, race_velocity_squared, rudder_loads
 from ..strider.geometry import DECK_CENTRE
-from ..strider.parameters import CENTRE_OF_MASS_HEIGHT, INERTIA, MASS
+from ..strider.parameters import CENTRE_OF_MASS_HEIGHT, GRAVITY, HULL_BEAM, INERTIA, MASS, WATER_DENSITY
+from ..strider.resistance import resistance
 from ..vessel import floating_maps, vessel_equations
 from ..vessel.hull import Hull, LoadArguments, load_of_force_at
-from ..vessel.wave_loads import Footprint
+from ..vessel.strips import Immersion, TwinHull, equivalent_strips, immersion
 from . import parameters as p
 from .geometry import BODY
 from .interface import VARIABLES
 
-_ORIGIN = ca.SX.zeros(3)  # of the body frame; the centre of mass and the centre of flotation
-_FOOTPRINT = Footprint(
-    ca.SX(p.LONGITUDINAL_MOMENT / p.WATERPLANE_AREA), ca.SX(p.TRANSVERSE_MOMENT / p.WATERPLANE_AREA), ca.SX(p.DRAUGHT)
+_ORIGIN = ca.SX.zeros(3)  # of the body frame; the centre of mass
+_STRIPS = equivalent_strips(
+    ca.SX([0, 0, -CENTRE_OF_MASS_HEIGHT]), (ca.SX(p.TRANSVERSE_MOMENT), ca.SX(p.LONGITUDINAL_MOMENT)), ca.SX(p.WATERPLANE_AREA)
 )
+_TWIN_HULL = TwinHull(_STRIPS, *(ca.SX(x) for x in (HULL_BEAM, p.MEAN_DRAUGHT, p.HULL_DEPTH, p.WATERPLANE_AREA)))
+_CENTRE_OF_BUOYANCY = ca.SX([0, 0, -CENTRE_OF_MASS_HEIGHT - p.MEAN_DRAUGHT / 2])
+_WEIGHT_DENSITY = WATER_DENSITY * GRAVITY  # N/m3
 _RIGID_BODY_MASS_MATRIX = np.diag([MASS] * 3 + list(INERTIA))
 
 
@@ -30,11 +34,12 @@ def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
     """Return the constants of the equations."""
     enabled = parameters["hydrodynamics"]
     return {
-        **vessel_equations.initial_parameters(parameters),
+        **initial_parameters(parameters),
+        **hull_constants(parameters),
         "hydrodynamics": enabled,
         "inverse_mass_matrix": ca.inv(_RIGID_BODY_MASS_MATRIX + enabled * ca.SX(p.ADDED_MASS)),
         "wave.count": parameters["wave.count"],
-        "wave_table": vessel_equations.wave_table_of(parameters, _FOOTPRINT),
+        "wave_table": vessel_equations.wave_table_of(parameters, _TWIN_HULL),
     }
 
 
@@ -48,55 +53,48 @@ def hull(constants: NamedValues) -> Hull:
         added_mass=enabled * ca.SX(p.ADDED_MASS),
         coriolis_added_mass=enabled * ca.SX(p.CORIOLIS_ADDED_MASS),
         inverse_mass_matrix=constants["inverse_mass_matrix"],
-        centre_of_flotation=_ORIGIN,
         deck_centre=ca.SX(DECK_CENTRE),
         equilibrium=ca.SX([CENTRE_OF_MASS_HEIGHT, 0, 0]),
-        footprint=_FOOTPRINT,
+        strips=_STRIPS,
         wave_count=enabled * constants["wave.count"],
         wave_table=constants["wave_table"],
         loads=lambda now: (
-            enabled * (water_loads(now) + wind_loads(now)) + load_of_force_at(_ORIGIN, ca.vertcat(now.inputs["thrust"], 0, 0))
+            enabled * (water_loads(constants, now) + wind_loads(now))
+            + load_of_force_at(_ORIGIN, ca.vertcat(now.inputs["thrust"], 0, 0))
         ),
     )
 
 
-def water_loads(now: LoadArguments) -> ca.SX:
-    """Return the load tau (6) of restoring forces, damping, hulls and rudder."""
+def water_loads(constants: NamedValues, now: LoadArguments) -> ca.SX:
+    """Return the load tau (6) of weight and water; that of the moving water shrinks as the hulls leave it."""
     u, v, r = now.relative_velocity[0], now.relative_velocity[1], now.relative_velocity[5]
-    return (
-        restoring(now)
-        + damping(now.relative_velocity)
-        + load_from_planar(hull_loads(v, r), p.HULL_FORCE_HEIGHT)
-        + rudder(now, u, v, r)
-    )
-
-
-def restoring(now: LoadArguments) -> ca.SX:
-    """Return the restoring load tau (6): buoyancy minus weight along the world's z axis, and restoring moments.
-
-    They are relative to the elevation and the slopes of the water. Buoyancy has no moment about the vertical, therefore the
-    restoring moment is the cross product of a lever with the vertical.
-    """
     up = now.frame.attitude[2, :].T
-    heave, roll, pitch = p.STIFFNESS
-    lift = heave * (CENTRE_OF_MASS_HEIGHT + now.elevation - now.height)
-    lever = -ca.vertcat(pitch * (up[0] - now.slopes[0]), roll * (up[1] - now.slopes[1]), 0)
-    return ca.vertcat(lift * up, ca.cross(lever, up))
+    under_water = immersion(_TWIN_HULL, up, now.height, now.water.elevations)
+    hulls = hull_loads(v, r) + ca.vertcat(constants["resistance"] * resistance(u), 0, 0)
+    race = race_velocity_squared(now.inputs["thrust"], constants["race_factor"])
+    moving = (
+        damping(now)
+        + load_from_planar(hulls, p.HULL_FORCE_HEIGHT)
+        + load_from_planar(rudder_loads(u, v, r, race, now.inputs["rudder_angle"]), p.RUDDER_HEIGHT)
+        + now.froude_krylov_load(ca.SX(MASS), _CENTRE_OF_BUOYANCY, _STRIPS)
+    )
+    return buoyancy_and_weight(under_water, up) + under_water.wetness * moving
 
 
-def damping(relative: ca.SX) -> ca.SX:
+def buoyancy_and_weight(under_water: Immersion, up: ca.SX) -> ca.SX:
+    """Return the load tau (6) of buoyancy and weight for the vertical axis in the body frame; O is the centre of mass."""
+    force = _WEIGHT_DENSITY * under_water.volume - MASS * GRAVITY
+    return ca.vertcat(force * up, ca.cross(_WEIGHT_DENSITY * under_water.moment, up))
+
+
+def damping(now: LoadArguments) -> ca.SX:
     """Return tau of the linear damping of heave, roll and pitch, and of the drag of the bottoms of the hulls."""
-    w, roll_rate, pitch_rate = ca.vertsplit(relative[2:5])
+    w, (roll_rate, pitch_rate) = now.relative_velocity[2], ca.vertsplit(now.rates_in_water)
     load = -ca.vertcat(0, 0, ca.SX(p.DAMPING) * ca.vertcat(w, roll_rate, pitch_rate), 0)
     for x, y in p.DRAG_POINTS:
         speed = w + y * roll_rate - x * pitch_rate
         load += load_of_force_at(ca.SX([x, y, 0]), ca.vertcat(0, 0, -p.POINT_DRAG * ca.fabs(speed) * speed))
     return load
-
-
-def rudder(now: LoadArguments, u: ca.SX, v: ca.SX, r: ca.SX) -> ca.SX:
-    """Return the load tau of the rudder for u, v (m/s) and r (rad/s) relative to the water."""
-    return load_from_planar(rudder_loads(u, v, r, now.inputs["rudder_angle"]), p.RUDDER_HEIGHT)
 
 
 def wind_loads(now: LoadArguments) -> ca.SX:

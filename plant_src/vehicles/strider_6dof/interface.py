@@ -2,9 +2,6 @@
 
 from __future__ import annotations
 
-from cosim.core.component import Variable
-from cosim.core.units import parse_unit
-
 from ..common.interface import (
     CURRENT_INPUTS,
     DECK_OUTPUTS,
@@ -16,25 +13,23 @@ from ..common.interface import (
     WIND_INPUTS,
     WORLD_OUTPUTS,
     initial_variables,
+    parameter,
 )
-from ..strider.interface import RUDDER_ANGLE, THRUST
+from ..strider.interface import HULL_PARAMETERS, RUDDER_ANGLE, THRUST
 
-HYDRODYNAMICS_PARAMETER = Variable(
-    "hydrodynamics",
-    "Float64",
-    "parameter",
-    "fixed",
-    1.0,
-    parse_unit("1"),
-    (),
-    "1: loads of water, air and weight act; 0: the vessel is a free rigid body",
-    0.0,
-    1.0,
+HYDRODYNAMICS_PARAMETER = parameter(
+    "hydrodynamics", "1", 1.0, "1: loads of water, air and weight act; 0: the vessel is a free rigid body", 0.0, 1.0
 )
 
-PARAMETERS = (*initial_variables("xy", "uvw", "pqr"), *FLOATING_INITIAL_PARAMETERS, HYDRODYNAMICS_PARAMETER, *WAVE_PARAMETERS)
+PARAMETERS = (
+    *initial_variables("xy", "uvw", "pqr"),
+    *FLOATING_INITIAL_PARAMETERS,
+    *HULL_PARAMETERS,
+    HYDRODYNAMICS_PARAMETER,
+    *WAVE_PARAMETERS,
+)
 INPUTS = (THRUST, RUDDER_ANGLE, *EXTERNAL_LOADS, *WIND_INPUTS, *CURRENT_INPUTS, *WAVE_GAIN_INPUT)
 VARIABLES = (*PARAMETERS, *INPUTS, *MOTION_OUTPUTS, *DECK_OUTPUTS, *WORLD_OUTPUTS)
 
 #: number of constants that the equations derive from the parameters
-CONSTANT_COUNT = 435
+CONSTANT_COUNT = 566

@@ -11,20 +11,22 @@ import math
 
 import numpy as np
 
-from ..strider.geometry import HULL_BEAM, HULL_BOTTOM, HULL_LENGTH, HULL_OFFSET
-from ..strider.parameters import CENTRE_OF_MASS_HEIGHT, HULL_COUNT, INERTIA, MASS, RUDDER_AREA, WATER_DENSITY
-
-GRAVITY = 9.81  # m/s2
-
-DRAUGHT = -HULL_BOTTOM - CENTRE_OF_MASS_HEIGHT  # m
-VOLUME = MASS / WATER_DENSITY  # displaced, m3
-
-#: block coefficient C_B = 0.86: the hulls are nearly boxes
-BLOCK_COEFFICIENT = VOLUME / (HULL_COUNT * HULL_LENGTH * HULL_BEAM * DRAUGHT)
-
-#: waterplane coefficient of U-shaped sections, (1 + 2 C_B) / 3
-#: (Schneekluth and Bertram 1998, Ship Design for Efficiency and Economy, section 1.6)
-WATERPLANE_COEFFICIENT = (1 + 2 * BLOCK_COEFFICIENT) / 3
+from ..strider.parameters import (
+    CENTRE_OF_MASS_HEIGHT,
+    DRAUGHT,
+    GRAVITY,
+    HULL_BEAM,
+    HULL_BOTTOM,
+    HULL_COUNT,
+    HULL_LENGTH,
+    HULL_OFFSET,
+    INERTIA,
+    MASS,
+    RUDDER_AREA,
+    VOLUME,
+    WATER_DENSITY,
+    WATERPLANE_COEFFICIENT,
+)
 
 WATERPLANE_AREA = HULL_COUNT * WATERPLANE_COEFFICIENT * HULL_LENGTH * HULL_BEAM  # m2
 
@@ -32,8 +34,15 @@ WATERPLANE_AREA = HULL_COUNT * WATERPLANE_COEFFICIENT * HULL_LENGTH * HULL_BEAM 
 TRANSVERSE_MOMENT = WATERPLANE_AREA * (HULL_OFFSET**2 + HULL_BEAM**2 / 12)
 LONGITUDINAL_MOMENT = WATERPLANE_COEFFICIENT * WATERPLANE_AREA * HULL_LENGTH**2 / 12
 
-#: transverse and longitudinal metacentric height (m); the centre of buoyancy is at half of the draught
-_BUOYANCY_BELOW_CENTRE = CENTRE_OF_MASS_HEIGHT + DRAUGHT / 2
+#: draught of boxes with this waterplane and volume (m)
+MEAN_DRAUGHT = VOLUME / WATERPLANE_AREA
+
+#: depth of the hulls [assumed]: as deep as wide (m). The published model ends 35 mm above the bottom; a hull that shallow could
+#: not carry the vessel alone. The righting moment is limited to m g times the offset of the hulls, 21.5 N m, for greater depths.
+HULL_DEPTH = HULL_BEAM
+
+#: transverse and longitudinal metacentric height (m); the centre of buoyancy is at half of the mean draught
+_BUOYANCY_BELOW_CENTRE = CENTRE_OF_MASS_HEIGHT + MEAN_DRAUGHT / 2
 METACENTRIC_HEIGHTS = tuple(moment / VOLUME - _BUOYANCY_BELOW_CENTRE for moment in (TRANSVERSE_MOMENT, LONGITUDINAL_MOMENT))
 
 #: restoring stiffness of heave (N/m), roll and pitch (N m/rad)

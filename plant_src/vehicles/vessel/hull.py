@@ -18,7 +18,8 @@ import casadi as ca
 from ..common import kinematics
 from ..common.interface import VESSEL_STATES
 from ..common.named_values import NamedValues
-from .wave_loads import Footprint, WaveKinematics, wave_kinematics
+from .strips import Strips
+from .wave_loads import WaterMotion, water_motion
 
 
 @dataclass(frozen=True)
@@ -40,13 +41,6 @@ class Frame:
     rates_to_angular_velocity: ca.SX
     world_to_current_axes: ca.SX
 
-    @property
-    def heading(self) -> tuple[ca.SX, ca.SX]:
-        """Cosine and sine of the yaw angle."""
-        x, y = self.attitude[0, 0], self.attitude[1, 0]
-        length = ca.sqrt(x * x + y * y + 1e-300)
-        return x / length, y / length
-
     def generalised_force(self, force: ca.SX, torque: ca.SX) -> ca.SX:
         """Return the load tau, shape (6,), of a force at O (N) and a torque about O (N m), both in the world frame."""
         return ca.vertcat(self.to_world.T @ force, self.rates_to_angular_velocity.T @ (self.attitude.T @ torque))
@@ -63,8 +57,7 @@ class LoadArguments:
         air_relative_velocity: Velocity of O relative to the air (m/s, velocity frame), shape (3,).
         velocity: Velocity of O (m/s, velocity frame), shape (3,).
         height: Height of O above the still water (m).
-        elevation: Elevation of the water at the centre of flotation (m).
-        slopes: Slopes of the water along the heading and to port (1), shape (2,).
+        water: Motion of the water in the waves.
         inputs: Inputs of the model.
         actuators: States of the actuators.
     """
@@ -75,10 +68,25 @@ class LoadArguments:
     air_relative_velocity: ca.SX
     velocity: ca.SX
     height: ca.SX
-    elevation: ca.SX
-    slopes: ca.SX
+    water: WaterMotion
     inputs: NamedValues
     actuators: ca.SX
+
+    @property
+    def rates_in_water(self) -> ca.SX:
+        """Roll and pitch rate relative to the surface of the water (rad/s), shape (2,)."""
+        return self.relative_velocity[3:5] - self.water.rates
+
+    def froude_krylov_load(self, mass: ca.SX, centre: ca.SX, strips: Strips) -> ca.SX:
+        """Return tau that accelerates the displaced water with the waves, beyond the hydrostatic pressure.
+
+        Args:
+            mass: Displaced mass (kg).
+            centre: Its centre (m, body frame).
+            strips: Strips of the hull.
+        """
+        load = load_of_force_at(centre, mass * (self.frame.to_world.T @ self.water.acceleration))
+        return load + ca.vertcat(0, 0, 0, mass * strips.radii_squared * self.water.angular_acceleration, 0)
 
 
 def level_frame(orientation: ca.SX) -> Frame:
@@ -98,10 +106,9 @@ class Hull:
         added_mass: M_A, shape (6, 6).
         coriolis_added_mass: Part of M_A whose Coriolis and centripetal loads C_A are not contained in `loads`, shape (6, 6).
         inverse_mass_matrix: Inverse of M_RB + M_A, shape (6, 6).
-        centre_of_flotation: Centre of the waterplane (m), shape (3,).
         deck_centre: Centre of the top of the landing deck (m), shape (3,).
         equilibrium: Height of O (m), roll and pitch (rad) of the vessel afloat at rest, shape (3,).
-        footprint: Waterplane for the wave loads.
+        strips: Strips at which the waves act.
         wave_count: Number of wave components.
         wave_table: Wave components, see `wave_loads.wave_table`.
         loads: Function for the load tau (6) of water, air and propulsion, without added mass.
@@ -114,71 +121,63 @@ class Hull:
     added_mass: ca.SX
     coriolis_added_mass: ca.SX
     inverse_mass_matrix: ca.SX
-    centre_of_flotation: ca.SX
     deck_centre: ca.SX
     equilibrium: ca.SX
-    footprint: Footprint
+    strips: Strips
     wave_count: ca.SX
     wave_table: ca.SX
     loads: Callable[[LoadArguments], ca.SX]
     frame: Callable[[ca.SX], Frame] = level_frame
 
     def initial_state(self, initial: NamedValues, actuators: int = 0) -> ca.SX:
-        """Return the state from the parameters `initial.*`, with `actuators` further states of 0."""
-        displacement = (initial[f"initial.{name}"] for name in ("heave", "roll", "pitch"))
-        height, roll, pitch = ca.vertsplit(self.equilibrium + ca.vertcat(*displacement))
-        orientation = kinematics.quaternion_from_euler(roll, pitch, initial["initial.yaw"])
-        origin = initial["initial.position"] - (self.frame(orientation).attitude @ self.centre_of_mass)[0:2]
-        rates = initial["initial.rates"]
-        velocity = initial["initial.velocity_body"] - ca.cross(rates, self.centre_of_mass)
-        return ca.vertcat(origin, height, orientation, velocity, rates, initial["initial.time"], ca.SX.zeros(actuators))
+        """Return the state from the parameters `initial.*`, with `actuators` further states of 0.
+
+        With `initial.on_waves` the vessel is displaced with the plane of the surface, and moves with the water.
+        """
+        displacement = self.equilibrium + ca.vertcat(*(initial[f"initial.{name}"] for name in ("heave", "roll", "pitch")))
+        yaw, time = initial["initial.yaw"], initial["initial.time"]
+        level = self.frame(kinematics.quaternion_from_euler(displacement[1], displacement[2], yaw))
+        centre = initial["initial.position"] + (level.attitude @ (self.strips.centre - self.centre_of_mass))[0:2]
+        water = water_motion(
+            centre, level.attitude, time, self.strips, initial["initial.on_waves"], self.wave_count, self.wave_table
+        )
+        rise = water.heave + ca.dot(water.slopes, ca.vertcat(-self.strips.centre[1], self.strips.centre[0]))
+        height, roll, pitch = ca.vertsplit(displacement + ca.vertcat(rise, water.slopes))
+        orientation = kinematics.quaternion_from_euler(roll, pitch, yaw)
+        frame = self.frame(orientation)
+        origin = initial["initial.position"] - (frame.attitude @ self.centre_of_mass)[0:2]
+        rates = initial["initial.rates"] + ca.vertcat(water.rates, 0)
+        velocity = initial["initial.velocity_body"] + frame.to_world.T @ water.velocity - ca.cross(rates, self.centre_of_mass)
+        return ca.vertcat(origin, height, orientation, velocity, rates, time, ca.SX.zeros(actuators))
 
     def rate(self, state: ca.SX, inputs: NamedValues) -> ca.SX:
         """Return the time derivative of position, quaternion, nu and time (`vehicles/README.md`)."""
         orientation, nu = state[3:7], state[7:13]
         frame = self.frame(orientation)
         rates = nu[3:6]
-        waves = self._wave_kinematics(state, frame, inputs["wave_gain"])
+        centre = state[0:2] + (frame.attitude @ self.strips.centre)[0:2]
+        water = water_motion(
+            centre, frame.attitude, state[13], self.strips, inputs["wave_gain"], self.wave_count, self.wave_table
+        )
         current = frame.world_to_current_axes @ ca.vertcat(inputs["current"], 0)
-        wave_velocity, wave_acceleration = frame.to_world.T @ waves.velocity, frame.to_world.T @ waves.acceleration
+        wave_velocity, wave_acceleration = frame.to_world.T @ water.velocity, frame.to_world.T @ water.acceleration
         nu_without_current = ca.vertcat(nu[0:3] - current, rates)
         nu_r = ca.vertcat(nu_without_current[0:3] - wave_velocity, rates)
-        now = self._load_arguments(state, frame, nu_r, waves, inputs)
-        horizontal_acceleration = frame.to_world.T @ ca.vertcat(waves.acceleration[0:2], 0)
+        air = nu[0:3] - frame.to_world.T @ inputs["wind"]
+        now = LoadArguments(frame, orientation, nu_r, air, nu[0:3], state[2], water, inputs, state[len(VESSEL_STATES) :])
         tau = self.loads(now) + self._external_load(frame, inputs)
-        added = self.added_mass[:, 0:3] @ (wave_acceleration - ca.cross(rates, wave_velocity))
-        tau += self.inertial_load(horizontal_acceleration) + added
+        linear = wave_acceleration - ca.cross(rates, wave_velocity)
+        tau += self.added_mass @ ca.vertcat(linear, water.angular_acceleration, 0)
         tau -= self._rigid_body_coriolis(nu_without_current) + coriolis_load(self.coriolis_added_mass, nu_r)
         acceleration = self.inverse_mass_matrix @ tau - ca.vertcat(ca.cross(rates, current), ca.SX.zeros(3))
         quaternion_rate = kinematics.quaternion_rate(orientation, frame.rates_to_angular_velocity @ rates)
         return ca.vertcat(frame.to_world @ nu[0:3], quaternion_rate, acceleration, 1)
-
-    def inertial_load(self, acceleration: ca.SX) -> ca.SX:
-        """Return the load tau that gives the rigid body a linear acceleration (m/s2, velocity frame) without rotation."""
-        force = self.mass * acceleration
-        return ca.vertcat(force, ca.cross(self.centre_of_mass, force))
 
     def _rigid_body_coriolis(self, nu: ca.SX) -> ca.SX:
         """Return C_RB(nu) nu in terms of the angular velocity (Fossen 2021, section 3.3)."""
         velocity, rates = nu[0:3], nu[3:6]
         force = self.mass * ca.cross(rates, velocity + ca.cross(rates, self.centre_of_mass))
         return ca.vertcat(force, ca.cross(rates, self.inertia @ rates) + ca.cross(self.centre_of_mass, force))
-
-    def _wave_kinematics(self, state: ca.SX, frame: Frame, gain: ca.SX) -> WaveKinematics:
-        position = state[0:2] + (frame.attitude @ self.centre_of_flotation)[0:2]
-        unit = wave_kinematics(position, frame.heading, state[13], self.footprint, self.wave_count, self.wave_table)
-        return WaveKinematics(gain * unit.elevation, gain * unit.slopes, gain * unit.velocity, gain * unit.acceleration)
-
-    def _load_arguments(
-        self, state: ca.SX, frame: Frame, nu_r: ca.SX, waves: WaveKinematics, inputs: NamedValues
-    ) -> LoadArguments:
-        cos, sin = frame.heading
-        slopes = ca.vertcat(cos * waves.slopes[0] + sin * waves.slopes[1], cos * waves.slopes[1] - sin * waves.slopes[0])
-        velocity = state[7:10]
-        air = velocity - frame.to_world.T @ inputs["wind"]
-        return LoadArguments(
-            frame, state[3:7], nu_r, air, velocity, state[2], waves.elevation, slopes, inputs, state[len(VESSEL_STATES) :]
-        )
 
     def _external_load(self, frame: Frame, inputs: NamedValues) -> ca.SX:
         force, torque = inputs["external_force"], inputs["external_torque"]

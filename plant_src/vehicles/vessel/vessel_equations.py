@@ -16,12 +16,13 @@ from ..common import kinematics
 from ..common.interface import VESSEL_STATES, WORLD_OUTPUTS
 from ..common.named_values import ConstantsMap, NamedValues, values_by_name, variables_of
 from .hull import Hull
-from .wave_loads import SURFACE_SUM, WAVE_SUM, Footprint, wave_table
+from .strips import TwinHull
+from .wave_loads import SURFACE_SUM, WAVE_SUM, wave_table
 
 
-def wave_table_of(parameters: NamedValues, footprint: Footprint) -> ca.SX:
+def wave_table_of(parameters: NamedValues, hull: TwinHull) -> ca.SX:
     """Return the table of wave components (`wave_loads.wave_table`) from the parameters `wave.*`."""
-    return wave_table(footprint, *(parameters[f"wave.{name}"] for name in ("amplitude", "frequency", "direction", "phase")))
+    return wave_table(hull, *(parameters[f"wave.{name}"] for name in ("amplitude", "frequency", "direction", "phase")))
 
 
 @dataclass(frozen=True)
@@ -79,8 +80,3 @@ class VesselModel:
 def normalised_state(state: ca.SX) -> ca.SX:
     """Return the state with a unit quaternion."""
     return ca.vertcat(state[0:3], kinematics.normalised_quaternion(state[3:7]), state[7:])
-
-
-def initial_parameters(parameters: NamedValues) -> dict[str, ca.SX]:
-    """Return the parameters `initial.*`."""
-    return {name: value for name, value in parameters.items() if name.startswith("initial.")}

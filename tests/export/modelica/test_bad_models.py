@@ -223,7 +223,7 @@ BAD = {
     ),
     "der of an expression": (
         in_model("Real x;", "der(2*x) = u;\n  y = x;"),
-        "M.mo:1: der(...) must have exactly one resolved variable-reference",
+        "M.mo:6: der(...) must have exactly one resolved variable-reference",
     ),
     "der of an Integer": (
         in_model("Integer n;", "n = 1;\n  y = der(n);"),
@@ -244,11 +244,11 @@ BAD = {
     ),
     "reinit of a variable that is no state": (
         in_model("Real a;", "a = u;\n  when u > 0 then\n    reinit(a, 0);\n  end when;\n  y = a;"),
-        "M.mo:1: reinit() can only be applied to state variables: a is not a",
+        "M.mo:8: reinit() can only be applied to state variables: a is not a",
     ),
     "reinit outside of when": (
         in_model("Real x;", "der(x) = u;\n  reinit(x, 0);\n  y = x;"),
-        "M.mo:1: reinit() can only be used inside when-equations (MLS \u00a78.3.6)",
+        "M.mo:7: reinit() can only be used inside when-equations (MLS \u00a78.3.6)",
     ),
     "nested when": (
         in_model("discrete Real d;", "when u > 0 then\n    when u > 1 then\n      d = 1;\n    end when;\n  end when;\n  y = d;"),
@@ -260,7 +260,7 @@ BAD = {
     ),
     "delay with a variable duration": (
         in_model("", "y = delay(u, u);"),
-        "M.mo:1: delay() time argument must be a parameter expression when",
+        "M.mo:6: delay() time argument must be a parameter expression when",
     ),
     "connect of unlike connectors": (
         in_model(

@@ -196,3 +196,20 @@ end M;""")
         assert list(model.get("y")) == list(2 * (turned if b else u) + 1)
         assert model.get("z") == 1 + (turned[0] + turned[1] if b else u[0])
         assert model.get("c") == ((turned.sum() > 0) if b else (-(2 * u[1]) + 2 * u[0] > 1))
+
+
+def test_a_function_may_iterate_over_an_array_of_any_size(compile_both):
+    model = compile_both("""model Votes
+  function count
+    input Boolean b[:];
+    output Integer n;
+  algorithm
+    n := sum({if b[i] then 1 else 0 for i in 1:size(b, 1)});
+  end count;
+  input Boolean u[3];
+  output Integer y;
+equation
+  y = count(u);
+end Votes;""")
+    for _, values in model.simulate(20):
+        assert model.get("y") == sum(values["u"])

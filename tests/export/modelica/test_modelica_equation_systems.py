@@ -183,3 +183,22 @@ equation
 end Singular;""")
     model.set(u=1.0)
     assert model.c.initialize() == "a system of equations has no solution (Singular.mo:6)"
+
+
+def test_the_derivative_of_the_maximum_of_an_array_is_that_of_the_largest_element(compile_both):
+    model = compile_both("""model Largest
+  output Real y;
+  output Real rate;
+  Real x[3](start = {1, 2, 0}, each fixed = true);
+equation
+  der(x) = {1, -1, 0.1};
+  y = max(2*x);
+  rate = der(y);
+end Largest;""")
+    model.initialize()
+    for k in range(100):
+        model.step(k * 0.01)
+        time = (k + 1) * 0.01
+        assert model.get("y") == pytest.approx(2 * max(1 + time, 2 - time), abs=1e-9)
+        if abs(time - 0.5) > 1e-6:
+            assert model.get("rate") == (2 if time > 0.5 else -2)

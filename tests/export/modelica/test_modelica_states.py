@@ -364,3 +364,30 @@ end M;""")
     assert model.c.step(0.0, 0.01) == "division by zero in div(), mod() or rem()"
     with pytest.raises(ComponentError, match="division by zero"):
         model.python.step(0.0, 0.01)
+
+
+def test_parameters_of_the_start_time_are_known_at_the_initialization(compile_both):
+    """Also parameters that depend on them; `terminal()` is never true."""
+    model = compile_both("""model Mean
+  input Real u;
+  output Real y;
+  output Integer n(start = 0, fixed = true);
+protected
+  parameter Real t0(fixed = false);
+  parameter Real begin = t0 + 0.5;
+  Real x(start = 0, fixed = true);
+initial equation
+  t0 = time;
+equation
+  der(x) = if time >= begin then u else 0;
+  y = x;
+  when {u > 2, terminal()} then
+    n = pre(n) + 1;
+  end when;
+end Mean;""")
+    model.initialize(3.0)
+    model.set(u=1.0)
+    for k in range(100):
+        model.step(3 + k * 0.01)
+    assert model.get("y") == pytest.approx(0.5, abs=1e-8)
+    assert model.get("n") == 0

@@ -209,7 +209,10 @@ def test_a_planar_vessel_in_waves_gives_a_warning(caplog: pytest.LogCaptureFixtu
     [
         ({"motion": "6dofs"}, r"""vehicles.usv.motion: found '6dofs'; did you mean "6dof"\?"""),
         ({"motion": 6}, "vehicles.usv.motion: found 6, expected one of: planar, 6dof"),
-        ({"parameters": {"mas": 1.0}}, 'vehicles.usv.parameters.mas: strider has no parameter "mas" to set; it has none'),
+        (
+            {"parameters": {"mas": 1.0}},
+            'vehicles.usv.parameters.mas: strider has no parameter "mas" to set; valid: resistance, propeller_diameter',
+        ),
         ({"parameters": {"initial.yaw": 1.0}}, 'strider has no parameter "initial.yaw" to set'),
         ({"parameters": 3}, r"vehicles.usv.parameters: found 3, expected an object"),
     ],

@@ -19,9 +19,9 @@ def rotor_speed(share: float) -> list[float]:
 
 
 def on_deck(height: float = 0.001, **more: object) -> WorldHarness:
-    """A quadcopter above the middle of the deck of a vessel in the origin."""
+    """A quadcopter above the middle of the deck of a vessel in the origin, whose hulls have no resistance."""
     uav = quadcopter_settings([-0.0135, 0.002, DECK_TOP + REST_HEIGHT + height], **more)
-    return WorldHarness({"uav": uav, "usv": vessel_settings([0.0, 0.0])})
+    return WorldHarness({"uav": uav, "usv": vessel_settings([0.0, 0.0], hull="paper")})
 
 
 @pytest.fixture(scope="module")
@@ -149,7 +149,12 @@ def test_two_pairs_do_not_affect_each_other(measured: MeasurementCheck) -> None:
 
 
 def test_vessels_push_each_other() -> None:
-    trial = WorldHarness({"a": vessel_settings([0.0, 0.0], velocity_body=[1.0, 0.0, 0.0]), "b": vessel_settings([1.2, 0.0])})
+    trial = WorldHarness(
+        {
+            name: vessel_settings([x, 0.0], hull="paper", velocity_body=[v, 0.0, 0.0])
+            for name, x, v in (("a", 0.0, 1.0), ("b", 1.2, 0.0))
+        }
+    )
     while not trial["b.contact.touching"]:
         trial.step()
     assert trial["a.contact.vessel"]

@@ -14,6 +14,8 @@ from plant_src.catalogue import MODELS, VEHICLE_MODELS
 from plant_src.vehicles.common.interface import ENVIRONMENT_INPUTS
 from plant_src.vehicles.multirotor.airframe import MAX_ROTORS
 from plant_src.vehicles.multirotor.multirotor_equations import MultirotorEquations
+from plant_src.vehicles.submerged.craft import MAX_THRUSTERS
+from plant_src.vehicles.submerged.submerged_equations import SubmergedEquations
 
 ALL = pytest.mark.parametrize("name", MODELS)
 
@@ -38,8 +40,12 @@ def test_environment_inputs_come_last_among_the_inputs(name: str) -> None:
 @pytest.mark.parametrize("name", [name for name, model in MODELS.items() if model.constant_count is not None])
 def test_the_number_of_constants_is_that_of_the_equations(name: str) -> None:
     model = MODELS[name]
-    module = equations(model.binary)
-    constants = MultirotorEquations(model.airframe, MAX_ROTORS).constants if model.airframe else module.VESSEL.constants
+    if model.airframe:
+        constants = MultirotorEquations(model.airframe, MAX_ROTORS).constants
+    elif model.craft:
+        constants = SubmergedEquations(model.craft, MAX_THRUSTERS).constants
+    else:
+        constants = getattr(equations(model.binary), "CONSTANTS", None) or equations(model.binary).VESSEL.constants
     parameters = model.equation_parameters(model.start_values("parameter"))
     assert constants.vector(ca.SX(parameters)).numel() == model.constant_count
 

@@ -39,7 +39,7 @@ def test_catamaran_in_waves_and_current_follows_its_equations(duration: float, m
     reference = Catamaran(sea(WATERS), thrust=1.0, rudder=0.15, current=(0.2, -0.1), wind=(-3.0, 1.0, 0.0))
     expected = reference.simulate(np.array([0.6, 0.05, 0, 0, 0, 0.1]), times)
     start = {"velocity_body": [0.6, 0.05, 0.0], "rates": [0.0, 0.0, 0.1]}
-    trial = WorldHarness({"usv": afloat(**start)}, environment=WATERS)
+    trial = WorldHarness({"usv": afloat(**start, parameters={"initial.on_waves": 0.0})}, environment=WATERS)
     trial["usv.thrust"], trial["usv.rudder_angle"] = 1.0, 0.15
     found = np.array([trial.step(100).vector("usv.position") for _ in times])
     assert np.ptp(expected[:, 2]) > 0.01

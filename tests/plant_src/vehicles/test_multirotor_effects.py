@@ -211,7 +211,7 @@ def test_without_effects_shorter_code_gives_the_same_flight() -> None:
 def test_wind_carries_the_ground_effect_away(measured: MeasurementCheck) -> None:
     """Cheeseman and Bennett in forward flight: the reduction of the inflow over 1 + (V / v)^2."""
     fmu = PlantFmu("ar_drone", {**HIGH, "ground_effect": 1.0})
-    thrust = 9.148e-6 * 350.0**2
+    thrust = 8.24e-6 * 350.0**2
     induced = np.sqrt(thrust / (2 * 1.225 * np.pi * 0.1016**2))
     for wind in (0.0, 3.0, 7.0):
         sums = []
@@ -239,7 +239,7 @@ def test_translational_lift_grows_with_the_air_speed_up_to_half_the_tip_speed(me
         fmu.set({f"rotor_speed[{k}]": 350.0 for k in range(1, 5)} | {"wind.y": wind})
         fmu.step(1e-4)
         thrust = (fmu.get("velocity.z").item() / 1e-4 + GRAVITY) * 0.443892
-        expected = 4 * (9.148e-6 * 350.0**2 + 0.01 * square)
+        expected = 4 * (8.24e-6 * 350.0**2 + 0.01 * square)
         measured(
             "Multirotors",
             "thrust with translational lift",

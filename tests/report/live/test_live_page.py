@@ -34,9 +34,10 @@ def waiting(page, condition):
 
 
 def test_a_live_run_is_shown_steered_and_replayed(run, page):
-    page.get_by_role("button", name="Resume", exact=True).click()
+    assert page.locator(".play").count() == page.locator(".speed").count() == 1  # one set of controls
+    page.locator(".play").click()
     waiting(page, "cosimReplay.player.time > cosimReplay.player.first && cosimReplay.live.run.rows > 20")
-    page.get_by_role("button", name="Pause", exact=True).click()
+    page.keyboard.press("Space")
     waiting(page, "document.querySelector('.state').textContent === 'Paused'")
     rows = page.evaluate("cosimReplay.live.run.rows")
     page.get_by_role("button", name="Step", exact=True).click()
@@ -54,8 +55,8 @@ def test_a_live_run_is_shown_steered_and_replayed(run, page):
     speed.press("Enter")
     waiting(page, "document.querySelector('.answer').textContent === ''")
 
-    page.get_by_label("Speed of the simulation").select_option(label="as fast as possible")
-    page.get_by_role("button", name="Resume", exact=True).click()
+    page.locator(".speed").select_option(label="fastest")
+    page.locator(".play").click()
     assert run.wait() in (0, 3)
     waiting(page, "document.querySelector('.state').textContent === 'Finished'")
     assert run.run_metadata()["live_events"] == [{"time": pytest.approx(0.01 * rows), "set": {"usv.speed_command": 0.25}}]

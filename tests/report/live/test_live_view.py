@@ -268,3 +268,14 @@ def test_the_address_of_the_page_is_in_no_list_of_processes(tmp_path, monkeypatc
     assert "secret" not in str(page)
     assert 'url=http://127.0.0.1:1/secret/"' in page.read_text()
     assert page.stat().st_mode & 0o777 == 0o600
+
+
+def test_a_run_waits_for_the_browser_on_request(tmp_path):
+    run = LiveRun(tmp_path, "free_flight", "--stop-time", "0.5", "--real-time", "100", "--wait")
+    described = run.page()
+    assert described["name"] == "free_flight"
+    time.sleep(0.5)
+    assert run.process.poll() is None
+    assert run.rows()[0]["count"] <= 51
+    assert run.wait() in (0, 3)
+    assert len(Result.from_csv(run.out / "result.csv").time) == 51

@@ -12,7 +12,11 @@ from cosim.results.comparison import Tolerance, compare
 FOLDER = resources.root() / "scenarios"
 REFERENCES = sorted(path for path in FOLDER.glob("*.json") if "reference" in json.loads(path.read_text()))
 
-ANOTHER_ALTITUDE = {"crazyflie_square": {"uav.mass": 0.03}, "fleet_survey": {"uav1.altitude_command": 2.1}}
+ANOTHER_ALTITUDE = {
+    "crazyflie_square": {"uav.mass": 0.03},
+    "fleet_survey": {"uav1.altitude_command": 2.1},
+    "rov_inspection": {"/components/plant/arguments/vehicles/rov/position/2": -0.4},
+}
 
 
 def compared(path, parameters=None):

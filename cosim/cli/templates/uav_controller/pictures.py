@@ -14,7 +14,7 @@ def track(result: Result, followed: str, vehicle: str) -> Figure:
     for name, style in ((followed, "--"), (vehicle, "-")):
         plan.plot(result[f"{name}.position.x"], result[f"{name}.position.y"], style, label=name)
     plan.set(xlabel="east / m", ylabel="north / m", aspect="equal")
-    plan.legend()
+    figure.legend(loc="outside upper center", ncols=2)
     height.plot(result.time, result[f"{vehicle}.position.z"])
     height.set(xlabel="time / s", ylabel="altitude / m")
     return figure

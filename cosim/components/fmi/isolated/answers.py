@@ -59,6 +59,13 @@ def variable_value(value: Any, variable: Variable) -> Any:
     return value
 
 
+def derivative_values(value: Any, count: int) -> list[float] | None:
+    """Return `count` directional derivatives that a worker sent; None if the FMU does not offer them."""
+    if value is not None and (not isinstance(value, list) or len(value) != count or {type(each) for each in value} - {float}):
+        raise TypeError("no directional derivatives")
+    return value
+
+
 def string_values(value: Any, count: int) -> list[Any]:
     """Return `count` values of String or Binary variables that a worker sent; None means an empty list."""
     values = [] if value is None else value

@@ -17,7 +17,7 @@ from ..file import FmuFile
 from ..function_calls import DISCARD, OK
 from ..instance import FmuInstance
 from ..instance_settings import InstanceSettings
-from .answers import call_names, state_number, step_result, string_values, variable_value
+from .answers import call_names, derivative_values, state_number, step_result, string_values, variable_value
 from .isolation import Isolation
 from .pipes import STEP_COMMAND, STEP_DONE
 from .shared_memory import SharedMemoryBlock, matching_buffers, string_array
@@ -62,6 +62,9 @@ class IsolatedFmu(WorkerClient, Component):
         self._instance_class, self.isolation = instance_class, isolation
         self.description = file.description.with_structural_parameters(settings.structural_parameters, file.limits)
         self.variables, self.has_state = self.description.variables, self.description.has_state
+        self.dependencies, self.initial_dependencies = self.description.dependencies, self.description.initial_dependencies
+        self.continuous_states = self.description.continuous_states
+        self.interpolates_inputs = self.description.interpolates_inputs
         self._variables_by_name = {variable.name: variable for variable in self.variables}
         self._settings = settings
         self._temporary_folder: LockedFolder | None = None
@@ -139,6 +142,14 @@ class IsolatedFmu(WorkerClient, Component):
     def get(self, name: str) -> Any:
         """Return the value of a variable of the FMU in the worker process."""
         return self._execute("get", name, convert=partial(variable_value, variable=self._variables_by_name[name]))
+
+    def get_directional_derivative(self, outputs: Sequence[str], input_name: str) -> Sequence[float] | None:
+        """Return the directional derivatives of the FMU in the worker process."""
+        if not self.description.directional_derivatives:
+            return None
+        convert = partial(derivative_values, count=len(outputs))
+        found: Sequence[float] | None = self._execute("get_directional_derivative", list(outputs), input_name, convert=convert)
+        return found
 
     def get_state(self) -> Any:
         """Save the FMU state in the worker process and return its number."""

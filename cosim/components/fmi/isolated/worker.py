@@ -51,6 +51,7 @@ class Worker:
             "instantiate": self._instantiate,
             "set": instance.set,
             "get": instance.get,
+            "get_directional_derivative": instance.get_directional_derivative,
             "enter_initialization_mode": instance.enter_initialization_mode,
             "exit_initialization_mode": instance.exit_initialization_mode,
             "set_inputs": self._set_inputs,

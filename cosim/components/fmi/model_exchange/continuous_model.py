@@ -66,7 +66,7 @@ class ContinuousModel:
         self.get_states = self._array_call("get_states", self.states)
         self.set_states = self._array_call("set_states", self.states)
         self.get_derivatives = self._array_call("get_derivatives", self.derivatives)
-        self.get_nominals = self._array_call("get_nominals", self.nominals)
+        self.get_nominals = self._array_call("get_nominals", self.nominals, is_optional=True)
         self.get_indicators = self._array_call("get_indicators", self.indicators)
         boolean = BOOLEAN[major]
         self._flags = (boolean(), boolean())
@@ -79,11 +79,14 @@ class ContinuousModel:
         needed = {"set_time": True, "complete_step": self.needs_completed_step, "get_indicators": len(self.indicators) > 0}
         return needed.get(role, len(self.states) > 0)
 
-    def _array_call(self, role: str, values: np.ndarray) -> Callable[[], None]:
-        """Return a function that transfers an array, and that does nothing if the array is empty."""
-        if not len(values):
-            return lambda: None
+    def _array_call(self, role: str, values: np.ndarray, is_optional: bool = False) -> Callable[[], None]:
+        """Return a function that transfers an array, and that does nothing if the array is empty.
+
+        A library without an optional function is accepted: the values stay as they are.
+        """
         name = self.functions[role]
+        if not len(values) or (is_optional and name not in self.library):
+            return lambda: None
         function, arguments = self.library[name], (self._instance, as_pointer(values.ctypes.data), as_size(len(values)))
 
         def call() -> None:

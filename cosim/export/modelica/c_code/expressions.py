@@ -11,6 +11,7 @@ from collections.abc import Callable
 
 from ..model import syntax_tree
 from ..model.syntax_tree import SourceLocation, raise_model_error
+from ..model.traversal import unroll
 from .builtin_functions import BUILTINS
 from .c_values import (
     CExpression,
@@ -47,6 +48,11 @@ class ExpressionLowering(SubscriptLowering):
         if node.name not in self.scope:
             raise_model_error(f"unknown name {node.name}", node.where)
         return self.scope[node.name]
+
+    def _comprehension(self, node: syntax_tree.Comprehension) -> CValue:
+        if not isinstance(node.range, syntax_tree.Range):
+            raise_model_error("an iterator needs a range such as 1:n", node.where)
+        return self.lower(unroll(node, [syntax_tree.Literal(k, "Integer") for k in self.static_range(node.range)]))
 
     def _array(self, node: syntax_tree.Array) -> CValue:
         parts = [self.lower(element) for element in node.elements]

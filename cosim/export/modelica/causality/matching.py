@@ -77,8 +77,8 @@ def match_equations(model: Model, assigned: Collection[str]) -> list[Assign]:
 
 
 def is_input(variable: Variable) -> bool:
-    """Return whether a variable is an input of the model itself (not of a component)."""
-    return variable.causality == "input" and variable.top_level
+    """Return whether a variable is an input of the model itself; neither one of a component nor a protected connector."""
+    return variable.causality == "input" and variable.top_level and not variable.protected
 
 
 def _candidates(model: Model, equation: Equation, defined: Collection[ScalarKey]) -> list[Assign]:

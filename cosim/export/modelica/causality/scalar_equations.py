@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import reduce
 from itertools import product
 from typing import Any
 
@@ -127,6 +128,9 @@ class EquationSplitter:
             return self._joined(arguments, position, axis=("rows", "columns").index(node.name))
         if node.name == "sum" and not position:
             return _total([self.element(arguments[0], p) for p in product(*map(range, self.shape(arguments[0])))])
+        if node.name in ("min", "max") and len(arguments) == 1 and (size := self.shape(arguments[0])):
+            elements = [self.element(arguments[0], p) for p in product(*map(range, size))]
+            return reduce(lambda a, b: Builtin(node.name, (a, b), node.where), elements) if elements else None
         return None
 
     def _joined(self, parts: Sequence[Expression], position: Position, axis: int) -> Expression:

@@ -4,16 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Iterable
 from dataclasses import replace
-from functools import partial
 from typing import Any
 
 import numpy as np
 
 from ..model.arithmetic import EvaluationError, to_python_scalar
 from ..model.evaluate import Evaluator
-from ..model.flat_model import Model, Variable
+from ..model.flat_model import Equation, Model, Variable
 from ..model.syntax_tree import Array, Builtin, Comprehension, Expression, Literal, Name, Range
-from ..model.traversal import rewrite, variable_names
+from ..model.traversal import rewrite, unroll, variable_names
 
 _DISCRETE_TYPES = ("Integer", "Boolean", "Enumeration", "String")
 
@@ -42,7 +41,7 @@ def fold_constants(model: Model) -> Model:
     def fold(node: Any) -> Any:
         if isinstance(node, Name):
             return literals.get(node.name, node)
-        return _unroll(node, model) if isinstance(node, Comprehension) else node
+        return _unroll_known(node, model) if isinstance(node, Comprehension) else node
 
     return replace(
         _rewrite_model(model, fold, {name for name in model.variables if name not in constants}), structural=frozenset(structural)
@@ -52,7 +51,8 @@ def fold_constants(model: Model) -> Model:
 def _bind_parameters(model: Model) -> Model:
     """Return the model with the initial equations of parameters with `fixed = false` as their bindings.
 
-    Those that depend on variables or on the time become variables that are only computed at the initialization.
+    Those that depend on variables or on the time become variables that are only computed at the initialization, and so do the
+    parameters that depend on them.
     """
     free = {v.name for v in model.variables.values() if v.variability == "parameter" and v.fixed is False and 0 not in v.shape}
     known = {v.name for v in model.variables.values() if v.variability in ("constant", "parameter")}
@@ -65,9 +65,17 @@ def _bind_parameters(model: Model) -> Model:
         else:
             remaining.append(equation)
     initialized = free - set(bindings)
+    while dependent := [v for v in model.variables.values() if v.name not in initialized and _depends(v, initialized)]:
+        remaining += [Equation(Name(v.name, v.where), v.binding, v.where) for v in dependent if v.binding]
+        initialized |= {v.name for v in dependent}
     variables = {n: replace(v, binding=bindings[n]) if n in bindings else v for n, v in model.variables.items()}
     variables |= {n: replace(model.variables[n], variability="discrete", binding=None) for n in initialized}
     return replace(model, variables=variables, initial_equations=tuple(remaining), initialized=frozenset(initialized))
+
+
+def _depends(variable: Variable, names: set[str]) -> bool:
+    """Return whether the binding of a parameter depends on variables."""
+    return variable.variability == "parameter" and not names.isdisjoint(variable_names(variable.binding))
 
 
 def _rewrite_model(model: Model, change: Any, names: Iterable[str] | None = None) -> Model:
@@ -131,14 +139,10 @@ def _is_ready(variable: Variable, literals: dict[str, Literal]) -> bool:
     return variable_names(_value(variable)) <= set(literals)
 
 
-def _unroll(node: Comprehension, model: Model) -> Expression:
+def _unroll_known(node: Comprehension, model: Model) -> Expression:
     """Return an array constructor with an iterator as a list of elements, if its range is known."""
     if not isinstance(node.range, Range | Array) or variable_names(node.range):
         return node
     numbers = np.atleast_1d(Evaluator(model.functions, {})(node.range))
     literals = [Literal(to_python_scalar(number), "Integer") for number in numbers]
-    return Array(tuple(rewrite(node.value, partial(_substitute, Name(node.index), literal)) for literal in literals))
-
-
-def _substitute(name: Name, value: Expression, node: Any) -> Any:
-    return value if node == name else node
+    return unroll(node, literals)

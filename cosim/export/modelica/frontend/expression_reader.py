@@ -23,7 +23,20 @@ _UNSUPPORTED_BUILTINS = {
     "terminate": "terminate() is supported in when-equations only",
 }
 _INTEGER_OPERATORS = {"+": operator.add, "-": operator.sub, "*": operator.mul}
-_MODELICA_SPELLING = {"noevent": "noEvent", "outerproduct": "outerProduct"}
+_MODELICA_SPELLING = {
+    spelling.lower(): spelling
+    for spelling in (
+        "noEvent",
+        "outerProduct",
+        "Clock",
+        "noClock",
+        "subSample",
+        "superSample",
+        "shiftSample",
+        "backSample",
+        "firstTick",
+    )
+}
 
 
 def is_object_constructor(function: Json) -> bool:
@@ -183,8 +196,10 @@ class ExpressionReader:
             value = syntax_tree.Comprehension(value, index["name"], self.read_expression(index["range"]), where)
         return value
 
-    def _builtin(self, node: Json) -> syntax_tree.Builtin:
+    def _builtin(self, node: Json) -> Expression:
         name = node["function"].lower()
+        if name == "terminal":  # an FMU computes nothing after the last step
+            return syntax_tree.Literal(False, "Boolean")
         if name in _UNSUPPORTED_BUILTINS:
             raise_model_error(_UNSUPPORTED_BUILTINS[name], self.locate(node))
         return syntax_tree.Builtin(

@@ -31,12 +31,17 @@ MODIFIED_MODEL = "CosimModifiedModel"
 
 _REFERENCE = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
 _WITHIN = re.compile(r"^\s*within\s+([\w.]+)\s*;", re.MULTILINE)
-_QUOTED = re.compile(r"['`]([\w.]+)['`]")
+_QUOTED = re.compile(r"['`]([\w.]+(?: = [\w.]+)?)['`]")
 _CLASS = r"^[^/\n]*\b(?:model|block|class|function|package|record|connector|type)\s+{}\b"
 #: beginnings of messages that name a part of the front end
 _PHASE = re.compile(
     r"^(?:parse error: |\w+ failed: \S+ failed in \w+: (?:unsupported Flat semantic owner `[^`]*`: |"
-    r"unsupported runtime operator `\w+`: |canonical DAE construction rejected an invalid operation: )?)"
+    r"unsupported runtime operator `[^`]+`: |canonical DAE construction rejected an invalid operation: )?)"
+)
+#: operators that a message may name without quotes
+_OPERATOR = re.compile(
+    r"\b(sample|hold|previous|subSample|superSample|shiftSample|backSample|noClock|interval|firstTick|Clock|"
+    r"der|pre|edge|change|delay|return|reinit|terminate)\b"
 )
 _COUNTS = re.compile(r"; unknowns\[.*$")
 _NOT_FOUND = " could not be compiled because resolve/parse failed"
@@ -294,8 +299,8 @@ def _locate_problem(reason: str, name: str, path: Path, sources: ModelicaSources
 
 
 def _find_quoted_name(reason: str, sources: ModelicaSources) -> SourceLocation | None:
-    """Return the first source line with the name that a message quotes."""
-    for quoted in _QUOTED.findall(reason):
+    """Return the first source line with a name that a message quotes, or with an operator that it names."""
+    for quoted in (*_QUOTED.findall(reason), *_OPERATOR.findall(reason)):
         word = re.compile(rf"(?<![\w.]){re.escape(quoted)}(?![\w])")
         for file in sources.files:
             for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), 1):

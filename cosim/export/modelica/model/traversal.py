@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 from .syntax_tree import (
+    Array,
     Assert,
     Assign,
     Builtin,
     Colon,
+    Comprehension,
     Index,
     Literal,
     MultiAssign,
@@ -47,6 +49,15 @@ def rewrite(node: Any, change: Callable[[Any], Any]) -> Any:
     if not is_dataclass(node) or isinstance(node, type):
         return node
     return change(replace(node, **{field.name: rewrite(getattr(node, field.name), change) for field in fields(node)}))
+
+
+def unroll(node: Comprehension, values: Sequence[Literal]) -> Array:
+    """Return an array constructor with an iterator as a list of elements, one for each value of the iterator."""
+
+    def element(value: Literal) -> Any:
+        return rewrite(node.value, lambda each: value if each == Name(node.index) else each)
+
+    return Array(tuple(map(element, values)))
 
 
 def rewrite_outermost(node: Any, change: Callable[[Any], Any]) -> Any:

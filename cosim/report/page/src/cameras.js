@@ -1,13 +1,16 @@
-// Cameras: one orbiting camera, which follows a vehicle in some of its modes.
+// Cameras: one orbiting camera, which follows a vehicle or all of them in some of its modes.
 import { Box3, MathUtils, PerspectiveCamera, Vector3 } from "three";
 import { OrbitControls } from "three/addons/controls/OrbitControls.js";
 
-const FROM = new Vector3(0.45, -0.86, 0.42).normalize();
+export const SIGNS = 1; // layer of what is drawn into the scene, but is no part of it: trails, marks and waypoints
+
+const FROM = new Vector3(0.45, -0.86, 0.21).normalize();
 
 export class Cameras {
   constructor(canvas, box, views) {
-    this.camera = new PerspectiveCamera(34, 1, 0.08, 2500);
+    this.camera = new PerspectiveCamera(34, 1, 0.08, 3000);
     this.camera.up.set(0, 0, 1);
+    this.camera.layers.enable(SIGNS);
     this.controls = new OrbitControls(this.camera, canvas);
     this.controls.maxPolarAngle = 0.496 * Math.PI;
     this.controls.minDistance = 0.5;
@@ -16,6 +19,7 @@ export class Cameras {
     this.views = views;
     this.mode = "orbit";
     this.carried = new Vector3();
+    this.spread = 1;
   }
 
   /** Set the box that contains all bodies so far. */
@@ -24,25 +28,37 @@ export class Cameras {
     this.size = box.getSize(new Vector3()).length();
   }
 
-  /** Select a camera: "orbit", "chase", "top", or a view that is fixed to a body. `subject` is the followed body. */
-  choose(mode, subject) {
+  /**
+   * Select a camera: "group" (follows all vehicles), "orbit" (shows the whole mission), "chase" (follows the subject), "top", or a
+   * view that is fixed to a body. `subject` is the followed body, `group` the sphere around all vehicles.
+   */
+  choose(mode, subject, group) {
     this.mode = mode;
     this.controls.enabled = !(mode in this.views);
     this.controls.enableRotate = mode !== "top";
-    const place = mode === "chase" ? subject.position : this.centre;
+    const place = { chase: subject.position, group: group.center }[mode] ?? this.centre;
     this.carried.copy(place);
+    this.spread = group.radius;
     this.controls.target.copy(place);
-    const distance = mode === "chase" ? 2.2 + 2.6 * subject.reach : this.#fitting();
+    const distance = { chase: 2.2 + 2.6 * subject.reach, group: this.#around(group) }[mode] ?? this.#fitting();
     const away = mode === "top" ? new Vector3(0, -1e-3, 1) : FROM;
     this.camera.position.copy(place).addScaledVector(away, distance);
-    this.update(subject);
+    this.update(subject, group);
   }
 
   /** Distance from which all bodies are visible. */
   #fitting() {
-    const half = MathUtils.degToRad(this.camera.fov / 2);
     const narrow = Math.min(1, this.camera.aspect);
-    return MathUtils.clamp((0.36 * this.size) / Math.tan(half) / narrow, 2.5, 350);
+    return MathUtils.clamp((0.36 * this.size) / this.#tangent / narrow, 2.5, 350);
+  }
+
+  /** Distance from which a sphere of vehicles, which lie beside each other rather than above, fills the picture. */
+  #around({ radius }) {
+    return MathUtils.clamp((1.15 * radius) / this.#tangent / MathUtils.clamp(this.camera.aspect, 0.5, 1.7), 2, 350);
+  }
+
+  get #tangent() {
+    return Math.tan(MathUtils.degToRad(this.camera.fov / 2));
   }
 
   resize(width, height) {
@@ -50,8 +66,8 @@ export class Cameras {
     this.camera.updateProjectionMatrix();
   }
 
-  /** Move with the subject, or with the body that the camera is mounted on. */
-  update(subject, mounted) {
+  /** Move with the subject or the group, or with the body that the camera is mounted on. */
+  update(subject, group, mounted) {
     const view = this.views[this.mode];
     if (view && mounted) {
       const turned = ([x, y, z]) => new Vector3(x, y, z).applyAxisAngle(this.camera.up, mounted.yaw).add(mounted.position);
@@ -59,13 +75,21 @@ export class Cameras {
       this.camera.lookAt(turned(view.target));
       return;
     }
-    if (this.mode === "chase") {
-      const step = subject.position.clone().sub(this.carried);
-      this.carried.copy(subject.position);
-      this.controls.target.add(step);
-      this.camera.position.add(step);
+    if (this.mode === "chase") this.#carry(subject.position);
+    if (this.mode === "group") {
+      this.#carry(group.center);
+      const away = this.camera.position.sub(this.controls.target).multiplyScalar(group.radius / this.spread);
+      away.add(this.controls.target);
+      this.spread = group.radius;
     }
     this.controls.update();
+  }
+
+  #carry(place) {
+    const step = place.clone().sub(this.carried);
+    this.carried.copy(place);
+    this.controls.target.add(step);
+    this.camera.position.add(step);
   }
 }
 

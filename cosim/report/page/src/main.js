@@ -1,12 +1,13 @@
 // The replay page. Its data is in the element #replay-data, written by `cosim/report/replay.py`.
 import "uplot/dist/uPlot.min.css";
 import "./style.css";
-import { build, connectSignals, connectTime, connectView, showSpans } from "./controls.js";
+import { build, connectSignals, connectTime, connectView } from "./controls.js";
 import { Live } from "./live.js";
-import { Player } from "./player.js";
+import { LivePlayer, Player } from "./player.js";
 import { Plots } from "./plots.js";
 import { Run } from "./run.js";
-import { steer } from "./steering.js";
+import { showSpans } from "./spans.js";
+import { commander, steer } from "./steering.js";
 import { onThemeChange, themeButtons } from "./theme.js";
 import { View } from "./view.js";
 
@@ -15,13 +16,14 @@ const REDRAW = 500; // ms between two updates of a growing run
 async function start(root, data) {
   const live = data.live && new Live(data.live);
   const runs = live ? [await live.begin()] : await Promise.all(data.runs.map(Run.decoded));
-  const player = new Player(runs[0].first, Math.max(...runs.map((run) => run.last)));
   const page = build(root);
+  const command = live && commander(page, live);
+  const player = live ? new LivePlayer(live, command) : new Player(runs[0].first, Math.max(...runs.map((run) => run.last)));
   connectTime(page, player);
   const view = sceneView(page, data.scene, runs);
   if (view) {
     player.onChange(() => view.update(player.time));
-    connectView(page, view, data.scene, live ? "chase" : "orbit");
+    connectView(page, view, data.scene, "group");
     showSpans(page, runs[0], data.scene);
   }
   const plots = new Plots(page.plots, runs, player, data.scene.marks);
@@ -32,14 +34,14 @@ async function start(root, data) {
   animate(player, view);
   if (live) {
     player.seek(player.last);
-    watch(live, page, { player, view, plots, scene: data.scene });
+    watch(live, page, command, { player, view, plots, scene: data.scene });
   }
   return { player, view, plots, runs, live };
 }
 
 /** Show new rows until the run has ended; then the page is an ordinary replay. */
-function watch(live, page, { player, view, plots, scene }) {
-  const show = steer(page, live);
+function watch(live, page, command, { player, view, plots, scene }) {
+  const show = steer(page, live, player, command);
   let drawn = 0;
   live.follow(() => {
     player.grow(live.run.last);

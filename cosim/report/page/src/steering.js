@@ -1,46 +1,35 @@
-// Controls of a running simulation: pause, step, speed, tunable parameters and unconnected inputs.
+// Controls of a running simulation, beside those of the replay: single step, state, tunable parameters and unconnected inputs.
+import { offerSpeeds } from "./controls.js";
 
-const SPEEDS = [0.1, 0.25, 0.5, 1, 2, 4, 8];
-
-const BAR = `
-<div class="steering" role="group" aria-label="Running simulation">
-  <b class="state" role="status"></b>
-  <button type="button" class="pause"></button><button type="button" class="step">Step</button>
-  <label>Speed <select aria-label="Speed of the simulation"></select></label><output class="answer" role="alert"></output></div>
-<details class="adjust"><summary>Parameters and inputs</summary>
+const STATE = `<button type="button" class="step">Step</button><button type="button" class="state" title="Show the newest row"></button>`;
+const ADJUST = `<output class="answer" role="alert"></output><details class="adjust"><summary>Parameters and inputs</summary>
   <input class="filter" placeholder="Filter" aria-label="Filter parameters and inputs" spellcheck="false"><div class="fields"></div></details>`;
 
-function speeds(select, speed) {
-  const known = [...new Set([...SPEEDS, ...(speed ? [speed] : [])])].sort((a, b) => a - b);
-  select.replaceChildren(...known.map((factor) => new Option(`${factor}×`, factor)), new Option("as fast as possible", ""));
-  select.value = speed ?? "";
-}
-
-/** Show the controls above the signals; return a function to be called when the state of the run has changed. */
-export function steer(page, live) {
-  const holder = document.createElement("div");
-  holder.className = "live";
-  holder.innerHTML = BAR;
-  page.root.querySelector(".signals").before(holder);
-  const [state, pause, step, speed, answer] = [".state", ".pause", ".step", "select", ".answer"].map((s) => holder.querySelector(s));
-  const tell = async (message) => {
+/** Return a function that sends a command, shows why it was refused, and returns true if it was carried out. */
+export function commander(page, live) {
+  return async (message) => {
     const { error } = await live.command(message);
-    answer.textContent = error ?? "";
+    page.root.querySelector(".answer").textContent = error ?? "";
     return !error;
   };
-  pause.addEventListener("click", () => tell({ command: live.state.paused ? "resume" : "pause" }));
-  step.addEventListener("click", () => tell({ command: "step" }));
-  speed.addEventListener("change", () => tell({ command: "speed", factor: speed.value ? Number(speed.value) : null }));
-  const fields = live.adjustable.map((about) => field(about, (value) => tell({ command: "set", name: about.name, value })));
-  holder.querySelector(".fields").append(...fields);
-  filtering(holder.querySelector(".filter"), fields);
+}
+
+/** Add the controls; return a function to be called when the state of the run has changed. */
+export function steer(page, live, player, command) {
+  page.play.insertAdjacentHTML("afterend", STATE);
+  page.bar.insertAdjacentHTML("afterend", `<div class="live">${ADJUST}</div>`);
+  const [step, state] = [".step", ".state"].map((selector) => page.bar.querySelector(selector));
+  step.addEventListener("click", () => command({ command: "step" }));
+  state.addEventListener("click", () => player.seek(player.last));
+  const fields = live.adjustable.map((about) => field(about, (value) => command({ command: "set", name: about.name, value })));
+  page.root.querySelector(".fields").append(...fields);
+  filtering(page.root.querySelector(".filter"), fields);
   const show = () => {
-    const { paused, ended } = live.state;
+    const { paused, ended, speed } = live.state;
     state.textContent = ended ? "Finished" : paused ? "Paused" : "Live";
     state.dataset.state = state.textContent;
-    pause.textContent = paused ? "Resume" : "Pause";
-    speeds(speed, live.state.speed);
-    if (ended) for (const control of holder.querySelectorAll("button, select, .fields input")) control.disabled = true;
+    offerSpeeds(page.speed, ended ? player.speed : speed, !ended);
+    if (ended) for (const control of [step, ...page.root.querySelectorAll(".fields input")]) control.disabled = true;
   };
   show();
   return show;

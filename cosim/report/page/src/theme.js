@@ -1,13 +1,17 @@
 // Colours of the scene and the plots in light and dark.
+import { Vector3 } from "three";
+
+/** Direction to the sun. */
+export const SUN = new Vector3(-0.45, -0.6, 0.66).normalize();
 
 export const THEMES = {
   light: {
-    horizon: "#e9f0f4", deep: "#3c8196", shallow: "#b4d5dc", line: "#ffffff", shade: 0.22,
-    sun: 1.9, sky: 1.75, ground: "#8fb0b8", ink: "#5b6875", rule: "#e3e8ec",
+    horizon: "#d5e4ef", zenith: "#7fb0dc", deep: "#1d5468", hill: "#5f8a7f", beach: "#cbb98c", meadow: "#7d9a4c",
+    trees: ["#2f6b3a", "#3f7f3f", "#5f8f3f"], shade: 0.3, sun: 1.9, sky: 1.75, ground: "#6d98a4", ink: "#5b6875", rule: "#e3e8ec",
   },
   dark: {
-    horizon: "#141d27", deep: "#0d2c3a", shallow: "#24505f", line: "#7fb4c8", shade: 0.4,
-    sun: 1.5, sky: 1.25, ground: "#24404c", ink: "#92a1b0", rule: "#26313c",
+    horizon: "#2a3a4a", zenith: "#0b1420", deep: "#0a1c27", hill: "#16262c", beach: "#3a3a34", meadow: "#1e2d25",
+    trees: ["#12241f", "#172b22", "#1d3025"], shade: 0.45, sun: 1.5, sky: 1.25, ground: "#24404c", ink: "#92a1b0", rule: "#26313c",
   },
 };
 

@@ -1,19 +1,19 @@
 // The scene: light, sky, water, bodies with their trails, and the camera; rendered only after a change.
 import {
   BasicShadowMap, Color, ColorManagement, DirectionalLight, Euler, Group, HemisphereLight, LinearSRGBColorSpace, MeshLambertMaterial,
-  PCFShadowMap, Scene, Vector3, WebGLRenderer,
+  PCFShadowMap, Scene, Sphere, WebGLRenderer,
 } from "three";
+import { Backdrop } from "./backdrop.js";
 import { bodyOf, reachOf } from "./bodies.js";
-import { boxAround, Cameras, withoutOutliers } from "./cameras.js";
+import { boxAround, Cameras, SIGNS, withoutOutliers } from "./cameras.js";
 import { markersOf } from "./markers.js";
 import { Cross, marksOf } from "./marks.js";
 import { drawnBySoftware, FINEST, Quality, setDetail } from "./quality.js";
-import { theme } from "./theme.js";
+import { SUN, theme } from "./theme.js";
 import { Ghosts, Trail } from "./trails.js";
 import { Water } from "./water.js";
 
 const REST = 350; // ms without a change until the picture is rendered at the highest quality
-const SUN = new Vector3(-0.45, -0.6, 0.66).normalize();
 const OTHER = "#c2185b";
 const LOWEST = -3; // m; what sinks below this height does not count for the camera
 
@@ -31,6 +31,12 @@ function rendererOn(canvas) {
   return { renderer, software };
 }
 
+/** Let an object be drawn without a mirror image in the water. */
+function asSign(object) {
+  object.traverse((part) => part.layers.set(SIGNS));
+  return object;
+}
+
 export class View {
   constructor(canvas, scene, runs) {
     Object.assign(this, { runs, marks: scene.marks, time: runs[0].first });
@@ -43,6 +49,8 @@ export class View {
     this.own = this.actors.filter((actor) => actor.run === runs[0]);
     this.subject = this.own[0];
     this.cameras = new Cameras(canvas, this.#box(), Object.fromEntries(scene.views.map((view) => [view.name, view])));
+    this.backdrop = this.water && new Backdrop(this.cameras.centre, this.cameras.size / 2);
+    if (this.backdrop) this.scene.add(this.backdrop.object);
     this.cameras.controls.addEventListener("change", () => this.request());
     this.recolour();
     new ResizeObserver(() => this.#resize()).observe(canvas.parentElement);
@@ -60,7 +68,7 @@ export class View {
     this.scene.add(this.light, this.light.target, this.around);
     this.water = scene.water && new Water(scene.water);
     if (this.water) this.scene.add(this.water.object);
-    this.scene.add(bodyOf(scene.fixed), markersOf(scene.markers));
+    this.scene.add(bodyOf(scene.fixed), asSign(markersOf(scene.markers)));
   }
 
   #actor(run, body, isOther) {
@@ -79,7 +87,7 @@ export class View {
     const trail = new Trail(run, body, isOther ? OTHER : body.colour, isOther, end);
     const ghosts = isOther || !solid ? null : new Ghosts(run, body, solid);
     const crosses = marks.map((mark) => new Cross(mark, run.position(body, mark.row)));
-    this.scene.add(...trail.lines, ...(ghosts ? [ghosts.mesh] : []), ...crosses.map((cross) => cross.object));
+    this.scene.add(...trail.lines.map(asSign), ...(ghosts ? [ghosts.mesh] : []), ...crosses.map((cross) => asSign(cross.object)));
     return { trail, ghosts, crosses, end };
   }
 
@@ -89,8 +97,20 @@ export class View {
       const rows = run.place(end).row;
       return Array.from({ length: 60 }, (_, i) => run.position(body, Math.round((i * rows) / 59)));
     });
-    const visible = ({ z }) => !this.water || z > LOWEST;
-    return boxAround(withoutOutliers(places.filter((place) => place.toArray().every(Number.isFinite) && visible(place))));
+    return boxAround(withoutOutliers(places.filter((place) => this.#counts(place))));
+  }
+
+  /** True if the camera must show a place. */
+  #counts(place) {
+    return place.toArray().every(Number.isFinite) && (!this.water || place.z > LOWEST);
+  }
+
+  /** The sphere around all vehicles now. */
+  #group() {
+    const places = withoutOutliers(this.own.map(({ position }) => position).filter((place) => this.#counts(place)));
+    const around = boxAround(places.length ? places : [this.subject.position]).getBoundingSphere(new Sphere());
+    around.radius += Math.max(...this.own.map(({ reach }) => reach));
+    return around;
   }
 
   /** Update after the runs have received more rows. */
@@ -126,6 +146,7 @@ export class View {
     this.around.groundColor.set(colours.ground);
     this.scene.background = new Color(colours.horizon);
     this.water?.colour(colours);
+    this.backdrop?.colour(colours);
     this.request();
   }
 
@@ -143,7 +164,7 @@ export class View {
   }
 
   choose(mode) {
-    this.cameras.choose(mode, this.subject);
+    this.cameras.choose(mode, this.subject, this.#group());
     this.update(this.time);
   }
 
@@ -160,7 +181,7 @@ export class View {
     }
     this.light.target.position.copy(this.subject.position);
     this.light.position.copy(this.subject.position).addScaledVector(SUN, 10);
-    this.cameras.update(this.subject, this.#mounted());
+    this.cameras.update(this.subject, this.#group(), this.#mounted());
     this.#moveWater(time);
     this.request();
   }

@@ -1,13 +1,16 @@
-// Water as one plane, displaced by the waves of the run, with ripples, a metre grid and soft shadows of vehicles.
+// Water as one plane, displaced by the waves of the run, with ripples, a mirror image and soft shadows of vehicles.
 import {
   BufferAttribute, BufferGeometry, Color, CustomBlending, Group, InstancedBufferAttribute, InstancedBufferGeometry, Mesh, PlaneGeometry,
-  ShaderMaterial, Vector2, Vector3, Vector4,
+  ShaderMaterial, Vector2, Vector4,
 } from "three";
+import { Reflector } from "three/addons/objects/Reflector.js";
 import { detailed } from "./quality.js";
+import { SUN } from "./theme.js";
 import { FINE, MOST_WAVES, SHADE, WATER } from "./water_shaders.js";
 
 const MOST_SHADES = 16;
 const REACH = 600; // m from the centre
+const IMAGE = { textureWidth: 1024, textureHeight: 512, multisample: 0 }; // of the mirror image
 const CELLS = { calm: [64, 32], waves: [160, 60] }; // number of cells along each side, fine and coarse
 
 /** A square mesh that is finer in its middle. */
@@ -43,28 +46,42 @@ export class Water {
     this.gain = spec.gain;
     this.uniforms = {
       waves: { value: Array.from({ length: MOST_WAVES }, () => new Vector4()) }, count: { value: 0 },
-      centre: { value: new Vector2() }, time: { value: 0 }, sun: { value: new Vector3(-0.45, -0.6, 0.66).normalize() },
-      deep: { value: new Color() }, shallow: { value: new Color() }, horizon: { value: new Color() }, ink: { value: new Color() },
-      strength: { value: 0 },
+      centre: { value: new Vector2() }, time: { value: 0 }, sun: { value: SUN }, strength: { value: 0 },
+      deep: { value: new Color() }, zenith: { value: new Color() }, horizon: { value: new Color() },
     };
     const [fine, coarse] = spec.waves.length ? CELLS.waves : CELLS.calm;
-    this.surface = detailed(new Mesh(undefined, new ShaderMaterial({ uniforms: this.uniforms, ...WATER })), mesh(fine), mesh(coarse));
+    this.surface = detailed(this.#mirror(), mesh(fine), mesh(coarse));
     this.shades = shades(this.uniforms);
     this.object = new Group().add(this.surface, this.shades);
     this.object.children.forEach((child, i) => Object.assign(child, { frustumCulled: false, renderOrder: i - 2 }));
   }
 
-  /** True if the lighting is computed per vertex. */
+  /** A surface that draws the mirror image of layer 0 before it is drawn itself; it shares the uniforms of the shadows. */
+  #mirror() {
+    const images = { color: { value: null }, tDiffuse: { value: null }, textureMatrix: { value: null } };
+    const surface = new Reflector(undefined, { ...IMAGE, shader: { uniforms: images, ...WATER } });
+    Object.assign(surface.material.uniforms, this.uniforms);
+    this.reflect = surface.onBeforeRender;
+    const imageCamera = surface.getReflectionCamera;
+    surface.getReflectionCamera = (camera) => {
+      const image = imageCamera.call(surface, camera);
+      image.layers.set(0);
+      return image;
+    };
+    return surface;
+  }
+
+  /** True if the water is lit per vertex, without a mirror image. */
   light(coarse) {
+    this.surface.onBeforeRender = coarse ? () => {} : this.reflect;
     this.surface.material.defines = coarse ? { COARSE: "" } : {};
     this.surface.material.needsUpdate = true;
   }
 
-  colour({ deep, shallow, horizon, line, shade }) {
+  colour({ deep, zenith, horizon, shade }) {
     this.uniforms.deep.value.set(deep);
-    this.uniforms.shallow.value.set(shallow);
+    this.uniforms.zenith.value.set(zenith);
     this.uniforms.horizon.value.set(horizon);
-    this.uniforms.ink.value.set(line);
     this.uniforms.strength.value = shade;
   }
 
@@ -83,11 +100,10 @@ export class Water {
 
   /** Shadows of bodies; they are softer at greater heights. */
   #shade(bodies) {
-    const sun = this.uniforms.sun.value;
     const { shade } = this.shades.geometry.attributes;
     bodies.forEach(({ position, reach }, i) => {
       const height = Math.max(position.z, 0);
-      const [x, y] = ["x", "y"].map((axis) => position[axis] - (sun[axis] / sun.z) * height);
+      const [x, y] = ["x", "y"].map((axis) => position[axis] - (SUN[axis] / SUN.z) * height);
       shade.setXYZW(i, x, y, 0.62 * reach * (1 + 0.15 * height), 1 / (1 + 0.5 * height));
     });
     shade.needsUpdate = true;

@@ -27,64 +27,85 @@ vec3 surface(vec2 at, out vec2 slope) {
 }
 void project(vec3 place) {
   float range = distance(cameraPosition, place);
-  haze = 1.0 - exp(-range * range / 20000.0);
+  haze = 1.0 - exp(-range * range / 160000.0);
   gl_Position = projectionMatrix * viewMatrix * vec4(place, 1.0);
 }`;
 
 const LIT = `
-uniform vec3 deep, shallow, sun;
-vec3 lit(vec3 place, vec2 slope) {
-  vec3 ray = normalize(cameraPosition - place);
-  vec3 normal = normalize(vec3(slope, 1.0));
+uniform vec3 deep, zenith, horizon, sun;
+float mirrored(vec3 ray, vec3 normal) {
   float grazing = 1.0 - max(dot(ray, normal), 0.0);
+  return 0.04 + 0.9 * grazing * grazing * grazing;
+}
+vec3 lit(vec3 place, vec3 normal, vec3 reflection, float share) {
+  vec3 ray = normalize(cameraPosition - place);
   float glint = max(dot(reflect(-sun, normal), ray), 0.0);
   glint *= glint; glint *= glint; glint *= glint; glint *= glint;
-  return mix(deep, shallow, 0.12 + 0.88 * grazing * grazing * grazing) + shallow * dot(normal.xy, sun.xy) + 0.10 * glint * glint;
+  return mix(deep + 0.25 * deep * dot(normal.xy, sun.xy), reflection, share) + 0.10 * glint * glint;
+}
+vec3 sky(vec3 ray, vec3 normal) {
+  float height = max(reflect(-ray, normal).z, 0.0);
+  return mix(horizon, zenith, sqrt(height));
 }`;
 
-// The lighting is computed per vertex if COARSE, otherwise per pixel.
+// COARSE: the water is lit per vertex and mirrors the sky alone. Otherwise it is lit per pixel, has finer ripples and mirrors the
+// scene (three's Reflector draws it into tDiffuse).
 export const WATER = {
   vertexShader: `${SURFACE}
-varying vec3 place;
+uniform mat4 textureMatrix;
 #ifdef COARSE
 ${LIT}
 varying vec3 colour;
 #else
+varying vec3 place;
 varying vec2 slope;
+varying vec4 image;
 #endif
 void main() {
   vec2 tilt;
-  place = surface(position.xy + centre, tilt);
+  vec3 at = surface(position.xy + centre, tilt);
 #ifdef COARSE
-  colour = lit(place, tilt);
+  vec3 normal = normalize(vec3(tilt, 1.0)), ray = normalize(cameraPosition - at);
+  project(at);
+  colour = mix(lit(at, normal, sky(ray, normal), mirrored(ray, normal)), horizon, haze);
 #else
+  place = at;
   slope = tilt;
+  image = textureMatrix * vec4(at.xy, 0.0, 1.0);
+  project(at);
 #endif
-  project(place);
 }`,
   fragmentShader: `
-uniform vec3 horizon, ink;
-varying vec3 place;
-varying float haze;
 #ifdef COARSE
 varying vec3 colour;
+void main() {
+  gl_FragColor = vec4(colour, 1.0);
+}
 #else
-${LIT}
+varying vec3 place;
+varying float haze;
+uniform sampler2D tDiffuse;
+uniform float time;
 varying vec2 slope;
-#endif
-float lines(float pitch, vec2 width) {
-  vec2 off = abs(fract(place.xy / pitch - 0.5) - 0.5) * pitch;
-  vec2 line = clamp(1.4 - off / width, 0.0, 1.0);
-  return max(line.x, line.y) * clamp(1.2 - 5.0 * max(width.x, width.y) / pitch, 0.0, 1.0);
+varying vec4 image;
+${LIT}
+vec2 ripple(vec2 number, float angle) {
+  return number * (0.012 * cos(dot(number, place.xy) + angle) / length(number));
+}
+vec2 ripples() {
+  return ripple(vec2(4.1, 2.3), 2.1 * time) + ripple(vec2(-3.3, 5.6), -2.6 * time) + ripple(vec2(7.9, -6.1), 3.3 * time)
+    + ripple(vec2(-9.7, -8.8), 3.9 * time) + ripple(vec2(1.3, 11.9), -3.6 * time);
 }
 void main() {
-#ifndef COARSE
-  vec3 colour = lit(place, slope);
-#endif
-  vec2 width = fwidth(place.xy) + 0.003;
-  vec3 ruled = mix(colour, ink, 0.05 * lines(1.0, width) + 0.08 * lines(5.0, width));
-  gl_FragColor = vec4(mix(ruled, horizon, haze), 1.0);
-}`,
+  vec3 ray = cameraPosition - place;
+  float range = length(ray);
+  ray /= range;
+  vec3 normal = normalize(vec3(slope + ripples() / (1.0 + 0.0015 * range * range), 1.0));
+  vec2 at = image.xy / image.w + normal.xy * vec2(0.5, 1.0) * min(0.6, 6.0 / range);
+  vec3 colour = lit(place, normal, texture2D(tDiffuse, at).rgb, mirrored(ray, normal));
+  gl_FragColor = vec4(mix(colour, horizon, haze), 1.0);
+}
+#endif`,
 };
 
 export const SHADE = {

@@ -135,6 +135,22 @@ static Status derivatives(Handle c, double dx[]) {
     dx[0] = INTEGER(m, FAULT) == 9 && m->time > 0.5 ? NAN : m->r[DX], dx[1] = m->r[DH], dx[2] = m->r[DV];
     return GOOD;
 }
+#if FMI == 3
+#define SEED_AND_RESULT const double dv[], size_t ndv, double dz[], size_t ndz
+#else
+#define SEED_AND_RESULT const double dv[], double dz[]
+#endif
+#if FMI > 1
+/* The derivatives of x', h', x, h and v with respect to u, x, h or v. */
+Status F(GetDirectionalDerivative)(Handle c, const Reference z[], size_t nz, const Reference v[], size_t nv, SEED_AND_RESULT) {
+    (void)c;
+    for (size_t k = 0; k < nz; k++) {
+        double slope = z[k] == v[0] ? 1 : z[k] == DX ? (v[0] == U) - (v[0] == X) : z[k] == DH ? v[0] == V : 0;
+        dz[k] = slope * dv[0];
+    }
+    return nv == 1 ? GOOD : BAD;
+}
+#endif
 Status F(GetEventIndicators)(Handle c, double z[], size_t n) {
     Model *m = c;
     MAY_FAIL(INDICATORS);

@@ -6,7 +6,7 @@ import math
 from fractions import Fraction
 
 import pytest
-from fakes import FakeComponent, outputs
+from fakes import FakeComponent, clock, outputs
 from systems import endpoint, make_system, run_system
 
 from cosim.components.fmi import FmuFile, InstanceSettings, Isolation, SolverSettings, create_component
@@ -76,6 +76,15 @@ def test_a_fixed_step_method_makes_the_steps_of_its_definition(ball, method, com
     rows = reference_run(method, 2000, 0.001)[::10]
     assert [list(row) for row in zip(*(columns(recording)[name] for name in "xhv"), strict=True)] == rows
     assert columns(recording)["count"][-1] == 8
+
+
+def test_connected_inputs_and_outputs_belong_to_the_fmu_and_steps_to_its_integrator(ball):
+    """x' = u - x with u = t of the start of the step; after three steps the native executor makes steps in compact form."""
+    system = make_system({"ball": component(ball, "euler", "0.1"), "clock": clock()}, "clock.y > ball.u")
+    found, x = columns(run_system(system, "0.9", "0.1", ["ball.x"]))["x"], 1.0
+    for n, value in enumerate(found):
+        assert value == pytest.approx(x, rel=1e-14)
+        x += 0.1 * (n / 10 - x)
 
 
 def test_the_step_size_of_a_method_divides_the_communication_step(ball):

@@ -45,8 +45,8 @@ block DeckFollower "Quadcopter controller that flies above the deck; SI units, a
   parameter Real inertia_xy(unit = "kg.m2") = 0.00283 "About the axes forward and left";
   parameter Real inertia_z(unit = "kg.m2") = 0.005131;
   parameter Real arm(unit = "m") = 0.1815;
-  parameter Real torque_per_thrust(unit = "m") = 0.026 "Reaction torque of a rotor over its thrust";
-  parameter Real thrust_coefficient(unit = "N.s2/rad2") = 9.148e-6 "Thrust of a rotor over its squared speed";
+  parameter Real torque_per_thrust(unit = "m") = 0.0289 "Reaction torque of a rotor over its thrust";
+  parameter Real thrust_coefficient(unit = "N.s2/rad2") = 8.24e-6 "Thrust of a rotor over its squared speed";
   parameter Real rotor_speed_limit(unit = "rad/s") = 523.6;
   input Vehicle vehicle;
   input Target target;

@@ -39,7 +39,7 @@ class DeckFollower(Fmi2Slave):
         self.position_bandwidth, self.attitude_bandwidth, self.yaw_bandwidth = 1.2, 8.0, 2.0
         self.acceleration_limit = 3.0
         self.mass, self.inertia_xy, self.inertia_z = 0.443892, 0.00283, 0.005131
-        self.arm, self.torque_per_thrust, self.thrust_coefficient = 0.1815, 0.026, 9.148e-6
+        self.arm, self.torque_per_thrust, self.thrust_coefficient = 0.1815, 0.0289, 8.24e-6
         self.rotor_speed_limit = 523.6
         self.rotor_speed = [0.0, 0.0, 0.0, 0.0]
         self._register_variables()

@@ -1,6 +1,6 @@
-"""Protection of a PythonFMU class in an exported FMU: its import, and a log of its exceptions.
+"""Protection of a PythonFMU class in an exported FMU: its import, a log of its exceptions, and its whole state.
 
-Exported FMUs contain a copy of this file. It imports only PythonFMU and the standard library.
+Exported FMUs contain copies of this file and of `object_state.py`. They import only PythonFMU and the standard library.
 """
 
 from __future__ import annotations
@@ -16,12 +16,16 @@ from typing import Any
 from pythonfmu import Fmi2Slave
 from pythonfmu.enums import Fmi2Status
 
+from .object_state import Restore, snapshot
+
 #: methods of a class that PythonFMU calls
 _METHODS = (
     *("__init__", "setup_experiment", "enter_initialization_mode", "exit_initialization_mode", "do_step", "terminate"),
     *(f"{access}_{kind}" for access in ("get", "set") for kind in ("real", "integer", "boolean", "string")),
     *("_get_fmu_state", "_set_fmu_state"),
 )
+#: attributes of a slave that belong to PythonFMU and are no state
+PYTHONFMU_ATTRIBUTES = frozenset({"vars", "log_queue"})
 #: references to the globals of entry modules
 _kept: list[object] = []
 
@@ -34,9 +38,15 @@ class SlaveError(Exception):
         return str(self)
 
 
-def with_exception_log(slave_class: type[Fmi2Slave]) -> type[Fmi2Slave]:
-    """Return a subclass with the same name that logs class, text, file and line of each exception before it raises it."""
+def protected_class(slave_class: type[Fmi2Slave]) -> type[Fmi2Slave]:
+    """Return a subclass with the same name.
+
+    It logs class, text, file and line of each exception before it raises it. Its states contain all attributes of the object,
+    not only the registered variables, unless the class overrides `_get_fmu_state`.
+    """
     methods = {name: _with_log(getattr(slave_class, name)) for name in _METHODS}
+    if slave_class._get_fmu_state is Fmi2Slave._get_fmu_state:
+        methods |= {"_get_fmu_state": _with_log(_get_state), "_set_fmu_state": _with_log(_set_state)}
     return type(slave_class.__name__, (slave_class,), {**methods, "__doc__": slave_class.__doc__})
 
 
@@ -60,9 +70,17 @@ def load_class(entry: dict[str, Any], source: str, name: str) -> type[Fmi2Slave]
         entry["__path__"][:] = sys.path[:1]  # where PythonFMU has just inserted the folder
         for module in [module for module in sys.modules if module.startswith(f"{package}.") and module != __name__]:
             del sys.modules[module]
-    slave_class = with_exception_log(getattr(importlib.import_module(f"{package}.{source}"), name))
+    slave_class = protected_class(getattr(importlib.import_module(f"{package}.{source}"), name))
     entry[name] = slave_class  # PythonFMU reads it from there
     return slave_class
+
+
+def _get_state(slave: Fmi2Slave) -> dict[str, Restore]:
+    return {"restore": snapshot(slave, PYTHONFMU_ATTRIBUTES)}
+
+
+def _set_state(_slave: Fmi2Slave, state: dict[str, Restore]) -> None:
+    state["restore"]()
 
 
 def _with_log(method: Callable[..., Any]) -> Callable[..., Any]:

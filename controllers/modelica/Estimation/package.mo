@@ -1,0 +1,2 @@
+package Estimation "State estimators"
+end Estimation;

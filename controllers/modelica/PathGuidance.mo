@@ -1,0 +1,3 @@
+block PathGuidance "Path command of the vessel: adaptive line of sight along straight legs"
+  extends Fleet.PathGuidance;
+end PathGuidance;

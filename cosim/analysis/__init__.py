@@ -1,0 +1,1 @@
+"""Analysis of a scenario as a control loop: trim, linearisation, margins."""

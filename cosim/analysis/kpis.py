@@ -1,0 +1,39 @@
+"""KPIs of the control loop, for checks such as "phase margin at least 45 degrees".
+
+    {"name": "loop", "python": "cosim.analysis.kpis:margins", "arguments": {"components": "uav", "at": 15}}
+
+Each function runs the scenario of the result again up to a point in time, where it linearises the loop.
+"""
+
+from __future__ import annotations
+
+import math
+
+from ..results import Result
+from ..results.kpi import better, units
+from .loop_margins import margins as loop_margins
+from .recorded_run import recorded_scenario
+
+
+@better(gain_margin="higher", phase_margin="higher", delay_margin="higher", disk_margin="higher", stable="higher")
+@units(gain_margin="dB", phase_margin="deg", delay_margin="s")
+def margins(
+    result: Result, components: str, at: float, loops: list[str] | None = None, duration: float | None = None
+) -> dict[str, float | bool]:
+    """Return the smallest gain (dB), phase (deg), delay (s) and disk margin (1) at the inputs and outputs of a controller.
+
+    Args:
+        result: Recorded run.
+        components: Name of a component or nested system.
+        at: Time at which the loop is linearised (s).
+        loops: Names of signals; None: all connected inputs and outputs.
+        duration: Duration of the impulse responses (s); None: 256 samples.
+    """
+    found = loop_margins(recorded_scenario(result), components, at, loops=loops or (), duration=duration)
+    return {
+        "gain_margin": 20 * math.log10(min((each.gain for each in found), default=math.inf)),
+        "phase_margin": math.degrees(min((each.phase for each in found), default=math.inf)),
+        "delay_margin": min((each.delay for each in found), default=math.inf),
+        "disk_margin": min((each.disk for each in found), default=math.inf),
+        "stable": all(each.stable for each in found),
+    }

@@ -1,0 +1,83 @@
+"""Mass and inertia of a rigid body: checks, parameters and principal axes."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping
+from itertools import permutations, product
+
+import numpy as np
+
+from cosim.core.component import Variable
+
+from .interface import scalar_variable
+from .shapes import Body, Box, quaternion_from_matrix
+
+#: function from the rotation matrix (3, 3) principal axes to body frame to the collision shape in principal axes
+Boxes = Callable[[np.ndarray], tuple[Box, ...]]
+
+#: parameter -> row and column in the symmetric inertia tensor
+INERTIA_INDICES = {f"inertia.{'xyz'[i]}{'xyz'[j]}": (i, j) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))}
+
+
+def inertia_variables(mass: float, inertia: np.ndarray, mass_text: str) -> tuple[Variable, ...]:
+    """Return the parameters `mass` (kg) and `inertia.*` (kg m2, about the centre of mass, body frame)."""
+    text = "inertia tensor about the centre of mass, body frame, rotors locked"
+    elements = {name: float(inertia[place]) for name, place in INERTIA_INDICES.items()}
+    tensor = (scalar_variable(name, "kg.m2", f"{text}: {name[-2:]}", "parameter", value) for name, value in elements.items())
+    return (scalar_variable("mass", "kg", mass_text, "parameter", mass), *tensor)
+
+
+def inertia_of(parameters: Mapping[str, float]) -> np.ndarray:
+    """Return the inertia tensor (kg m2) of the parameters `inertia.*`, shape (3, 3)."""
+    inertia = np.zeros((3, 3))
+    for name, (i, j) in INERTIA_INDICES.items():
+        inertia[i, j] = inertia[j, i] = parameters[name]
+    return inertia
+
+
+def inertia_problems(inertia: np.ndarray) -> Iterator[str]:
+    """Yield a message if no rigid body has this inertia tensor (kg m2)."""
+    tensor = np.asarray(inertia, float)
+    if tensor.shape != (3, 3) or not np.isfinite(tensor).all():
+        yield f"found {tensor.tolist()}, expected 3 rows of 3 finite numbers"
+    elif not np.allclose(tensor, tensor.T, rtol=1e-12, atol=0):
+        yield f"found {tensor.tolist()}, expected a symmetric tensor"
+    else:
+        small, middle, large = moments = np.linalg.eigvalsh(tensor).tolist()  # in ascending order
+        if small <= 0:
+            yield f"found the principal moments {moments}, expected all greater than 0"
+        elif large > (small + middle) * (1 + 1e-9):
+            yield f"found the principal moments {moments}, expected none greater than the sum of the other two"
+
+
+def principal_axes(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the principal moments of inertia and their axes.
+
+    Args:
+        inertia: Inertia tensor (kg m2, body frame), shape (3, 3).
+
+    Returns:
+        Moments of inertia (kg m2), shape (3,), and the rotation matrix from the principal axes to the body frame, shape
+        (3, 3). Its angle is less than 120 degrees; subject to that, the moments ascend.
+    """
+    moments, axes = np.linalg.eigh(inertia)
+    for order in permutations(range(3)):
+        ordered = axes[:, order] * np.where(np.diag(axes[:, order]) < 0, -1.0, 1.0)
+        for signs in product((1.0, -1.0), repeat=3):
+            to_body = ordered * signs[::-1]
+            if np.linalg.det(to_body) > 0 and np.trace(to_body) > 0:
+                return moments[list(order)], to_body
+    raise AssertionError("one of the 24 frames of the principal axes is rotated by less than 63 degrees")
+
+
+def principal_body(mass: float, inertia: np.ndarray, boxes: Boxes) -> Body:
+    """Return a rigid body for Bullet, in its principal axes.
+
+    Args:
+        mass: Mass (kg).
+        inertia: Inertia tensor about the centre of mass (kg m2, body frame), shape (3, 3).
+        boxes: Collision shape.
+    """
+    moments, to_body = principal_axes(inertia)
+    x, y, z = moments.tolist()
+    return Body(mass, (x, y, z), boxes(to_body), axes=quaternion_from_matrix(to_body))

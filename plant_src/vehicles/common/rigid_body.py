@@ -1,0 +1,77 @@
+"""Motion of a free rigid body as CasADi expressions.
+
+The state begins with position (m) and velocity (m/s) of the centre of mass in the world frame, a unit quaternion (body to world)
+and the angular velocity (rad/s, body frame), in the order of `interface.FREE_STATES`.
+"""
+
+from __future__ import annotations
+
+from typing import NamedTuple
+
+import casadi as ca
+
+from . import kinematics
+from .interface import FREE_STATES
+from .named_values import NamedValues
+
+#: number of rigid-body states; those of the actuators follow them in the state vector
+RIGID_BODY_STATE_COUNT = len(FREE_STATES)
+
+
+class RigidBody(NamedTuple):
+    """Mass (kg), inertia about the centre of mass (kg m2, body frame, shape (3, 3)) and the inverse of the inertia."""
+
+    mass: ca.SX
+    inertia: ca.SX
+    inverse_inertia: ca.SX
+
+    def inertia_in_world(self, orientation: ca.SX) -> ca.SX:
+        """Return the inertia (kg m2) in world axes."""
+        to_world = kinematics.rotation_matrix(orientation)
+        return to_world @ self.inertia @ to_world.T
+
+
+def rigid_body(constants: NamedValues) -> RigidBody:
+    """Return mass and inertia."""
+    return RigidBody(constants["mass"], symmetric_matrix(constants["inertia"]), constants["inverse_inertia"])
+
+
+def initial_rigid_state(initial: NamedValues) -> ca.SX:
+    """Return the states of the rigid body at the start from the parameters `initial.*`."""
+    orientation = kinematics.quaternion_about_z(initial["initial.yaw"])
+    velocity = kinematics.rotation_matrix(orientation) @ initial["initial.velocity_body"]
+    return ca.vertcat(initial["initial.position"], orientation, velocity, initial["initial.rates"])
+
+
+def symmetric_matrix(elements: ca.SX) -> ca.SX:
+    """Return the symmetric matrix (3, 3) with the elements xx, yy, zz, xy, xz, yz."""
+    xx, yy, zz, xy, xz, yz = ca.vertsplit(elements)
+    return ca.vertcat(ca.horzcat(xx, xy, xz), ca.horzcat(xy, yy, yz), ca.horzcat(xz, yz, zz))
+
+
+def rigid_body_rate(body: RigidBody, gravity: ca.SX, state: ca.SX, inputs: NamedValues, force: ca.SX, torque: ca.SX) -> ca.SX:
+    """Return the time derivative of the rigid-body states.
+
+    Args:
+        body: Mass and inertia.
+        gravity: Gravitational acceleration (m/s2).
+        state: Position, quaternion, velocity (world frame) and rates (body frame), shape (13,).
+        inputs: Inputs by name; the external force and torque are used.
+        force: Force without weight and external force (N, body frame).
+        torque: Torque about the centre of mass without external torque (N m, body frame).
+    """
+    orientation, velocity, rates = state[3:7], state[7:10], state[10:13]
+    to_world = kinematics.rotation_matrix(orientation)
+    acceleration = (to_world @ force + inputs["external_force"]) / body.mass - ca.vertcat(0, 0, gravity)
+    moment = torque + to_world.T @ inputs["external_torque"] - ca.cross(rates, body.inertia @ rates)
+    return ca.vertcat(velocity, kinematics.quaternion_rate(orientation, rates), acceleration, body.inverse_inertia @ moment)
+
+
+def normalised_state(state: ca.SX) -> ca.SX:
+    """Return the rigid-body states with a unit quaternion."""
+    return ca.vertcat(state[0:3], kinematics.normalised_quaternion(state[3:7]), state[7:RIGID_BODY_STATE_COUNT])
+
+
+def motion_of_state(state: ca.SX) -> ca.SX:
+    """Return the published motion (`interface.MOTION_OUTPUTS`)."""
+    return kinematics.motion_outputs(state[0:3], state[3:7], state[7:10], state[10:RIGID_BODY_STATE_COUNT])

@@ -1,0 +1,1 @@
+"""Modules of submerged vehicles: craft, interface, equations, reader of vehicle files."""

@@ -1,0 +1,65 @@
+"""JSON Schema of vehicle files: it accepts what the readers accept, and requires what they require."""
+
+from __future__ import annotations
+
+import copy
+import json
+from typing import Any
+
+import jsonschema
+import pytest
+
+from cosim.core import resources
+from cosim.core.errors import InputError
+from plant_src.catalogue import FAMILIES, model_from_data
+from plant_src.vehicle_schema import vehicle_schema
+
+FILES = sorted((resources.root() / "plant_src/vehicles/data").glob("*.json"))
+VALIDATOR = jsonschema.Draft202012Validator(vehicle_schema())
+EXAMPLES = {data["family"]: data for data in (json.loads(file.read_text()) for file in FILES)}
+
+
+def paths(data: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
+    """Paths of all keys of objects."""
+    items = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    below = [(*path, key) for key, _ in items] if isinstance(data, dict) else []
+    return below + [found for key, value in items for found in paths(value, (*path, key))]
+
+
+def is_accepted(data: Any) -> bool:
+    try:
+        model_from_data(data, "vehicle")
+    except InputError:
+        return False
+    return True
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: file.stem)
+def test_shipped_vehicles_satisfy_the_schema(file: Any) -> None:
+    VALIDATOR.validate(json.loads(file.read_text()))
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_schema_and_reader_require_the_same_keys(family: str) -> None:
+    """Without any one of the keys of a file, both accept it or both refuse it."""
+    for path in paths(EXAMPLES[family]):
+        changed = copy.deepcopy(EXAMPLES[family])
+        parent = changed
+        for key in path[:-1]:
+            parent = parent[key]
+        del parent[path[-1]]
+        # coefficients may be in "rotor" or in each of the rotors, which the schema does not know
+        if path[-1] not in ("thrust_coefficient", "torque_coefficient"):
+            assert VALIDATOR.is_valid(changed) == is_accepted(changed), path
+
+
+@pytest.mark.parametrize("family", FAMILIES)
+def test_unknown_keys_are_refused_by_both(family: str) -> None:
+    for place in ((), ("boxes", 0), ("inertia",)):
+        changed = copy.deepcopy(EXAMPLES[family])
+        parent: Any = changed
+        for key in place:
+            parent = parent[key]
+        parent["masss"] = 1
+        assert not VALIDATOR.is_valid(changed)
+        assert not is_accepted(changed)
