@@ -44,9 +44,9 @@ def _missing_connections(prepared: PreparedRun) -> Iterator[Problem]:
         others = f" and {count_noun(more, 'more input')}" if more else ""
         shown_source = next((port for port, inner in system.aliases.items() if inner == source), source)
         texts.append(f"nothing feeds or sets {end}{others}, but there is an output {shown_source}: is a connection missing?")
-    elif len(system.components) > 1:
+    elif system.connections:
         isolated = [name for name, component in system.components.items() if _has_no_fed_input(name, component, inputs)]
-        texts += [f"nothing feeds or sets an input of {name}: are connections missing?" for name in isolated]
+        texts += [f"nothing feeds or sets an input of {', '.join(isolated)}: are connections missing?"] if isolated else []
     yield from (Problem(text, prepared.root.where("connections")) for text in texts)
 
 

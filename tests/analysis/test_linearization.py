@@ -53,7 +53,7 @@ def test_the_sailing_vessel_has_the_jacobian_of_its_equations():
     """Differences of the original system's equations at 1 m/s, with the thrust that a trim finds."""
     fmu = str(resources.root() / "fmus/strider.fmu")
     scenario = {"name": "vessel", "stop_time": 1, "step_size": 0.01, "components": {"vessel": {"fmu": fmu}}}
-    start = {"vessel.initial.velocity_body.u": 1.0}
+    start = {"vessel.initial.velocity_body.u": 1.0, "vessel.resistance": 0.0, "vessel.propeller_diameter": 0.0}
     thrust = cosim.trim(scenario, ["vessel.thrust"], ["vessel.velocity_body.u"], parameters=start)
     assert thrust.is_found
     names = ["position.x", "position.y", "attitude.yaw", "velocity_body.u", "velocity_body.v", "rates.r"]

@@ -40,7 +40,7 @@ def test_it_turns_to_the_course_and_keeps_it(tmp_path, course):
     error = result["vessel.attitude.yaw"] - course
     late = result.time > 15
     assert np.abs(np.arctan2(np.sin(error), np.cos(error)))[late].max() < 0.01
-    assert result["vessel.velocity_body.u"][late] == pytest.approx(1.0, abs=0.01)
+    assert result["vessel.velocity_body.u"][late] == pytest.approx(1.0, abs=0.02)  # without integral action
 
 
 def test_in_process_and_exported_are_the_same_to_the_bit(tmp_path):

@@ -36,10 +36,12 @@ def test_a_missing_connection_is_recognized_by_matching_names(folder, left, line
 
 
 def test_components_without_any_connected_input_cause_warnings(folder):
-    components = {"one": folder.block("Plant"), "other": folder.block("Plant", parameters={"ship.motor[1]": 1.0})}
-    line = "connections: nothing feeds or sets an input of one: are connections missing?"
-    assert warnings_of(folder.scenario(components)) == [line]
-    assert warnings_of(folder.scenario({"alone": folder.block("Plant")})) == []
+    set_to_one = folder.block("Plant", parameters={"ship.motor[1]": 1.0})
+    components = {"one": folder.block("Plant"), "other": set_to_one, "third": folder.block("Plant")}
+    link = connection("other.ship.position.x", "other.ship.motor[2]")
+    line = "connections: nothing feeds or sets an input of one, third: are connections missing?"
+    assert warnings_of(folder.scenario(components, [link])) == [line]
+    assert warnings_of(folder.scenario(components)) == []  # every component by itself
 
 
 def test_inputs_with_a_value_or_without_a_matching_output_cause_no_warning(folder):

@@ -13,6 +13,7 @@ import cosim
 
 FMUS = Path(__file__).parents[3] / "fmus"
 GAINS = {"P": 8.0, "I": 2.0, "D": 1.5, "N": 40.0, "tracking_time": 0.7, "u_min": -5.0, "u_max": 5.0}
+HULL = {"resistance": 0.0, "propeller_diameter": 0.0}  # of the published simulator
 STEP, MASS, DRAG = 0.01, 4.11, 0.1  # s, kg, kg/m: surge of the vessel by the fact sheet of the published simulator
 
 
@@ -24,7 +25,7 @@ def fly(folder: Path, controller: str, **changes: float) -> cosim.Result:
         "step_size": STEP,
         "components": {
             "pid": {"fmu": str(FMUS / controller), "parameters": GAINS | {"reference": 1.5} | changes},
-            "vessel": {"fmu": str(FMUS / "strider.fmu"), "parameters": {"initial.velocity_body.u": 0.2}},
+            "vessel": {"fmu": str(FMUS / "strider.fmu"), "parameters": HULL | {"initial.velocity_body.u": 0.2}},
         },
         "connections": [
             {"from": "vessel.velocity_body.u", "to": "pid.measurement"},

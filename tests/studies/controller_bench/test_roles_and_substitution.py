@@ -16,7 +16,7 @@ from cosim.studies.controller_bench.score import RunKpis, compare_kpis, compare_
 from cosim.studies.controller_bench.substitution import ControllerSubstitution
 
 ROOT = resources.root()
-SCENARIOS = {"uav_inverse_kinematics": "demo3_inverse_kinematics"}
+SCENARIOS = {"uav_inverse_kinematics": "demo3_inverse_kinematics", "usv_station_keeping": "station_keeping"}
 BARE = """
 from pythonfmu import Fmi2Causality, Fmi2Slave, Real
 

@@ -18,6 +18,7 @@ WORLD = {
             "quadcopter": {"model": "ar_drone", "position": [-5.0, 1.0, 2.0], "yaw": 1.5707963267948966},
             "vessel": {
                 "model": "strider",
+                "hull": "paper",
                 "position": [-0.1, 0.075],
                 "velocity_body": [0.5, 0.0, 0.0],
                 "rates": [0.0, 0.0, 0.1],

@@ -1,6 +1,6 @@
 """A Model Exchange FMU integrated at fixed step size, and a plain C loop that makes the same calls.
 
-Run with: pytest -m benchmark -n 0 -s tests/benchmarks/test_model_exchange.py
+Run with: pytest -m benchmark -n 0 -s tests/benchmarks/test_model_exchange_speed.py
 """
 
 from __future__ import annotations
