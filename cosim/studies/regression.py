@@ -108,8 +108,10 @@ class Regression:
             margin = run.margin if comparison.passed else ""
             counts.append((len(comparison.failures), len(comparison.verdicts), "signal"))
             if not comparison.passed:
+                reason = run.scenario["reference"].get("reason")
                 failed += [
                     *str(comparison).splitlines(),
+                    *([f"reason of the tolerances: {reason}"] if reason else []),
                     *run.reference_changes(),
                     f"see {run.draw_tubes(comparison, tubes)}",
                 ]
