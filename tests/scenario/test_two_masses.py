@@ -110,7 +110,7 @@ def test_outputs_with_derivatives_are_extrapolated_along_their_tangents(folder, 
 
 @pytest.mark.parametrize("coupling", ["Gauss-Seidel, linear", "iterated, linear"])
 def test_known_values_at_both_ends_are_better_than_tangents(folder, mass, sloped_mass, coupling):
-    """Where the source has stepped before, its input passes through both values."""
+    """Inputs whose source has stepped before pass through both values."""
     second = [displacements(folder, fmu, coupling, "0.02", stop_time=1) for fmu in (sloped_mass, mass)]
     if coupling.startswith("iterated"):
         assert second[0].tolist() == second[1].tolist()
