@@ -74,8 +74,8 @@ ARGUMENTS = {
     "Tables.CombiTable2Ds": _TABLE_2D,
     "Tables.CombiTable2Dv": _TABLE_2D,
 }
-#: inputs of blocks with pre(), edge() or change() of an input, which the front end refuses for inputs of the model itself, or with
-#: an input that has a value; such a block is a component, and an equation sets each of its inputs
+#: inputs of blocks with pre(), edge() or change() of an input, which the front end refuses for inputs of the model itself, or
+#: with an input that has a value; such a block is a component, and an equation sets each of its inputs
 INPUTS = {
     "Discrete.UnitDelay": ("Real u",),
     "Interaction.Show.BooleanValue": ("Boolean activePort",),

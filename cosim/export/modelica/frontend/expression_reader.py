@@ -224,7 +224,8 @@ class ExpressionReader:
             names = [name for local in function["outputs"] for name in self.scalar_names(local)]
             if (name := f"{function['outputs'][0]['name']}.{field}") in names:
                 return replace(self._call(call), result=names.index(name))
-        raise_model_error(f"the record of {function['name']}() has no field {field}; records in records are not supported", where)
+        reason = f"the record of {function['name']}() has no field {field}; records in records are not supported"
+        return raise_model_error(reason, where)
 
     def scalar_names(self, local: Json) -> list[str]:
         """Return the names of the fields of a record that is a variable of a function, or the name of any other variable."""
@@ -234,11 +235,11 @@ class ExpressionReader:
         """Return the fields of a record that is a variable of a function, none for other variables."""
         if local["type_class"] != "Record":
             return []
-        functions = self.json["functions"].values()
-        constructors = (f["inputs"] for f in functions if f["is_constructor"] and f["def_id"] == local["type_def_id"])
-        return next(constructors, None) or raise_model_error(
-            f"the record {local['name']} inside a function is not supported; pass its fields", self.locate(local)
-        )
+        for function in self.json["functions"].values():
+            if function["is_constructor"] and function["def_id"] == local["type_def_id"]:
+                return list(function["inputs"])
+        reason = f"the record {local['name']} inside a function is not supported; pass its fields"
+        return raise_model_error(reason, self.locate(local))
 
     def _call(self, node: Json) -> syntax_tree.Call:
         if node["is_constructor"]:

@@ -154,7 +154,9 @@ class ModelReader(StatementReader):
         left, call = self.read_expression(residual["lhs"]), residual["rhs"].get("FunctionCall")
         if call and isinstance(left, syntax_tree.Name) and left.name in self.json["record_instances"]:
             fields = self._fields_of(left.name)
-            return [flat_model.Equation(syntax_tree.Name(left.name + f, where), self.read_field(call, f[1:]), where) for f in fields]
+            return [
+                flat_model.Equation(syntax_tree.Name(left.name + f, where), self.read_field(call, f[1:]), where) for f in fields
+            ]
         right = self.read_expression(residual["rhs"])
         return [flat_model.Equation(a, b, where) for a, b in self._split_records(left, right)]
 

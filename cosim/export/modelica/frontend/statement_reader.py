@@ -24,17 +24,17 @@ class StatementReader(ExpressionReader):
 
     def _statements(self, kind: str, node: Json) -> list[Statement]:
         """Convert a statement; the assignment of a record constructor becomes one assignment for each field."""
-        value = node["value"].get("FunctionCall") if kind == "Assignment" else None
-        function = value and self.json["functions"].get(value["name"]["name"])
-        if value is None or not (value["is_constructor"] or (function and self.fields(function["outputs"][0]))):
+        call = node["value"].get("FunctionCall") if kind == "Assignment" else None
+        function = self.json["functions"].get(call["name"]["name"]) if call else None
+        if call is None or function is None or not (call["is_constructor"] or self.fields(function["outputs"][0])):
             return [self._statement(kind, node)]
         where, target = self.locate(node), referenced_variable(self._target(node["comp"]))
-        if not value["is_constructor"]:
-            names = [name.partition(".")[2] for name in self.scalar_names(function["outputs"][0])]
-            targets = tuple(syntax_tree.Name(f"{target}.{name}", where) for name in names)
-            return [syntax_tree.MultiAssign(targets, self._call(value), where)]
+        if not call["is_constructor"]:
+            results = [name.partition(".")[2] for name in self.scalar_names(function["outputs"][0])]
+            targets = tuple(syntax_tree.Name(f"{target}.{name}", where) for name in results)
+            return [syntax_tree.MultiAssign(targets, self._call(call), where)]
         names = [local["name"] for local in function["inputs"]]
-        values = [self.read_field(value, name) for name in names]
+        values = [self.read_field(call, name) for name in names]
         if any(name.startswith(f"{target}.") for name in variable_names(values)):
             raise_model_error(f"the new value of the record {target} reads its fields; assign to another record first", where)
         return [
@@ -113,7 +113,8 @@ class StatementReader(ExpressionReader):
             InputError: The function contains an unsupported element.
         """
         inputs, outputs, local = (
-            tuple(variable for local in node[kind] for variable in self._locals(local)) for kind in ("inputs", "outputs", "locals")
+            tuple(variable for local in node[kind] for variable in self._locals(local))
+            for kind in ("inputs", "outputs", "locals")
         )
         body, external = self.read_body(node["body"]), None
         if node["external"]:
