@@ -68,7 +68,8 @@ class Variable:
         items: Names and values of an enumeration.
         relative_quantity: The value is a difference, to which the offset of a unit does not apply.
         dtype: NumPy type of a value in memory, by default that of `type`. FMI 2.0 stores Boolean and Enumeration as C int.
-        derivative_of: Name of the input whose time derivative (per s) this value is; only in `bind`, see `interpolates_inputs`.
+        derivative_of: Name of the input or output whose time derivative (per s) this value is; only in `bind`, see
+            `Component.interpolates_inputs`.
     """
 
     name: str
@@ -195,6 +196,8 @@ class Component(Protocol):
         initial_dependencies: The same in initialization mode.
         interpolates_inputs: Inputs may change linearly within a step (FMI 2.0: canInterpolateInputs). The inputs of `bind` end
             with the time derivatives of those that do, see `Variable.derivative_of`.
+        gives_output_slopes: First time derivatives of outputs are available (FMI: maxOutputDerivativeOrder). The outputs of
+            `bind` end with those that are used.
     """
 
     variables: Sequence[Variable]
@@ -206,6 +209,7 @@ class Component(Protocol):
     dependencies: Mapping[str, frozenset[str]] = MappingProxyType({})
     initial_dependencies: Mapping[str, frozenset[str]] = MappingProxyType({})
     interpolates_inputs: bool = False
+    gives_output_slopes: bool = False
 
     def set(self, name: str, value: Any) -> None:
         """Set a variable to a Python value, an array to nested lists; not called while stepping through a macro step."""

@@ -119,7 +119,8 @@ def compile_plan(system: System, settings: Settings) -> Plan:
     grid = check_run(system, settings)
     phases = list(_split_into_phases(system))
     connections = [connection for phase in phases for connection in _connections_of(phase)]
-    inputs, outputs = _input_layout(system, connections), _output_layout(system, connections, settings.columns.values())
+    inputs = _input_layout(system, connections)
+    outputs = _output_layout(system, connections, settings.columns.values(), _extrapolated_sources(system, phases, set()))
     planner = TransferPlanner(system, inputs, outputs, float(grid.step))
     stepped: set[str] = set()
 
@@ -221,9 +222,21 @@ def _input_layout(system: System, connections: Iterable[Connection]) -> Layout:
     return _layout_of_endpoints(system, (connection.target for connection in connections), "input", terms, linear)
 
 
-def _output_layout(system: System, connections: Iterable[Connection], recorded: Iterable[Endpoint]) -> Layout:
-    """Lay out the connected and recorded outputs, in the order in which they are first read."""
-    return _layout_of_endpoints(system, (*(connection.source for connection in connections), *recorded), "output")
+def _extrapolated_sources(system: System, phases: Iterable[_PhaseDraft], stepped: set[str]) -> Iterator[Endpoint]:
+    """Yield the outputs whose slopes are given, and are used by linear connections before their components step."""
+    for phase in phases:
+        for source in (c.source for c in phase.connections if c.interpolation == "linear"):
+            if source.component not in stepped and system.components[source.component].gives_output_slopes:
+                yield source
+        stepped.update(phase.names, component_names(phase.group.stages) if phase.group else ())
+        yield from _extrapolated_sources(system, phase.inner, stepped)
+
+
+def _output_layout(
+    system: System, connections: Iterable[Connection], recorded: Iterable[Endpoint], sloped: Iterable[Endpoint]
+) -> Layout:
+    """Lay out the connected and recorded outputs, in the order in which they are first read, and the slopes of some of them."""
+    return _layout_of_endpoints(system, (*(connection.source for connection in connections), *recorded), "output", (), sloped)
 
 
 def _layout_of_endpoints(
@@ -231,7 +244,7 @@ def _layout_of_endpoints(
     endpoints: Iterable[Endpoint],
     causality: Causality,
     terms: Sequence[Variable] = (),
-    linear: Iterable[Endpoint] = (),
+    sloped: Iterable[Endpoint] = (),
 ) -> Layout:
     used: dict[str, dict[str, Variable]] = {name: {} for name in component_names(system.stages)}
     for endpoint in endpoints:
@@ -239,7 +252,7 @@ def _layout_of_endpoints(
         used[endpoint.component][variable.name] = variable
     bound = {name: _variables_to_bind(system.components[name], some, causality) for name, some in used.items()}
     slopes: dict[str, dict[str, Variable]] = defaultdict(dict)
-    for endpoint in linear:
+    for endpoint in sloped:
         variable = system.find_element(endpoint).variable
         slopes[endpoint.component][variable.name] = slope_variable(variable)
     bound |= {name: [*bound[name], *own.values()] for name, own in slopes.items()}

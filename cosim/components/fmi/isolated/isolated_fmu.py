@@ -65,6 +65,7 @@ class IsolatedFmu(WorkerClient, Component):
         self.dependencies, self.initial_dependencies = self.description.dependencies, self.description.initial_dependencies
         self.continuous_states = self.description.continuous_states
         self.interpolates_inputs = self.description.interpolates_inputs
+        self.gives_output_slopes = self.description.gives_output_slopes
         self._variables_by_name = {variable.name: variable for variable in self.variables}
         self._settings = settings
         self._temporary_folder: LockedFolder | None = None

@@ -12,7 +12,7 @@
 
 enum { OK = 0, WARNING = 1, DISCARD = 2, NOT_A_NUMBER = -1 };
 enum { STATE_EVENT = 1, TIME_EVENT = 2, STEP_EVENT = 4, TERMINATION = 8 };
-enum { SET_TIME, SET_STATES, GET_DERIVATIVES, GET_INDICATORS, COMPLETE_STEP };
+enum { SET_TIME, SET_STATES, GET_DERIVATIVES, GET_INDICATORS, COMPLETE_STEP, SET_INPUTS };
 
 /* relative to the substep: a time event so close after its end is reached */
 #define TIME_TOLERANCE 1e-9
@@ -25,9 +25,16 @@ typedef struct {
     int (*get_derivatives)(void *, double *, size_t);
     int (*get_indicators)(void *, double *, size_t);
     void *complete_step; /* NULL if the FMU does not need it */
+    void *set_inputs;
     int64_t version, stages, state_count, indicator_count;
+    int64_t reference_count, input_count; /* of the linear inputs */
     double *states, *derivatives, *start_states, *sum, *indicators, *previous_indicators;
-    double next_event_time, substep_size, time;
+    const uint32_t *input_references;
+    const double *input_array;
+    const int64_t *input_indices;
+    const double *input_slopes;
+    double *input_values;
+    double next_event_time, substep_size, time, begin;
     int64_t substeps, next_substep, event, status, failed_function;
 } State;
 
@@ -41,6 +48,25 @@ typedef struct {
         }                                                                                                                  \
     } while (0)
 
+/* Set the linear inputs to their values at `time`. */
+static int set_inputs(State *s, double time) {
+    size_t references = (size_t)s->reference_count, count = (size_t)s->input_count;
+    for (size_t i = 0; i < count; i++)
+        s->input_values[i] = s->input_array[s->input_indices[i]] + s->input_slopes[i] * (time - s->begin);
+    if (s->version == 3)
+        CALL(SET_INPUTS, ((int (*)(void *, const uint32_t *, size_t, const double *, size_t))s->set_inputs)(
+                             s->instance, s->input_references, references, s->input_values, count));
+    else
+        CALL(SET_INPUTS, ((int (*)(void *, const uint32_t *, size_t, const double *))s->set_inputs)(
+                             s->instance, s->input_references, references, s->input_values));
+    return OK;
+}
+
+static int set_time(State *s, double time) {
+    CALL(SET_TIME, s->set_time(s->instance, time));
+    return s->reference_count ? set_inputs(s, time) : OK;
+}
+
 static int set_states(State *s) {
     if (s->state_count) CALL(SET_STATES, s->set_states(s->instance, s->states, (size_t)s->state_count));
     return OK;
@@ -53,14 +79,14 @@ static int get_derivatives(State *s) {
 
 static int euler_step(State *s, double end) {
     if (get_derivatives(s)) return DISCARD;
-    CALL(SET_TIME, s->set_time(s->instance, end));
+    if (set_time(s, end)) return DISCARD;
     for (int64_t i = 0; i < s->state_count; i++) s->states[i] += s->substep_size * s->derivatives[i];
     return set_states(s);
 }
 
 /* states = start + weight * derivatives, at `time` */
 static int evaluate_stage(State *s, double time, double weight) {
-    CALL(SET_TIME, s->set_time(s->instance, time));
+    if (set_time(s, time)) return DISCARD;
     for (int64_t i = 0; i < s->state_count; i++) s->states[i] = s->start_states[i] + weight * s->derivatives[i];
     if (set_states(s)) return DISCARD;
     return get_derivatives(s);
@@ -121,6 +147,7 @@ static int complete_step(State *s) {
 static int advance(void *state, double time, double step_size, int unused) {
     State *s = state;
     (void)unused;
+    s->begin = time;
     while (s->next_substep < s->substeps) {
         int64_t n = s->next_substep;
         double begin = time + (double)n * s->substep_size;

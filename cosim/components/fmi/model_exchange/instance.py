@@ -22,6 +22,7 @@ from ..instance_settings import InstanceSettings
 from .continuous_model import ContinuousModel, IntegrationError
 from .fixed_step import FixedStepIntegrator
 from .integrator import EventKind, Integrator
+from .linear_inputs import LinearInputs
 from .variable_step import VariableStepIntegrator
 
 #: largest number of calls of fmi*NewDiscreteStates or fmi3UpdateDiscreteStates at one event
@@ -64,8 +65,13 @@ class ModelExchangeInstance(FmuInstance):
 
     def _prepare_transfers(self, factory: AccessorCallFactory) -> None:
         super()._prepare_transfers(factory)
+        self._linear_inputs = LinearInputs(self._inputs, self.description.value_references)
         self._continuous_calls = factory.prepare("Set", self._inputs, self._set_object, _is_continuous)
-        self._discrete_calls = factory.prepare("Set", self._inputs, self._set_object, lambda v: not _is_continuous(v))
+        self._discrete_calls = factory.prepare("Set", self._inputs, self._set_object, _is_discrete)
+
+    def _prepare_input_slopes(self, _factory: AccessorCallFactory) -> list[PreparedCall]:
+        """Return no calls: the importer itself computes the values of linear inputs."""
+        return []
 
     def exit_initialization_mode(self) -> None:
         """Call fmi*ExitInitializationMode, iterate the initial event and enter Continuous-Time Mode."""
@@ -76,7 +82,7 @@ class ModelExchangeInstance(FmuInstance):
             raise ComponentError(self.name, self._full_name(self._update_method), reason, self._current_time.value)
         names = {role: self._c_prefix + name for role, name in self._function_names.items()}
         counts, completes = self._count_states(), self.description.needs_completed_step
-        model = ContinuousModel(self.major, self._fmu.functions, self._handle, names, counts, completes)
+        model = ContinuousModel(self.major, self._fmu.functions, self._handle, names, counts, completes, self._linear_inputs)
         self._integrator = self._create_integrator(model)
         self._restart(self._current_time.value)
 
@@ -183,7 +189,7 @@ class ModelExchangeInstance(FmuInstance):
         assert self._integrator is not None
         discrete = [array[index].tolist() for array, index in self._discrete_elements]
         now = ([array.tolist() for array in self._inputs.arrays.values()], discrete)
-        if now == self._last_inputs:
+        if now == self._last_inputs and not len(self._linear_inputs.slopes):
             return OK
         self._integrator.inputs_changed()
         if discrete == self._last_inputs[1]:
@@ -200,7 +206,7 @@ class ModelExchangeInstance(FmuInstance):
         for variable in self._inputs.variables:
             begin = begins[variable.dtype]
             begins[variable.dtype] += len(variable.scalar_names)
-            if not _is_continuous(variable):
+            if _is_discrete(variable):
                 elements.append((self._inputs.arrays[variable.dtype], slice(begin, begins[variable.dtype])))
         return elements
 
@@ -269,4 +275,8 @@ class ModelExchangeInstance(FmuInstance):
 
 
 def _is_continuous(variable: Variable) -> bool:
-    return variable.variability == "continuous" and variable.type in FLOAT_TYPES
+    return variable.variability == "continuous" and variable.type in FLOAT_TYPES and not variable.derivative_of
+
+
+def _is_discrete(variable: Variable) -> bool:
+    return not (_is_continuous(variable) or variable.derivative_of)
