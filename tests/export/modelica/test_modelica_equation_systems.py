@@ -202,3 +202,36 @@ end Largest;""")
         assert model.get("y") == pytest.approx(2 * max(1 + time, 2 - time), abs=1e-9)
         if abs(time - 0.5) > 1e-6:
             assert model.get("rate") == (2 if time > 0.5 else -2)
+
+
+def test_homotopy_leads_from_the_solution_of_the_simplified_equation_to_the_actual_one(compile_both):
+    """Newton's method alone finds the root -2 of x^2 = 4 from the start value -3."""
+    model = compile_both("""model Root
+  input Real u;
+  output Real x(start = -3);
+equation
+  0 = homotopy(x*x - 4 - u, x - 3);
+end Root;""")
+    model.initialize()
+    assert model.get("x") == pytest.approx(2, rel=1e-12)
+    model.set(u=5.0)
+    model.step(0.0)
+    assert model.get("x") == pytest.approx(3, rel=1e-12)
+
+
+def test_a_steady_state_start_follows_homotopy(compile_both):
+    """The state balances atan(8 (x - 3)) + x/10 = 0; from 0, with a negligible slope of the arc tangent, far from the solution."""
+    model = compile_both("""model Steady
+  Real x(start = 0);
+  output Real y;
+initial equation
+  der(x) = 0;
+equation
+  der(x) = -homotopy(atan(8*(x - 3)) + 0.1*x, x - 2);
+  y = x;
+end Steady;""")
+    model.initialize()
+    x = model.get("y")
+    assert math.atan(8 * (x - 3)) + 0.1 * x == pytest.approx(0, abs=1e-10)
+    model.step(0.0)
+    assert model.get("y") == pytest.approx(x, abs=1e-9)

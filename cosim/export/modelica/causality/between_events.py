@@ -27,7 +27,7 @@ class BetweenEvents(NamedTuple):
     continuous: Body
 
 
-def statements_between_events(model: Model, continuous: Iterable[Assign | Solve], held: set[ScalarKey]) -> BetweenEvents:
+def statements_between_events(model: Model, continuous: Iterable[Statement], held: set[ScalarKey]) -> BetweenEvents:
     """Return the statements between events.
 
     Args:
@@ -78,5 +78,5 @@ def _without_ticks(statement: Statement) -> Statement:
     return result
 
 
-def _is_discrete(model: Model, statement: Assign | Solve) -> bool:
+def _is_discrete(model: Model, statement: Statement) -> bool:
     return isinstance(statement, Assign) and model.variables[statement.name].type != "Real"
