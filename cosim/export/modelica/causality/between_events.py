@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from ..model.flat_model import Model, derivative_name
-from ..model.syntax_tree import Assign, Body, Builtin, Literal, Name, Solve, Statement
+from ..model.syntax_tree import Assign, Body, Builtin, Literal, Name, Statement
 from ..model.traversal import has_builtin, read_references, rewrite, variable_names
 from .matching import ScalarKey, is_input, scalar_keys
 from .nodes import algorithm_nodes, make_node

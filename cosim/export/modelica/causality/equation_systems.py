@@ -68,6 +68,10 @@ class EquationSystem:
         """The equations, one for each element."""
         return self._scalar
 
+    def is_linear(self, equation: Equation, key: ScalarKey) -> bool:
+        """Return whether a scalar equation is linear in an unknown."""
+        return self._system([equation], [key]).linear
+
     def matching(self) -> dict[int, ScalarKey]:
         """Return the unknown that each scalar equation determines; equations without one are missing."""
         return match([self._preferences(k) for k in range(len(self._scalar))], self.optional)
