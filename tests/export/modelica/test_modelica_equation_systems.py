@@ -220,7 +220,7 @@ end Root;""")
 
 
 def test_a_steady_state_start_follows_homotopy(compile_both):
-    """The state balances atan(8 (x - 3)) + x/10 = 0; from 0, with a negligible slope of the arc tangent, far from the solution."""
+    """The state balances atan(8 (x - 3)) + x/10 = 0; at the start value 0 the arc tangent is nearly constant."""
     model = compile_both("""model Steady
   Real x(start = 0);
   output Real y;
