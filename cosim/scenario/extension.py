@@ -36,7 +36,7 @@ def read_system_document(file: Path) -> Document:
 
 
 def expand_document(document: Document, extending: tuple[Path, ...] = ()) -> Document:
-    """Include the files that the arguments of components name, resolve the paths of shipped files, and merge the document with those that it extends.
+    """Include the files that arguments name, resolve the paths of shipped files, and merge the document with its bases.
 
     Args:
         document: A scenario or nested system.

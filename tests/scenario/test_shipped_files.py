@@ -27,7 +27,7 @@ def test_a_scenario_of_any_folder_uses_shipped_components(tmp_path):
     assert "vessel.position.x" in cosim.run(below / "more.json")
 
 
-def test_dictionaries_and_settings_name_shipped_files(tmp_path):
+def test_dictionaries_and_settings_name_shipped_files():
     both = document(plant=PLANT, vessel=VESSEL)
     assert "vessel.deck.position.x" in cosim.run(both)
     inputs = {"signals": ["vessel.propeller_speed[1]"]}  # of the Otter, the Strider has a rudder
