@@ -52,11 +52,11 @@ class ComparisonTask(NamedTuple):
         """Return the verdict on each signal of the reference."""
         return compare_results(*self)
 
-    def figure(self) -> NamedCall:
+    def figure(self, comparison: Comparison) -> NamedCall:
         """Return name, function and arguments of the figure with the largest deviations."""
         from ..report.comparison_figure import draw_tubes
 
-        arguments = {"reference": self.reference, "tolerances": self.tolerances, "comparison": self.compare()}
+        arguments = {"reference": self.reference, "tolerances": self.tolerances, "comparison": comparison}
         return "comparison", draw_tubes, arguments
 
     def needed_share(self) -> float:

@@ -17,7 +17,7 @@ from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
 
-from ..core.errors import PASS_THROUGH_EXCEPTIONS, InputError, Problem, describe_exception, did_you_mean
+from ..core.errors import PASS_THROUGH_EXCEPTIONS, InputError, Problem, describe_exception, did_you_mean, nearest_file
 from ..core.paths import is_file, resolve_path
 from .sibling_imports import read_with_relative_imports, with_imported_siblings
 
@@ -40,7 +40,7 @@ def load_object(reference: str, folder: Path) -> Any:
         raise InputError(f'expected "file.py:name", found "{reference}"')
     path = resolve_path(folder / file)
     if not is_file(path):
-        raise InputError(f'file "{file}" does not exist')
+        raise InputError(f'file "{file}" does not exist{nearest_file(path)}')
     module = _import_file(path)
     if not hasattr(module, name):
         public_names = [key for key, value in vars(module).items() if getattr(value, "__module__", None) == module.__name__]

@@ -179,6 +179,16 @@ def did_you_mean(name: str, valid: Iterable[str]) -> str:
     return _did_you_mean(name, tuple(valid))
 
 
+def nearest_file(path: Path) -> str:
+    """Return a hint for the end of a message about a missing file: the most similar name in its folder, else ""."""
+    try:
+        names = tuple(each.name for each in path.parent.iterdir() if not path.suffix or each.suffix == path.suffix)
+    except (OSError, ValueError):
+        return ""
+    near = [name for name in names if Path(name).stem == path.name] or _close_matches(path.name, names)
+    return f'; did you mean "{near[0]}"?' if near else ""
+
+
 @lru_cache(16)  # the same wrong name often occurs several times
 def _did_you_mean(name: str, names: tuple[str, ...]) -> str:
     if len(name) > MAX_QUOTATION_LENGTH:  # no slip of the pen, and the search takes quadratic time

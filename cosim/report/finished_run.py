@@ -14,7 +14,7 @@ from .run_page import write_report
 from .runs import NamedCall, load_figures, read_run
 
 
-def write_folder_report(folder: Path, target: Path, more_figures: Iterable[NamedCall] = ()) -> None:
+def write_folder_report(folder: Path, target: Path, more_figures: Iterable[NamedCall] = (), deviation: str = "") -> None:
     """Write the report of the run in a folder: KPIs, checks, figures, system and 3-D replay.
 
     The report of a run that failed shows the cause and what was recorded until then. Its figures are drawn as far as that is
@@ -24,12 +24,14 @@ def write_folder_report(folder: Path, target: Path, more_figures: Iterable[Named
         folder: Folder that `cosim run` wrote.
         target: The HTML file.
         more_figures: Name, function and arguments of figures that are drawn before those of the scenario.
+        deviation: Summary of a failed comparison with a reference, which becomes the verdict; "" without one.
 
     Raises:
         InputError: The folder or the figures cannot be read, or the result has no rows.
         ComponentError: A figure of a complete run cannot be drawn.
     """
     run = read_run(folder)
+    run.metadata["deviation"] = deviation
     checks = run.metadata.get("scenario", {}).get("checks", [])
     outcomes = evaluate_checks(run.kpis, [check for check in checks if check["kpi"] in run.kpis])
     write_report(run, outcomes, _draw_figures(run, [*more_figures, *load_figures(run)]), target)

@@ -93,6 +93,7 @@ def _metadata_with_defaults(result: Result) -> dict[str, Any]:
     missing: dict[str, Any] = {
         "name": "run",
         "failure": None,
+        "deviation": "",
         "scenario": {},
         "scenario_file": "",
         "system": None,

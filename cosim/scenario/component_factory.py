@@ -9,7 +9,7 @@ from typing import Any
 
 from ..components.fmi import FmuFile, InstanceSettings, Interface, Isolation, SolverSettings, create_component
 from ..core.component import Component
-from ..core.errors import InputError
+from ..core.errors import InputError, nearest_file
 from ..core.paths import is_file, resolve_path
 from ..export.foreign.source_fmus import usable_fmu
 from ..process.journal import calling_component
@@ -95,6 +95,6 @@ class ComponentFactory:
         if not file.endswith(".mo"):
             raise InputError(f'expected "file.mo:Model", found "{reference}"')
         if not is_file(folder / file):
-            raise InputError(f'file "{file}" does not exist')
+            raise InputError(f'file "{file}" does not exist{nearest_file(folder / file)}')
         self.modelica_files.append(folder / file)
         return cached_fmu(folder / file, model, [folder / library for library in spec.libraries])

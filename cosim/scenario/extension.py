@@ -140,6 +140,11 @@ def _component_of(name: Any) -> str:
     return name.partition(".")[0] if isinstance(name, str) else ""
 
 
+def _is_change_of_nothing(components: Mapping[str, Any], name: str, new: Any) -> bool:
+    """Return whether an entry without a source is none of the base's components, so that it can neither change nor add one."""
+    return name not in components and isinstance(new, dict) and bool(new) and not any(source in new for source in SOURCES)
+
+
 class _Merger:
     """Merger of a document with its base. Results besides the value: `origins`, `problems`, `removed`."""
 
@@ -158,6 +163,8 @@ class _Merger:
             places = ((*path, key), (*old_path, key), (*new_path, key))
             if key not in new:
                 result[key] = self._copy(self._base, places[0], old[key], places[1])
+            elif path == ("components",) and _is_change_of_nothing(old, key, new[key]):
+                self._report(places[2], f"the base has no such component{did_you_mean(key, old)}")
             elif new[key] is not None:
                 result[key] = self._merge(*places, old.get(key), new[key])
             elif key in old:

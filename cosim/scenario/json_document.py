@@ -16,7 +16,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from ..core.errors import InputError, Problem
+from ..core.errors import InputError, Problem, nearest_file
 from ..core.paths import open_text
 from ..core.text import acceptable_text, shorten, text_problem
 
@@ -135,7 +135,7 @@ def read_document(file: Path) -> Document:
         with open_text(file, encoding="utf-8-sig") as opened:
             text = opened.read()
     except OSError as error:
-        raise InputError(f'cannot read "{file}": {error.strerror}') from None
+        raise InputError(f'cannot read "{file}": {error.strerror}{nearest_file(file)}') from None
     except UnicodeDecodeError as error:
         raise InputError(f'"{file}" is not UTF-8 text: {error.reason} at byte {error.start}') from None
     return parse_document(Document(file, text))

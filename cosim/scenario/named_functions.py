@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..components.python_import import load_object
-from ..core.errors import Problem, did_you_mean
+from ..core.errors import Problem, did_you_mean, nearest_file
 from ..core.paths import is_file
 from .evaluation_schema import CallSpec, FunctionSpec
 from .nested_systems import Node
@@ -72,7 +72,7 @@ def definition_problem(spec: CallSpec, folder: Path) -> str:
         return f'expected "file.py:function" or "package.module:function", found "{spec.python}"'
     path = _source_path(file, folder)
     if path is None or not is_file(path):
-        return f'{"file" if file.endswith(".py") else "module"} "{file}" does not exist'
+        return f'{"file" if file.endswith(".py") else "module"} "{file}" does not exist{nearest_file(path) if path else ""}'
     try:
         functions = _function_definitions(path.read_bytes())
     except SyntaxError as error:
@@ -120,6 +120,8 @@ def unknown_signals(spec: CallSpec, root: Node, signals: Collection[str]) -> Ite
 def _reason(value: str, root: Node, names: Collection[str]) -> str:
     """Return the most probable reason for which a signal is not recorded."""
     component = value.partition(".")[0]
+    if ("components", component) in root.document.removed:
+        return f': the component "{component}" is removed; also remove by null what needs it, or mark it as optional'
     if component not in root.spec.components:
         return f': the scenario has no component "{component}"{did_you_mean(component, root.spec.components)}'
     return f'{did_you_mean(value, names)} (inputs are recorded if "record" names them)'

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
 from typing import TYPE_CHECKING
 
@@ -10,6 +11,7 @@ from ..core.errors import Problem
 from ..core.paths import is_file
 from ..core.system import Endpoint, System, incompatibility
 from ..core.text import count_noun
+from ..engine.transfer_plan import unit_conversion
 
 if TYPE_CHECKING:
     from .prepared_run import PreparedRun
@@ -28,6 +30,7 @@ def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
     if prepared.plan.end_warning:
         yield Problem(prepared.plan.end_warning, prepared.root.where("stop_time"))
     yield from _missing_connections(prepared)
+    yield from _double_conversions(prepared)
     for file in prepared.component_factory.fmus.values():
         if file.run_warning:
             yield Problem(file.run_warning)
@@ -48,6 +51,21 @@ def _missing_connections(prepared: PreparedRun) -> Iterator[Problem]:
         isolated = [name for name, component in system.components.items() if _has_no_fed_input(name, component, inputs)]
         texts += [f"nothing feeds or sets an input of {', '.join(isolated)}: are connections missing?"] if isolated else []
     yield from (Problem(text, prepared.root.where("connections")) for text in texts)
+
+
+def _double_conversions(prepared: PreparedRun) -> Iterator[Problem]:
+    """Yield a warning for each connection whose gain is the factor between the units of its ends, which is applied anyway."""
+    system = prepared.system
+    for connection in system.connections:
+        source, target = (system.find_element(end).variable for end in (connection.source, connection.target))
+        factor, _ = unit_conversion(source, target)
+        if factor != 1.0 and math.isclose(abs(connection.gain), factor, rel_tol=1e-3) and source.unit and target.unit:
+            sign = "-1" if connection.gain < 0 else "1"
+            text = (
+                f"{connection.source} -> {connection.target}: {source.unit.name} is converted to {target.unit.name}, and then "
+                f"multiplied by the gain {connection.gain:g}: is the gain {sign} meant?"
+            )
+            yield Problem(text, prepared.root.where("connections"))
 
 
 def _has_no_fed_input(name: str, component: Component, unconnected: VariablesByEndpoint) -> bool:

@@ -248,3 +248,8 @@ def test_paths_in_settings_start_from_the_working_directory(folder, extend, monk
     assert result["b.y"].tolist() == [0, 4, 4, 4]
     done = run_cosim("check", str(file), "--set", '/components/b={"system": "mine.json"}', cwd=folder.path / "here")
     assert done.returncode == 0, done.stderr
+
+
+def test_a_misspelt_component_is_recognized(folder, extend):
+    (found,) = folder.problems_of(extend(components={"pllant": {"period": 0.2}}))
+    assert "components.pllant: the base has no such component" in found

@@ -1,10 +1,12 @@
 """Connections of components with other names and units: patterns with "*", gains and offsets."""
 
+import numpy as np
 import pytest
 from systems import connection
 
 import cosim
 from cosim.scenario import load
+from cosim.scenario.plausibility import find_warnings
 
 FOREIGN = """
 from pythonfmu import Fmi2Causality, Fmi2Slave, Integer, Real
@@ -75,3 +77,15 @@ def test_wrong_mappings_are_refused(folder, pair):
     problem, *others = folder.problems(pair, [connection("pilot.turns", "pilot.count", gain=2.0)])
     assert problem.endswith("gains, offsets and sums are for inputs of floating-point numbers, found Int32")
     assert not others
+
+
+@pytest.mark.parametrize(("gain", "warns"), [(100.0, True), (-100.0, True), (-1.0, False), (50.0, False)])
+def test_a_gain_that_repeats_the_conversion_of_units_causes_a_warning(folder, gain, warns):
+    (folder.path / "metric.py").write_text(
+        FOREIGN.replace("class Foreign(Fmi2Slave):", 'class Foreign(Fmi2Slave):\n    units = {"pos_x_cm": "cm", "motor1": "m"}')
+    )
+    both = {name: {"python": "metric.py:Foreign"} for name in ("one", "two")}
+    file = folder.scenario(both, [connection("one.motor1", "two.pos_x_cm", gain=gain)])
+    texts = [str(problem) for problem in find_warnings(load(file))]
+    hint = f"m is converted to cm, and then multiplied by the gain {gain:g}: is the gain {int(np.sign(gain))} meant?"
+    assert any(hint in text for text in texts) is warns

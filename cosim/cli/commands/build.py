@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ...core.errors import CheckError, InputError, Problem
+from ...core.errors import CheckError, InputError, Problem, nearest_file
 
 if TYPE_CHECKING:
     from ...export.build import BuildResult
@@ -112,7 +112,7 @@ def _build_one(
     if len(sources) != 1:
         raise InputError(f"--output requires one source, found {len(sources)}")
     if not sources[0].exists():
-        raise InputError(Problem("does not exist", str(sources[0])))
+        raise InputError(Problem(f"does not exist{nearest_file(sources[0])}", str(sources[0])))
     if modelica_compiler == "omc":
         if fmi_version != 2:
             raise InputError("--modelica-compiler omc exports FMI 2.0 only")

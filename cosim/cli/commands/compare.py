@@ -51,7 +51,7 @@ def command(
     if plot:
         from ...report.figures import draw_figure, save_figure
 
-        save_figure(draw_figure(task.result, *task.figure()), plot)
+        save_figure(draw_figure(task.result, *task.figure(comparison)), plot)
     if as_json:
         verdicts = [{**verdict._asdict(), "passed": verdict.passed} for verdict in comparison.verdicts]
         print_json({"passed": comparison.passed, "signals": verdicts})

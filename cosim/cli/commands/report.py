@@ -33,9 +33,13 @@ def command(result: Path, output_file: Path | None, reference: Path | None, open
     from ...results.comparison import Tolerance
 
     print_log()
-    figures = [ComparisonTask.read(result, reference, Tolerance()).figure()] if reference else []
     target = output_file or result / "report.html"
-    write_folder_report(result, target, figures)
+    if reference:
+        task = ComparisonTask.read(result, reference, Tolerance())
+        comparison = task.compare()
+        write_folder_report(result, target, [task.figure(comparison)], "" if comparison.passed else str(comparison))
+    else:
+        write_folder_report(result, target)
     click.echo(target)
     if open_page:
         click.launch(str(target.absolute()))

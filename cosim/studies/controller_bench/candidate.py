@@ -12,7 +12,7 @@ from tempfile import TemporaryDirectory
 from typing import cast
 
 from ...core.component import Component, Variable
-from ...core.errors import InputError, Problem, did_you_mean
+from ...core.errors import InputError, Problem, did_you_mean, nearest_file
 from ...scenario import load
 from ...scenario.name_resolution import SlotIndex, Target, UnknownNameError, resolve_name
 from ...scenario.nested_systems import Node, load_scenario
@@ -51,7 +51,7 @@ def parse_source(text: str) -> CandidateSource:
     if kind is None or bool(separator) != (kind in ("python", "modelica")):
         raise InputError(f'expected my.fmu, my.py:Class, my.mo:Model or a nested system my.json, found "{text}"')
     if not path.is_file():
-        raise InputError(f'there is no file "{file}"')
+        raise InputError(f'there is no file "{file}"{nearest_file(path)}')
     return CandidateSource({kind: f"{path.resolve()}{separator}{member}"}, member or path.stem, text)
 
 

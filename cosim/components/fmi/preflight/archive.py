@@ -10,7 +10,7 @@ from contextlib import contextmanager
 from io import BufferedReader
 from pathlib import Path
 
-from ....core.errors import InputError
+from ....core.errors import InputError, nearest_file
 from . import zip_format
 from .findings import FatalFindingError, Finding, Rule
 from .limits import PreflightLimits
@@ -174,7 +174,7 @@ def open_regular_file(path: Path) -> Iterator[BufferedReader]:
     try:
         descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
     except (FileNotFoundError, ValueError):
-        raise InputError(f'FMU "{path}" does not exist') from None
+        raise InputError(f'FMU "{path}" does not exist{nearest_file(path)}') from None
     except OSError as error:
         raise InputError(f'FMU "{path}" cannot be opened: {error.strerror}') from None
     mode = os.fstat(descriptor).st_mode

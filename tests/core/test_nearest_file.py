@@ -1,0 +1,24 @@
+"""Hints at files with similar names."""
+
+import pytest
+
+import cosim
+from cosim.core.errors import nearest_file
+
+
+@pytest.mark.parametrize(
+    ("name", "hint"),
+    [("rooom.fmu", '; did you mean "room.fmu"?'), ("room", '; did you mean "room.fmu"?'), ("room.py", ""), ("x/room.fmu", "")],
+)
+def test_the_most_similar_file_of_the_folder_is_named(tmp_path, name, hint):
+    for present in ("room.fmu", "house.fmu"):
+        (tmp_path / present).touch()
+    assert nearest_file(tmp_path / name) == hint
+
+
+def test_a_missing_fmu_and_a_missing_scenario_are_refused_with_the_hint(tmp_path):
+    (tmp_path / "room.fmu").touch()
+    (tmp_path / "heating.json").touch()
+    for missing, near in (("romm.fmu", "room.fmu"), ("heatng.json", "heating.json")):
+        with pytest.raises(cosim.InputError, match=f'did you mean "{near}"'):
+            (cosim.simulate if missing.endswith(".fmu") else cosim.run)(tmp_path / missing)
