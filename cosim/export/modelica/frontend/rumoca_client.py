@@ -14,8 +14,8 @@ from typing import Any
 from ....core.errors import InputError, Problem
 from ....process.failure_attribution import describe_exit_status
 
-#: limits of the child process: wall time and processor time (s), private memory and size of the flat model (bytes)
-TIMEOUT, MEMORY_LIMIT, OUTPUT_LIMIT = 120, 2 << 30, 1 << 28
+#: limits of the child process: processor time and wall time (s), private memory and size of the flat model (bytes)
+CPU_LIMIT, TIMEOUT, MEMORY_LIMIT, OUTPUT_LIMIT = 120, 900, 2 << 30, 1 << 28
 
 _PROGRAM = Path(__file__).with_name("rumoca_process.py")
 #: text that Rust writes when memory is exhausted
@@ -50,7 +50,7 @@ def run_rumoca(
         "declaration": declaration,
         "memory": MEMORY_LIMIT,
         "output_size": OUTPUT_LIMIT,
-        "seconds": TIMEOUT,
+        "seconds": CPU_LIMIT,
     }
     with TemporaryFile() as output, TemporaryFile() as errors:
         reason = _run_process(json.dumps(request).encode(), output, errors)
