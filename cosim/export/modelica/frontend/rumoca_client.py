@@ -23,7 +23,12 @@ _OUT_OF_MEMORY = b"memory allocation of"
 
 
 def run_rumoca(
-    version: str, files: Sequence[Path], packages: Sequence[Path], model: str, display_name: str | None, declaration: str = ""
+    version: str,
+    files: Sequence[Path],
+    packages: Sequence[Path],
+    model: str,
+    text: tuple[str, str] | None,
+    declaration: str = "",
 ) -> dict[str, Any]:
     """Run rumoca in a child process.
 
@@ -32,7 +37,7 @@ def run_rumoca(
         files: All files that the model may use; the file of the model is the first one.
         packages: Folders of packages.
         model: Full name of the model.
-        display_name: Name under which the model's file is loaded; None for a member of a package.
+        text: Name under which the model's file is loaded, and its text; None for a member of a package.
         declaration: Text of a further class, which is that of the model.
 
     Returns:
@@ -46,7 +51,7 @@ def run_rumoca(
         "files": [str(file) for file in files],
         "packages": [str(package) for package in packages],
         "model": model,
-        "display_name": display_name,
+        "text": text,
         "declaration": declaration,
         "memory": MEMORY_LIMIT,
         "output_size": OUTPUT_LIMIT,
