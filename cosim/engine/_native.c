@@ -623,8 +623,10 @@ static bool traps_changed(const Program *p) { return sse_control() != p->sse_con
 static int run_macro_steps(Program *p, int64_t first, int64_t count, double origin, double stride, double denominator) {
     const int64_t steps_per_check = macro_steps_per_signal_check(p);
     int64_t left = steps_per_check;
+    double next_time = (origin + (double)first * stride) / denominator;
     for (int64_t n = first; n < first + count && !p->end_request; n++) {
-        double time = (origin + (double)n * stride) / denominator;
+        double time = next_time;
+        next_time = (origin + (double)(n + 1) * stride) / denominator; /* the division takes its time during the step */
         *p->current_time = time;
         if (run_macro_step(p, n, time) < 0) return -1;
         if (p->end_request == END_BEFORE_STEP) return 0;
