@@ -190,6 +190,7 @@ class Component(Protocol):
             have static variables.
         runs_foreign_code: Code that is not cosim's runs in this process, where it may change the state of the process.
         continuous_states: Names of the derivatives by the names of the states, if `get_directional_derivative` accepts both.
+        variable_step: Steps may have different sizes (FMI: canHandleVariableCommunicationStepSize).
         has_state: `get_state` and `set_state` are supported (FMI: canGetAndSetFMUState).
         dependencies: Names of the inputs on which an output depends directly, by the name of the output (FMI: ModelStructure).
             An output without an entry may depend on every input.
@@ -205,6 +206,7 @@ class Component(Protocol):
     shared_code: object = None
     runs_foreign_code: bool = True
     continuous_states: Mapping[str, str] = MappingProxyType({})
+    variable_step: bool = True
     has_state: bool
     dependencies: Mapping[str, frozenset[str]] = MappingProxyType({})
     initial_dependencies: Mapping[str, frozenset[str]] = MappingProxyType({})
@@ -260,7 +262,9 @@ class Component(Protocol):
         return None
 
     def prepare_step_calls(self, current_time: ctypes.c_double, step_size: float) -> Sequence[PreparedCall] | None:  # noqa: ARG002
-        """Return `set_inputs`, `do_step` and `get_outputs` of one step as prepared calls; called once, in step mode.
+        """Return `set_inputs`, `do_step` and `get_outputs` of one step as prepared calls, in step mode.
+
+        Called before the first step, and again before a step of another size.
 
         Args:
             current_time: Memory from which the calls read the start of the step (s).

@@ -10,13 +10,15 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 from ..core.component import Causality, Component, Variable
+from ..core.errors import abbreviate_names
 from ..core.system import Connection, Endpoint, Group, Iteration, Parallel, Stage, System, component_names
 from ..core.time_grid import TimeGrid
 from .layout import Layout, build_layout
-from .run_checks import check_run
+from .run_checks import check_run, components_with_fixed_steps
 from .settings import Event, Settings
 from .transfer_plan import Transfer, TransferPlanner, slope_variable, term_endpoint
 
@@ -92,13 +94,28 @@ class Plan:
 
     @property
     def end_warning(self) -> str:
-        """Message that the run ends before the stop time, because no shorter step is made; "" if it does not."""
+        """Message that the run ends before the stop time, because a component cannot make a shorter step; "" if it does not."""
         end, stop = self.grid.end, self.settings.stop_time
         if end == stop:
             return ""
         periods = " and all periods" if self.system.periods else ""
         reason = f"the last whole multiple of the step size {float(self.grid.step):.12g} s{periods}"
-        return f"the run ends at t = {float(end):.12g} s, {reason} before the stop time {float(stop):.12g} s"
+        names = abbreviate_names(components_with_fixed_steps(self.system, self.settings))
+        return (
+            f"the run ends at t = {float(end):.12g} s, {reason} before the stop time {float(stop):.12g} s, "
+            f"because {names} cannot make a shorter step"
+        )
+
+    @cached_property
+    def shorter_steps(self) -> Mapping[int, Mapping[str, float]]:
+        """Sizes (s) of the last steps that are shorter, by the macro step in which they begin and by component."""
+        found: dict[int, dict[str, float]] = defaultdict(dict)
+        for step in (step for phase in self.all_phases for step in phase.steps if self.grid.count):
+            begin = (self.grid.count - 1) // step.divisor * step.divisor
+            rest = self.grid.end - self.grid.start - begin * self.grid.step
+            if rest < step.divisor * self.grid.step:
+                found[begin][step.name] = float(rest)
+        return found
 
     @property
     def all_phases(self) -> Iterator[Phase]:

@@ -58,7 +58,7 @@ class FmuInstance(FunctionCaller, Component):
         self.shared_code = file
         self.description = file.description.with_structural_parameters(settings.structural_parameters, file.limits)
         self.variables = self.description.variables
-        self.has_state = self.description.has_state
+        self.has_state, self.variable_step = self.description.has_state, self.description.variable_step
         self.continuous_states = self.description.continuous_states
         self.dependencies = self.description.dependencies
         self.initial_dependencies = self.description.initial_dependencies
