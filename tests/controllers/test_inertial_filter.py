@@ -76,7 +76,8 @@ class Flight:
         self.velocity = self.velocity + H * acceleration
         self.attitude = self.attitude * Rotation.from_rotvec(rates * H)
         gyro, accelerometer = self.biases
-        self.biases = gyro + rng.normal(0, self.density[2] * H**0.5, 3), accelerometer + rng.normal(0, self.density[3] * H**0.5, 3)
+        gyro_walk, force_walk = (rng.normal(0, density * H**0.5, 3) for density in self.density[2:])
+        self.biases = gyro + gyro_walk, accelerometer + force_walk
         self.past.append((self.position, self.velocity))
         self._filter(rates + self.biases[0], force + self.biases[1])
         self.count += 1
@@ -88,7 +89,8 @@ class Flight:
         fix = place + rng.normal(0, NOISE[[0, 0, 1]]), speed + rng.normal(0, NOISE[2], 3)
         following = np.empty(SIZE)
         has_fix, has_field = int(k % 10 == 9 and k > 10), int(k % 2 == 0)
-        self.library.step(self.state, H, *measured, self.density, has_fix, *fix, DELAY, has_field, self._field(), EARTH, NOISE, following)
+        sight = has_fix, *fix, DELAY, has_field, self._field(), EARTH
+        self.library.step(self.state, H, *measured, self.density, *sight, NOISE, following)
         self.state = following
 
     def normalised_error(self) -> float:
