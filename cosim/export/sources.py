@@ -85,6 +85,7 @@ def _load_equations(path: Path, _model: str | None, _options: ModelicaOptions | 
 #: program whose function `vehicle_block` makes the block of a vehicle file
 _VEHICLE_PROGRAM = "plant_src/vehicle_block.py"
 _URDF_READER = "plant_src/urdf.py:vehicle_from_urdf"
+_MESH_READER = "plant_src/mesh_import.py:vehicle_from_mesh"
 _VEHICLE_SCHEMA = "plant_src/vehicle_schema.py:vehicle_schema"
 
 
@@ -117,6 +118,23 @@ def vehicle_from_urdf(urdf: Path, data: Mapping[str, Any]) -> dict[str, Any]:
 
     read: Callable[[Path, Mapping[str, Any]], dict[str, Any]] = load_object(_URDF_READER, resources.root())
     return read(urdf, data)
+
+
+def vehicle_from_mesh(mesh: Path, data: Mapping[str, Any], scale: float) -> dict[str, Any]:
+    """Return the data of a vehicle with inertia, collision shape and appearance of a mesh.
+
+    Args:
+        mesh: STL, OBJ or GLB file.
+        data: Further data of the vehicle, with its mass.
+        scale: Factor on all coordinates.
+
+    Raises:
+        InputError: The mesh cannot be read or encloses no volume, or the data have no mass.
+    """
+    from ..components.python_import import load_object
+
+    read: Callable[[Path, Mapping[str, Any], float], dict[str, Any]] = load_object(_MESH_READER, resources.root())
+    return read(mesh, data, scale)
 
 
 SOURCE_KINDS = (

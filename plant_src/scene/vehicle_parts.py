@@ -7,7 +7,7 @@ from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
 from ..catalogue import models_of
-from ..vehicles.common.shapes import Body, Box, Quaternion, Vector
+from ..vehicles.common.shapes import Body, Quaternion, Shape, Vector
 from ..vehicles.model import Model
 from ..vehicles.multirotor.airframe import Airframe, Rotor
 from ..vehicles.submerged.craft import Craft
@@ -51,7 +51,7 @@ def catamaran_parts(body: Body) -> Iterator[Part]:
             yield from _hull_parts(hull, x - 0.8 * length, x + 0.8 * length, z)
 
 
-def _hull_parts(hull: Box, aft: float, fore: float, deck: float) -> Iterator[Part]:
+def _hull_parts(hull: Shape, aft: float, fore: float, deck: float) -> Iterator[Part]:
     (length, beam, _), (x, y, z) = hull.half_extents, hull.position
     yield Part("cylinder", (beam, 2 * (length - beam)), hull.position, YELLOW, ALONG_X)
     for end in (-1.0, 1.0):
