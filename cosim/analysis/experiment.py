@@ -103,7 +103,7 @@ class Experiment:
             raise InputError(f"at: expected a time at which the steps of all components end, found {float(begin):.12g} s")
         self.time, self.step = grid.time_at(first), float(grid.step * self.stride)
         self.sample_count = (
-            (grid.count - first) // self.stride if span else min(DEFAULT_SAMPLES, (grid.count - first) // self.stride)
+            (grid.whole_steps - first) // self.stride if span else min(DEFAULT_SAMPLES, (grid.whole_steps - first) // self.stride)
         )
         if self.sample_count < MIN_SAMPLES:
             raise InputError(

@@ -5,7 +5,7 @@ from __future__ import annotations
 import os
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 from ..core.errors import InputError
 from ..results import Result
@@ -13,6 +13,9 @@ from ..results.comparison import Comparison, Tolerance, needed_share
 from ..results.comparison import compare as compare_results
 from ..scenario import find_scenario, load_scenario
 from .arguments import expect, is_number
+
+if TYPE_CHECKING:
+    from ..report.runs import NamedCall
 
 #: a result, a CSV file, or a folder that `cosim run` has written
 ResultSource = Result | str | Path
@@ -48,6 +51,13 @@ class ComparisonTask(NamedTuple):
     def compare(self) -> Comparison:
         """Return the verdict on each signal of the reference."""
         return compare_results(*self)
+
+    def figure(self) -> NamedCall:
+        """Return name, function and arguments of the figure with the largest deviations."""
+        from ..report.comparison_figure import draw_tubes
+
+        arguments = {"reference": self.reference, "tolerances": self.tolerances, "comparison": self.compare()}
+        return "comparison", draw_tubes, arguments
 
     def needed_share(self) -> float:
         """Return the share of all tolerances (1) with which a comparison that passes would still pass; 0 if all are equal."""

@@ -68,7 +68,8 @@ class Variable:
         items: Names and values of an enumeration.
         relative_quantity: The value is a difference, to which the offset of a unit does not apply.
         dtype: NumPy type of a value in memory, by default that of `type`. FMI 2.0 stores Boolean and Enumeration as C int.
-        derivative_of: Name of the input whose time derivative (per s) this value is; only in `bind`, see `interpolates_inputs`.
+        derivative_of: Name of the input or output whose time derivative (per s) this value is; only in `bind`, see
+            `Component.interpolates_inputs`.
     """
 
     name: str
@@ -189,12 +190,15 @@ class Component(Protocol):
             have static variables.
         runs_foreign_code: Code that is not cosim's runs in this process, where it may change the state of the process.
         continuous_states: Names of the derivatives by the names of the states, if `get_directional_derivative` accepts both.
+        variable_step: Steps may have different sizes (FMI: canHandleVariableCommunicationStepSize).
         has_state: `get_state` and `set_state` are supported (FMI: canGetAndSetFMUState).
         dependencies: Names of the inputs on which an output depends directly, by the name of the output (FMI: ModelStructure).
             An output without an entry may depend on every input.
         initial_dependencies: The same in initialization mode.
         interpolates_inputs: Inputs may change linearly within a step (FMI 2.0: canInterpolateInputs). The inputs of `bind` end
             with the time derivatives of those that do, see `Variable.derivative_of`.
+        gives_output_slopes: First time derivatives of outputs are available (FMI: maxOutputDerivativeOrder). The outputs of
+            `bind` end with those that are used.
     """
 
     variables: Sequence[Variable]
@@ -202,10 +206,12 @@ class Component(Protocol):
     shared_code: object = None
     runs_foreign_code: bool = True
     continuous_states: Mapping[str, str] = MappingProxyType({})
+    variable_step: bool = True
     has_state: bool
     dependencies: Mapping[str, frozenset[str]] = MappingProxyType({})
     initial_dependencies: Mapping[str, frozenset[str]] = MappingProxyType({})
     interpolates_inputs: bool = False
+    gives_output_slopes: bool = False
 
     def set(self, name: str, value: Any) -> None:
         """Set a variable to a Python value, an array to nested lists; not called while stepping through a macro step."""
@@ -256,7 +262,9 @@ class Component(Protocol):
         return None
 
     def prepare_step_calls(self, current_time: ctypes.c_double, step_size: float) -> Sequence[PreparedCall] | None:  # noqa: ARG002
-        """Return `set_inputs`, `do_step` and `get_outputs` of one step as prepared calls; called once, in step mode.
+        """Return `set_inputs`, `do_step` and `get_outputs` of one step as prepared calls, in step mode.
+
+        Called before the first step, and again before a step of another size.
 
         Args:
             current_time: Memory from which the calls read the start of the step (s).

@@ -44,7 +44,8 @@ class Connection:
         offset: Value that is added after `gain`, in the unit of the input.
         term: Number, from 1, of the value among those that are added at the input; 0: it is the only one.
         convert: Booleans and all integers are converted to floating-point numbers.
-        interpolation: Course of the input within a step: constant, or linear through the last two values of the output.
+        interpolation: Course of the input within a step: constant, or linear with the slope that the source gives, or else
+            through the last two values of the output.
     """
 
     source: Endpoint

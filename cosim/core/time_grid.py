@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from fractions import Fraction
 from math import lcm
 
@@ -51,7 +51,7 @@ def exact_divisor(duration: Fraction, step: Fraction) -> Fraction:
 
 @dataclass(frozen=True, slots=True)
 class TimeGrid:
-    """Communication points start + n * step, n = 0 ... count (seconds, as exact fractions)."""
+    """Communication points start + n * step, n = 0 ... count (seconds, as exact fractions); the last step may be shorter."""
 
     start: Fraction
     step: Fraction
@@ -59,6 +59,8 @@ class TimeGrid:
     _denominator: int
     _origin: int
     _stride: int
+    #: time of the last point (s) if the last step is shorter
+    _stop: Fraction | None = None
 
     @classmethod
     def from_times(cls, start: Fraction, stop: Fraction, step: Fraction) -> TimeGrid:
@@ -84,14 +86,29 @@ class TimeGrid:
         denominator = lcm(start.denominator, step.denominator)
         return cls(start, step, int(count), denominator, int(start * denominator), int(step * denominator))
 
+    def ending_at(self, stop: Fraction) -> TimeGrid:
+        """Return the grid with a shorter last step, which ends at `stop` (s), if `stop` lies between two points."""
+        count = (stop - self.start) / self.step
+        if count.denominator == 1:
+            return replace(self, count=int(count), _stop=None)
+        return replace(self, count=int(count) + 1, _stop=stop)
+
     def time_at(self, n: int) -> float:
         """Return the time of communication point n (s), correctly rounded."""
+        return float(self._stop) if self._stop is not None and n >= self.count else self._regular_time(n)
+
+    def _regular_time(self, n: int) -> float:
         return (self._origin + n * self._stride) / self._denominator
 
     @property
     def end(self) -> Fraction:
         """Time of the last communication point (s)."""
-        return self.start + self.count * self.step
+        return self.start + self.count * self.step if self._stop is None else self._stop
+
+    @property
+    def whole_steps(self) -> int:
+        """Number of steps that are not shorter."""
+        return self.count - (self._stop is not None)
 
     @property
     def integer_coefficients(self) -> dict[str, int]:
@@ -103,7 +120,10 @@ class TimeGrid:
         if not self.float_coefficients(points.stop):
             return np.array([self.time_at(n) for n in points], np.float64)
         n = np.arange(points.start, points.stop, points.step, dtype=np.int64)
-        return (self._origin + n * self._stride) / self._denominator
+        times: np.ndarray = (self._origin + n * self._stride) / self._denominator
+        if self._stop is not None:
+            times[n >= self.count] = float(self._stop)
+        return times
 
     def float_coefficients(self, last: int) -> tuple[float, float, float] | None:
         """Return origin, stride and denominator of the formula (origin + n * stride) / denominator in float64 arithmetic.
@@ -126,6 +146,8 @@ class TimeGrid:
         Raises:
             ValueError: The time lies between two communication points or before the start.
         """
+        if time == self._stop:
+            return self.count
         n = (time - self.start) / self.step
         if n.denominator != 1:
             raise ValueError(f"{float(time)!r} s lies between two communication points ({float(self.step)!r} s apart)")

@@ -128,13 +128,29 @@ class Executor(ABC):
 
     def _run_until(self, end: int) -> None:
         runner = self._runner
+        changes = sorted(self.plan.shorter_steps)
         while (n := runner.completed_steps) < end and not runner.termination:
+            if changes:
+                self._choose_step_sizes(n)
             try:
-                self._run_macro_steps(n, min(end, self.recorder.last_point_in_chunk(n)))
+                next_change = next((point for point in changes if point > n), end)
+                self._run_macro_steps(n, min(end, next_change, self.recorder.last_point_in_chunk(n)))
                 if enabled_traps():
                     self._restore_float_traps(self.completed_steps)
             finally:
                 self.recorder.set_row_count(runner.recorded_rows)
+
+    def _choose_step_sizes(self, n: int) -> None:
+        """Prepare the steps with their sizes in macro step `n`, if these have changed; they run on one thread from now on."""
+        sizes = {name: size for begin, some in self.plan.shorter_steps.items() if begin <= n for name, size in some.items()}
+        if sizes == self._schedule.shorter_steps:
+            return
+        self._parallel_steps.withdraw_candidates()
+        self._schedule.prepare(sizes)
+        last = self.plan.grid.end - self.plan.grid.start - self.plan.grid.whole_steps * self.plan.grid.step
+        for line in self._delay_lines.values():
+            line.shorten_step(float(last) if n + 1 == self.plan.grid.count else None)
+        self._rebuild()
 
     def save(self) -> ExecutorState:
         """Return the numbers of steps and rows, the values of all inputs and outputs, and those in the delays."""

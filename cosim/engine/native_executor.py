@@ -104,7 +104,7 @@ class NativeExecutor(Executor):
             transfer.term_count,
             _address(transfer.slope_indices),
             transfer.interpolates,
-            transfer.step_size,
+            self._delay_lines[transfer].step_size if transfer.delay else 0.0,
         )
 
     def _add_object_transfer(self, transfer_call: Callable[[], object]) -> None:

@@ -124,6 +124,10 @@ class ParallelSteps:
 
             self._threads = ThreadPool(largest - 1)
 
+    def withdraw_candidates(self) -> None:
+        """Let the steps of all phases run one after another, unless it has been decided that they do not."""
+        self._candidates = {}
+
     def _run_group(self, group: ParallelGroup) -> int:
         assert self._threads is not None
         run_partition = partial(run_due, n=self._runner.completed_steps)

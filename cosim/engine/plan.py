@@ -10,13 +10,15 @@ from __future__ import annotations
 from collections import defaultdict
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import NamedTuple
 
 from ..core.component import Causality, Component, Variable
+from ..core.errors import abbreviate_names
 from ..core.system import Connection, Endpoint, Group, Iteration, Parallel, Stage, System, component_names
 from ..core.time_grid import TimeGrid
 from .layout import Layout, build_layout
-from .run_checks import check_run
+from .run_checks import check_run, components_with_fixed_steps
 from .settings import Event, Settings
 from .transfer_plan import Transfer, TransferPlanner, slope_variable, term_endpoint
 
@@ -92,13 +94,28 @@ class Plan:
 
     @property
     def end_warning(self) -> str:
-        """Message that the run ends before the stop time, because no shorter step is made; "" if it does not."""
+        """Message that the run ends before the stop time, because a component cannot make a shorter step; "" if it does not."""
         end, stop = self.grid.end, self.settings.stop_time
         if end == stop:
             return ""
         periods = " and all periods" if self.system.periods else ""
         reason = f"the last whole multiple of the step size {float(self.grid.step):.12g} s{periods}"
-        return f"the run ends at t = {float(end):.12g} s, {reason} before the stop time {float(stop):.12g} s"
+        names = abbreviate_names(components_with_fixed_steps(self.system, self.settings))
+        return (
+            f"the run ends at t = {float(end):.12g} s, {reason} before the stop time {float(stop):.12g} s, "
+            f"because {names} cannot make a shorter step"
+        )
+
+    @cached_property
+    def shorter_steps(self) -> Mapping[int, Mapping[str, float]]:
+        """Sizes (s) of the last steps that are shorter, by the macro step in which they begin and by component."""
+        found: dict[int, dict[str, float]] = defaultdict(dict)
+        for step in (step for phase in self.all_phases for step in phase.steps if self.grid.count):
+            begin = (self.grid.count - 1) // step.divisor * step.divisor
+            rest = self.grid.end - self.grid.start - begin * self.grid.step
+            if rest < step.divisor * self.grid.step:
+                found[begin][step.name] = float(rest)
+        return found
 
     @property
     def all_phases(self) -> Iterator[Phase]:
@@ -119,7 +136,8 @@ def compile_plan(system: System, settings: Settings) -> Plan:
     grid = check_run(system, settings)
     phases = list(_split_into_phases(system))
     connections = [connection for phase in phases for connection in _connections_of(phase)]
-    inputs, outputs = _input_layout(system, connections), _output_layout(system, connections, settings.columns.values())
+    inputs = _input_layout(system, connections)
+    outputs = _output_layout(system, connections, settings.columns.values(), _extrapolated_sources(system, phases, set()))
     planner = TransferPlanner(system, inputs, outputs, float(grid.step))
     stepped: set[str] = set()
 
@@ -221,9 +239,21 @@ def _input_layout(system: System, connections: Iterable[Connection]) -> Layout:
     return _layout_of_endpoints(system, (connection.target for connection in connections), "input", terms, linear)
 
 
-def _output_layout(system: System, connections: Iterable[Connection], recorded: Iterable[Endpoint]) -> Layout:
-    """Lay out the connected and recorded outputs, in the order in which they are first read."""
-    return _layout_of_endpoints(system, (*(connection.source for connection in connections), *recorded), "output")
+def _extrapolated_sources(system: System, phases: Iterable[_PhaseDraft], stepped: set[str]) -> Iterator[Endpoint]:
+    """Yield the outputs whose slopes are given, and are used by linear connections before their components step."""
+    for phase in phases:
+        for source in (c.source for c in phase.connections if c.interpolation == "linear"):
+            if source.component not in stepped and system.components[source.component].gives_output_slopes:
+                yield source
+        stepped.update(phase.names, component_names(phase.group.stages) if phase.group else ())
+        yield from _extrapolated_sources(system, phase.inner, stepped)
+
+
+def _output_layout(
+    system: System, connections: Iterable[Connection], recorded: Iterable[Endpoint], sloped: Iterable[Endpoint]
+) -> Layout:
+    """Lay out the connected and recorded outputs, in the order in which they are first read, and the slopes of some of them."""
+    return _layout_of_endpoints(system, (*(connection.source for connection in connections), *recorded), "output", (), sloped)
 
 
 def _layout_of_endpoints(
@@ -231,7 +261,7 @@ def _layout_of_endpoints(
     endpoints: Iterable[Endpoint],
     causality: Causality,
     terms: Sequence[Variable] = (),
-    linear: Iterable[Endpoint] = (),
+    sloped: Iterable[Endpoint] = (),
 ) -> Layout:
     used: dict[str, dict[str, Variable]] = {name: {} for name in component_names(system.stages)}
     for endpoint in endpoints:
@@ -239,7 +269,7 @@ def _layout_of_endpoints(
         used[endpoint.component][variable.name] = variable
     bound = {name: _variables_to_bind(system.components[name], some, causality) for name, some in used.items()}
     slopes: dict[str, dict[str, Variable]] = defaultdict(dict)
-    for endpoint in linear:
+    for endpoint in sloped:
         variable = system.find_element(endpoint).variable
         slopes[endpoint.component][variable.name] = slope_variable(variable)
     bound |= {name: [*bound[name], *own.values()] for name, own in slopes.items()}

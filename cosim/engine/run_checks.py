@@ -24,7 +24,8 @@ MIN_ULPS_PER_STEP = 100
 def check_run(system: System, settings: Settings) -> TimeGrid:
     """Check that the system can be simulated with these settings, and return its communication points.
 
-    The last one is the last point at or before the stop time at which the steps of all components end.
+    The last one is the stop time if the components whose steps do not end there can make a shorter last step. Otherwise it is the
+    last point before it at which the steps of all components end.
 
     Raises:
         InputError: it cannot. The `subject` of each problem names the setting: ("stop_time",), ("components", NAME, "period"),
@@ -46,11 +47,23 @@ def check_run(system: System, settings: Settings) -> TimeGrid:
     problems += _find_event_time_problems(settings.events, grid)
     if problems:
         raise InputError(problems)
+    if not components_with_fixed_steps(system, settings):
+        return grid.ending_at(settings.stop_time)
     common = lcm(*(int(period / grid.step) for period in system.periods.values()))
     if 0 < grid.count < common:
         text = f"the steps of all components end together only after {float(common * grid.step)!r} s, after the stop time"
         raise InputError(Problem(text, subject=("stop_time",)))
     return replace(grid, count=grid.count - grid.count % common)
+
+
+def components_with_fixed_steps(system: System, settings: Settings) -> list[str]:
+    """Return the components whose last step would have to be shorter to end at the stop time, but cannot."""
+    duration = settings.stop_time - settings.start_time
+    return [
+        name
+        for name, component in system.components.items()
+        if not component.variable_step and (duration / system.periods.get(name, settings.step_size)).denominator != 1
+    ]
 
 
 def _find_real_time_problems(settings: Settings) -> Iterator[Problem]:

@@ -50,6 +50,8 @@ class SavingRecorder(Recorder):
         ]
         header = {
             **self._plan.grid.integer_coefficients,
+            "last_point": self._plan.grid.count,
+            "end": float(self._plan.grid.end),
             "steps_per_row": self.every,
             "row_size": dtype.itemsize,
             "columns": columns,

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from types import MappingProxyType
 
 from ..core.component import PreparedCall
 from .component_step import ScheduledStep
@@ -18,15 +20,18 @@ class Schedule:
 
     Attributes:
         phases: the steps of each phase of the plan, in order.
+        shorter_steps: sizes of the steps (s) that differ from those of the plan, by component.
     """
 
     def __init__(self, plan: Plan, runner: StepRunner, delay_lines: Mapping[Transfer, DelayLine]):
         self._plan, self._runner, self._delay_lines = plan, runner, delay_lines
         self._steps: list[ScheduledStep] = []
         self.phases: list[list[ScheduledStep]] = []
+        self.shorter_steps: Mapping[str, float] = {}
 
-    def prepare(self) -> None:
-        """Schedule all phases; the components must be in step mode, since they prepare their calls here."""
+    def prepare(self, shorter_steps: Mapping[str, float] = MappingProxyType({})) -> None:
+        """Schedule all phases, again for other sizes of steps; the components must be in step mode and prepare their calls."""
+        self.shorter_steps, self._steps = shorter_steps, []
         self.phases = [self._schedule_phase(phase) for phase in self._plan.phases]
 
     def add_step(self, step: Step, calls: Sequence[PreparedCall]) -> ScheduledStep:
@@ -46,7 +51,8 @@ class Schedule:
         return [(step.step.name, call.name) for step in self._steps for call in step.calls]
 
     def _schedule_phase(self, phase: Phase, is_outermost: bool = True) -> list[ScheduledStep]:
-        steps = [self.add_step(step, self._step_calls(step)) for step in phase.steps]
+        sized = [replace(step, step_size=self.shorter_steps.get(step.name, step.step_size)) for step in phase.steps]
+        steps = [self.add_step(step, self._step_calls(step)) for step in sized]
         return [*steps, self._schedule_loop(phase.loop, is_outermost)] if phase.loop else steps
 
     def _step_calls(self, step: Step) -> Sequence[PreparedCall]:

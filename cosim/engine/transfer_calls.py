@@ -85,12 +85,19 @@ class DelayLine:
         self.transfer = transfer
         #: source values, shape (delay, values)
         self.ring = np.empty((transfer.delay, len(transfer.source_indices)), transfer.source.dtype)
+        #: duration to which the slopes of a linear transfer belong (s)
+        self.step_size = transfer.step_size
         self._oldest = 0
         self._all = np.arange(len(transfer.source_indices))
 
     def fill(self) -> None:
         """Fill all rows with the current source values."""
         self.ring[:] = self.transfer.source[self.transfer.source_indices]
+
+    def shorten_step(self, step_size: float | None) -> None:
+        """Set the size of the present step (s), to which slopes between its ends belong; None: it is not shorter."""
+        if self.transfer.interpolates:
+            self.step_size = step_size or self.transfer.step_size
 
     def restore(self, ring: np.ndarray) -> None:
         """Restore a copy of the ring in which the oldest row comes first."""
@@ -105,7 +112,7 @@ class DelayLine:
         """Deliver values and slopes of a linear transfer, without storing the current source values."""
         transfer, (before,) = self.transfer, self.ring
         now = transfer.source[transfer.source_indices]
-        slopes = (now - before) / transfer.step_size
+        slopes = (now - before) / self.step_size
         transfer.target[transfer.slope_indices] = slopes if transfer.factor is None else transfer.factor * slopes
         _scatter(transfer, before if transfer.interpolates else now, self._all)
 

@@ -23,7 +23,7 @@ class Transfer:
 
     With `slope_indices` the inputs change linearly within the next step of `step_size` (s): the slope of the output since the
     last transfer is stored at these indices of `target`. The values are those of the last transfer if the output already has its
-    value of the end of the step (`interpolates`). The delay is then 1.
+    value of the end of the step (`interpolates`). The delay is then 1. Slopes that the source gives are plain transfers.
     """
 
     source: np.ndarray
@@ -49,12 +49,12 @@ def term_endpoint(connection: Connection) -> Endpoint:
 
 
 def slope_variable(variable: Variable) -> Variable:
-    """Return the variable with the time derivative of an input."""
-    return Variable(f"slope of {variable.name}", causality="input", shape=variable.shape, derivative_of=variable.name)
+    """Return the variable with the time derivative of an input or output."""
+    return Variable(f"slope of {variable.name}", causality=variable.causality, shape=variable.shape, derivative_of=variable.name)
 
 
 def slope_endpoint(system: System, end: Endpoint) -> Endpoint:
-    """Return the name of the time derivative of an input in the layout of the inputs."""
+    """Return the name of the time derivative of an input or output in the layout of the inputs or outputs."""
     variable, element = system.find_element(end)
     return Endpoint(end.component, slope_variable(variable).scalar_names[element])
 
@@ -121,10 +121,7 @@ class TransferPlanner:
         connections = list(connections)
         self._targets_read |= {self._positions(connection)[1] for connection in connections}
         groups: dict[tuple[Dtype, Dtype, int, bool], list[Connection]] = defaultdict(list)
-        linear = [connection for connection in connections if connection.interpolation == "linear"]
-        for interpolates in (False, True):
-            if group := [c for c in linear if (c.source.component in stepped) == interpolates]:
-                yield self._linear_transfer(group, interpolates)
+        yield from self._linear_transfers([c for c in connections if c.interpolation == "linear"], stepped)
         for connection in (connection for connection in connections if connection.interpolation == "hold"):
             source, target = self._positions(connection)
             converted = self._conversion(connection) != (1.0, 0.0)
@@ -149,6 +146,24 @@ class TransferPlanner:
                 self._inputs.arrays[dtype],
                 np.array([self._inputs.positions[target].offset for target in group], np.intp),
             )
+
+    def _linear_transfers(self, connections: Sequence[Connection], stepped: Set[str]) -> Iterator[Transfer]:
+        """Yield the transfers of values and slopes: slopes that the source gives, else those of the line through two values."""
+        given = [c for c in connections if slope_endpoint(self._system, c.source) in self._outputs.positions]
+        given = [connection for connection in given if connection.source.component not in stepped]
+        if given:
+            yield self._delayed_or_converted(given, 0, True)
+            yield self._slope_transfer(given)
+        for interpolates in (False, True):
+            rest = [c for c in connections if (c.source.component in stepped) == interpolates and c not in given]
+            if rest:
+                yield self._linear_transfer(rest, interpolates)
+
+    def _slope_transfer(self, connections: Sequence[Connection]) -> Transfer:
+        ends = [[slope_endpoint(self._system, end) for end in (c.source, c.target)] for c in connections]
+        factor = np.array([self._conversion(connection)[0] for connection in connections])
+        sources = [self._outputs.positions[source] for source, _ in ends]
+        return self._make_transfer(sources, [self._inputs.positions[t] for _, t in ends], 0, factor, np.zeros_like(factor))
 
     def _linear_transfer(self, connections: Sequence[Connection], interpolates: bool) -> Transfer:
         converted = any(self._conversion(connection) != (1.0, 0.0) for connection in connections)

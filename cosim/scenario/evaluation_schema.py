@@ -80,3 +80,4 @@ class ReferenceSpec(Spec):
     tolerances: dict[str, ToleranceSpec] = key(
         "tolerances by pattern; only matching signals are compared", {"plant.*.position.*": {"absolute": 0.01, "time": 0.02}}
     )
+    reason: str = key("why the tolerances are as they are", "a tenth of the size of the deck", default="")

@@ -20,7 +20,7 @@ from ..core import paths
 from ..core.errors import InputError, Problem, did_you_mean
 from ..core.size_limits import MAX_LEVELS
 from .component_schema import SOURCES
-from .file_paths import change_paths, find_scenario, relocating
+from .file_paths import change_paths, find_scenario, relocating, resolve_shipped_paths
 from .included_files import include_files
 from .json_document import Document, JsonPath, Origin, read_document
 from .schema import KEYED_LISTS, NOT_INHERITED
@@ -36,7 +36,7 @@ def read_system_document(file: Path) -> Document:
 
 
 def expand_document(document: Document, extending: tuple[Path, ...] = ()) -> Document:
-    """Include the files that the arguments of components name, and merge the document with those that it extends.
+    """Include the files that arguments name, resolve the paths of shipped files, and merge the document with its bases.
 
     Args:
         document: A scenario or nested system.
@@ -46,8 +46,11 @@ def expand_document(document: Document, extending: tuple[Path, ...] = ()) -> Doc
         InputError: A base does not exist, is not JSON, or extends itself.
     """
     document = include_files(document)
+    if not isinstance(document.value, dict):
+        return document
+    document = replace(document, value=resolve_shipped_paths(document.value, document.file.parent))
     value = document.value
-    if not isinstance(value, dict) or "extends" not in value:
+    if "extends" not in value:
         return document
     extending = (*extending, paths.resolve_path(document.file))
     base = expand_document(_read_base(document, value["extends"], extending), extending)

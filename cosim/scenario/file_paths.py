@@ -14,6 +14,9 @@ from .json_pointer import pointer_keys
 #: returns the new text of a path
 PathChange = Callable[[str], str]
 
+#: a path that begins so starts from the files that cosim ships
+SHIPPED = "cosim:"
+
 #: keys of a scenario with lists or objects of entries that name files, and keys with one such entry
 _ENTRIES, _ENTRY = ("components", "inputs", "kpis", "figures"), ("scene", "reference")
 #: keys of an entry that hold a path, and keys that hold a reference such as "file.py:Class"
@@ -39,9 +42,20 @@ def find_scenario(scenario: str | Path) -> Path:
 
 def relocating(old_folder: Path, new_folder: Path | None) -> PathChange:
     """Return a function that changes paths relative to one folder into paths relative to another one; None: absolute paths."""
-    old = paths.resolve_path(old_folder)
-    shift = old if new_folder is None else os.path.relpath(old, paths.resolve_path(new_folder))
-    return lambda text: os.path.normpath(os.path.join(shift, text)).replace(os.sep, "/")  # noqa: PTH118
+
+    def change(text: str) -> str:
+        path = resources.root() / text.removeprefix(SHIPPED) if text.startswith(SHIPPED) else old / text
+        changed = os.path.normpath(path) if new is None else os.path.relpath(path, new)
+        return changed.replace(os.sep, "/")
+
+    old, new = paths.resolve_path(old_folder), new_folder and paths.resolve_path(new_folder)
+    return change
+
+
+def resolve_shipped_paths(system: Mapping[str, Any], folder: Path) -> dict[str, Any]:
+    """Return a copy of a scenario or nested system in `folder` with the paths of shipped files ("cosim:...") relative to it."""
+    change = relocating(folder, folder)
+    return change_paths(system, lambda text: change(text) if text.startswith(SHIPPED) else text)
 
 
 def change_paths(system: Mapping[str, Any], change: PathChange) -> dict[str, Any]:

@@ -108,18 +108,20 @@ class Regression:
             margin = run.margin if comparison.passed else ""
             counts.append((len(comparison.failures), len(comparison.verdicts), "signal"))
             if not comparison.passed:
+                reason = run.scenario["reference"].get("reason")
                 failed += [
                     *str(comparison).splitlines(),
+                    *([f"reason of the tolerances: {reason}"] if reason else []),
                     *run.reference_changes(),
                     f"see {run.draw_tubes(comparison, tubes)}",
                 ]
         if failed:
-            failed += self._write_report()
+            failed += self._write_report(*(["--reference", str(self.file)] if run.scenario.get("reference") else []))
         return RegressionOutcome(self.file.stem, 3 if failed else 0, _summarize(counts, margin), tuple(failed))
 
-    def _write_report(self) -> list[str]:
+    def _write_report(self, *options: str) -> list[str]:
         """Write the report of the run by `cosim report` in a separate process, and return a line that names it."""
-        command = [sys.executable, "-m", "cosim", "report", str(self.directory)]
+        command = [sys.executable, "-m", "cosim", "report", str(self.directory), *options]
         done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)  # noqa: S603
         return [f"see {self.directory / 'report.html'}"] if done.returncode == 0 else [f"no report: {done.stderr.strip()}"]
 

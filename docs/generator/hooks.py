@@ -32,6 +32,8 @@ REFERENCE = {
 
 _LINK = re.compile(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)")
 _CODE = re.compile(r"`[^`\n]*`")
+#: first line of a block of code with a word for the tests, such as "fails"
+_MANNER = re.compile(r"^(```\w+) \w+$", re.MULTILINE)
 
 
 def on_files(files: Files, config: MkDocsConfig) -> Files:
@@ -46,8 +48,8 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 
 
 def on_page_markdown(markdown: str, **_: object) -> str:
-    """Remove the backslashes before bars in code, which only GitHub's tables need."""
-    return _CODE.sub(lambda code: code[0].replace(r"\|", "|"), markdown)
+    """Remove the backslashes before bars in code, which only GitHub's tables need, and the words for the tests."""
+    return _MANNER.sub(r"\1", _CODE.sub(lambda code: code[0].replace(r"\|", "|"), markdown))
 
 
 def repository_files(generated: Mapping[str, str]) -> list[str]:

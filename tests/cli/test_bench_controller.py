@@ -82,7 +82,7 @@ def folder(tmp_path):
     return tmp_path
 
 
-def bench(folder, controller, *arguments, role="usv_autopilot"):
+def bench(folder, controller, *arguments, role="vessel_autopilot"):
     return run_cosim("bench-controller", controller, "--role", role, *arguments, cwd=folder)
 
 
@@ -182,7 +182,7 @@ def test_entries_about_missing_variables_are_removed_and_noted(folder):
     assert done.returncode == 3
     assert 'note: sail: kpi "away" is left out: the candidate has no "usv.distance"' in done.stdout
     assert 'note: sail: "usv.waypoint_count" is left out: the candidate has no such variable' in done.stdout
-    written = json.loads((folder / "runs/bench/usv_autopilot/Keeper/scenarios/sail.json").read_text())
+    written = json.loads((folder / "runs/bench/vessel_autopilot/Keeper/scenarios/sail.json").read_text())
     assert written["components"]["usv"] == {"parameters": {}, "python": f"{folder / 'keeper.py'}:Keeper"}
     assert [kpi["name"] for kpi in written["kpis"]] == ["waypoints"]
     assert "reference" not in written

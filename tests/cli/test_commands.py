@@ -10,6 +10,7 @@ from pathlib import Path
 
 import pytest
 from cosim_command import run_cosim
+from probe_fmus import build_probe_fmu
 
 ROOT = Path(__file__).parents[2]
 BLOCKS = ROOT / "tests/scenario/pythonfmu_blocks.py"
@@ -303,6 +304,14 @@ def test_a_failing_fmu_gives_exit_code_1_and_keeps_its_rows(probe, tmp_path):
     assert done.returncode == 1
     assert "status 3 (error): told to fail" in done.stderr
     assert len((tmp_path / "y.csv").read_text().splitlines()) == 4
+
+
+def test_info_prints_which_capabilities_are_used(tmp_path):
+    flags = 'maxOutputDerivativeOrder="2" canRunAsynchronuously="true"'
+    lines = cosim("info", build_probe_fmu(2, tmp_path, name="mass", flags=flags)).stdout.splitlines()
+    capabilities = next(line for line in lines if line.startswith("capabilities"))
+    assert "inputs can be linear within a step, derivatives of outputs" in capabilities
+    assert next(line for line in lines if line.startswith("not used")).split() == ["not", "used", "canRunAsynchronuously"]
 
 
 def test_info_prints_properties_and_variables(probe):

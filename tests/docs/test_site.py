@@ -36,10 +36,14 @@ def test_the_reference_is_complete(site):
     parts = [part for schema in schemas for part in (schema, *schema["$defs"].values())]
     assert all(key in keys for part in parts for key in part["properties"])
     assert "landing_waves" in text_of(reference / "scenarios.html")
-    assert "usv_autopilot" in text_of(reference / "roles.html")
+    assert "vessel_autopilot" in text_of(reference / "roles.html")
     assert "rotor_speed[1]" in text_of(reference / "variables.html")
     assert "touchdown_speed" in text_of(reference / "kpis.html")
     assert "cosim.run" in text_of(reference / "python.html")
+
+
+def test_no_page_shows_the_markdown_of_a_block(site):
+    assert [page for page in site.rglob("*.html") if "```" in page.read_text()] == []
 
 
 def test_pages_are_read_and_searched_as_files_without_a_network(site, chromium):

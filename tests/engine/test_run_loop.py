@@ -193,17 +193,25 @@ def test_results_do_not_depend_on_the_floating_point_mode_of_the_caller(probe, c
     assert (is_changed(), enabled_traps()) == (False, 0)
 
 
-def test_a_run_ends_at_the_last_common_end_of_all_steps_before_the_stop_time():
-    built = make_system({"a": counter(), "b": counter()}, periods={"b": exact_fraction(2)})
+def fixed_counter():
+    component = counter()
+    component.variable_step = False
+    return component
+
+
+def test_without_variable_steps_a_run_ends_at_the_last_common_end_of_all_steps_before_the_stop_time():
+    built = make_system({"a": fixed_counter(), "b": fixed_counter()}, periods={"b": exact_fraction(2)})
     plan = compile_plan(built, settings(stop=5.5))
     assert plan.grid.end == 4
     assert plan.end_warning == (
-        "the run ends at t = 4 s, the last whole multiple of the step size 1 s and all periods before the stop time 5.5 s"
+        "the run ends at t = 4 s, the last whole multiple of the step size 1 s and all periods before the stop time 5.5 s, "
+        "because a, b cannot make a shorter step"
     )
     assert simulate(built, settings(stop=5.5)).recording.time.tolist() == [0, 1, 2, 3, 4]
 
 
 def test_periods_whose_steps_never_end_together_are_refused():
-    built = make_system({"a": counter(), "b": counter()}, periods={"a": exact_fraction(2), "b": exact_fraction(3)})
+    parts = {"a": fixed_counter(), "b": fixed_counter()}
+    built = make_system(parts, periods={"a": exact_fraction(2), "b": exact_fraction(3)})
     with pytest.raises(InputError, match=r"end together only after 6\.0 s, after the stop time"):
         simulate(built, settings(stop=5))

@@ -7,6 +7,7 @@ matrix of the whole system.
 import numpy as np
 import pytest
 from probe_fmus import build_probe_fmu
+from scipy.linalg import expm
 from systems import connection
 
 import cosim
@@ -70,12 +71,51 @@ def test_the_errors_and_orders_are_those_of_the_coupling(folder, mass, coupling,
 
 
 @pytest.mark.parametrize("coupling", ERRORS)
-def test_both_executors_couple_alike(folder, mass, coupling, monkeypatch):
+def test_both_executors_couple_alike(folder, mass, sloped_mass, coupling, monkeypatch):
     found = []
     for kind in EXECUTORS.values():
         monkeypatch.setattr("cosim.engine.plan_run.executor_class", lambda _, kind=kind: kind)
-        found.append(displacements(folder, mass, coupling, "0.02", stop_time=1).tolist())
+        found.append([displacements(folder, fmu, coupling, "0.02", stop_time=1).tolist() for fmu in (mass, sloped_mass)])
     assert found[0] == found[1]
+
+
+@pytest.fixture(scope="session")
+def sloped_mass(tmp_path_factory):
+    return build_probe_fmu(2, tmp_path_factory.mktemp("slopes"), name="mass", flags='maxOutputDerivativeOrder="1"')
+
+
+def along_tangents(step, count):
+    """Return x and v of both masses if each sees the tangents of the other's displacement and velocity, without cosim."""
+    one = np.zeros((6, 6))  # x, v, and of the other mass: x, v and their slopes
+    one[0, 1] = one[2, 4] = one[3, 5] = 1
+    one[1, :4] = -40, -0.3, 30, 0.2
+    transition = expm(one * step)
+    rows = [np.array([[1.0, 0.0], [0.0, 0.0]])]
+    seen = rows[0][::-1]  # the values of the other mass that belong to the forces
+    for _ in range(count):
+        slopes = np.column_stack([rows[-1][:, 1], (np.hstack([rows[-1], seen]) @ one[1, :4])])
+        inputs = np.hstack([rows[-1][::-1], slopes[::-1]])
+        rows.append((np.hstack([rows[-1], inputs]) @ transition.T)[:, :2])
+        seen = inputs[:, :2] + step * inputs[:, 2:]
+    return np.array(rows).reshape(-1, 4)
+
+
+@pytest.mark.parametrize("step", STEPS[:2])
+def test_outputs_with_derivatives_are_extrapolated_along_their_tangents(folder, mass, sloped_mass, step):
+    found = displacements(folder, sloped_mass, "Jacobi, linear", step)
+    np.testing.assert_allclose(found, along_tangents(float(step), len(found) - 1), rtol=0, atol=1e-12)
+    tangents, secants = (error(folder, fmu, "Jacobi, linear", step) for fmu in (sloped_mass, mass))
+    assert tangents / secants == pytest.approx(0.4, abs=0.1)  # of the cubic terms 1/6 and 5/12
+
+
+@pytest.mark.parametrize("coupling", ["Gauss-Seidel, linear", "iterated, linear"])
+def test_known_values_at_both_ends_are_better_than_tangents(folder, mass, sloped_mass, coupling):
+    """Inputs whose source has stepped before pass through both values."""
+    second = [displacements(folder, fmu, coupling, "0.02", stop_time=1) for fmu in (sloped_mass, mass)]
+    if coupling.startswith("iterated"):
+        assert second[0].tolist() == second[1].tolist()
+    else:
+        assert np.abs(second[0] - exact(0.02, 50)).max() < np.abs(second[1] - exact(0.02, 50)).max()
 
 
 def test_gauss_seidel_with_hold_conserves_the_energy(folder, mass):

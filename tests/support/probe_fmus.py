@@ -15,7 +15,7 @@ PROBE_SOURCES = Path(__file__).parents[1] / "components/fmi/foreign"
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 
-def build_probe_fmu(version: int, folder: Path, identifier: str = "probe", name: str = "") -> Path:
+def build_probe_fmu(version: int, folder: Path, identifier: str = "probe", name: str = "", flags: str = "") -> Path:
     """Build the probe FMU of an FMI major version, or the one of another source.
 
     Args:
@@ -23,6 +23,7 @@ def build_probe_fmu(version: int, folder: Path, identifier: str = "probe", name:
         folder: Folder of the FMU.
         identifier: File name of its library.
         name: Name of the C file and of the XML file; by default "probe2" or "probe3".
+        flags: Further attributes of its Co-Simulation interface.
     """
     name = name or f"probe{version}"
     compiler = os.environ.get("CC") or shutil.which("cc") or "gcc"
@@ -30,7 +31,8 @@ def build_probe_fmu(version: int, folder: Path, identifier: str = "probe", name:
     source = PROBE_SOURCES / f"{name}.c"
     subprocess.run([compiler, "-shared", "-fPIC", "-O2", f"-I{HEADERS}", source, "-o", library], check=True)
     with ZipFile(target, "w") as archive:
-        archive.write(PROBE_SOURCES / f"{name}.xml", "modelDescription.xml")
+        description = (PROBE_SOURCES / f"{name}.xml").read_text()
+        archive.writestr("modelDescription.xml", description.replace("<CoSimulation ", f"<CoSimulation {flags} "))
         platform = fmpy.platform if version == 2 else fmpy.platform_tuple
         archive.write(library, f"binaries/{platform}/{identifier}.so")
     return target

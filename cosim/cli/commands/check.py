@@ -97,9 +97,11 @@ def _print_verdict(prepared: PreparedRun, warnings: Sequence[Problem]) -> None:
         click.echo(f"WARNING {problem}", err=True)
     verdict = f"{count_noun(len(warnings), 'warning')}." if warnings else "No warnings."
     times, grid = prepared.settings, prepared.plan.grid
+    rest = grid.end - grid.start - grid.whole_steps * grid.step
+    last = f", the last one of {float(rest):.6g} s" if rest else ""
     click.echo(
         f"\n{prepared.spec.name}: {float(grid.start):g} s ... {float(grid.end):g} s in {count_noun(grid.count, 'step')} of "
-        f"{float(times.step_size):g} s, {count_noun(len(times.columns), 'signal')} recorded. {verdict}"
+        f"{float(times.step_size):g} s{last}, {count_noun(len(times.columns), 'signal')} recorded. {verdict}"
     )
 
 

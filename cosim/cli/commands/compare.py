@@ -3,17 +3,12 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING
 
 import click
 
 from ..completion import complete_scenario
 from ..messages import print_json
 from ..output_options import json_option
-
-if TYPE_CHECKING:
-    from ...api.comparison import ComparisonTask
-    from ...results.comparison import Comparison
 
 
 @click.command()
@@ -54,7 +49,9 @@ def command(
     task = ComparisonTask.read(result, reference, Tolerance(absolute, relative, time), signals)
     comparison = task.compare()
     if plot:
-        _draw_tubes(task, comparison, plot)
+        from ...report.figures import draw_figure, save_figure
+
+        save_figure(draw_figure(task.result, *task.figure()), plot)
     if as_json:
         verdicts = [{**verdict._asdict(), "passed": verdict.passed} for verdict in comparison.verdicts]
         print_json({"passed": comparison.passed, "signals": verdicts})
@@ -63,11 +60,3 @@ def command(
         margin = f"; {share:.0%} of the tolerances would suffice" if share else ""
         click.echo(f"{comparison}{margin}", err=not comparison.passed)
     return 0 if comparison.passed else 3
-
-
-def _draw_tubes(task: ComparisonTask, comparison: Comparison, path: Path) -> None:
-    from ...report.comparison_figure import draw_tubes
-    from ...report.figures import draw_figure, save_figure
-
-    arguments = {"reference": task.reference, "tolerances": task.tolerances, "comparison": comparison}
-    save_figure(draw_figure(task.result, "tubes", draw_tubes, arguments), path)

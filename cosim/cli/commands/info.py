@@ -36,6 +36,9 @@ _USED_CAPABILITIES = {
     "caninterpolateinputs",
     "providesdirectionalderivative",
     "providesdirectionalderivatives",
+    "maxoutputderivativeorder",
+    "haseventmode",
+    "mightreturnearlyfromdostep",
 }
 
 
@@ -71,6 +74,9 @@ def _properties(file: FmuFile) -> dict[str, str]:
         "variable step size": about.variable_step,
         "state can be saved and restored": about.has_state,
         "inputs can be linear within a step": about.interpolates_inputs,
+        "derivatives of outputs": about.gives_output_slopes,
+        "event mode": about.has_event_mode,
+        "early return": about.may_return_early,
         "directional derivatives": about.directional_derivatives,
         "one instance per process": about.once_per_process,
         "needs an external tool": about.needs_execution_tool,

@@ -8,7 +8,7 @@ from .description import DefaultExperiment, FmuDescription
 from .file import FmuFile
 from .fmi1 import Fmi1Instance
 from .fmi2 import Fmi2Instance
-from .fmi3 import Fmi3Instance
+from .fmi3_slave import Fmi3Slave
 from .instance import FmuInstance
 from .instance_settings import InstanceSettings, Method, SolverSettings
 from .isolated import Isolation
@@ -66,7 +66,7 @@ def create_component(
 
         classes: Sequence[type[FmuInstance]] = (Fmi1Model, Fmi2Model, Fmi3Model)
     else:
-        classes = (Fmi1Instance, Fmi2Instance, Fmi3Instance)
+        classes = (Fmi1Instance, Fmi2Instance, Fmi3Slave)
     instance_class = classes[description.major - 1]
     if isolation:
         from .isolated.isolated_fmu import IsolatedFmu

@@ -74,7 +74,10 @@ class FmuDescription:
         initial_dependencies: The same in Initialization Mode.
         directional_derivatives: `providesDirectionalDerivatives`.
         continuous_states: Names of the derivatives by the names of the scalar states, as the model structure lists them.
-        interpolates_inputs: `canInterpolateInputs` of FMI 1.0 and 2.0.
+        interpolates_inputs: `canInterpolateInputs` of FMI 1.0 and 2.0, always true for Model Exchange.
+        gives_output_slopes: `maxOutputDerivativeOrder` is at least 1.
+        has_event_mode: `hasEventMode` of FMI 3.0 Co-Simulation.
+        may_return_early: `mightReturnEarlyFromDoStep` of FMI 3.0 Co-Simulation.
         dimensions: Sizes of the dimensions by name of the variable, a number or the name of a structural parameter; empty unless
             the shape depends on structural parameters.
     """
@@ -106,6 +109,9 @@ class FmuDescription:
     directional_derivatives: bool
     continuous_states: Mapping[str, str]
     interpolates_inputs: bool
+    gives_output_slopes: bool
+    has_event_mode: bool
+    may_return_early: bool
     dimensions: Mapping[str, Sequence[int | str]]
 
     @property
@@ -203,7 +209,10 @@ def build_description(path: Path, examination: Examination, interface: Interface
         _read_dependencies(model, "Output") | _read_dependencies(model, "InitialUnknown"),
         any(attributes.get(name) in _TRUE for name in ("providesDirectionalDerivative", "providesDirectionalDerivatives")),
         _read_continuous_states(model),
-        attributes.get("canInterpolateInputs") in _TRUE,
+        selected == "model-exchange" or (model.major < 3 and attributes.get("canInterpolateInputs") in _TRUE),
+        selected == "co-simulation" and _is_set("maxOutputDerivativeOrder", attributes.get("maxOutputDerivativeOrder", "")),
+        selected == "co-simulation" and attributes.get("hasEventMode") in _TRUE,
+        selected == "co-simulation" and attributes.get("mightReturnEarlyFromDoStep") in _TRUE,
         {name: _read_sizes(model, source) for source in model.variables for name in _names_with_aliases(source)},
     )
 

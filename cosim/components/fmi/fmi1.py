@@ -62,7 +62,7 @@ class Fmi1Instance(FmuInstance):
 
     def exit_initialization_mode(self) -> None:
         """Do nothing in the FMU, which is in step mode since fmiInitializeSlave."""
-        self._deadline_name = "step"
+        self._enter_stepping()
 
     def _prepare_transfers(self, factory: AccessorCallFactory) -> None:
         super()._prepare_transfers(factory)

@@ -1,4 +1,4 @@
-"""FMI 3.0 Co-Simulation instances, without event mode and without early return."""
+"""FMI 3.0 instances: the functions that Co-Simulation and Model Exchange share, and fmi3DoStep."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ MAX_BINARY_SIZE = 1 << 28
 
 _TRUE = ctypes.c_bool.from_param(True)
 #: name of the prepared call that follows fmi3DoStep
-_STEP_FLAGS_CHECK = "fmi3DoStep (returned flags)"
+STEP_FLAGS_CHECK = "fmi3DoStep (returned flags)"
 
 
 class Fmi3Instance(FmuInstance):
@@ -35,9 +35,16 @@ class Fmi3Instance(FmuInstance):
         slave_class: type = FMU3Slave
         return slave_class
 
+    def _instantiation_options(self) -> dict[str, bool]:
+        """Return further arguments of the instantiation."""
+        return {}
+
     def _instantiate_fmu(self, logging_on: bool) -> None:
+        def log(_: Any, status: int, __: Any, text: bytes) -> None:
+            self.log_message(status, text)
+
         try:
-            self._fmu.instantiate(loggingOn=logging_on, logMessage=lambda _, status, __, text: self.log_message(status, text))
+            self._fmu.instantiate(loggingOn=logging_on, logMessage=log, **self._instantiation_options())
         except Exception:
             raise self._instantiation_error() from None
 
@@ -71,29 +78,19 @@ class Fmi3Instance(FmuInstance):
         keep_alive = (self._step_flags, self._last_successful_time)
         return [
             PreparedCall(do_step, arguments, "fmi3DoStep", native, keep_alive),
-            PreparedCall(self._check_step_flags, (), _STEP_FLAGS_CHECK, NativeFlagCheck(flags), keep_alive),
+            PreparedCall(self._check_step_flags, (), STEP_FLAGS_CHECK, NativeFlagCheck(flags), keep_alive),
         ]
 
     def _check_step_flags(self) -> int:
         """Return discard if fmi3DoStep set eventHandlingNeeded, terminateSimulation or earlyReturn."""
         return DISCARD if self._combined_flags.value else OK
 
-    def interpret_status(self, function: str, status: int) -> StepResult:
-        """Return the result of a step that set a flag.
-
-        Raises:
-            ComponentError: For a bad status of any other call.
-        """
-        if function == _STEP_FLAGS_CHECK:
-            return self._step_result()
-        raise self.status_error(function, status)
-
-    def _step_result(self) -> StepResult:
-        """Return the result of the last step; a lastSuccessfulTime that is NaN or before the step is an error."""
-        reached, start = self._last_successful_time.value, self._current_time.value
-        if not reached >= start:
+    def _step_result(self, begin: float) -> StepResult:
+        """Return the result of fmi3DoStep from `begin` (s); a lastSuccessfulTime that is NaN or before it is an error."""
+        reached = self._last_successful_time.value
+        if not reached >= begin:
             reason = f"lastSuccessfulTime is {reached!r} s, expected at least the start of the step"
-            raise ComponentError(self.name, "fmi3DoStep", reason, start)
+            raise ComponentError(self.name, "fmi3DoStep", reason, begin)
         return StepResult(reached, self._step_flags[0], self._step_flags[1])
 
     # FMPy's own methods fail on null pointers, on texts that are not UTF-8 and on sizes beyond the available memory

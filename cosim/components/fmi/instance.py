@@ -58,11 +58,12 @@ class FmuInstance(FunctionCaller, Component):
         self.shared_code = file
         self.description = file.description.with_structural_parameters(settings.structural_parameters, file.limits)
         self.variables = self.description.variables
-        self.has_state = self.description.has_state
+        self.has_state, self.variable_step = self.description.has_state, self.description.variable_step
         self.continuous_states = self.description.continuous_states
         self.dependencies = self.description.dependencies
         self.initial_dependencies = self.description.initial_dependencies
         self.interpolates_inputs = self.description.interpolates_inputs
+        self.gives_output_slopes = self.description.gives_output_slopes
         self._variables_by_name = {variable.name: variable for variable in self.variables}
         self._is_instantiated, self._has_acquired_file = False, False
         #: registration of the logger of FMI 1.0 and 2.0
@@ -139,8 +140,13 @@ class FmuInstance(FunctionCaller, Component):
     def _prepare_transfers(self, factory: AccessorCallFactory) -> None:
         """Prepare the calls that transfer the bound arrays."""
         self._set_calls = factory.prepare("Set", self._inputs, self._set_object, lambda v: not v.derivative_of)
-        self._slope_calls = factory.prepare("Set", self._inputs, self._set_object, lambda v: bool(v.derivative_of))
-        self._get_calls = factory.prepare("Get", self._outputs, self._get_object)
+        self._slope_calls = self._prepare_input_slopes(factory)
+        self._get_calls = factory.prepare("Get", self._outputs, self._get_object, lambda v: not v.derivative_of)
+        self._output_slope_calls = factory.prepare("Get", self._outputs, self._get_object, lambda v: bool(v.derivative_of))
+
+    def _prepare_input_slopes(self, factory: AccessorCallFactory) -> list[PreparedCall]:
+        """Prepare the calls that set the time derivatives of inputs."""
+        return factory.prepare("Set", self._inputs, self._set_object, lambda v: bool(v.derivative_of))
 
     def _copy_fmpy_slave(self, folder: Path) -> Any:
         """Return FMPy's slave object for this instance, a copy because creating one takes milliseconds."""
@@ -180,7 +186,12 @@ class FmuInstance(FunctionCaller, Component):
     def exit_initialization_mode(self) -> None:
         """Call fmi*ExitInitializationMode."""
         self.call_function("exitInitializationMode")
+        self._enter_stepping()
+
+    def _enter_stepping(self) -> None:
+        """From now on calls have the deadline of steps, and outputs have time derivatives."""
         self._deadline_name = "step"
+        self._get_calls = [*self._get_calls, *self._output_slope_calls]
 
     def terminate(self) -> None:
         """Call fmi*Terminate, unless an instance of the FMU has returned fatal."""

@@ -51,7 +51,8 @@ class Column:
 class RowsHeader:
     """Layout of the rows of an unfinished run.
 
-    Row k belongs to communication point n = k * `steps_per_row`. Its time is (`origin` + n * `stride`) / `denominator` (s).
+    Row k belongs to communication point n = k * `steps_per_row`. Its time is (`origin` + n * `stride`) / `denominator` (s); that
+    of the last point is `end`, because the last step may be shorter.
 
     Attributes:
         origin: See above.
@@ -62,6 +63,8 @@ class RowsHeader:
         columns: Numeric signals.
         calls: Component and function of each call, by the number in the marker.
         texts: String signals, each with its index among all signals.
+        last_point: Number of the last communication point; -1: unknown.
+        end: Time of the last communication point (s).
     """
 
     origin: int
@@ -72,6 +75,8 @@ class RowsHeader:
     columns: Sequence[Column]
     calls: Sequence[tuple[str, str]]
     texts: Sequence[tuple[int, str]]
+    last_point: int = -1
+    end: float = 0.0
 
     @property
     def names(self) -> list[str]:
@@ -101,7 +106,7 @@ class RowsHeader:
 
     def time_at(self, n: int) -> float:
         """Return the time of communication point n (s)."""
-        return (self.origin + n * self.stride) / self.denominator
+        return self.end if n == self.last_point else (self.origin + n * self.stride) / self.denominator
 
     def times(self, rows: int) -> np.ndarray:
         """Return the times of the first `rows` rows (s), shape (rows,)."""
@@ -109,7 +114,10 @@ class RowsHeader:
 
         start, step = Fraction(self.origin, self.denominator), Fraction(self.stride, self.denominator)
         grid = TimeGrid(start, step, rows * self.steps_per_row, self.denominator, self.origin, self.stride)
-        return grid.times(range(0, rows * self.steps_per_row, self.steps_per_row))
+        times = grid.times(range(0, rows * self.steps_per_row, self.steps_per_row))
+        if rows and (rows - 1) * self.steps_per_row == self.last_point:
+            times[-1] = self.end
+        return times
 
 
 def read_header(folder: Path | None) -> RowsHeader | None:

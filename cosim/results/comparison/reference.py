@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+import math
+from collections import defaultdict
+from collections.abc import Mapping
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +22,8 @@ from .tube import Tolerance
 MAX_ROW_DISTANCE = 64
 #: fraction of the tolerances that the run itself may deviate from its reference
 TOLERANCE_FRACTION = 0.25
+#: fraction of the half width of a tube to which values are rounded
+ROUNDING_FRACTION = 0.01
 
 _PROVENANCE_KEYS = ("versions", "machine", "sha256")
 
@@ -31,26 +36,35 @@ def decimate(result: Result, tolerances: Mapping[str, Tolerance]) -> Result:
         tolerances: Tolerance by pattern of signals, see `compare`.
 
     Returns:
-        The matching signals at the selected rows.
+        The matching signals at the selected rows, rounded to about a hundredth of their tolerances.
 
     Raises:
         CheckError: The run cannot be a reference: a pattern matches no signal, or a value is not finite.
     """
     selected = match_tolerances(tolerances, list(result))
-    whole = _select_rows(np.arange(len(result.time)), result, selected)
+    rounded = {name: _round(result[name], tolerance) for name, tolerance in selected.items()}
+    source = Result(Recording(result.time, rounded, {name: result.units[name] for name in selected}))
+    whole = _select_rows(np.arange(len(result.time)), source)
     comparison = compare(result, whole, tolerances)
     if not comparison.passed:
         raise CheckError(f"this run is no reference: {comparison}")
     rows = np.unique(np.append(np.arange(0, len(result.time), MAX_ROW_DISTANCE), len(result.time) - 1))
-    while (outside := _find_rows_outside(result, reference := _select_rows(rows, result, selected), selected, rows)).size:
+    while (outside := _find_rows_outside(result, reference := _select_rows(rows, source), selected, rows)).size:
         gaps = np.searchsorted(rows, outside) - 1
         rows = np.union1d(rows, (rows[gaps] + rows[gaps + 1]) // 2)
     return reference
 
 
-def _select_rows(rows: np.ndarray, result: Result, names: Iterable[str]) -> Result:
-    columns = {name: result[name][rows] for name in names}
-    return Result(Recording(result.time[rows], columns, {name: result.units[name] for name in names}))
+def _round(values: np.ndarray, tolerance: Tolerance) -> np.ndarray:
+    """Round floating-point values to the decimal place below a hundredth of the tolerance; keep all others."""
+    half_width = tolerance.half_width(values) if values.dtype.kind == "f" else 0.0
+    if not 0 < half_width < math.inf:
+        return values
+    return np.round(values, -math.floor(math.log10(ROUNDING_FRACTION * half_width))) + 0.0  # no negative zeros
+
+
+def _select_rows(rows: np.ndarray, result: Result) -> Result:
+    return Result(Recording(result.time[rows], {name: result[name][rows] for name in result}, dict(result.units)))
 
 
 def _find_rows_outside(result: Result, reference: Result, tolerances: Mapping[str, Tolerance], rows: np.ndarray) -> np.ndarray:
@@ -86,8 +100,25 @@ def write_reference(result: Result, path: Path, tolerances: Mapping[str, Toleran
     reference = decimate(result, tolerances)
     reference.to_csv(path)
     about = {"name": result.metadata.get("name"), "signals": len(reference), "rows": len(reference.time)}
-    write_json({**about, **{key: result.metadata.get(key) for key in _PROVENANCE_KEYS}}, path.with_suffix(".json"))
+    write_json({**about, **_provenance(result.metadata)}, path.with_suffix(".json"))
     return reference
+
+
+def _provenance(metadata: Mapping[str, Any]) -> dict[str, Any]:
+    """Return the versions, machine and hashes of `run.json`, with one hash for the Python files of a folder."""
+    provenance = {key: metadata.get(key) for key in _PROVENANCE_KEYS}
+    return {**provenance, "sha256": _join_modules(metadata.get("sha256") or {})}
+
+
+def _join_modules(hashes: Mapping[str, str]) -> dict[str, str]:
+    folders: dict[str, list[str]] = defaultdict(list)
+    for name in sorted(hashes):
+        folder = name.rpartition("/")[0]
+        folders[f"{folder}/*.py".lstrip("/") if name.endswith(".py") else name].append(f"{name} {hashes[name]}\n")
+    return {
+        folder: sha256("".join(lines).encode()).hexdigest() if folder not in hashes else hashes[folder]
+        for folder, lines in sorted(folders.items())
+    }
 
 
 def describe_provenance_changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
@@ -97,9 +128,9 @@ def describe_provenance_changes(before: Mapping[str, Any], after: Mapping[str, A
         before: Provenance of the reference, as in its JSON file.
         after: Metadata of the run.
     """
-    changes = []
+    changes, now = [], _provenance(after)
     for key in _PROVENANCE_KEYS:
-        old, new = before.get(key), after.get(key) or {}
+        old, new = before.get(key), now[key] or {}
         old = old if isinstance(old, dict) else {}
         names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
         changes += [name if key == "sha256" else f"{name} {old.get(name)} -> {new.get(name)}" for name in names]

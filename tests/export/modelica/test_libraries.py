@@ -108,6 +108,14 @@ def test_a_folder_may_be_a_library_itself(model, library):
     assert found(model(), library / "Blocks", library / "Constants 1.0") == ["Blocks 2.1.0", "Constants 1.0"]
 
 
+def test_a_record_in_a_file_of_its_own_is_found_by_its_name(library, tmp_path):
+    write(library, {"Phasor.mo": "record Phasor\n  Real re;\n  Real im;\nend Phasor;\n"})
+    text = (
+        "model Rotation\n  input Real u;\n  output Real y;\n  Phasor p = Phasor(u, 0);\nequation\n  y = 2*p.re;\nend Rotation;\n"
+    )
+    assert gain_of(write(tmp_path / "model", {"Rotation.mo": text}) / "Rotation.mo", library) == 2
+
+
 def test_the_required_version_is_selected(model, library):
     write(
         library,

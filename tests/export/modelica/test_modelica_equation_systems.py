@@ -202,3 +202,78 @@ end Largest;""")
         assert model.get("y") == pytest.approx(2 * max(1 + time, 2 - time), abs=1e-9)
         if abs(time - 0.5) > 1e-6:
             assert model.get("rate") == (2 if time > 0.5 else -2)
+
+
+def test_homotopy_leads_from_the_solution_of_the_simplified_equation_to_the_actual_one(compile_both):
+    """Newton's method alone finds the root -2 of x^2 = 4 from the start value -3."""
+    model = compile_both("""model Root
+  input Real u;
+  output Real x(start = -3);
+equation
+  0 = homotopy(x*x - 4 - u, x - 3);
+end Root;""")
+    model.initialize()
+    assert model.get("x") == pytest.approx(2, rel=1e-12)
+    model.set(u=5.0)
+    model.step(0.0)
+    assert model.get("x") == pytest.approx(3, rel=1e-12)
+
+
+def test_a_steady_state_start_follows_homotopy(compile_both):
+    """The state balances atan(8 (x - 3)) + x/10 = 0; at the start value 0 the arc tangent is nearly constant."""
+    model = compile_both("""model Steady
+  Real x(start = 0);
+  output Real y;
+initial equation
+  der(x) = 0;
+equation
+  der(x) = -homotopy(atan(8*(x - 3)) + 0.1*x, x - 2);
+  y = x;
+end Steady;""")
+    model.initialize()
+    x = model.get("y")
+    assert math.atan(8 * (x - 3)) + 0.1 * x == pytest.approx(0, abs=1e-10)
+    model.step(0.0)
+    assert model.get("y") == pytest.approx(x, abs=1e-9)
+
+
+def test_inertias_joined_by_a_gear_have_one_degree_of_freedom(compile_both):
+    """A torque on the first inertia (2 kg.m2) also accelerates the second one (3 kg.m2) behind a gear with the ratio 4."""
+    model = compile_both("""model Gear
+  input Real tau;
+  output Real w;
+  output Real phi(start = 0.5);
+  Real behind, speed_behind, torque;
+equation
+  der(phi) = w;
+  der(behind) = speed_behind;
+  2*der(w) = tau - torque;
+  3*der(speed_behind) = 4*torque;
+  phi = 4*behind;
+end Gear;""")
+    model.initialize()
+    model.set(tau=1.0)
+    for k in range(100):
+        model.step(k * 0.01)
+    assert model.get("w") == pytest.approx(1 / (2 + 3 / 16), rel=1e-12)
+
+
+def test_a_nonlinear_constraint_between_states_is_refused_by_their_names(write_model):
+    path = write_model("""model Pendulum
+  output Real x(start = 1), y(start = 0);
+  Real vx, vy, f;
+equation
+  der(x) = vx;
+  der(y) = vy;
+  der(vx) = f*x;
+  der(vy) = f*y - 9.81;
+  x^2 + y^2 = 1;
+end Pendulum;""")
+    with pytest.raises(InputError, match=r"Pendulum.mo:9: this equation relates the states x, y, and it is not linear in x"):
+        load_block(path)
+
+
+def test_the_derivative_of_an_input_is_refused_by_its_name(write_model):
+    path = write_model("block M\n  input Real u;\n  output Real y;\n  Real x = 2*u;\nequation\n  y = der(x);\nend M;")
+    with pytest.raises(InputError, match=r"M.mo:2: the derivative of the input u is needed; filter the input"):
+        load_block(path)

@@ -5,6 +5,8 @@ C and interpreter are compared bit for bit, both with references written by hand
 
 from __future__ import annotations
 
+import pytest
+
 
 def test_continuous_equations_are_sorted_across_components(compile_both):
     model = compile_both("""model M
@@ -192,3 +194,54 @@ end M;""")
     model.step(0.0)
     model.initialize()
     assert model.get("x") == 4.0
+
+
+def test_record_constructors_and_functions_with_records(compile_both):
+    model = compile_both("""model M
+  record Phasor
+    Real re;
+    Real im;
+  end Phasor;
+  function product
+    input Phasor a;
+    input Phasor b;
+    output Phasor c;
+  algorithm
+    c := Phasor(a.re*b.re - a.im*b.im, a.re*b.im + a.im*b.re);
+  end product;
+  function square
+    input Phasor a;
+    output Real size;
+  protected
+    Phasor c;
+  algorithm
+    c := product(a, Phasor(a.re, -a.im));
+    size := c.re;
+  end square;
+  input Real u;
+  input Real v;
+  output Real re;
+  output Real im;
+  output Real size;
+  Phasor p;
+  Phasor q = product(p, Phasor(2, u));
+equation
+  p = Phasor(u, v);
+  re = q.re;
+  im = q.im;
+  size = square(q);
+end M;""")
+    for _, inputs in model.simulate(20):
+        p = complex(inputs["u"], inputs["v"])
+        expected = p * complex(2, inputs["u"])
+        assert complex(model.get("re"), model.get("im")) == pytest.approx(expected, rel=1e-14)
+        assert model.get("size") == pytest.approx(abs(expected) ** 2, rel=1e-13)
+
+
+def test_a_declared_value_of_an_input_is_its_start_value(compile_both):
+    model = compile_both("model M\n  input Real u = 2.5;\n  output Real y = 2*u;\nend M;")
+    model.initialize()
+    assert model.get("y") == 5
+    model.set(u=3.0)
+    model.step(0.0)
+    assert model.get("y") == 6

@@ -133,3 +133,42 @@ end M;""")
     assert (model.get("n"), model.get("k")) == (4, 0)
     model.step(0.0, 0.02)
     assert (model.get("n"), model.get("k")) == (4, 8)
+
+
+def test_an_edge_of_a_component_input_starts_a_delay(compile_both):
+    model = compile_both("""model M
+  block OnDelay
+    input Boolean u;
+    output Boolean y;
+  protected
+    Boolean waiting(start = false, fixed = true);
+    discrete Real t_next;
+  initial equation
+    pre(u) = false;
+    pre(t_next) = time - 1;
+  algorithm
+    when initial() then
+      waiting := u;
+      t_next := time - 1;
+    elsewhen u then
+      waiting := true;
+      t_next := time + 0.025;
+    elsewhen not u then
+      waiting := false;
+      t_next := time - 1;
+    end when;
+  equation
+    y = waiting and time >= t_next;
+  end OnDelay;
+  input Boolean u;
+  output Boolean y = delay.y;
+  OnDelay delay(u = u);
+end M;""")
+    model.initialize()
+    levels = [False, True, True, True, True, True, False, True, True, False]
+    outputs = []
+    for k, level in enumerate(levels):
+        model.set(u=level)
+        model.step(0.01 * k)
+        outputs.append(model.get("y"))
+    assert outputs == [False, False, False, True, True, True, False, False, False, False]

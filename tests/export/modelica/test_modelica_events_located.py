@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import math
+import re
 
 import numpy as np
 import pytest
 
 from cosim.core.errors import ComponentError
+from cosim.export.modelica.causality import hybrid_interpreter
 
 BALL = """model Ball
   parameter Real e = 0.8;
@@ -161,8 +163,8 @@ equation
 end Endless;""")
     model.initialize()
     model.set(u=1.0)
-    assert model.c.step(0.0, 0.01) == "the event iteration does not end"
-    with pytest.raises(ComponentError, match="the event iteration does not end"):
+    assert model.c.step(0.0, 0.01) == "the event iteration does not end: b changes in each evaluation (Endless.mo:2)"
+    with pytest.raises(ComponentError, match="the event iteration does not end: b changes in each evaluation"):
         model.python.step(0.0, 0.01)
 
 
@@ -194,3 +196,37 @@ end Rounded;""")
         0.45 * (quotient - np.trunc(quotient)),
     ]
     assert list(model.get("y")) == pytest.approx([values.mean() for values in expected], abs=2e-6)
+
+
+def test_chattering_is_a_failure_that_names_the_relation(compile_both, monkeypatch):
+    monkeypatch.setattr(hybrid_interpreter, "MAX_EVENTS", 20)
+    model = compile_both("""model Relay
+  Real x(start = 0, fixed = true);
+  output Real y;
+  input Real u;
+equation
+  der(x) = if x > u then -1 else 1;
+  y = x;
+end Relay;""")
+    model.set(u=0.1)
+    model.initialize()
+    expected = "too many events in one step (chattering): x > u changes again and again"
+    assert model.c.step(0.0, 0.2) == f"{expected} (Relay.mo:6)"
+    with pytest.raises(ComponentError, match=re.escape(expected)):
+        model.python.step(0.0, 0.2)
+
+
+def test_temporary_values_of_equations_and_relations_do_not_collide(compile_both):
+    model = compile_both("""model Temporaries
+  parameter Real k = 2;
+  parameter Real a[3] = {1, 3, 4};
+  Real x[2](start = {1, 2}, each fixed = true);
+  output Real y;
+equation
+  der(x) = -k*x;
+  y = (a[2:3] - k*a[1:2])*x + (if k*x[1]*x[2] > 0.5 then 1 else 0);
+end Temporaries;""")
+    model.initialize()
+    for n in range(100):
+        model.step(n * 0.01)
+    assert model.get("y") == pytest.approx((1 - 2 * 2) * math.exp(-2), abs=1e-8)

@@ -60,7 +60,7 @@ def test_a_shipped_controller_can_replace_itself_in_a_scenario(name, tmp_path):
 
 
 def test_a_scenario_without_the_role_is_not_written(tmp_path):
-    role = read_role("usv_autopilot")
+    role = read_role("vessel_autopilot")
     candidate = parse_source(str(min(role.controllers)))
     scenario = ROOT / "scenarios/demo3_inverse_kinematics.json"
     assert ControllerSubstitution(role, candidate, read_interface(candidate), scenario).write(tmp_path) is None
@@ -68,7 +68,7 @@ def test_a_scenario_without_the_role_is_not_written(tmp_path):
 
 
 def test_other_json_is_skipped_and_an_invalid_scenario_is_refused(tmp_path):
-    role = read_role("usv_autopilot")
+    role = read_role("vessel_autopilot")
     candidate = parse_source(str(min(role.controllers)))
     shape = read_interface(candidate)
     (tmp_path / "data.json").write_text('{"checks": []}')
@@ -176,19 +176,19 @@ def candidate_of(inputs=(), outputs=(), parameters=()):
     ],
 )
 def test_an_unsuitable_interface_is_refused(found, message):
-    assert message in interface_problems(read_role("usv_autopilot"), found)[0].message
+    assert message in interface_problems(read_role("vessel_autopilot"), found)[0].message
 
 
 def test_an_unknown_parameter_is_refused():
     found = candidate_of(outputs=["thrust", "rudder_angle"], parameters=["heading_P", "waypoint_x[1]"])
-    (problem,) = interface_problems(read_role("usv_autopilot"), found, ["heading_p", "waypoint_x", "heading_P"])
+    (problem,) = interface_problems(read_role("vessel_autopilot"), found, ["heading_p", "waypoint_x", "heading_P"])
     assert problem.message == 'the controller has no variable "heading_p"; did you mean "heading_P"?'
 
 
 @pytest.mark.parametrize(
     ("function", "text", "message"),
     [
-        (read_role, "usv_autopilo", 'there is no role "usv_autopilo"; did you mean "usv_autopilot"?'),
+        (read_role, "vessel_autopilo", 'there is no role "vessel_autopilo"; did you mean "vessel_autopilot"?'),
         (read_role, "captain", 'there is no role "captain"; valid: uav_altitude, '),
         (parse_source, "none.fmu", 'there is no file "none.fmu"'),
         (parse_source, "lazy.json:Pilot", "expected my.fmu, my.py:Class, my.mo:Model or a nested system my.json"),

@@ -62,9 +62,11 @@ class IsolatedFmu(WorkerClient, Component):
         self._instance_class, self.isolation = instance_class, isolation
         self.description = file.description.with_structural_parameters(settings.structural_parameters, file.limits)
         self.variables, self.has_state = self.description.variables, self.description.has_state
+        self.variable_step = self.description.variable_step
         self.dependencies, self.initial_dependencies = self.description.dependencies, self.description.initial_dependencies
         self.continuous_states = self.description.continuous_states
         self.interpolates_inputs = self.description.interpolates_inputs
+        self.gives_output_slopes = self.description.gives_output_slopes
         self._variables_by_name = {variable.name: variable for variable in self.variables}
         self._settings = settings
         self._temporary_folder: LockedFolder | None = None

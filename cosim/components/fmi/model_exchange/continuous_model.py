@@ -10,6 +10,7 @@ import numpy as np
 
 from ....core.component import SUCCESS_STATUSES
 from ..c_functions import FunctionTable, as_pointer, as_size
+from .linear_inputs import LinearInputs
 
 
 class IntegrationError(Exception):
@@ -41,10 +42,18 @@ class ContinuousModel:
         nominals: Nominal values of the states, shape (state_count,).
         indicators: Event indicators, shape (indicator_count,).
         needs_completed_step: The FMU requires fmi*CompletedIntegratorStep.
+        linear_inputs: Inputs that are set whenever the time is set.
     """
 
     def __init__(
-        self, major: int, library: FunctionTable, handle: int, names: Mapping[str, str], counts: tuple[int, int], completes: bool
+        self,
+        major: int,
+        library: FunctionTable,
+        handle: int,
+        names: Mapping[str, str],
+        counts: tuple[int, int],
+        completes: bool,
+        linear_inputs: LinearInputs,
     ):
         """Prepare the calls.
 
@@ -53,15 +62,17 @@ class ContinuousModel:
             library: C functions of the FMU's library.
             handle: Address of the FMU instance.
             names: Names of the C functions by role: set_time, set_states, get_states, get_derivatives, get_indicators,
-                get_nominals, complete_step.
+                get_nominals, complete_step, set_inputs.
             counts: Numbers of continuous states and of event indicators.
             completes: The FMU requires fmi*CompletedIntegratorStep.
+            linear_inputs: Inputs that change linearly within a communication step.
         """
         state_count, indicator_count = counts
         self.major, self.library, self.handle, self.functions = major, library, handle, names
         self.states, self.derivatives = np.zeros(state_count), np.zeros(state_count)
         self.nominals, self.indicators = np.ones(state_count), np.zeros(indicator_count)
-        self.needs_completed_step = completes
+        self.needs_completed_step, self.linear_inputs = completes, linear_inputs
+        linear_inputs.prepare(major, library, handle, names["set_inputs"])
         self._instance, self._set_time = as_pointer(handle), library[names["set_time"]]
         self.get_states = self._array_call("get_states", self.states)
         self.set_states = self._array_call("set_states", self.states)
@@ -75,8 +86,13 @@ class ContinuousModel:
         self._completion_arguments = (self._instance, *no_set_state, *addresses[: 1 if major == 1 else 2])
 
     def is_called(self, role: str) -> bool:
-        """Return whether the function of a role is needed: not without states, indicators or required completion."""
-        needed = {"set_time": True, "complete_step": self.needs_completed_step, "get_indicators": len(self.indicators) > 0}
+        """Return whether the function of a role is needed: not without states, indicators, inputs or required completion."""
+        needed = {
+            "set_time": True,
+            "complete_step": self.needs_completed_step,
+            "get_indicators": len(self.indicators) > 0,
+            "set_inputs": len(self.linear_inputs.references) > 0,
+        }
         return needed.get(role, len(self.states) > 0)
 
     def _array_call(self, role: str, values: np.ndarray, is_optional: bool = False) -> Callable[[], None]:
@@ -97,10 +113,13 @@ class ContinuousModel:
         return call
 
     def set_time(self, time: float) -> None:
-        """Set the time (s)."""
+        """Set the time (s), and the linear inputs to their values at this time."""
         status = self._set_time(self._instance, ctypes.c_double(time))
         if status not in SUCCESS_STATUSES:
             raise IntegrationError(self.functions["set_time"], status)
+        status = self.linear_inputs.set(time)
+        if status not in SUCCESS_STATUSES:
+            raise IntegrationError(self.functions["set_inputs"], status)
 
     def check_indicators(self, indicators: np.ndarray) -> None:
         """Raise an IntegrationError if an event indicator is NaN, because its events would be missed."""

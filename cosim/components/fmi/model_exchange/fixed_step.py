@@ -25,7 +25,7 @@ except ImportError:  # installed without a C compiler
 #: number of evaluations of the right-hand side per step, by method
 STAGES: Mapping[Method, int] = {"euler": 1, "rk4": 4}
 #: roles of the functions by their number in `_fixed_step.c`
-_ROLES: Sequence[str] = ("set_time", "set_states", "get_derivatives", "get_indicators", "complete_step")
+_ROLES: Sequence[str] = ("set_time", "set_states", "get_derivatives", "get_indicators", "complete_step", "set_inputs")
 #: relative to the substep: a time event so close after its end is reached
 _TIME_TOLERANCE = 1e-9
 #: status of a call that returned an event indicator which is NaN
@@ -38,12 +38,18 @@ class FixedStepState(ctypes.Structure):
     _fields_ = (
         [("instance", ctypes.c_void_p)]
         + [(role, ctypes.c_void_p) for role in _ROLES]
-        + [(name, ctypes.c_int64) for name in ("version", "stages", "state_count", "indicator_count")]
+        + [
+            (name, ctypes.c_int64)
+            for name in ("version", "stages", "state_count", "indicator_count", "reference_count", "input_count")
+        ]
         + [
             (name, ctypes.c_void_p)
-            for name in ("states", "derivatives", "start_states", "sum", "indicators", "previous_indicators")
+            for name in (
+                *("states", "derivatives", "start_states", "sum", "indicators", "previous_indicators"),
+                *("input_references", "input_array", "input_indices", "input_slopes", "input_values"),
+            )
         ]
-        + [(name, ctypes.c_double) for name in ("next_event_time", "substep_size", "time")]
+        + [(name, ctypes.c_double) for name in ("next_event_time", "substep_size", "time", "begin")]
         + [(name, ctypes.c_int64) for name in ("substeps", "next_substep", "event", "status", "failed_function")]
     )
 
@@ -71,6 +77,10 @@ class FixedStepIntegrator(Integrator):
         state.states, state.derivatives = model.states.ctypes.data, model.derivatives.ctypes.data
         state.start_states, state.sum = self._start_states.ctypes.data, self._sum.ctypes.data
         state.indicators, state.previous_indicators = model.indicators.ctypes.data, self._previous_indicators.ctypes.data
+        inputs = model.linear_inputs
+        state.reference_count, state.input_count = len(inputs.references), len(inputs.indices)
+        for name in ("references", "array", "indices", "slopes", "values"):
+            setattr(state, f"input_{name}", getattr(inputs, name).ctypes.data)
 
     @property
     def time(self) -> float:
@@ -119,6 +129,7 @@ class FixedStepIntegrator(Integrator):
     def _advance_in_python(self, current_time: ctypes.c_double, step_size: float) -> int:
         """Make the operations of `advance` in `_fixed_step.c`, in the same order."""
         state, model, time = self._state, self._model, current_time.value
+        model.linear_inputs.begin = time
         try:
             while (n := state.next_substep) < state.substeps:
                 begin = time + n * state.substep_size

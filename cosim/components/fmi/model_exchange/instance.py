@@ -3,31 +3,22 @@
 from __future__ import annotations
 
 import ctypes
-import math
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from functools import cached_property
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from ....core.component import PreparedCall, StepResult, Variable
+from ....core.component import PreparedCall, StepResult
 from ....core.errors import ComponentError
-from ....core.system import FLOAT_TYPES
 from ..accessor_calls import AccessorCallFactory
+from ..event_mode import MAX_EVENTS_PER_STEP, EventModeInstance
 from ..file import FmuFile
 from ..function_calls import OK
-from ..instance import FmuInstance
 from ..instance_settings import InstanceSettings
 from .continuous_model import ContinuousModel, IntegrationError
 from .fixed_step import FixedStepIntegrator
 from .integrator import EventKind, Integrator
+from .linear_inputs import LinearInputs
 from .variable_step import VariableStepIntegrator
-
-#: largest number of calls of fmi*NewDiscreteStates or fmi3UpdateDiscreteStates at one event
-MAX_EVENT_ITERATIONS = 1000
-#: largest number of events in one communication step
-MAX_EVENTS_PER_STEP = 10_000
 
 
 class ModelState(NamedTuple):
@@ -38,13 +29,12 @@ class ModelState(NamedTuple):
     next_event_time: float
 
 
-class ModelExchangeInstance(FmuInstance):
+class ModelExchangeInstance(EventModeInstance):
     """Base of the Model Exchange instances; the other base of a subclass is the Co-Simulation instance of the FMI version."""
 
     #: names of the C functions by role, see `ContinuousModel`
     _function_names: Mapping[str, str]
-    #: name of FMPy's method that updates the discrete states
-    _update_method: str
+    _continue_method = "enterContinuousTimeMode"
 
     def __init__(self, file: FmuFile, instance_name: str, settings: InstanceSettings):
         """Create the component; see `create_component`.
@@ -54,9 +44,6 @@ class ModelExchangeInstance(FmuInstance):
         """
         super().__init__(file, instance_name, settings)
         self._integrator: Integrator | None = None
-        self._next_event_time, self._terminates = math.inf, False
-        #: values of all bound inputs, and of those that change only at events, in the last step
-        self._last_inputs: tuple[Any, Any] = (None, None)
         self._integration_call: PreparedCall | None = None
         self._step_duration = 0.0
 
@@ -64,19 +51,19 @@ class ModelExchangeInstance(FmuInstance):
 
     def _prepare_transfers(self, factory: AccessorCallFactory) -> None:
         super()._prepare_transfers(factory)
-        self._continuous_calls = factory.prepare("Set", self._inputs, self._set_object, _is_continuous)
-        self._discrete_calls = factory.prepare("Set", self._inputs, self._set_object, lambda v: not _is_continuous(v))
+        self._linear_inputs = LinearInputs(self._inputs, self.description.value_references)
+
+    def _prepare_input_slopes(self, _factory: AccessorCallFactory) -> list[PreparedCall]:
+        """Return no calls: the importer itself computes the values of linear inputs."""
+        return []
 
     def exit_initialization_mode(self) -> None:
         """Call fmi*ExitInitializationMode, iterate the initial event and enter Continuous-Time Mode."""
         super().exit_initialization_mode()
-        self._iterate_event()
-        if self._terminates:
-            reason = "the FMU requested termination in the initial event"
-            raise ComponentError(self.name, self._full_name(self._update_method), reason, self._current_time.value)
+        self._iterate_initial_event()
         names = {role: self._c_prefix + name for role, name in self._function_names.items()}
         counts, completes = self._count_states(), self.description.needs_completed_step
-        model = ContinuousModel(self.major, self._fmu.functions, self._handle, names, counts, completes)
+        model = ContinuousModel(self.major, self._fmu.functions, self._handle, names, counts, completes, self._linear_inputs)
         self._integrator = self._create_integrator(model)
         self._restart(self._current_time.value)
 
@@ -99,46 +86,18 @@ class ModelExchangeInstance(FmuInstance):
 
     # -- events ----------------------------------------------------------------------------------------------------------
 
-    def _iterate_event(self) -> None:
-        """Update the discrete states until they are consistent, and enter Continuous-Time Mode.
+    @property
+    def _is_stepping(self) -> bool:
+        return self._integrator is not None
 
-        Raises:
-            ComponentError: A call failed, or the iteration did not end.
-        """
-        for _ in range(MAX_EVENT_ITERATIONS):
-            again, terminate, has_next, next_time = self._update_discrete_states()
-            if has_next and math.isnan(next_time):
-                reason = "the next time event is at NaN, expected a time in seconds"
-                raise ComponentError(self.name, self._full_name(self._update_method), reason, self._current_time.value)
-            self._next_event_time = next_time if has_next else math.inf
-            if terminate:
-                self._terminates = True
-                return
-            if not again:
-                self._enter_mode("enterContinuousTimeMode")
-                return
-        reason = f"the event iteration did not end after {MAX_EVENT_ITERATIONS} calls"
-        raise ComponentError(self.name, self._full_name(self._update_method), reason, self._current_time.value)
-
-    def _update_discrete_states(self) -> tuple[bool, bool, bool, float]:
-        """Update the discrete states once.
-
-        Returns:
-            Another update is needed, termination is requested, there is a next time event, and its time (s).
-        """
-        again, terminate, _, _, has_next, next_time = self.call_function(self._update_method)
-        return again, terminate, has_next, next_time
-
-    def _enter_mode(self, method: str) -> None:
-        """Enter Event Mode or Continuous-Time Mode by FMPy's method."""
-        self.call_function(method)
+    def _continuous_inputs_changed(self) -> None:
+        assert self._integrator is not None
+        self._integrator.inputs_changed()
 
     def _handle_event(self, change: Callable[[], object] = lambda: None) -> None:
         """Handle an event at the present time of the integration; `change` sets variables in Event Mode."""
         assert self._integrator is not None
-        self._enter_mode("enterEventMode")
-        change()
-        self._iterate_event()
+        super()._handle_event(change)
         if not self._terminates:
             self._restart(self._integrator.time)
 
@@ -157,52 +116,6 @@ class ModelExchangeInstance(FmuInstance):
             if error.status is None:
                 raise ComponentError(self.name, error.function, error.reason, self._current_time.value) from None
             raise self.status_error(error.function, error.status) from None
-
-    # -- inputs ----------------------------------------------------------------------------------------------------------
-
-    def set(self, name: str, value: Any) -> None:
-        """Set a variable; after the initialization, everything but continuous inputs is set in Event Mode."""
-        variable = self._variables_by_name[name]
-        if self._integrator is None:
-            super().set(name, value)
-        elif variable.causality == "input" and _is_continuous(variable):
-            super().set(name, value)
-            self._integrator.inputs_changed()
-        else:
-            self._handle_event(lambda: super(ModelExchangeInstance, self).set(name, value))
-
-    def set_inputs(self) -> None:
-        """Set all bound inputs, discrete ones in Event Mode if they have changed."""
-        if self._integrator is None:
-            super().set_inputs()
-        else:
-            self._apply_inputs()
-
-    def _apply_inputs(self) -> int:
-        """Set the bound inputs that have changed since the last step; discrete ones at an event."""
-        assert self._integrator is not None
-        discrete = [array[index].tolist() for array, index in self._discrete_elements]
-        now = ([array.tolist() for array in self._inputs.arrays.values()], discrete)
-        if now == self._last_inputs:
-            return OK
-        self._integrator.inputs_changed()
-        if discrete == self._last_inputs[1]:
-            self._execute_calls(self._continuous_calls)
-        else:
-            self._handle_event(lambda: self._execute_calls([*self._continuous_calls, *self._discrete_calls]))
-        self._last_inputs = now
-        return OK
-
-    @cached_property
-    def _discrete_elements(self) -> list[tuple[np.ndarray, slice]]:
-        """Array and elements of each bound input that changes only at events."""
-        elements, begins = [], dict.fromkeys(self._inputs.arrays, 0)
-        for variable in self._inputs.variables:
-            begin = begins[variable.dtype]
-            begins[variable.dtype] += len(variable.scalar_names)
-            if not _is_continuous(variable):
-                elements.append((self._inputs.arrays[variable.dtype], slice(begin, begins[variable.dtype])))
-        return elements
 
     # -- steps -----------------------------------------------------------------------------------------------------------
 
@@ -266,7 +179,3 @@ class ModelExchangeInstance(FmuInstance):
     def free_state(self, state: Any) -> None:
         """Free the FMU's part of a snapshot."""
         super().free_state(state.fmu_state)
-
-
-def _is_continuous(variable: Variable) -> bool:
-    return variable.variability == "continuous" and variable.type in FLOAT_TYPES

@@ -124,6 +124,7 @@ class VariableStepIntegrator(Integrator):
 
     def _advance(self, current_time: ctypes.c_double, step_size: float) -> int:
         end = current_time.value + step_size
+        self._model.linear_inputs.begin = current_time.value
         self._failure = None
         try:
             while end - self._time > _MIN_ULPS * math.ulp(end):

@@ -14,6 +14,7 @@ _COMMON_NAMES = {
     "get_indicators": "GetEventIndicators",
     "get_nominals": "GetNominalsOfContinuousStates",
     "complete_step": "CompletedIntegratorStep",
+    "set_inputs": "SetReal",
 }
 
 
@@ -61,7 +62,11 @@ class Fmi3Model(ModelExchangeInstance, Fmi3Instance):
     """Model Exchange instance of an FMI 3.0 FMU."""
 
     _instantiate_function = "fmi3InstantiateModelExchange"
-    _function_names = {**_COMMON_NAMES, "get_derivatives": "GetContinuousStateDerivatives"}
+    _function_names = {
+        **_COMMON_NAMES,
+        "get_derivatives": "GetContinuousStateDerivatives",
+        "set_inputs": "SetFloat64",
+    }
     _update_method = "updateDiscreteStates"
 
     def _fmpy_class(self) -> type:

@@ -96,7 +96,7 @@ class FunctionTranslator:
         if len(actual) != len(declared) or any(n not in (None, k) for n, k in zip(declared, actual, strict=True)):
             expected = ", ".join(":" if n is None else str(n) for n in declared)
             raise_model_error(f"the argument for {local.name}: found size {list(actual)}, expected [{expected}]", where)
-        value = variable_value(local.type, actual, c_identifier(local.name))
+        value = variable_value(local.type, actual, c_identifier(local.name.replace(".", "__")))
         lowering.scope[local.name] = value
         return value
 

@@ -12,10 +12,10 @@ typedef struct {
     const double *dx[STATES];
 } Hybrid;
 
-/* Functions of the model. `crossed` returns whether a relation differs from its stored value; z is positive on one side of each
-   relation. `record` stores the present values of the arguments of delay(). */
+/* Functions of the model. `crossed` returns the number, from 1, of a relation that differs from its stored value, or 0; z is positive
+   on one side of each relation. `record` stores the present values of the arguments of delay(). */
 static void derivatives(Model *m, double time);
-static bool crossed(Model *m, double time, double *z);
+static int crossed(Model *m, double time, double *z);
 static void record(Model *m, double time);
 
 enum { STAGES = 7 };
@@ -75,7 +75,7 @@ static inline double locate(Model *m, const Hybrid *s, double time, double h, co
         at = smaller(larger(at, left + width / 4), right - width / 4);
         double trial[RELATIONS];
         dormand_prince(m, s, time, at, start, k);
-        side = crossed(m, time + at, trial);
+        side = crossed(m, time + at, trial) != 0;
         memcpy(z[side], trial, sizeof trial);
         if (side == 1) right = at;
         else left = at;

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from ..causality.hybrid_interpreter import MAX_EVENTS, MAX_PASSES
+from ..causality.event_limits import MAX_EVENTS, MAX_PASSES, chattering_reason, endless_reason, iterated_names
 from ..causality.matching import is_input
 from ..causality.past_values import PAST_VALUES
 from ..model.flat_model import Model, Relation, derivative_name, is_integrated, previous_name
@@ -44,26 +44,31 @@ class HybridCode(ModelCode):
         model, clocks = self.model, len(self.schedule.clocks)
         assert model.hybrid
         values = self._make_lowering().scope
-        endless = self._failure_code("the event iteration does not end", None)
-        too_many = self._failure_code("too many events in one step (chattering)", None)
         initial = self._body(self.schedule.initialization, initial=True)
         definitions = [
             *self._common_definitions(),
             f"static const bool NO_TICK[{max(clocks, 1)}] = {{false}};",
             record_function(model, values, self._make_lowering(), PAST_VALUES),
-            *event_functions(model, values, self._event(), endless, initial),
-            function_definition("const char *model_initialize(Model *m, double time)", self._initialize_hybrid(endless)),
+            *event_functions(model, values, self._event(), self._endless_codes(), initial),
+            function_definition("const char *model_initialize(Model *m, double time)", self._initialize_hybrid()),
         ]
         if is_integrated(model):
             definitions += [*self._hybrid_system(values)]
-        step = hybrid_step_body(clocks, is_integrated(model), too_many)
+        step = hybrid_step_body(clocks, is_integrated(model))
         return [
             *definitions,
             function_definition("const char *model_step(Model *m, double time, double step_size)", step),
             *self._exchange(f"event(m, time, {'tick ? due : ' * bool(clocks)}NO_TICK);", record=bool(model.hybrid.delays)),
         ]
 
-    def _initialize_hybrid(self, endless: str) -> list[str]:
+    def _endless_codes(self) -> dict[str, str]:
+        """Return the failure code of an event iteration that does not end by the variable that changes."""
+        hybrid, variables = self.model.hybrid, self.model.variables
+        assert hybrid
+        names = iterated_names(hybrid)
+        return {name: self._failure_code(endless_reason(hybrid, name), variables[name].where) for name in names}
+
+    def _initialize_hybrid(self) -> list[str]:
         """Generate the body of model_initialize: the initial equations, repeated until relations are consistent, and an event."""
         past = ["memset(m->past, 0, sizeof m->past);"] if self.model.hybrid and self.model.hybrid.delays else []
         return [
@@ -73,7 +78,7 @@ class HybridCode(ModelCode):
             "start_variables(m);",
             *self._clock_lines(),
             "for (int pass = 0; initialize(m, time); pass++) {",
-            f"    if (pass == {MAX_PASSES}) fail(m, {endless});",
+            f"    if (pass == {MAX_PASSES}) fail(m, endless(m));",
             *(f"    {line}" for line in self._copy_relations()),
             "}",
             "if (m->failure == 0) remember_inputs(m);",
@@ -119,6 +124,10 @@ class HybridCode(ModelCode):
         names = [relation.name for relation in self.model.hybrid.relations]
         return copy_values((values[previous_name(name)], values[name]) for name in names)
 
+    def _chattering_codes(self) -> list[str]:
+        relations = self.model.hybrid.relations if self.model.hybrid else ()
+        return [self._failure_code(chattering_reason(each), each.condition.where) for each in relations]
+
     def _hybrid_system(self, values: Mapping[str, CValue]) -> list[str]:
         """Generate the functions for the integration between events."""
         assert self.model.hybrid
@@ -133,6 +142,7 @@ class HybridCode(ModelCode):
                 self._derivatives(),
             ),
             crossing_function(self.model.hybrid.relations, values, lowering),
+            f"static const int32_t CHATTERING[] = {{0, {', '.join(self._chattering_codes()) or 0}}};",
             function_definition(
                 "static bool advance(Model *m, double from, double to, double *reached)",
                 [
@@ -168,7 +178,7 @@ def memory_functions(inputs: Sequence[ValuePair], others: Sequence[ValuePair]) -
 
 
 def event_functions(
-    model: Model, values: Mapping[str, CValue], evaluation: list[str], endless: str, initial: list[str]
+    model: Model, values: Mapping[str, CValue], evaluation: list[str], endless: Mapping[str, str], initial: list[str]
 ) -> list[str]:
     """Generate `evaluate`, `initialize` and `event`, and the functions that they use.
 
@@ -176,7 +186,7 @@ def event_functions(
         model: The flat model.
         values: The C values of the variables.
         evaluation: The statements of an evaluation of all equations.
-        endless: The failure code of an event iteration that does not end.
+        endless: The failure code of an event iteration that does not end by the variable that changes.
         initial: The statements of the initialization.
 
     Returns:
@@ -187,14 +197,17 @@ def event_functions(
     inputs = [name for name in pairs if is_input(model.variables[name])]
     changes = _any_differs(pairs[name] for name in model.hybrid.iterated)
     relations = _any_differs(pairs[relation.name] for relation in model.hybrid.relations)
+    causes = [f"if ({_differs(*pairs[name])}) return {code};" for name, code in endless.items()]
     return [
         *memory_functions([pairs[name] for name in inputs], [pair for name, pair in pairs.items() if name not in inputs]),
+        "/* Returns the failure of an event iteration in which a value changes in each evaluation. */",
+        function_definition("static int32_t endless(const Model *m)", ["(void)m;", *causes, "return 0;"]),
         "/* Evaluates all equations; returns whether they must be evaluated again, since values have changed. */",
         function_definition(
             "static bool evaluate(Model *m, double time, const bool *due)",
             ["(void)time;", "(void)due;", *evaluation, f"return m->failure == 0 && ({changes});"],
         ),
-        function_definition("static void event(Model *m, double time, const bool *due)", _event_lines(endless)),
+        function_definition("static void event(Model *m, double time, const bool *due)", _event_lines()),
         function_definition(
             "static bool initialize(Model *m, double time)",
             ["(void)time;", *initial, f"return m->failure == 0 && ({relations});"],
@@ -206,12 +219,12 @@ def _any_differs(pairs: Iterable[ValuePair]) -> str:
     return " || ".join(_differs(*pair) for pair in pairs) or "false"
 
 
-def _event_lines(endless: str) -> list[str]:
+def _event_lines() -> list[str]:
     return [
         "remember(m);",
         "/* flags of ticks are true in the first evaluation only */",
         "for (int pass = 0; (evaluate(m, time, due) || due != NO_TICK) && m->failure == 0; pass++) {",
-        f"    if (pass == {MAX_PASSES}) fail(m, {endless});",
+        f"    if (pass == {MAX_PASSES}) fail(m, endless(m));",
         "    remember(m);",
         "    remember_inputs(m);",
         "    due = NO_TICK;",
@@ -238,20 +251,20 @@ def record_function(model: Model, values: Mapping[str, CValue], lowering: Statem
 
 def crossing_function(relations: Iterable[Relation], values: Mapping[str, CValue], lowering: StatementLowering) -> str:
     """Generate `crossed`, which compares the relations with their stored values."""
-    lines = ["bool changed = false;", "(void)m;", "(void)time;", "z[0] = 0;"]
+    lines = ["int changed = 0;", "(void)m;", "(void)time;", "z[0] = 0;"]
     for k, relation in enumerate(relations):
         a, b = (lowering.evaluated_once(lowering.lower(s)).text for s in (relation.condition.left, relation.condition.right))
         left, right, held = a.parenthesized(9), b.parenthesized(10), values[relation.name].text.code
         lowering.lines += [
             f"z[{k}] = {left} - {right};",
-            f"if (({left} {relation.condition.operator} {right}) != {held}) changed = true;",
+            f"if (({left} {relation.condition.operator} {right}) != {held}) changed = {k + 1};",
         ]
     return function_definition(
-        "static bool crossed(Model *m, double time, double *z)", [*lines, *lowering.lines, "return changed;"]
+        "static int crossed(Model *m, double time, double *z)", [*lines, *lowering.lines, "return changed;"]
     )
 
 
-def hybrid_step_body(clocks: int, continuous: bool, too_many: str) -> list[str]:
+def hybrid_step_body(clocks: int, continuous: bool) -> list[str]:
     """Generate the body of model_step."""
     lines = ["const double end = time + step_size;", "m->failure = 0;"]
     tick = ["const bool tick = false;", *["const double target = end;"] * continuous]
@@ -273,8 +286,9 @@ def hybrid_step_body(clocks: int, continuous: bool, too_many: str) -> list[str]:
             f"const bool crossing = {'!at_start && ' * bool(clocks)}advance(m, reached, target, &reached);",
             "if (m->failure != 0) break;",
             "if (crossing) {",
-            "    event(m, reached, NO_TICK);",
-            f"    if (count == {MAX_EVENTS}) fail(m, {too_many});",
+            "    double z[RELATIONS];",
+            f"    if (count == {MAX_EVENTS}) fail(m, CHATTERING[crossed(m, reached, z)]);",
+            "    else event(m, reached, NO_TICK);",
             "    continue;",
             "}",
         ]

@@ -6,7 +6,7 @@ from collections.abc import Iterable
 from typing import Any, NamedTuple
 
 from ..model.flat_model import Model, derivative_name
-from ..model.syntax_tree import Assign, Body, Builtin, Literal, Name, Solve, Statement
+from ..model.syntax_tree import Assign, Body, Builtin, Literal, Name, Statement
 from ..model.traversal import has_builtin, read_references, rewrite, variable_names
 from .matching import ScalarKey, is_input, scalar_keys
 from .nodes import algorithm_nodes, make_node
@@ -27,7 +27,7 @@ class BetweenEvents(NamedTuple):
     continuous: Body
 
 
-def statements_between_events(model: Model, continuous: Iterable[Assign | Solve], held: set[ScalarKey]) -> BetweenEvents:
+def statements_between_events(model: Model, continuous: Iterable[Statement], held: set[ScalarKey]) -> BetweenEvents:
     """Return the statements between events.
 
     Args:
@@ -78,5 +78,5 @@ def _without_ticks(statement: Statement) -> Statement:
     return result
 
 
-def _is_discrete(model: Model, statement: Assign | Solve) -> bool:
+def _is_discrete(model: Model, statement: Statement) -> bool:
     return isinstance(statement, Assign) and model.variables[statement.name].type != "Real"

@@ -8,13 +8,13 @@ ratio to that of the equation. Constructors `Clock(...)` and these ratios determ
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass, fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass, replace
 from fractions import Fraction
 from typing import Any
 
 from ..model.evaluate import Evaluator
 from ..model.flat_model import Model
-from ..model.syntax_tree import Builtin, Expression, If, Name, SourceLocation, When, raise_model_error
+from ..model.syntax_tree import Builtin, Expression, If, Index, Name, SourceLocation, When, raise_model_error
 from ..model.traversal import variable_names, walk
 
 CONVERSIONS = ("subSample", "superSample", "shiftSample", "backSample")
@@ -50,9 +50,8 @@ def is_clock(expression: Any, model: Model) -> bool:
         return is_clock(expression.otherwise, model)
     if isinstance(expression, Builtin):
         return expression.name == "Clock" or (expression.name in CONVERSIONS and is_clock(expression.arguments[0], model))
-    return (
-        isinstance(expression, Name) and expression.name in model.variables and model.variables[expression.name].type == "Clock"
-    )
+    base = expression.base if isinstance(expression, Index) else expression
+    return isinstance(base, Name) and base.name in model.variables and model.variables[base.name].type == "Clock"
 
 
 def is_sampler(call: Builtin, model: Model) -> bool:
@@ -134,6 +133,8 @@ class ClockInference:
                 self._collect(node, item, where)
         elif isinstance(tree, Builtin) and (tree.name in CLOCKED_OPERATORS or is_sampler(tree, self._model)):
             self._operator(node, tree, where)
+        elif isinstance(tree, Index) and is_clock(tree, self._model):
+            self._parents[self._find(node)] = self._find(str(replace(tree, where=None)))
         elif isinstance(tree, Name):
             self._reference(node, tree.name, where)
         elif isinstance(tree, If) and is_clock(tree, self._model):

@@ -10,14 +10,17 @@ from collections.abc import Collection, Sequence
 
 from ....core.errors import InputError
 from ..model.flat_model import Equation, Model, previous_name
-from ..model.syntax_tree import Assign, Literal, Name, Solve
-from ..model.traversal import read_references
+from ..model.syntax_tree import Assign, For, Literal, Name, Solve
+from ..model.traversal import assigned_references, read_references
 from .assignment import strongly_connected_components
 from .equation_systems import EquationSystem, reference_of
 from .matching import ScalarKey, is_input, match_equations, match_initial_equations, scalar_keys
 
+#: solved equation, system of equations, or loop around a system
+Solution = Assign | Solve | For
 
-def solve_equations(model: Model, assigned: Collection[str]) -> tuple[Sequence[Assign | Solve], set[ScalarKey]]:
+
+def solve_equations(model: Model, assigned: Collection[str]) -> tuple[Sequence[Solution], set[ScalarKey]]:
     """Solve the continuous equations for the variables that nothing else defines.
 
     Args:
@@ -54,8 +57,8 @@ def _has_loop(model: Model, statements: Sequence[Assign]) -> bool:
 
 
 def solve_initial_equations(
-    model: Model, assigned: Collection[str], continuous: Sequence[Assign | Solve], written: Collection[ScalarKey]
-) -> tuple[Sequence[Assign | Solve], set[ScalarKey]]:
+    model: Model, assigned: Collection[str], continuous: Sequence[Solution], written: Collection[ScalarKey]
+) -> tuple[Sequence[Solution], set[ScalarKey]]:
     """Solve the continuous and the initial equations for the values at the start.
 
     States, variables that when-clauses assign, and values before the initialization have their start values unless an initial
@@ -78,7 +81,7 @@ def solve_initial_equations(
             explicit = match_initial_equations(model, assigned)
         except InputError:
             explicit = None
-        if explicit is not None and not any(isinstance(s, Solve) for s in continuous):
+        if explicit is not None and all(isinstance(s, Assign) for s in continuous):
             return [*continuous, *explicit], set()
     known = {v.name for v in model.variables.values() if v.variability in ("constant", "parameter") or is_input(v)}
     fixed = {name for name in model.states if model.variables[name].fixed}
@@ -91,7 +94,7 @@ def solve_initial_equations(
         if v.fixed and v.type == "Real" and v.name in {name for name, _ in unknowns}
     ]
     equations = (*model.equations, *model.initial_equations, *fixed_unknowns)
-    system = EquationSystem(model, equations, unknowns, [optional])
+    system = EquationSystem(model, equations, unknowns, [optional], continues=True)
     solved = system.solve()
     determined = {key for s in solved for key in _solved_keys(model, s)} | set(written)
     kept = [
@@ -102,9 +105,8 @@ def solve_initial_equations(
     return [*solved, *kept], system.held
 
 
-def _solved_keys(model: Model, statement: Assign | Solve) -> set[ScalarKey]:
-    targets = (statement.target,) if isinstance(statement, Assign) else statement.unknowns
-    return {key for target in targets for key in scalar_keys(model.variables, target)}
+def _solved_keys(model: Model, statement: Solution) -> set[ScalarKey]:
+    return {key for target in assigned_references(statement) for key in scalar_keys(model.variables, target)}
 
 
 def _previous_values(model: Model) -> set[str]:

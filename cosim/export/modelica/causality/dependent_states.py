@@ -10,7 +10,7 @@ from dataclasses import replace
 
 from ..model.flat_model import Equation, Model, Variable, derivative_name
 from ..model.syntax_tree import Expression, Index, Literal, Name, raise_model_error, referenced_variable
-from ..model.traversal import assigned_references
+from ..model.traversal import assigned_references, variable_names
 from .continuous_states import derivative_variable
 from .differentiation import Differentiation
 from .equation_systems import EquationSystem
@@ -50,7 +50,7 @@ def _system(model: Model, assigned: set[str]) -> EquationSystem:
 
 class _Reduction:
     def __init__(self, model: Model, system: EquationSystem, matched: dict[int, ScalarKey], assigned: set[str]):
-        self._model = model
+        self._model, self._system = model, system
         self._equation_of = {key: system.scalar_equations[number] for number, key in matched.items()}
         self._assigned = assigned
         self._variables = dict(model.variables)
@@ -65,6 +65,7 @@ class _Reduction:
                 raise_model_error(
                     f"only some elements of the state {name} are determined by equations", self._model.variables[name].where
                 )
+        self._refuse_nonlinear_constraints(dependent)
         self._pending = sorted(dependent)
         equations, done = list(self._model.equations), set[ScalarKey]()
         while self._pending:
@@ -75,6 +76,18 @@ class _Reduction:
             equations.append(self._differentiated(key))
         states = tuple(name for name in self._model.states if name not in names)
         return replace(self._model, variables=self._variables, states=states, equations=tuple(equations))
+
+    def _refuse_nonlinear_constraints(self, dependent: set[ScalarKey]) -> None:
+        """Raise InputError if an equation between states cannot be solved for one of them at all times."""
+        for key in sorted(dependent):
+            equation = self._equation_of[key]
+            names = variable_names((equation.left, equation.right)) & set(self._model.states)
+            if len(names) > 1 and not self._system.is_linear(equation, key):
+                raise_model_error(
+                    f"this equation relates the states {', '.join(sorted(names))}, and it is not linear in {key[0]}: "
+                    "such an index reduction is not supported; write the model with independent states",
+                    equation.where,
+                )
 
     def _differentiated(self, key: ScalarKey) -> Equation:
         """Return the derivative of the equation that determines a variable."""

@@ -8,20 +8,26 @@ from dataclasses import dataclass
 from ..model.flat_model import Equation, Model
 from ..model.syntax_tree import (
     Assign,
+    Binary,
+    Builtin,
     Expression,
+    For,
     Index,
     Literal,
     Name,
+    Range,
     Solve,
     SourceLocation,
     raise_model_error,
 )
-from ..model.traversal import read_references, rewrite, rewrite_outermost
+from ..model.traversal import has_builtin, read_references, rewrite, rewrite_outermost
 from .assignment import match, strongly_connected_components
 from .differentiation import ZERO, Differentiation, divide, negate, subtract
 from .matching import ScalarKey, scalar_keys
 from .scalar_equations import EquationSplitter
 
+#: steps from the simplified to the actual expressions of homotopy()
+_CONTINUATION_STEPS = 10
 _DISCRETE_TYPES = ("Integer", "Boolean", "Enumeration")
 
 
@@ -44,6 +50,8 @@ class EquationSystem:
     unknowns: Collection[ScalarKey]
     #: groups of unknowns that have a value if no equation is needed for them, for example start values
     optional: Sequence[Collection[ScalarKey]] = ()
+    #: true to solve equations with homotopy(actual, simplified) in steps from the simplified to the actual ones
+    continues: bool = False
 
     def __post_init__(self) -> None:
         splitter = EquationSplitter(self.model)
@@ -60,11 +68,15 @@ class EquationSystem:
         """The equations, one for each element."""
         return self._scalar
 
+    def is_linear(self, equation: Equation, key: ScalarKey) -> bool:
+        """Return whether a scalar equation is linear in an unknown."""
+        return self._system([equation], [key]).linear
+
     def matching(self) -> dict[int, ScalarKey]:
         """Return the unknown that each scalar equation determines; equations without one are missing."""
         return match([self._preferences(k) for k in range(len(self._scalar))], self.optional)
 
-    def solve(self) -> list[Assign | Solve]:
+    def solve(self) -> list[Assign | Solve | For]:
         """Return the equations as assignments and systems of equations, in no particular order.
 
         Raises:
@@ -124,7 +136,7 @@ class EquationSystem:
             name = min(missing)[0]
             raise_model_error(f"no equation gives {name} a value", self.model.variables[name].where)
 
-    def _solve_component(self, numbers: list[int], matched: dict[int, ScalarKey]) -> Assign | Solve:
+    def _solve_component(self, numbers: list[int], matched: dict[int, ScalarKey]) -> Assign | Solve | For:
         if len(numbers) == 1:
             return self._solve_scalar(self._scalar[numbers[0]], matched[numbers[0]])
         keys = [matched[number] for number in numbers]
@@ -134,16 +146,32 @@ class EquationSystem:
                 f"algebraic loop with the discrete variable {discrete[0][0]}: {chain}; break it with pre()",
                 self._scalar[numbers[0]].where,
             )
-        return self._system([self._scalar[number] for number in numbers], keys)
+        return self._continued([self._scalar[number] for number in numbers], keys)
 
-    def _solve_scalar(self, equation: Equation, key: ScalarKey) -> Assign | Solve:
+    def _continued(self, equations: Sequence[Equation], keys: Sequence[ScalarKey]) -> Solve | For:
+        """Return a system of equations, or the loop that solves it for a growing part of the actual expressions."""
+        if not (self.continues and has_builtin(tuple(equations), "homotopy")):
+            return self._system(equations, keys)
+        part = Binary("/", Name("continuation"), Literal(float(_CONTINUATION_STEPS), "Real"))
+
+        def mix(node: object) -> object:
+            if not (isinstance(node, Builtin) and node.name == "homotopy"):
+                return node
+            actual, simplified = node.arguments
+            return Binary("+", simplified, Binary("*", part, Binary("-", actual, simplified, node.where)))
+
+        system = self._system(rewrite(tuple(equations), mix), keys)
+        steps = Range(Literal(0, "Integer"), None, Literal(_CONTINUATION_STEPS, "Integer"))
+        return For("continuation", steps, (system,), system.where)
+
+    def _solve_scalar(self, equation: Equation, key: ScalarKey) -> Assign | Solve | For:
         reference = reference_of(key, self.model)
         for side, other in ((equation.left, equation.right), (equation.right, equation.left)):
             if self._key_of(side) == {key} and self._is_free_of(key, side, equation):
                 return Assign(reference, other, equation.where)
         system = self._system([equation], [key])
         if not system.linear or system.jacobian[0][0] == ZERO:
-            return system
+            return self._continued([equation], [key])
         constant = self._without(system.residuals[0], key)
         return Assign(reference, divide(negate(constant), system.jacobian[0][0]), equation.where)
 
@@ -181,7 +209,7 @@ def _first_location(equations: Sequence[Equation]) -> SourceLocation | None:
 
 def _simplified(node: Expression) -> Expression:
     """Remove terms and factors that are zero."""
-    from ..model.syntax_tree import Binary, Unary
+    from ..model.syntax_tree import Unary
     from .differentiation import add, multiply
 
     operations = {"+": add, "-": subtract, "*": multiply, "/": divide}

@@ -1,7 +1,8 @@
 """Preparation of models with event iteration.
 
 A model needs it if `pre()` or `sample()` occurs outside when-clauses, or if it has `reinit()`, `delay()`, or comparisons between
-values that change while the states are integrated, or if it has states and uses a library. In such a model
+values that change while the states are integrated, or if it uses a library and has states or when-clauses whose conditions change
+with time, or if an initial equation determines `pre()` of a variable that equations determine. In such a model
 
 - `pre(x)` becomes a variable with this name, which holds the value of x before the current evaluation of the equations;
 - a comparison becomes a Boolean variable, which keeps its value between events; its change is an event;
@@ -20,6 +21,7 @@ from ..model.syntax_tree import (
     Array,
     Assign,
     Binary,
+    Body,
     Builtin,
     Expression,
     If,
@@ -57,8 +59,8 @@ def prepare_hybrid(model: Model) -> Model:
 class _Preparation:
     def __init__(self, model: Model):
         self._model = model
-        self._discrete = {referenced_variable(target) for target in assigned_references((model.whens, model.algorithms))}
-        self._discrete |= model.initialized
+        self._assigned = {referenced_variable(target) for target in assigned_references((model.whens, model.algorithms))}
+        self._discrete = self._assigned | model.initialized
         self._discrete |= {v.name for v in model.variables.values() if v.variability != "continuous" or v.type != "Real"}
         self._variables: dict[str, Variable] = dict(model.variables)
         self._relations: list[Relation] = []
@@ -79,7 +81,9 @@ class _Preparation:
             return True
         if any(isinstance(item, Reinit) for item in walk((self._model.whens, self._model.algorithms))):
             return True
-        if self._model.uses_library and self._model.states:
+        if _remembered(self._model.initial_equations) - self._assigned:
+            return True
+        if self._model.uses_library and (self._model.states or any(self._is_relation(item) for item in walk(conditions))):
             return True
         comparisons = rewrite_outermost((self._model.equations, conditions), _without_events)
         return bool(self._model.states) and any(self._is_relation(item) or self._is_rounding(item) for item in walk(comparisons))
@@ -92,6 +96,7 @@ class _Preparation:
             sections["whens"] = self._in_conditions(sections["whens"], self._replace_rounding)
             sections["equations"] = rewrite_outermost(sections["equations"], self._replace_relation)
             sections["whens"] = self._in_conditions((*sections["whens"], *self._whens), self._replace_relation)
+            sections["algorithms"] = tuple(map(self._in_algorithm, sections["algorithms"]))
         sections["equations"] = (*sections["equations"], *self._equations)
         used = {name for section in sections.values() for name in _remembered(section)}
         used |= {relation.name for relation in self._relations} | {v.name for v in self._variables.values() if is_input(v)}
@@ -130,6 +135,15 @@ class _Preparation:
             )
             for when in whens
         )
+
+    def _in_algorithm(self, body: Body) -> Body:
+        """Return an algorithm whose when-clauses have located conditions, if it does not assign the compared variables itself."""
+        assigned = {referenced_variable(target) for target in assigned_references(body)}
+
+        def change(node: Any) -> Any:
+            return node if variable_names(node) & assigned else self._replace_relation(node)
+
+        return tuple(self._in_conditions((s,), change)[0] if isinstance(s, When) else s for s in body)
 
     def _replace_relation(self, node: Any) -> Any:
         if _without_events(node) is not None:

@@ -4,18 +4,18 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from typing import Any
+from typing import Any, NoReturn
 
 import numpy as np
 
 from ....core.errors import ComponentError
 from ..model.arithmetic import EvaluationError, divide
 from ..model.flat_model import Model, derivative_name, is_integrated, previous_name
+from .event_limits import MAX_EVENTS, MAX_PASSES, chattering_reason, endless_reason, iterated_names
 from .interpreter import TICK_TOLERANCE, Interpreter
 from .matching import is_input
 from .past_values import PAST_VALUES, PastValues
 
-MAX_PASSES, MAX_EVENTS = 100, 100_000
 RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-7, 1e-9
 
 _NODES = (0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0)
@@ -76,7 +76,7 @@ class HybridInterpreter(Interpreter):
                 if not self._changed(relations):
                     break
                 self._remember(relations)
-                _check_passes(count)
+                self._check_passes(count)
         self._remember(self._inputs)
         self._record(time)
         self._event("initialize", time, ())
@@ -110,9 +110,9 @@ class HybridInterpreter(Interpreter):
                     reached, crossing = self._advance(reached, target)
             count += 1
             if crossing:
-                self._event("step", reached, ())
                 if count > MAX_EVENTS:
-                    raise ComponentError(self.model.name, "step", "too many events in one step (chattering)", reached)
+                    self._raise_chattering(reached)
+                self._event("step", reached, ())
                 continue
             if not is_tick:
                 break
@@ -120,7 +120,17 @@ class HybridInterpreter(Interpreter):
             self._count_ticks(due)
         self._event("step", end, ())
 
+    def _raise_chattering(self, time: float) -> NoReturn:
+        self.values["time"] = time
+        relations = [r for r in self._hybrid.relations if bool(self.evaluate(r.condition)) != self.values[r.name]]
+        raise ComponentError(self.model.name, "step", chattering_reason(relations[-1]), time)
+
     # events
+
+    def _check_passes(self, count: int) -> None:
+        if count == MAX_PASSES:
+            name = next(name for name in iterated_names(self._hybrid) if self._changed([name]))
+            raise EvaluationError(endless_reason(self._hybrid, name), self.model.variables[name].where)
 
     def _event(self, function: str, time: float, due: Sequence[int]) -> None:
         self._remember([name for name in self._hybrid.remembered if name not in self._inputs])
@@ -132,7 +142,7 @@ class HybridInterpreter(Interpreter):
                 self._check_finite()
                 if not (due or self._changed(self._hybrid.iterated)):
                     break
-                _check_passes(count)
+                self._check_passes(count)
                 self._remember(self._hybrid.remembered)
                 due = ()
         self._remember(self._inputs)
@@ -283,8 +293,3 @@ def _elements(model: Model, names: Sequence[str]) -> Iterator[tuple[str, int | N
 def _element(values: Any, key: tuple[str, int | None]) -> float:
     name, index = key
     return float(values[name] if index is None else values[name].flat[index])
-
-
-def _check_passes(count: int) -> None:
-    if count == MAX_PASSES:
-        raise EvaluationError("the event iteration does not end")

@@ -36,8 +36,8 @@ def make_node(model: Model, statements: Body, assigned: Iterable[str] = ()) -> N
     }
     if len(statements) == 1 and isinstance(statements[0], Assign):
         written = scalar_keys(model.variables, statements[0].target)
-    if len(statements) == 1 and isinstance(statements[0], Solve):
-        written = {key for target in statements[0].unknowns for key in scalar_keys(model.variables, target)}
+    if unknowns := [target for item in walk(statements) if isinstance(item, Solve) for target in item.unknowns]:
+        written = {key for target in unknowns for key in scalar_keys(model.variables, target)}
     read = {key for reference in read_references(statements) for key in scalar_keys(model.variables, reference)}
     flags_read = {_flag_key(item.arguments[0]) for item in walk(statements) if isinstance(item, Builtin) and item.name == "risen"}
     flags_written = {_flag_key(Literal(s.index, "Integer")) for s in statements if isinstance(s, EdgeDetector)}

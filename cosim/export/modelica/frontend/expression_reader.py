@@ -4,13 +4,13 @@ from __future__ import annotations
 
 import operator
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cached_property
 from typing import Any
 
 from ..model import syntax_tree
 from ..model.syntax_tree import Expression, SourceLocation, raise_model_error
-from .rumoca_frontend import ModelicaSources
+from .sources import ModelicaSources
 
 Json = Mapping[str, Any]
 
@@ -110,6 +110,7 @@ class ExpressionReader:
             "FunctionCall": self._call,
             "StringConversion": lambda n: syntax_tree.Builtin("String", (self.read_expression(n["value"]),), self.locate(n)),
             "ArrayComprehension": self._comprehension,
+            "FieldAccess": self._field_access,
         }
         if kind not in readers:
             raise_model_error(f"the expression {kind} is not supported", self.locate(payload))
@@ -206,9 +207,43 @@ class ExpressionReader:
             _MODELICA_SPELLING.get(name, name), tuple(map(self.read_expression, node["args"])), self.locate(node)
         )
 
+    def _field_access(self, node: Json) -> Expression:
+        kind, record = split_tagged(node["base"])
+        if kind != "FunctionCall":
+            raise_model_error("a field can only be taken from a record variable or a function call", self.locate(node))
+        return self.read_field(record, node["field"])
+
+    def read_field(self, call: Json, field: str) -> Expression:
+        """Convert the field of a record that a record constructor or another function returns."""
+        function, where = self.json["functions"][call["name"]["name"]], self.locate(call)
+        if call["is_constructor"]:
+            names = [local["name"] for local in function["inputs"]]
+            if field in names and len(call["args"]) == len(names):
+                return self.read_expression(call["args"][names.index(field)])
+        else:
+            names = [name for local in function["outputs"] for name in self.scalar_names(local)]
+            if (name := f"{function['outputs'][0]['name']}.{field}") in names:
+                return replace(self._call(call), result=names.index(name))
+        reason = f"the record of {function['name']}() has no field {field}; records in records are not supported"
+        return raise_model_error(reason, where)
+
+    def scalar_names(self, local: Json) -> list[str]:
+        """Return the names of the fields of a record that is a variable of a function, or the name of any other variable."""
+        return [f"{local['name']}.{field['name']}" for field in self.fields(local)] or [local["name"]]
+
+    def fields(self, local: Json) -> list[Json]:
+        """Return the fields of a record that is a variable of a function, none for other variables."""
+        if local["type_class"] != "Record":
+            return []
+        for function in self.json["functions"].values():
+            if function["is_constructor"] and function["def_id"] == local["type_def_id"]:
+                return list(function["inputs"])
+        reason = f"the record {local['name']} inside a function is not supported; pass its fields"
+        return raise_model_error(reason, self.locate(local))
+
     def _call(self, node: Json) -> syntax_tree.Call:
         if node["is_constructor"]:
-            raise_model_error("a record constructor is not supported; assign the fields", self.locate(node))
+            raise_model_error("a record constructor is not supported here; write one for a record variable", self.locate(node))
         return self._function_call(node["name"], node["args"], self.locate(node))
 
     def _function_call(self, reference: Json, arguments: list[Json], where: SourceLocation | None) -> syntax_tree.Call:

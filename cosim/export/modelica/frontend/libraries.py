@@ -26,6 +26,7 @@ _FOLDER_NAME = re.compile(r"(?P<name>[A-Za-z_]\w*)( (?P<version>\d.*))?")
 #: comments and strings; the strings of an annotation that are needed have no quotation marks inside
 _COMMENT_OR_STRING = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:[^"\\]|\\.)*"', re.DOTALL)
 _REFERENCE = re.compile(r"(?<![\w.])([A-Za-z_]\w*)\s*\.\s*[A-Za-z_]")
+_WORD = re.compile(r"(?<![\w.])[A-Za-z_]\w*(?=\s*[\w(\[])")
 _ARGUMENT = re.compile(r"\s*([\w.]+)\s*(=|\()\s*")
 _LIBRARY_FILES = (".mo", ".c", ".h")
 
@@ -125,7 +126,7 @@ def find_libraries(files: Sequence[Path], folders: Sequence[Path], known: Collec
         InputError: A folder does not exist, or a library is not found in a version that fits.
     """
     available = list(libraries_in(folders))
-    names = {library.name for library in available}
+    names = {library.name: library.path.is_file() for library in available}
     queue = [(*each, file) for file in files for each in _used_names(file, names).items()]
     found: dict[str, Library] = {}
     while queue:
@@ -141,10 +142,15 @@ def find_libraries(files: Sequence[Path], folders: Sequence[Path], known: Collec
     return list(found.values())
 
 
-def _used_names(file: Path, names: Collection[str]) -> dict[str, str]:
-    """Return the required version of each library that a file uses: those of `uses`, and those of `names` that it refers to."""
+def _used_names(file: Path, names: Mapping[str, bool]) -> dict[str, str]:
+    """Return the required version of each library that a file uses: those of `uses`, and those of `names` that it refers to.
+
+    A library in a single file (value True), such as `Complex`, may also be a class that declarations name alone.
+    """
     text = file.read_text(encoding="utf-8", errors="replace")
-    references = {match[1] for match in _REFERENCE.finditer(_COMMENT_OR_STRING.sub(" ", text))}
+    code = _COMMENT_OR_STRING.sub(" ", text)
+    references = {match[1] for match in _REFERENCE.finditer(code)}
+    references |= {name for name in _WORD.findall(code) if names.get(name)}
     return dict.fromkeys(sorted(references & {*names, _STANDARD_LIBRARY}), "") | required_versions(_top_annotation_of(text))
 
 

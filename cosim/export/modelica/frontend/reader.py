@@ -30,7 +30,7 @@ class ModelReader(StatementReader):
         return flat_model.Model(
             name=name,
             description=self.json["model_description"] or "",
-            variables={key: self.read_variable(key) for key in names},
+            variables={key: _with_default(self.read_variable(key)) for key in names},
             equations=(*self._unrolled_equations(), *self._declaration_equations()),
             whens=tuple(self.read_when_chain(chain) for chain in self.json["when_chains"]),
             algorithms=tuple(self.read_body(algorithm["statements"]) for algorithm in self.json["algorithms"]),
@@ -151,7 +151,13 @@ class ModelReader(StatementReader):
             return [flat_model.Equation(self.read_expression(node["residual"]), syntax_tree.Literal(0.0, "Real"), where)]
         if "Tuple" in residual["lhs"]:
             return self._split_tuple(residual["lhs"]["Tuple"]["elements"], self.read_expression(residual["rhs"]), where)
-        left, right = self.read_expression(residual["lhs"]), self.read_expression(residual["rhs"])
+        left, call = self.read_expression(residual["lhs"]), residual["rhs"].get("FunctionCall")
+        if call and isinstance(left, syntax_tree.Name) and left.name in self.json["record_instances"]:
+            fields = self._fields_of(left.name)
+            return [
+                flat_model.Equation(syntax_tree.Name(left.name + f, where), self.read_field(call, f[1:]), where) for f in fields
+            ]
+        right = self.read_expression(residual["rhs"])
         return [flat_model.Equation(a, b, where) for a, b in self._split_records(left, right)]
 
     def _split_tuple(self, targets: list[Json], call: Expression, where: SourceLocation | None) -> list[flat_model.Equation]:
@@ -173,11 +179,14 @@ class ModelReader(StatementReader):
             raise_model_error(
                 "a record can only be equated with a record variable; write one equation for each field", left.where
             )
-        names = [name for name in self.json["variables"] if name.startswith(left.name + ".")]
         return [
-            (syntax_tree.Name(n, left.where), syntax_tree.Name(right.name + n.removeprefix(left.name), right.where))
-            for n in names
+            (syntax_tree.Name(left.name + field, left.where), syntax_tree.Name(right.name + field, right.where))
+            for field in self._fields_of(left.name)
         ]
+
+    def _fields_of(self, record: str) -> list[str]:
+        """Return the fields of a record variable, with a dot before each."""
+        return [name.removeprefix(record) for name in self.json["variables"] if name.startswith(f"{record}.")]
 
     def _declaration_equations(self) -> list[flat_model.Equation]:
         """Return the declaration equations (`Real y = 2*u;`) of all variables that are neither parameters nor constants."""
@@ -185,7 +194,7 @@ class ModelReader(StatementReader):
         return [
             flat_model.Equation(syntax_tree.Name(v.name, v.where), v.binding, v.where)
             for v in variables
-            if v.binding is not None and v.variability not in ("constant", "parameter")
+            if v.binding is not None and v.variability not in ("constant", "parameter") and not _is_default(v)
         ]
 
     def read_when_chain(self, chain: Json) -> syntax_tree.When:
@@ -224,6 +233,17 @@ class ModelReader(StatementReader):
         return syntax_tree.Index(
             syntax_tree.Name(base, where), tuple(syntax_tree.Literal(int(k), "Integer") for k in numbers), where
         )
+
+
+def _is_default(variable: flat_model.Variable) -> bool:
+    """Return whether the declaration equation of a variable is the value of an input of the model that nothing sets."""
+    is_input = variable.causality == "input" and variable.top_level and not variable.protected
+    return is_input and isinstance(variable.binding, syntax_tree.Literal)
+
+
+def _with_default(variable: flat_model.Variable) -> flat_model.Variable:
+    """Return an input of the model with its declared value as start value."""
+    return replace(variable, start=variable.binding, binding=None) if _is_default(variable) else variable
 
 
 def _is_fixed(flags: list[bool] | bool | None) -> bool | None:

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import cast
 
 from ..model import flat_model, syntax_tree
-from ..model.syntax_tree import Body, Expression, SourceLocation, Statement, raise_model_error
+from ..model.syntax_tree import Body, Expression, SourceLocation, Statement, raise_model_error, referenced_variable
+from ..model.traversal import variable_names
 from .expression_reader import ExpressionReader, Json, is_object_constructor, split_tagged
+from .termination import MARK
 
 _DESTRUCTOR = re.compile(r'\bfunction\s+destructor\b.*?\bexternal\s*(?:"C"\s*)?(\w+)\s*\(', re.DOTALL)
 
@@ -18,7 +21,27 @@ class StatementReader(ExpressionReader):
 
     def read_body(self, nodes: list[Json]) -> Body:
         """Convert a list of statements."""
-        return tuple(self._statement(*split_tagged(node)) for node in nodes)
+        return tuple(statement for node in nodes for statement in self._statements(*split_tagged(node)))
+
+    def _statements(self, kind: str, node: Json) -> list[Statement]:
+        """Convert a statement; the assignment of a record constructor becomes one assignment for each field."""
+        call = node["value"].get("FunctionCall") if kind == "Assignment" else None
+        function = self.json["functions"].get(call["name"]["name"]) if call else None
+        if call is None or function is None or not (call["is_constructor"] or self.fields(function["outputs"][0])):
+            return [self._statement(kind, node)]
+        where, target = self.locate(node), referenced_variable(self._target(node["comp"]))
+        if not call["is_constructor"]:
+            results = [name.partition(".")[2] for name in self.scalar_names(function["outputs"][0])]
+            targets = tuple(syntax_tree.Name(f"{target}.{name}", where) for name in results)
+            return [syntax_tree.MultiAssign(targets, self._call(call), where)]
+        names = [local["name"] for local in function["inputs"]]
+        values = [self.read_field(call, name) for name in names]
+        if any(name.startswith(f"{target}.") for name in variable_names(values)):
+            raise_model_error(f"the new value of the record {target} reads its fields; assign to another record first", where)
+        return [
+            syntax_tree.Assign(syntax_tree.Name(f"{target}.{name}", where), value, where)
+            for name, value in zip(names, values, strict=True)
+        ]
 
     def _statement(self, kind: str, node: Json) -> Statement:
         readers: Mapping[str, Callable[[Json], Statement]] = {
@@ -79,10 +102,12 @@ class StatementReader(ExpressionReader):
         level = None if node["level"] is None else self.read_expression(node["level"])
         if level is not None and not isinstance(level, syntax_tree.Literal):
             raise_model_error("the level of an assert() must be a literal of AssertionLevel", where)
-        message = tuple(message_parts(self.read_expression(node["message"])))
-        return syntax_tree.Assert(
-            self.read_expression(node["condition"]), message, where, warning=level is not None and level.value == 1
-        )
+        condition = self.read_expression(node["condition"])
+        first, *others = message_parts(self.read_expression(node["message"]))
+        if isinstance(first, syntax_tree.Literal) and str(first.value).startswith(MARK):
+            text = syntax_tree.Literal(str(first.value).removeprefix(MARK), "String")
+            return syntax_tree.Assert(condition, (text, *others), where, terminates=True)
+        return syntax_tree.Assert(condition, (first, *others), where, warning=level is not None and level.value == 1)
 
     def read_function(self, node: Json) -> flat_model.Function:
         """Convert a function.
@@ -90,7 +115,10 @@ class StatementReader(ExpressionReader):
         Raises:
             InputError: The function contains an unsupported element.
         """
-        inputs, outputs, local = (tuple(map(self._local, node[kind])) for kind in ("inputs", "outputs", "locals"))
+        inputs, outputs, local = (
+            tuple(variable for local in node[kind] for variable in self._locals(local))
+            for kind in ("inputs", "outputs", "locals")
+        )
         body, external = self.read_body(node["body"]), None
         if node["external"]:
             body, external = (self._external_call(node),), self._external_code(node)
@@ -117,10 +145,14 @@ class StatementReader(ExpressionReader):
         match = _DESTRUCTOR.search(text)
         return match[1] if match else ""
 
+    def _locals(self, node: Json) -> list[flat_model.FunctionVariable]:
+        """Convert a variable of a function; a record becomes one variable for each field."""
+        fields = [self._local({**field, "default": None}) for field in self.fields(node)]
+        names = self.scalar_names(node)
+        return [replace(each, name=name) for each, name in zip(fields, names, strict=True)] if fields else [self._local(node)]
+
     def _local(self, node: Json) -> flat_model.FunctionVariable:
         where = self.locate(node)
-        if node["type_class"] == "Record":
-            raise_model_error(f"the record {node['name']} inside a function is not supported; pass its fields", where)
         dimensions = tuple(None if isinstance(d, syntax_tree.Colon) else d for d in self._subscripts(node["shape_expr"]))
         kind = self._type(node["effective_type"]["canonical_type"])
         return flat_model.FunctionVariable(node["name"], kind, dimensions, self._optional(node["default"]), where)

@@ -1,5 +1,6 @@
 /* An FMI 2.0 FMU, written by hand: a mass of 1 kg with spring and damper to the ground, and both to another mass, whose position
-   and velocity are inputs. It is solved exactly for inputs that are linear within a step, by the exponential of a matrix.
+   and velocity are inputs. It is solved exactly for inputs that are linear within a step, by the exponential of a matrix. It gives
+   the time derivatives of its outputs.
    Value references: 0 u, 1 w (position and velocity of the other mass), 2 x, 3 v, 4 c, 5 d, 6 ck, 7 dk, 8 x_start.            */
 #include <stdlib.h>
 #include <string.h>
@@ -9,6 +10,7 @@ enum { U, W, X, V, C, D, CK, DK, X_START, COUNT, ORDER = 6, TERMS = 24 };
 
 typedef struct {
     double r[COUNT], slope[2];
+    double time; /* since the begin of the last step */
     double step, transition[2][ORDER]; /* rows of exp(A step) for x and v; columns x, v, u, w, slopes of u and w */
 } Mass;
 
@@ -61,7 +63,7 @@ fmi2Status fmi2SetReal(fmi2Component c, const fmi2ValueReference vr[], size_t n,
     Mass *m = c;
     for (size_t k = 0; k < n; k++) {
         m->r[vr[k]] = v[k];
-        if (vr[k] <= W) m->slope[vr[k]] = 0; /* an input is constant until its derivative is set */
+        if (vr[k] <= W) m->slope[vr[k]] = m->time = 0; /* an input is constant until its derivative is set */
     }
     return fmi2OK;
 }
@@ -81,6 +83,18 @@ fmi2Status fmi2DoStep(fmi2Component c, fmi2Real t, fmi2Real h, fmi2Boolean no_se
         for (int j = 0; j < ORDER; j++) next[i] += m->transition[i][j] * state[j];
     m->r[X] = next[0];
     m->r[V] = next[1];
+    m->time = h;
+    return fmi2OK;
+}
+fmi2Status fmi2GetRealOutputDerivatives(fmi2Component c, const fmi2ValueReference vr[], size_t n, const fmi2Integer order[],
+                                        fmi2Real v[]) {
+    Mass *m = c;
+    double u = m->r[U] + m->slope[0] * m->time, w = m->r[W] + m->slope[1] * m->time;
+    double force = m->r[CK] * (u - m->r[X]) + m->r[DK] * (w - m->r[V]) - m->r[C] * m->r[X] - m->r[D] * m->r[V];
+    for (size_t k = 0; k < n; k++) {
+        if (vr[k] < X || vr[k] > V || order[k] != 1) return fmi2Error;
+        v[k] = vr[k] == X ? m->r[V] : force; /* of 1 kg */
+    }
     return fmi2OK;
 }
 

@@ -179,6 +179,7 @@ const char *F(GetVersion)(void) { return FMI == 3 ? "3.0" : FMI == 2 ? "2.0" : "
         return GOOD;                                                                                                       \
     }                                                                                                                      \
     Status F(Set##NAME)(Handle c, const Reference vr[], size_t n, const TYPE v[] EXTRA) {                                  \
+        MAY_FAIL(SET);                                                                                                     \
         for (size_t k = 0; k < n; k++) ((Model *)c)->MEMBER[vr[k] - FIRST] = v[k];                                         \
         return GOOD;                                                                                                       \
     }

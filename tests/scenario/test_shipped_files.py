@@ -1,0 +1,40 @@
+"""Paths that begin with "cosim:" start from the files that cosim ships, wherever a scenario is."""
+
+import json
+
+import pytest
+
+import cosim
+
+PLANT = {
+    "python": "cosim:plant_src/world.py:World",
+    "arguments": {"vehicles": {"uav": {"model": "ar_drone", "position": [0, 0, 1]}}},
+}
+VESSEL = {"fmu": "cosim:fmus/strider.fmu"}
+
+
+def document(**components):
+    return {"name": "away", "stop_time": 0.05, "step_size": 0.01, "components": components}
+
+
+def test_a_scenario_of_any_folder_uses_shipped_components(tmp_path):
+    file = tmp_path / "away.json"
+    file.write_text(json.dumps(document(plant=PLANT, vessel=VESSEL)))
+    assert {"plant.uav.position.z", "vessel.position.x"} <= set(cosim.run(file))
+    below = tmp_path / "below"
+    below.mkdir()
+    (below / "more.json").write_text(json.dumps({"extends": "../away", "name": "more"}))
+    assert "vessel.position.x" in cosim.run(below / "more.json")
+
+
+def test_dictionaries_and_settings_name_shipped_files():
+    both = document(plant=PLANT, vessel=VESSEL)
+    assert "vessel.deck.position.x" in cosim.run(both)
+    inputs = {"signals": ["vessel.propeller_speed[1]"]}  # of the Otter, the Strider has a rudder
+    changed = cosim.run(both, {"/components/vessel/fmu": "cosim:fmus/otter.fmu", "/record": inputs})
+    assert list(changed) == inputs["signals"]
+
+
+def test_shipped_files_that_do_not_exist_are_refused():
+    with pytest.raises(cosim.InputError, match=r'fmus/strder.fmu" does not exist'):
+        cosim.run(document(vessel={"fmu": "cosim:fmus/strder.fmu"}))
