@@ -165,6 +165,12 @@ def find_sources(root: Path) -> list[Source]:
     return sources
 
 
+def vehicle_files(root: Path) -> dict[str, Path]:
+    """Return the shipped vehicle files by the names of their vehicles, also those of vehicles with equations of their own."""
+    templates = {path.stem: path for path in root.glob("plant_src/vehicles/*/*.json") if path.parent.name == path.stem}
+    return templates | {source.name: source.path for source in find_sources(root) if source.kind.name == "vehicle file"}
+
+
 def classify_source(path: Path, model: str | None = None) -> Source:
     """Determine the kind of a source file and the name of its FMU.
 

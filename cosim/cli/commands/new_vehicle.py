@@ -65,15 +65,13 @@ def command(name: str, base: str, directory: Path, urdf: Path | None, mesh: Path
 
 def _find_vehicle(base: str) -> Path:
     """Return the path of a vehicle file that is given by its path or by the name of a shipped vehicle."""
-    from ...export.sources import find_sources
+    from ...export.sources import vehicle_files
 
     if base.endswith(".json"):
         if not (path := Path(base)).is_file():
             raise InputError(f'file "{base}" does not exist')
         return path
-    root = resources.root()
-    files = {path.stem: path for path in (root / "plant_src/vehicles").glob("*/*.json") if path.parent.name == path.stem}
-    files |= {source.name: source.path for source in find_sources(root) if source.kind.name == "vehicle file"}
+    files = vehicle_files(resources.root())
     if base not in files:
         raise InputError(f'no vehicle file and no shipped vehicle "{base}"{did_you_mean(base, files)}')
     return files[base]
