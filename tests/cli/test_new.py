@@ -199,3 +199,10 @@ def test_unsuitable_names_and_languages_are_refused(tmp_path, name, language, me
     assert done.returncode == 2
     assert done.stderr.startswith(message)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_new_boat_is_a_copy_of_the_otter(tmp_path: Path) -> None:
+    done = run_cosim("new", "vehicle", "my_boat", "--from", "otter", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "Name it in a scenario" in done.stdout
+    assert json.loads((tmp_path / "my_boat.json").read_text())["family"] == "surface_vessel"
