@@ -18,6 +18,7 @@ from cosim.core.errors import InputError
 from plant_src import mesh_import
 from plant_src.catalogue import model_from_data
 from plant_src.mesh_import import vehicle_from_mesh
+from plant_src.scene.vehicle_parts import vehicle_parts
 from plant_src.urdf import vehicle_from_urdf
 
 trimesh = pytest.importorskip("trimesh")
@@ -58,6 +59,10 @@ def test_a_mesh_gives_inertia_pieces_and_appearance(tmp_path: Path, suffix: str)
     model = model_from_data(json.loads(json.dumps(data)), "boat")
     assert model.visual is not None
     assert model.visual.shape == (36, 3, 3)
+    (part,) = vehicle_parts(json.loads(json.dumps(data)))
+    assert part.shape == "mesh"
+    highest = np.reshape(part.size, (-1, 3))[:, 2].max() + part.position[2]
+    assert highest == pytest.approx(0.4 - centre[2], abs=1e-5)  # pictures are relative to the centre of mass
     assert max(box.position[2] + box.half_extents[2] for box in model.body.boxes) == pytest.approx(0.4)
 
 
