@@ -21,7 +21,7 @@ import numpy as np
 
 from .results import Result
 from .results.kpi import Signal, better, first_crossing_time, units
-from .results.signal_analysis import control_error, integrate, row_slice, step_response, time_average
+from .results.signal_analysis import control_error, integrate, require, row_slice, step_response, time_average
 
 FOREVER = math.inf
 
@@ -147,6 +147,7 @@ def saturation_share(
         start: Time (s) of the first row that counts.
         stop: Time (s) of the last row that counts.
     """
+    require(lower <= upper, f"lower limit {lower:g} is above upper limit {upper:g}")
     rows = row_slice(result, start, stop)
     time, values = result.time[rows], result[signal][rows]
     if len(time) < 2 or time[-1] == time[0] or np.isnan(values).any():
@@ -199,6 +200,7 @@ def rise_time(
         low: Fraction of the step from `initial` to `target` (1).
         high: Fraction of the step from `initial` to `target` (1).
     """
+    require(0 <= low < high, f"expected 0 <= low < high; found low {low:g}, high {high:g}")
     step = step_response(result, signal, start, stop, initial, target)
     return {"value": first_crossing_time(step.time, step.fraction, high) - first_crossing_time(step.time, step.fraction, low)}
 
@@ -239,6 +241,7 @@ def settling_time(
         target: Value after the step; None: value of the last row.
         band: Half width of the band around the target as a fraction of the step from `initial` to `target` (1).
     """
+    require(band >= 0, f"expected a band of 0 or more; found {band:g}")
     time, fraction = step_response(result, signal, start, stop, initial, target)
     distance = np.abs(fraction - 1)
     outside = np.flatnonzero(~(distance <= band))

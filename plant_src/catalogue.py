@@ -1,13 +1,16 @@
-"""Catalogue of the vehicle models: those of the files in `vehicles/data/`, and the vessels."""
+"""Catalogue of the vehicle models: those of the files in `vehicles/data/`, and the vessels with equations of their own."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import replace
 from typing import Any
 
 from cosim.core.errors import InputError, Problem, did_you_mean
 
+from .vehicles.common.inertia import inertia_of
 from .vehicles.common.interface import VESSEL_STATES
+from .vehicles.common.visual_mesh import read_visual
 from .vehicles.data import read_vehicle_files
 from .vehicles.model import Model
 from .vehicles.multirotor import interface as multirotor_interface
@@ -16,6 +19,8 @@ from .vehicles.multirotor.vehicle_data import read_multirotor
 from .vehicles.otter import geometry as otter
 from .vehicles.otter import interface as otter_interface
 from .vehicles.otter import parameters as otter_parameters
+from .vehicles.planar_vessel import interface as planar_vessel_interface
+from .vehicles.planar_vessel.vehicle_data import read_planar_vessel
 from .vehicles.strider import geometry as strider
 from .vehicles.strider import interface as strider_interface
 from .vehicles.strider import parameters as strider_parameters
@@ -24,9 +29,15 @@ from .vehicles.strider_6dof import interface as strider_6dof_interface
 from .vehicles.submerged import interface as submerged_interface
 from .vehicles.submerged.craft import MAX_THRUSTERS
 from .vehicles.submerged.vehicle_data import read_submerged
+from .vehicles.surface_vessel import interface as surface_vessel_interface
+from .vehicles.surface_vessel.vehicle_data import read_surface_vessel
+from .vehicles.vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS
 
 #: keys of a vehicle file of any family besides those of its family
-COMMON_KEYS = ("family", "name", "description", "sources", "validity", "$schema")
+COMMON_KEYS = ("family", "name", "description", "sources", "validity", "visual", "$schema")
+
+#: numbers of elements of the arrays of propellers and rudders in the compiled equations of vessels
+SLOTS = (MAX_PROPELLERS, MAX_RUDDERS)
 
 
 def multirotor_model(name: str, data: Mapping[str, Any]) -> Model:
@@ -41,7 +52,7 @@ def multirotor_model(name: str, data: Mapping[str, Any]) -> Model:
         vehicle.crash_speed,
         constant_count=multirotor_interface.constant_count(airframe, MAX_ROTORS),
         airframe=airframe,
-        body_of=vehicle.body_with,
+        body_of=lambda given: vehicle.body_with(given["mass"], inertia_of(given)),
         equations="multirotor",
         layout=multirotor_interface.variables(airframe, MAX_ROTORS),
     )
@@ -59,14 +70,58 @@ def submerged_model(name: str, data: Mapping[str, Any]) -> Model:
         vehicle.crash_speed,
         constant_count=submerged_interface.constant_count(craft, MAX_THRUSTERS),
         craft=craft,
-        body_of=vehicle.body_with,
+        body_of=lambda given: vehicle.body_with(given["mass"], inertia_of(given)),
         equations="submerged",
         layout=submerged_interface.variables(craft, MAX_THRUSTERS),
     )
 
 
+def surface_vessel_model(name: str, data: Mapping[str, Any]) -> Model:
+    """Return the model of a floating vessel. Raises InputError with all problems of its data."""
+    vehicle = read_surface_vessel(name, data, COMMON_KEYS)
+    vessel = vehicle.vessel
+    return Model(
+        name,
+        surface_vessel_interface.variables(vessel),
+        surface_vessel_interface.states(MAX_PROPELLERS),
+        vehicle.body_with(vessel.mass, vessel.inertia),
+        vehicle.crash_speed,
+        is_vessel=True,
+        constant_count=surface_vessel_interface.constant_count(SLOTS),
+        boat=vessel,
+        body_of=lambda given: vehicle.body_with(given["mass"], inertia_of(given)),
+        equations="surface_vessel",
+        layout=surface_vessel_interface.variables(vessel, SLOTS),
+    )
+
+
+def planar_vessel_model(name: str, data: Mapping[str, Any]) -> Model:
+    """Return the model of a planar vessel. Raises InputError with all problems of its data."""
+    vehicle = read_planar_vessel(name, data, COMMON_KEYS)
+    vessel = vehicle.vessel
+    return Model(
+        name,
+        planar_vessel_interface.variables(vessel),
+        planar_vessel_interface.states(MAX_PROPELLERS),
+        vehicle.body_with(vessel.mass, vessel.yaw_inertia),
+        vehicle.crash_speed,
+        is_vessel=True,
+        motion="planar",
+        constant_count=planar_vessel_interface.constant_count(SLOTS),
+        boat=vessel,
+        body_of=lambda given: vehicle.body_with(given["mass"], given["yaw_inertia"]),
+        equations="planar_vessel",
+        layout=planar_vessel_interface.variables(vessel, SLOTS),
+    )
+
+
 #: family of equations -> function from name and data to the model
-FAMILIES = {"multirotor": multirotor_model, "submerged": submerged_model}
+FAMILIES = {
+    "multirotor": multirotor_model,
+    "submerged": submerged_model,
+    "surface_vessel": surface_vessel_model,
+    "planar_vessel": planar_vessel_model,
+}
 
 
 def model_from_data(data: Mapping[str, Any], name: str = "") -> Model:
@@ -83,7 +138,7 @@ def model_from_data(data: Mapping[str, Any], name: str = "") -> Model:
     if family not in FAMILIES:
         hint = did_you_mean(family, FAMILIES) if isinstance(family, str) else f", expected one of: {', '.join(FAMILIES)}"
         raise InputError([Problem(f"found {family!r}{hint}", "family", ("arguments", "family"))])
-    return FAMILIES[family](str(data.get("name", name)), data)
+    return replace(FAMILIES[family](str(data.get("name", name)), data), visual=read_visual(data))
 
 
 #: name -> model

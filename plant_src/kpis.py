@@ -15,6 +15,7 @@ import numpy as np
 from cosim.results import Result
 from cosim.results.checks import Number
 from cosim.results.kpi import Prefix, Signal, better, declared_units, units
+from cosim.results.signal_analysis import require, row_slice
 
 from . import deck_frame
 from .recorded_motion import distance_from_line, horizontal_distance, touchdown_row, used_waypoints
@@ -123,6 +124,7 @@ def touchdown(result: Result, vehicle: Prefix, deck: Prefix, mass: float) -> dic
         - `deck_heave`: height of the deck centre above its mean over all rows (m)
         - `peak_force`: largest contact force from touchdown on, each the mean over a step (N)
     """
+    require(mass > 0, f"expected a positive mass (kg); found {mass:g}")
     row = touchdown_row(result, vehicle)
     if row is None:
         return dict.fromkeys(declared_units(touchdown), math.nan)
@@ -202,6 +204,7 @@ def waypoints(
         - `all_reached`: true if that is the number of waypoints
         - `time[1]`, `time[2]`, ...: time at which each waypoint was reached (s); NaN if it was not
     """
+    require(acceptance_radius > 0, f"expected a positive acceptance_radius (m); found {acceptance_radius:g}")
     route = used_waypoints(waypoint_x, waypoint_y, waypoint_count)
     times, row = [math.nan] * len(route), 0
     position_x, position_y = result[f"{vehicle}.position.x"], result[f"{vehicle}.position.y"]
@@ -282,7 +285,7 @@ def tracking(result: Result, vehicle: Prefix, target: Prefix, start: float, stop
     Returns:
         `rms`, the root mean square over the rows, and `max`, the largest distance (m); NaN without rows.
     """
-    distance = horizontal_distance(result, vehicle, target)[(result.time >= start) & (result.time <= stop)]
+    distance = horizontal_distance(result, vehicle, target)[row_slice(result, start, stop)]
     if not distance.size:
         return {"rms": math.nan, "max": math.nan}
     return {"rms": float(np.sqrt(np.mean(distance**2))), "max": float(distance.max())}
@@ -306,6 +309,7 @@ def motors(result: Result, rotor_speed: Prefix, threshold: float = 1.0) -> dict[
         - `final_speed`: largest command of the last row (rad/s)
         - `max_speed`: largest command of the run (rad/s)
     """
+    require(threshold > 0, f"expected a positive threshold (rad/s); found {threshold:g}")
     names = result.signals(f"{rotor_speed}[*]") or [f"{rotor_speed}[1]"]
     fastest = np.max([np.abs(result[name]) for name in names], axis=0)
     running = np.flatnonzero(fastest >= threshold)

@@ -22,6 +22,7 @@ import numpy as np
 from cosim.results import Result
 from cosim.results.checks import Number
 from cosim.results.kpi import Prefix, better, first_crossing_time, units
+from cosim.results.signal_analysis import require
 
 from .manoeuvre_track import CENTRE_OF_MASS, Point, Track, track
 
@@ -64,6 +65,7 @@ def turning_circle(
         - `steady_speed`: mean speed over the last full turn (m/s)
         - `speed_loss`: 1 - `steady_speed` / speed at the order
     """
+    require(length > 0, f"expected a positive length (m); found {length:g}")
     motion = track(result, vehicle, start, midships)
     quarter, half = motion.time_of_heading_change(math.pi / 2), motion.time_of_heading_change(math.pi)
     advance, transfer = motion.interpolate(motion.position, quarter).real, motion.interpolate(motion.position, quarter).imag
@@ -123,6 +125,7 @@ def zigzag(result: Result, vehicle: Prefix, start: float, angle: float = 10 * DE
         - `reach`: time from the first order until the heading is first back on the original course (s)
         - `period`: time between the first and the third reversal (s)
     """
+    require(angle > 0, f"expected a positive angle (rad); found {angle:g}")
     motion = track(result, vehicle, start)
     times, overshoot_angles = _reversals(motion, angle, max(overshoots, 3))
     executes = [time - start for time in times]
@@ -185,6 +188,7 @@ def initial_turning(
         - `distance_lengths`: the same in lengths of the vessel
         - `time`: time from the order until then (s)
     """
+    require(length > 0, f"expected a positive length (m); found {length:g}")
     motion = track(result, vehicle, start, midships)
     time = motion.time_of_heading_change(angle)
     distance = motion.interpolate(motion.distance, time).real
@@ -216,6 +220,7 @@ def stopping(
         - `lateral_deviation`: distance from the line of the original course, to port or starboard (m)
         - `time`: time from the order until the vessel has stopped (s)
     """
+    require(length > 0, f"expected a positive length (m); found {length:g}")
     motion = track(result, vehicle, start, midships)
     forward = np.interp(motion.time, result.time, result[f"{vehicle}.velocity_body.u"])
     time = first_crossing_time(motion.time, -forward, -speed)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from cosim.results import Result
+from cosim.results.signal_analysis import require
 
 #: shortest time without contact that counts as flight (s); excludes bounces and a start some millimetres above the support
 MIN_FLIGHT_TIME = 0.1
@@ -47,5 +48,6 @@ def distance_from_line(position: np.ndarray, start: complex, end: complex) -> np
 
 def used_waypoints(x: Sequence[float], y: Sequence[float], count: float | None) -> list[tuple[float, float]]:
     """Return the first `count` waypoints as (x, y); None: all. An autopilot has more elements than it uses."""
+    require(len(x) == len(y), f"expected as many waypoint_x as waypoint_y; found {len(x)} and {len(y)}")
     waypoints = list(zip(x, y, strict=True))
     return waypoints if count is None else waypoints[: int(count)]

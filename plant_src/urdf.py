@@ -1,4 +1,4 @@
-"""Import of a vehicle from URDF (Unified Robot Description Format): mass, inertia, collision shape, places of rotors.
+"""Import of a vehicle from URDF (Unified Robot Description Format): mass, inertia, collision shape, meshes, places of rotors.
 
 All links are one rigid body in the zero position of the joints. Frames of URDF are x forward, y left, z up, in m, kg and rad.
 """
@@ -14,8 +14,10 @@ import numpy as np
 
 from cosim.core.errors import InputError, Problem, did_you_mean
 
+from . import mesh_import
+
 #: lists of a vehicle file whose elements may name a link in place of position and axis
-_NAMED_LISTS = ("rotors", "thrusters")
+_NAMED_LISTS = ("rotors", "thrusters", "propellers")
 
 _AXES = np.eye(3)
 
@@ -32,12 +34,11 @@ class Pose(NamedTuple):
 
 
 class RigidLinks(NamedTuple):
-    """Rigid body of all links: mass (kg), centre of mass (m, root frame), inertia about it (kg m2) and poses of the links."""
+    """Rigid body of all links: mass (kg), centre of mass (m, root frame) and inertia about it (kg m2)."""
 
     mass: float
     centre: np.ndarray
     inertia: np.ndarray
-    poses: Mapping[str, Pose]
 
 
 def vehicle_from_urdf(urdf: Path, data: Mapping[str, Any]) -> dict[str, Any]:
@@ -46,9 +47,9 @@ def vehicle_from_urdf(urdf: Path, data: Mapping[str, Any]) -> dict[str, Any]:
     Args:
         urdf: URDF file.
         data: Further data of the vehicle. Mass, inertia and boxes are those of the URDF unless `data` have them. A rotor or
-            thruster may have the key "link" in place of position and axis: it is at the origin of this link, and its thrust
-            points along the z axis of the link (rotor) or the x axis (thruster). Given positions are in the root frame of the
-            URDF and become relative to the centre of mass.
+            thruster or propeller may have the key "link" in place of position and axis: it is at the origin of this link, and its
+            thrust points along the z axis of the link (rotor) or the x axis (thruster, propeller). Given positions are in the
+            root frame of the URDF and become relative to the centre of mass. The origin of a vessel is the root frame.
 
     Raises:
         InputError: With file and element, if the URDF cannot be read or does not describe a rigid body.
@@ -60,18 +61,29 @@ def vehicle_from_urdf(urdf: Path, data: Mapping[str, Any]) -> dict[str, Any]:
     poses = link_poses(robot, urdf)
     body = _rigid_body(robot, urdf, poses)
     source = f"URDF file {urdf.name}"
-    boxes = [box for link in robot.findall("link") for box in _boxes(link, poses[_name(link)], body.centre, urdf)]
+    is_vessel = data.get("family") in ("surface_vessel", "planar_vessel")
+    origin = np.zeros(3) if is_vessel else body.centre
+    frames = [(link, Pose(poses[_name(link)].rotation, poses[_name(link)].position - origin)) for link in robot.findall("link")]
+    boxes = [box for link, pose in frames for box in _collision_shape(link, pose, urdf)]
     if not boxes and "boxes" not in data:
         raise InputError(Problem('no link has a collision shape; expected one, or "boxes" in the accompanying file', str(urdf)))
     result: dict[str, Any] = {
         **data,
         "mass": data.get("mass", {"value": body.mass, "unit": "kg", "source": source}),
-        "inertia": data.get("inertia", {"value": body.inertia.tolist(), "unit": "kg.m2", "source": source}),
         "boxes": data.get("boxes", [{**box, "source": source} for box in boxes]),
     }
+    if data.get("family") == "planar_vessel":
+        result.setdefault("yaw_inertia", {"value": float(body.inertia[2, 2]), "unit": "kg.m2", "source": source})
+    else:
+        result.setdefault("inertia", {"value": body.inertia.tolist(), "unit": "kg.m2", "source": source})
+    if is_vessel:
+        result.setdefault("centre_of_mass", {"value": body.centre.tolist(), "unit": "m", "source": source})
+    triangles = [mesh for link, pose in frames for mesh in _visual_meshes(link, pose, urdf)]
+    if triangles and "visual" not in data:
+        result["visual"] = mesh_import.visual_data(np.concatenate(triangles), source)
     for key in _NAMED_LISTS:
         if key in data:
-            result[key] = [_place(each, body, urdf, key) for each in data[key]]
+            result[key] = [_place(each, poses, origin, urdf, key) for each in data[key]]
     return result
 
 
@@ -116,15 +128,19 @@ def _rigid_body(robot: ET.Element, urdf: Path, poses: Mapping[str, Pose]) -> Rig
     for weight, place, tensor in zip(masses, centres, tensors, strict=True):
         arm = place - centre
         composed += tensor + weight * (arm @ arm * _AXES - np.outer(arm, arm))
-    return RigidLinks(total, centre, (composed + composed.T) / 2, poses)
+    return RigidLinks(total, centre, (composed + composed.T) / 2)
 
 
-def _boxes(link: ET.Element, pose: Pose, centre: np.ndarray, urdf: Path) -> Iterator[dict[str, Any]]:
-    """Yield the collision shapes of a link as boxes; what is not an upright box becomes the level box around it."""
+def _collision_shape(link: ET.Element, pose: Pose, urdf: Path) -> Iterator[dict[str, Any]]:
+    """Yield the collision shapes of a link; what is not an upright box or a mesh becomes the level box around it."""
     for collision in link.findall("collision"):
         frame, shape = pose @ _origin(collision), collision.find("geometry/*")
         if shape is None:
             raise InputError(Problem(f'link "{_name(link)}": <collision> needs a <geometry>', str(urdf)))
+        if shape.tag == "mesh":
+            for points in mesh_import.convex_pieces(_mesh(shape, urdf)):
+                yield mesh_import.piece_data(points @ frame.rotation.T + frame.position, "")
+            continue
         match shape.tag:
             case "box":
                 edges = _numbers(shape, "size")
@@ -133,25 +149,43 @@ def _boxes(link: ET.Element, pose: Pose, centre: np.ndarray, urdf: Path) -> Iter
             case "sphere":
                 edges = np.full(3, 2 * _number(shape, "radius"))
             case found:
-                text = f'link "{_name(link)}": found the collision geometry {found}, expected box, cylinder or sphere'
+                text = f'link "{_name(link)}": found the collision geometry {found}, expected box, cylinder, sphere or mesh'
                 raise InputError(Problem(text, str(urdf)))
         upright = abs(frame.rotation[2, 2]) > 1 - 1e-9
         size = edges if upright else np.abs(frame.rotation) @ edges
         yaw = float(np.arctan2(frame.rotation[1, 0], frame.rotation[0, 0])) if upright else 0.0
-        yield {"size": size.tolist(), "position": (frame.position - centre).tolist(), "yaw": yaw}
+        yield {"size": size.tolist(), "position": frame.position.tolist(), "yaw": yaw}
 
 
-def _place(element: Mapping[str, Any], body: RigidLinks, urdf: Path, key: str) -> dict[str, Any]:
-    """Return a rotor or thruster with its position relative to the centre of mass."""
+def _visual_meshes(link: ET.Element, pose: Pose, urdf: Path) -> Iterator[np.ndarray]:
+    """Yield the triangles of the visual meshes of a link, each of shape (n, 3, 3)."""
+    for visual in link.findall("visual"):
+        if (shape := visual.find("geometry/mesh")) is not None:
+            frame = pose @ _origin(visual)
+            yield np.asarray(_mesh(shape, urdf).triangles) @ frame.rotation.T + frame.position
+
+
+def _mesh(shape: ET.Element, urdf: Path) -> Any:
+    """Return the mesh of <mesh>; the path of "package://NAME/path" starts from a folder NAME above the URDF file."""
+    name = shape.get("filename", "")
+    folders = [urdf.parent]
+    if name.startswith("package://"):
+        package, _, name = name.removeprefix("package://").partition("/")
+        folders = [folder for folder in urdf.resolve().parents if folder.name == package] or folders
+    return mesh_import.load_mesh(folders[0] / name.removeprefix("file://"), _numbers(shape, "scale", "1 1 1").tolist())
+
+
+def _place(element: Mapping[str, Any], poses: Mapping[str, Pose], origin: np.ndarray, urdf: Path, key: str) -> dict[str, Any]:
+    """Return a rotor, thruster or propeller with its position relative to the origin of the vehicle file."""
     placed = dict(element)
     if "link" in placed:
         name = str(placed.pop("link"))
-        if name not in body.poses:
-            raise InputError(Problem(f'{key}: no link "{name}"{did_you_mean(name, body.poses)}', str(urdf)))
-        pose = body.poses[name]
+        if name not in poses:
+            raise InputError(Problem(f'{key}: no link "{name}"{did_you_mean(name, poses)}', str(urdf)))
+        pose = poses[name]
         column = 2 if key == "rotors" else 0
         placed = {"position": pose.position.tolist(), "axis": pose.rotation[:, column].tolist(), "label": name, **placed}
-    placed["position"] = (np.array(placed["position"], float) - body.centre).tolist()
+    placed["position"] = (np.array(placed["position"], float) - origin).tolist()
     return placed
 
 

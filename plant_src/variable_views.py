@@ -21,6 +21,17 @@ def variable_views(
         yield variable, arrays[variable.dtype][first : ends[variable.dtype]]
 
 
+def views_in_parts(variables: Sequence[Variable], parts: Sequence[np.ndarray]) -> Iterator[tuple[Variable, np.ndarray]]:
+    """Yield each variable with a view of its values; the parts hold the variables in order."""
+    remaining, part, first = iter(parts), np.zeros(0), 0
+    for variable in variables:
+        if first == len(part):
+            part, first = next(remaining), 0
+        end = first + len(variable.scalar_names)
+        yield variable, part[first:end]
+        first = end
+
+
 def recorded_others(outputs: Ports) -> list[tuple[str, np.ndarray]]:
     """Return the name of each recorded variable that is no output, and the view to which its value belongs."""
     views = variable_views(outputs.variables, outputs.arrays)

@@ -11,7 +11,11 @@ from cosim.export.fmu.block import Block
 
 from .catalogue import FAMILIES, model_from_data
 from .vehicles.multirotor.multirotor_equations import multirotor_block
+from .vehicles.planar_vessel.planar_equations import planar_vessel_block
+from .vehicles.planar_vessel.planar_vessel import PlanarVessel
 from .vehicles.submerged.submerged_equations import submerged_block
+from .vehicles.surface_vessel.floating_equations import surface_vessel_block
+from .vehicles.surface_vessel.surface_vessel import SurfaceVessel
 
 
 def vehicle_block(path: Path) -> Block:
@@ -36,5 +40,9 @@ def vehicle_block(path: Path) -> Block:
     description = str(data.get("description", model.name))
     if model.airframe:
         return multirotor_block(model.airframe, f"{description} in free flight")
+    if isinstance(model.boat, SurfaceVessel):
+        return surface_vessel_block(model.boat, f"{description} afloat")
+    if isinstance(model.boat, PlanarVessel):
+        return planar_vessel_block(model.boat, f"{description} on calm water")
     assert model.craft is not None
     return submerged_block(model.craft, f"{description} in open water")

@@ -26,7 +26,7 @@ from .physics.contacts import overlap_depths
 from .physics.failures import FLAG_COUNT
 from .physics.fleet import Fleet, FleetState
 from .scene import replay
-from .variable_views import recorded_others, variable_views
+from .variable_views import recorded_others, variable_views, views_in_parts
 from .world_settings import INITIAL_PREFIX, WAVE_PREFIX, WorldSettings
 
 if TYPE_CHECKING:
@@ -150,7 +150,7 @@ class World(Component):
         """Yield every variable with a view of its values."""
         for body, flags in zip(self._fleet.bodies, self._flags, strict=True):
             prefixed = [replace(variable, name=f"{body.name}.{variable.name}") for variable in body.model.variables]
-            yield from variable_views([v for v in prefixed if v.causality == "input"], {_FLOAT: body.inputs})
+            yield from views_in_parts([v for v in prefixed if v.causality == "input"], body.inputs)
             yield from variable_views([v for v in prefixed if v.causality == "output"], {_FLOAT: body.outputs, _FLAG: flags})
             yield from _constants(body, f"/components/{self._name}/arguments/vehicles/{body.name}/parameters")
         environment = self._environment
@@ -182,11 +182,9 @@ class World(Component):
         bound_inputs, bound_outputs = inputs.arrays[_FLOAT].data, outputs.arrays[_FLOAT].data
         # memoryviews: copying a few numbers is faster than with NumPy
         own_outputs = self._fleet.outputs.data
-        ends = list(accumulate(len(body.inputs) for body in self._fleet.bodies))
-        self._input_copies = [
-            (body.inputs.data, bound_inputs[end - len(body.inputs) : end])
-            for body, end in zip(self._fleet.bodies, ends, strict=True)
-        ]
+        parts = [part for body in self._fleet.bodies for part in body.inputs]
+        ends = list(accumulate(map(len, parts)))
+        self._input_copies = [(part.data, bound_inputs[end - len(part) : end]) for part, end in zip(parts, ends, strict=True)]
         self._output_copies = [
             (bound_outputs[: len(own_outputs)], own_outputs),
             (outputs.arrays[_FLAG].data, self._flags.reshape(-1).data),

@@ -92,6 +92,8 @@ class VariableAccess:
         variable = variables.get(text)
         names = variable.scalar_names if variable else [slot for slot in elements if slot.startswith(f"{text}[")]
         names = names or vector_names(variables, text)
+        if not names and (below := [slot for slot in elements if slot.startswith(f"{text}.")]):
+            raise InputError(f'"{component}.{text}" is a prefix, expected a variable such as "{component}.{below[0]}"')
         if not names:
             raise InputError(f'component "{component}" has no variable "{text}"{did_you_mean(text, elements)}')
         readers = [self._make_scalar_reader(Endpoint(component, slot)) for slot in names]

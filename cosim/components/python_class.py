@@ -80,7 +80,24 @@ def _resources(factory: type) -> dict[str, str]:
     return {"resources": str(Path(file).parent)} if accepted and file else {}
 
 
+def _check_do_step(factory: type, reference: str) -> None:
+    """Raise InputError unless a PythonFMU class has a method `do_step` that accepts the time and the step size."""
+    method = factory.__dict__.get("do_step") or getattr(factory, "do_step", None)
+    if method is None or getattr(method, "__isabstractmethod__", False):
+        raise InputError(f"{reference} has no method do_step(self, current_time, step_size)")
+    if not inspect.isfunction(method):
+        return
+    try:
+        inspect.signature(method).bind(None, 0.0, 0.0)
+    except TypeError:
+        place = f"{Path(method.__code__.co_filename).name}:{method.__code__.co_firstlineno}"
+        found = f"do_step{inspect.signature(method)}"
+        raise InputError(f"{reference}: expected do_step(self, current_time, step_size); found {found} ({place})") from None
+
+
 def _construct(factory: Callable[..., Any], reference: str, /, *positional: Any, **named: Any) -> Any:
+    if isinstance(factory, type) and _is_pythonfmu_class(factory):
+        _check_do_step(factory, reference)
     try:
         inspect.signature(factory).bind(*positional, **named)
     except TypeError as error:

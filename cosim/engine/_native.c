@@ -39,6 +39,7 @@ enum { WARNING = 1, DISCARD = 2 };                   /* FMI statuses; 0 is OK, e
 enum { CONTINUE = 0, END_AFTER_STEP = 1, END_BEFORE_STEP = 2 }; /* answers of `on_status`; the last one discards the macro step */
 enum { MARKER_CALL = 0, MARKER_STEPS = 1, MARKER_ROWS = 2 };    /* marker: number of the current call, completed steps, rows */
 enum { MEASURED_STEPS = 3 };                         /* the first doStep calls of each instance, whose durations are measured */
+enum { TRAP_CHECK_INTERVAL = 8 };                    /* macro steps; reading the control register takes longer than some steps */
 enum { SIGNAL_CHECK_INTERVAL = 50000000, OPERATION_DURATION = 20 }; /* ns; estimated duration of one operation */
 
 /* C functions of FMI 2.0 and FMI 3.0; `values` has the element type of the function. */
@@ -617,15 +618,19 @@ static int check_signals(Program *p) {
     return interrupted;
 }
 
+static bool traps_changed(const Program *p) { return sse_control() != p->sse_control; }
+
 static int run_macro_steps(Program *p, int64_t first, int64_t count, double origin, double stride, double denominator) {
     const int64_t steps_per_check = macro_steps_per_signal_check(p);
     int64_t left = steps_per_check;
+    double next_time = (origin + (double)first * stride) / denominator;
     for (int64_t n = first; n < first + count && !p->end_request; n++) {
-        double time = (origin + (double)n * stride) / denominator;
+        double time = next_time;
+        next_time = (origin + (double)(n + 1) * stride) / denominator; /* the division takes its time during the step */
         *p->current_time = time;
         if (run_macro_step(p, n, time) < 0) return -1;
         if (p->end_request == END_BEFORE_STEP) return 0;
-        if (sse_control() != p->sse_control && report_status(p, -1, FLOAT_TRAPS_ENABLED) < 0) return -1;
+        if ((n + 1) % TRAP_CHECK_INTERVAL == 0 && traps_changed(p) && report_status(p, -1, FLOAT_TRAPS_ENABLED) < 0) return -1;
         if (!all_finite(p) && report_status(p, -1, NOT_FINITE) < 0) return -1;
         if (record_row(p, n + 1) < 0) return -1;
         p->marker[MARKER_STEPS] = n + 1;
@@ -650,7 +655,7 @@ static PyObject *run(Program *p, PyObject *arguments) {
     if (!p->is_packed && all_steps_measured(p) && pack_steps(p) < 0) return NULL;
     release_gil(p);
     int failed = run_macro_steps(p, first, count, origin, stride, denominator);
-    if (!failed && x87_control() != p->x87_control) failed = report_status(p, -1, FLOAT_TRAPS_ENABLED);
+    if (!failed && (traps_changed(p) || x87_control() != p->x87_control)) failed = report_status(p, -1, FLOAT_TRAPS_ENABLED);
     acquire_gil(p);
     if (failed) return NULL;
     Py_RETURN_NONE;

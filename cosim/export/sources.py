@@ -85,6 +85,7 @@ def _load_equations(path: Path, _model: str | None, _options: ModelicaOptions | 
 #: program whose function `vehicle_block` makes the block of a vehicle file
 _VEHICLE_PROGRAM = "plant_src/vehicle_block.py"
 _URDF_READER = "plant_src/urdf.py:vehicle_from_urdf"
+_MESH_READER = "plant_src/mesh_import.py:vehicle_from_mesh"
 _VEHICLE_SCHEMA = "plant_src/vehicle_schema.py:vehicle_schema"
 
 
@@ -119,6 +120,23 @@ def vehicle_from_urdf(urdf: Path, data: Mapping[str, Any]) -> dict[str, Any]:
     return read(urdf, data)
 
 
+def vehicle_from_mesh(mesh: Path, data: Mapping[str, Any], scale: float) -> dict[str, Any]:
+    """Return the data of a vehicle with inertia, collision shape and appearance of a mesh.
+
+    Args:
+        mesh: STL, OBJ or GLB file.
+        data: Further data of the vehicle, with its mass.
+        scale: Factor on all coordinates.
+
+    Raises:
+        InputError: The mesh cannot be read or encloses no volume, or the data have no mass.
+    """
+    from ..components.python_import import load_object
+
+    read: Callable[[Path, Mapping[str, Any], float], dict[str, Any]] = load_object(_MESH_READER, resources.root())
+    return read(mesh, data, scale)
+
+
 SOURCE_KINDS = (
     SourceKind("Modelica model", "controllers/modelica/*.mo", "rumoca", _load_modelica),
     SourceKind("PythonFMU class", "controllers/python/*.py", "pythonfmu", None, "python", write_python_fmu, compiled=False),
@@ -145,6 +163,12 @@ def find_sources(root: Path) -> list[Source]:
             [Problem(f'has the same FMU name "{a.manifest_key}.fmu" as {b.path}; rename one', str(a.path)) for a, b in clashes]
         )
     return sources
+
+
+def vehicle_files(root: Path) -> dict[str, Path]:
+    """Return the shipped vehicle files by the names of their vehicles, also those of vehicles with equations of their own."""
+    templates = {path.stem: path for path in root.glob("plant_src/vehicles/*/*.json") if path.parent.name == path.stem}
+    return templates | {source.name: source.path for source in find_sources(root) if source.kind.name == "vehicle file"}
 
 
 def classify_source(path: Path, model: str | None = None) -> Source:

@@ -9,7 +9,8 @@ is JSON as well, with any of these keys (m, rad; world frame east-north-up; colo
   "parts"}; position, orientation and attitude are names of signals, their negatives ("-name"), or numbers
 - `parts` of a body, and `fixed`: {"shape", "size", "position", "orientation": [x, y, z, w], "colour": [r, g, b] in 0 ... 1,
   "opacity"}; all but the first two have defaults. The size of a "box" is its edge lengths, of a "cylinder" (along z) radius and
-  length, of a "cone" lower and upper radius and length, of a "sphere" its radius, of a "ring" radius and thickness
+  length, of a "cone" lower and upper radius and length, of a "sphere" its radius, of a "ring" radius and thickness, of a "mesh"
+  the coordinates of the corners of its triangles, nine numbers each
 - `water`, at z = 0: {"waves": [{"amplitude", "frequency", "number", "direction", "phase"}], "gain": signal or number}
 - `markers`: {"position", "radius", "label"}; `views`: {"name", "on": a body, "eye", "target"} in axes that turn with its yaw
 - `spans`: {"signal", "label", "colour"} for a Boolean signal; `plots`: lists of patterns of signals
@@ -32,8 +33,8 @@ from ..scenario.named_functions import load_function
 
 LIST_KEYS = ("bodies", "fixed", "markers", "views", "spans", "marks", "plots")
 
-#: number of elements of the size of each shape
-SHAPE_SIZES: Mapping[str, int] = {"box": 3, "cylinder": 2, "cone": 3, "sphere": 1, "ring": 2}
+#: number of elements of the size of each shape; a mesh has that of each of its triangles
+SHAPE_SIZES: Mapping[str, int] = {"box": 3, "cylinder": 2, "cone": 3, "sphere": 1, "ring": 2, "mesh": 9}
 
 _BODY_DEFAULTS: Mapping[str, Any] = {"colour": "#0072b2", "parts": ()}
 _PART_DEFAULTS: Mapping[str, Any] = {"position": (0, 0, 0), "orientation": (0, 0, 0, 1), "colour": (0.6, 0.6, 0.6), "opacity": 1}
@@ -138,6 +139,9 @@ def _part_with_defaults(part: Mapping[str, Any]) -> dict[str, Any]:
     shape, size = str(part.get("shape")), part.get("size", ())
     if shape not in SHAPE_SIZES:
         raise ValueError(f'unknown shape "{shape}"{did_you_mean(shape, SHAPE_SIZES)}')
-    if len(size) != SHAPE_SIZES[shape]:
+    if shape == "mesh":
+        if not size or len(size) % 9:
+            raise ValueError(f"a mesh has nine numbers for each triangle as its size, found {len(size)} numbers")
+    elif len(size) != SHAPE_SIZES[shape]:
         raise ValueError(f"a {shape} has {SHAPE_SIZES[shape]} numbers as its size, found {list(size)}")
     return {**_PART_DEFAULTS, **part}

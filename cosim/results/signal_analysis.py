@@ -44,8 +44,19 @@ def step_response(
     return StepResponse(time, (values - begin) / (end - begin)) if end != begin else StepResponse(time[:0], values[:0])
 
 
+def require(holds: bool, message: str) -> None:
+    """Raise InputError with a message about the arguments of a KPI unless a condition holds."""
+    if not holds:
+        raise InputError(message)
+
+
 def row_slice(result: Result, start: float, stop: float) -> slice:
-    """Return the rows with start <= time <= stop (s)."""
+    """Return the rows with start <= time <= stop (s).
+
+    Raises:
+        InputError: `stop` is before `start`.
+    """
+    require(start <= stop, f"start {start:g} s is after stop {stop:g} s")
     return slice(int(np.searchsorted(result.time, start, "left")), int(np.searchsorted(result.time, stop, "right")))
 
 

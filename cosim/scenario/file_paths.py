@@ -27,11 +27,13 @@ def find_scenario(scenario: str | Path) -> Path:
     """Return the path of a scenario file that is given by its path or by the name of a shipped scenario.
 
     Raises:
-        InputError: There is neither such a file nor a shipped scenario of this name, or it is an FMU.
+        InputError: There is neither such a file nor a shipped scenario of this name, or it is an FMU or a Python file.
     """
     path = Path(scenario)
     if path.suffix == ".fmu":
         raise InputError(f"{scenario} is an FMU, expected a scenario; `cosim simulate {scenario}` simulates a single FMU")
+    if path.suffix == ".py":
+        raise InputError(f"{scenario} is a Python file, expected a scenario, which is a JSON file that names its classes")
     if path.suffix == ".json" or paths.is_file(path):
         return path
     names = resources.shipped_names("scenarios/*.json")

@@ -18,7 +18,7 @@ from ..core.errors import Problem, did_you_mean
 from .evaluation_schema import CallSpec, FunctionSpec
 from .json_pointer import find_value, pointer_keys
 from .name_resolution import Target, UnknownNameError, resolve_name
-from .named_functions import declared_arguments, definition_problem, unknown_signals
+from .named_functions import declared_arguments, definition_problem, unknown_signals, wrong_types
 from .nested_systems import Node
 from .schema import ScenarioSpec
 from .schema_types import INVALID, accepted
@@ -63,6 +63,9 @@ class FunctionResolver:
             return spec
         found: list[Problem] = []
         resolved = self._resolve_arguments(spec, found, kind, i)
+        if not found and (wrong := self._type_problems(resolved, spec, kind, i)):
+            self.problems += wrong
+            return INVALID
         if not spec.optional:
             self.problems += [problem for problem in found if problem.message]
             return INVALID if found else resolved
@@ -90,6 +93,16 @@ class FunctionResolver:
                 if name not in arguments:
                     self._add_argument(arguments, name, spec.sources, is_required, problems, self.root.where(*path, "from"))
         return spec.model_copy(update={"arguments": arguments, "sources": []})
+
+    def _type_problems(self, resolved: CallSpec, spec: CallSpec, *path: str | int) -> list[Problem]:
+        """Return the problems of values that do not have the annotated type; `spec` is the function before `resolved`."""
+        problems = []
+        for name, text in wrong_types(resolved, self.root.folder):
+            if name in spec.arguments:
+                problems.append(Problem(text, self.root.where(*path, "arguments", name)))
+            else:
+                problems.append(Problem(f"argument {name}: {text}", self.root.where(*path, "from")))
+        return problems
 
     def _add_argument(
         self, arguments: dict[str, Any], name: str, sources: Sequence[str], is_required: bool, problems: list[Problem], where: str

@@ -191,7 +191,8 @@ class _JsonParser:
             if result:
                 offset = self.expect(offset, ",", "}")
             if self.text[offset : offset + 1] != '"':
-                raise self.error(offset, 'expected a key in double quotes or "}"')
+                comment = "; JSON has no comments" if self.text.startswith(("//", "/*"), offset) else ""
+                raise self.error(offset, f'expected a key in double quotes or "}}"{comment}')
             begin = offset
             raw_key, offset = self.string(offset)
             key = acceptable_text(raw_key)

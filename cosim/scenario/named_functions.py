@@ -14,6 +14,7 @@ from typing import Any
 from ..components.python_import import load_object
 from ..core.errors import Problem, did_you_mean, nearest_file
 from ..core.paths import is_file
+from .argument_types import argument_problem
 from .evaluation_schema import CallSpec, FunctionSpec
 from .nested_systems import Node
 from .schema import ScenarioSpec
@@ -115,6 +116,14 @@ def unknown_signals(spec: CallSpec, root: Node, signals: Collection[str]) -> Ite
             yield parameter.arg, f'no signal "{value}" is recorded{_reason(value, root, signals)}'
         if "Prefix" in kinds and not any(name.startswith((f"{value}.", f"{value}[")) for name in signals):
             yield parameter.arg, f'no signal below "{value}" is recorded{_reason(value, root, _signal_prefixes(signals))}'
+
+
+def wrong_types(spec: CallSpec, folder: Path) -> Iterator[tuple[str, str]]:
+    """Yield (parameter, message) of every argument whose value does not have the annotated type."""
+    declared = _function_definition(spec, folder).args
+    for parameter in (*declared.posonlyargs, *declared.args, *declared.kwonlyargs):
+        if parameter.arg in spec.arguments and (text := argument_problem(parameter.annotation, spec.arguments[parameter.arg])):
+            yield parameter.arg, text
 
 
 def _reason(value: str, root: Node, names: Collection[str]) -> str:

@@ -21,12 +21,14 @@ VariablesByEndpoint = dict[Endpoint, Variable]
 
 def find_warnings(prepared: PreparedRun) -> list[Problem]:
     """Return all warnings about a prepared run, each with its location in the scenario file."""
-    return [*find_run_warnings(prepared), *_missing_reference(prepared), *_late_events(prepared)]
+    return [*find_run_warnings(prepared), *_missing_reference(prepared)]
 
 
 def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
-    """Yield the warnings that concern the results: functions left out, end of the run, connections, FMU files."""
+    """Yield the warnings that concern the results: functions left out, end of the run, late times, connections, FMU files."""
     yield from prepared.left_out
+    yield from _late_events(prepared)
+    yield from _late_kpis(prepared)
     if prepared.plan.end_warning:
         yield Problem(prepared.plan.end_warning, prepared.root.where("stop_time"))
     yield from _missing_connections(prepared)
@@ -136,3 +138,13 @@ def _late_events(prepared: PreparedRun) -> Iterator[Problem]:
         if event.time > stop:
             text = f"this event does not happen: {float(event.time):g} s is after the stop time {float(stop):g} s"
             yield Problem(text, event.where)
+
+
+def _late_kpis(prepared: PreparedRun) -> Iterator[Problem]:
+    """Yield a warning for every KPI whose argument `start` (s) is after the end of the run."""
+    stop = prepared.settings.stop_time
+    for kpi in prepared.spec.kpis:
+        start = kpi.arguments.get("start")
+        if isinstance(start, int | float) and start > stop:
+            text = f'KPI "{kpi.name}" starts at {float(start):g} s, after the stop time {float(stop):g} s, and may have no value'
+            yield Problem(text, prepared.root.where("kpis", prepared.index_of_kpi(kpi.name), "arguments", "start"))

@@ -19,6 +19,7 @@ from .schema_types import (
     INVALID,
     AutoOrBool,
     Duration,
+    Gain,
     Integer,
     Name,
     NameList,
@@ -69,7 +70,7 @@ class ConnectionSpec(Spec):
         alias="from",
     )
     target: str = key('input "component.variable", a prefix of inputs, or a pattern', "uav.vehicle", alias="to")
-    gain: float | list[float] = key(
+    gain: Gain = key(
         "factor that is applied after the conversion of units; a list has one for each output of a sum", -1.0, default=1.0
     )
     offset: float = key("value that is added after the gain", 0.5, unit="that of the input", default=0.0)

@@ -79,6 +79,13 @@ def _as_list(value: Any) -> Any:
     return [value] if isinstance(value, str) else value
 
 
+def _check_gain(value: Any) -> Any:
+    gains = value if isinstance(value, list) else [value]
+    if not all(isinstance(gain, int | float) and not isinstance(gain, bool) for gain in gains):
+        raise ValueError("expected a number or a list of numbers")
+    return value
+
+
 Name = Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$")]
 Seconds = Annotated[
     Fraction,
@@ -110,6 +117,11 @@ Duration = Annotated[
             ]
         }
     ),
+]
+Gain = Annotated[
+    float | list[float],
+    BeforeValidator(_check_gain),
+    WithJsonSchema({"anyOf": [{"type": "number"}, {"type": "array", "items": {"type": "number"}}]}),
 ]
 Integer = Annotated[int, BeforeValidator(_as_integer)]
 BoolOrNumber = Annotated[

@@ -167,7 +167,10 @@ def _error_message(kind: type[BaseModel], path: Sequence[str | int], detail: Any
             hint = '; a scenario that "extends" this one removes a component by null' if is_removal else ""
             return f"expected an object; found {found}{hint}"
         case "string_pattern_mismatch":
-            return f"expected a name of letters, digits and underscores; found {found}"
+            characters = (
+                'letters, digits, "_", ".", "-" and spaces' if tuple(path) == ("name",) else "letters, digits and underscores"
+            )
+            return f"expected a name of {characters}; found {found}"
     return f"{detail['msg'].replace('Input should be', 'expected')}; found {found}"
 
 

@@ -103,6 +103,8 @@ def read_study(file: str | Path | Mapping[str, Any], kind: type[S], max_runs: in
         InputError: with all problems of the file.
     """
     document = _document_of_dict(file) if isinstance(file, Mapping) else read_document(_find_study(file))
+    if isinstance(document.value, dict) and "components" in document.value and "scenario" not in document.value:
+        raise InputError(f'"{document.file}" is a scenario, expected a study; `cosim run {document.file}` runs it')
     try:
         spec = kind.model_validate(document.value)
     except ValidationError as error:

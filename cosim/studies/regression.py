@@ -89,7 +89,8 @@ class Regression:
         if done.returncode not in (0, 3):
             report = self._write_report() if done.returncode == 1 and (self.directory / "result.csv").is_file() else []
             details = (*done.stderr.splitlines(), *report)
-            return RegressionOutcome(self.file.stem, done.returncode, "did not run to its end", details)
+            summary = "was refused" if done.returncode == 2 else "did not run to its end"
+            return RegressionOutcome(self.file.stem, done.returncode, summary, details)
         try:
             run = _FinishedRun.read(self.file, self.directory)
             outcome = self._update_reference(run) if self.update else self._compare(run)

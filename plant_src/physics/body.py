@@ -21,11 +21,12 @@ from typing import TYPE_CHECKING, Any, ClassVar
 import numpy as np
 
 from ..placement import DRY, ContactSurface
-from ..vehicles.common.shapes import Body, Box
+from ..vehicles.common.shapes import Body, Box, ConvexPiece, Shape
 from ..vehicles.common.step_status import MAX_STATE_NORM
 from .clearance import BoundingBox
 from .client import pybullet
 from .compiled_equations import bind_arrays, load_library
+from .convex_pieces import mesh_file
 
 if TYPE_CHECKING:
     from ctypes import _NamedFuncPointer
@@ -60,7 +61,7 @@ class ContactBody:
         name: Name of the vehicle.
         model: Model of the vehicle.
         body_id: Number of the body in Bullet.
-        inputs: Real inputs of the model in order.
+        inputs: Real inputs of the model in order, in one or several parts.
         outputs: Real outputs in order; `correct` writes the motion, `contacts.py` the contact force.
         environment_inputs: Inputs that the environment writes, in order.
         commanded_twist: Twist to set in Bullet before its step, shape (6,).
@@ -97,7 +98,8 @@ class ContactBody:
         constants = vehicle.model.constant_count if vehicle.model.constant_count is not None else len(parameters)
         fixed = {"parameters": parameters, "principal_axes": np.array(vehicle.body.axes)}
         self._arrays = arrays = {**arrays, **fixed, "constants": np.zeros(constants)}
-        self.inputs, self.outputs = arrays["inputs"][: len(vehicle.model.slots("input"))], arrays["outputs"]
+        self.inputs = [arrays["inputs"][place] for place in vehicle.model.input_places]
+        self.outputs = arrays["outputs"]
         self.parameters = np.array(vehicle.parameters)
         self.environment_inputs = arrays["environment_inputs"]
         self.environment_inputs[:] = [variable.start for variable in vehicle.model.environment_inputs]
@@ -156,7 +158,7 @@ class ContactBody:
     def describe_invalid_state(self) -> str:
         """Return a message that names the first input that is not finite, or the predicted state with the largest value."""
         names = [*self.model.slots("input"), *(variable.name for variable in self.model.environment_inputs)]
-        for name, value in zip(names, np.concatenate([self.inputs, self.environment_inputs]), strict=True):
+        for name, value in zip(names, np.concatenate([*self.inputs, self.environment_inputs]), strict=True):
             if not math.isfinite(value):
                 return f"{self.name}.{name} is {value}, expected a finite number"
         predicted = self._arrays["predicted_state"]
@@ -175,13 +177,17 @@ class FreeBody(ContactBody):
     )
 
 
-def create_compound_shape(boxes: Sequence[Box], client: int) -> int:
-    """Create a collision shape of boxes in Bullet and return its number."""
+def create_compound_shape(boxes: Sequence[Shape], client: int) -> int:
+    """Create a collision shape of boxes and convex pieces in Bullet and return its number."""
+    is_piece = [isinstance(box, ConvexPiece) for box in boxes]
+    centred = [(0.0, 0.0, 0.0) if piece else box.position for box, piece in zip(boxes, is_piece, strict=True)]
+    names = [mesh_file(box) if isinstance(box, ConvexPiece) else "" for box in boxes]
     number = pybullet.createCollisionShapeArray(
-        [pybullet.GEOM_BOX] * len(boxes),
+        [pybullet.GEOM_MESH if piece else pybullet.GEOM_BOX for piece in is_piece],
         halfExtents=[box.half_extents for box in boxes],
-        collisionFramePositions=[box.position for box in boxes],
+        collisionFramePositions=centred,
         collisionFrameOrientations=[box.orientation for box in boxes],
+        **({"fileNames": names, "meshScales": [[1.0] * 3] * len(boxes)} if any(is_piece) else {}),
         physicsClientId=client,
     )
     return int(number)

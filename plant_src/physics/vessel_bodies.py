@@ -49,7 +49,7 @@ class FloatingBody(ContactBody):
         """
         place_and_time, result = np.zeros(3), np.zeros(1)
         count = np.full(1, float(wave_count))
-        call = bind_arrays(load_library(self.model.name).water_elevation, [place_and_time, count, waves], [result])
+        call = bind_arrays(load_library(self.model.binary).water_elevation, [place_and_time, count, waves], [result])
         arguments, elevations, outputs = place_and_time.data, result.data, self.outputs.data
 
         def elevation(time: float) -> float:

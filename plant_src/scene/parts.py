@@ -29,12 +29,12 @@ LEAVES = ((0.22, 0.42, 0.17), (0.28, 0.48, 0.19), (0.18, 0.36, 0.18), (0.36, 0.5
 class Part(NamedTuple):
     """Coloured solid in the frame of its object.
 
-    `size` (m) is: box: three edges; cylinder: radius and length along z; sphere: radius. `position` (m) is the centre,
-    `orientation` a unit quaternion (x, y, z, w), `colour` red, green, blue in 0 ... 1. Only the 3-D replay draws an `opacity`
-    below 1.
+    `size` (m) is: box: three edges; cylinder: radius and length along z; sphere: radius; mesh: corners of all triangles, nine
+    numbers each. `position` (m) is the centre, `orientation` a unit quaternion (x, y, z, w), `colour` red, green, blue in
+    0 ... 1. Only the 3-D replay draws an `opacity` below 1.
     """
 
-    shape: Literal["box", "cylinder", "sphere"]
+    shape: Literal["box", "cylinder", "sphere", "mesh"]
     size: tuple[float, ...]
     position: Vector
     colour: Vector
@@ -50,6 +50,8 @@ class Part(NamedTuple):
                 return math.hypot(self.size[0], self.size[1] / 2)
             case "sphere":
                 return self.size[0]
+            case "mesh":
+                return float(np.linalg.norm(np.reshape(self.size, (-1, 3)), axis=1).max())
 
 
 #: distance of the feet from the middle of the AR.Drone, and length of its legs (m)

@@ -61,6 +61,8 @@ class SolidRenderer:
                 sizes = {"shapeType": pybullet.GEOM_CYLINDER, "radius": part.size[0], "length": part.size[1]}
             case "sphere":
                 sizes = {"shapeType": pybullet.GEOM_SPHERE, "radius": part.size[0]}
+            case "mesh":
+                sizes = {"shapeType": pybullet.GEOM_MESH, **_triangles(part.size)}
         shape = pybullet.createVisualShape(**sizes, rgbaColor=[*part.colour, 1.0], physicsClientId=self.client)
         return int(
             pybullet.createMultiBody(
@@ -119,3 +121,16 @@ class SolidRenderer:
         metres = np.full((rows, columns), np.inf, np.float32)
         metres[solid] = FAR * NEAR / (FAR - (FAR - NEAR) * np.asarray(depth, np.float32).reshape(rows, columns)[solid])
         return Picture(np.asarray(colour, np.uint8).reshape(rows, columns, 4)[..., :3], metres)
+
+
+def _triangles(corners: Sequence[float]) -> dict[str, object]:
+    """Return vertices, vertex numbers and normals of a mesh; its triangles are seen from both sides."""
+    triangles = np.reshape(corners, (-1, 3, 3))
+    both = np.concatenate([triangles, triangles[:, ::-1]])
+    normals = np.cross(both[:, 1] - both[:, 0], both[:, 2] - both[:, 0])
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    return {
+        "vertices": both.reshape(-1, 3).tolist(),
+        "indices": list(range(3 * len(both))),
+        "normals": np.repeat(normals, 3, axis=0).tolist(),
+    }

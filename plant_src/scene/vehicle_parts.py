@@ -6,11 +6,14 @@ import math
 from collections.abc import Callable, Iterator, Mapping
 from typing import Any
 
+import numpy as np
+
 from ..catalogue import models_of
-from ..vehicles.common.shapes import Body, Box, Quaternion, Vector
+from ..vehicles.common.shapes import Body, Quaternion, Shape, Vector
 from ..vehicles.model import Model
 from ..vehicles.multirotor.airframe import Airframe, Rotor
 from ..vehicles.submerged.craft import Craft
+from ..vehicles.surface_vessel.surface_vessel import SurfaceVessel
 from .parts import ALONG_X, BLACK, BLUE, GREY, ORANGE, RED, SILVER, YELLOW, Part, ar_drone_parts, landing_mark, strider_parts
 
 #: model -> function that draws it in detail
@@ -18,7 +21,7 @@ DETAILED_MODELS: Mapping[str, Callable[[Model], list[Part]]] = {"ar_drone": ar_d
 
 
 def vehicle_parts(vehicle: Any) -> list[Part]:
-    """Return the parts of a vehicle in its body frame.
+    """Return the parts of a vehicle in its body frame, relative to its centre of mass.
 
     Args:
         vehicle: Name of a vehicle of the catalogue ("crazyflie"), or its data.
@@ -26,11 +29,29 @@ def vehicle_parts(vehicle: Any) -> list[Part]:
     model = next(iter(models_of(vehicle).values()))
     if model.name in DETAILED_MODELS and isinstance(vehicle, str):
         return DETAILED_MODELS[model.name](model)
+    if model.visual is not None:
+        return [_mesh_part(model, model.visual)]
     if model.airframe:
         return list(multirotor_parts(model.airframe, model.body))
     if model.craft:
         return list(submerged_parts(model.craft, model.body))
-    return list(catamaran_parts(model.body) if model.is_vessel else box_parts(model.body))
+    parts = list(catamaran_parts(model.body) if model.is_vessel else box_parts(model.body))
+    return [part._replace(position=_difference(part.position, _origin_of_boxes(model))) for part in parts]
+
+
+def _mesh_part(model: Model, triangles: np.ndarray) -> Part:
+    """Return the triangles of a vehicle file, whose positions start from the origin of the file."""
+    centre = model.boat.centre_of_mass if model.boat else (0.0, 0.0, 0.0)
+    return Part("mesh", tuple(triangles.ravel().tolist()), _difference((0.0, 0.0, 0.0), centre), YELLOW if model.boat else ORANGE)
+
+
+def _origin_of_boxes(model: Model) -> Vector:
+    """Return the centre of mass from the origin of the collision shape, which is that of the file of a floating vessel."""
+    return model.boat.centre_of_mass if isinstance(model.boat, SurfaceVessel) else (0.0, 0.0, 0.0)
+
+
+def _difference(a: Vector, b: Vector) -> Vector:
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]
 
 
 def box_parts(body: Body) -> Iterator[Part]:
@@ -44,14 +65,19 @@ def catamaran_parts(body: Body) -> Iterator[Part]:
     """Yield cylindrical hulls in place of the lower collision boxes, and struts to the landing deck, the highest box."""
     deck = max(body.boxes, key=lambda box: box.position[2])
     (length, width, thickness), (x, y, z) = deck.half_extents, deck.position
-    yield Part("box", (2 * length, 2 * width, 2 * thickness), deck.position, GREY)
+    aft = width if len(body.boxes) == 1 else 0.0
+    yield Part("box", (2 * length - aft, 2 * width, 2 * thickness), (x - aft / 2, y, z), GREY)
     yield from landing_mark(x, y, z + thickness)
+    if len(body.boxes) == 1:  # a single hull: the turned box below the deck is its bow
+        bow, turn = (x + length - width, y, z), (0.0, 0.0, math.sin(math.pi / 8), math.cos(math.pi / 8))
+        yield Part("box", (math.sqrt(2) * width, math.sqrt(2) * width, 1.99 * thickness), bow, YELLOW, turn)
+        return
     for hull in body.boxes:
         if hull is not deck:
             yield from _hull_parts(hull, x - 0.8 * length, x + 0.8 * length, z)
 
 
-def _hull_parts(hull: Box, aft: float, fore: float, deck: float) -> Iterator[Part]:
+def _hull_parts(hull: Shape, aft: float, fore: float, deck: float) -> Iterator[Part]:
     (length, beam, _), (x, y, z) = hull.half_extents, hull.position
     yield Part("cylinder", (beam, 2 * (length - beam)), hull.position, YELLOW, ALONG_X)
     for end in (-1.0, 1.0):

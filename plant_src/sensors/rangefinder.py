@@ -10,7 +10,7 @@ from ..catalogue import VEHICLE_MODELS
 from ..json_reader import JsonReader
 from ..physics.body import create_compound_shape
 from ..physics.client import pybullet
-from ..vehicles.common.shapes import Box
+from ..vehicles.common.shapes import Box, Shape
 from .rotations import Vector, to_world
 from .sampled_sensor import Measurement, SampledSensor, timing_variables
 from .variable_declarations import (
@@ -90,7 +90,7 @@ class Rangefinder(SampledSensor):
             self._add_body([Box((size[0] / 2, size[1] / 2, size[2] / 2), (0.0, 0.0, 0.0))], position)
         self._bodies = [self._add_body(body, (0.0, 0.0, 0.0)) for body in bodies.values()]
 
-    def _add_body(self, boxes: Sequence[Box], position: Sequence[float]) -> int:
+    def _add_body(self, boxes: Sequence[Shape], position: Sequence[float]) -> int:
         shape = create_compound_shape(boxes, self._client)
         return int(pybullet.createMultiBody(0, shape, -1, position, physicsClientId=self._client))
 
@@ -136,7 +136,7 @@ class Rangefinder(SampledSensor):
             self._client = -1
 
 
-def _read_vessels(reader: JsonReader, vessels: Any) -> dict[str, Sequence[Box]]:
+def _read_vessels(reader: JsonReader, vessels: Any) -> dict[str, Sequence[Shape]]:
     """Return the boxes of each vessel, relative to the centre of its deck."""
     models = {kind: next(iter(variants.values())) for kind, variants in VEHICLE_MODELS.items()}
     valid = [kind for kind, model in models.items() if model.is_vessel]
@@ -144,14 +144,14 @@ def _read_vessels(reader: JsonReader, vessels: Any) -> dict[str, Sequence[Box]]:
     return {name: _relative_to_deck(models[reader.choice(kind, ("vessels", name), valid)].body.boxes) for name, kind in named}
 
 
-def _relative_to_deck(boxes: Sequence[Box]) -> Sequence[Box]:
+def _relative_to_deck(boxes: Sequence[Shape]) -> Sequence[Shape]:
     """Move boxes so that the centre of the top of the first one, the deck, is the origin.
 
     Poses refer to the deck because the centre of mass of some vessels depends on their payload.
     """
     a, b, c = boxes[0].position
     top = c + boxes[0].half_extents[2]
-    return [box._replace(position=(box.position[0] - a, box.position[1] - b, box.position[2] - top)) for box in boxes]
+    return [box.moved((-a, -b, -top)) for box in boxes]
 
 
 def _read_platforms(reader: JsonReader, platforms: Any) -> Sequence[tuple[Sequence[float], Sequence[float]]]:

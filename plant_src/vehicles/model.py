@@ -11,11 +11,11 @@ import numpy as np
 
 from cosim.core.component import Causality, Variable
 
-from .common.inertia import inertia_of
 from .common.interface import ENVIRONMENT_INPUTS
 from .common.shapes import Body, Vector
 from .multirotor.airframe import Airframe
 from .submerged.craft import Craft
+from .vessel.boat import Boat
 
 
 @dataclass(frozen=True)
@@ -34,10 +34,11 @@ class Model:
         constant_count: Number of constants that the equations derive from the parameters, or None if they use the parameters.
         airframe: Data of a multirotor.
         craft: Data of a submerged vehicle.
-        body_of: Function from mass (kg) and inertia tensor (kg m2) to the rigid body, if they are parameters. Raises InputError.
+        boat: Data of a vessel that is given by a file.
+        visual: Triangles that pictures show in place of shapes derived from the data (m, body frame), shape (n, 3, 3).
+        body_of: Function from the parameters to the rigid body, if it depends on them. Raises InputError.
         equations: Name of the FMU whose binary has the equations, if it is not `name`.
-        layout: Parameters and inputs of these equations, if they have longer arrays than `interface`; the last arrays of inputs
-            are those that are longer.
+        layout: Parameters and inputs of these equations, if they have longer arrays or more variables than `interface`.
         hulls: Name of each further hull of a vessel -> its parameters.
     """
 
@@ -52,7 +53,9 @@ class Model:
     constant_count: int | None = None
     airframe: Airframe | None = None
     craft: Craft | None = None
-    body_of: Callable[[float, np.ndarray], Body] | None = None
+    boat: Boat | None = None
+    visual: np.ndarray | None = None
+    body_of: Callable[[Mapping[str, float]], Body] | None = None
     equations: str = ""
     layout: Sequence[Variable] = ()
     hulls: Mapping[str, Mapping[str, float]] = field(default_factory=dict)
@@ -71,9 +74,9 @@ class Model:
         """Return the rigid body of a vehicle with these parameters.
 
         Raises:
-            InputError: If mass and inertia are physically impossible; a problem's subject begins with "mass" or "inertia".
+            InputError: If mass and inertia are physically impossible; a problem's subject begins with the name of a parameter.
         """
-        return self.body_of(parameters["mass"], inertia_of(parameters)) if self.body_of else self.body
+        return self.body_of(parameters) if self.body_of else self.body
 
     @cached_property
     def variables(self) -> tuple[Variable, ...]:
@@ -91,13 +94,28 @@ class Model:
         inputs = [variable for variable in self.layout or self.interface if variable.causality == "input"]
         return sum(len(variable.scalar_names) for variable in inputs if variable.name not in ENVIRONMENT_INPUTS)
 
+    @cached_property
+    def input_places(self) -> list[slice]:
+        """Consecutive parts of the inputs of the equations that belong to the inputs of the interface, in order."""
+        counts = {variable.name: len(variable.scalar_names) for variable in self.variables if variable.causality == "input"}
+        places, end = list[slice](), 0
+        for variable in self.layout or self.variables:
+            if variable.causality == "input" and variable.name not in ENVIRONMENT_INPUTS:
+                start, count = end, counts.get(variable.name, 0)
+                end += len(variable.scalar_names)
+                if count and places and places[-1].stop == start:
+                    places[-1] = slice(places[-1].start, start + count)
+                elif count:
+                    places.append(slice(start, start + count))
+        return places
+
     def equation_parameters(self, values: Sequence[float]) -> list[float]:
         """Return the parameters of the equations for the parameters of the interface: arrays are filled up with zeros."""
         remaining, result = iter(values), list[float]()
         counts = {variable.name: len(variable.scalar_names) for variable in self.interface}
         for variable in self.layout or self.interface:
             if variable.causality == "parameter":
-                count = counts[variable.name]
+                count = counts.get(variable.name, 0)
                 result += [*islice(remaining, count), *[0.0] * (len(variable.scalar_names) - count)]
         return result
 

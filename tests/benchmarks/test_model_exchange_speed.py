@@ -20,7 +20,7 @@ from cosim.engine import native_available
 from cosim.export.fmu.compiler import find_compiler
 from cosim.export.fmu.package import fmi_headers
 
-STEPS = 300_000
+STEPS = 1_000_000
 #: largest allowed ratio to the plain C loop (generous; the goal is 1.5)
 LARGEST_RATIO = 20
 DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>

@@ -199,3 +199,37 @@ def test_unsuitable_names_and_languages_are_refused(tmp_path, name, language, me
     assert done.returncode == 2
     assert done.stderr.startswith(message)
     assert list(tmp_path.iterdir()) == []
+
+
+def test_a_missing_language_and_a_file_in_the_place_of_the_folder_are_named(tmp_path):
+    (tmp_path / "room").write_text("x")
+    done = new(tmp_path, "room", "python")
+    assert (done.returncode, done.stderr) == (2, "room: is a file, expected the name of a new folder\n")
+    done = run_cosim("new", "controller", "keeper", cwd=tmp_path)
+    assert "Missing option '--language': python, modelica, c" in done.stderr
+
+
+def test_the_test_of_a_new_controller_ends_an_endless_loop(tmp_path):
+    assert new(tmp_path, "keeper", "python").returncode == 0
+    source = tmp_path / "keeper/keeper.py"
+    source.write_text(re.sub(r"(    def do_step\(.*\n)", r"\1        while True:\n            pass\n", source.read_text()))
+    scenario = tmp_path / "keeper/keeper.json"
+    scenario.write_text(json.dumps(json.loads(scenario.read_text()) | {"deadlines": {"step": 0.3}}))
+    command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", "keeper"]
+    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=30)
+    assert done.returncode == 1
+    assert "did not return within 0.3 s" in done.stdout
+
+
+def test_the_output_of_a_build_is_an_fmu(tmp_path):
+    (tmp_path / "room.py").write_text("x = 1")
+    done = run_cosim("build", "room.py", "--output", "room", cwd=tmp_path)
+    assert done.returncode == 2
+    assert '--output: expected the name of an FMU; found "room"; did you mean "room.fmu"?' in done.stderr
+
+
+def test_a_new_boat_is_a_copy_of_the_otter(tmp_path: Path) -> None:
+    done = run_cosim("new", "vehicle", "my_boat", "--from", "otter", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    assert "Name it in a scenario" in done.stdout
+    assert json.loads((tmp_path / "my_boat.json").read_text())["family"] == "surface_vessel"

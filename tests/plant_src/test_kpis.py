@@ -174,3 +174,15 @@ def test_unknown_signal_names_are_rejected():
 
 def test_the_final_value_of_a_signal():
     assert final(mission_result(), "plant.uav.position.z") == {"value": mission_result()["plant.uav.position.z"][-1]}
+
+
+@pytest.mark.parametrize(
+    ("x", "y", "radius", "message"),
+    [
+        ([0.0, 1.0], [0.0], 2.0, "expected as many waypoint_x as waypoint_y; found 2 and 1"),
+        ([0.0], [0.0], -2.0, r"expected a positive acceptance_radius \(m\); found -2"),
+    ],
+)
+def test_implausible_arguments_are_refused(x, y, radius, message):
+    with pytest.raises(InputError, match=message):
+        waypoints(mission_result(), "plant.usv", x, y, radius)

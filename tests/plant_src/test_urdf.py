@@ -95,7 +95,7 @@ def test_the_vehicle_hovers(tmp_path: Path) -> None:
 
 FAULTS = [
     ("<robot", "cannot be read"),
-    (robot(shape='<mesh filename="arm.stl"/>'), 'link "front_left": found the collision geometry mesh, expected box'),
+    (robot(shape='<capsule radius="1"/>'), 'link "front_left": found the collision geometry capsule, expected box'),
     (robot(BODY.replace('<mass value="0.8"/>', "")), 'link "base": <inertial> needs <mass>'),
     (
         robot().replace('<parent link="base"/><child link="rear_left"/>', '<parent link="x"/><child link="rear_left"/>'),

@@ -235,3 +235,18 @@ def test_a_target_is_converted_to_the_unit_of_the_signal():
     assert value(kpis.final, "tank", "setpoint", result=result) == pytest.approx(3.0)
     with pytest.raises(InputError, match=r'"power" \(W\) cannot be compared with "tank" \(degC\)'):
         kpis.final(result, "tank", "power")
+
+
+@pytest.mark.parametrize(
+    ("function", "arguments", "message"),
+    [
+        (kpis.settling_time, {"band": -0.3}, "expected a band of 0 or more; found -0.3"),
+        (kpis.rise_time, {"low": 0.9, "high": 0.1}, "expected 0 <= low < high; found low 0.9, high 0.1"),
+        (kpis.saturation_share, {"lower": 2.0, "upper": 1.0}, "lower limit 2 is above upper limit 1"),
+        (kpis.peak, {"start": 3.0, "stop": 2.0}, "start 3 s is after stop 2 s"),
+    ],
+)
+def test_implausible_arguments_are_refused(function, arguments, message):
+    with pytest.raises(InputError) as refusal:
+        function(RUN, "first", **arguments)
+    assert str(refusal.value) == message

@@ -54,6 +54,49 @@ def test_signals_in_arguments_of_functions_are_checked_before_the_run(folder, ar
     assert f"$.kpis[0].arguments.{line}" in found
 
 
+TYPED = """
+from collections.abc import Sequence
+from cosim.results.kpi import Prefix, Signal
+
+def typed(result, signal: Signal = "a.y", start: float = 0.0, count: int = 1, target: Signal | float | None = None,
+          x: Sequence[float] = (), point: tuple[float, float] = (0, 0), plain: bool = False, free=None): ...
+"""
+
+
+@pytest.mark.parametrize(
+    ("argument", "wrong", "message", "right"),
+    [
+        ("start", "300", 'expected a number; found "300"', 300),
+        ("start", True, "expected a number; found true", 0.5),
+        ("count", 2.5, "expected an integer; found 2.5", 2),
+        ("signal", 3, "expected the name of a signal; found 3", "a.y"),
+        ("target", [1], "expected the name of a signal or a number or null; found [1]", None),
+        ("x", [1, "2"], 'expected a list, each element a number; found [1, "2"]', [1, 2.5]),
+        ("x", "12", 'expected a list, each element a number; found "12"', []),
+        ("point", 1, "expected a list, each element a number; found 1", [1, 2]),
+        ("plain", 1, "expected true or false; found 1", True),
+    ],
+)
+@pytest.mark.parametrize("kind", ["kpis", "figures"])
+def test_values_of_arguments_must_have_the_annotated_type(folder, kind, argument, wrong, message, right):
+    (folder.path / "f.py").write_text(TYPED)
+    good = {"name": "good", "python": "f.py:typed", "arguments": {argument: right, "free": {"any": ["thing"]}}}
+    bad = {"name": "bad", "python": "f.py:typed", "arguments": {argument: wrong}, "optional": True}
+    (found,) = folder.problems({"a": folder.block("Gain")}, **{kind: [good, bad]})
+    assert found.endswith(f"$.{kind}[1].arguments.{argument}: {message}")
+
+
+def test_a_value_that_is_taken_from_the_system_must_have_the_annotated_type(folder):
+    (folder.path / "f.py").write_text(TYPED)
+    taken = {"name": "taken", "python": "f.py:typed", "arguments": {"count": {"from": "a.k"}}}
+    by_name = {"name": "by_name", "python": "f.py:typed", "from": "/components/a/parameters"}
+    found = folder.problems({"a": folder.block("Gain", parameters={"start": "x", "k": 2.0})}, kpis=[taken, by_name])
+    assert [each.partition("$.kpis")[2] for each in found if "kpis" in each] == [
+        "[0].arguments.count: expected an integer; found 2.0",
+        '[1].from: argument start: expected a number; found "x"',
+    ]
+
+
 def test_missing_signals_of_an_invalid_component_are_not_reported(folder):
     kpi = {"name": "k", "python": "cosim.kpis:rms", "arguments": {"signal": "a.y"}}
     (found,) = folder.problems({"a": {"python": "none.py:A"}, "b": folder.block("Gain")}, kpis=[kpi])

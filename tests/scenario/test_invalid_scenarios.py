@@ -95,6 +95,7 @@ def test_one_mistake_is_reported_in_one_line(folder, change, line):
     [
         ("", "expected a JSON value"),
         ('{"name": "x",}', "expected a key in double quotes"),
+        ("{// a comment", 'expected a key in double quotes or "}"; JSON has no comments'),
         ('{"name": "x"} x', "expected the end of the file"),
         ('{"name" "x"}', "expected ':'"),
         ("[" * 200, "nested more than 100 levels deep"),
@@ -178,3 +179,18 @@ def test_settings_of_the_caller_may_be_arrays_and_must_be_finite(folder):
 )
 def test_steps_that_the_times_resolve_are_accepted(folder, times):
     load(folder.scenario({"a": folder.block("Gain")}, **times)).free()
+
+
+def test_a_python_file_is_not_read_as_json(folder):
+    file = folder.write("x = 1", "room.py")
+    assert folder.problems_of(file) == [
+        "room.py is a Python file, expected a scenario, which is a JSON file that names its classes"
+    ]
+
+
+def test_a_gain_of_the_wrong_type_and_a_wrong_name_are_reported_in_one_line_each(folder):
+    blocks = {"a": folder.block("Gain"), "b": folder.block("Gain")}
+    (found,) = folder.problems(blocks, [{"from": "a.y", "to": "b.u", "gain": "2"}])
+    assert found.endswith('$.connections[0].gain: expected a number or a list of numbers; found "2"')
+    (found,) = folder.problems(blocks, name="my run/1")
+    assert found.endswith('$.name: expected a name of letters, digits, "_", ".", "-" and spaces; found "my run/1"')

@@ -24,3 +24,16 @@ def test_unknown_values(options):
     ((name, value),) = options.items()
     with pytest.raises(cosim.InputError, match=rf"{name}: expected .*found '{value}'"):
         cosim.load("free_flight", **options)
+
+
+@pytest.mark.parametrize(
+    ("method", "message"),
+    [
+        ("do_step(self, t)", "x.py:A: expected do_step(self, current_time, step_size); found do_step(self, t) (x.py:3)"),
+        ("dostep(self, t, h)", "x.py:A has no method do_step(self, current_time, step_size)"),
+    ],
+)
+def test_a_wrong_or_missing_do_step_is_named_before_the_run(folder, method, message):
+    (folder.path / "x.py").write_text(f"from pythonfmu import Fmi2Slave\nclass A(Fmi2Slave):\n    def {method}: return True\n")
+    (found,) = folder.problems({"a": {"python": "x.py:A"}})
+    assert found.endswith(message)

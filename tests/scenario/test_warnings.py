@@ -1,6 +1,7 @@
 """Warnings about scenarios that can run, although something in them is probably a mistake."""
 
 import pytest
+from cosim_command import run_cosim
 from systems import connection
 
 from cosim.core import resources
@@ -54,9 +55,23 @@ def test_late_events_and_missing_references_cause_warnings(folder):
     late = {"events": [{"time": 4, "set": {"pilot.offset": 1.0}}]}
     missing = {"reference": {"file": "run.csv", "tolerances": {"*": {"absolute": 0.1}}}}
     assert ship(folder, BOTH, **late, **missing) == [
-        'reference.file: file "run.csv" does not exist: `cosim regress --update` writes it',
         "events[0]: this event does not happen: 4 s is after the stop time 3 s",
+        'reference.file: file "run.csv" does not exist: `cosim regress --update` writes it',
     ]
+
+
+def test_run_and_check_warn_of_times_after_the_end(folder):
+    kpi = {"name": "late", "python": "cosim.kpis:peak", "arguments": {"signal": "a.y", "start": 99}}
+    late = {"events": [{"time": 4, "set": {"a.u": 1.0}}], "kpis": [kpi]}
+    file = folder.scenario({"a": folder.block("Gain")}, **late)
+    lines = [
+        "$.events[0]: this event does not happen: 4 s is after the stop time 3 s",
+        '$.kpis[0].arguments.start: KPI "late" starts at 99 s, after the stop time 3 s, and may have no value',
+    ]
+    for command in ("check", "run"):
+        done = run_cosim(command, file, cwd=folder.path)
+        assert done.returncode == 0, done.stderr
+        assert [line.partition(": ")[2] for line in done.stderr.splitlines() if "WARNING" in line] == lines
 
 
 @pytest.mark.parametrize("file", SHIPPED, ids=lambda file: file.stem)

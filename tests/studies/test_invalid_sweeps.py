@@ -6,6 +6,7 @@ import json
 
 import pytest
 from click.testing import CliRunner
+from cosim_command import run_cosim
 
 from cosim.cli import cli
 from cosim.core.errors import InputError
@@ -210,3 +211,11 @@ def test_schemas_are_printed():
     for option, key in (("--sweep", "factors"), ("--tune", "minimize")):
         done = CliRunner().invoke(cli, ["schema", option])
         assert key in json.loads(done.output)["properties"]
+
+
+def test_a_scenario_is_not_read_as_a_sweep(tmp_path):
+    (tmp_path / "base.json").write_text('{"name": "base", "components": {}}')
+    done = run_cosim("sweep", "base.json", cwd=tmp_path)
+    assert done.returncode == 2
+    assert "is a scenario, expected a study; `cosim run base.json` runs it" in done.stderr
+    assert len(done.stderr.splitlines()) == 1

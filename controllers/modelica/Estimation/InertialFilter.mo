@@ -60,10 +60,10 @@ block InertialFilter "Inertial navigation by an error-state extended Kalman filt
     Real yaw(unit = "rad");
   end Attitude;
 
-  parameter Real declination(unit = "rad") = 1.551190995937692 "Heading of the horizontal magnetic field, counter-clockwise from east";
-  parameter Real density[4] = {2e-3, 3e-4, 2e-5, 2e-4} "Noise of velocity, attitude, gyroscope and accelerometer bias per square root of s";
-  parameter Real start_deviation[5] = {0.05, 0.05, 0.02, 0.02, 0.2} "Standard deviations: position, velocity, attitude, both biases";
-  parameter Real noise[4] = {0.012, 0.02, 0.05, 0.03} "Of horizontal and vertical position, velocity and heading";
+  parameter Real earth[2](each unit = "rad") = {1.551190995937692, 0.967273} "Magnetic field: heading, counter-clockwise from east, and dip";
+  parameter Real density[4] = {6e-3, 3e-4, 2e-5, 2e-4} "Noise of velocity, attitude, gyroscope and accelerometer bias per square root of s";
+  parameter Real start_deviation[3] = {0.02, 0.02, 0.2} "Standard deviations: roll and pitch, biases of gyroscopes and accelerometers";
+  parameter Real noise[4] = {0.02, 0.03, 0.05, 0.012} "Of horizontal and vertical position, velocity and heading";
   input Imu imu;
   input Gnss gnss;
   input Magnetometer magnetometer;
@@ -72,15 +72,18 @@ block InertialFilter "Inertial navigation by an error-state extended Kalman filt
   output Orientation orientation;
   output Attitude attitude;
   output Rates rates "Without bias";
-  output Real position_deviation(unit = "m") "Standard deviation of the position east";
+  output Real deviation[9] "Standard deviations of position (world), velocity (world) and attitude (body): x, y, z of each";
 protected
   constant Real h(unit = "s") = 0.01;
   pure function start
     input Real position[3];
-    input Real yaw;
-    input Real deviation[5];
+    input Real velocity[3];
+    input Real field[3];
+    input Real earth[2];
+    input Real deviation[3];
+    input Real noise[4];
     output Real next[244];
-  external "C" ekf_start(position, yaw, deviation, next) annotation(Include = "#include \"inertial_ekf.h\"");
+  external "C" ekf_start(position, velocity, field, earth, deviation, noise, next) annotation(Include = "#include \"inertial_ekf.h\"");
   end start;
 
   pure function advance
@@ -93,35 +96,33 @@ protected
     input Real position[3];
     input Real velocity[3];
     input Real delay;
-    input Boolean has_yaw;
-    input Real yaw;
+    input Boolean has_field;
+    input Real field[3];
+    input Real earth[2];
     input Real noise[4];
     output Real next[244];
-  external "C" ekf_step(state, h, rates, force, density, has_fix, position, velocity, delay, has_yaw, yaw, noise, next)
-    annotation(Include = "#include \"inertial_ekf.h\"");
+  external "C" ekf_step(state, h, rates, force, density, has_fix, position, velocity, delay, has_field, field,
+    earth, noise, next) annotation(Include = "#include \"inertial_ekf.h\"");
   end advance;
 
   discrete Boolean running(start = false, fixed = true);
   discrete Real fix_time(start = 0, fixed = true);
   discrete Real field_time(start = 0, fixed = true);
-  discrete Real roll(start = 0, fixed = true);
-  discrete Real pitch(start = 0, fixed = true);
-  discrete Real yaw(start = 0, fixed = true) "Measured, levelled with the estimate";
+  discrete Real rates_now[3](each start = 0, each fixed = true) "Of the gyroscopes; a step turns by the mean of its two ends";
+  discrete Real field[3](each start = 0, each fixed = true);
   discrete Real state[244](each start = 0, each fixed = true);
 algorithm
   when sample(0, 0.01) then
-    roll := if pre(running) then atan2(2*(pre(state[7])*pre(state[8]) + pre(state[9])*pre(state[10])), 1 - 2*(pre(state[8])^2 + pre(state[9])^2)) else 0.0;
-    pitch := if pre(running) then asin(min(1, max(-1, 2*(pre(state[7])*pre(state[9]) - pre(state[10])*pre(state[8]))))) else 0.0;
-    yaw := declination - atan2(
-      cos(roll)*magnetometer.field.y - sin(roll)*magnetometer.field.z,
-      cos(pitch)*magnetometer.field.x + sin(pitch)*(sin(roll)*magnetometer.field.y + cos(roll)*magnetometer.field.z));
+    rates_now := {imu.rates.p, imu.rates.q, imu.rates.r};
+    field := {magnetometer.field.x, magnetometer.field.y, magnetometer.field.z};
     if pre(running) then
-      state := advance(pre(state), h, {imu.rates.p, imu.rates.q, imu.rates.r},
+      state := advance(pre(state), h, (pre(rates_now) + rates_now)/2,
         {imu.acceleration.x, imu.acceleration.y, imu.acceleration.z}, density, gnss.time > pre(fix_time),
         {gnss.position.x, gnss.position.y, gnss.position.z}, {gnss.velocity.x, gnss.velocity.y, gnss.velocity.z},
-        time - gnss.time, magnetometer.time > pre(field_time), yaw, noise);
+        time - gnss.time, magnetometer.time > pre(field_time), field, earth, noise);
     else
-      state := start({gnss.position.x, gnss.position.y, gnss.position.z}, yaw, start_deviation);
+      state := start({gnss.position.x, gnss.position.y, gnss.position.z}, {gnss.velocity.x, gnss.velocity.y, gnss.velocity.z}, field,
+        earth, start_deviation, noise);
     end if;
     running := true;
     fix_time := gnss.time;
@@ -143,6 +144,8 @@ algorithm
     rates.p := imu.rates.p - state[11];
     rates.q := imu.rates.q - state[12];
     rates.r := imu.rates.r - state[13];
-    position_deviation := sqrt(max(0, state[20]));
+    for i in 1:9 loop
+      deviation[i] := sqrt(max(0, state[4 + 16*i]));
+    end for;
   end when;
 end InertialFilter;

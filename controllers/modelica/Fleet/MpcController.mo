@@ -48,7 +48,7 @@ algorithm
       position_reference.y - vehicle.position.y,
       position_reference.z - vehicle.position.z};
     ease := min(1, error_limit/max(1e-9, sqrt(error[1]^2 + error[2]^2)));
-    side := gravity*tan(tilt_limit/degrees)/sqrt(2.0);
+    side := gravity*tan(tilt_limit/degrees);
     needed_x := deck_share*forecast_x.acceleration - fill(disturbance[1], 10);
     needed_y := deck_share*forecast_y.acceleration - fill(disturbance[2], 10);
     needed_z := deck_share*forecast_z.acceleration - fill(disturbance[3], 10);

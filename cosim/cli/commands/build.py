@@ -111,6 +111,8 @@ def _build_one(
 
     if len(sources) != 1:
         raise InputError(f"--output requires one source, found {len(sources)}")
+    if output.suffix != ".fmu":
+        raise InputError(f'--output: expected the name of an FMU; found "{output}"; did you mean "{output}.fmu"?')
     if not sources[0].exists():
         raise InputError(Problem(f"does not exist{nearest_file(sources[0])}", str(sources[0])))
     if modelica_compiler == "omc":

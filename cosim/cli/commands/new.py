@@ -81,7 +81,7 @@ command.add_command(new_vehicle.command, "vehicle")
 
 @command.command()
 @click.argument("name")
-@click.option("--language", required=True, help=f"Language of the controller: {', '.join(LANGUAGES)}.")
+@click.option("--language", help=f"Language of the controller: {', '.join(LANGUAGES)}.")
 @click.option(
     "--role", default=next(iter(ROLES)), show_default=True, help=f"Role, which determines the variables: {', '.join(ROLES)}."
 )
@@ -97,12 +97,14 @@ command.add_command(new_vehicle.command, "vehicle")
     help="Parent of the folder NAME; default: the working directory.",
 )
 @click.option("--force", is_flag=True, help="Overwrite existing files.")
-def controller(name: str, language: str, role: str, library: bool, directory: Path, force: bool) -> None:
+def controller(name: str, language: str | None, role: str, library: bool, directory: Path, force: bool) -> None:
     """Create the folder NAME with a controller, a scenario in which it runs, and a test.
 
     A vessel_autopilot passes waypoints. A uav_controller is a quadcopter controller that follows the deck of a vessel. The
     scenario checks it. Change the controller and run the scenario again.
     """
+    if language is None:
+        raise click.UsageError(f"Missing option '--language': {', '.join(LANGUAGES)}")
     for kind, chosen, known in (("language", language, LANGUAGES), ("role", role, ROLES)):
         if chosen not in known:
             raise InputError(f'there is no {kind} "{chosen}"{did_you_mean(chosen, known)}')
@@ -111,6 +113,8 @@ def controller(name: str, language: str, role: str, library: bool, directory: Pa
     role = LIBRARY_ROLE if library else role
     names, texts = _controller_files(name, role, language)
     folder = directory / names["SNAKE"]
+    if folder.is_file():
+        raise InputError(Problem("is a file, expected the name of a new folder", str(folder)))
     _write_files(
         {folder / file: text for file, text in texts.items()}, [folder / plant for plant in _ALL_ROLES[role].plants], force
     )

@@ -26,12 +26,19 @@ from ...core.json_values import parse_object
     type=click.Path(path_type=Path),
     help="URDF file with the mass, inertia and collision shape, unless the file of --from has them.",
 )
+@click.option(
+    "--mesh",
+    type=click.Path(path_type=Path),
+    help="STL, OBJ or GLB file with the shape: inertia for an even density, convex collision pieces, appearance. "
+    "Requires the extra mesh.",
+)
+@click.option("--mesh-scale", default=1.0, help="Factor on the coordinates of --mesh, for example 0.001 for mm.")
 @click.option("--force", is_flag=True, help="Overwrite an existing file.")
-def command(name: str, base: str, directory: Path, urdf: Path | None, force: bool) -> None:
+def command(name: str, base: str, directory: Path, urdf: Path | None, mesh: Path | None, mesh_scale: float, force: bool) -> None:
     """Create NAME.json, a copy of a vehicle file. Change its numbers, and name it in a scenario as "model".
 
     The file contains geometry, mass and coefficients with their units and sources. No compiler is needed. With --urdf, the
-    rotors or thrusters in the file of --from may have a "link" of the URDF file in place of position and axis.
+    rotors, thrusters or propellers in the file of --from may have a "link" of the URDF file in place of position and axis.
     """
     if not re.fullmatch(r"[A-Za-z_]\w*", name):
         raise InputError(f'"{name}" is not a name of a vehicle: expected letters, digits and "_"')
@@ -39,29 +46,34 @@ def command(name: str, base: str, directory: Path, urdf: Path | None, force: boo
     if file.exists() and not force:
         raise InputError([Problem("exists; --force overwrites it", str(file))])
     directory.mkdir(parents=True, exist_ok=True)
-    if urdf:
-        from ...export.sources import vehicle_from_urdf
+    if urdf or mesh:
+        from ...export.sources import vehicle_from_mesh, vehicle_from_urdf
 
-        data = vehicle_from_urdf(urdf, parse_object(source.read_text(encoding="utf-8")))
+        data = parse_object(source.read_text(encoding="utf-8"))
+        data = vehicle_from_urdf(urdf, data) if urdf else data
+        data = vehicle_from_mesh(mesh, data, mesh_scale) if mesh else data
         file.write_text(json.dumps(data, indent=4) + "\n", encoding="utf-8")
     else:
         shutil.copyfile(source, file)
+    family = parse_object(file.read_text(encoding="utf-8")).get("family")
     setting = f"/components/plant/arguments/vehicles/uav/model={file}"
+    demo = f"Fly Demo 1 with it:\n  cosim run demo1_box --set {shlex.quote(setting)}\n"
+    if family != "multirotor":
+        demo = f'Name it in a scenario, as a vehicle of the plant:\n  {{"model": "{file}", ...}}\n'
     click.echo(
-        f"{file}\n\nFly Demo 1 with it:\n  cosim run demo1_box --set {shlex.quote(setting)}\n"
-        f"As an FMU:\n  {shlex.join(['cosim', 'build', str(file), '--output', str(file.with_suffix('.fmu'))])}"
+        f"{file}\n\n{demo}As an FMU:\n  {shlex.join(['cosim', 'build', str(file), '--output', str(file.with_suffix('.fmu'))])}"
     )
 
 
 def _find_vehicle(base: str) -> Path:
     """Return the path of a vehicle file that is given by its path or by the name of a shipped vehicle."""
-    from ...export.sources import find_sources
+    from ...export.sources import vehicle_files
 
     if base.endswith(".json"):
         if not (path := Path(base)).is_file():
             raise InputError(f'file "{base}" does not exist')
         return path
-    files = {source.name: source.path for source in find_sources(resources.root()) if source.kind.name == "vehicle file"}
+    files = vehicle_files(resources.root())
     if base not in files:
         raise InputError(f'no vehicle file and no shipped vehicle "{base}"{did_you_mean(base, files)}')
     return files[base]

@@ -4,21 +4,23 @@ The package rumoca parses, checks and flattens a model. The order of computation
 
 | Folder       | Modules                                                                                                    |
 | ------------ | ---------------------------------------------------------------------------------------------------------- |
-| `frontend/`  | `rumoca_frontend`: flatten a model with rumoca; `libraries`: find the libraries that it uses; `flat_cache`: |
+| `frontend/`  | `rumoca_frontend`: flatten a model with rumoca; `libraries`: find the libraries that it uses; `sources`:   |
+|              | files and locations; `messages`: those of rumoca; `termination`: terminate() in algorithms; `flat_cache`:  |
 |              | keep flat models; `rumoca_client`, `rumoca_process`: run rumoca in a child process; `reader`               |
 |              | (`expression_reader`, `statement_reader`, `unrolling`): convert its JSON to the flat model; `constants`:   |
 |              | structural parameters and constants become literals; `folded_branches`: find the parameters with which     |
 |              | rumoca has selected equations; `strings`: String arguments become literals; `openmodelica`: export with    |
 |              | OpenModelica instead                                                                                       |
-| `model/`     | `flat_model`, `syntax_tree`: the data structure; `traversal`; `evaluate`, `arithmetic`: evaluation in      |
-|              | Python                                                                                                     |
+| `model/`     | `flat_model`, `syntax_tree`: the data structure; `traversal`; `text`: Modelica text of expressions;        |
+|              | `evaluate`, `arithmetic`: evaluation in Python                                                             |
 | `causality/` | `clocked_partitions` (`clock_inference`): replace clocked equations by sampled ones;                       |
 |              | `continuous_states`: replace der(x) by a variable; `dependent_states`: derivatives of other variables;     |
 |              | `hybrid`: variables for pre(), relations and delay(); `continuous_equations`: solve the equations, with    |
 |              | `matching` if each has a variable alone on one side, else with `equation_systems` (`scalar_equations`,     |
 |              | `assignment`, `differentiation`); `when_conditions`: clocks and edge detectors; `topological_sort`;        |
-|              | `schedule` (`nodes`, `between_events`): the order of computation; `parameter_roles`: which parameters can  |
-|              | be set; `interpreter`, `hybrid_interpreter` (`past_values`): simulation of a model in Python               |
+|              | `schedule` (`nodes`, `between_events`): the order of computation; `event_limits`: endless events;          |
+|              | `parameter_roles`: which parameters can be set; `interpreter`, `hybrid_interpreter` (`past_values`):       |
+|              | simulation of a model in Python                                                                            |
 | `c_code/`    | `emit`: the files; `model_code`: model.c; `hybrid_code`: model.c with event iteration; `header`: model.h;  |
 |              | `model_step`: clock ticks and integration; `exchange_code`: Model Exchange; `functions`, `statements`,     |
 |              | `expressions`, `subscripts`, `builtin_functions`, `lowering`, `c_values`, `formatting`: parts of model.c   |
@@ -51,7 +53,7 @@ Models with continuous states (`der(x) = ...`):
 
 Models with event iteration. These are all models with `pre()`, `edge()`, `change()` or `sample()` outside when-clauses, with
 `reinit()` or `delay()`, with continuous states and comparisons (outside `noEvent()`) of values that change with time, or with
-continuous states and a library:
+continuous states and a library, and library models with when-clauses whose conditions change with time:
 
 - There is an event at t if an input has changed, at every tick, at t + h, and whenever a comparison changes its value. The time
   of this change is located to 1e-10 s. Between events, comparisons keep their value.
@@ -66,6 +68,8 @@ Equations in any form:
 - Linear equations are solved symbolically, systems of linear equations by elimination, all others by Newton's method from the
   last values with symbolic derivatives. A step fails if there is no solution.
 - A variable x in der(x) that equations determine is not a state; its derivative is computed from the derivatives of equations.
+  An equation between states must be linear in this variable, and derivatives of inputs are refused.
+- At the initialization, systems with homotopy() are solved in ten steps from the simplified to the actual expressions.
 - Structural parameters (those that select equations or sizes) are constants of the FMU.
 """
 

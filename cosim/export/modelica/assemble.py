@@ -31,7 +31,8 @@ from .external.library import callable_functions
 from .frontend.constants import fold_constants
 from .frontend.folded_branches import folded_parameters
 from .frontend.reader import ModelReader
-from .frontend.rumoca_frontend import DEFAULT_OPTIONS, ModelicaOptions, ModelicaSources, flatten_model
+from .frontend.rumoca_frontend import DEFAULT_OPTIONS, ModelicaOptions, flatten_model
+from .frontend.sources import ModelicaSources
 from .frontend.strings import fold_strings, string_parameters
 from .model.arithmetic import EvaluationError
 from .model.flat_model import Model, Variable, derivative_name

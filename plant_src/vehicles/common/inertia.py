@@ -10,10 +10,10 @@ import numpy as np
 from cosim.core.component import Variable
 
 from .interface import scalar_variable
-from .shapes import Body, Box, quaternion_from_matrix
+from .shapes import Body, Shape, quaternion_from_matrix
 
 #: function from the rotation matrix (3, 3) principal axes to body frame to the collision shape in principal axes
-Boxes = Callable[[np.ndarray], tuple[Box, ...]]
+Boxes = Callable[[np.ndarray], tuple[Shape, ...]]
 
 #: parameter -> row and column in the symmetric inertia tensor
 INERTIA_INDICES = {f"inertia.{'xyz'[i]}{'xyz'[j]}": (i, j) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))}

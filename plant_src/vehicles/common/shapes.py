@@ -34,6 +34,53 @@ class Box(NamedTuple):
         cross = np.cross(axis, local)
         return self.position + local + 2 * (w * cross + np.cross(axis, cross))
 
+    def moved(self, offset: Vector) -> Box:
+        """Return the box moved by `offset` (m)."""
+        return self._replace(position=_sum(self.position, offset))
+
+
+class ConvexPiece(NamedTuple):
+    """A convex piece of a collision shape, in the frame of its body.
+
+    Attributes:
+        points: Points whose convex hull the piece is (m).
+    """
+
+    points: tuple[Vector, ...]
+
+    @property
+    def half_extents(self) -> Vector:
+        """Half of the edges of the box around the piece (m)."""
+        x, y, z = (np.ptp(self.points, axis=0) / 2).tolist()
+        return x, y, z
+
+    @property
+    def position(self) -> Vector:
+        """Centre of the box around the piece (m)."""
+        x, y, z = ((np.min(self.points, axis=0) + np.max(self.points, axis=0)) / 2).tolist()
+        return x, y, z
+
+    @property
+    def orientation(self) -> Quaternion:
+        """Orientation of the box around the piece: that of the body."""
+        return 0.0, 0.0, 0.0, 1.0
+
+    def corners(self) -> np.ndarray:
+        """Return the points (m) in the frame of the body."""
+        return np.array(self.points)
+
+    def moved(self, offset: Vector) -> ConvexPiece:
+        """Return the piece moved by `offset` (m)."""
+        return ConvexPiece(tuple(_sum(point, offset) for point in self.points))
+
+
+def _sum(a: Vector, b: Vector) -> Vector:
+    return a[0] + b[0], a[1] + b[1], a[2] + b[2]
+
+
+#: part of a collision shape
+Shape = Box | ConvexPiece
+
 
 class Body(NamedTuple):
     """A rigid body in a frame at its centre of mass.
@@ -48,7 +95,7 @@ class Body(NamedTuple):
 
     mass: float
     inertia: Vector
-    boxes: tuple[Box, ...]
+    boxes: tuple[Shape, ...]
     height: float = 0.0
     axes: Quaternion = (0.0, 0.0, 0.0, 1.0)
 

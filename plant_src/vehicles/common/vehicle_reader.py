@@ -3,16 +3,20 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
-from typing import Any
+from typing import Any, TypeVar
 
 import numpy as np
 
+from cosim.core.errors import InputError
+
 from ...json_reader import JsonPath
 from .quantities import QuantityReader
-from .shapes import BODY_UP, Box, Vector, level_box
+from .shapes import BODY_UP, ConvexPiece, Shape, Vector, level_box
+
+_Vehicle = TypeVar("_Vehicle")
 
 
 @dataclass(frozen=True)
@@ -29,13 +33,47 @@ class CollisionBox:
         cosine, sine = math.cos(self.yaw), math.sin(self.yaw)
         return np.column_stack([cosine * x - sine * y, sine * x + cosine * y, z]) + self.position
 
+    def shape_in(self, to_body: np.ndarray) -> Shape:
+        """Return the box in the frame from which `to_body` (3, 3) rotates into the body frame."""
+        return level_box(to_body, self.size, self.position, self.yaw)
 
-def boxes_in(boxes: Sequence[CollisionBox], to_body: np.ndarray) -> tuple[Box, ...]:
-    """Return the boxes in the frame from which `to_body` (3, 3) rotates into the body frame."""
-    return tuple(level_box(to_body, box.size, box.position, box.yaw) for box in boxes)
+
+@dataclass(frozen=True)
+class CollisionPiece:
+    """A convex piece of the collision shape: the convex hull of points (m, body frame)."""
+
+    points: tuple[Vector, ...]
+
+    @property
+    def size(self) -> Vector:
+        """Edges of the box around the piece (m)."""
+        x, y, z = np.ptp(self.points, axis=0).tolist()
+        return x, y, z
+
+    @property
+    def position(self) -> Vector:
+        """Centre of the box around the piece (m)."""
+        return ConvexPiece(self.points).position
+
+    def corners(self) -> np.ndarray:
+        """Return the points (m, body frame)."""
+        return np.array(self.points)
+
+    def shape_in(self, to_body: np.ndarray) -> Shape:
+        """Return the piece in the frame from which `to_body` (3, 3) rotates into the body frame."""
+        return ConvexPiece(tuple((x, y, z) for x, y, z in (self.corners() @ to_body).tolist()))
 
 
-def edges_around(boxes: Sequence[CollisionBox]) -> Vector:
+#: element of "boxes"
+Collision = CollisionBox | CollisionPiece
+
+
+def boxes_in(boxes: Sequence[Collision], to_body: np.ndarray) -> tuple[Shape, ...]:
+    """Return the collision shape in the frame from which `to_body` (3, 3) rotates into the body frame."""
+    return tuple(box.shape_in(to_body) for box in boxes)
+
+
+def edges_around(boxes: Sequence[Collision]) -> Vector:
     """Return the edges (m) of the box around all boxes; 1 m if there are none."""
     corners = np.concatenate([box.corners() for box in boxes or (CollisionBox((1.0,) * 3, (0.0,) * 3, 0.0),)])
     length, width, height = np.ptp(corners, axis=0).tolist()
@@ -44,6 +82,15 @@ def edges_around(boxes: Sequence[CollisionBox]) -> Vector:
 
 class VehicleReader(QuantityReader):
     """Reader of vehicle data."""
+
+    def construct(self, create: Callable[[], _Vehicle]) -> _Vehicle | None:
+        """Return a new vehicle; if it is impossible, record its problems and return None."""
+        try:
+            return create()
+        except InputError as error:
+            for problem in error.problems:
+                self.add_problem(problem.subject, problem.message)
+            return None
 
     def elements(self, data: Mapping[str, Any], key: str) -> list[tuple[int, Any]]:
         """Read a list with at least one element; return its elements with their indices."""
@@ -70,15 +117,26 @@ class VehicleReader(QuantityReader):
             return BODY_UP
         return x / length, y / length, z / length
 
-    def read_boxes(self, data: Mapping[str, Any]) -> tuple[CollisionBox, ...]:
+    def read_boxes(self, data: Mapping[str, Any]) -> tuple[Collision, ...]:
         """Read the collision shape."""
         return tuple(self.read_box(box, ("boxes", str(i))) for i, box in self.elements(data, "boxes"))
 
-    def read_box(self, value: Any, path: JsonPath) -> CollisionBox:
-        """Read one box of the collision shape."""
+    def read_box(self, value: Any, path: JsonPath) -> Collision:
+        """Read one box or convex piece of the collision shape."""
+        if isinstance(value, Mapping) and "points" in value:
+            return self.read_piece(self.read_data(value, path, ("points",), ()).get("points"), (*path, "points"))
         data = self.read_data(value, path, ("size",), ("position", "yaw"))
         length, width, height = self.vector_quantity(data.get("size", [1.0] * 3), (*path, "size"), "m", "xyz")
         if not min(length, width, height) > 0:
             self.add_problem((*path, "size"), f"found {[length, width, height]}, expected edges greater than 0")
         x, y, z = self.vector_quantity(data.get("position", [0.0] * 3), (*path, "position"), "m", "xyz")
         return CollisionBox((length, width, height), (x, y, z), self.quantity(data.get("yaw", 0.0), (*path, "yaw"), "rad"))
+
+    def read_piece(self, value: Any, path: JsonPath) -> CollisionPiece:
+        """Read the points of a convex piece."""
+        numbers = self.si_value(value, path, "m")
+        rows = [self.vector(row, (*path, str(i)), "xyz") for i, row in enumerate(numbers)] if isinstance(numbers, list) else []
+        if len(rows) < 4 or np.linalg.matrix_rank(np.array(rows) - rows[0], tol=1e-9) < 3:
+            self.add_problem(path, f"found {len(rows)} points, expected at least 4 that do not lie in a plane")
+            rows = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
+        return CollisionPiece(tuple((x, y, z) for x, y, z in rows))

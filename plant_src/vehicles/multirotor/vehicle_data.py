@@ -11,8 +11,8 @@ import numpy as np
 from cosim.core.errors import InputError
 
 from ...json_reader import JsonPath
-from ..common.shapes import BODY_UP, Body, Box
-from ..common.vehicle_reader import CollisionBox, VehicleReader, boxes_in, edges_around
+from ..common.shapes import BODY_UP, Body, Shape
+from ..common.vehicle_reader import Collision, VehicleReader, boxes_in, edges_around
 from .airframe import Airframe, Hull, Rotor, RotorEffects
 
 #: sense of rotation seen from the tip of the thrust's axis -> sign of the reaction torque about this axis
@@ -37,14 +37,14 @@ class MultirotorData:
     """Data of a multirotor: airframe, collision boxes and crash speed (m/s)."""
 
     airframe: Airframe
-    boxes: tuple[CollisionBox, ...]
+    boxes: tuple[Collision, ...]
     crash_speed: float
 
     def body_with(self, mass: float, inertia: np.ndarray) -> Body:
         """Return the rigid body for Bullet with another mass (kg) and inertia tensor (kg m2). Raises InputError."""
         return replace(self.airframe, mass=mass, inertia=inertia).body(self.boxes_in)
 
-    def boxes_in(self, to_body: np.ndarray) -> tuple[Box, ...]:
+    def boxes_in(self, to_body: np.ndarray) -> tuple[Shape, ...]:
         """Return the boxes in the frame from which `to_body` (3, 3) rotates into the body frame."""
         return boxes_in(self.boxes, to_body)
 
@@ -93,7 +93,7 @@ class _MultirotorReader(VehicleReader):
                 self.add_problem(problem.subject, problem.message)
             return None
 
-    def read_hull(self, data: Mapping[str, Any], boxes: Sequence[CollisionBox], mass: float) -> Hull:
+    def read_hull(self, data: Mapping[str, Any], boxes: Sequence[Collision], mass: float) -> Hull:
         """Read what water acts on: the box around all boxes, the displaced volume and the drag coefficient."""
         length, width, height = edges_around(boxes)
         volume = self.quantity(data.get("displaced_volume", mass / DEFAULT_DENSITY), ("displaced_volume",), "m3", low=0.0)

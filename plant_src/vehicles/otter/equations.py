@@ -191,4 +191,4 @@ VESSEL = vessel_equations.VesselModel(
 def block() -> Block:
     """Return the Otter for export."""
     model = VESSEL.create_continuous_model(OtterModel, max_sub_step=0.01)
-    return as_block(model, floating_maps.FloatingContactMaps(model, VESSEL, BODY).functions())
+    return as_block(model, floating_maps.FloatingContactMaps(model, VESSEL, floating_maps.constant_body(BODY)).functions())

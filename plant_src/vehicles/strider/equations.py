@@ -15,10 +15,11 @@ from cosim.export.equations.model import ContinuousModel
 from cosim.export.fmu.block import Block
 
 from ..common import kinematics
-from ..common.elementary_functions import arctangent, sine_and_cosine, sine_of_right_angle_share
+from ..common.elementary_functions import sine_and_cosine
 from ..common.interface import WORLD_OUTPUTS
 from ..common.named_values import ConstantsMap, NamedValues, initial_parameters, values_by_name
 from ..vessel import planar_maps
+from ..vessel.rudder import rudder_force
 from . import parameters as p
 from .geometry import DECK_CENTRE
 from .interface import INPUTS, STATES, VARIABLES
@@ -86,14 +87,10 @@ def rudder_loads(u: ca.SX, v: ca.SX, r: ca.SX, race: ca.SX, rudder_angle: ca.SX)
         race: Value of `race_velocity_squared` (m2/s2).
         rudder_angle: Rudder angle (rad).
     """
-    pressure = ca.fabs(u) * u + race
-    ahead = ca.sign(pressure)
-    inflow_angle = arctangent(ahead * (v - p.RUDDER_ARM * r), ca.sqrt(ca.fabs(pressure)))
-    attack = ca.fmin(1, ca.fmax(-1, (rudder_angle - inflow_angle) / p.STALL_ANGLE))
-    max_lift = p.WATER_DENSITY / 2 * p.RUDDER_MAX_LIFT_COEFFICIENT * p.RUDDER_AREA * pressure
-    lift = max_lift * sine_of_right_angle_share(attack)
-    side_force = lift * ca.cos(rudder_angle)
-    return ca.vertcat(-lift * ca.sin(rudder_angle), side_force, -p.RUDDER_ARM * side_force)
+    turn = ca.sin(rudder_angle), ca.cos(rudder_angle)
+    pressure_area = ca.SX(p.WATER_DENSITY / 2 * p.RUDDER_MAX_LIFT_COEFFICIENT * p.RUDDER_AREA)
+    ahead, abeam = rudder_force(u, v - p.RUDDER_ARM * r, race, rudder_angle, turn, pressure_area, ca.SX(p.STALL_ANGLE))
+    return ca.vertcat(ahead, abeam, -p.RUDDER_ARM * abeam)
 
 
 def initial_state(constants: ca.SX) -> ca.SX:
@@ -134,5 +131,6 @@ def model() -> ContinuousModel:
 def block() -> Block:
     """Return the catamaran for export."""
     equations = model()
-    maps = planar_maps.PlanarContactMaps(equations, p.MASS, p.INERTIA[2], p.CENTRE_OF_MASS_HEIGHT, observe)
+    body = planar_maps.PlanarBody(ca.SX(p.MASS), ca.SX(p.INERTIA[2]), ca.SX(p.CENTRE_OF_MASS_HEIGHT))
+    maps = planar_maps.PlanarContactMaps(equations, lambda _constants: body, lambda state, _constants: observe(state))
     return as_block(equations, maps.functions())

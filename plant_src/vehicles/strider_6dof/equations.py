@@ -115,4 +115,4 @@ VESSEL = vessel_equations.VesselModel(
 def block() -> Block:
     """Return the catamaran for export."""
     model = VESSEL.create_continuous_model()
-    return as_block(model, floating_maps.FloatingContactMaps(model, VESSEL, BODY).functions())
+    return as_block(model, floating_maps.FloatingContactMaps(model, VESSEL, floating_maps.constant_body(BODY)).functions())

@@ -11,8 +11,8 @@ import numpy as np
 from cosim.core.errors import InputError
 
 from ...json_reader import JsonPath
-from ..common.shapes import Body, Box
-from ..common.vehicle_reader import CollisionBox, VehicleReader, boxes_in, edges_around
+from ..common.shapes import Body, Shape
+from ..common.vehicle_reader import Collision, VehicleReader, boxes_in, edges_around
 from .craft import Craft, Thruster
 from .interface import MATRICES
 
@@ -41,14 +41,14 @@ class SubmergedData:
     """Data of a submerged vehicle: craft, collision boxes and crash speed (m/s)."""
 
     craft: Craft
-    boxes: tuple[CollisionBox, ...]
+    boxes: tuple[Collision, ...]
     crash_speed: float
 
     def body_with(self, mass: float, inertia: np.ndarray) -> Body:
         """Return the rigid body for Bullet with another mass (kg) and inertia tensor (kg m2). Raises InputError."""
         return replace(self.craft, mass=mass, inertia=inertia).body(self.boxes_in)
 
-    def boxes_in(self, to_body: np.ndarray) -> tuple[Box, ...]:
+    def boxes_in(self, to_body: np.ndarray) -> tuple[Shape, ...]:
         """Return the boxes in the frame from which `to_body` (3, 3) rotates into the body frame."""
         return boxes_in(self.boxes, to_body)
 
@@ -90,14 +90,9 @@ class _SubmergedReader(VehicleReader):
         crash_speed = self.quantity(data.get("crash_speed", 1.0), ("crash_speed",), "m/s", above=0.0)
         if self.problems:
             return None
-        try:
-            return SubmergedData(Craft(name, **values), boxes, crash_speed)
-        except InputError as error:
-            for problem in error.problems:
-                self.add_problem(problem.subject, problem.message)
-            return None
+        return self.construct(lambda: SubmergedData(Craft(name, **values), boxes, crash_speed))
 
-    def read_volume(self, data: Mapping[str, Any], boxes: tuple[CollisionBox, ...]) -> dict[str, Any]:
+    def read_volume(self, data: Mapping[str, Any], boxes: tuple[Collision, ...]) -> dict[str, Any]:
         """Read what determines weight and buoyancy."""
         size = self.vector_quantity(data.get("size", list(edges_around(boxes))), ("size",), "m", "xyz")
         if not min(size) > 0:

@@ -9,6 +9,7 @@ is constant in world axes, which conserves momentum.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NamedTuple
 
@@ -41,11 +42,23 @@ class _Impulse(NamedTuple):
     angular: ca.SX
 
 
+class BulletBody(NamedTuple):
+    """Mass (kg) and moments of inertia about the body axes (kg m2, shape (3,)) of the body in Bullet."""
+
+    mass: ca.SX
+    inertia: ca.SX
+
+
+def constant_body(body: Body) -> Callable[[ca.SX], BulletBody]:
+    """Return the function from the constants to mass and inertia of a body that does not depend on them."""
+    return lambda _constants: BulletBody(ca.SX(body.mass), ca.SX(body.inertia))
+
+
 @dataclass(frozen=True)
 class FloatingContactMaps:
     """Contact functions of a vessel with the states `interface.VESSEL_STATES`.
 
-    Bullet's body has its centre of mass in the origin O of the body frame, and mass and inertia of `body` for every payload. The
+    Bullet's body has its centre of mass in the origin O of the body frame, and mass and inertia of `body`. The
     impulse that Bullet finds does not depend on them, because the previous impulse is taken into account; they should not exceed
     those of the vessel. Poses and twists in Bullet are those of O. The argument `contact_impulse` is the impulse on O in the last
     step (N s, N m s about O, world frame), shape (6,).
@@ -53,12 +66,12 @@ class FloatingContactMaps:
     Attributes:
         model: Equations of the vessel as they are exported.
         vessel: The same equations by name.
-        body: Rigid body in Bullet.
+        body: Function from the constants to mass and inertia of the body in Bullet.
     """
 
     model: ContinuousModel
     vessel: VesselModel
-    body: Body
+    body: Callable[[ca.SX], BulletBody]
 
     def functions(self) -> list[ca.Function]:
         """Return the functions to export."""
@@ -80,9 +93,10 @@ class FloatingContactMaps:
         end = predicted_state(self.model, state, loaded, environment_inputs, constants, step)
         linear = (end[0:3] - state[0:3]) / step
         angular = kinematics.rotation_vector(kinematics.quaternion_product(end[3:7], kinematics.conjugate(state[3:7]))) / step
-        inertia = self._inertia_in_world(attitude)
+        body = self.body(constants)
+        inertia = _inertia_in_world(body, attitude)
         twist = ca.vertcat(linear, angular) - ca.vertcat(
-            impulse[0:3] / self.body.mass, self._angular_velocity_change(attitude, impulse[3:6])
+            impulse[0:3] / body.mass, _angular_velocity_change(body, attitude, impulse[3:6])
         )
         torque = ca.cross(twist[3:6], inertia @ twist[3:6])
         endpoints = ca.vertcat(state[0:3], end[0:3])
@@ -95,8 +109,8 @@ class FloatingContactMaps:
         start, predicted, twist, bullet_twist, constants, step = arguments
         (previous,) = create_symbols(previous_contact_impulse=6)
         hull, attitude = self.vessel.hull_with(constants), kinematics.rotation_matrix(start[3:7])
-        change = bullet_twist - twist
-        linear, angular = self.body.mass * change[0:3], self._inertia_in_world(attitude) @ change[3:6]
+        change, body = bullet_twist - twist, self.body(constants)
+        linear, angular = body.mass * change[0:3], _inertia_in_world(body, attitude) @ change[3:6]
         magnitude = contact_impulse(ca.norm_2(linear))
         impulse = ca.if_else(magnitude > 0, ca.vertcat(linear, angular), ca.SX.zeros(6)) + 0 * magnitude
         in_contact = ca.logic_or(magnitude > 0, ca.norm_2(previous) > 0)
@@ -122,12 +136,14 @@ class FloatingContactMaps:
         load = ca.vertcat(impulse.linear, impulse.angular) / step
         return ca.vertcat(inputs[:first], inputs[first : first + TWIST_SIZE] + load, inputs[first + TWIST_SIZE :])
 
-    def _inertia_in_world(self, attitude: ca.SX) -> ca.SX:
-        return attitude @ ca.diag(ca.SX(self.body.inertia)) @ attitude.T
 
-    def _angular_velocity_change(self, attitude: ca.SX, impulse: ca.SX) -> ca.SX:
-        """Return the change of angular velocity (rad/s, world frame) of Bullet's body by an angular impulse (N m s)."""
-        return attitude @ ((attitude.T @ impulse) / ca.SX(self.body.inertia))
+def _inertia_in_world(body: BulletBody, attitude: ca.SX) -> ca.SX:
+    return attitude @ ca.diag(body.inertia) @ attitude.T
+
+
+def _angular_velocity_change(body: BulletBody, attitude: ca.SX, impulse: ca.SX) -> ca.SX:
+    """Return the change of angular velocity (rad/s, world frame) of Bullet's body by an angular impulse (N m s)."""
+    return attitude @ ((attitude.T @ impulse) / body.inertia)
 
 
 def _impulse_about_centre(hull: Hull, attitude: ca.SX, impulse: ca.SX) -> _Impulse:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import casadi as ca
 
@@ -22,9 +23,19 @@ from ..common.contact_maps import (
 )
 
 
+class PlanarBody(NamedTuple):
+    """Mass (kg), moment of inertia about the yaw axis through the centre of mass (kg m2) and height of this centre (m)."""
+
+    mass: ca.SX
+    yaw_inertia: ca.SX
+    height: ca.SX
+
+
 @dataclass(frozen=True)
 class PlanarContactMaps:
-    """Contact functions of a vessel in the horizontal plane with the state (x, y, yaw, surge, sway, yaw rate).
+    """Contact functions of a vessel in the horizontal plane.
+
+    The state begins with x, y, yaw, surge, sway and yaw rate of the centre of mass; contact does not change its further elements.
 
     Bullet's body cannot roll or pitch, but it can heave. A load presses it down; the lift that cancels this is predicted from the
     impulses of the last two steps, and Bullet receives it as an upward velocity. If Bullet finds the same impulse again, the
@@ -34,17 +45,13 @@ class PlanarContactMaps:
 
     Attributes:
         model: Equations of the vessel.
-        mass: Mass of the hull (kg).
-        yaw_inertia: Moment of inertia about the yaw axis, on which the centre of mass lies (kg m2).
-        height: Height of the centre of mass (m, world frame).
-        observe: Function from the state to the published motion.
+        body: Function from the constants to mass, inertia and height.
+        observe: Function from state and constants to the published motion.
     """
 
     model: ContinuousModel
-    mass: float
-    yaw_inertia: float
-    height: float
-    observe: Callable[[ca.SX], ca.SX]
+    body: Callable[[ca.SX], PlanarBody]
+    observe: Callable[[ca.SX, ca.SX], ca.SX]
 
     def functions(self) -> list[ca.Function]:
         """Return the functions to export."""
@@ -54,37 +61,47 @@ class PlanarContactMaps:
         parameters, constants = parameters_and_constants(self.model)
         state = self.model.initial_state(constants)
         twist = _planar_twist(_planar_rotation(state[2]) @ state[3:5], ca.SX(0), state[5])
-        return ca.Function("contact_initialize", [parameters], [constants, state, twist, twist, self._bullet_pose(state)])
+        return ca.Function(
+            "contact_initialize", [parameters], [constants, state, twist, twist, _bullet_pose(state, self.body(constants))]
+        )
 
     def _predict_function(self) -> ca.Function:
         arguments = predict_symbols(self.model)
-        state, end, step = arguments[0], predicted_state(self.model, *arguments[:5]), arguments[4]
+        state, end, constants, step = arguments[0], predicted_state(self.model, *arguments[:5]), *arguments[3:5]
+        body = self.body(constants)
         (vertical_load,) = create_symbols(vertical_load=3)
         rates = (end[0:3] - state[0:3]) / step
-        twist = _planar_twist(rates[0:2], _minmod(vertical_load[0], vertical_load[1]) / self.mass, rates[2])
-        endpoints = ca.vertcat(self.observe(state)[0:3], self.observe(end)[0:3])
+        twist = _planar_twist(rates[0:2], _minmod(vertical_load[0], vertical_load[1]) / body.mass, rates[2])
+        endpoints = ca.vertcat(self.observe(state, constants)[0:3], self.observe(end, constants)[0:3])
         previous_load = ca.vertcat(vertical_load[0], vertical_load[2])
         status = step_status(end, endpoints, arguments, ca.SX(0))
-        results = [state, end, twist, twist, self._bullet_pose(state), previous_load, endpoints, status]
+        results = [state, end, twist, twist, _bullet_pose(state, body), previous_load, endpoints, status]
         return ca.Function("contact_predict", [*arguments, vertical_load], results)
 
     def _correct_function(self) -> ca.Function:
-        start, predicted, twist, bullet_twist, _, step = arguments = correct_symbols(self.model)
+        start, predicted, twist, bullet_twist, constants, step = arguments = correct_symbols(self.model)
         (previous_load,) = create_symbols(previous_vertical_load=2)
-        change = bullet_twist - twist
+        change, body = bullet_twist - twist, self.body(constants)
         velocity = predicted[3:6] + ca.vertcat(_planar_rotation(predicted[2]).T @ change[0:2], change[5])
-        impulse = contact_impulse(ca.norm_2(ca.vertcat(self.mass * change[0:3], self.yaw_inertia * change[5])))
+        impulse = contact_impulse(ca.norm_2(ca.vertcat(body.mass * change[0:3], body.yaw_inertia * change[5])))
         pose = start[0:3] + step * ca.vertcat(bullet_twist[0:2], bullet_twist[5])
-        published = ca.vertcat(pose, _planar_rotation(pose[2]).T @ bullet_twist[0:2], bullet_twist[5])
-        vertical_load = ca.vertcat(-self.mass * change[2], previous_load[0], previous_load[1] + bullet_twist[2] * step)
-        corrected = ca.vertcat(pose, velocity)
+        published = ca.vertcat(pose, _planar_rotation(pose[2]).T @ bullet_twist[0:2], bullet_twist[5], predicted[6:])
+        vertical_load = ca.vertcat(-body.mass * change[2], previous_load[0], previous_load[1] + bullet_twist[2] * step)
+        corrected = ca.vertcat(pose, velocity, predicted[6:])
         return correct_function(
-            [*arguments, previous_load], impulse, predicted, corrected, self.observe, published, vertical_load
+            [*arguments, previous_load],
+            impulse,
+            predicted,
+            corrected,
+            lambda state: self.observe(state, constants),
+            published,
+            vertical_load,
         )
 
-    def _bullet_pose(self, state: ca.SX) -> ca.SX:
-        q = kinematics.quaternion_about_z(state[2])
-        return ca.vertcat(state[0:2], self.height, q[1:4], q[0])
+
+def _bullet_pose(state: ca.SX, body: PlanarBody) -> ca.SX:
+    q = kinematics.quaternion_about_z(state[2])
+    return ca.vertcat(state[0:2], body.height, q[1:4], q[0])
 
 
 def _planar_twist(horizontal: ca.SX, vertical: ca.SX, yaw_rate: ca.SX) -> ca.SX:

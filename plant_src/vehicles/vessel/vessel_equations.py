@@ -10,6 +10,7 @@ from typing import Any
 import casadi as ca
 
 from cosim.core.component import Variable
+from cosim.export.equations.c_code import Callee
 from cosim.export.equations.model import ContinuousModel
 
 from ..common import kinematics
@@ -35,7 +36,10 @@ class VesselModel:
         variables: Parameters, inputs and outputs.
         derive_constants: Function from the parameters to the constants, which holds everything that depends on parameters only.
         hull: Function from the constants to the vessel.
-        actuators: Names of the actuator states. Their rates are 0; the kind of the exported model moves them after each step.
+        actuators: Names of the actuator states.
+        actuator_rate: Function from actuator states, inputs and constants to the rates of these states. None means that the kind
+            of the exported model moves them after each step.
+        callees: Further functions that the equations call.
     """
 
     identifier: str
@@ -44,6 +48,8 @@ class VesselModel:
     derive_constants: Callable[[NamedValues], Mapping[str, ca.SX]]
     hull: Callable[[NamedValues], Hull]
     actuators: Sequence[str] = ()
+    actuator_rate: Callable[[ca.SX, NamedValues, NamedValues], ca.SX] | None = None
+    callees: Sequence[Callee] = ()
 
     @cached_property
     def constants(self) -> ConstantsMap:
@@ -68,13 +74,19 @@ class VesselModel:
             self.variables,
             (*VESSEL_STATES, *self.actuators),
             lambda c: self.hull_with(c).initial_state(self.constants.by_name(c), actuators),
-            lambda x, u, c: ca.vertcat(self.hull_with(c).rate(x, values_by_name(u, inputs)), ca.SX.zeros(actuators)),
+            lambda x, u, c: ca.vertcat(self.hull_with(c).rate(x, values_by_name(u, inputs)), self._actuator_rates(x, u, c)),
             lambda x, _u, c: ca.vertcat(self.hull_with(c).observe(x), ca.SX.zeros(len(WORLD_OUTPUTS))),
             normalised_state,
             derived_parameters=self.constants.vector,
-            callees=[WAVE_SUM, SURFACE_SUM],
+            callees=[WAVE_SUM, SURFACE_SUM, *self.callees],
             **options,
         )
+
+    def _actuator_rates(self, state: ca.SX, inputs: ca.SX, constants: ca.SX) -> ca.SX:
+        if self.actuator_rate is None:
+            return ca.SX.zeros(len(self.actuators))
+        given = values_by_name(inputs, variables_of(self.variables, "input"))
+        return self.actuator_rate(state[len(VESSEL_STATES) :], given, self.constants.by_name(constants))
 
 
 def normalised_state(state: ca.SX) -> ca.SX:

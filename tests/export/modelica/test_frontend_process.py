@@ -61,7 +61,7 @@ def test_ordinary_depth_is_compiled(tmp_path):
 
 
 def test_a_hang_ends_at_the_deadline(tmp_path, monkeypatch):
-    monkeypatch.setattr(rumoca_client, "TIMEOUT", 1)
+    monkeypatch.setattr(rumoca_client, "CPU_LIMIT", 1)
     path = model(tmp_path, "  y = a[1];\n  for i in 1:1000000 loop a[i] = u; end for;", "  Real a[1000000];\n")
     assert re.search(r"failed on this file: (it did not end within 1 s|.* signal \d+ )", refusal(path))
 

@@ -214,3 +214,19 @@ end Relay;""")
     assert model.c.step(0.0, 0.2) == f"{expected} (Relay.mo:6)"
     with pytest.raises(ComponentError, match=re.escape(expected)):
         model.python.step(0.0, 0.2)
+
+
+def test_temporary_values_of_equations_and_relations_do_not_collide(compile_both):
+    model = compile_both("""model Temporaries
+  parameter Real k = 2;
+  parameter Real a[3] = {1, 3, 4};
+  Real x[2](start = {1, 2}, each fixed = true);
+  output Real y;
+equation
+  der(x) = -k*x;
+  y = (a[2:3] - k*a[1:2])*x + (if k*x[1]*x[2] > 0.5 then 1 else 0);
+end Temporaries;""")
+    model.initialize()
+    for n in range(100):
+        model.step(n * 0.01)
+    assert model.get("y") == pytest.approx((1 - 2 * 2) * math.exp(-2), abs=1e-8)

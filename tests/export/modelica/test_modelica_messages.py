@@ -68,6 +68,15 @@ equation
 end Timer;"""
 
 
+def test_terminate_in_an_algorithm_is_that_of_an_equation(write_model, tmp_path, caplog):
+    algorithm = TIMER.replace("  when", "algorithm\n  when").replace("Timer", "Alarm")
+    fmu = build_to(write_model(algorithm), None, tmp_path / "alarm.fmu", 3)
+    with caplog.at_level("WARNING", "cosim.component"):
+        result = cosim.simulate(fmu, stop_time=1.0, step_size=0.01)
+    assert result.time[-1] == pytest.approx(0.26)
+    assert caplog.messages == ["alarm: y has reached 0.513 (Alarm.mo:7)"]
+
+
 @pytest.mark.parametrize("version", [2, 3])
 @pytest.mark.parametrize("solver", [None, "cvode"])
 def test_terminate_ends_the_run_without_an_error(write_model, tmp_path, caplog, version, solver):

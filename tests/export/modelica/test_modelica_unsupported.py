@@ -109,7 +109,7 @@ end M;""")
 
 def test_unknown_elements_of_the_front_ends_json_are_refused():
     from cosim.export.modelica.frontend.reader import ModelReader
-    from cosim.export.modelica.frontend.rumoca_frontend import ModelicaSources
+    from cosim.export.modelica.frontend.sources import ModelicaSources
 
     reader = ModelReader({"enum_literal_ordinals": {}}, ModelicaSources([]))
     with pytest.raises(InputError, match="the expression Quantum is not supported"):

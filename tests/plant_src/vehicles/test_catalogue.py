@@ -10,12 +10,16 @@ import pytest
 from fmpy import read_model_description
 
 from cosim.core import resources
-from plant_src.catalogue import MODELS, VEHICLE_MODELS
+from plant_src.catalogue import MODELS, SLOTS, VEHICLE_MODELS
 from plant_src.vehicles.common.interface import ENVIRONMENT_INPUTS
 from plant_src.vehicles.multirotor.airframe import MAX_ROTORS
 from plant_src.vehicles.multirotor.multirotor_equations import MultirotorEquations
+from plant_src.vehicles.planar_vessel.planar_equations import PlanarEquations
+from plant_src.vehicles.planar_vessel.planar_vessel import PlanarVessel
 from plant_src.vehicles.submerged.craft import MAX_THRUSTERS
 from plant_src.vehicles.submerged.submerged_equations import SubmergedEquations
+from plant_src.vehicles.surface_vessel.floating_equations import FloatingEquations
+from plant_src.vehicles.surface_vessel.surface_vessel import SurfaceVessel
 
 ALL = pytest.mark.parametrize("name", MODELS)
 
@@ -44,6 +48,10 @@ def test_the_number_of_constants_is_that_of_the_equations(name: str) -> None:
         constants = MultirotorEquations(model.airframe, MAX_ROTORS).constants
     elif model.craft:
         constants = SubmergedEquations(model.craft, MAX_THRUSTERS).constants
+    elif isinstance(model.boat, SurfaceVessel):
+        constants = FloatingEquations(model.boat, SLOTS, name, "").model.constants
+    elif isinstance(model.boat, PlanarVessel):
+        constants = PlanarEquations(model.boat, SLOTS, name, "").constants
     else:
         constants = getattr(equations(model.binary), "CONSTANTS", None) or equations(model.binary).VESSEL.constants
     parameters = model.equation_parameters(model.start_values("parameter"))

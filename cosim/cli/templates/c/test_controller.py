@@ -1,14 +1,17 @@
-"""Test of the controller CONTROLLER in its scenario."""
+"""Test of the controller CONTROLLER in its scenario, by the command that ends an endless loop or a crash with a message."""
 
+import subprocess
+import sys
 from pathlib import Path
 
-import cosim
 from cosim.export.build import build_to
 
 FOLDER = Path(__file__).parent
 
 
-def test_the_controller_meets_the_checks() -> None:
+def test_the_controller_meets_the_checks(tmp_path: Path) -> None:
     build_to(FOLDER / "modelDescription.xml", None, FOLDER / "CONTROLLER.fmu")
-    result = cosim.run(FOLDER / "CONTROLLER.json")
-    assert all(check.passed for check in result.checks)
+    scenario = str(FOLDER / "CONTROLLER.json")
+    command = [sys.executable, "-m", "cosim", "run", scenario, "--no-report", "--output-dir", str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True)
+    assert done.returncode == 0, done.stdout + done.stderr

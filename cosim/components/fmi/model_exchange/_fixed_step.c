@@ -62,22 +62,22 @@ static int set_inputs(State *s, double time) {
     return OK;
 }
 
-static int set_time(State *s, double time) {
+static inline int set_time(State *s, double time) {
     CALL(SET_TIME, s->set_time(s->instance, time));
     return s->reference_count ? set_inputs(s, time) : OK;
 }
 
-static int set_states(State *s) {
+static inline int set_states(State *s) {
     if (s->state_count) CALL(SET_STATES, s->set_states(s->instance, s->states, (size_t)s->state_count));
     return OK;
 }
 
-static int get_derivatives(State *s) {
+static inline int get_derivatives(State *s) {
     if (s->state_count) CALL(GET_DERIVATIVES, s->get_derivatives(s->instance, s->derivatives, (size_t)s->state_count));
     return OK;
 }
 
-static int euler_step(State *s, double end) {
+static inline int euler_step(State *s, double end) {
     if (get_derivatives(s)) return DISCARD;
     if (set_time(s, end)) return DISCARD;
     for (int64_t i = 0; i < s->state_count; i++) s->states[i] += s->substep_size * s->derivatives[i];
@@ -114,7 +114,6 @@ static int runge_kutta_step(State *s, double begin, double end) {
 
 static int find_state_event(State *s) {
     size_t count = (size_t)s->indicator_count;
-    if (!count) return OK;
     CALL(GET_INDICATORS, s->get_indicators(s->instance, s->indicators, count));
     for (size_t i = 0; i < count; i++) CALL(GET_INDICATORS, s->indicators[i] == s->indicators[i] ? OK : NOT_A_NUMBER);
     for (size_t i = 0; i < count; i++)
@@ -123,24 +122,23 @@ static int find_state_event(State *s) {
     return OK;
 }
 
-static int complete_step(State *s) {
-    if (!s->complete_step) return OK;
+static inline int complete_step(State *s) {
     bool event, terminate = false;
-    if (s->version == 3) {
+    if (s->version == 2) {
+        int event_needed = 0, ends = 0;
+        CALL(COMPLETE_STEP, ((int (*)(void *, int, int *, int *))s->complete_step)(s->instance, 1, &event_needed, &ends));
+        event = event_needed != 0, terminate = ends != 0;
+    } else if (s->version == 3) {
         bool event_needed = false, ends = false;
         CALL(COMPLETE_STEP,
              ((int (*)(void *, bool, bool *, bool *))s->complete_step)(s->instance, true, &event_needed, &ends));
         event = event_needed, terminate = ends;
-    } else if (s->version == 2) {
-        int event_needed = 0, ends = 0;
-        CALL(COMPLETE_STEP, ((int (*)(void *, int, int *, int *))s->complete_step)(s->instance, 1, &event_needed, &ends));
-        event = event_needed != 0, terminate = ends != 0;
     } else {
         char event_needed = 0;
         CALL(COMPLETE_STEP, ((int (*)(void *, char *))s->complete_step)(s->instance, &event_needed));
         event = event_needed != 0;
     }
-    s->event |= (event ? STEP_EVENT : 0) | (terminate ? TERMINATION : 0);
+    if (event || terminate) s->event |= (event ? STEP_EVENT : 0) | (terminate ? TERMINATION : 0);
     return OK;
 }
 
@@ -148,17 +146,19 @@ static int advance(void *state, double time, double step_size, int unused) {
     State *s = state;
     (void)unused;
     s->begin = time;
-    while (s->next_substep < s->substeps) {
-        int64_t n = s->next_substep;
-        double begin = time + (double)n * s->substep_size;
-        double end = n + 1 < s->substeps ? time + (double)(n + 1) * s->substep_size : time + step_size;
-        s->event = 0;
-        s->status = OK;
-        if (s->stages == 1 ? euler_step(s, end) : runge_kutta_step(s, begin, end)) return DISCARD;
+    s->event = 0;
+    s->status = OK;
+    const int64_t substeps = s->substeps;
+    const double size = s->substep_size;
+    for (int64_t n = s->next_substep; n < substeps; n++) {
+        double end = n + 1 < substeps ? time + (double)(n + 1) * size : time + step_size;
+        s->next_substep = n;
+        if (s->stages == 1 ? euler_step(s, end) : runge_kutta_step(s, time + (double)n * size, end)) return DISCARD;
         s->time = end;
         s->next_substep = n + 1;
-        if (find_state_event(s) || complete_step(s)) return DISCARD;
-        if (end >= s->next_event_time - TIME_TOLERANCE * s->substep_size) s->event |= TIME_EVENT;
+        if (s->indicator_count && find_state_event(s)) return DISCARD;
+        if (s->complete_step && complete_step(s)) return DISCARD;
+        if (end >= s->next_event_time - TIME_TOLERANCE * size) s->event |= TIME_EVENT;
         if (s->event) return DISCARD;
     }
     s->next_substep = 0;

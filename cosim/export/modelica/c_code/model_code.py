@@ -228,7 +228,7 @@ class ModelCode:
             return []
         continuous = self._body(self.schedule.between.continuous, initial=False)
         if self.model.hybrid:
-            continuous += indicator_lines(self.model.hybrid.relations, self._make_lowering())
+            continuous += ["{", *indicator_lines(self.model.hybrid.relations, self._make_lowering()), "}"]
         states, rates = self._element_pointers(self.model.states), self._element_pointers(map(derivative_name, self.model.states))
         return exchange_functions(continuous, states, rates, len(self.schedule.clocks), event, record)
 

@@ -21,6 +21,7 @@ from ..model.syntax_tree import (
     Array,
     Assign,
     Binary,
+    Body,
     Builtin,
     Expression,
     If,
@@ -95,6 +96,7 @@ class _Preparation:
             sections["whens"] = self._in_conditions(sections["whens"], self._replace_rounding)
             sections["equations"] = rewrite_outermost(sections["equations"], self._replace_relation)
             sections["whens"] = self._in_conditions((*sections["whens"], *self._whens), self._replace_relation)
+            sections["algorithms"] = tuple(map(self._in_algorithm, sections["algorithms"]))
         sections["equations"] = (*sections["equations"], *self._equations)
         used = {name for section in sections.values() for name in _remembered(section)}
         used |= {relation.name for relation in self._relations} | {v.name for v in self._variables.values() if is_input(v)}
@@ -133,6 +135,15 @@ class _Preparation:
             )
             for when in whens
         )
+
+    def _in_algorithm(self, body: Body) -> Body:
+        """Return an algorithm whose when-clauses have located conditions, if it does not assign the compared variables itself."""
+        assigned = {referenced_variable(target) for target in assigned_references(body)}
+
+        def change(node: Any) -> Any:
+            return node if variable_names(node) & assigned else self._replace_relation(node)
+
+        return tuple(self._in_conditions((s,), change)[0] if isinstance(s, When) else s for s in body)
 
     def _replace_relation(self, node: Any) -> Any:
         if _without_events(node) is not None:

@@ -10,7 +10,7 @@ from typing import Any
 
 from ..model import syntax_tree
 from ..model.syntax_tree import Expression, SourceLocation, raise_model_error
-from .rumoca_frontend import ModelicaSources
+from .sources import ModelicaSources
 
 Json = Mapping[str, Any]
 

@@ -14,8 +14,8 @@ from typing import Any
 from ....core.errors import InputError, Problem
 from ....process.failure_attribution import describe_exit_status
 
-#: limits of the child process: wall time and processor time (s), private memory and size of the flat model (bytes)
-TIMEOUT, MEMORY_LIMIT, OUTPUT_LIMIT = 120, 2 << 30, 1 << 28
+#: limits of the child process: processor time and wall time (s), private memory and size of the flat model (bytes)
+CPU_LIMIT, TIMEOUT, MEMORY_LIMIT, OUTPUT_LIMIT = 120, 900, 2 << 30, 1 << 28
 
 _PROGRAM = Path(__file__).with_name("rumoca_process.py")
 #: text that Rust writes when memory is exhausted
@@ -23,7 +23,12 @@ _OUT_OF_MEMORY = b"memory allocation of"
 
 
 def run_rumoca(
-    version: str, files: Sequence[Path], packages: Sequence[Path], model: str, display_name: str | None, declaration: str = ""
+    version: str,
+    files: Sequence[Path],
+    packages: Sequence[Path],
+    model: str,
+    text: tuple[str, str] | None,
+    declaration: str = "",
 ) -> dict[str, Any]:
     """Run rumoca in a child process.
 
@@ -32,7 +37,7 @@ def run_rumoca(
         files: All files that the model may use; the file of the model is the first one.
         packages: Folders of packages.
         model: Full name of the model.
-        display_name: Name under which the model's file is loaded; None for a member of a package.
+        text: Name under which the model's file is loaded, and its text; None for a member of a package.
         declaration: Text of a further class, which is that of the model.
 
     Returns:
@@ -46,11 +51,11 @@ def run_rumoca(
         "files": [str(file) for file in files],
         "packages": [str(package) for package in packages],
         "model": model,
-        "display_name": display_name,
+        "text": text,
         "declaration": declaration,
         "memory": MEMORY_LIMIT,
         "output_size": OUTPUT_LIMIT,
-        "seconds": TIMEOUT,
+        "seconds": CPU_LIMIT,
     }
     with TemporaryFile() as output, TemporaryFile() as errors:
         reason = _run_process(json.dumps(request).encode(), output, errors)

@@ -19,9 +19,9 @@ def main(request: dict[str, Any]) -> None:
 
     Args:
         request: "version" of rumoca; "files", the file of the model first; "packages", their folders; "model", its name;
-            "display_name" under which a model outside a package is loaded, null for one in a package; "declaration", text of the
-            model if it is not in the file; "memory" (bytes),
-            "output_size" (bytes) and "seconds" of processor time, the limits of this process.
+            "text", the name under which a model outside a package is loaded and its text, null for one in a package;
+            "declaration", text of the model if it is not in the file; "memory" (bytes), "output_size" (bytes) and "seconds" of
+            processor time, the limits of this process.
     """
     limits = {resource.RLIMIT_DATA: "memory", resource.RLIMIT_FSIZE: "output_size", resource.RLIMIT_CPU: "seconds"}
     for kind, name in limits.items():
@@ -50,16 +50,16 @@ def _syntax_errors(rumoca: Any, file: str) -> list[tuple[str, int, str]]:
 
 
 def _flatten(rumoca: Any, request: dict[str, Any]) -> dict[str, Any]:
-    path, model, name, declaration = (request["files"][0], *(request[key] for key in ("model", "display_name", "declaration")))
+    path, model, text, declaration = (request["files"][0], *(request[key] for key in ("model", "text", "declaration")))
     _write({"file": path})
     session = rumoca.Session(roots=request["packages"])
     try:
-        if name is None and declaration:
+        if text is None and declaration:
             compiled = session.loads(declaration, model=model, filename="<values>")
-        elif name is None:
+        elif text is None:
             compiled = session.load(path, model=model)
         else:  # the text under a name without a folder, because rumoca reads all files beside an existing file
-            compiled = session.loads(f"{Path(path).read_text(encoding='utf-8')}\n{declaration}", model=model, filename=name)
+            compiled = session.loads(f"{text[1]}\n{declaration}", model=model, filename=text[0])
         return {"flat": compiled.to_json("flat")}
     except BaseException as error:  # a panic of rumoca is not derived from Exception
         return {"error": str(error) or type(error).__name__, "panicked": not isinstance(error, Exception)}

@@ -11,6 +11,7 @@ from ..model import flat_model, syntax_tree
 from ..model.syntax_tree import Body, Expression, SourceLocation, Statement, raise_model_error, referenced_variable
 from ..model.traversal import variable_names
 from .expression_reader import ExpressionReader, Json, is_object_constructor, split_tagged
+from .termination import MARK
 
 _DESTRUCTOR = re.compile(r'\bfunction\s+destructor\b.*?\bexternal\s*(?:"C"\s*)?(\w+)\s*\(', re.DOTALL)
 
@@ -101,10 +102,12 @@ class StatementReader(ExpressionReader):
         level = None if node["level"] is None else self.read_expression(node["level"])
         if level is not None and not isinstance(level, syntax_tree.Literal):
             raise_model_error("the level of an assert() must be a literal of AssertionLevel", where)
-        message = tuple(message_parts(self.read_expression(node["message"])))
-        return syntax_tree.Assert(
-            self.read_expression(node["condition"]), message, where, warning=level is not None and level.value == 1
-        )
+        condition = self.read_expression(node["condition"])
+        first, *others = message_parts(self.read_expression(node["message"]))
+        if isinstance(first, syntax_tree.Literal) and str(first.value).startswith(MARK):
+            text = syntax_tree.Literal(str(first.value).removeprefix(MARK), "String")
+            return syntax_tree.Assert(condition, (text, *others), where, terminates=True)
+        return syntax_tree.Assert(condition, (first, *others), where, warning=level is not None and level.value == 1)
 
     def read_function(self, node: Json) -> flat_model.Function:
         """Convert a function.

@@ -1,6 +1,6 @@
 // Bodies made of coloured parts; parts of the same opacity are merged into one geometry, so that they need one draw call.
 import {
-  BoxGeometry, Color, CylinderGeometry, DoubleSide, Float32BufferAttribute, Group, Matrix4, Mesh, MeshLambertMaterial,
+  BoxGeometry, BufferGeometry, Color, CylinderGeometry, DoubleSide, Float32BufferAttribute, Group, Matrix4, Mesh, MeshLambertMaterial,
   Quaternion, SphereGeometry, TorusGeometry, Vector3,
 } from "three";
 import { mergeGeometries, mergeVertices } from "three/addons/utils/BufferGeometryUtils.js";
@@ -20,6 +20,11 @@ const SHAPES = {
   },
   cone: ([low, high, length], fine) => new CylinderGeometry(high, low, length, fine ? 20 : 10).applyQuaternion(UP),
   sphere: ([radius], fine) => new SphereGeometry(radius, ...(fine ? [20, 14] : [12, 8])),
+  mesh: (corners) => {
+    const triangles = new BufferGeometry().setAttribute("position", new Float32BufferAttribute(corners, 3));
+    triangles.computeVertexNormals();
+    return triangles;
+  },
   ring: ([radius, thickness], fine) => new TorusGeometry(radius, thickness, ...(fine ? [8, 56] : [5, 32])),
 };
 
@@ -60,5 +65,5 @@ export function bodyOf(parts) {
 
 /** Largest distance of a body's parts from its origin (m). */
 export function reachOf(parts) {
-  return Math.max(0.1, ...parts.map((part) => Math.hypot(...part.position) + Math.max(...part.size) / 2));
+  return Math.max(0.1, ...parts.map((part) => Math.hypot(...part.position) + part.size.reduce((a, b) => Math.max(a, b), 0) / 2));
 }

@@ -1,8 +1,9 @@
-/* Error-state extended Kalman filter of an inertial navigation aided by position, velocity and heading.
+/* Error-state extended Kalman filter of an inertial navigation aided by position, velocity and magnetic field.
 
-   J. Sola: Quaternion kinematics for the error-state Kalman filter (2017), sections 5 and 7 (global angular error).
-   World axes x east, y north, z up. Errors: position, velocity, attitude (rotation vector, world axes), biases of gyroscopes and
-   accelerometers (body axes). */
+   J. Sola: Quaternion kinematics for the error-state Kalman filter (2017), section 5 (local angular error).
+   World axes x east, y north, z up. Errors: position, velocity (world axes), attitude (rotation vector), biases of gyroscopes and
+   accelerometers (body axes). At rest only the sum of the effects of tilt and accelerometer bias is observable. In body axes this sum
+   does not depend on the estimated attitude, so that corrections of the heading do not pretend to know more. */
 
 #include <math.h>
 #include <string.h>
@@ -12,7 +13,7 @@
 
 enum { EKF_POSITION = 0, EKF_VELOCITY = 3, EKF_ATTITUDE = 6, EKF_GYRO = 9, EKF_FORCE = 12 };
 
-/* Packed state of Fleet.InertialFilter. */
+/* Packed state of Estimation.InertialFilter. */
 typedef struct {
     double position[3], velocity[3], q[4], gyro_bias[3], force_bias[3], specific_force[3];
     double P[EKF_SIZE][EKF_SIZE];
@@ -43,18 +44,23 @@ static void ekf_small_rotation(const double v[3], double q[4])
     for (int i = 0; i < 3; i++) q[1 + i] = scale * v[i];
 }
 
-/* Adds one step of the error dynamics to the rows (by_column 0) or columns (1) of P: half of F P F'. */
-static void ekf_propagate(double P[EKF_SIZE][EKF_SIZE], double R[3][3], const double f[3], double h, int by_column)
+/* Adds one step of the error dynamics to the rows (by_column 0) or columns (1) of P: half of F P F'. R: attitude; f: specific force
+   (body axes); T: turn of the body in the step, transposed. */
+static void ekf_propagate(double P[EKF_SIZE][EKF_SIZE], double R[3][3], const double f[3], double T[3][3], double h, int by_column)
 {
-    const double C[3][3] = {{0, h * f[2], -h * f[1]}, {-h * f[2], 0, h * f[0]}, {h * f[1], -h * f[0], 0}};
+    double C[3][3], old[3];
+    for (int i = 0; i < 3; i++)
+        for (int k = 0; k < 3; k++) C[i][k] = h * (R[i][(k + 1) % 3] * f[(k + 2) % 3] - R[i][(k + 2) % 3] * f[(k + 1) % 3]);
 #define EKF_AT(i, j) (*(by_column ? &P[j][i] : &P[i][j]))
     for (int j = 0; j < EKF_SIZE; j++) {
-        for (int i = 0; i < 3; i++) EKF_AT(EKF_POSITION + i, j) += h * EKF_AT(EKF_VELOCITY + i, j);
+        for (int i = 0; i < 3; i++) {
+            EKF_AT(EKF_POSITION + i, j) += h * EKF_AT(EKF_VELOCITY + i, j);
+            old[i] = EKF_AT(EKF_ATTITUDE + i, j);
+        }
         for (int i = 0; i < 3; i++)
-            for (int k = 0; k < 3; k++)
-                EKF_AT(EKF_VELOCITY + i, j) += C[i][k] * EKF_AT(EKF_ATTITUDE + k, j) - h * R[i][k] * EKF_AT(EKF_FORCE + k, j);
+            for (int k = 0; k < 3; k++) EKF_AT(EKF_VELOCITY + i, j) -= C[i][k] * old[k] + h * R[i][k] * EKF_AT(EKF_FORCE + k, j);
         for (int i = 0; i < 3; i++)
-            for (int k = 0; k < 3; k++) EKF_AT(EKF_ATTITUDE + i, j) -= h * R[i][k] * EKF_AT(EKF_GYRO + k, j);
+            EKF_AT(EKF_ATTITUDE + i, j) = T[0][i] * old[0] + T[1][i] * old[1] + T[2][i] * old[2] - h * EKF_AT(EKF_GYRO + i, j);
     }
 #undef EKF_AT
 }
@@ -63,19 +69,18 @@ static void ekf_propagate(double P[EKF_SIZE][EKF_SIZE], double R[3][3], const do
    accelerometer bias (unit of the state per square root of s). */
 static void ekf_predict(EkfState *s, double h, const double *rates, const double *force, const double *density)
 {
-    double turn[3], half[3], middle[4], rotation[4], R[3][3];
+    double turn[3], half[3], middle[4], rotation[4], f[3], R[3][3], T[3][3];
     for (int i = 0; i < 3; i++) { turn[i] = h * (rates[i] - s->gyro_bias[i]); half[i] = turn[i] / 2; }
     ekf_small_rotation(half, rotation);
     ekf_product(s->q, rotation, middle);
     ekf_product(middle, rotation, s->q);
     ekf_rotation(middle, R);
-    for (int i = 0; i < 3; i++) {
-        double f = 0;
-        for (int k = 0; k < 3; k++) f += R[i][k] * (force[k] - s->force_bias[k]);
-        s->specific_force[i] = f;
-    }
-    ekf_propagate(s->P, R, s->specific_force, h, 0);
-    ekf_propagate(s->P, R, s->specific_force, h, 1);
+    ekf_small_rotation(turn, rotation);
+    ekf_rotation(rotation, T);
+    for (int i = 0; i < 3; i++) f[i] = force[i] - s->force_bias[i];
+    for (int i = 0; i < 3; i++) s->specific_force[i] = R[i][0] * f[0] + R[i][1] * f[1] + R[i][2] * f[2];
+    ekf_propagate(s->P, R, f, T, h, 0);
+    ekf_propagate(s->P, R, f, T, h, 1);
     for (int i = 0; i < 12; i++) s->P[3 + i][3 + i] += density[i / 3] * density[i / 3] * h;
     for (int i = 0; i < 3; i++) {
         double a = s->specific_force[i] - (i == 2 ? EKF_GRAVITY : 0);
@@ -84,12 +89,12 @@ static void ekf_predict(EkfState *s, double h, const double *rates, const double
     }
 }
 
-/* Corrects the state by a scalar residual whose row is `gain_of_state` at index i and `slope` at index k (0: none). */
-static void ekf_correct(EkfState *s, int i, int k, double slope, double residual, double deviation)
+/* Corrects the state by a scalar residual whose row has the entries `slope` at the three indices `at`. */
+static void ekf_correct(EkfState *s, const int at[3], const double slope[3], double residual, double deviation)
 {
-    double row[EKF_SIZE], d[EKF_SIZE], rotation[4], variance = deviation * deviation;
-    for (int j = 0; j < EKF_SIZE; j++) row[j] = s->P[i][j] + slope * s->P[k][j];
-    double total = row[i] + slope * row[k] + variance;
+    double row[EKF_SIZE], d[EKF_SIZE], rotation[4], total = deviation * deviation;
+    for (int j = 0; j < EKF_SIZE; j++) row[j] = slope[0] * s->P[at[0]][j] + slope[1] * s->P[at[1]][j] + slope[2] * s->P[at[2]][j];
+    for (int j = 0; j < 3; j++) total += slope[j] * row[at[j]];
     for (int j = 0; j < EKF_SIZE; j++) {
         d[j] = row[j] * residual / total;
         for (int l = 0; l < EKF_SIZE; l++) s->P[j][l] -= row[j] * row[l] / total;
@@ -99,37 +104,60 @@ static void ekf_correct(EkfState *s, int i, int k, double slope, double residual
         s->gyro_bias[j] += d[EKF_GYRO + j], s->force_bias[j] += d[EKF_FORCE + j];
     }
     ekf_small_rotation(d + EKF_ATTITUDE, rotation);
-    ekf_product(rotation, s->q, s->q);
+    ekf_product(s->q, rotation, s->q);
 }
 
-/* Starts at rest and level. deviation: standard deviations of the five groups of errors. */
-static void ekf_start(const double *position, double yaw, const double *deviation, double *next)
+/* Corrects by a position and a velocity of age `delay` (s) along the axis i. */
+static void ekf_correct_by_fix(EkfState *s, int i, double position, double velocity, double delay, const double *noise)
 {
+    const int at[3] = {EKF_POSITION + i, EKF_VELOCITY + i, 0};
+    const double place[3] = {1, -delay, 0}, speed[3] = {0, 1, 0};
+    double a = s->specific_force[i] - (i == 2 ? EKF_GRAVITY : 0);
+    ekf_correct(s, at, place, position - s->position[i] + delay * (s->velocity[i] - delay / 2 * a), noise[i / 2]);
+    ekf_correct(s, at, speed, velocity - s->velocity[i] + delay * a, noise[2]);
+}
+
+/* Corrects by a magnetic field (body axes). earth: heading of its horizontal part in the world (rad, counter-clockwise from east)
+   and its dip below the horizontal (rad). Where the field dips, the heading that it shows depends on roll and pitch. */
+static void ekf_correct_by_field(EkfState *s, const double *field, const double *earth, double deviation)
+{
+    const int at[3] = {EKF_ATTITUDE, EKF_ATTITUDE + 1, EKF_ATTITUDE + 2};
+    const double turning[3] = {cos(earth[0]) * tan(earth[1]), sin(earth[0]) * tan(earth[1]), 1};
+    double R[3][3], B[2], slope[3];
+    ekf_rotation(s->q, R);
+    for (int i = 0; i < 3; i++) slope[i] = R[0][i] * turning[0] + R[1][i] * turning[1] + R[2][i] * turning[2];
+    for (int i = 0; i < 2; i++) B[i] = R[i][0] * field[0] + R[i][1] * field[1] + R[i][2] * field[2];
+    ekf_correct(s, at, slope, remainder(earth[0] - atan2(B[1], B[0]), 2 * 3.14159265358979323846), deviation);
+}
+
+/* Starts level, at the first fix, with the heading of the field. deviation: standard deviations of roll and pitch and of both
+   biases; noise: those of the measurements, as in ekf_step. */
+static void ekf_start(const double *position, const double *velocity, const double *field, const double *earth, const double *deviation,
+                      const double *noise, double *next)
+{
+    const double unknown = 1, yaw = earth[0] - atan2(field[1], field[0]);
     EkfState s;
+    double groups[EKF_SIZE] = {noise[0], noise[0], noise[1], noise[2], noise[2], noise[2], deviation[0], deviation[0], unknown};
+    for (int i = EKF_GYRO; i < EKF_SIZE; i++) groups[i] = deviation[i / 3 - 2];
     memset(&s, 0, sizeof s);
     memcpy(s.position, position, sizeof s.position);
+    memcpy(s.velocity, velocity, sizeof s.velocity);
     s.q[0] = cos(yaw / 2), s.q[3] = sin(yaw / 2), s.specific_force[2] = EKF_GRAVITY;
-    for (int i = 0; i < EKF_SIZE; i++) s.P[i][i] = deviation[i / 3] * deviation[i / 3];
+    for (int i = 0; i < EKF_SIZE; i++) s.P[i][i] = groups[i] * groups[i];
+    ekf_correct_by_field(&s, field, earth, noise[3]);
     memcpy(next, &s, sizeof s);
 }
 
 /* One step: prediction, then the measurements that are new. delay: age of the fix (s). noise: standard deviations of horizontal
    and vertical position, velocity and heading. */
 static void ekf_step(const double *previous, double h, const double *rates, const double *force, const double *density, int has_fix,
-                     const double *position, const double *velocity, double delay, int has_yaw, double yaw, const double *noise, double *next)
+                     const double *position, const double *velocity, double delay, int has_field, const double *field, const double *earth,
+                     const double *noise, double *next)
 {
     EkfState s;
     memcpy(&s, previous, sizeof s);
     ekf_predict(&s, h, rates, force, density);
-    for (int i = 0; has_fix && i < 3; i++) {
-        double a = s.specific_force[i] - (i == 2 ? EKF_GRAVITY : 0);
-        double past = s.position[i] - delay * (s.velocity[i] - delay / 2 * a);
-        ekf_correct(&s, EKF_POSITION + i, EKF_VELOCITY + i, -delay, position[i] - past, noise[i / 2]);
-        ekf_correct(&s, EKF_VELOCITY + i, 0, 0, velocity[i] - s.velocity[i] + delay * a, noise[2]);
-    }
-    if (has_yaw) {
-        double own = atan2(2 * (s.q[0] * s.q[3] + s.q[1] * s.q[2]), 1 - 2 * (s.q[2] * s.q[2] + s.q[3] * s.q[3]));
-        ekf_correct(&s, EKF_ATTITUDE + 2, 0, 0, remainder(yaw - own, 2 * 3.14159265358979323846), noise[3]);
-    }
+    for (int i = 0; has_fix && i < 3; i++) ekf_correct_by_fix(&s, i, position[i], velocity[i], delay, noise);
+    if (has_field) ekf_correct_by_field(&s, field, earth, noise[3]);
     memcpy(next, &s, sizeof s);
 }

@@ -1,0 +1,113 @@
+"""Import of meshes (STL, OBJ, GLB) into vehicle files: mass properties, convex pieces of the collision shape, triangles to show.
+
+trimesh (extra "mesh") reads the files. Only the import needs it: the vehicle file contains all results. Coordinates are taken as
+they are: x forward, y left, z up.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from cosim.core.errors import InputError, Problem
+
+from .vehicles.common.visual_mesh import MAX_TRIANGLES
+
+#: largest number of points of a convex piece
+MAX_POINTS = 64
+
+_DIGITS = 6  # of coordinates in vehicle files (m)
+
+
+def load_mesh(path: Path, scale: Sequence[float] = (1.0, 1.0, 1.0)) -> Any:
+    """Return the mesh of a file as a `trimesh.Trimesh`.
+
+    Args:
+        path: STL, OBJ or GLB file, or another format that trimesh reads.
+        scale: Factors along x, y and z, for example 0.001 for coordinates in mm.
+
+    Raises:
+        InputError: trimesh is not installed, or the file cannot be read or has no triangles.
+    """
+    try:
+        import trimesh
+    except ModuleNotFoundError:
+        raise InputError('reading meshes needs trimesh: pip install "fmi-cosim[mesh]"') from None
+    try:
+        mesh: Any = trimesh.load(path, force="mesh")
+    except Exception as error:
+        raise InputError(Problem(f"cannot be read: {error}", str(path))) from None
+    if not 0 < len(mesh.faces) <= MAX_TRIANGLES:
+        raise InputError(Problem(f"found {len(mesh.faces)} triangles, expected 1 to {MAX_TRIANGLES}", str(path)))
+    mesh.apply_scale(scale)
+    return mesh
+
+
+def convex_pieces(mesh: Any) -> list[np.ndarray]:
+    """Return the points (m) of the convex hull of each connected part, at most MAX_POINTS each.
+
+    A hull with more points is replaced by its outermost points in MAX_POINTS directions, which lie evenly on a sphere.
+    """
+    parts = mesh.split(only_watertight=False)
+    hulls = [np.asarray(part.convex_hull.vertices) for part in (parts if len(parts) else [mesh])]
+    return [points if len(points) <= MAX_POINTS else _outermost(points) for points in hulls]
+
+
+def _outermost(points: np.ndarray) -> np.ndarray:
+    height = 1 - 2 * (np.arange(MAX_POINTS) + 0.5) / MAX_POINTS
+    angle, radius = np.pi * (1 + 5**0.5) * np.arange(MAX_POINTS), np.sqrt(1 - height**2)
+    directions = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), height])
+    chosen: np.ndarray = points[np.unique(np.argmax(points @ directions.T, axis=0))]
+    return chosen
+
+
+def piece_data(points: np.ndarray, source: str) -> dict[str, Any]:
+    """Return an element of "boxes" of a vehicle file for the points (m, body frame) of a convex piece."""
+    return {"points": np.round(points, _DIGITS).tolist(), "source": source}
+
+
+def visual_data(triangles: np.ndarray, source: str) -> dict[str, Any]:
+    """Return "visual" of a vehicle file for triangles (m, body frame), shape (n, 3, 3)."""
+    vertices, faces = np.unique(np.round(triangles.reshape(-1, 3), _DIGITS), axis=0, return_inverse=True)
+    return {"vertices": vertices.tolist(), "faces": faces.reshape(-1, 3).tolist(), "source": source}
+
+
+def vehicle_from_mesh(path: Path, data: Mapping[str, Any], scale: float = 1.0) -> dict[str, Any]:
+    """Return the data of a vehicle with the inertia, collision shape and appearance of a mesh.
+
+    Args:
+        path: Mesh file.
+        data: Further data of the vehicle with its "mass". The mass is distributed evenly over the volume of the mesh. The origin
+            of multirotors and submerged vehicles becomes the centre of mass; that of vessels remains the origin of the mesh.
+        scale: Factor on all coordinates.
+
+    Raises:
+        InputError: The mesh cannot be read or encloses no volume, or the data have no mass.
+    """
+    mesh, source = load_mesh(path, (scale,) * 3), f"mesh file {path.name}"
+    if not mesh.is_volume:
+        raise InputError(Problem("encloses no volume: its surface has holes, or its faces point inwards", str(path)))
+    mass = data.get("mass")
+    value = mass.get("value") if isinstance(mass, Mapping) else mass
+    if not isinstance(value, int | float):
+        raise InputError('"mass" is missing in the accompanying file; the mesh gives its distribution only')
+    inertia = np.asarray(mesh.moment_inertia) * value / float(mesh.volume)
+    uniform = f"{source}, even density"
+    is_vessel = data.get("family") in ("surface_vessel", "planar_vessel")
+    centre = np.asarray(mesh.center_mass)
+    origin = np.zeros(3) if is_vessel else centre
+    result = {
+        **data,
+        "boxes": data.get("boxes", [piece_data(points - origin, source) for points in convex_pieces(mesh)]),
+        "visual": data.get("visual", visual_data(np.asarray(mesh.triangles) - origin, source)),
+    }
+    if data.get("family") == "planar_vessel":
+        result.setdefault("yaw_inertia", {"value": float(inertia[2, 2]), "unit": "kg.m2", "source": uniform})
+    else:
+        result.setdefault("inertia", {"value": ((inertia + inertia.T) / 2).tolist(), "unit": "kg.m2", "source": uniform})
+    if is_vessel:
+        result.setdefault("centre_of_mass", {"value": centre.tolist(), "unit": "m", "source": uniform})
+    return result
