@@ -122,7 +122,7 @@ def test_replacing_the_results_of_another_scenario_causes_a_warning(tmp_path):
     copy = tmp_path / "mine.json"
     shipped = resources.root() / "scenarios/free_flight.json"
     copy.write_text(shipped.read_text().replace('"../', f'"{resources.root()}/'))
-    words = ("--stop-time", "0.1", "--isolation", "none", "--no-report", "--output-dir", tmp_path / "out")
+    words = ("--stop-time", "9", "--isolation", "none", "--no-report", "--output-dir", tmp_path / "out")
     said = [invoke(run, file, *words).stderr for file in ("free_flight", "free_flight", copy)]
     text = f'replaces the results of {shipped} in {tmp_path / "out"}; another "name" in the scenario or --output-dir keeps both\n'
     assert said[0] == said[1] == ""
