@@ -47,7 +47,8 @@ def relocating(old_folder: Path, new_folder: Path | None) -> PathChange:
 
     def change(text: str) -> str:
         path = resources.root() / text.removeprefix(SHIPPED) if text.startswith(SHIPPED) else old / text
-        changed = os.path.normpath(path) if new is None else os.path.relpath(path, new)
+        stays_absolute = new is None or Path(text).is_absolute()
+        changed = os.path.normpath(path) if stays_absolute else os.path.relpath(path, new)
         return changed.replace(os.sep, "/")
 
     old, new = paths.resolve_path(old_folder), new_folder and paths.resolve_path(new_folder)

@@ -74,10 +74,12 @@ class Fmi3Slave(EventModeInstance, Fmi3Instance):
             if event_needed and self.description.has_event_mode and not terminate:
                 self._handle_event()
                 terminate = self._terminates
-            elif reached <= begin and not terminate:
+            elif reached <= begin and self.description.may_return_early and not terminate:
                 raise ComponentError(self.name, "fmi3DoStep", f"returned early at t = {reached!r} s without an event", start)
             if terminate or reached >= end - _TIME_TOLERANCE * self._step_size:
                 return StepResult(end if not terminate and reached < end else reached, event_needed, terminate)
+            if not self.description.may_return_early:
+                return StepResult(reached, event_needed, terminate)  # an error, which the caller reports
             begin = reached
             if not self._continue_step(begin, end - begin):
                 return StepResult(end)
