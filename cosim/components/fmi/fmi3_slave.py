@@ -102,13 +102,22 @@ class Fmi3Slave(EventModeInstance, Fmi3Instance):
                 raise ComponentError(self.name, "fmi3DoStep", f"returned early at t = {reached!r} s without an event", start)
             if terminate or reached >= end - _TIME_TOLERANCE * self._step_size:
                 return StepResult(end if not terminate and reached < end else reached, event_needed, terminate)
-            if not self._may_return_early:
+            if not self._may_return_early and not self._accept_early_return(event_needed):
                 return StepResult(reached, event_needed, terminate)  # an error, which the caller reports
             begin = reached
             if not self._continue_step(begin, end - begin):
                 return StepResult(end)
         reason = f"more than {MAX_EVENTS_PER_STEP} events in one communication step, the last one at t = {begin:.12g} s"
         raise ComponentError(self.name, "fmi3DoStep", reason, start)
+
+    def _accept_early_return(self, event_needed: bool) -> bool:
+        """Return whether a step that ended early, which the FMU does not declare, ended at an event that was handled."""
+        if not (event_needed and self._uses_event_mode):
+            return False
+        self._may_return_early = True
+        text = "returned early from fmi3DoStep at an event, without declaring mightReturnEarlyFromDoStep"
+        component_log.log_message(self.name, component_log.WARNING, text)
+        return True
 
     def _continue_step(self, begin: float, duration: float) -> bool:
         """Call fmi3DoStep for the rest of a step (s), and return whether it has set a flag."""

@@ -94,10 +94,22 @@ def test_an_fmu_that_refuses_what_it_declares_runs_without_it(bounces, flags, is
     assert caplog.text.count("could only be instantiated without them") == 1
 
 
+@pytest.mark.parametrize("isolation", [None, Isolation()], ids=["here", "isolated"])
+def test_an_early_return_that_is_not_declared_is_continued_after_its_event(bounces, isolation, caplog):
+    component = create_component(FmuFile(bounces["event mode"]), "undeclared", isolation=isolation)
+    signals = [name.replace("bounce", "undeclared") for name in SIGNALS]
+    with caplog.at_level(logging.WARNING, "cosim"):
+        columns = run_system(make_system({"undeclared": component}), 1, "1/16", [*signals, "undeclared.events"]).columns
+    rows, events = own_results(16, 64)
+    assert [list(row) for row in zip(*(columns[name].tolist() for name in signals), strict=True)] == rows
+    assert columns["undeclared.events"][-1] == events
+    assert caplog.text.count("without declaring mightReturnEarlyFromDoStep") == 1
+
+
 @pytest.mark.parametrize("flags", FLAGS)
 def test_an_fmu_that_cannot_be_instantiated_gives_its_reason(bounces, flags):
     component = create_component(FmuFile(bounces[flags]), "impossible")
-    with pytest.raises(ComponentError, match="^impossible: fmi3InstantiateCoSimulation failed: this is not supported$"):
+    with pytest.raises(ComponentError, match=r"^impossible: fmi3InstantiateCoSimulation failed: this is not supported$"):
         run_system(make_system({"impossible": component}), 1, "1/16", ["impossible.x"])
 
 
