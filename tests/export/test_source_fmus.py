@@ -108,7 +108,7 @@ GOOD = SOURCE.read_text()
 
 #: case -> sources and the message
 BAD_SOURCES = {
-    "several errors": ({"ball.c": "int x = ;\nint y = ;"}, "cannot be compiled: ball.c:1:.* \\(and 1 more\\)$"),
+    "several errors": ({"ball.c": "int x = nowhere;\nint y = nobody;"}, "cannot be compiled: ball.c:1:.* \\(and 1 more\\)$"),
     "a header that does not exist": ({"ball.c": '#include "none.h"'}, "ball.c:1:.*none.h"),
     "a platform that it refuses": ({"ball.c": '#error "needs a real-time clock"'}, "needs a real-time clock"),
     "functions defined twice": (
