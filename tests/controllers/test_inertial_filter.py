@@ -19,12 +19,13 @@ from plant_src.sensors.device_data import IMU_DEVICES
 HEADERS = resources.root() / "controllers/modelica/Estimation/Resources/Include"
 COMPILER = shutil.which("cc") or shutil.which("gcc") or "cc"
 SOURCE = """#include "inertial_ekf.h"
-void start(int n, const double *p, const double *v, const double *b, const double *e, const double *d, const double *noise, double *s)
+void start(int n, const double *p, const double *v, const double *b, const double *e, const double *d, const double *noise,
+           double *s)
 { for (int i = 0; i < n; i++) ekf_start(p + 3 * i, v + 3 * i, b + 3 * i, e, d, noise, s + 244 * i); }
-void step(int n, double *s, double h, const double *r, const double *f, const double *d, int fix, const double *p, const double *v,
-          double delay, int has_field, const double *b, const double *e, const double *noise)
-{ for (int i = 0; i < n; i++)
-    ekf_step(s + 244 * i, h, r + 3 * i, f + 3 * i, d, fix, p + 3 * i, v + 3 * i, delay, has_field, b + 3 * i, e, noise, s + 244 * i); }
+void step(int n, double *s, double h, const double *r, const double *f, const double *d, int fix, const double *p,
+          const double *v, double delay, int has_field, const double *b, const double *e, const double *noise)
+{ for (int i = 0; i < n; i++, s += 244)
+    ekf_step(s, h, r + 3 * i, f + 3 * i, d, fix, p + 3 * i, v + 3 * i, delay, has_field, b + 3 * i, e, noise, s); }
 """
 H, DELAY, SIZE = 0.01, 0.05, 244
 NOISE = np.array([0.02, 0.03, 0.05, 0.012])
@@ -48,12 +49,22 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Any:
     library, number = ctypes.CDLL(str(folder / "ekf.so")), ctypes.c_double
     array = np.ctypeslib.ndpointer(float, flags="C")
     library.start.argtypes = [ctypes.c_int, *[array] * 7]
-    library.step.argtypes = [ctypes.c_int, array, number, *[array] * 3, ctypes.c_int, *[array] * 2, number, ctypes.c_int, *[array] * 3]
+    library.step.argtypes = [
+        ctypes.c_int,
+        array,
+        number,
+        *[array] * 3,
+        ctypes.c_int,
+        *[array] * 2,
+        number,
+        ctypes.c_int,
+        *[array] * 3,
+    ]
     return library
 
 
 class Flights:
-    """Manoeuvres with the shipped IMU, other sensors that agree with the model of the filter, and the filters; arrays (start, axis)."""
+    """Manoeuvres with the shipped IMU and other sensors as in the model of the filter, and the filters; arrays (start, axis)."""
 
     def __init__(self, library: Any, tilt: float, density: float, turning: float, pushing: float):
         rng = self.rng = np.random.default_rng(2)
