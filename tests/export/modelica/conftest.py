@@ -13,7 +13,7 @@ import numpy as np
 import pytest
 
 from cosim.export.fmu.block import Block, BlockVariable
-from cosim.export.modelica import load_block, load_interpreter
+from cosim.export.modelica import assemble, load_block, load_interpreter
 from cosim.export.modelica.causality.interpreter import Interpreter
 
 CTYPES = {"Float64": ctypes.c_double, "Int32": ctypes.c_int32, "Enumeration": ctypes.c_int32, "Boolean": ctypes.c_bool}
@@ -170,8 +170,13 @@ def write_model(tmp_path: Path) -> Callable[[str], Path]:
 
 
 @pytest.fixture
-def compile_both(tmp_path: Path, write_model: Callable[[str], Path]) -> Callable[..., CompiledAndInterpreted]:
-    """Return a function that compiles and interprets a model, given as text or as a file."""
+def compile_both(
+    tmp_path: Path, write_model: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
+) -> Callable[..., CompiledAndInterpreted]:
+    """Return a function that compiles and interprets a model, given as text or as a file.
+
+    The front end, which takes most of the time, runs once for both.
+    """
 
     if shutil.which("gcc") is None:
         pytest.skip("needs gcc")
@@ -180,6 +185,9 @@ def compile_both(tmp_path: Path, write_model: Callable[[str], Path]) -> Callable
         path = write_model(source) if isinstance(source, str) else source
         folder = tmp_path / "c" / path.stem
         folder.mkdir(parents=True)
-        return CompiledAndInterpreted(CompiledBlock(load_block(path, model), folder), load_interpreter(path, model))
+        with monkeypatch.context() as patch:
+            flat = assemble.flatten_model(path, model)
+            patch.setattr(assemble, "flatten_model", lambda *_arguments: flat)
+            return CompiledAndInterpreted(CompiledBlock(load_block(path, model), folder), load_interpreter(path, model))
 
     return open_model
