@@ -11,10 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from frontend_server import run_forked
 
 from cosim.export.fmu.block import Block, BlockVariable
 from cosim.export.modelica import assemble, load_block, load_interpreter
 from cosim.export.modelica.causality.interpreter import Interpreter
+from cosim.export.modelica.frontend import rumoca_client
 
 CTYPES = {"Float64": ctypes.c_double, "Int32": ctypes.c_int32, "Enumeration": ctypes.c_int32, "Boolean": ctypes.c_bool}
 GCC = [
@@ -155,6 +157,13 @@ def _random(rng: np.random.Generator, variable: BlockVariable, scale: float) -> 
     if variable.type == "Int32":
         return rng.integers(-5 if low is None else low, (5 if high is None else high) + 1, variable.shape or None)
     return rng.uniform(-scale if low is None else low, scale if high is None else high, variable.shape or None)
+
+
+@pytest.fixture(autouse=True)
+def forked_front_end(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fork front ends from a process that has imported rumoca, except in the tests of their processes."""
+    if request.path.stem != "test_frontend_process":
+        monkeypatch.setattr(rumoca_client, "_run_process", run_forked)
 
 
 @pytest.fixture
