@@ -151,11 +151,15 @@ def test_the_folder_can_be_moved(tmp_path):
     assert done.returncode == 0, done.stderr
 
 
-def test_a_run_writes_a_figure_and_a_replay(moved):
-    folder = moved("vessel_autopilot", "python")
+FIGURES = [("vessel_autopilot", "course", ["vessel"]), ("uav_controller", "track", ["quadcopter", "vessel"])]
+
+
+@pytest.mark.parametrize(("role", "figure", "bodies"), FIGURES)
+def test_a_run_writes_a_figure_and_a_replay(moved, role, figure, bodies):
+    folder = moved(role, "python")
     runs = folder / "runs/my_pilot"
-    assert (runs / "course.png").is_file()
-    assert build_scene(json.loads((runs / "run.json").read_text()))["bodies"][0]["name"] == "vessel"
+    assert (runs / f"{figure}.png").is_file()
+    assert [body["name"] for body in build_scene(json.loads((runs / "run.json").read_text()))["bodies"]] == bodies
     done = cosim("replay", runs, cwd=folder)
     assert (done.returncode, done.stderr) == (0, "")
 
