@@ -6,6 +6,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
 from ..causality.event_limits import MAX_EVENTS, MAX_PASSES, chattering_reason, endless_reason, iterated_names
+from ..causality.hybrid_interpreter import SAME_TIME
 from ..causality.matching import is_input
 from ..causality.past_values import PAST_VALUES
 from ..model.flat_model import Model, Relation, derivative_name, is_integrated, previous_name
@@ -49,12 +50,12 @@ class HybridCode(ModelCode):
             *self._common_definitions(),
             f"static const bool NO_TICK[{max(clocks, 1)}] = {{false}};",
             record_function(model, values, self._make_lowering(), PAST_VALUES),
-            *event_functions(model, values, self._event(), self._endless_codes(), initial),
+            *event_functions(model, values, self._event(), self._endless_codes(), initial, self._limits()),
             function_definition("const char *model_initialize(Model *m, double time)", self._initialize_hybrid()),
         ]
         if is_integrated(model):
             definitions += [*self._hybrid_system(values)]
-        step = hybrid_step_body(clocks, is_integrated(model))
+        step = hybrid_step_body(clocks, is_integrated(model), bool(model.hybrid.sampled))
         return [
             *definitions,
             function_definition("const char *model_step(Model *m, double time, double step_size)", step),
@@ -77,6 +78,7 @@ class HybridCode(ModelCode):
             *past,
             "start_variables(m);",
             *self._clock_lines(),
+            *(["m->event_time = -INFINITY;"] if self.model.hybrid and self.model.hybrid.sampled else []),
             "for (int pass = 0; initialize(m, time); pass++) {",
             f"    if (pass == {MAX_PASSES}) fail(m, endless(m));",
             *(f"    {line}" for line in self._copy_relations()),
@@ -103,6 +105,11 @@ class HybridCode(ModelCode):
             lowering.lines.append(f"{C_TYPES[self.model.variables[name].type]} {local};")
         lowering.body(body)
         return ["(void)m;", "(void)time;", *lowering.lines]
+
+    def _limits(self) -> list[str]:
+        lowering = self._make_lowering()
+        lowering.body(self.schedule.between.limits)
+        return lowering.lines
 
     def _first_ticks(self) -> list[str]:
         """Generate the event of the clocks that tick at the start time; with inputs, it belongs to the first step."""
@@ -178,7 +185,12 @@ def memory_functions(inputs: Sequence[ValuePair], others: Sequence[ValuePair]) -
 
 
 def event_functions(
-    model: Model, values: Mapping[str, CValue], evaluation: list[str], endless: Mapping[str, str], initial: list[str]
+    model: Model,
+    values: Mapping[str, CValue],
+    evaluation: list[str],
+    endless: Mapping[str, str],
+    initial: list[str],
+    limits: list[str],
 ) -> list[str]:
     """Generate `evaluate`, `initialize` and `event`, and the functions that they use.
 
@@ -188,6 +200,7 @@ def event_functions(
         evaluation: The statements of an evaluation of all equations.
         endless: The failure code of an event iteration that does not end by the variable that changes.
         initial: The statements of the initialization.
+        limits: The statements that compute the values of continuous variables before an event.
 
     Returns:
         The function definitions.
@@ -199,7 +212,10 @@ def event_functions(
     relations = _any_differs(pairs[relation.name] for relation in model.hybrid.relations)
     causes = [f"if ({_differs(*pairs[name])}) return {code};" for name, code in endless.items()]
     return [
-        *memory_functions([pairs[name] for name in inputs], [pair for name, pair in pairs.items() if name not in inputs]),
+        *memory_functions(
+            [pairs[name] for name in inputs],
+            [pair for name, pair in pairs.items() if name not in {*inputs, *model.hybrid.sampled}],
+        ),
         "/* Returns the failure of an event iteration in which a value changes in each evaluation. */",
         function_definition("static int32_t endless(const Model *m)", ["(void)m;", *causes, "return 0;"]),
         "/* Evaluates all equations; returns whether they must be evaluated again, since values have changed. */",
@@ -207,7 +223,10 @@ def event_functions(
             "static bool evaluate(Model *m, double time, const bool *due)",
             ["(void)time;", "(void)due;", *evaluation, f"return m->failure == 0 && ({changes});"],
         ),
-        function_definition("static void event(Model *m, double time, const bool *due)", _event_lines()),
+        function_definition(
+            "static void event(Model *m, double time, const bool *due)",
+            [*limits, *_sampled_lines(pairs[name] for name in model.hybrid.sampled), *_event_lines()],
+        ),
         function_definition(
             "static bool initialize(Model *m, double time)",
             ["(void)time;", *initial, f"return m->failure == 0 && ({relations});"],
@@ -217,6 +236,12 @@ def event_functions(
 
 def _any_differs(pairs: Iterable[ValuePair]) -> str:
     return " || ".join(_differs(*pair) for pair in pairs) or "false"
+
+
+def _sampled_lines(pairs: Iterable[ValuePair]) -> list[str]:
+    copies = copy_values(pairs)
+    guarded = ["if (time > m->event_time) {", *(f"    {line}" for line in copies), "}", f"m->event_time = time + {SAME_TIME};"]
+    return guarded if copies else []
 
 
 def _event_lines() -> list[str]:
@@ -264,8 +289,8 @@ def crossing_function(relations: Iterable[Relation], values: Mapping[str, CValue
     )
 
 
-def hybrid_step_body(clocks: int, continuous: bool) -> list[str]:
-    """Generate the body of model_step."""
+def hybrid_step_body(clocks: int, continuous: bool, inputs_first: bool) -> list[str]:
+    """Generate the body of model_step; `inputs_first`: changes of inputs are an event before a tick at the same time."""
     lines = ["const double end = time + step_size;", "m->failure = 0;"]
     tick = ["const bool tick = false;", *["const double target = end;"] * continuous]
     if clocks:
@@ -277,9 +302,16 @@ def hybrid_step_body(clocks: int, continuous: bool) -> list[str]:
         ]
     loop, at_start = [*tick], "count == 0"
     if clocks:
-        loop.append(f"const bool at_start = tick && next <= time + TOLERANCE * shortest_period(m->clock, {clocks});")
-        at_start += " && !at_start"
-    loop.append(f"if ({at_start} && (m->changed || inputs_changed(m))) event(m, time, NO_TICK);")
+        loop += [f"const bool at_start = tick && next <= time + TOLERANCE * shortest_period(m->clock, {clocks});"] * (
+            continuous or not inputs_first
+        )
+        at_start += " && !at_start" * (not inputs_first)
+    input_event = f"if ({at_start} && (m->changed || inputs_changed(m)))"
+    loop += (
+        [f"{input_event} {{", "    event(m, time, NO_TICK);", "    m->event_time = -INFINITY;", "}"]
+        if inputs_first
+        else [f"{input_event} event(m, time, NO_TICK);"]
+    )
     if continuous:
         lines.append("double reached = time;")
         loop += [

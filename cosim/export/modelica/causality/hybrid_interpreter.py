@@ -17,6 +17,8 @@ from .matching import is_input
 from .past_values import PAST_VALUES, PastValues
 
 RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-7, 1e-9
+#: events at a distance (s) up to this one are at the same time for clocked sample() operators
+SAME_TIME = 1e-9
 
 _NODES = (0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0)
 _WEIGHTS: Sequence[Sequence[float]] = (
@@ -51,6 +53,7 @@ class HybridInterpreter(Interpreter):
         self.evaluate.past = lambda index, time: self._past[index].value(time)
         self._step = 0.0
         self._parameters_changed = False
+        self._event_time = -math.inf
 
     def set(self, name: str, value: Any) -> None:
         """Set a parameter or an input; a parameter causes an event at the start of the next step."""
@@ -63,7 +66,7 @@ class HybridInterpreter(Interpreter):
         Raises:
             ComponentError: The model has failed.
         """
-        self._step = 0.0
+        self._step, self._event_time = 0.0, -math.inf
         self._past[:] = [PastValues() for _ in self._hybrid.delays]
         self._apply_start_values(inputs=False)
         self.evaluate.previous_conditions.clear()
@@ -102,8 +105,10 @@ class HybridInterpreter(Interpreter):
             is_tick = bool(due) and tick < end - slack
             at_start = is_tick and tick <= time + slack
             target = tick if is_tick else end
-            if count == 0 and not at_start and (self._parameters_changed or self._changed(self._inputs)):
+            inputs_first = not at_start or bool(self._hybrid.sampled)
+            if count == 0 and inputs_first and (self._parameters_changed or self._changed(self._inputs)):
                 self._event("step", time, ())
+                self._event_time = -math.inf
             crossing = False
             if is_integrated(self.model) and not at_start:
                 with self._as_component_error("step", reached), np.errstate(all="ignore"):
@@ -133,9 +138,11 @@ class HybridInterpreter(Interpreter):
             raise EvaluationError(endless_reason(self._hybrid, name), self.model.variables[name].where)
 
     def _event(self, function: str, time: float, due: Sequence[int]) -> None:
-        self._remember([name for name in self._hybrid.remembered if name not in self._inputs])
         self.values["time"] = time
         with self._as_component_error(function, time), np.errstate(all="ignore"):
+            self.evaluate.execute(self.schedule.between.limits)
+            self._remember_sampled(time)
+            self._remember([name for name in self._hybrid.remembered if name not in self._inputs])
             for count in range(MAX_PASSES + 1):
                 self.evaluate.event_flags.update({("due", k): k in due for k in range(len(self.clocks))})
                 self.evaluate.execute(self.schedule.event)
@@ -149,9 +156,17 @@ class HybridInterpreter(Interpreter):
         self._parameters_changed = False
         self._record(time)
 
+    def _remember_sampled(self, time: float) -> None:
+        """Store the values of sampled variables, unless the previous event was at the same time."""
+        if self._hybrid.sampled and time > self._event_time:
+            for name in self._hybrid.sampled:
+                self.values[previous_name(name)] = self.get(name)
+        self._event_time = time + SAME_TIME
+
     def _remember(self, names: Sequence[str]) -> None:
         for name in names:
-            self.values[previous_name(name)] = self.get(name)
+            if name not in self._hybrid.sampled:
+                self.values[previous_name(name)] = self.get(name)
 
     def _changed(self, names: Sequence[str]) -> bool:
         return any(not np.array_equal(self.values[name], self.values[previous_name(name)]) for name in names)
