@@ -28,7 +28,10 @@ _JUMPING = (
 
 
 class JumpSearch:
-    """Dependences of the variables of a model, through all equations that contain them; states, inputs and parameters end them."""
+    """Dependences of the variables of a model, through all equations that contain them.
+
+    States, inputs and parameters depend on nothing here.
+    """
 
     def __init__(self, model: Model):
         self._model = model
