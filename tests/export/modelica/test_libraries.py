@@ -225,7 +225,7 @@ package Vectors "return is a word in a text"
   end both;
 end Vectors;
 """,
-    "Search/Block.mo": "within Search;\nblock Block\n  input Real u;\n  output Real y;\nequation\n  y = Vectors.first(u);\nend Block;",
+    "Search/Block.mo": "within Search;\nblock Block\n  input Real u;\n  output Real y = Vectors.first(u);\nend Block;",
 }
 
 

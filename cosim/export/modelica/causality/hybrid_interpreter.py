@@ -11,6 +11,7 @@ import numpy as np
 from ....core.errors import ComponentError
 from ..model.arithmetic import EvaluationError, divide
 from ..model.flat_model import Model, derivative_name, is_integrated, previous_name
+from .dormand_prince import ERROR, NODES, WEIGHTS, weighted_sum
 from .event_limits import MAX_EVENTS, MAX_PASSES, chattering_reason, endless_reason, iterated_names
 from .interpreter import TICK_TOLERANCE, Interpreter
 from .matching import is_input
@@ -20,17 +21,6 @@ RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-7, 1e-9
 #: events at a distance (s) up to this one are at the same time for clocked sample() operators
 SAME_TIME = 1e-9
 
-_NODES = (0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0)
-_WEIGHTS: Sequence[Sequence[float]] = (
-    (),
-    (1 / 5,),
-    (3 / 40, 9 / 40),
-    (44 / 45, -56 / 15, 32 / 9),
-    (19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729),
-    (9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656),
-    (35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84),
-)
-_ERROR = (71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40)
 _COMPARISONS: dict[str, Callable[[float, float], bool]] = {
     "<": lambda a, b: a < b,
     "<=": lambda a, b: a <= b,
@@ -221,14 +211,14 @@ class HybridInterpreter(Interpreter):
     def _dormand_prince(self, time: float, h: float, start: Sequence[float], slopes: list[list[float]]) -> float:
         """Advance the states from `start` with the slopes in the first row; return the error as a multiple of the tolerance."""
         del slopes[1:]
-        for node, weights in zip(_NODES[1:], _WEIGHTS[1:], strict=True):
-            self._set_states([x + h * _weighted(weights, slopes, i) for i, x in enumerate(start)])
+        for node, weights in zip(NODES[1:], WEIGHTS[1:], strict=True):
+            self._set_states([x + h * weighted_sum(weights, slopes, i) for i, x in enumerate(start)])
             slopes.append(self._slopes(time + node * h))
         largest = 0.0
         for i, (x, y) in enumerate(zip(start, self._get_states(), strict=True)):
             a, b = abs(x), abs(y)
             scale = ABSOLUTE_TOLERANCE + RELATIVE_TOLERANCE * (a if a > b else b)
-            ratio = abs(h * _weighted(_ERROR, slopes, i)) / scale
+            ratio = abs(h * weighted_sum(ERROR, slopes, i)) / scale
             if not ratio <= largest:
                 largest = ratio
         return largest
@@ -288,14 +278,6 @@ class HybridInterpreter(Interpreter):
             count += 1
         self._dormand_prince(time, right, start, slopes)
         return time + right
-
-
-def _weighted(weights: Sequence[float], slopes: Sequence[Sequence[float]], index: int) -> float:
-    total = 0.0
-    for weight, row in zip(weights, slopes, strict=True):
-        if weight:
-            total += weight * row[index]
-    return total
 
 
 def _elements(model: Model, names: Sequence[str]) -> Iterator[tuple[str, int | None]]:
