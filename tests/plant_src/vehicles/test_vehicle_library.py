@@ -97,7 +97,9 @@ def quantities(data: Any) -> Any:
         yield from quantities(value)
 
 
-@pytest.mark.parametrize("name", ["blueboat", "wamv16", "cybership2", "heron", "crazyflie", "x500", "survey_hexacopter", "bluerov2_heavy"])
+@pytest.mark.parametrize(
+    "name", ["blueboat", "wamv16", "cybership2", "heron", "crazyflie", "x500", "survey_hexacopter", "bluerov2_heavy"]
+)
 def test_every_quantity_of_the_library_states_its_source(name: str) -> None:
     data = json.loads((DATA / f"{name}.json").read_text())
     assert {"sources", "validity"} <= data.keys()
