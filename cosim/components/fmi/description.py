@@ -17,7 +17,7 @@ from ...core.errors import InputError, join_alternatives
 from ...core.size_limits import require_at_most
 from ...core.time_grid import exact_fraction
 from ...core.units import BASE_UNITS, Unit, named_unit
-from .preflight import DEFAULT_LIMITS, Examination, PreflightLimits, examine, raise_errors
+from .preflight import DEFAULT_LIMITS, Examination, PreflightLimits, raise_errors
 from .preflight.binary import list_platforms
 from .preflight.model_description import Interface, ModelDescription, ModelVariable, UnitDefinition
 from .preflight.rules_values import dimension_size, read_limit
@@ -145,21 +145,6 @@ class FmuDescription:
         return replace(self, variables=variables)
 
 
-def read_description(path: Path, limits: PreflightLimits = DEFAULT_LIMITS) -> FmuDescription:
-    """Check an FMU and read its model description, without extracting anything.
-
-    The FMU needs no binary for this platform.
-
-    Args:
-        path: The FMU.
-        limits: Limits of the preflight check.
-
-    Raises:
-        InputError: The file is missing, is not a valid or safe FMU, or has no interface of FMI 2.0 or 3.0 that can be simulated.
-    """
-    return build_description(path, examine(path, limits))
-
-
 def build_description(path: Path, examination: Examination, interface: Interface | None = None) -> FmuDescription:
     """Build the description of an examined FMU.
 
@@ -200,8 +185,8 @@ def build_description(path: Path, examination: Examination, interface: Interface
         selected == "model-exchange" or attributes.get("canHandleVariableCommunicationStepSize") in _TRUE,
         attributes.get("canBeInstantiatedOnlyOncePerProcess") in _TRUE,
         attributes.get("needsExecutionTool") in _TRUE,
-        _count_states(model),
-        int(model.root.get("numberOfEventIndicators", 0)),
+        _count_states(model, selected),
+        int(model.root.get("numberOfEventIndicators", 0)) if selected == "model-exchange" and model.major < 3 else 0,
         _needs_completed_step(model.major, attributes),
         list_platforms(examination.members),
         [name for name in model.log_categories if name in _ERROR_CATEGORIES],
@@ -333,9 +318,9 @@ def _build_default_experiment(experiment: Mapping[str, str]) -> DefaultExperimen
     return DefaultExperiment(start, stop, positive_step, float(tolerance) if tolerance and tolerance > 0 else None)
 
 
-def _count_states(model: ModelDescription) -> int:
+def _count_states(model: ModelDescription, interface: str) -> int:
     if model.major == 1:
-        return int(model.root.get("numberOfContinuousStates", 0))
+        return int(model.root.get("numberOfContinuousStates", 0)) if interface == "model-exchange" else 0
     return sum(unknown.element == "ContinuousStateDerivative" for unknown in model.model_structure)
 
 
