@@ -88,12 +88,11 @@ MODULES = {
 
 def runtime_nodes(tree):
     """Yield all nodes of a syntax tree, except those below `if TYPE_CHECKING`."""
-    waiting = [tree]
-    while waiting:
-        for node in ast.iter_child_nodes(waiting.pop()):
-            if not (isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING"):
-                yield node
-                waiting.append(node)
+    for node in ast.iter_child_nodes(tree):
+        if isinstance(node, ast.If) and getattr(node.test, "id", "") == "TYPE_CHECKING":
+            continue
+        yield node
+        yield from runtime_nodes(node)
 
 
 def imported(name):
