@@ -96,7 +96,7 @@ class GroundDistance:
 
     def __init__(self, vessels: Sequence[ContactBody], platforms: Sequence[Platform], sea: Sea):
         decks, tops = [DeckSurface(vessel) for vessel in vessels], [PlatformSurface(platform) for platform in platforms]
-        self._surfaces_below = [surface.below for surface in (*decks, *tops)]
+        self._surfaces_below = [*(deck.below for deck in decks), *(top.below for top in tops)]
         self._elevation = sea.elevation_function() if len(sea.amplitude) else None
 
     def distance_and_share(
