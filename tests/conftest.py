@@ -1,5 +1,6 @@
 """Fixtures of all tests."""
 
+import gc
 from pathlib import Path
 
 import pytest
@@ -28,6 +29,17 @@ def pytest_configure(config):
 def pytest_xdist_auto_num_workers():
     """One worker more than processors: many tests wait for processes, clocks or a browser."""
     return available_processors() + 1
+
+
+@pytest.hookimpl(wrapper=True)
+def pytest_collection():
+    """Keep the garbage collector away from the 400 000 objects of the collected tests."""
+    gc.disable()
+    try:
+        return (yield)
+    finally:
+        gc.freeze()
+        gc.enable()
 
 
 def pytest_collection_modifyitems(config, items):

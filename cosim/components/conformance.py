@@ -13,6 +13,8 @@ from ..core.errors import did_you_mean
 from ..core.units import Unit
 
 _METHODS = {name: method for name, method in vars(Component).items() if inspect.isfunction(method) and not name.startswith("_")}
+#: method name -> names of its arguments
+_ARGUMENTS = {name: tuple(inspect.signature(method).parameters)[1:] for name, method in _METHODS.items()}
 _VALID_FIELD_VALUES = {"causality": get_args(Causality), "variability": get_args(Variability)}
 
 
@@ -36,9 +38,9 @@ def find_violations(candidate: Any) -> Iterator[str]:
     for name in _required_methods({variable.causality for variable in variables}, candidate.has_state):
         if getattr(getattr(candidate, name), "__func__", None) is _METHODS[name]:
             yield f'it does not define "{name}"{_misnamed_method_hint(candidate, name)}'
-    for name, method in _METHODS.items():
-        arguments = list(inspect.signature(method).parameters)[1:]
-        if not _accepts_arguments(getattr(candidate, name), arguments):
+    for name, arguments in _ARGUMENTS.items():
+        method = getattr(candidate, name)
+        if getattr(method, "__func__", None) is not _METHODS[name] and not _accepts_arguments(method, arguments):
             yield f'"{name}" does not take the arguments ({", ".join(arguments)})'
 
 
@@ -87,7 +89,7 @@ def _misnamed_method_hint(candidate: Any, name: str) -> str:
     return f', but "{similar[0]}"' if similar else ""
 
 
-def _accepts_arguments(method: Any, arguments: list[str]) -> bool:
+def _accepts_arguments(method: Any, arguments: Sequence[str]) -> bool:
     try:
         inspect.signature(method).bind(*arguments)
     except TypeError:

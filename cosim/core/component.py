@@ -19,6 +19,7 @@ import ctypes
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import product
 from types import MappingProxyType
 from typing import Any, Literal, NamedTuple, Protocol
@@ -100,8 +101,13 @@ class Variable:
         """Names of the elements: the name of a scalar, else "name[1]", "name[2]" or "name[1,2]"."""
         if not self.shape:
             return (self.name,)
-        indices = product(*(range(1, n + 1) for n in self.shape))
-        return tuple(f"{self.name}[{','.join(map(str, index))}]" for index in indices)
+        return tuple([self.name + subscript for subscript in _subscripts(self.shape)])
+
+
+@lru_cache(16)
+def _subscripts(shape: tuple[int, ...]) -> Sequence[str]:
+    """Return "[1]", "[2]" or "[1,2]" for each element of an array."""
+    return [f"[{','.join(map(str, index))}]" for index in product(*(range(1, n + 1) for n in shape))]
 
 
 def count_scalars(variables: Iterable[Variable]) -> int:

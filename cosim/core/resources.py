@@ -3,14 +3,17 @@
 from __future__ import annotations
 
 import os
+from functools import cache
 from pathlib import Path
 
 
+@cache
 def package_folder() -> Path:
     """Return the folder of the installed package `cosim`."""
     return Path(__file__).resolve().parents[1]
 
 
+@cache
 def root() -> Path:
     """Return the folder of scenarios, FMUs, plant and controller sources: the installed bundle, else the checkout."""
     bundle = package_folder() / "_bundle"

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import copy
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, field
@@ -12,6 +11,7 @@ from typing import Any
 from ..components.python_import import package_files
 from ..core import paths
 from ..core.errors import InputError, Problem
+from ..core.json_values import copy_json
 from ..core.size_limits import MAX_LEVELS
 from ..core.text import shorten
 from . import json_pointer
@@ -110,7 +110,7 @@ class Scenario:
 
     def expanded(self) -> dict[str, Any]:
         """Return the scenario as one JSON object without "extends", with the values of the caller and absolute paths."""
-        value: dict[str, Any] = copy.deepcopy(self.root.document.value)
+        value: dict[str, Any] = copy_json(self.root.document.value)
         for name, setting in self.assignments.items():
             component, _, variable = name.partition(".")
             parameters = value["components"][component].setdefault("parameters", {})
@@ -185,7 +185,7 @@ def _find_seed_problems(document: Document, spec: SystemSpec) -> Iterator[Proble
             yield Problem(
                 f'expected a JSON pointer, which begins with "/"; found "{shorten(pointer)}"', document.where(("seeds", i))
             )
-        elif problem := json_pointer.set_value(copy.deepcopy(document.value), pointer, 0):
+        elif problem := json_pointer.set_value(copy_json(document.value), pointer, 0):
             yield Problem(problem, document.where(("seeds", i)))
 
 

@@ -5,7 +5,6 @@ Invalid parts are reported and removed, so that the rest can be read.
 
 from __future__ import annotations
 
-import copy
 import json
 import types
 import typing
@@ -16,6 +15,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 from pydantic import BaseModel, ValidationError
 
 from ..core.errors import Problem, did_you_mean
+from ..core.json_values import copy_json
 from ..core.text import REPLACEMENT, count_noun
 from .json_document import Document
 from .schema import SystemSpec
@@ -42,7 +42,7 @@ class Validated(NamedTuple, Generic[S]):
 
 def validate_document(document: Document, kind: type[S]) -> Validated[S]:
     """Convert a document to a specification of the class `kind`; parts that are invalid are reported and removed."""
-    value, problems = copy.deepcopy(document.value), list(document.problems)
+    value, problems = copy_json(document.value), list(document.problems)
     if not isinstance(value, dict):
         if () not in document.invalid_paths:
             problems.append(Problem(f"expected an object, found {_shorten_json(value)}", document.where(())))
@@ -198,7 +198,7 @@ def _replace_invalid(kind: Any, value: Any, path: Sequence[str | int]) -> None:
         value, kind = value[key], _child_type(kind, key)
     last = path[-1]
     if value is root and last in _PLACEHOLDERS:
-        value[last] = copy.deepcopy(_PLACEHOLDERS[str(last)])
+        value[last] = copy_json(_PLACEHOLDERS[str(last)])
     elif isinstance(value, dict):
         value.pop(last, None)
     elif isinstance(value, list) and last in range(len(value)):

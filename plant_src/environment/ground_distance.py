@@ -9,7 +9,7 @@ edge.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from typing import TYPE_CHECKING, Any, NamedTuple
 
 from .sea import Sea
@@ -57,9 +57,30 @@ class DeckSurface:
         return Surface(outputs[c + 2] + dz, share) if share > 0 else None
 
 
+class PlatformSurface:
+    """The top of a platform."""
+
+    def __init__(self, platform: Platform):
+        self._x, self._y, z = platform.position
+        edge_x, edge_y, edge_z = platform.size
+        self._half_x, self._half_y, self._height = edge_x / 2, edge_y / 2, z + edge_z / 2
+
+    def below(self, x: float, y: float, radius: float) -> Surface | None:
+        """Return the plane of the top, or None if a disc of this radius (m) around (x, y) is beside the platform."""
+        share = _share_of_strip(self._half_x, x - self._x, radius)
+        if share:
+            share *= _share_of_strip(self._half_y, y - self._y, radius)
+        return Surface(self._height, share) if share else None
+
+
 def _share_of_strip(half_width: float, position: float, radius: float) -> float:
     """Return the share of a disc at a position (m) above a strip around 0."""
-    return max(_share_of_half_plane(half_width - position, radius) + _share_of_half_plane(half_width + position, radius) - 1, 0.0)
+    near, far = half_width - abs(position), half_width + abs(position)
+    if near >= radius:
+        return 1.0
+    if near <= -radius:
+        return 0.0
+    return max(_share_of_half_plane(near, radius) + _share_of_half_plane(far, radius) - 1, 0.0)
 
 
 def _share_of_half_plane(distance: float, radius: float) -> float:
@@ -74,8 +95,8 @@ class GroundDistance:
     """Distances from points to the highest surface vertically below them."""
 
     def __init__(self, vessels: Sequence[ContactBody], platforms: Sequence[Platform], sea: Sea):
-        self._decks = [DeckSurface(vessel) for vessel in vessels]
-        self._platforms = [(platform.position, platform.size) for platform in platforms]
+        decks, tops = [DeckSurface(vessel) for vessel in vessels], [PlatformSurface(platform) for platform in platforms]
+        self._surfaces_below = [surface.below for surface in (*decks, *tops)]
         self._elevation = sea.elevation_function() if len(sea.amplitude) else None
 
     def distance_and_share(
@@ -100,16 +121,8 @@ class GroundDistance:
     def _solid_surface(self, x: float, y: float, z: float, radius: float) -> Surface | None:
         """Return the highest deck or platform below a disc that is not above its centre."""
         highest: Surface | None = None
-        for surface in self._solid_surfaces(x, y, radius):
-            if surface.height <= z and (highest is None or surface.height > highest.height):
+        for surface_below in self._surfaces_below:
+            surface = surface_below(x, y, radius)
+            if surface and surface.height <= z and (highest is None or surface.height > highest.height):
                 highest = surface
         return highest
-
-    def _solid_surfaces(self, x: float, y: float, radius: float) -> Iterator[Surface]:
-        for deck in self._decks:
-            if surface := deck.below(x, y, radius):
-                yield surface
-        for (px, py, pz), (ex, ey, ez) in self._platforms:
-            share = _share_of_strip(ex / 2, x - px, radius) * _share_of_strip(ey / 2, y - py, radius)
-            if share > 0:
-                yield Surface(pz + ez / 2, share)

@@ -28,9 +28,9 @@ from zipfile import BadZipFile, ZipFile
 from peer_comparison import last_line, write_into
 from virtual_environments import environment, versions
 
+from cosim.export.foreign.windows_fmus import find_wine, prepare_wine
+
 DRIVERS = Path(__file__).parent / "peers"
-#: wall time (s) after which an importer has failed
-TIME_LIMIT = 60.0
 #: other importers: name -> driver and requirements
 PEERS: Mapping[str, tuple[str, Sequence[str]]] = {
     "FMPy": ("try_fmpy.py", ["fmpy"]),
@@ -102,8 +102,8 @@ def _binary(names: Sequence[str]) -> str:
     return "+".join([*(["sources"] if sources else []), *sorted(platforms)]) or "none"
 
 
-def attempt(command: Sequence[str | Path]) -> Attempt:
-    """Run an importer in a process group and a temporary folder of its own."""
+def attempt(command: Sequence[str | Path], time_limit: float) -> Attempt:
+    """Run an importer in a process group and a temporary folder of its own; it fails after `time_limit` (s, wall time)."""
     with tempfile.TemporaryDirectory() as folder:
         process = subprocess.Popen(
             [*map(str, command)],
@@ -115,11 +115,11 @@ def attempt(command: Sequence[str | Path]) -> Attempt:
             start_new_session=True,
         )
         try:
-            _, messages = process.communicate(timeout=TIME_LIMIT)
+            _, messages = process.communicate(timeout=time_limit)
         except subprocess.TimeoutExpired:
             os.killpg(process.pid, signal.SIGKILL)
             process.communicate()
-            return Attempt(False, f"exceeded {TIME_LIMIT:g} s")
+            return Attempt(False, f"exceeded {time_limit:g} s")
     if process.returncode < 0:
         return Attempt(False, f"{signal.Signals(-process.returncode).name}")
     return Attempt(process.returncode == 0, last_line(messages))
@@ -158,25 +158,29 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--environments", type=Path, default=Path.home() / ".cache/cosim-peers")
     parser.add_argument("--only", nargs="*", default=list(PEERS), metavar="NAME", help=f"of {', '.join(PEERS)}")
+    parser.add_argument("--time-limit", type=float, default=60.0, metavar="SECONDS", help="for one FMU and one importer")
     parser.add_argument("--document", type=Path)
     parser.add_argument("--json", type=Path, help="file for all outcomes; if it exists, those of the other importers are kept")
     arguments = parser.parse_args()
     pythons = {name: environment(arguments.environments / PEERS[name][1][0], PEERS[name][1]) for name in arguments.only}
     known = json.loads(arguments.json.read_text()) if arguments.json and arguments.json.exists() else {}
     rows: list[tuple[Subject, dict[str, Attempt]]] = []
+    if find_wine():
+        prepare_wine()  # the first use takes a minute or two
     for path in sorted(arguments.folder.rglob("*.fmu")):
         subject = read_subject(path.resolve(), arguments.folder.resolve())
         earlier = {name: Attempt(*known[subject.label][name]) for name in pythons if name in known.get(subject.label, {})}
         commands = importer_commands(subject, pythons)
-        attempts = {name: earlier.get(name) or attempt(command) for name, command in commands.items()}
+        attempts = {name: earlier.get(name) or attempt(command, arguments.time_limit) for name, command in commands.items()}
         rows.append((subject, attempts))
         print(
             subject.label, *("+" if a.reached_end else "-" for a in attempts.values()), attempts["cosim"].reason[:150], flush=True
         )
+        if arguments.json:
+            known[subject.label] = _as_json(subject, attempts)
+            arguments.json.write_text(json.dumps(known, indent=1))
     label = ", ".join(versions(python, [PEERS[name][1][0]]) for name, python in pythons.items())
     text = "\n".join([*summary(rows), "", *table(rows), "", f"Measured beside {label}."])
-    if arguments.json:
-        arguments.json.write_text(json.dumps({s.label: _as_json(s, attempts) for s, attempts in rows}, indent=1))
     if arguments.document:
         write_into(arguments.document, text, "fmus")
 

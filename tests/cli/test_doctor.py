@@ -11,6 +11,7 @@ from importlib import metadata
 from importlib.util import find_spec
 
 import pytest
+from cosim_command import run_cosim
 
 from cosim.engine import native_available as native_available
 
@@ -24,6 +25,9 @@ Requires-Dist: no-such-feathers>=2; extra == "wings"
 
 
 def doctor(*options, **environment):
+    """Run the command; PYTHONPATH needs a new interpreter."""
+    if "PYTHONPATH" not in environment:
+        return run_cosim("doctor", *options, cwd="/", env=environment)
     command = [sys.executable, "-m", "cosim", "doctor", *options]
     return subprocess.run(command, capture_output=True, text=True, check=False, cwd="/", env={**os.environ, **environment})
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import multiprocessing
 import shutil
 from hashlib import sha256
 from pathlib import Path
@@ -12,6 +13,7 @@ from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 
 from cosim.core.errors import InputError
+from cosim.export import behaviour
 from cosim.export.build import build, build_to, cached_fmu, read_manifest
 from cosim.export.build_check import check_fmus
 from cosim.export.sources import classify_source, find_sources, snake_case, tool_version
@@ -107,6 +109,13 @@ def root(built_once, tmp_path):
     return Path(shutil.copytree(built_once, tmp_path / "root"))
 
 
+@pytest.fixture
+def forked(monkeypatch):
+    """Simulate FMUs in forked processes, which start faster than new ones."""
+    context = multiprocessing.get_context("fork")
+    monkeypatch.setattr(behaviour.multiprocessing, "get_context", lambda _kind: context)
+
+
 def messages(root):
     return [str(problem) for problem in check_fmus(root)]
 
@@ -173,6 +182,7 @@ def test_a_fresh_build_passes_the_check(built_once):
     assert check_fmus(built_once) == []
 
 
+@pytest.mark.usefixtures("forked")
 def test_the_check_finds_a_changed_source(root):
     write(root, {f"{VEHICLE}/parameters.py": "GAIN = 1.0  # a remark\n", "controllers/python/doubler.py": CLASS + "\n"})
     assert messages(root) == [
@@ -201,6 +211,7 @@ def test_the_check_finds_an_fmu_without_source_and_a_source_without_fmu(root):
     ]
 
 
+@pytest.mark.usefixtures("forked")
 def test_the_check_finds_changed_behaviour_despite_equal_hashes(root):
     """model.c is not listed as a source here, so that only a simulation of both FMUs shows the difference."""
     write(root, {f"{VEHICLE}/model.c": MODEL.replace("m->x * h", "m->x * h * (m->gain == 1.0 ? 1.0 : 1.000001)")})
@@ -209,11 +220,13 @@ def test_the_check_finds_changed_behaviour_despite_equal_hashes(root):
     assert all('differs from a rebuild: output "y" differs at t = ' in text for text in found)
 
 
+@pytest.mark.usefixtures("forked")
 def test_the_check_tolerates_rounding(root):
     write(root, {f"{VEHICLE}/model.c": MODEL.replace("m->x * h", "m->x * (h * (1 + 1e-13))")})
     assert messages(root) == []
 
 
+@pytest.mark.usefixtures("forked")
 def test_the_check_finds_changed_variables(root):
     equations = EQUATIONS.replace('"continuous", 0.0', '"continuous", 0.5')
     write(root, {f"{VEHICLE}/equations.py": equations})
@@ -230,6 +243,7 @@ def test_the_check_reports_an_fmu_that_crashes(root):
     )
 
 
+@pytest.mark.usefixtures("forked")
 def test_the_check_reports_a_source_that_can_no_longer_be_built(root):
     write(root, {f"{VEHICLE}/model.c": MODEL.replace("m->gain * m->x", "m->gian")})
     (message,) = messages(root)

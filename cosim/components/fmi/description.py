@@ -200,8 +200,8 @@ def build_description(path: Path, examination: Examination, interface: Interface
         selected == "model-exchange" or attributes.get("canHandleVariableCommunicationStepSize") in _TRUE,
         attributes.get("canBeInstantiatedOnlyOncePerProcess") in _TRUE,
         attributes.get("needsExecutionTool") in _TRUE,
-        _count_states(model),
-        int(model.root.get("numberOfEventIndicators", 0)),
+        _count_states(model, selected),
+        int(model.root.get("numberOfEventIndicators", 0)) if selected == "model-exchange" and model.major < 3 else 0,
         _needs_completed_step(model.major, attributes),
         list_platforms(examination.members),
         [name for name in model.log_categories if name in _ERROR_CATEGORIES],
@@ -333,9 +333,9 @@ def _build_default_experiment(experiment: Mapping[str, str]) -> DefaultExperimen
     return DefaultExperiment(start, stop, positive_step, float(tolerance) if tolerance and tolerance > 0 else None)
 
 
-def _count_states(model: ModelDescription) -> int:
+def _count_states(model: ModelDescription, interface: str) -> int:
     if model.major == 1:
-        return int(model.root.get("numberOfContinuousStates", 0))
+        return int(model.root.get("numberOfContinuousStates", 0)) if interface == "model-exchange" else 0
     return sum(unknown.element == "ContinuousStateDerivative" for unknown in model.model_structure)
 
 

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Sequence
+from contextlib import suppress
 from typing import Any
 
 import numpy as np
@@ -51,7 +52,8 @@ class Fmi1Instance(FmuInstance):
         self._log_key = log_callback.register(callbacks, self.name, self.log_message)
         callbacks.allocateMemory = fmi1.fmi1CallbackAllocateMemoryTYPE(calloc)
         callbacks.freeMemory = fmi1.fmi1CallbackFreeMemoryTYPE(free)
-        self._fmu.instantiate(functions=callbacks, loggingOn=logging_on)
+        with suppress(Exception):  # FMPy's exception of a null pointer has no reason
+            self._fmu.instantiate(functions=callbacks, loggingOn=logging_on)
         if not self._fmu.component:
             raise self._instantiation_error()
 

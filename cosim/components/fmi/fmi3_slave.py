@@ -7,12 +7,15 @@ import math
 from collections.abc import Sequence
 from typing import Any, NamedTuple
 
+from ...core import component_log
 from ...core.component import PreparedCall, StepResult
 from ...core.errors import ComponentError
 from ...process.journal import calling_component
 from .event_mode import MAX_EVENTS_PER_STEP, EventModeInstance
+from .file import FmuFile
 from .fmi3 import STEP_FLAGS_CHECK, Fmi3Instance
 from .function_calls import OK, WARNING
+from .instance_settings import InstanceSettings
 
 #: relative to the step: a lastSuccessfulTime so close to its end has reached it
 _TIME_TOLERANCE = 1e-9
@@ -33,23 +36,44 @@ class Fmi3Slave(EventModeInstance, Fmi3Instance):
 
     _update_method, _continue_method = "updateDiscreteStates", "enterStepMode"
 
+    def __init__(self, file: FmuFile, instance_name: str, settings: InstanceSettings):
+        """Create the component; see `create_component`.
+
+        Raises:
+            InputError: The FMU has errors or no usable binary for this platform.
+        """
+        super().__init__(file, instance_name, settings)
+        self._uses_event_mode, self._may_return_early = self.description.has_event_mode, self.description.may_return_early
+
     def _instantiation_options(self) -> dict[str, bool]:
-        return {"eventModeUsed": self.description.has_event_mode, "earlyReturnAllowed": self.description.may_return_early}
+        return {"eventModeUsed": self._uses_event_mode, "earlyReturnAllowed": self._may_return_early}
+
+    def _instantiate_fmu(self, logging_on: bool) -> None:
+        """Call fmi3InstantiateCoSimulation, again without Event Mode and early return if the FMU refuses what it declares."""
+        try:
+            super()._instantiate_fmu(logging_on)
+        except ComponentError:
+            if not (self._uses_event_mode or self._may_return_early):
+                raise
+            self._uses_event_mode = self._may_return_early = False
+            super()._instantiate_fmu(logging_on)
+            text = "declares hasEventMode or mightReturnEarlyFromDoStep, but could only be instantiated without them"
+            component_log.log_message(self.name, component_log.WARNING, text)
 
     @property
     def _is_stepping(self) -> bool:
-        return self.description.has_event_mode and self._deadline_name == "step"
+        return self._uses_event_mode and self._deadline_name == "step"
 
     def exit_initialization_mode(self) -> None:
         """Call fmi3ExitInitializationMode, and iterate the initial event if the FMU has Event Mode."""
         super().exit_initialization_mode()
-        if self.description.has_event_mode:
+        if self._uses_event_mode:
             self._iterate_initial_event()
 
     def prepare_step_calls(self, current_time: ctypes.c_double, step_size: float) -> Sequence[PreparedCall]:
         """Prepare the calls that set the inputs, make one step from `current_time` (s) and get the outputs."""
         calls = super().prepare_step_calls(current_time, step_size)
-        if not (self.description.has_event_mode and self._discrete_calls):
+        if not (self._uses_event_mode and self._discrete_calls):
             return calls
         return [PreparedCall(self._apply_inputs, (), "inputs"), *calls[len(self._set_calls) :]]
 
@@ -71,20 +95,29 @@ class Fmi3Slave(EventModeInstance, Fmi3Instance):
         end = start + self._step_size
         for _ in range(MAX_EVENTS_PER_STEP):
             reached, event_needed, terminate = self._step_result(begin)
-            if event_needed and self.description.has_event_mode and not terminate:
+            if event_needed and self._uses_event_mode and not terminate:
                 self._handle_event()
                 terminate = self._terminates
-            elif reached <= begin and self.description.may_return_early and not terminate:
+            elif reached <= begin and self._may_return_early and not terminate:
                 raise ComponentError(self.name, "fmi3DoStep", f"returned early at t = {reached!r} s without an event", start)
             if terminate or reached >= end - _TIME_TOLERANCE * self._step_size:
                 return StepResult(end if not terminate and reached < end else reached, event_needed, terminate)
-            if not self.description.may_return_early:
+            if not self._may_return_early and not self._accept_early_return(event_needed):
                 return StepResult(reached, event_needed, terminate)  # an error, which the caller reports
             begin = reached
             if not self._continue_step(begin, end - begin):
                 return StepResult(end)
         reason = f"more than {MAX_EVENTS_PER_STEP} events in one communication step, the last one at t = {begin:.12g} s"
         raise ComponentError(self.name, "fmi3DoStep", reason, start)
+
+    def _accept_early_return(self, event_needed: bool) -> bool:
+        """Return whether a step that ended early, which the FMU does not declare, ended at an event that was handled."""
+        if not (event_needed and self._uses_event_mode):
+            return False
+        self._may_return_early = True
+        text = "returned early from fmi3DoStep at an event, without declaring mightReturnEarlyFromDoStep"
+        component_log.log_message(self.name, component_log.WARNING, text)
+        return True
 
     def _continue_step(self, begin: float, duration: float) -> bool:
         """Call fmi3DoStep for the rest of a step (s), and return whether it has set a flag."""

@@ -36,7 +36,9 @@ _PRELOADED_MODULES = (
     "fmpy.fmi1",
     "fmpy.fmi2",
     "fmpy.fmi3",
+    "cosim.components.conformance",
     "cosim.components.fmi.isolated.isolated_fmu",
+    "cosim.components.python_class",
     "cosim.engine.native_executor",
     "numpy.random",
 )

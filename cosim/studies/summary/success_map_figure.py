@@ -52,19 +52,27 @@ def _build_figure(map_: SuccessMap, link: CellLink) -> Figure:
     figure = Figure(figsize=(size[0], size[1]), layout="constrained")
     cast(Any, figure.get_layout_engine()).set(w_pad=GAP / 2, h_pad=GAP / 2, wspace=0, hspace=0)
     grid = figure.subplots(len(rows), len(columns), sharex=True, sharey=True, squeeze=False)
-    for (i, row), (j, column) in product(enumerate(rows), enumerate(columns)):
-        _draw_panel(grid[i][j], layout, row, column, link)
+    for axes in grid.flat:
+        _prepare_panel(axes, layout)
     x_title = _annotate(figure, grid, layout)
     _draw_colour_bar(figure, grid, layout)
     _resize_to_panels(figure, grid, layout)
     x_title.set_x((grid[0, 0].get_position().x0 + grid[0, -1].get_position().x1) / 2)
+    # cells do not change the layout, and each layout draws everything
+    for (i, row), (j, column) in product(enumerate(rows), enumerate(columns)):
+        _draw_cells(grid[i][j], layout, row, column, link)
     return figure
 
 
-def _draw_panel(axes: Axes, layout: MapLayout, row: Any, column: Any, link: CellLink) -> None:
+def _draw_cells(axes: Axes, layout: MapLayout, row: Any, column: Any, link: CellLink) -> None:
     _, _, ys, xs = layout.levels
     for (j, y), (i, x) in product(enumerate(ys), enumerate(xs)):
         _draw_cell(axes, i, j, layout.map_.cell(row, column, y, x), layout.cell, link)
+
+
+def _prepare_panel(axes: Axes, layout: MapLayout) -> None:
+    """Set limits, ticks and style of a panel."""
+    _, _, ys, xs = layout.levels
     axes.set(xlim=(-0.5, len(xs) - 0.5), ylim=(-0.5, len(ys) - 0.5))
     axes.set_xticks(list(layout.x_ticks), layout.x_ticks.values(), rotation=90 if layout.rotate_x_labels else 0)
     axes.set_yticks(list(layout.y_ticks), layout.y_ticks.values())

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import math
 from fractions import Fraction
 
@@ -12,6 +13,7 @@ from systems import endpoint, make_system, run_system
 
 from cosim.components.fmi import FmuFile, InstanceSettings, Isolation, SolverSettings, create_component, fmi3_slave
 from cosim.core.component import Variable
+from cosim.core.errors import ComponentError
 from cosim.core.system import Connection, Group, Iteration, System
 from cosim.engine.run_loop import simulate
 from cosim.engine.settings import Event, Settings
@@ -77,6 +79,38 @@ def test_discrete_inputs_are_set_in_event_mode_when_they_change(bounces, flags, 
         assert columns["bounce.events"][-1] == own + 5
     else:
         assert columns["bounce.i_out"][-1] == 40
+
+
+@pytest.mark.parametrize("isolation", [None, Isolation()], ids=["here", "isolated"])
+@pytest.mark.parametrize("flags", ["event mode", "early return", "both"])
+def test_an_fmu_that_refuses_what_it_declares_runs_without_it(bounces, flags, isolation, caplog):
+    component = create_component(FmuFile(bounces[flags]), "refusing", isolation=isolation)
+    signals = [name.replace("bounce", "refusing") for name in SIGNALS]
+    with caplog.at_level(logging.WARNING, "cosim"):
+        columns = run_system(make_system({"refusing": component}), 1, "1/16", [*signals, "refusing.events"]).columns
+    rows, _ = own_results(16, 64)
+    assert [list(row) for row in zip(*(columns[name].tolist() for name in signals), strict=True)] == rows
+    assert columns["refusing.events"][-1] == 0
+    assert caplog.text.count("could only be instantiated without them") == 1
+
+
+@pytest.mark.parametrize("isolation", [None, Isolation()], ids=["here", "isolated"])
+def test_an_early_return_that_is_not_declared_is_continued_after_its_event(bounces, isolation, caplog):
+    component = create_component(FmuFile(bounces["event mode"]), "undeclared", isolation=isolation)
+    signals = [name.replace("bounce", "undeclared") for name in SIGNALS]
+    with caplog.at_level(logging.WARNING, "cosim"):
+        columns = run_system(make_system({"undeclared": component}), 1, "1/16", [*signals, "undeclared.events"]).columns
+    rows, events = own_results(16, 64)
+    assert [list(row) for row in zip(*(columns[name].tolist() for name in signals), strict=True)] == rows
+    assert columns["undeclared.events"][-1] == events
+    assert caplog.text.count("without declaring mightReturnEarlyFromDoStep") == 1
+
+
+@pytest.mark.parametrize("flags", FLAGS)
+def test_an_fmu_that_cannot_be_instantiated_gives_its_reason(bounces, flags):
+    component = create_component(FmuFile(bounces[flags]), "impossible")
+    with pytest.raises(ComponentError, match=r"^impossible: fmi3InstantiateCoSimulation failed: this is not supported$"):
+        run_system(make_system({"impossible": component}), 1, "1/16", ["impossible.x"])
 
 
 @pytest.mark.parametrize("flags", ["event mode", "both"])

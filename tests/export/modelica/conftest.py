@@ -11,10 +11,12 @@ from typing import Any
 
 import numpy as np
 import pytest
+from frontend_server import run_forked
 
 from cosim.export.fmu.block import Block, BlockVariable
-from cosim.export.modelica import load_block, load_interpreter
+from cosim.export.modelica import assemble, load_block, load_interpreter
 from cosim.export.modelica.causality.interpreter import Interpreter
+from cosim.export.modelica.frontend import rumoca_client
 
 CTYPES = {"Float64": ctypes.c_double, "Int32": ctypes.c_int32, "Enumeration": ctypes.c_int32, "Boolean": ctypes.c_bool}
 GCC = [
@@ -157,6 +159,13 @@ def _random(rng: np.random.Generator, variable: BlockVariable, scale: float) -> 
     return rng.uniform(-scale if low is None else low, scale if high is None else high, variable.shape or None)
 
 
+@pytest.fixture(autouse=True)
+def forked_front_end(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fork front ends from a process that has imported rumoca, except in the tests of their processes."""
+    if request.path.stem != "test_frontend_process":
+        monkeypatch.setattr(rumoca_client, "_run_process", run_forked)
+
+
 @pytest.fixture
 def write_model(tmp_path: Path) -> Callable[[str], Path]:
     """Return a function that writes Modelica text to a file with the name of its last class."""
@@ -170,8 +179,13 @@ def write_model(tmp_path: Path) -> Callable[[str], Path]:
 
 
 @pytest.fixture
-def compile_both(tmp_path: Path, write_model: Callable[[str], Path]) -> Callable[..., CompiledAndInterpreted]:
-    """Return a function that compiles and interprets a model, given as text or as a file."""
+def compile_both(
+    tmp_path: Path, write_model: Callable[[str], Path], monkeypatch: pytest.MonkeyPatch
+) -> Callable[..., CompiledAndInterpreted]:
+    """Return a function that compiles and interprets a model, given as text or as a file.
+
+    The front end, which takes most of the time, runs once for both.
+    """
 
     if shutil.which("gcc") is None:
         pytest.skip("needs gcc")
@@ -180,6 +194,9 @@ def compile_both(tmp_path: Path, write_model: Callable[[str], Path]) -> Callable
         path = write_model(source) if isinstance(source, str) else source
         folder = tmp_path / "c" / path.stem
         folder.mkdir(parents=True)
-        return CompiledAndInterpreted(CompiledBlock(load_block(path, model), folder), load_interpreter(path, model))
+        with monkeypatch.context() as patch:
+            flat = assemble.flatten_model(path, model)
+            patch.setattr(assemble, "flatten_model", lambda *_arguments: flat)
+            return CompiledAndInterpreted(CompiledBlock(load_block(path, model), folder), load_interpreter(path, model))
 
     return open_model

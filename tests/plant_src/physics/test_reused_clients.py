@@ -13,7 +13,7 @@ from plant_src.replica.world import World as Replica
 
 @pytest.fixture(autouse=True)
 def only_new_clients(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(client, "_empty_clients", [])
+    monkeypatch.setattr(client, "_spare_clients", [])
 
 
 def landing() -> bytes:
@@ -42,14 +42,14 @@ def leave_bodies_in_contact_and_saved_states() -> None:
 @pytest.mark.parametrize("leave", [landing, leave_replica_with_gravity_and_small_steps, leave_bodies_in_contact_and_saved_states])
 def test_a_landing_in_a_used_client_has_the_bytes_of_one_in_a_new_client(leave: Callable[[], object]) -> None:
     in_new_client = landing()
-    client._empty_clients.clear()
+    client._spare_clients.clear()
     leave()
-    (kept,) = client._empty_clients
+    (kept,) = client._spare_clients
     assert landing() == in_new_client
-    assert client._empty_clients == [kept]
+    assert client._spare_clients == [kept]
 
 
-def test_one_empty_client_is_kept_and_the_others_are_disconnected() -> None:
+def test_one_client_is_kept_and_the_others_are_disconnected() -> None:
     worlds = [WorldHarness({"uav": quadcopter_settings([0.0, 0.0, 5.0])}).world for _ in range(3)]
     numbers = [world._client for world in worlds]
     assert len(set(numbers)) == 3
@@ -62,4 +62,4 @@ def test_a_world_that_is_freed_twice_releases_its_client_once() -> None:
     world = WorldHarness({"uav": quadcopter_settings([0.0, 0.0, 5.0])}).world
     world.free()
     world.free()
-    assert len(client._empty_clients) == 1
+    assert len(client._spare_clients) == 1

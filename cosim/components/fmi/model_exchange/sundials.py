@@ -5,8 +5,10 @@ FMPy's own wrapper passes over internal steps, leaves memory behind, and prints 
 
 from __future__ import annotations
 
-from collections.abc import Callable
-from contextlib import ExitStack
+import os
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
 from ctypes import CFUNCTYPE, POINTER, byref, c_char_p, c_double, c_int, c_int64, c_void_p
 from typing import Any
 
@@ -65,7 +67,7 @@ class Cvode:
         self._core, self._cvode = sundials_core, sundials_cvode
 
     def _function(self, name: str, result: Any, *arguments: Any) -> Any:
-        function: Any = (self._core if name.startswith("SUNContext") else self._cvode)[name]
+        function: Any = (self._core if name.startswith(("SUNContext", "SUNLogger")) else self._cvode)[name]
         function.restype, function.argtypes = result, arguments
         return function
 
@@ -75,6 +77,9 @@ class Cvode:
         self._free.callback(self._function("SUNContext_Free", c_int, POINTER(c_void_p)), byref(context))
         self._function("SUNContext_ClearErrHandlers", c_int, c_void_p)(context)
         self._function("SUNContext_PushErrHandler", c_int, c_void_p, _ERROR_HANDLER, c_void_p)(context, self._callbacks[2], None)
+        logger = c_void_p()
+        self._function("SUNContext_GetLogger", c_int, c_void_p, POINTER(c_void_p))(context, byref(logger))
+        self._function("SUNLogger_SetWarningFilename", c_int, c_void_p, c_char_p)(logger, os.devnull.encode())
         make_vector = self._function("N_VMake_Serial", c_void_p, c_int64, c_void_p, c_void_p)
         self._x = self._owned(make_vector(size, self._states.ctypes.data, context), "N_VDestroy_Serial")
         self._tolerances = self._owned(make_vector(size, self._absolute_tolerances.ctypes.data, context), "N_VDestroy_Serial")
@@ -123,13 +128,27 @@ class Cvode:
 
         Raises:
             SolverError: The step failed.
+            BaseException: An evaluation raised this exception, or a signal arrived during it.
         """
         self._message = ""
         self._set_stop_time(self._memory, stop_time)
-        flag = self._run(self._memory, stop_time, self._x, byref(self._time), _ONE_STEP)
+        with self._raising_exceptions_of_callbacks():
+            flag = self._run(self._memory, stop_time, self._x, byref(self._time), _ONE_STEP)
         if flag < 0:
             raise SolverError(self._message)
         return flag, self._time.value
+
+    @contextmanager
+    def _raising_exceptions_of_callbacks(self) -> Iterator[None]:
+        """Raise the first exception of a callback after the block, where ctypes would print it and continue."""
+        hook, exceptions = sys.unraisablehook, []
+        sys.unraisablehook = lambda failure: exceptions.append(failure.exc_value)
+        try:
+            yield
+        finally:
+            sys.unraisablehook = hook
+        if exceptions:
+            raise exceptions[0] or SolverError("a callback failed")
 
     def close(self) -> None:
         """Free the memory of the solver."""

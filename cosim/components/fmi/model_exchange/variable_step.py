@@ -17,6 +17,8 @@ from .sundials import FAILED, RECOVERABLE, ROOT_FOUND, Cvode, SolverError
 
 #: intervals shorter than this number of units in the last place of the time are not integrated
 _MIN_ULPS = 16
+#: largest number of consecutive internal steps that do not change the time
+_MAX_STALLED_STEPS = 100
 
 
 class VariableStepIntegrator(Integrator):
@@ -34,7 +36,7 @@ class VariableStepIntegrator(Integrator):
         """
         self._model, self._tolerance = model, tolerance
         self._time, self._next_event_time, self._must_restart = 0.0, math.inf, True
-        self._event = StepEvent(EventKind(0), 0.0)
+        self._event, self._stalled_steps = StepEvent(EventKind(0), 0.0), 0
         self._failure: IntegrationError | None = None
         #: a model without states gets one that is constant, because CVODE needs one
         self._states = model.states if len(model.states) else np.zeros(1)
@@ -141,7 +143,10 @@ class VariableStepIntegrator(Integrator):
         return OK
 
     def _integrate_to(self, target: float) -> StepEvent:
-        """Make one step of the solver up to `target` (s) at most, and return its event, of kind 0 if there is none."""
+        """Make one step of the solver up to `target` (s) at most, and return its event, of kind 0 if there is none.
+
+        A `target` in the past is a time event that the FMU announces too late: it takes place at once.
+        """
         kind = EventKind(0)
         if target - self._time > _MIN_ULPS * math.ulp(target):
             if self._must_restart:
@@ -150,10 +155,9 @@ class VariableStepIntegrator(Integrator):
                 valid = np.where((nominals > 0) & np.isfinite(nominals), nominals, 1.0)  # some FMUs return 0
                 self._cvode.restart(self._time, self._tolerance, self._tolerance * valid)
                 self._must_restart = False
-            flag, self._time = self._cvode.step(target)
-            kind = EventKind.STATE if flag == ROOT_FOUND else kind
+            kind = EventKind.STATE if self._step_of_solver(target) == ROOT_FOUND else kind
         else:
-            self._time = target
+            self._time = max(self._time, target)
         self._model.set_time(self._time)
         self._model.set_states()
         completion = self._model.complete_step()
@@ -161,6 +165,15 @@ class VariableStepIntegrator(Integrator):
         kind |= EventKind.TERMINATION if completion.terminate_requested else EventKind(0)
         kind |= EventKind.TIME if self._time >= self._next_event_time else EventKind(0)
         return StepEvent(kind, self._time)
+
+    def _step_of_solver(self, target: float) -> int:
+        """Make one internal step of CVODE and return its result; many steps without progress are an error."""
+        flag, time = self._cvode.step(target)
+        self._stalled_steps = self._stalled_steps + 1 if time == self._time else 0
+        if self._stalled_steps > _MAX_STALLED_STEPS:
+            raise SolverError(f"{_MAX_STALLED_STEPS} internal steps without progress; a derivative may be infinite")
+        self._time = time
+        return flag
 
     def close(self) -> None:
         """Free the memory of the solver."""

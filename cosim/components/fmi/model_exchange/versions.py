@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from ....core.errors import ComponentError
+from ....core.size_limits import MAX_SCALARS
 from ..fmi1 import Fmi1Instance
 from ..fmi2 import Fmi2Instance
 from ..fmi3 import Fmi3Instance
@@ -76,4 +78,16 @@ class Fmi3Model(ModelExchangeInstance, Fmi3Instance):
         return model_class
 
     def _count_states(self) -> tuple[int, int]:
-        return self.call_function("getNumberOfContinuousStates"), self.call_function("getNumberOfEventIndicators")
+        return self._count("getNumberOfContinuousStates"), self._count("getNumberOfEventIndicators")
+
+    def _count(self, method: str) -> int:
+        """Return a number of the FMU.
+
+        Raises:
+            ComponentError: The call failed, or the number is too large.
+        """
+        found: int = self.call_function(method)
+        if found > MAX_SCALARS:
+            reason = f"found {found}, expected at most {MAX_SCALARS}"
+            raise ComponentError(self.name, self._full_name(method), reason, self._current_time.value)
+        return found

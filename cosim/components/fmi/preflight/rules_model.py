@@ -6,6 +6,7 @@ import math
 import re
 from collections.abc import Iterable, Iterator
 
+from ....core.size_limits import MAX_SCALARS
 from ....core.units import BASE_UNITS
 from .findings import DESCRIPTION_FILE, Finding, Rule
 from .model_description import ModelDescription, TypeDefinition, UnitDefinition
@@ -24,6 +25,7 @@ EMPTY_TOKEN = Rule("model.empty-token", _ROOT, "warning")
 INTERFACE = Rule("model.interface", _INTERFACE)
 LIBRARY_NAME = Rule("model.library-name", _INTERFACE)
 IDENTIFIER = Rule("model.identifier", _INTERFACE, "warning")
+COUNT = Rule("model.count", "FMI 1.0 ME section 3.1, FMI 2.0.5 section 2.2.1")
 UNIT_NAME = Rule("unit.unique", _UNITS)
 UNIT_BASE = Rule("unit.base", _UNITS)
 TYPE_NAME = Rule("type.unique", _TYPES)
@@ -109,6 +111,17 @@ def _item_violations(definition: TypeDefinition) -> Iterator[str]:
             yield f'the item "{name}" of enumeration "{definition.name}" is "{value}", expected an integer'
 
 
+def check_counts(model: ModelDescription) -> Iterator[Finding]:
+    """Check the numbers of states and event indicators that FMI 1.0 and 2.0 declare for Model Exchange."""
+    if "model-exchange" not in model.interfaces or model.major == 3:
+        return
+    for name in ("numberOfContinuousStates", "numberOfEventIndicators"):
+        text = model.root.get(name, "0")
+        if not (text.isascii() and text.isdecimal() and len(text) < 10 and int(text) <= MAX_SCALARS):
+            found = f'found {name}="{text}", expected an integer from 0 to {MAX_SCALARS}'
+            yield COUNT(found, DESCRIPTION_FILE, model.lines[""])
+
+
 def check_experiment(model: ModelDescription) -> Iterator[Finding]:
     """Check that the values of the default experiment are finite, and that stop time, step size and tolerance are consistent."""
     line = model.lines.get("DefaultExperiment", 0)
@@ -145,4 +158,4 @@ def _find_duplicates(names: Iterable[tuple[str, int]]) -> Iterator[tuple[str, in
         seen.add(name)
 
 
-CHECKS = (check_names, check_units, check_types, check_experiment, check_categories)
+CHECKS = (check_names, check_units, check_types, check_counts, check_experiment, check_categories)

@@ -55,7 +55,8 @@ def read_model(root: Any) -> ModelDescription:
         raise FatalFindingError(ROOT(f"found <{root.tag}>, expected <fmiModelDescription>", DESCRIPTION_FILE, root.sourceline))
     version = root.get("fmiVersion")
     if version is None or not _SUPPORTED_VERSION.fullmatch(version):
-        found = "lacks the attribute fmiVersion" if version is None else f"is an FMI {version} FMU"
+        pre_release = ", a pre-release, whose C functions differ" if version and "-" in version else ""
+        found = "lacks the attribute fmiVersion" if version is None else f"is an FMI {version} FMU{pre_release}"
         raise FatalFindingError(VERSION(f"{found}; FMI 1.0, 2.0 and 3.0 are supported", DESCRIPTION_FILE, root.sourceline))
     major = int(version[0])
     types = [_read_type(element, major) for element in root.iterfind("TypeDefinitions/*")]

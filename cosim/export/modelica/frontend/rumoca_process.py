@@ -27,6 +27,7 @@ def main(request: dict[str, Any]) -> None:
     for kind, name in limits.items():
         resource.setrlimit(kind, (request[name], request[name]))
     resource.setrlimit(resource.RLIMIT_CORE, (0, 0))
+    sys.modules["IPython"] = None  # type: ignore[assignment]  # rumoca would import it, which takes longer than a small model
     try:
         import rumoca
     except ImportError:
@@ -35,8 +36,10 @@ def main(request: dict[str, Any]) -> None:
     if rumoca.version() != request["version"]:
         _write({"version": rumoca.version()})
         return
-    errors = [error for file in request["files"] for error in _syntax_errors(rumoca, file)]
-    _write({"syntax_errors": errors} if errors else _flatten(rumoca, request))
+    answer = _flatten(rumoca, request)
+    # a file with a syntax error, and a package with such a file, cannot be loaded
+    errors = [each for file in request["files"] for each in _syntax_errors(rumoca, file)] if "error" in answer else []
+    _write({"syntax_errors": errors} if errors else answer)
 
 
 def _syntax_errors(rumoca: Any, file: str) -> list[tuple[str, int, str]]:

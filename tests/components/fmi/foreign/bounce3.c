@@ -1,5 +1,6 @@
 /* An FMI 3.0 Co-Simulation FMU with Event Mode and early return, written by hand: a lag, a bouncing ball and a counter, integrated
-   by Euler's method with steps of 1/1024 s. It refuses calls in a wrong mode.
+   by Euler's method with steps of 1/1024 s. It refuses calls in a wrong mode. An instance named "refusing" cannot be instantiated
+   with Event Mode or early return, one named "impossible" not at all. One named "undeclared" returns early in any case.
 
    Float64: 0 u (input), 1 x (x' = u - x), 2 h, 3 v
    Int32: 10 i_in (discrete input), 11 i_out = 10 i_in after events, 12 count (one more every 0.25 s), 13 events (number of calls of
@@ -49,10 +50,13 @@ fmi3Instance fmi3InstantiateCoSimulation(fmi3String name, fmi3String token, fmi3
                                          bool events, bool early, const fmi3ValueReference required[], size_t n,
                                          fmi3InstanceEnvironment environment, fmi3LogMessageCallback log,
                                          fmi3IntermediateUpdateCallback update) {
+    bool refused = !strcmp(name, "impossible") || (!strcmp(name, "refusing") && (events || early));
+    if (refused) log(environment, fmi3Error, "error", "this is not supported");
+    if (refused) return NULL;
     Model *m = calloc(1, sizeof(Model));
     m->f[X] = m->f[H] = 1;
     INTEGER(m, LAST_COUNT) = 1000;
-    m->has_events = events, m->may_return_early = early;
+    m->has_events = events, m->may_return_early = early || !strcmp(name, "undeclared");
     return m;
 }
 void fmi3FreeInstance(fmi3Instance c) { free(c); }

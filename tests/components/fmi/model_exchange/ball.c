@@ -6,9 +6,12 @@
    simulation ends there), 14 fault (parameter): 1 GetDerivatives returns error, 2 the event indicator is NaN, 3 the event
    iteration never ends, 4 the next time event is always now, 5 GetDerivatives crashes, 6 discarded derivatives, 7 an event
    after every step, 8 nominal values of 0, 9 derivatives are NaN, 10 the next time event is NaN, 11 the event indicator changes
-   its sign at each call, 12 the states are NaN after events, 13 the number of states changes (FMI 3.0), 100 k + n: function k
+   its sign at each call, 12 the states are NaN after events, 13 the number of states changes (FMI 3.0),
+   14 the next time event is a second ago, 15 it is at minus infinity, 16 a derivative is infinite, 17 and 18 the number of states
+   or event indicators is 2^40 (FMI 3.0), 19 the process receives SIGTERM, 100 k + n: function k
    (see `enum functions`) returns status n, or fails as `enum failures` says */
 #include <math.h>
+#include <signal.h>
 #include <stdlib.h>
 #include <string.h>
 
@@ -96,6 +99,8 @@ static int update(Handle c, int *again, int *ends) {
         INTEGER(m, COUNT)++;
         m->next_event = INTEGER(m, FAULT) == 4 ? m->time : INTEGER(m, FAULT) == 10 && m->time > 0.5 ? NAN : 0.25 * (INTEGER(m, COUNT) + 1);
     }
+    if (INTEGER(m, FAULT) == 14 && m->time > 0.5) m->next_event = m->time - 1;
+    if (INTEGER(m, FAULT) == 15 && m->time > 0.5) m->next_event = -INFINITY;
     INTEGER(m, I_OUT) = 10 * INTEGER(m, I_IN);
     *again = INTEGER(m, FAULT) == 3;
     *ends = INTEGER(m, COUNT) >= INTEGER(m, LAST_COUNT);
@@ -131,7 +136,9 @@ static Status derivatives(Handle c, double dx[]) {
     if (INTEGER(m, FAULT) == 1 && m->time > 0.5) return BAD;
     if (INTEGER(m, FAULT) == 6 && m->time > 0.5) return DISCARDED;
     if (INTEGER(m, FAULT) == 5 && m->time > 0.5) *(volatile int *)8 = 1;
+    if (INTEGER(m, FAULT) == 19 && m->time > 0.5) raise(SIGTERM);
     compute(m);
+    if (INTEGER(m, FAULT) == 16 && m->time > 0.5) m->r[DX] = INFINITY;
     dx[0] = INTEGER(m, FAULT) == 9 && m->time > 0.5 ? NAN : m->r[DX], dx[1] = m->r[DH], dx[2] = m->r[DV];
     return GOOD;
 }
@@ -207,6 +214,7 @@ typedef struct {
 } EventInfo;
 
 void *ball_fmiInstantiateModel(const char *name, const char *guid, Callbacks callbacks, char logging) {
+    if (!strcmp(name, "impossible")) return NULL;
     callbacks.logger(NULL, name, 0, "info", "a ball of FMI %.1f", 1.0);
     return create();
 }
@@ -272,8 +280,8 @@ Status fmi3EnterInitializationMode(Handle c, bool has_tolerance, double toleranc
     return GOOD;
 }
 Status fmi3GetContinuousStateDerivatives(Handle c, double dx[], size_t n) { return derivatives(c, dx); }
-Status fmi3GetNumberOfContinuousStates(Handle c, size_t *n) { return *n = INTEGER((Model *)c, FAULT) == 13 ? 4 : 3, GOOD; }
-Status fmi3GetNumberOfEventIndicators(Handle c, size_t *n) { return *n = 1, GOOD; }
+Status fmi3GetNumberOfContinuousStates(Handle c, size_t *n) { return *n = INTEGER((Model *)c, FAULT) == 13 ? 4 : INTEGER((Model *)c, FAULT) == 17 ? (size_t)1 << 40 : 3, GOOD; }
+Status fmi3GetNumberOfEventIndicators(Handle c, size_t *n) { return *n = INTEGER((Model *)c, FAULT) == 18 ? (size_t)1 << 40 : 1, GOOD; }
 Status fmi3CompletedIntegratorStep(Handle c, bool no_set_state, bool *event, bool *ends) {
     MAY_FAIL(COMPLETE);
     *event = INTEGER((Model *)c, FAULT) == 7;

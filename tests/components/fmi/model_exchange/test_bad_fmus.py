@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import logging
+import signal
 from fractions import Fraction
+from zipfile import ZipFile
 
 import pytest
 from ball_fmus import build_ball_fmu
@@ -11,6 +13,7 @@ from systems import endpoint, make_system
 
 from cosim.components.fmi import FmuFile, InstanceSettings, Isolation, SolverSettings, create_component
 from cosim.components.fmi.model_exchange import instance
+from cosim.core.errors import InputError
 from cosim.engine.run_loop import simulate
 from cosim.engine.settings import Settings
 
@@ -88,7 +91,16 @@ SEMANTICS = {
     (12, "cvode"): "fail",
     (12, "euler"): "fail",
     (13, "cvode"): "GetContinuousStates failed",
+    (14, "cvode"): "more than 100 events in one communication step, the last one at t = 0.75 s",
+    (14, "euler"): None,
+    (15, "cvode"): "more than 100 events in one communication step, the last one at t = 0.75 s",
+    (16, "cvode"): "CVode failed at t = 0.5 s: at t = 0.5 s: 100 internal steps without progress; a derivative may be infinite",
+    (16, "euler"): None,
+    (17, "cvode"): "GetNumberOfContinuousStates failed at t = 0 s: found 1099511627776, expected at most 2000000",
+    (18, "euler"): "GetNumberOfEventIndicators failed at t = 0 s: found 1099511627776, expected at most 2000000",
 }
+#: faults that are found before the first row
+FAULTS_OF_THE_INITIALIZATION = (13, 17, 18)
 
 
 @pytest.mark.parametrize(("fault", "method"), SEMANTICS)
@@ -99,7 +111,50 @@ def test_values_without_meaning(balls, fault, method, monkeypatch):
     if message is None:
         assert outcome.failure is None
     else:
-        check(outcome, ("ball: ", message), 0 if fault == 13 else 5)
+        check(outcome, ("ball: ", message), 0 if fault in FAULTS_OF_THE_INITIALIZATION else 5)
+
+
+def test_the_solver_prints_nothing(balls, capfd):
+    run(balls[3], "cvode", 16)
+    assert capfd.readouterr() == ("", "")
+
+
+def test_a_signal_in_a_callback_of_the_solver_ends_the_run(balls):
+    """ctypes would print the exception of the signal handler and continue with a wrong result."""
+
+    def interrupt(_number, _frame):
+        raise KeyboardInterrupt
+
+    before = signal.signal(signal.SIGTERM, interrupt)
+    try:
+        outcome = run(balls[3], "cvode", 19)
+    finally:
+        signal.signal(signal.SIGTERM, before)
+    assert isinstance(outcome.failure, KeyboardInterrupt)
+    assert outcome.recording.time[-1] == pytest.approx(0.5)
+
+
+def test_a_model_of_fmi_1_that_cannot_be_instantiated(balls):
+    component = create_component(FmuFile(balls[1]), "impossible", InstanceSettings(1e-6))
+    outcome = simulate(make_system({"impossible": component}), Settings(Fraction(0), Fraction(1), Fraction(1, 10), {}))
+    assert str(outcome.failure) == "impossible: fmi1InstantiateModel failed: the FMU gave no reason"
+
+
+@pytest.mark.parametrize("text", ["-1", "2000000000", "many", ""])
+@pytest.mark.parametrize(("version", "name", "number"), [(1, "numberOfContinuousStates", 3), (2, "numberOfEventIndicators", 1)])
+def test_a_declared_number_that_cannot_be_right_is_refused(balls, tmp_path, version, name, number, text):
+    path = tmp_path / "ball.fmu"
+    change_description(balls[version], path, f'{name}="{number}"', f'{name}="{text}"')
+    expected = f'found {name}="{text}", expected an integer from 0 to 2000000 \\[model.count'
+    with pytest.raises(InputError, match=expected):
+        create_component(FmuFile(path), "ball")
+
+
+def change_description(source, target, old, new):
+    with ZipFile(source) as archive, ZipFile(target, "w") as changed:
+        for name in archive.namelist():
+            content = archive.read(name)
+            changed.writestr(name, content.replace(old.encode(), new.encode()) if name.endswith(".xml") else content)
 
 
 @pytest.fixture(scope="session")
