@@ -44,9 +44,9 @@ def literal(node: ast.expr, constants: dict[str, str]) -> str | float:
 
 def listed(text: str) -> Iterator[tuple[Statement, str, list[float]]]:
     """The statements of the tables that tests write on a page, each with its case and numbers."""
-    parts = re.split(r"^## (.*)$", text.partition("## Against measurements")[0], flags=re.MULTILINE)
-    for model, table in zip(parts[1::2], parts[2::2], strict=True):
-        for row in table.strip().splitlines()[2:]:
+    parts = re.split(r"^###? (.*)$", text, flags=re.MULTILINE)
+    for model, section in zip(parts[1::2], parts[2::2], strict=True):
+        for row in (line for line in section.splitlines() if "](../tests/" in line):
             quantity, unit, *numbers, limit, source, test = row.removeprefix("| ").removesuffix(" |").split(" | ")
             name, file = re.fullmatch(r"\[(\w+)\]\(\.\./tests/(.*)\)", test).groups()
             what, _, case = quantity.partition(" [")

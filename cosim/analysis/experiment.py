@@ -58,6 +58,7 @@ class Experiment:
         step: Time between two samples (s), at which the steps of all components end.
         stride: Number of macro steps between two samples.
         sample_count: Number of samples of a response.
+        max_sample_count: Largest number of samples; more than `sample_count` if no duration was given.
         time: The point in time (s).
     """
 
@@ -102,9 +103,8 @@ class Experiment:
         if first % self.stride:
             raise InputError(f"at: expected a time at which the steps of all components end, found {float(begin):.12g} s")
         self.time, self.step = grid.time_at(first), float(grid.step * self.stride)
-        self.sample_count = (
-            (grid.whole_steps - first) // self.stride if span else min(DEFAULT_SAMPLES, (grid.whole_steps - first) // self.stride)
-        )
+        self.max_sample_count = (grid.whole_steps - first) // self.stride
+        self.sample_count = self.max_sample_count if span else min(DEFAULT_SAMPLES, self.max_sample_count)
         if self.sample_count < MIN_SAMPLES:
             raise InputError(
                 f"duration: expected at least {MIN_SAMPLES} samples of {self.step:.12g} s, found {self.sample_count}"

@@ -22,18 +22,22 @@ def margins(
 ) -> dict[str, float | bool]:
     """Return the smallest gain (dB), phase (deg), delay (s) and disk margin (1) at the inputs and outputs of a controller.
 
+    If a loop is unstable or its linear model is not valid, `stable` is false and the margins are NaN.
+
     Args:
         result: Recorded run.
         components: Name of a component or nested system.
         at: Time at which the loop is linearised (s).
         loops: Names of signals; None: all connected inputs and outputs.
-        duration: Duration of the impulse responses (s); None: 256 samples.
+        duration: Duration of the impulse responses (s); None: 256 samples, and more for slow modes.
     """
     found = loop_margins(recorded_scenario(result), components, at, loops=loops or (), duration=duration)
+    if not all(each.stable and each.valid for each in found):
+        return {**dict.fromkeys(("gain_margin", "phase_margin", "delay_margin", "disk_margin"), math.nan), "stable": False}
     return {
         "gain_margin": 20 * math.log10(min((each.gain for each in found), default=math.inf)),
         "phase_margin": math.degrees(min((each.phase for each in found), default=math.inf)),
         "delay_margin": min((each.delay for each in found), default=math.inf),
         "disk_margin": min((each.disk for each in found), default=math.inf),
-        "stable": all(each.stable for each in found),
+        "stable": True,
     }

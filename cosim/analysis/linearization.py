@@ -20,6 +20,11 @@ from .realization import Realization, misfit, realize
 
 #: largest error of the realized impulse responses, as a fraction of their peaks, without a hint
 MAX_MISFIT = 1e-4
+#: hint at the causes of a larger error
+NO_EQUILIBRIUM = (
+    "the operating point is no equilibrium (see cosim trim), or a mode changes during the response (choose another --at or a "
+    "shorter --duration)"
+)
 #: part of an output's row in C that no other output has, as a fraction of the row, from which it counts as a state
 _INDEPENDENT = 1e-6
 #: feedthrough, as a fraction of the peak of the impulse response, that is rounding
@@ -119,8 +124,7 @@ def _notes(realization: Realization, measured: np.ndarray, responses: ImpulseRes
         share = f"{responses.nonlinearity:.2g}"
         notes.append(f"the responses to two perturbations differ by {share} of their peak: a limit, a mode or contact acts")
     if error > MAX_MISFIT:
-        hint = "the operating point is no equilibrium (see cosim trim), or choose a shorter duration"
-        notes.append(f"the model reproduces the measured responses only to {error:.2g} of their peak: {hint}")
+        notes.append(f"the model reproduces the measured responses only to {error:.2g} of their peak: {NO_EQUILIBRIUM}")
     return notes
 
 

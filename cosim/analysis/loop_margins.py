@@ -23,6 +23,7 @@ class LoopMargins:
     Attributes:
         loop: Name of the signal.
         stable: The closed loop is stable at the operating point; margins of an unstable loop mean nothing.
+        valid: The linear model is close to the measured response; else stability and margins mean nothing.
         gain: Factor (1) by which the gain may grow; infinity if it may grow without limit.
         gain_reduction: Factor (1) by which the gain may fall; 0 if it may vanish.
         phase: Phase (rad) that may be lost or gained; infinity if the gain is 1 at no frequency.
@@ -37,6 +38,7 @@ class LoopMargins:
 
     loop: str
     stable: bool
+    valid: bool
     gain: float
     gain_reduction: float
     phase: float
@@ -65,7 +67,7 @@ def margins(
         at: Point in time (s) at which the loop is linearised; None: the start time.
         loops: Names of signals; empty: all connected inputs and outputs.
         parameters: Values that replace those of the scenario, see `cosim.load`.
-        duration: Duration of the impulse responses (s); None: 256 samples.
+        duration: Duration of the impulse responses (s); None: 256 samples, and up to 64 times more for slow modes.
 
     Returns:
         The margins of each loop. A signal that does not act on itself belongs to no loop and is left out.
@@ -97,6 +99,7 @@ def loop_margins(loop: LoopResponse) -> LoopMargins:
     return LoopMargins(
         loop.name,
         loop.is_stable,
+        loop.is_valid,
         gain,
         reduction,
         phase,

@@ -7,7 +7,7 @@ is broken at this signal while all others remain closed, with the sign of negati
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal
 
 import numpy as np
@@ -18,11 +18,18 @@ from ..engine.perturbation import PerturbationTarget
 from .experiment import Experiment, Scenario
 from .impulse_response import NONLINEAR, measure_impulse_responses
 from .linear_model import LinearModel
-from .linearization import MAX_MISFIT
+from .linearization import MAX_MISFIT, NO_EQUILIBRIUM
 from .realization import misfit, realize
 
 #: signal of an estimated frequency response
 Excitation = Literal["sines", "chirp"]
+
+#: error of a model, as a fraction of the peak of the response, from which its margins mean nothing
+_INVALID = 0.05
+#: the same for an unstable model: a slightly unstable mode may be fitted to what is no linear response
+_UNCERTAIN = 1e-3
+#: factor by which a response is made longer whose slowest mode it does not show, and how often
+_LONGER, _MAX_EXTENSIONS = 4, 3
 
 
 @dataclass(frozen=True, eq=False)
@@ -32,10 +39,12 @@ class LoopResponse:
     Attributes:
         name: Name of the signal.
         closed: Discrete model from the added value d to the value v before the addition, in the closed loop.
+        error: Error of its impulse response, as a fraction of the peak of the measured one.
     """
 
     name: str
     closed: LinearModel
+    error: float
 
     def open_loop(self, frequencies: np.ndarray) -> np.ndarray:
         """Return L at angular frequencies (rad/s), shape (frequencies,), with the sign of negative feedback."""
@@ -45,7 +54,20 @@ class LoopResponse:
     @property
     def is_stable(self) -> bool:
         """True if no pole of the closed loop lies outside the unit circle."""
-        return bool(np.max(np.abs(self.closed.poles()), initial=0) < 1 + 1e-6)
+        return bool(self._largest_pole < 1 + 1e-6)
+
+    @property
+    def is_valid(self) -> bool:
+        """False if the model is too far from the measured response for its margins, or for a pole outside the unit circle."""
+        return self.error < (_INVALID if self.is_stable else _UNCERTAIN)
+
+    @property
+    def _largest_pole(self) -> float:
+        return float(np.max(np.abs(self.closed.poles()), initial=0))
+
+    def is_covered(self, sample_count: int) -> bool:
+        """Return whether the slowest mode decays to 1/e within half of a response of so many samples."""
+        return bool(self._largest_pole ** (sample_count / 2) < np.exp(-1))
 
 
 def find_loops(experiment: Experiment, components: Sequence[str]) -> dict[str, list[PerturbationTarget]]:
@@ -108,7 +130,7 @@ def measure_loops(
         at: Point in time (s); None: the start time.
         loops: Names of signals; empty: all connected inputs and outputs.
         parameters: Values that replace those of the scenario.
-        duration: Duration of the impulse responses (s); None: 256 samples.
+        duration: Duration of the impulse responses (s); None: 256 samples, and up to 64 times more for slow modes.
 
     Returns:
         The loops. A signal that does not act on itself belongs to no loop and is left out.
@@ -121,22 +143,54 @@ def measure_loops(
         responses = []
         for name, targets in choose_loops(experiment, components, loops).items():
             experiment.choose({name: targets}, [])
-            measured = measure_impulse_responses(experiment, 1)
-            if measured.observed.any():
-                responses.append(LoopResponse(name, _closed_loop(name, measured.observed, measured.nonlinearity, experiment)))
+            if found := _measure_long_enough(name, experiment):
+                responses.append(found)
     return responses
 
 
-def _closed_loop(name: str, response: np.ndarray, nonlinearity: float, experiment: Experiment) -> LinearModel:
-    realization = realize(response)
-    error = misfit(realization, response)
+def _measure_long_enough(name: str, experiment: Experiment) -> LoopResponse | None:
+    """Measure a loop, and again with a longer response while it does not show the slowest mode; None: the signal is in no loop.
+
+    A longer response counts only if its model is about as good: later the mode of a controller may change.
+    """
+    count = experiment.sample_count
+    try:
+        found = _measure(name, experiment)
+        for _ in range(_MAX_EXTENSIONS):
+            if not found or found.is_covered(experiment.sample_count) or experiment.sample_count == experiment.max_sample_count:
+                break
+            experiment.sample_count = min(_LONGER * experiment.sample_count, experiment.max_sample_count)
+            longer = _measure(name, experiment)
+            if longer is None or longer.error > max(found.error, MAX_MISFIT):
+                break
+            found = longer
+    finally:
+        experiment.sample_count = count
+    return found
+
+
+def _measure(name: str, experiment: Experiment) -> LoopResponse | None:
+    measured = measure_impulse_responses(experiment, 1)
+    if not measured.observed.any():
+        return None
+    realization = realize(measured.observed)
+    error = misfit(realization, measured.observed)
+    states = [f"x{i + 1}" for i in range(len(realization.a))]
+    closed = LinearModel(*realization, [name], [name], states, experiment.step, experiment.time)
+    loop = LoopResponse(name, closed, error)
+    return replace(loop, closed=replace(closed, notes=_notes(loop, measured.nonlinearity)))
+
+
+def _notes(loop: LoopResponse, nonlinearity: float) -> list[str]:
+    """Return hints about the validity of a model."""
     notes = []
     if nonlinearity > NONLINEAR:
-        notes.append(f"responses to two perturbations differ by {nonlinearity:.2g} of their peak")
-    if error > MAX_MISFIT:
-        notes.append(f"the model reproduces the measured response only to {error:.2g} of its peak")
-    states = [f"x{i + 1}" for i in range(len(realization.a))]
-    return LinearModel(*realization, [name], [name], states, experiment.step, experiment.time, notes)
+        share = f"{nonlinearity:.2g}"
+        notes.append(f"the responses to two perturbations differ by {share} of their peak: a limit, a mode or contact acts")
+    if loop.error > MAX_MISFIT:
+        found = f"the model reproduces the measured response only to {loop.error:.2g} of its peak"
+        notes.append(f"{found}{'' if loop.is_valid else ', so its margins mean nothing'}: {NO_EQUILIBRIUM}")
+    return notes
 
 
 def estimate_loop(

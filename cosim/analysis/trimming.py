@@ -10,7 +10,10 @@ import numpy as np
 
 from ..api.scenario_runs import load
 from ..core.errors import InputError
+from ..core.system import Endpoint
+from ..scenario import PreparedRun
 from ..scenario.json_pointer import find_value, pointer_keys
+from ..scenario.name_resolution import SlotIndex, UnknownNameError, resolve_name
 from ..scenario.nested_systems import load_scenario
 from .experiment import Scenario
 
@@ -37,11 +40,13 @@ class Trim:
         parameters: Found values, for the `parameters` of `cosim.load`.
         residuals: Rate of change of each steady signal (its unit per s), and deviation of each required signal.
         evaluations: Number of times that the scenario was started.
+        without_effect: Free values that change no residual.
     """
 
     parameters: Mapping[str, Any]
     residuals: Mapping[str, float]
     evaluations: int
+    without_effect: Sequence[str]
 
     @property
     def largest(self) -> str:
@@ -99,9 +104,8 @@ def trim(
         gtol=1e-15,
         max_nfev=100,
     )
-    return Trim(
-        search.settings(found.x), dict(zip(search.names, search.residuals(found.x).tolist(), strict=True)), search.evaluations
-    )
+    residuals = dict(zip(search.names, search.residuals(found.x).tolist(), strict=True))
+    return Trim(search.settings(found.x), residuals, search.evaluations, search.without_effect(found.jac))
 
 
 @dataclass
@@ -125,6 +129,7 @@ class _Search:
         values: list[float] = []
         with load(self.scenario, self.parameters) as simulation:
             for name in self.free:
+                _refuse_connected(simulation.prepared, name)
                 present = _pointed(document, name) if name.startswith("/") else simulation.get(name)
                 self.sizes.append(len(present) if isinstance(present, list) else None)
                 values += [_number(name, each) for each in (present if isinstance(present, list) else [present])]
@@ -139,6 +144,12 @@ class _Search:
             settings[name] = part[0] if size is None else part
             position += size or 1
         return settings
+
+    def without_effect(self, jacobian: np.ndarray) -> list[str]:
+        """Return the free values of whose elements none changes a residual, from the derivatives of the residuals."""
+        ends = np.cumsum([size or 1 for size in self.sizes])
+        parts = np.split(jacobian, ends[:-1], axis=1)
+        return [name for name, part in zip(self.free, parts, strict=True) if not part.any()]
 
     def residuals(self, values: np.ndarray) -> np.ndarray:
         """Start the scenario with values, and return all residuals."""
@@ -156,6 +167,22 @@ class _Search:
         residuals = [*rates.items(), *deviations.items()]
         self.names = [name for name, _ in residuals]
         return np.array([value for _, value in residuals])
+
+
+def _refuse_connected(prepared: PreparedRun, name: str) -> None:
+    """Raise an error if a name stands for an input that a connection feeds."""
+    if name.startswith("/"):
+        return
+    try:
+        targets = resolve_name(prepared.root, name, ("inputs",), include_inner=True)
+    except UnknownNameError:  # a parameter, or reported with the values
+        return
+    sources = {connection.target: connection.source for connection in prepared.system.connections}
+    for component, prefix in targets:
+        for slot in SlotIndex(prepared.system.components[component], "input").below(prefix).values():
+            if source := sources.get(Endpoint(component, slot)):
+                expected = "expected an input without connection, a parameter or an initial state"
+                raise InputError(f'free: "{component}.{slot}" is fed by "{source}", {expected}')
 
 
 def _elements(name: str, value: Any) -> dict[str, float]:

@@ -12,6 +12,7 @@ from ..report.tables import cell_text, format_number, table_console
 
 if TYPE_CHECKING:
     from ..results.checks import Number
+    from ..studies.controller_bench.page import BenchedController
     from ..studies.controller_bench.ranking import Ranking
     from ..studies.controller_bench.score import KpiComparison
 
@@ -36,6 +37,29 @@ def print_ranking(ranking: Ranking, candidate: str) -> None:
     ]
     words = {"above": "is better than", "equal": "equals", "below": "is worse than"}
     click.echo(f"{candidate} {words[ranking.verdict]} the shipped controller" + (f" ({'; '.join(goals)})" if goals else ""))
+
+
+def print_side_by_side(controllers: Sequence[BenchedController], reference: str) -> None:
+    """Print a line per controller: scenarios passed, checks met and costs per step.
+
+    Args:
+        controllers: the controllers, the best first.
+        reference: name of the controller whose costs are 1.
+    """
+    from rich import box
+    from rich.table import Table
+
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    table.add_column("controller", overflow="fold")
+    for header in ("scenarios", "checks", "cost (us)", "ratio"):
+        table.add_column(header, justify="right")
+    for each in controllers:
+        found = each.ranking.candidate
+        counts = (f"{found.passed} of {found.scenarios}", f"{found.met} of {found.checks}")
+        table.add_row(cell_text(each.name), *counts, f"{1e6 * each.cost:.3g}", f"{each.cost_ratio:.3g}")
+    click.echo()
+    table_console().print(table)
+    click.echo(f"cost: smallest processor time per step; ratio: to {reference}")
 
 
 def print_comparison(rows: Sequence[KpiComparison], candidate: str) -> None:

@@ -21,13 +21,15 @@ CONTENT_SECURITY_POLICY = (
 )
 
 _ABSOLUTE_PATH = re.compile(r"(?<![\w./:])(?:/[\w.+@ -]*[\w.+@-])+")
+#: a path to a folder that has little in common with the one it starts from
+_DISTANT_PATH = re.compile(r"(?<![\w./])(?:\.\./){3,}[\w.+@/ -]*[\w.+@-]")
 
 
 @cache
 def _jinja_environment() -> Environment:
     from jinja2 import Environment, FileSystemLoader, StrictUndefined
 
-    return Environment(
+    environment = Environment(
         loader=FileSystemLoader(TEMPLATE_FOLDER),
         autoescape=True,
         undefined=StrictUndefined,
@@ -35,18 +37,29 @@ def _jinja_environment() -> Environment:
         lstrip_blocks=True,
         finalize=_hide_folders,
     )
+    environment.filters["breakable"] = _breakable
+    return environment
+
+
+def _breakable(name: str) -> str:
+    """Return a dotted name as HTML that may be broken after its points and underscores."""
+    from markupsafe import escape
+
+    return safe_markup(re.sub(r"(?<=[._])(?=\w)", "<wbr>", str(escape(name))))
 
 
 def _hide_folders(value: Any) -> Any:
     """Return a text of a page without folders of this machine, because pages are shared; other values are returned unchanged.
 
-    A path below the working directory becomes relative, another one is replaced by its file name.
+    A path below the working directory becomes relative. Another one, also one that climbs three folders or more, is replaced by
+    its file name.
     """
     from markupsafe import Markup
 
     if isinstance(value, Markup) or not isinstance(value, str | Path):
         return value
-    return _ABSOLUTE_PATH.sub(lambda found: _shown_path(Path(found[0])), str(value))
+    text = _ABSOLUTE_PATH.sub(lambda found: _shown_path(Path(found[0])), str(value))
+    return _DISTANT_PATH.sub(lambda found: Path(found[0]).name, text)
 
 
 def _shown_path(path: Path) -> str:

@@ -115,7 +115,7 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
     yield "rows", str(len(result.time))
     if events := result.metadata.get("live_events"):
         yield "set by hand", count_noun(len(events), "time")
-    if result.termination:
+    if result.termination and not result.crashed:  # a crash is at the top
         yield "end", result.termination
 
 

@@ -36,6 +36,8 @@ def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
     for file in prepared.component_factory.fmus.values():
         if file.run_warning:
             yield Problem(file.run_warning)
+        if changed := file.changed_sources():
+            yield Problem(f'"{file.path}" was built from another version of {", ".join(changed)}: `cosim build` builds it again')
 
 
 def _missing_connections(prepared: PreparedRun) -> Iterator[Problem]:

@@ -18,8 +18,9 @@ def recommend(system: System) -> list[str]:
     groups = ordered_groups(feeders)
     iterated = {name for group in iterate_groups(system.stages) if group.iteration for name in component_names(group.stages)}
     lines = list(_late_values(system, inner, groups))
-    for group in (group for group in groups if len(group) > 1 and not iterated.issuperset(group)):
-        lines += _coupling(system, [c for c in inner if {c.source.component, c.target.component} <= set(group)], group)
+    within = [c for c in system.connections if not c.delay]
+    for group in (group for group in groups if not iterated.issuperset(group)):
+        lines += _coupling(system, [c for c in within if {c.source.component, c.target.component} <= set(group)], group)
     return lines or ["the algorithm fits: values flow from earlier to later stages, or their couplings are solved"]
 
 
@@ -42,17 +43,25 @@ def _late_values(system: System, connections: Sequence[Connection], groups: Sequ
 def _coupling(system: System, connections: Sequence[Connection], group: Sequence[str]) -> Iterator[str]:
     """Yield a line about components that depend on each other, if their coupling can be solved better."""
     names = abbreviate_names(group)
-    can_repeat = all(system.components[name].has_state and name not in system.periods for name in group)
+    fixed = [name for name in group if not system.components[name].has_state or name in system.periods]
     is_direct = bool(_declared_loops(system, connections))
     linear = {c for c in connections if c.interpolation == "linear"}
     can_be_linear = [c for c in connections if _can_be_linear(system, c)]
     position = dict(_positions(system.stages))
-    if is_direct and can_repeat:
+    if is_direct and not fixed:
         yield (
             f'"iteration": {{"method": "newton"}} for {names}: their outputs depend directly on each other, '
             "and all of them can return to a state"
         )
-    elif can_be_linear and not linear:
+        return
+    if is_direct:
+        yield (
+            f"a smaller step size: outputs of {names} form an algebraic loop, and one of them is a step late; "
+            f"an iteration is not possible, because {abbreviate_names(fixed)} cannot repeat a step"
+        )
+    if len(group) == 1:
+        return
+    if can_be_linear and not linear:
         targets = abbreviate_names(dict.fromkeys(c.target.component for c in can_be_linear))
         yield f'"interpolation": "linear" for connections between {names}: {targets} can interpolate, which raises the order to 2'
     elif not linear and not any(_steps_earlier(position[a], position[b]) for a in group for b in group):

@@ -4,7 +4,7 @@ import math
 
 import numpy as np
 import pytest
-from linear_blocks import block, loop
+from linear_blocks import StateSpace, block, loop
 from scipy.signal import cont2discrete, ss2tf
 
 import cosim
@@ -65,6 +65,42 @@ def test_a_loop_of_several_rates_is_sampled_with_the_slowest_one():
     each = only(margins(scenario, "controller", loops=["plant.y0"]))
     assert each.gain == pytest.approx(4, rel=1e-6)
     assert each.crossover == pytest.approx(2 * math.asin(0.25) / 0.2, rel=1e-6)
+
+
+def test_a_slow_loop_is_measured_until_it_shows_its_slowest_mode():
+    """L = k / (z - 1) with a time constant of 25 s at 0.1 s per step, which 256 samples hardly show."""
+    k, h = 4e-3, 0.1
+    scenario = loop(k, block([[1]], [[1]], [[1]]), h)
+    (measured,) = measure_loops(scenario, ["controller"], loops=["plant.y0"])
+    assert measured.is_covered(1024)
+    assert measured.closed.poles() == pytest.approx([1 - k], abs=1e-9)
+    assert only(margins(scenario, "controller", loops=["plant.y0"])).phase == pytest.approx(math.pi / 2, rel=1e-3)
+
+
+def test_station_keeping_is_found_to_be_stable_although_its_modes_are_slow():
+    """Its adaptation takes tens of seconds; a response of 2.56 s alone gives a slightly unstable model."""
+    slow = only(measure_loops("station_keeping", ["usv"], 120, loops=["vessel.position.x"]))
+    assert slow.is_stable
+    assert slow.is_valid
+    short = only(measure_loops("station_keeping", ["usv"], 120, loops=["vessel.position.x"], duration=2.56))
+    assert not short.is_covered(256)
+
+
+class SwitchedGain(StateSpace):
+    """A controller whose gain is ten times larger from 1 s on."""
+
+    def do_step(self, time, _step_size):
+        """Choose the gain."""
+        self.d[:] = -0.1 if time < 0.95 else -1.0
+
+
+def test_margins_of_a_model_that_misses_the_response_count_as_invalid():
+    """The gain of the loop changes during the response, which no linear model with constant coefficients shows."""
+    scenario = loop(0.5, block([[1]], [[1]], [[1]]))
+    scenario["components"]["controller"]["python"] = SwitchedGain
+    each = only(margins(scenario, "controller", loops=["plant.y0"]))
+    assert not each.valid
+    assert any("margins mean nothing" in note and "a mode changes" in note for note in each.notes)
 
 
 def test_signals_that_act_on_nothing_that_returns_are_left_out():

@@ -5,7 +5,7 @@ import json
 import numpy as np
 import pytest
 from cosim_command import run_cosim
-from linear_blocks import block
+from linear_blocks import block, loop
 
 import cosim
 from cosim.core import resources
@@ -69,6 +69,22 @@ def test_wrong_names_are_refused():
     ):
         with pytest.raises(cosim.InputError, match=message):
             cosim.trim(plant(), *arguments)
+
+
+def test_an_input_that_a_connection_feeds_is_refused():
+    scenario = loop(0.5, block([[0.5]], [[1]], [[1]], x0=[1.0]))
+    with pytest.raises(
+        cosim.InputError, match=r'free: "plant.u0" is fed by "controller.y0", expected an input without connection'
+    ):
+        cosim.trim(scenario, ["plant.u0"], ["plant.y0"])
+
+
+def test_a_free_value_that_changes_no_residual_is_named():
+    scenario = plant()
+    scenario["components"]["other"] = block([[0.5]], [[1]], [[1]])
+    found = cosim.trim(scenario, ["plant.u0", "other.u0"], ["plant.y0"])
+    assert found.is_found
+    assert found.without_effect == ["other.u0"]
 
 
 def test_the_command_writes_a_scenario_that_extends_the_given_one(tmp_path):

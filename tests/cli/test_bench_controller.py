@@ -148,7 +148,7 @@ def test_a_controller_that_fails_checks_ranks_below_however_many_kpis_are_better
 def test_all_problems_of_an_unsuitable_controller_are_reported(folder):
     source = keeper(
         folder,
-        ["vehicle.position.x", "vehicle.postion.y", "wind"],
+        ["vehicle.position.x", "vehicle.postion.y", "gusts"],
         ["thrust", "rudder_angel"],
         {"thrust": "m", "vehicle.position.x": "cm"},
     )
@@ -157,7 +157,7 @@ def test_all_problems_of_an_unsuitable_controller_are_reported(folder):
     assert done.stderr.splitlines() == [
         f'{source}: the output "rudder_angle" (rad) is missing; did you mean "rudder_angel"?',
         f'{source}: the role has no signal for the input "vehicle.postion.y"; did you mean "vehicle.position.y"?',
-        f'{source}: the role has no signal for the input "wind"',
+        f'{source}: the role has no signal for the input "gusts"',
         f'{source}: "thrust" has the unit "m", expected "N" or a unit that converts to it',
     ]
     assert not (folder / "runs/bench/shipped").exists()
@@ -232,6 +232,42 @@ def test_a_part_of_a_shipped_controller_is_replaced(folder):
     lame = bench(folder, "heading.fmu", "--json", "--set", "rudder_limit=0.02", role="usv_heading")
     assert lame.returncode == 3
     assert "worse" in [kpi["against_shipped"] for kpi in json.loads(lame.stdout)["scenarios"][0]["kpis"]]
+
+
+def test_several_controllers_are_shown_side_by_side_with_their_costs(folder):
+    """A weak nested system, a class in Python that does not steer, and the shipped FMU, which is listed first."""
+    done = bench(folder, lazy(folder), keeper(folder), ROOT / "fmus/strider_autopilot.fmu")
+    assert done.returncode == 3, done.stdout + done.stderr
+    lines = done.stdout.splitlines()
+    rows = [line.split() for line in lines[lines.index("") + 3 : -2]]
+    assert rows[0][:7] == ["strider_autopilot", "1", "of", "1", "2", "of", "2"]
+    costs = {row[0]: float(row[-2]) for row in rows}
+    ratios = {row[0]: float(row[-1]) for row in rows}
+    assert set(costs) == {"strider_autopilot", "lazy", "Keeper"}
+    assert costs["Keeper"] > 3 * costs["strider_autopilot"] > 0
+    assert 0.05 < ratios["strider_autopilot"] < 3
+    assert costs["lazy"] / ratios["lazy"] == pytest.approx(costs["Keeper"] / ratios["Keeper"], rel=0.02)
+    assert lines[-2] == "cost: smallest processor time per step; ratio: to ar_drone_geometric"
+    page = (folder / lines[-1].removeprefix("page: ")).read_text()
+    assert page.index("strider_autopilot</td>") < page.index("lazy</td>")
+    assert 'class="number missed" title="check: equals true">no' in page
+    assert "http" not in page.split("<body>")[1]
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ([], "name a CONTROLLER, or --all"),
+        (["lazy.json", "other/lazy.json"], '2 controllers are called "lazy"'),
+        (["lazy.json", "--all", "--set", "speed_P=1"], "--set needs a single CONTROLLER"),
+    ],
+)
+def test_controllers_that_cannot_be_compared_are_refused(folder, arguments, message):
+    (folder / "other").mkdir()
+    shutil.copy(lazy(folder), folder / "other/lazy.json")
+    done = run_cosim("bench-controller", *arguments, "--role", "vessel_autopilot", cwd=folder)
+    assert done.returncode == 2
+    assert message in done.stderr
 
 
 def test_scenarios_with_equal_names_are_refused(folder):

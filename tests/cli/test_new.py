@@ -19,6 +19,7 @@ import pytest
 from cosim_command import run_cosim
 
 from cosim.cli import main
+from cosim.components.fmi import FmuFile
 from cosim.core import resources
 from cosim.report.scene import build_scene
 from cosim.results import Result
@@ -158,13 +159,34 @@ def test_the_folder_can_be_moved(tmp_path):
     assert done.returncode == 0, done.stderr
 
 
-def test_a_run_writes_a_figure_and_a_replay(moved):
-    folder = moved("vessel_autopilot", "python")
+FIGURES = [("vessel_autopilot", "course", ["vessel"]), ("uav_controller", "track", ["quadcopter", "vessel"])]
+
+
+@pytest.mark.parametrize(("role", "figure", "bodies"), FIGURES)
+def test_a_run_writes_a_figure_and_a_replay(moved, role, figure, bodies):
+    folder = moved(role, "python")
     runs = folder / "runs/my_pilot"
-    assert (runs / "course.png").is_file()
-    assert build_scene(json.loads((runs / "run.json").read_text()))["bodies"][0]["name"] == "vessel"
+    assert (runs / f"{figure}.png").is_file()
+    assert [body["name"] for body in build_scene(json.loads((runs / "run.json").read_text()))["bodies"]] == bodies
     done = cosim("replay", runs, cwd=folder)
     assert (done.returncode, done.stderr) == (0, "")
+
+
+@pytest.mark.parametrize("language", MADE)
+def test_an_fmu_older_than_its_source_is_recognized(moved, language, tmp_path):
+    folder = shutil.copytree(moved("vessel_autopilot", language) / "my_pilot", tmp_path / "my_pilot")
+    assert FmuFile(folder / "my_pilot.fmu").changed_sources() == []
+    source = folder / MADE[language][-1]
+    source.write_text(source.read_text() + "\n")
+    assert FmuFile(folder / "my_pilot.fmu").changed_sources() == [source.name]
+
+
+def test_a_run_of_an_fmu_older_than_its_source_warns(moved, tmp_path):
+    folder = shutil.copytree(moved("vessel_autopilot", "c") / "my_pilot", tmp_path / "my_pilot")
+    with (folder / "my_pilot.c").open("a") as source:
+        source.write("/* changed */\n")
+    done = cosim("check", "my_pilot/my_pilot.json", cwd=tmp_path)
+    assert 'my_pilot.fmu" was built from another version of my_pilot.c: `cosim build` builds it again' in done.stderr
 
 
 def test_files_are_overwritten_only_with_force(tmp_path):

@@ -6,6 +6,7 @@ import sys
 from pathlib import Path
 
 import pytest
+from page_probes import LOW_CONTRAST
 
 from cosim.cli import COMMANDS
 from cosim.scenario import json_schema
@@ -59,3 +60,20 @@ def test_pages_are_read_and_searched_as_files_without_a_network(site, chromium):
     page.wait_for_function("document.querySelector('.md-search-result__meta').innerText.includes('matching')")
     assert page.locator(".md-search-result__link").count() > 0
     assert {url.partition(":")[0] for url in requests} <= {"file", "data", "blob"}
+
+
+#: a page of each kind
+SAMPLES = ("index", "docs/tutorials/own_boat", "docs/how_to/swap_controller", "docs/reference/python", "docs/controllers")
+
+
+@pytest.mark.parametrize("scheme", ["light", "dark"])
+def test_pages_fit_a_phone_and_are_legible(site, chromium, scheme):
+    context = chromium.new_context(offline=True, color_scheme=scheme, viewport={"width": 360, "height": 740})
+    page, complaints = context.new_page(), []
+    page.on("console", lambda said: complaints.append(said.text) if said.type == "error" else None)
+    for name in SAMPLES:
+        page.goto((site / f"{name}.html").as_uri())
+        assert page.evaluate("document.documentElement.scrollWidth") == 360, name
+        assert page.evaluate(LOW_CONTRAST) == [], name
+    assert complaints == []
+    context.close()

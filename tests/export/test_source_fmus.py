@@ -9,6 +9,9 @@ import pytest
 from ball_fmus import SOURCE, description_1, model_description
 from cosim_command import run_cosim
 
+from cosim.core.errors import InputError
+from cosim.export.foreign.source_fmus import usable_fmu
+
 #: macro of the source that sets the FMI version; the prefix is that of tools whose sources add one by themselves
 MAIN = "#define FMI {version}\n#if !defined FMI2_FUNCTION_PREFIX && !defined NO_FUNCTION_PREFIX\n"
 MAIN += "#define FMI2_FUNCTION_PREFIX ball_\n"
@@ -96,3 +99,49 @@ def test_sources_that_cannot_be_compiled_are_refused_in_one_line(sources, files,
     done = run_cosim("simulate", write_source_fmu(tmp_path / "ball.fmu", 2, sources, files))
     assert (done.returncode, len(done.stderr.splitlines())) == (2, 1), done.stderr
     assert message in done.stderr
+
+
+BUILT = '<fmiBuildDescription><BuildConfiguration modelIdentifier="{}">{}</BuildConfiguration></fmiBuildDescription>'
+ONE_FILE = '<SourceFileSet><SourceFile name="{}"/></SourceFileSet>'
+DEFINITION = '<SourceFileSet><PreprocessorDefinition name="A; touch pwned" value="$(touch pwned)"/></SourceFileSet>'
+GOOD = SOURCE.read_text()
+
+#: case -> sources and the message
+BAD_SOURCES = {
+    "several errors": ({"ball.c": "int x = nowhere;\nint y = nobody;"}, "cannot be compiled: ball.c:1:.* \\(and 1 more\\)$"),
+    "a header that does not exist": ({"ball.c": '#include "none.h"'}, "ball.c:1:.*none.h"),
+    "a platform that it refuses": ({"ball.c": '#error "needs a real-time clock"'}, "needs a real-time clock"),
+    "functions defined twice": (
+        {"a.c": "int f(void) { return 1; }", "b.c": "int f(void) { return 2; }"},
+        "multiple definition of",
+    ),
+    "assembly that includes a device": ({"ball.c": '__asm__(".incbin \\"/dev/zero/none\\"");'}, "Error: .*dev/zero"),
+    "C++ without a list of files": ({"ball.cpp": "class A {};"}, "names no source files, and found no C files; found: .cpp$"),
+    "a file that includes itself": ({"ball.c": '#include "ball.c"'}, "names no source files"),
+    "a build description that is not XML": ({"ball.c": GOOD, "buildDescription.xml": "<fmi"}, "is not well-formed XML"),
+    "a file outside of the FMU": (
+        {"ball.c": GOOD, "buildDescription.xml": BUILT.format("ball", ONE_FILE.format("../../etc/passwd"))},
+        'its source file "../../etc/passwd" does not exist',
+    ),
+    "a file with the name of an option": (
+        {"-o": "x", "ball.c": "int x;", "buildDescription.xml": BUILT.format("ball", ONE_FILE.format("-o"))},
+        "cannot be compiled: .*syntax error",
+    ),
+    "a definition with a command": (
+        {"ball.c": "int x;", "buildDescription.xml": BUILT.format("ball", DEFINITION + ONE_FILE.format("ball.c"))},
+        "the library does not export fmi3",
+    ),
+    "a library of another name": (
+        {"ball.c": "int x;", "buildDescription.xml": BUILT.format("bell", ONE_FILE.format("ball.c"))},
+        "ball.so does not exist; found: .*bell.so",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", BAD_SOURCES)
+def test_bad_sources_are_one_problem(case, tmp_path):
+    sources, message = BAD_SOURCES[case]
+    with pytest.raises(InputError, match=message) as refused:
+        usable_fmu(write_source_fmu(tmp_path / "ball.fmu", 3, sources), None).check_binary()
+    assert len(str(refused.value).splitlines()) == 1
+    assert [path.name for path in tmp_path.rglob("pwned")] == []

@@ -1,47 +1,14 @@
 """The report on screens of all sizes: layout, contrast and keyboard."""
 
+from dataclasses import replace
+
 import pytest
+from page_probes import LOW_CONTRAST, OVERFLOWING, UNREACHABLE
 
 from cosim.report.run_page import write_report
 from cosim.results.checks import evaluate_checks
 
 SIZES = ((1280, 800), (768, 1024), (360, 740))
-
-#: ratio of the luminances of every visible text and its background (WCAG 2.2, 1.4.3), those below the limit
-LOW_CONTRAST = """() => {
-  const canvas = document.createElement("canvas").getContext("2d", {willReadFrequently: true});
-  const rgba = (css) => { canvas.clearRect(0, 0, 1, 1); canvas.fillStyle = css; canvas.fillRect(0, 0, 1, 1);
-    return [...canvas.getImageData(0, 0, 1, 1).data]; };
-  const light = (rgb) => rgb.slice(0, 3).map((v) => v / 255).map((v) => v <= 0.04045 ? v / 12.92 : ((v + 0.055) / 1.055) ** 2.4)
-    .reduce((sum, v, i) => sum + v * [0.2126, 0.7152, 0.0722][i], 0);
-  const behind = (element) => { for (let e = element; e; e = e.parentElement) {
-    const colour = rgba(getComputedStyle(e).backgroundColor); if (colour[3] > 200) return colour; } return [255, 255, 255]; };
-  const texts = document.createTreeWalker(document.body, NodeFilter.SHOW_TEXT), low = [];
-  while (texts.nextNode()) {
-    const element = texts.currentNode.parentElement, style = getComputedStyle(element);
-    const shown = texts.currentNode.data.trim() && element.getClientRects().length;
-    if (!shown || element.closest("script, style, .drawn, svg, :disabled")) continue;
-    const [one, other] = [light(rgba(style.color)), light(behind(element))].sort((a, b) => b - a);
-    const large = parseFloat(style.fontSize) >= 24, ratio = (one + 0.05) / (other + 0.05);
-    if (ratio < (large ? 3 : 4.5)) low.push([texts.currentNode.data.trim().slice(0, 30), ratio]);
-  }
-  return low;
-}"""
-
-#: texts whose box ends outside of the window or of its card
-OVERFLOWING = """() => {
-  const parts = document.querySelectorAll(".card *, .verdict, .chip, .facts *, .bar > *, .tools *, .plot figcaption *");
-  return [...parts].filter((element) => !element.closest("datalist, option")).filter((element) => {
-    const inner = element.getBoundingClientRect(), outer = (element.closest(".card") ?? document.body).getBoundingClientRect();
-    return inner.right > outer.right + 0.5 || inner.left < outer.left - 0.5;
-  }).map((element) => element.className || element.tagName);
-}"""
-
-#: controls that Tab does not reach, or that have no name
-UNREACHABLE = """() => [...document.querySelectorAll("button, select, input, summary")]
-  .filter((element) => element.getClientRects().length && !element.disabled)
-  .filter((element) => element.tabIndex < 0 || !(element.ariaLabel || element.title || element.textContent.trim()))
-  .map((element) => element.outerHTML.slice(0, 80))"""
 
 
 @pytest.fixture(scope="module")
@@ -52,7 +19,9 @@ def report(open_page, flight_result, tmp_path_factory):
         {"kpi": "landing.touchdown_speed", "min": 0.123456, "max": 0.234567},
         {"kpi": "waypoints.all_reached", "equals": True},
     ]
-    write_report(flight_result, evaluate_checks(flight_result.kpis, checks), [], file)
+    ended = {"terminated_by": {"time": 16.0, "since": 13.0, "condition": "landed", "cause": "plant.uav.contact.vessel"}}
+    result = replace(flight_result, metadata={**flight_result.metadata, **ended})
+    write_report(result, evaluate_checks(flight_result.kpis, checks), [], file)
     return open_page(file)
 
 
@@ -73,6 +42,8 @@ def test_a_phone_shows_the_picture_first(report):
     )
     assert tops == sorted(tops)
     assert tops[0] <= 0
+    places = "cosimReplay.view.actors.map(({position}) => position.clone().project(cosimReplay.view.cameras.camera).x)"
+    assert all(abs(x) < 0.9 for x in report(places))
 
 
 def test_the_keyboard_reaches_every_control(report):

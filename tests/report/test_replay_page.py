@@ -322,7 +322,9 @@ def fallen(open_page, flight_result, tmp_path_factory):
 
 def test_a_failure_is_a_mark_on_the_slider_in_the_plots_and_in_the_scene(fallen):
     assert [mark.get_attribute("title") for mark in fallen.page.locator(".spans b").all()] == ["uav ditched at 10.00 s"]
-    assert fallen.page.locator(".plot").first.locator(".mark").get_attribute("title") == "uav ditched at 10.00 s"
+    line = fallen.page.locator(".plot").first.locator(".mark")
+    assert line.get_attribute("title") == "uav ditched at 10.00 s"
+    assert line.evaluate("(element) => element.offsetWidth") <= 2  # pixels: a straight line
     crosses = "cosimReplay.view.actors.flatMap((actor) => actor.crosses.map((cross) => cross.object.visible))"
     fallen.seek(9.9)
     assert fallen(crosses) == [False]

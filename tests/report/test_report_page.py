@@ -28,7 +28,7 @@ class Reader(HTMLParser):
     def __init__(self, text):
         super().__init__()
         self.tags, self.texts, self.links, self._open = [], [], [], []
-        self.feed(text)
+        self.feed(text.replace("<wbr>", ""))
 
     def handle_starttag(self, tag, attributes):
         self.tags.append(tag)
@@ -194,11 +194,12 @@ def test_a_page_shows_no_folder_of_this_machine(flight_result, tmp_path, monkeyp
     """Paths below the working directory are relative, others are file names; JSON paths and addresses stay."""
     monkeypatch.chdir(tmp_path)
     texts = [f"{tmp_path}/own/pilot.fmu is late", "/components/uav: see https://example.org/a/b", f"in {Path(__file__)}"]
-    metadata = {**flight_result.metadata, "warnings": texts}
+    metadata = {**flight_result.metadata, "warnings": texts, "sha256": {"../../../../home/person/pilot.py": "12ab"}}
     write_report(replace(flight_result, metadata=metadata), [], [], tmp_path / "report.html")
     page = (tmp_path / "report.html").read_text()
     assert "<li>own/pilot.fmu is late</li>" in page
     assert f"<li>{texts[1]}</li>" in page
     assert f"<li>in {Path(__file__).name}</li>" in page
+    assert '<td class="name">pilot.py</td>' in page
     assert str(tmp_path) not in page
     assert str(Path(__file__).parents[2]) not in page

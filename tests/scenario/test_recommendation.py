@@ -37,6 +37,23 @@ def test_a_direct_loop_needs_an_iteration():
     assert recommended(LOOP, stages, declare("u"))[0].startswith("the algorithm fits")
 
 
+def test_a_direct_loop_that_cannot_be_iterated_needs_small_steps():
+    def prepare(component):
+        component.dependencies, component.has_state = {"y": frozenset("u")}, False
+
+    (line,) = recommended(LOOP, (("a",), ("b",), ("c",)), prepare)
+    assert line.startswith("a smaller step size: outputs of a, b form an algebraic loop, and one of them is a step late")
+    assert line.endswith("because a, b cannot repeat a step")
+    (line,) = recommended("a.y > a.u", (("a",), ("b",), ("c",)), prepare)
+    assert line.startswith("a smaller step size: outputs of a form an algebraic loop")
+
+
+def test_a_component_that_feeds_itself_needs_an_iteration_only_if_the_feedback_is_direct():
+    stages = (("a",), ("b",), ("c",))
+    assert recommended("a.y > a.u", stages, declare("u"))[0].startswith('"iteration": {"method": "newton"} for a')
+    assert recommended("a.y > a.u", stages, declare())[0].startswith("the algorithm fits")
+
+
 def test_components_that_interpolate_need_linear_inputs():
     (line,) = recommended(LOOP, (("a",), ("b",), ("c",)), lambda component: setattr(component, "interpolates_inputs", True))
     assert line == '"interpolation": "linear" for connections between a, b: b, a can interpolate, which raises the order to 2'

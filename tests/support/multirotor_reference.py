@@ -17,7 +17,6 @@ from scipy.integrate import solve_ivp
 GRAVITY = 9.81
 AIR_DENSITY = 1.225
 FLIP = np.diag([1.0, -1.0, -1.0])  # forward-right-down <-> forward-left-up
-RPM = 2 * np.pi / 60
 
 
 @dataclass(frozen=True)
@@ -85,9 +84,9 @@ VEHICLES = {
         * 1e-6,
         rotors=np.array([[0.028, -0.028, 0.008], [-0.028, -0.028, 0.008], [-0.028, 0.028, 0.008], [0.028, 0.028, 0.008]]),
         spin_directions=(1, -1, 1, -1),
-        thrust=3.16e-10 / RPM**2,
-        torque=7.94e-12 / RPM**2,
-        max_rotor_speed=float(np.sqrt(2.25 * 0.027 * GRAVITY / 4 / 3.16e-10)) * RPM,
+        thrust=2.218e-8,
+        torque=1.63e-10,
+        max_rotor_speed=2501.0,
         radius=0.0225,
         inflow_reduction=square_ground_effect(0.0225, 0.056),
         time_constant=0.072,

@@ -44,6 +44,16 @@ MODELS = (
     "Sensors",
     "Replica of the published simulator",
 )
+#: the sections of the part "Against measurements", whose text is in `MEASUREMENTS`
+MEASURED_VEHICLES = (
+    "AR.Drone 2.0 in flight",
+    "BlueBoat",
+    "BlueROV2 Heavy",
+    "Crazyflie 2.1",
+    "CyberShip II",
+    "Heron",
+    "Otter at sea",
+)
 
 INTRODUCTION = """# Validation
 
@@ -54,7 +64,8 @@ written by this command:
 pytest tests -m "" --validation docs/validation.md
 ```
 
-Do not edit this page by hand; its last part, "Against measurements", is `tests/support/validation_against_measurements.md`.
+Do not edit this page by hand; the text of its last part, "Against measurements", is
+`tests/support/validation_against_measurements.md`.
 A comparison that exceeds its limit fails its test. `tests/test_validation_document.py` fails if this page and the tests list
 different comparisons. Speed is documented in [performance.md](performance.md).
 
@@ -65,9 +76,11 @@ different comparisons. Speed is documented in [performance.md](performance.md).
 * *DOP853* is the eighth-order Runge-Kutta method of SciPy with tolerances of 1e-11 or less, applied to an independent
   implementation of the equations in NumPy.
 """
-#: last part of the page, written by hand: comparisons with data that the project does not contain
+#: text of the last part of the page: comparisons with data that the project does not contain
 MEASUREMENTS = Path(__file__).with_name("validation_against_measurements.md")
 COLUMNS = ("quantity", "unit", "reference", "measured", "deviation", "limit", "source", "test")
+#: the same of a table that compares with a vehicle
+VEHICLE_COLUMNS = ("quantity", "unit", "vehicle", "model", "difference", "limit", "source", "test")
 
 
 @dataclass(frozen=True)
@@ -84,7 +97,7 @@ class Statement:
 
 def statement(test: str, model: str, what: str, unit: str, source: str, within: float = 0.0, relative: float = 0.0) -> Statement:
     """Return the statement of a call of `measured`."""
-    assert model in MODELS, f"unknown model {model}, expected one of {MODELS}"
+    assert model in (known := MODELS + MEASURED_VEHICLES), f"unknown model {model}, expected one of {known}"
     return Statement(model, what, unit, f"{relative:g} rel." if relative else f"{within:g}" if within else "exact", source, test)
 
 
@@ -129,12 +142,21 @@ def worst_deviation(found: ArrayLike, expected: ArrayLike, relative: bool) -> di
 
 def render_document(records: Sequence[dict[str, Any]]) -> str:
     """Return the document: a table for each model, ordered by files, lines and cases."""
-    lines = [INTRODUCTION]
-    sections = {model: list(table_rows(record for record in records if record["model"] == model)) for model in MODELS}
-    for model, section in sections.items():
-        if section:
-            lines += [f"## {model}", "", table_line(COLUMNS), table_line(["---"] * len(COLUMNS)), *map(table_line, section), ""]
-    return "\n".join([*lines, MEASUREMENTS.read_text()])
+    parts = [INTRODUCTION, *(f"## {model}\n\n{table}" for model in MODELS if (table := render_table(records, model, COLUMNS)))]
+    text = MEASUREMENTS.read_text()
+    for vehicle in MEASURED_VEHICLES:
+        heading = f"### {vehicle}\n\n"
+        assert heading in text, f"{MEASUREMENTS.name} has no heading {heading.strip()!r}"
+        table = render_table(records, vehicle, VEHICLE_COLUMNS)
+        text = text.replace(heading, f"{heading}{table}\n" if table else heading)
+    return "\n".join([*parts, text])
+
+
+def render_table(records: Sequence[dict[str, Any]], model: str, columns: Sequence[str]) -> str:
+    """Return the table of a model, nothing if there are no records."""
+    rows = list(table_rows(record for record in records if record["model"] == model))
+    lines = [table_line(columns), table_line(["---"] * len(columns)), *map(table_line, rows)]
+    return "\n".join([*lines, ""]) if rows else ""
 
 
 def table_line(cells: Iterable[str]) -> str:

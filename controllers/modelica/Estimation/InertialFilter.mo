@@ -61,7 +61,7 @@ block InertialFilter "Inertial navigation by an error-state extended Kalman filt
   end Attitude;
 
   parameter Real earth[2](each unit = "rad") = {1.551190995937692, 0.967273} "Magnetic field: heading, counter-clockwise from east, and dip";
-  parameter Real density[4] = {6e-3, 3e-4, 2e-5, 2e-4} "Noise of velocity, attitude, gyroscope and accelerometer bias per square root of s";
+  parameter Real density[4] = {3e-3, 3e-4, 2e-5, 2e-4} "Noise of velocity, attitude, gyroscope and accelerometer bias per square root of s";
   parameter Real start_deviation[3] = {0.02, 0.02, 0.2} "Standard deviations: roll and pitch, biases of gyroscopes and accelerometers";
   parameter Real noise[4] = {0.02, 0.03, 0.05, 0.012} "Of horizontal and vertical position, velocity and heading";
   input Imu imu;

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Mapping, Sequence
-from dataclasses import asdict
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from shutil import rmtree
 from typing import TYPE_CHECKING, Any
@@ -16,7 +16,7 @@ from ...core.processors import available_processors
 from ...core.text import count_noun
 from ...studies.regression_runs import check_unique_names, default_folder, find_scenario_files
 from .. import current_command_line, supervision
-from ..bench_table import print_comparison, print_ranking
+from ..bench_table import print_comparison, print_ranking, print_side_by_side
 from ..bench_trial import ControllerTrial, TrialResult, run_trials
 from ..completion import complete_role, complete_scenario
 from ..messages import print_json
@@ -24,22 +24,26 @@ from ..output_options import json_option
 from .regress import EXIT_CODE_SEVERITY, print_outcome
 
 if TYPE_CHECKING:
+    from ...studies.controller_bench.page import BenchedController
     from ...studies.controller_bench.ranking import Ranking
     from ...studies.controller_bench.score import KpiComparison
 
 #: file in which the child process that examines the candidate returns its results
 _PREPARED_FILE = "bench.json"
+#: file in which the child process that measures the costs per step returns them
+_COSTS_FILE = "costs.json"
 
 
 @click.command()
-@click.argument("controller")
+@click.argument("controllers", nargs=-1, metavar="[CONTROLLER]...")
 @click.option(
     "--role",
     required=True,
     shell_complete=complete_role,
     help="Role of the controller (see `cosim list roles`), or the path of a role's JSON file.",
 )
-@click.option("--set", "settings", multiple=True, metavar="NAME=value", help="Set a parameter of the controller.")
+@click.option("--all", "with_shipped", is_flag=True, help="Also benchmark all shipped controllers of the role.")
+@click.option("--set", "settings", multiple=True, metavar="NAME=value", help="Set a parameter of the (only) controller.")
 @click.option(
     "--scenarios",
     multiple=True,
@@ -52,52 +56,190 @@ _PREPARED_FILE = "bench.json"
     "--output-dir", type=click.Path(path_type=Path), default=Path("runs/bench"), show_default=True, help="Folder for the results."
 )
 @click.option("--jobs", type=click.IntRange(min=1), help="Number of scenarios at a time; default: one per processor.")
-@json_option("an object with candidate, role, ranking, scenarios (name, code, seconds, problems, kpis) and notes")
+@json_option(
+    "an object with candidate, role, ranking, scenarios (name, code, seconds, problems, kpis) and notes; of several controllers: "
+    "role, reference and controllers, objects with the same keys, cost (s per step) and cost_ratio"
+)
 def command(
-    controller: str,
+    controllers: tuple[str, ...],
     role: str,
+    with_shipped: bool,
     settings: tuple[str, ...],
     scenarios: tuple[Path, ...],
     output_dir: Path,
     jobs: int | None,
     as_json: bool,
 ) -> int:
-    """Benchmark CONTROLLER in every scenario with its role.
+    """Benchmark each CONTROLLER in every scenario with its role.
 
     CONTROLLER is an FMU, my.py:Class, my.mo:Model or the JSON file of a nested system. It replaces the shipped controller. The
     summary ranks both: the one that meets more checks is above; then the goals of the role decide. --verbose prints tables that
-    compare all KPIs with those of the shipped controller and of the candidate's last run. Exit code 0: all checks passed; 1: a
-    component failed; 2: the controller's variables do not fit the role; 3: a check failed.
+    compare all KPIs with those of the shipped controller and of the candidate's last run.
+
+    Several controllers, or those of --all, are shown side by side: a table here and the page bench.html in the output directory,
+    with the processor time per step of each. Exit code 0: all checks passed; 1: a component failed; 2: the controller's variables
+    do not fit the role; 3: a check failed.
     """
     from ...scenario.settings import parse_settings
-    from ...studies.controller_bench.candidate import parse_source
-    from ...studies.controller_bench.ranking import rank
+    from ...studies.controller_bench.role import read_role
 
-    candidate = parse_source(controller)
+    shipped = [str(path) for path in read_role(role).different_controllers] if with_shipped else []
+    sources = list(dict.fromkeys([*controllers, *shipped]))
+    _check_sources(sources, settings)
     files = list(find_scenario_files(scenarios or [default_folder()]))
     check_unique_names(files)
-    candidate_folder = output_dir / Path(role).stem / candidate.name
-    code = supervision.run_supervised_command(
-        lambda: _write_scenarios(controller, role, files, candidate_folder, parse_settings(settings)),
-        "run",
-        lambda _outcome: None,
-    )
-    if code:
-        return code
-    prepared = json.loads((candidate_folder / _PREPARED_FILE).read_text(encoding="utf-8"))
-    trials = _make_trials(prepared["scenarios"], candidate_folder, output_dir / "shipped")
-    results = []
-    for result in run_trials(trials, jobs or available_processors()):
-        results.append(result)
-        if not as_json:
-            _print_trial(result, candidate.name)
-    ranking = rank([result.kpis for result in results], prepared["goals"])
-    if as_json:
-        _print_json(candidate.name, role, results, prepared["notes"], ranking)
-    else:
-        _print_notes(prepared["notes"])
-        print_ranking(ranking, candidate.name)
-    return min((result.outcome.code for result in results), key=EXIT_CODE_SEVERITY.index)
+    bench = _Bench(role, files, output_dir, jobs or available_processors(), as_json)
+    if len(sources) == 1 and not with_shipped:
+        return bench.run_one(sources[0], parse_settings(settings))
+    return bench.run_all(sources)
+
+
+def _check_sources(sources: Sequence[str], settings: Sequence[str]) -> None:
+    from ...studies.controller_bench.candidate import parse_source
+
+    if not sources:
+        raise click.UsageError("name a CONTROLLER, or --all")
+    if settings and len(sources) > 1:
+        raise click.UsageError("--set needs a single CONTROLLER")
+    names = [parse_source(source).name for source in sources]
+    if repeated := next((name for name in names if names.count(name) > 1), None):
+        raise InputError(f'2 controllers are called "{repeated}": their results would go to one folder')
+
+
+@dataclass(frozen=True)
+class _Trials:
+    """Results of a controller in all scenarios, what its preparation returned, and its ranking against the shipped controller."""
+
+    source: str
+    name: str
+    prepared: Mapping[str, Any]
+    results: Sequence[TrialResult]
+    ranking: Ranking
+
+    @property
+    def exit_code(self) -> int:
+        return min((result.outcome.code for result in self.results), key=EXIT_CODE_SEVERITY.index)
+
+    def as_json(self) -> dict[str, Any]:
+        scenarios = [
+            {
+                "name": result.name,
+                "code": result.outcome.code,
+                "seconds": result.outcome.seconds,
+                "problems": result.outcome.details,
+                "kpis": [_row_as_json(row) for row in result.rows()],
+            }
+            for result in self.results
+        ]
+        summary = {**asdict(self.ranking), "verdict": self.ranking.verdict}
+        return {"candidate": self.name, "ranking": summary, "scenarios": scenarios, "notes": self.prepared["notes"]}
+
+
+class _RefusedError(Exception):
+    """A controller was refused or crashed while it was examined; the child process has printed why."""
+
+    def __init__(self, code: int):
+        super().__init__(code)
+        self.code = code
+
+
+@dataclass(frozen=True)
+class _Bench:
+    """Benchmark of controllers in the scenarios of a role."""
+
+    role: str
+    files: Sequence[Path]
+    output_dir: Path
+    jobs: int
+    as_json: bool
+
+    def run_one(self, source: str, settings: Mapping[str, Any]) -> int:
+        """Benchmark a controller against the shipped one."""
+        try:
+            trials = self._run_trials(source, settings)
+        except _RefusedError as refused:
+            return refused.code
+        if self.as_json:
+            print_json({"role": self.role, **trials.as_json()})
+        else:
+            _print_notes(trials.prepared["notes"])
+            print_ranking(trials.ranking, trials.name)
+        return trials.exit_code
+
+    def run_all(self, sources: Sequence[str]) -> int:
+        """Benchmark several controllers and show them side by side."""
+        from ...studies.controller_bench.page import order, write_bench_page
+
+        everything = []
+        try:
+            for source in sources:
+                if not self.as_json:
+                    click.echo(f"{source}:")
+                everything.append(self._run_trials(source, {}))
+            reference, costs = self._measure_costs(everything)
+        except _RefusedError as refused:
+            return refused.code
+        benched = [_side(trials, cost, costs[0]) for trials, cost in zip(everything, costs[1:], strict=True)]
+        ordered = order(benched)
+        page = self.output_dir / Path(self.role).stem / "bench.html"
+        write_bench_page(self.role, reference, costs[0], ordered, page)
+        if self.as_json:
+            shown = [
+                {**trials.as_json(), "cost": each.cost, "cost_ratio": each.cost_ratio}
+                for trials, each in zip(everything, benched, strict=True)
+            ]
+            print_json({"role": self.role, "reference": reference, "reference_cost": costs[0], "controllers": shown})
+        else:
+            print_side_by_side(ordered, reference)
+            click.echo(f"page: {page}")
+        return min((trials.exit_code for trials in everything), key=EXIT_CODE_SEVERITY.index)
+
+    def _run_trials(self, source: str, settings: Mapping[str, Any]) -> _Trials:
+        from ...studies.controller_bench.candidate import parse_source
+        from ...studies.controller_bench.ranking import rank
+
+        name = parse_source(source).name
+        folder = self.output_dir / Path(self.role).stem / name
+        prepared = _in_child(lambda: _write_scenarios(source, self.role, self.files, folder, settings), folder / _PREPARED_FILE)
+        trials = _make_trials(prepared["scenarios"], folder, self.output_dir / "shipped")
+        results = []
+        for result in run_trials(trials, self.jobs):
+            results.append(result)
+            if not self.as_json:
+                _print_trial(result, name)
+        return _Trials(source, name, prepared, results, rank([result.kpis for result in results], prepared["goals"]))
+
+    def _measure_costs(self, everything: Sequence[_Trials]) -> tuple[str, list[float]]:
+        """Return the name of the reference, its processor time per step (s) and that of each controller, in a child process."""
+        file = self.output_dir / Path(self.role).stem / _COSTS_FILE
+        measured = [(trials.source, trials.prepared["scenarios"][0]) for trials in everything]
+        found = _in_child(lambda: _write_costs(self.role, measured, file), file)
+        return found["reference"], found["costs"]
+
+
+def _in_child(work: Callable[[], int], file: Path) -> Any:
+    """Do work that executes foreign code in a child process; return the content of the JSON file that it writes."""
+    if code := supervision.run_supervised_command(work, "run", lambda _outcome: None):
+        raise _RefusedError(code)
+    return json.loads(file.read_text(encoding="utf-8"))
+
+
+def _write_costs(role_name: str, measured: Sequence[tuple[str, Mapping[str, str]]], file: Path) -> int:
+    from ...results.files import write_json
+    from ...studies.controller_bench.role import read_role
+    from ...studies.controller_bench.step_cost import MeasuredController, measure_step_costs
+
+    reference = str(read_role(role_name).cost_reference or measured[0][0])
+    controllers = [MeasuredController(source, Path(each["file"]), each["component"]) for source, each in measured]
+    write_json({"reference": Path(reference).stem, "costs": measure_step_costs(controllers, reference)}, file)
+    return 0
+
+
+def _side(trials: _Trials, cost: float, reference_cost: float) -> BenchedController:
+    from ...studies.controller_bench.page import BenchedController
+
+    kpis = {result.name: result.kpis for result in trials.results}
+    return BenchedController(trials.name, trials.ranking, kpis, tuple(trials.prepared["goals"]), cost, cost / reference_cost)
 
 
 def _write_scenarios(controller: str, role_name: str, files: Sequence[Path], folder: Path, settings: Mapping[str, Any]) -> int:
@@ -116,7 +258,7 @@ def _write_scenarios(controller: str, role_name: str, files: Sequence[Path], fol
     for file in files:
         substitution = ControllerSubstitution(role, candidate, variables, file, settings)
         if path := substitution.write((folder / "scenarios").absolute()):
-            written.append({"file": path, "original": file})
+            written.append({"file": path, "original": file, "component": substitution.replaced_components[0]})
             notes += [f"{file.stem}: {note}" for note in dict.fromkeys(substitution.notes)]
     if not written:
         raise InputError(f'no scenario has a component with the role "{role.name}": {role.description}')
@@ -150,21 +292,6 @@ def _print_notes(notes: Sequence[str]) -> None:
         is_grouped = len(names) > 1 and current_command_line().verbosity <= 0
         for where in [count_noun(len(names), "scenario")] if is_grouped else names:
             click.echo(f"note: {where}: {text}")
-
-
-def _print_json(candidate: str, role: str, results: Sequence[TrialResult], notes: Sequence[str], ranking: Ranking) -> None:
-    scenarios = [
-        {
-            "name": result.name,
-            "code": result.outcome.code,
-            "seconds": result.outcome.seconds,
-            "problems": result.outcome.details,
-            "kpis": [_row_as_json(row) for row in result.rows()],
-        }
-        for result in results
-    ]
-    summary = {**asdict(ranking), "verdict": ranking.verdict}
-    print_json({"candidate": candidate, "role": role, "ranking": summary, "scenarios": scenarios, "notes": notes})
 
 
 def _row_as_json(row: KpiComparison) -> dict[str, Any]:

@@ -47,7 +47,7 @@ def command(
 
     SCENARIO is a JSON file or the name of a shipped scenario. Each loop is broken at one signal while all other loops remain
     closed. --estimate compares the linear model of one loop with the response of the nonlinear system. Exit code 0: all loops are
-    stable; 3: a loop is unstable.
+    stable; 3: a loop is unstable ("NO"), or its linear model is not valid ("?").
     """
     from ...analysis.loop_margins import loop_margins
     from ...analysis.loop_response import measure_loops
@@ -69,7 +69,7 @@ def command(
         _print_estimate(measured[0], scenario, names, at, estimate, amplitude, parameters)
     if figures:
         _draw(measured, figures)
-    return 0 if all(each.stable for each in found) else 3
+    return 0 if all(each.stable and each.valid for each in found) else 3
 
 
 def _decibels(factor: float) -> str:
@@ -87,7 +87,7 @@ def _print_margins(found: Sequence[LoopMargins]) -> None:
             f"{each.delay:.4g}" if each.delay < math.inf else "any",
             f"{each.disk:.3f}",
             f"{each.crossover:.4g}" if each.crossover == each.crossover else "",
-            "yes" if each.stable else "NO",
+            "?" if not each.valid else "yes" if each.stable else "NO",
         ]
         for each in found
     ]

@@ -94,4 +94,6 @@ def _print_trim(found: Trim, output: Path | None) -> None:
     print_table(["signal", "residual"], [[name, f"{value:.2g}"] for name, value in found.residuals.items()])
     if not found.is_found:
         click.echo(f"no equilibrium: the residual of {found.largest} is {found.residuals[found.largest]:.3g}", err=True)
+    for name in found.without_effect:
+        click.echo(f"NOTE {name} changes no residual", err=True)
     click.echo(f"\n{count_noun(found.evaluations, 'evaluation')}" + (f"; values in {output}" if output else ""))

@@ -9,6 +9,7 @@ from functools import cached_property
 from hashlib import file_digest
 from pathlib import Path
 from typing import Any
+from zlib import crc32
 
 from ...core.errors import InputError
 from ...process.journal import suspending_deadline
@@ -29,6 +30,9 @@ from .preflight import (
 )
 from .preflight.binary import can_be_compiled
 from .preflight.fmu_platform import current_platform
+
+#: files that `cosim build` copies into an FMU
+_SOURCE_SUFFIXES = (".py", ".mo", ".c", ".h")
 
 
 @dataclass(frozen=True)
@@ -121,6 +125,17 @@ class FmuFile:
             return ""
         more = f", and {len(found) - 1} more" if len(found) > 1 else ""
         return f'"{self.path}": {found[0]}{more}; `cosim validate` lists all findings'
+
+    def changed_sources(self) -> list[str]:
+        """Return the names of the sources beside the FMU that differ from the copies that `cosim build` put into it."""
+        beside = sorted(path for path in self.path.parent.glob("*.*") if path.suffix in _SOURCE_SUFFIXES and path.is_file())
+        return [path.name for path in beside if self._differs(path)]
+
+    def _differs(self, source: Path) -> bool:
+        """Return whether the FMU contains files with the name of a source, but none with its content."""
+        names = (f"resources/{source.name}", f"sources/{source.name}")
+        copies = [self.examination.members[name] for name in names if name in self.examination.members]
+        return bool(copies) and crc32(source.read_bytes()) not in copies
 
     @cached_property
     def sha256(self) -> str:

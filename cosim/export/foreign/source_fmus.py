@@ -20,7 +20,7 @@ from ...components.fmi.preflight.archive import Archive
 from ...components.fmi.preflight.findings import DESCRIPTION_FILE, FatalFindingError
 from ...components.fmi.preflight.fmu_platform import current_platform
 from ...components.fmi.preflight.xml import parse_xml
-from ...core.errors import InputError, Problem, did_you_mean
+from ...core.errors import InputError, did_you_mean
 from ..cache import cached_file
 from ..fmu.archive import write_archive
 from ..fmu.compiler import compiler_version, find_compiler
@@ -37,7 +37,8 @@ _RECIPE = 2
 _WINDOWS_HEADERS = {"minmax.h": "#define max(a, b) ((a) > (b) ? (a) : (b))\n#define min(a, b) ((a) < (b) ? (a) : (b))\n"}
 #: headers of FMI 1.0, which FMPy does not contain
 _FMI1_HEADERS = ("fmiFunctions.h", "fmiModelFunctions.h", "fmiPlatformTypes.h", "fmiModelTypes.h")
-_MAX_ERRORS = 5
+#: words of the compiler's lines that state a cause
+_ERROR_WORDS = ("error:", "Error:", "undefined reference", "multiple definition", "syntax error")
 
 
 @dataclass(frozen=True, slots=True)
@@ -116,7 +117,7 @@ def _compile_library(file: FmuFile, compiler: Sequence[str], configuration: _Con
     folders = [*(sources / name for name in ("", *configuration.include_folders)), headers, sources.parent]
     options = [*_OPTIONS, *(f"-D{text}" for text in configuration.definitions), *(f"-I{folder}" for folder in folders)]
     linker_options = ["-Wl,--no-undefined"] if sys.platform == "linux" else []
-    files = [str(sources / name) for name in configuration.files]
+    files = [str(sources / name) for name in configuration.files]  # absolute: no name is an option
     process = subprocess.run(  # noqa: S603 - the compiler of the user
         [*command, *options, *linker_options, "-o", str(library), *files, "-lm"],
         cwd=sources,
@@ -127,10 +128,9 @@ def _compile_library(file: FmuFile, compiler: Sequence[str], configuration: _Con
     )
     if process.returncode:
         lines = [line.replace(f"{sources}/", "") for line in process.stderr.splitlines()]
-        errors = [line for line in lines if ("error:" in line and "ld returned" not in line) or "undefined reference" in line]
-        raise InputError(
-            Problem(f'the sources of "{file.path}" cannot be compiled: {line}') for line in (errors or lines[-1:])[:_MAX_ERRORS]
-        )
+        errors = [line for line in lines if any(words in line for words in _ERROR_WORDS) and "ld returned" not in line]
+        more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
+        raise InputError(f'the sources of "{file.path}" cannot be compiled: {(errors or lines[-1:] or ["no reason"])[0]}{more}')
 
 
 def _read_configurations(file: FmuFile, members: Mapping[str, bytes]) -> list[_Configuration]:
@@ -150,7 +150,8 @@ def _read_configurations(file: FmuFile, members: Mapping[str, bytes]) -> list[_C
                 text = f'"{file.path}": its source file "{name}" does not exist{did_you_mean(name, sources)}'
                 raise InputError(text)
         if not configuration.files:
-            raise InputError(f'"{file.path}": names no source files')
+            others = sorted({PurePosixPath(name).suffix for name in sources} - {""})
+            raise InputError(f'"{file.path}": names no source files, and found no C files; found: {", ".join(others)}')
     return configurations
 
 

@@ -10,6 +10,7 @@ Each role is a JSON file; the shipped ones are in scenarios/roles/. Paths in it 
      "outputs": {"thrust": "N", "rotor_speed[1]": "rad/s"},
      "parameters": {"speed_command": "m/s"},
      "goals": ["waypoints.reached", "waypoints.time*"],                         KPIs that rank controllers, the first one first
+     "cost_reference": "../../fmus/ar_drone_geometric.fmu",                     costs per step are ratios to that of this FMU
      "stand_ins": {"../../fmus/strider_autopilot.fmu": "../systems/strider_autopilot.json"}}
 
 A controller declares the inputs and parameters that it uses; it must have all outputs. A parameter without an index stands for
@@ -46,6 +47,7 @@ class RoleSpec(Spec):
     inputs: dict[str, str | OutputsSpec]
     outputs: dict[str, str]
     goals: list[str] = []
+    cost_reference: str | None = None
     parameters: dict[str, str] = {}
     stand_ins: dict[str, str] = {}
 
@@ -62,8 +64,15 @@ class Role:
     #: patterns of the KPI values that rank controllers, the most important first; "*" matches any text
     goals: tuple[str, ...]
     #: resolved paths of the shipped controllers, and of nested systems by the path of the file that they replace
-    controllers: frozenset[Path]
+    controllers: tuple[Path, ...]
     stand_ins: dict[Path, Path]
+    #: costs per step are ratios to that of this FMU; None: to that of the first controller
+    cost_reference: Path | None
+
+    @property
+    def different_controllers(self) -> list[Path]:
+        """First shipped controller of each name: without the FMI 3.0, Python and nested versions of the same controller."""
+        return list({path.stem: path for path in reversed(self.controllers)}.values())[::-1]
 
 
 def read_role(role: str) -> Role:
@@ -84,8 +93,9 @@ def read_role(role: str) -> Role:
         {name: _parse_unit(unit) for name, unit in spec.outputs.items()},
         {name: _parse_unit(unit) for name, unit in spec.parameters.items()},
         tuple(spec.goals),
-        frozenset((folder / path).resolve() for path in spec.controllers),
+        tuple((folder / path).resolve() for path in spec.controllers),
         {(folder / path).resolve(): (folder / system).resolve() for path, system in spec.stand_ins.items()},
+        (folder / spec.cost_reference).resolve() if spec.cost_reference else None,
     )
 
 

@@ -10,6 +10,7 @@ from typing import Any
 from ...core.version import __version__
 from ...report.figures import figure_to_svg, save_figure
 from ...report.pages import render_page, safe_markup
+from ...report.tables import format_number
 from ...results.checks import evaluate_checks
 from ...results.files import remove_files, writing_atomically
 from ..design import Design
@@ -54,7 +55,7 @@ def write_sweep_page(sweep: Sweep, summary: SweepSummary, maps: Sequence[Success
         maps=[_write_map(sweep, each, folder) for each in maps],
         commands=[cell for cell in cells if cell["link"].startswith(PAGE_FILE)],
         replays=[cell for cell in cells if not cell["link"].startswith(PAGE_FILE)],
-        kpis=list(overall.statistics()) if overall else [],
+        kpis=[(name, _shown_numbers(numbers)) for name, numbers in overall.statistics()] if overall else [],
         version=__version__,
         file=sweep.study_file.document.file,
     )
@@ -66,6 +67,11 @@ def _criterion(check: Mapping[str, Any]) -> tuple[str, str]:
     """Return a criterion as (KPI, limits)."""
     (outcome,) = evaluate_checks({check["kpi"]: 0.0}, [check])
     return check["kpi"], outcome.limits
+
+
+def _shown_numbers(numbers: Mapping[str, float]) -> dict[str, str]:
+    """Return the statistics of a KPI as texts, "-" without a value."""
+    return {name: format_number(value) for name, value in numbers.items()}
 
 
 def _design_rows(sweep: Sweep) -> Iterator[tuple[str, str]]:

@@ -46,7 +46,7 @@ def test_a_planar_deck_carries_a_vehicle_heavier_than_its_vessel() -> None:
 def test_it_takes_off_again(model: str) -> None:
     trial = dropped(model)
     count = len(trial["uav.rotor_speed"])
-    trial["uav.rotor_speed"] = [1.05 * {"crazyflie": 1516.0, "survey_hexacopter": 387.0}[model]] * count
+    trial["uav.rotor_speed"] = [1.05 * {"crazyflie": 1728.0, "survey_hexacopter": 387.0}[model]] * count
     trial.step(100)
     assert not trial["uav.contact.touching"]
     assert trial["uav.position.z"] > PLATFORM_TOP - FEET[model] + 0.2

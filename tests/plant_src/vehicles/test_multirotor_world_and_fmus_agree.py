@@ -15,7 +15,7 @@ import cosim
 from cosim.core import resources
 
 ROTORS = {"ar_drone": 4, "crazyflie": 4, "survey_hexacopter": 6}
-HOVER = {"ar_drone": 345.0, "crazyflie": 1516.0, "survey_hexacopter": 387.0}
+HOVER = {"ar_drone": 345.0, "crazyflie": 1728.0, "survey_hexacopter": 387.0}
 WIND = (3.0, -2.0, 0.5)
 EFFECTS = {
     "rotor_time_constant": 0.04,

@@ -59,6 +59,16 @@ def test_a_shipped_controller_can_replace_itself_in_a_scenario(name, tmp_path):
         prepared.free()
 
 
+def test_a_controller_with_only_the_variables_of_the_role_is_accepted_for_a_fleet(tmp_path):
+    (tmp_path / "bare.py").write_text(BARE)
+    candidate = parse_source(f"{tmp_path / 'bare.py'}:Bare")
+    scenario = ROOT / "scenarios/fleet_survey.json"
+    path = ControllerSubstitution(read_role("uav_controller"), candidate, read_interface(candidate), scenario).write(
+        tmp_path / "new"
+    )
+    load(path).free()
+
+
 def test_a_scenario_without_the_role_is_not_written(tmp_path):
     role = read_role("vessel_autopilot")
     candidate = parse_source(str(min(role.controllers)))

@@ -5,6 +5,7 @@ from html.parser import HTMLParser
 
 import pytest
 from lag_project import SEGV_ORDER
+from page_probes import LOW_CONTRAST
 
 from cosim.studies.summary.page import _design_rows
 from cosim.studies.sweep import Sweep
@@ -71,6 +72,17 @@ def test_maps_are_written_as_png_and_svg(results):
 def test_the_page_has_no_scripts_and_no_external_links(page):
     assert "script" not in page.tags
     assert all(link.startswith(("#", "sweep.html#", "data:")) for link in page.links), page.links
+
+
+def test_a_phone_shows_names_on_one_line_and_scrolls_only_tables_and_maps(chromium, page, results):
+    assert page.tags  # before the second call replaces the page
+    context = chromium.new_context(viewport={"width": 360, "height": 740})
+    opened = context.new_page()
+    opened.goto((results / "sweep.html").as_uri())
+    assert opened.evaluate("document.documentElement.scrollWidth") == 360
+    assert max(opened.evaluate("[...document.querySelectorAll('.scroll td.name')].map((cell) => cell.clientHeight)")) < 50
+    assert opened.evaluate(LOW_CONTRAST) == []
+    context.close()
 
 
 def test_cells_link_to_the_command_that_repeats_a_run(page):

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 from io import BufferedReader
@@ -70,14 +70,14 @@ class Examination:
 
     Attributes:
         file_identity: Device, inode, size and modification time, to detect that the file is changed later.
-        members: Names of the members of the archive.
+        members: CRC-32 of each member of the archive, by name.
         model: Model description, None if it cannot be read.
         findings: Findings that do not depend on the platform.
         binary_findings: Findings about the binary for this platform, by interface.
     """
 
     file_identity: tuple[int, ...] = ()
-    members: Sequence[str] = ()
+    members: Mapping[str, int] = field(default_factory=dict)
     model: ModelDescription | None = None
     findings: list[Finding] = field(default_factory=list)
     binary_findings: dict[Interface, list[Finding]] = field(default_factory=dict)
@@ -113,7 +113,7 @@ def _examine_archive(archive: Archive, limits: PreflightLimits, result: Examinat
     result.findings += archive.findings
     if _has_errors(archive.findings):
         return
-    result.members = list(archive.members)
+    result.members = {name: entry.crc for name, entry in archive.members.items()}
     if DESCRIPTION_FILE not in archive.members:
         raise FatalFindingError(MISSING(f"there is no member '{DESCRIPTION_FILE}' in the archive"))
     root = parse_xml(archive.read(DESCRIPTION_FILE), DESCRIPTION_FILE, limits)

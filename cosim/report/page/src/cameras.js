@@ -48,22 +48,31 @@ export class Cameras {
 
   /** Distance from which all bodies are visible. */
   #fitting() {
-    const narrow = Math.min(1, this.camera.aspect);
-    return MathUtils.clamp((0.36 * this.size) / this.#tangent / narrow, 2.5, 350);
+    return MathUtils.clamp((0.36 * this.size) / this.#tangent / this.#width, 2.5, 350);
   }
 
   /** Distance from which a sphere of vehicles, which lie beside each other rather than above, fills the picture. */
   #around({ radius }) {
-    return MathUtils.clamp((1.15 * radius) / this.#tangent / MathUtils.clamp(this.camera.aspect, 0.5, 1.7), 2, 350);
+    return MathUtils.clamp((1.15 * radius) / this.#tangent / this.#width, 2, 350);
+  }
+
+  /** The part of the picture's width over its height that counts for the distance in this mode. */
+  get #width() {
+    const { aspect } = this.camera;
+    return { group: MathUtils.clamp(aspect, 0.5, 1.7), orbit: Math.min(1, aspect), top: Math.min(1, aspect) }[this.mode] ?? 1;
   }
 
   get #tangent() {
     return Math.tan(MathUtils.degToRad(this.camera.fov / 2));
   }
 
+  /** Set the size of the picture; the camera keeps as much of the scene in it. */
   resize(width, height) {
+    const before = this.#width;
     this.camera.aspect = width / height;
     this.camera.updateProjectionMatrix();
+    const { target } = this.controls;
+    this.camera.position.sub(target).multiplyScalar(before / this.#width).add(target);
   }
 
   /** Move with the subject or the group, or with the body that the camera is mounted on. */

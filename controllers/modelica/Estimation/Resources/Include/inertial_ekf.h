@@ -89,12 +89,13 @@ static void ekf_predict(EkfState *s, double h, const double *rates, const double
     }
 }
 
-/* Corrects the state by a scalar residual whose row has the entries `slope` at the three indices `at`. */
-static void ekf_correct(EkfState *s, const int at[3], const double slope[3], double residual, double deviation)
+/* Corrects the state by a scalar residual with the row `slope` of the measurement matrix. */
+static void ekf_correct(EkfState *s, const double slope[EKF_SIZE], double residual, double deviation)
 {
-    double row[EKF_SIZE], d[EKF_SIZE], rotation[4], total = deviation * deviation;
-    for (int j = 0; j < EKF_SIZE; j++) row[j] = slope[0] * s->P[at[0]][j] + slope[1] * s->P[at[1]][j] + slope[2] * s->P[at[2]][j];
-    for (int j = 0; j < 3; j++) total += slope[j] * row[at[j]];
+    double row[EKF_SIZE] = {0}, d[EKF_SIZE], rotation[4], total = deviation * deviation;
+    for (int i = 0; i < EKF_SIZE; i++)
+        for (int j = 0; slope[i] != 0 && j < EKF_SIZE; j++) row[j] += slope[i] * s->P[i][j];
+    for (int j = 0; j < EKF_SIZE; j++) total += slope[j] * row[j];
     for (int j = 0; j < EKF_SIZE; j++) {
         d[j] = row[j] * residual / total;
         for (int l = 0; l < EKF_SIZE; l++) s->P[j][l] -= row[j] * row[l] / total;
@@ -107,27 +108,35 @@ static void ekf_correct(EkfState *s, const int at[3], const double slope[3], dou
     ekf_product(s->q, rotation, s->q);
 }
 
-/* Corrects by a position and a velocity of age `delay` (s) along the axis i. */
+/* Corrects by a position and a velocity of age `delay` (s) along the axis i. Errors of the attitude and of the accelerometer bias
+   change the acceleration, and with it the velocity at the time of the sample. */
 static void ekf_correct_by_fix(EkfState *s, int i, double position, double velocity, double delay, const double *noise)
 {
-    const int at[3] = {EKF_POSITION + i, EKF_VELOCITY + i, 0};
-    const double place[3] = {1, -delay, 0}, speed[3] = {0, 1, 0};
-    double a = s->specific_force[i] - (i == 2 ? EKF_GRAVITY : 0);
-    ekf_correct(s, at, place, position - s->position[i] + delay * (s->velocity[i] - delay / 2 * a), noise[i / 2]);
-    ekf_correct(s, at, speed, velocity - s->velocity[i] + delay * a, noise[2]);
+    const int j = (i + 1) % 3, l = (i + 2) % 3;
+    double place[EKF_SIZE] = {0}, speed[EKF_SIZE] = {0}, R[3][3], a = s->specific_force[i] - (i == 2 ? EKF_GRAVITY : 0);
+    ekf_rotation(s->q, R);
+    place[EKF_POSITION + i] = speed[EKF_VELOCITY + i] = 1;
+    place[EKF_VELOCITY + i] = -delay;
+    for (int k = 0; k < 3; k++) {
+        speed[EKF_ATTITUDE + k] = delay * (s->specific_force[j] * R[l][k] - s->specific_force[l] * R[j][k]);
+        speed[EKF_FORCE + k] = delay * R[i][k];
+    }
+    for (int k = EKF_ATTITUDE; k < EKF_SIZE; k++) place[k] = -delay / 2 * speed[k];
+    ekf_correct(s, place, position - s->position[i] + delay * (s->velocity[i] - delay / 2 * a), noise[i / 2]);
+    a = s->specific_force[i] - (i == 2 ? EKF_GRAVITY : 0);
+    ekf_correct(s, speed, velocity - s->velocity[i] + delay * a, noise[2]);
 }
 
 /* Corrects by a magnetic field (body axes). earth: heading of its horizontal part in the world (rad, counter-clockwise from east)
    and its dip below the horizontal (rad). Where the field dips, the heading that it shows depends on roll and pitch. */
 static void ekf_correct_by_field(EkfState *s, const double *field, const double *earth, double deviation)
 {
-    const int at[3] = {EKF_ATTITUDE, EKF_ATTITUDE + 1, EKF_ATTITUDE + 2};
     const double turning[3] = {cos(earth[0]) * tan(earth[1]), sin(earth[0]) * tan(earth[1]), 1};
-    double R[3][3], B[2], slope[3];
+    double R[3][3], B[2], slope[EKF_SIZE] = {0};
     ekf_rotation(s->q, R);
-    for (int i = 0; i < 3; i++) slope[i] = R[0][i] * turning[0] + R[1][i] * turning[1] + R[2][i] * turning[2];
+    for (int i = 0; i < 3; i++) slope[EKF_ATTITUDE + i] = R[0][i] * turning[0] + R[1][i] * turning[1] + R[2][i] * turning[2];
     for (int i = 0; i < 2; i++) B[i] = R[i][0] * field[0] + R[i][1] * field[1] + R[i][2] * field[2];
-    ekf_correct(s, at, slope, remainder(earth[0] - atan2(B[1], B[0]), 2 * 3.14159265358979323846), deviation);
+    ekf_correct(s, slope, remainder(earth[0] - atan2(B[1], B[0]), 2 * 3.14159265358979323846), deviation);
 }
 
 /* Starts level, at the first fix, with the heading of the field. deviation: standard deviations of roll and pitch and of both

@@ -1,0 +1,84 @@
+"""Controllers of a role side by side: their order, and the page `bench.html`."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Any
+
+from ...core.version import __version__
+from ...report.pages import render_page
+from ...report.tables import format_number
+from ...results.checks import evaluate_all_checks
+from ...results.files import writing_atomically
+from .ranking import Ranking, ScenarioKpis
+
+
+@dataclass(frozen=True)
+class BenchedController:
+    """Controller, its ranking against the shipped one, and its costs.
+
+    Attributes:
+        name: name of the controller.
+        ranking: its ranking.
+        scenarios: its KPIs by the name of the scenario.
+        goals: patterns of the KPI values that its role is for, the most important first.
+        cost: processor time per step (s).
+        cost_ratio: ratio of `cost` to that of the reference.
+    """
+
+    name: str
+    ranking: Ranking
+    scenarios: Mapping[str, ScenarioKpis]
+    goals: Sequence[str]
+    cost: float
+    cost_ratio: float
+
+
+def order(controllers: Sequence[BenchedController]) -> list[BenchedController]:
+    """Return the controllers by checks met, then scenarios passed, then goals; the best first."""
+
+    def key(each: BenchedController) -> list[int]:
+        goals = [counts["better"] - counts["worse"] for counts in each.ranking.goals.values()]
+        return [each.ranking.candidate.met, each.ranking.candidate.passed, *goals]
+
+    return sorted(controllers, key=key, reverse=True)
+
+
+def write_bench_page(
+    role: str, reference: str, reference_cost: float, controllers: Sequence[BenchedController], path: Path
+) -> None:
+    """Write a page with ranks, costs per step, and the checked KPIs and goals in every scenario, a column per controller."""
+    text = render_page(
+        "bench.html",
+        role=Path(role).stem,
+        reference=reference,
+        reference_cost=1e6 * reference_cost,
+        controllers=controllers,
+        scenarios=[(name, list(_kpi_rows(name, controllers))) for name in controllers[0].scenarios],
+        version=__version__,
+    )
+    with writing_atomically(path) as temporary:
+        temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def _kpi_rows(scenario: str, controllers: Sequence[BenchedController]) -> Iterator[tuple[str, str, list[dict[str, Any]]]]:
+    """Yield the name, the unit and the cells of each KPI that is checked or a goal."""
+    runs = [each.scenarios[scenario] for each in controllers]
+    checked = {check["kpi"] for run in runs for check in run.checks}
+    found = [run.candidate for run in runs if run.candidate]
+    names = dict.fromkeys(name for run in found for name in run.kpis)
+    for name in names:
+        if name in checked or any(fnmatchcase(name, goal) for goal in controllers[0].goals):
+            unit = next((run.units[name] for run in found if name in run.units), "")
+            yield name, unit, [_cell(name, run) for run in runs]
+
+
+def _cell(name: str, run: ScenarioKpis) -> dict[str, Any]:
+    if run.candidate is None or name not in run.candidate.kpis:
+        return {"text": "", "failed": run.candidate is None, "limits": ""}
+    outcomes = evaluate_all_checks(run.candidate.kpis, [check for check in run.checks if check["kpi"] == name])
+    failed = [outcome.limits for outcome in outcomes if not outcome.passed]
+    return {"text": format_number(run.candidate.kpis[name]), "failed": bool(failed), "limits": ", ".join(failed)}

@@ -1,0 +1,156 @@
+"""Models compared with measured vehicles; tests/support/validation_against_measurements.md describes the measurements."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+from world_harness import WorldHarness
+
+from plant_src.catalogue import MODELS
+
+AR_DRONE, BLUEBOAT, BLUEROV, CRAZYFLIE = "AR.Drone 2.0 in flight", "BlueBoat", "BlueROV2 Heavy", "Crazyflie 2.1"
+CYBERSHIP, HERON, OTTER = "CyberShip II", "Heron", "Otter at sea"
+RUNS, BENDERS = "runs of a BlueBoat, 2024", "flight data, Benders 2020"
+GRAVITY = 9.81
+
+
+def vessel(model: str, **settings: object) -> WorldHarness:
+    return WorldHarness({"usv": {"model": model, "position": [0, 0], **settings}})
+
+
+def speed(trial: WorldHarness) -> float:
+    return float(np.hypot(*trial.vector("usv.velocity_body", "uv")))
+
+
+def run(
+    trial: WorldHarness, commands: list[float], duration: float, value: Callable[[WorldHarness], float] = speed
+) -> np.ndarray:
+    """Return a value of every step (10 ms) while the propellers have these commands (rad/s)."""
+    trial["usv.propeller_speed"] = commands
+    return np.array([value(trial.step()) for _ in range(round(100 * duration))])
+
+
+def time_between(speeds: np.ndarray, first: float, second: float) -> float:
+    """Return the time (s) from the first sample beyond the first speed to that beyond the second one."""
+    sign = np.sign(second - first)
+    return 0.01 * float(np.argmax(sign * speeds > sign * second) - np.argmax(sign * speeds > sign * first))
+
+
+def vertical_acceleration(model: str, mass: float, rotor_speed: float) -> float:
+    """Return the acceleration (m/s2) of a level multirotor at rest in the first step."""
+    parameters = {"mass": mass, "initial_rotor_speed": rotor_speed}
+    trial = WorldHarness({"uav": {"model": model, "position": [0, 0, 50], "parameters": parameters}})
+    trial["uav.rotor_speed"] = [rotor_speed] * 4
+    return float(trial.step()["uav.velocity.z"]) / 0.01
+
+
+def rotor_thrust(model: str, mass: float, rotor_speed: float) -> float:
+    return mass * (GRAVITY + vertical_acceleration(model, mass, rotor_speed)) / 4
+
+
+@pytest.mark.parametrize(("mass", "pwm"), [(0.481, 169.06), (0.497, 172.91)])
+def test_ar_drone_hovers_with_the_measured_rotor_speed(measured, mass: float, pwm: float) -> None:
+    thrust, weight = rotor_thrust("ar_drone", mass, 1.451 * pwm + 130.9), mass * GRAVITY / 4
+    measured(AR_DRONE, "thrust of a rotor, hover", thrust, weight, "N", BENDERS, relative=0.02, case=f"{mass} kg")
+
+
+def test_ar_drone_thrust_lies_between_two_test_benches(measured) -> None:
+    thrust = rotor_thrust("ar_drone", 0.481, 376.2)
+    delft = np.polyval([8.386e-6, -3.723e-5, -0.03818], 376.2)
+    eindhoven = 9.36e-6 * 376.2**2
+    assert delft < thrust < eindhoven
+    measured(AR_DRONE, "thrust at 376 rad/s, test bench in Delft", thrust, delft, "N", BENDERS, relative=0.05)
+    measured(AR_DRONE, "thrust at 376 rad/s, test bench in Eindhoven", thrust, eindhoven, "N", BENDERS, relative=0.15)
+
+
+#: signs of the changes of the four rotors (front, left, rear, right arm) and axis; the hull points between front and right arm
+HULL_AXES = {"roll": ([1, 1, -1, -1], [1, -1, 0]), "pitch": ([1, -1, -1, 1], [1, 1, 0]), "yaw": ([-1, 1, -1, 1], [0, 0, 1])}
+
+
+@pytest.mark.parametrize(("name", "expected"), [("roll", 3.85e-4), ("pitch", 4.15e-4), ("yaw", 3.35e-5)])
+def test_ar_drone_angular_acceleration(measured, name: str, expected: float) -> None:
+    signs, axis = np.array(HULL_AXES[name][0]), np.array(HULL_AXES[name][1])
+    rates = []
+    for change in (100.0, -100.0):
+        trial = WorldHarness({"uav": {"model": "ar_drone", "position": [0, 0, 50], "parameters": {"initial_rotor_speed": 363.0}}})
+        trial["uav.rotor_speed"] = np.sqrt(363.0**2 + change * signs).tolist()
+        rates.append(trial.step().vector("uav.rates", "pqr"))
+    acceleration = abs((rates[0] - rates[1]) @ axis / np.linalg.norm(axis)) / 0.01 / 800.0
+    measured(
+        AR_DRONE, "angular acceleration over difference of squared speeds", acceleration, expected, "rad", BENDERS,
+        relative=0.6, case=name,
+    )  # fmt: skip
+
+
+def test_blueboat_runs_straight(measured) -> None:
+    trial = vessel("blueboat")
+    speeds = run(trial, [320.0, 320.0], 15)
+    measured(BLUEBOAT, "speed at full power ahead (identified)", speeds[-1], 3.07, "m/s", RUNS, relative=0.02)
+    measured(BLUEBOAT, "acceleration from 0.8 to 2.5 m/s", time_between(speeds, 0.8, 2.5), 0.69, "s", RUNS, relative=0.1)
+    speeds = run(trial, [0.0, 0.0], 12)
+    measured(BLUEBOAT, "coasting from 1.3 to 0.7 m/s", time_between(speeds, 1.3, 0.7), 1.93, "s", RUNS, relative=0.2)
+    measured(BLUEBOAT, "coasting from 1.3 to 0.5 m/s", time_between(speeds, 1.3, 0.5), 3.6, "s", RUNS, relative=0.2)
+    astern = run(vessel("blueboat"), [-320.0, -320.0], 15)
+    measured(BLUEBOAT, "speed at full power astern (identified)", astern[-1], 2.28, "m/s", RUNS, relative=0.02)
+
+
+def test_blueboat_turns(measured) -> None:
+    trial = vessel("blueboat")
+    speeds = run(trial, [0.0, 320.0], 20)
+    measured(BLUEBOAT, "speed with one thruster", speeds[-1], 2.07, "m/s", RUNS, relative=0.1)
+    measured(BLUEBOAT, "yaw rate with one thruster (identified)", trial["usv.rates.r"], 0.208, "rad/s", RUNS, relative=0.05)
+    trial = vessel("blueboat")
+    boat = MODELS["blueboat"].boat
+    assert boat is not None
+    propeller = boat.propellers[0]
+    ahead = 320.0 * (propeller.reverse_thrust_coefficient / propeller.thrust_coefficient) ** 0.5
+    run(trial, [-320.0, ahead], 10)
+    measured(BLUEBOAT, "yaw rate with opposed thrusters (identified)", trial["usv.rates.r"], 0.89, "rad/s", RUNS, relative=0.05)
+    rates = run(trial, [0.0, 0.0], 1, lambda trial: trial["usv.rates.r"])
+    decay = np.log(rates[49] / rates[99]) / 0.5
+    measured(BLUEBOAT, "decay of the yaw rate (identified)", decay, 1.73, "1/s", RUNS, relative=0.1)
+
+
+@pytest.mark.parametrize(("sense", "expected"), [("ahead", 36.4), ("astern", -28.6)])
+def test_bluerov_thrust(measured, sense: str, expected: float) -> None:
+    """Thrust from the surge acceleration in the first step, with four horizontal thrusters at 45 degrees."""
+    rov = {"model": "bluerov2_heavy", "position": [0, 0, -10], "parameters": {"thruster_time_constant": 0.0}}
+    trial = WorldHarness({"rov": rov})
+    trial["rov.thruster_speed"] = [*(np.sign(expected) * np.array([283.0, 283.0, -283.0, -283.0])), 0, 0, 0, 0]
+    thrust = float(trial.step()["rov.velocity_body.u"]) / 0.01 * (13.5 + 6.36) / (4 * 0.5**0.5)
+    measured(BLUEROV, "largest thrust of a thruster", thrust, expected, "N", "T200 at 12 V, maker", relative=0.2, case=sense)
+
+
+@pytest.mark.parametrize(("turns", "grams"), [(10885, 10.9), (14691, 21.0), (17174, 28.6), (20539, 41.7), (23882, 57.9)])
+def test_crazyflie_thrust(measured, turns: int, grams: float) -> None:
+    thrust, expected = 4 * rotor_thrust("crazyflie", 0.027, turns * np.pi / 30), grams * 9.80665e-3
+    measured(CRAZYFLIE, "thrust of all rotors", thrust, expected, "N", "Bitcraze 2015", relative=0.1, case=f"{turns} 1/min")
+
+
+@pytest.mark.parametrize("angle", [10, 20, 30])
+def test_cybership_turns_by_its_rudders(measured, angle: int) -> None:
+    """Yaw acceleration at 0.5 m/s without thrust, from the inertia matrix and the identified lift."""
+    delta, u, lever = np.radians(angle), 0.5, 0.549
+    inertia = np.array([[33.8, 23.8 * 0.046], [23.8 * 0.046, 2.76]])
+    lift = 2 * (6.43306 * delta - 5.83594 * delta**2) * u**2  # of both rudders
+    expected = np.linalg.solve(inertia, [lift, -lever * lift])[1]
+    trial = vessel("cybership2", velocity_body=[u, 0, 0])
+    trial["usv.rudder_angle"] = [delta, delta]
+    acceleration = float(trial.step()["usv.rates.r"]) / 0.01
+    measured(
+        CYBERSHIP, "yaw acceleration by the rudders at 0.5 m/s", acceleration, expected, "rad/s2", "Skjetne et al. 2004",
+        relative=0.1, case=f"{angle} degrees",
+    )  # fmt: skip
+
+
+def test_heron_top_speed(measured) -> None:
+    top = run(vessel("heron"), [100.0, 100.0], 20)[-1]
+    measured(HERON, "speed at full power", top, 1.7, "m/s", "maker", relative=0.15)
+
+
+def test_otter_top_speed(measured) -> None:
+    trial = vessel("otter")
+    trial["usv.propeller_speed"] = [103.93, 103.93]
+    measured(OTTER, "speed at full power (identified)", speed(trial.step(3000)), 6 * 0.5144, "m/s", "maker", relative=0.01)
