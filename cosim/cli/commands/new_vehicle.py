@@ -57,7 +57,7 @@ def command(name: str, base: str, directory: Path, urdf: Path | None, mesh: Path
         shutil.copyfile(source, file)
     family = parse_object(file.read_text(encoding="utf-8")).get("family")
     setting = f"/components/plant/arguments/vehicles/uav/model={file}"
-    demo = f"Fly Demo 1 with it:\n  cosim run demo1_box --set {shlex.quote(setting)}\n"
+    demo = f"Fly Demo 1 (controllers of the AR.Drone) with it:\n  cosim run demo1_box --set {shlex.quote(setting)}\n"
     if family != "multirotor":
         demo = f'Name it in a scenario, as a vehicle of the plant:\n  {{"model": "{file}", ...}}\n'
     click.echo(
