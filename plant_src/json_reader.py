@@ -27,8 +27,10 @@ class JsonReader:
         self.problems: list[Problem] = []
 
     def add_problem(self, path: JsonPath, text: str) -> None:
-        """Record a problem of the value at `path`."""
-        self.problems.append(Problem(text, ".".join(path), ("arguments", *path)))
+        """Record a problem of the value at `path`, once."""
+        problem = Problem(text, ".".join(path), ("arguments", *path))
+        if problem not in self.problems:
+            self.problems.append(problem)
 
     def read_named_objects(self, value: Any, path: JsonPath) -> Mapping[str, Any]:
         """Read an object whose keys become parts of variable names."""

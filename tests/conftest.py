@@ -1,6 +1,7 @@
 """Fixtures of all tests."""
 
 import gc
+import signal
 from pathlib import Path
 
 import pytest
@@ -21,6 +22,8 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
+    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in the background of a script; commands would inherit it
+        signal.signal(signal.SIGINT, signal.default_int_handler)
     target = config.getoption("--validation")
     if target and not hasattr(config, "workerinput"):
         config.pluginmanager.register(ValidationReport(Path(target)))

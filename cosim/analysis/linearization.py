@@ -76,7 +76,7 @@ def linearize(
         experiment.choose(channels, names, active)
         responses = measure_impulse_responses(experiment, len(channels))
     held = responses.outputs[1:]
-    realization = realize(held if continuous else responses.outputs, order)
+    realization = realize(held if continuous else responses.outputs, order, responses.variation)
     notes = _notes(realization, held if continuous else responses.outputs, responses)
     if continuous:
         realization = to_continuous(realization, experiment.step)

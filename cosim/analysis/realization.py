@@ -14,6 +14,8 @@ import numpy as np
 _TOLERANCES = 10.0 ** -np.arange(8, 2, -1)
 #: factor by which the misfit of a lower order may exceed the smallest misfit
 _MISFIT_FACTOR = 3.0
+#: largest tolerance
+_MAX_TOLERANCE = 1e-3
 
 
 class Realization(NamedTuple):
@@ -33,12 +35,13 @@ class Realization(NamedTuple):
         return np.array(response)
 
 
-def realize(response: np.ndarray, max_order: int | None = None) -> Realization:
+def realize(response: np.ndarray, max_order: int | None = None, tolerance: float = 0.0) -> Realization:
     """Return a balanced realization of the lowest order that reproduces a response about as well as any.
 
     Args:
         response: Impulse response D, C B, C A B, ..., shape (steps, outputs, inputs).
         max_order: Largest order; None: no limit.
+        tolerance: Misfit of about this size is good enough, because the response itself varies as much; at most 0.001 counts.
     """
     rows, columns = _scales(response)
     scaled = response / rows[:, None] / columns
@@ -56,7 +59,8 @@ def realize(response: np.ndarray, max_order: int | None = None) -> Realization:
     orders = {int(np.sum(singular > tolerance * singular[0])) if singular[0] > 0 else 0 for tolerance in _TOLERANCES}
     found = [realization(order) for order in sorted({order if max_order is None else min(order, max_order) for order in orders})]
     misfits = [misfit(each, response) for each in found]
-    return next(each for each, value in zip(found, misfits, strict=True) if value <= _MISFIT_FACTOR * min(misfits))
+    enough = _MISFIT_FACTOR * max(min(misfits), min(tolerance, _MAX_TOLERANCE))
+    return next(each for each, value in zip(found, misfits, strict=True) if value <= enough)
 
 
 def misfit(realization: Realization, response: np.ndarray) -> float:

@@ -57,11 +57,6 @@ class SimulationOutcome:
     failure: BaseException | None
     real_time: Mapping[str, Any] | None = None
 
-    @property
-    def loop_seconds(self) -> float:
-        """Wall time (s) of the stepping loop; 0 if it was not reached."""
-        return self.timing.get("loop_seconds", 0.0)
-
 
 class PlanRun:
     """A plan that is being simulated: call `initialize`, then `advance` as often as needed, and `close` in every case.

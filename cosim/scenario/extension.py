@@ -170,7 +170,8 @@ class _Merger:
             elif key in old:
                 self.removed.add(places[0])
             else:
-                self._report(places[2], f"nothing to remove{did_you_mean(key, old)}")
+                own = not path and key in NOT_INHERITED
+                self._report(places[2], f"nothing to remove{', it is not inherited' if own else did_you_mean(key, old)}")
         return result
 
     def _merge(self, path: JsonPath, old_path: JsonPath, new_path: JsonPath, old: Any, new: Any) -> Any:

@@ -95,8 +95,8 @@ class GroundDistance:
     """Distances from points to the highest surface vertically below them."""
 
     def __init__(self, vessels: Sequence[ContactBody], platforms: Sequence[Platform], sea: Sea):
-        decks = [DeckSurface(vessel).below for vessel in vessels]
-        self._surfaces_below = [*decks, *(PlatformSurface(platform).below for platform in platforms)]
+        decks, tops = [DeckSurface(vessel) for vessel in vessels], [PlatformSurface(platform) for platform in platforms]
+        self._surfaces_below = [*(deck.below for deck in decks), *(top.below for top in tops)]
         self._elevation = sea.elevation_function() if len(sea.amplitude) else None
 
     def distance_and_share(

@@ -7,7 +7,7 @@ from zipfile import ZipFile
 import numpy as np
 import original_system_reference as reference
 import pytest
-from linear_blocks import block, loop
+from linear_blocks import StateSpace, block, loop
 from scipy.io import loadmat
 
 import cosim
@@ -165,6 +165,25 @@ def test_a_point_that_is_no_equilibrium_gives_a_hint():
     equal = {"quadcopter.rotor_speed": [360.0] * 4}
     model = linearize(HOVER, ["quadcopter.rotor_speed"], ["quadcopter.position"], parameters=equal, duration=4)
     assert any("no equilibrium" in note for note in model.notes)
+
+
+class Tanks(StateSpace):
+    """Two tanks with outflow; the square roots make the response change while the levels fall."""
+
+    def do_step(self, _time, step_size):
+        """Advance the levels by Euler's method."""
+        first, second = np.sqrt(self.x)
+        self.x = self.x + step_size * (self.u + np.array([-0.5 * first, 0.5 * first - 0.4 * second]))
+
+
+def test_a_moving_operating_point_adds_no_states():
+    """The response differs from a linear one by products of the motion and the perturbation, which are no modes."""
+    unit = np.eye(2).tolist()
+    tanks = {"python": Tanks, "arguments": {"a": unit, "b": unit, "c": unit, "x0": [1.0, 1.5625]}}
+    scenario = {"name": "s", "stop_time": 1, "step_size": 0.1, "components": {"plant": tanks}}
+    moving = linearize(scenario, ["plant.u0", "plant.u1"], ["plant"], parameters={"plant.u0": 0.4999})
+    assert list(moving.states) == ["plant.y0", "plant.y1"]
+    assert moving.a == pytest.approx(np.array([[0.975, 0], [0.025, 0.984]]), abs=1e-4)
 
 
 def test_files_hold_the_matrices(tmp_path):

@@ -28,7 +28,7 @@ steps, step = int(sys.argv[2]) - 1, Fraction(1, 100)
 outputs = {f"a.y{k}": Endpoint("a", f"y{k}") for k in range(1, int(sys.argv[3]) + 1)}
 system = System({"a": create_component(FmuFile(Path(sys.argv[1])), "a")}, (), (("a",),))
 run = simulate(system, Settings(Fraction(0), steps * step, step, outputs))
-print(run.loop_seconds)
+print(run.timing["loop_seconds"])
 for name, write in (("csv", write_csv), ("parquet", write_parquet)):
     start = time.perf_counter()
     write(run.recording, f"result.{name}")

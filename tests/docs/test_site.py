@@ -1,4 +1,7 @@
-"""The documentation site is built without warnings, is complete, and needs no network."""
+"""The documentation site is built without warnings, is complete, and needs no network.
+
+The build takes about 10 s of processor time, so `.ci/run` runs these tests apart from the suite, which it runs twice.
+"""
 
 import re
 import subprocess
@@ -10,6 +13,8 @@ from page_probes import LOW_CONTRAST
 
 from cosim.cli import COMMANDS
 from cosim.scenario import json_schema
+
+pytestmark = pytest.mark.long
 
 ROOT = Path(__file__).parents[2]
 

@@ -91,3 +91,43 @@ def test_a_library_without_the_functions_is_refused(tmp_path):
     source.write_text("__declspec(dllexport) int nothing(void) { return 0; }")
     with pytest.raises(InputError, match="the library does not export fmi2"):
         cosim.simulate(windows_fmu(tmp_path / "e.fmu", "win64", "ball", source, model_description(2)))
+
+
+#: case -> C code behind that of the FMU, and part of the message
+LOADING = {
+    "a crash": (
+        "int __stdcall DllMain(void *a, unsigned b, void *c) { return *(volatile int *)8; }",
+        "it crashed while it was loaded",
+    ),
+    "a refusal": ("int __stdcall DllMain(void *a, unsigned b, void *c) { return 0; }", "its initialization failed"),
+}
+
+
+@pytest.mark.parametrize("case", LOADING)
+def test_a_library_that_cannot_be_loaded_gives_the_reason(case, tmp_path):
+    code, reason = LOADING[case]
+    source = tmp_path / "ball.c"
+    source.write_text(f"{SOURCE.read_text()}\n{code}\n")
+    path = windows_fmu(tmp_path / "ball.fmu", "win64", "ball", source, model_description(2), "-DFMI=2")
+    with pytest.raises(cosim.ComponentError, match=f"the Windows library cannot be loaded: error [0-9]+ \\({reason}\\)$"):
+        cosim.simulate(path)
+
+
+def test_a_library_that_ends_its_process_is_one_line_and_keeps_the_rows(tmp_path):
+    path = windows_fmu(tmp_path / "ball.fmu", "win64", "ball", SOURCE, model_description(2), "-DFMI=2")
+    for fault in (391, 392):
+        with pytest.raises(cosim.ComponentError, match="the Windows process ended in fmi2GetDerivatives") as failed:
+            cosim.simulate(path, start_values={"fault": fault})
+        assert len(failed.value.result.time) > 10
+
+
+@pytest.mark.parametrize(
+    "content", [b"MZ" + bytes(5000), b"\x7fELF" + bytes(5000), b""], ids=["zeros", "another format", "empty"]
+)
+def test_a_damaged_library_is_refused(content, tmp_path):
+    path = tmp_path / "ball.fmu"
+    with ZipFile(path, "w") as archive:
+        archive.writestr("modelDescription.xml", model_description(2))
+        archive.writestr("binaries/win64/ball.dll", content)
+    with pytest.raises(InputError, match=r"ball.dll"):
+        cosim.simulate(path)

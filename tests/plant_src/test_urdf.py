@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 from pathlib import Path
 from typing import Any
 
@@ -19,15 +20,10 @@ from plant_src.urdf import vehicle_from_urdf
 
 ARM = 0.2
 ANGLES = {"front_left": 45, "rear_left": 135, "rear_right": 225, "front_right": 315}
-DATA: dict[str, Any] = {
-    "family": "multirotor",
-    "rotor": {"radius": 0.1, "max_speed": 900, "thrust_coefficient": 1e-5, "torque_coefficient": 2e-7},
-    "rotors": [
-        {"link": name, "turns": turns}
-        for name, turns in zip(ANGLES, ("clockwise", "counter-clockwise", "clockwise", "counter-clockwise"), strict=True)
-    ],
-    "crash_speed": 3.0,
-}
+#: the example of the documentation
+PAGE = Path(__file__).parents[2] / "plant_src/vehicles/data/README.md"
+(EXAMPLE,) = re.findall(r'^```json\n(\{"family": "multirotor".*?)^```$', PAGE.read_text(), re.MULTILINE | re.DOTALL)
+DATA: dict[str, Any] = json.loads(EXAMPLE)
 BODY = """<link name="base"><inertial><origin xyz="0 0 0.02" rpy="0 0 0.5"/><mass value="0.8"/>
   <inertia ixx="0.004" iyy="0.005" izz="0.008" ixy="0.0002" ixz="0" iyz="0"/></inertial>
   <collision><origin rpy="0 0 0.3"/><geometry><box size="0.2 0.1 0.06"/></geometry></collision></link>"""

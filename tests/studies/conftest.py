@@ -5,9 +5,15 @@ from __future__ import annotations
 from pathlib import Path
 from typing import Any
 
+import forked_fork_servers
 import pytest
 from fault_fmu import build_library
 from lag_project import LagProject, MakeLagProject
+
+from cosim.studies.execution import worker_pool
+
+#: modules whose tests kill fork servers or measure their memory
+REAL_PROCESSES = ("test_killed_sweeps", "test_sweep_memory")
 
 
 @pytest.fixture(scope="session")
@@ -24,3 +30,10 @@ def make_lag(tmp_path_factory: pytest.TempPathFactory) -> MakeLagProject:
 @pytest.fixture
 def lag(make_lag: MakeLagProject) -> LagProject:
     return make_lag()
+
+
+@pytest.fixture(autouse=True)
+def forked_servers(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Fork the fork servers of worker pools, except in the tests of their processes."""
+    if request.path.stem not in REAL_PROCESSES:
+        monkeypatch.setattr(worker_pool, "subprocess", forked_fork_servers.SUBPROCESS)

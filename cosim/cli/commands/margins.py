@@ -60,8 +60,10 @@ def command(
     if as_json:
         times = {"time": measured[0].closed.time, "step": measured[0].closed.step} if measured else {}
         print_json({**times, "loops": [vars(each) for each in found]})
-    else:
+    elif found:
         _print_margins(found)
+    else:
+        click.echo(f"no signal of {', '.join(names)} acts on itself through the other components")
     print_notes([f"{each.loop}: {note}" for each in found for note in each.notes])
     if estimate:
         if len(measured) != 1 or amplitude is None:

@@ -17,7 +17,7 @@ from ...core.errors import InputError, join_alternatives
 from ...core.size_limits import require_at_most
 from ...core.time_grid import exact_fraction
 from ...core.units import BASE_UNITS, Unit, named_unit
-from .preflight import DEFAULT_LIMITS, Examination, PreflightLimits, examine, raise_errors
+from .preflight import DEFAULT_LIMITS, Examination, PreflightLimits, raise_errors
 from .preflight.binary import list_platforms
 from .preflight.model_description import Interface, ModelDescription, ModelVariable, UnitDefinition
 from .preflight.rules_values import dimension_size, read_limit
@@ -143,21 +143,6 @@ class FmuDescription:
             else:
                 variables.append(replace(variable, start=values[variable.name]) if variable.name in values else variable)
         return replace(self, variables=variables)
-
-
-def read_description(path: Path, limits: PreflightLimits = DEFAULT_LIMITS) -> FmuDescription:
-    """Check an FMU and read its model description, without extracting anything.
-
-    The FMU needs no binary for this platform.
-
-    Args:
-        path: The FMU.
-        limits: Limits of the preflight check.
-
-    Raises:
-        InputError: The file is missing, is not a valid or safe FMU, or has no interface of FMI 2.0 or 3.0 that can be simulated.
-    """
-    return build_description(path, examine(path, limits))
 
 
 def build_description(path: Path, examination: Examination, interface: Interface | None = None) -> FmuDescription:

@@ -108,5 +108,7 @@ class Block:
     files: Mapping[str, str]
     #: name in the FMU's `resources/` folder -> file, for the original sources
     resources: Mapping[str, Path] = field(default_factory=dict)
+    #: name -> static library that is linked to the FMU
+    archives: Mapping[str, Path] = field(default_factory=dict)
     #: None if the block is only exported for Co-Simulation
     exchange: Exchange | None = None

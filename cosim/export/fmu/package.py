@@ -45,7 +45,7 @@ def write_fmu(block: Block, fmi_version: int, target: Path) -> Path:
     files = _description_and_sources(block, fmi_version)
     files |= {f"resources/{name}": path.read_bytes() for name, path in block.resources.items()}
     sources = {name.removeprefix("sources/"): text for name, text in files.items() if name.startswith("sources/")}
-    files |= compile_binary(block.identifier, fmi_version, sources, _c_files(sources))
+    files |= compile_binary(block.identifier, fmi_version, sources, [*_c_files(sources), *block.archives])
     return write_archive(files, target)
 
 
@@ -64,6 +64,7 @@ def _description_and_sources(block: Block, fmi_version: int) -> dict[str, bytes]
 def _collect_sources(block: Block, fmi_version: int) -> dict[str, bytes]:
     """Return all source files and headers that are needed to compile the FMU, without the instantiation token."""
     sources = {name: text.encode() for name, text in block.files.items()}
+    sources |= {name: path.read_bytes() for name, path in block.archives.items()}
     shell = _SHELL_FILES[fmi_version] + (_EXCHANGE_FILES[fmi_version] if block.exchange else ())
     sources |= {name: (SHELL_FOLDER / name).read_bytes() for name in shell}
     sources |= fmi_headers(fmi_version)
@@ -95,7 +96,7 @@ def compile_binary(identifier: str, fmi_version: int, sources: Mapping[str, byte
         identifier: The model identifier.
         fmi_version: 2 or 3; determines the folder of the binary in the FMU.
         sources: Name -> contents of the C files and headers.
-        c_files: Names of the C files to compile.
+        c_files: Names of the C files to compile, and of static libraries.
 
     Returns:
         The path of the library in the FMU -> its contents.

@@ -5,25 +5,27 @@ The package rumoca parses, checks and flattens a model. The order of computation
 | Folder       | Modules                                                                                                    |
 | ------------ | ---------------------------------------------------------------------------------------------------------- |
 | `frontend/`  | `rumoca_frontend`: flatten a model with rumoca; `libraries`: find the libraries that it uses; `sources`:   |
-|              | files and locations; `messages`: those of rumoca; `termination`: terminate() in algorithms; `flat_cache`:  |
-|              | keep flat models; `rumoca_client`, `rumoca_process`: run rumoca in a child process; `reader`               |
+|              | files and locations; `messages`: those of rumoca; `parts`, `library_search`: places of errors;             |
+|              | `termination`: terminate() in algorithms; `flat_cache`: keep flat models; `rumoca_client`,                 |
+|              | `rumoca_process`: run rumoca in a child process; `reader`                                                  |
 |              | (`expression_reader`, `statement_reader`, `unrolling`): convert its JSON to the flat model; `constants`:   |
 |              | structural parameters and constants become literals; `folded_branches`: find the parameters with which     |
 |              | rumoca has selected equations; `strings`: String arguments become literals; `openmodelica`: export with    |
 |              | OpenModelica instead                                                                                       |
 | `model/`     | `flat_model`, `syntax_tree`: the data structure; `traversal`; `text`: Modelica text of expressions;        |
 |              | `evaluate`, `arithmetic`: evaluation in Python                                                             |
-| `causality/` | `clocked_partitions` (`clock_inference`): replace clocked equations by sampled ones;                       |
+| `causality/` | `clocked_partitions` (`clock_inference`, `jumps`): replace clocked equations by sampled ones;              |
 |              | `continuous_states`: replace der(x) by a variable; `dependent_states`: derivatives of other variables;     |
 |              | `hybrid`: variables for pre(), relations and delay(); `continuous_equations`: solve the equations, with    |
 |              | `matching` if each has a variable alone on one side, else with `equation_systems` (`scalar_equations`,     |
 |              | `assignment`, `differentiation`); `when_conditions`: clocks and edge detectors; `topological_sort`;        |
 |              | `schedule` (`nodes`, `between_events`): the order of computation; `event_limits`: endless events;          |
-|              | `parameter_roles`: which parameters can be set; `interpreter`, `hybrid_interpreter` (`past_values`):       |
-|              | simulation of a model in Python                                                                            |
-| `c_code/`    | `emit`: the files; `model_code`: model.c; `hybrid_code`: model.c with event iteration; `header`: model.h;  |
-|              | `model_step`: clock ticks and integration; `exchange_code`: Model Exchange; `functions`, `statements`,     |
-|              | `expressions`, `subscripts`, `builtin_functions`, `lowering`, `c_values`, `formatting`: parts of model.c   |
+|              | `parameter_roles`: which parameters can be set; `interpreter`, `hybrid_interpreter` (`past_values`,        |
+|              | `dormand_prince`): simulation of a model in Python                                                         |
+| `c_code/`    | `emit`: the files; `model_code`: model.c; `hybrid_code`, `event_code`: model.c with event iteration;        |
+|              | `header`: model.h; `model_step`: clock ticks and integration; `exchange_code`: Model Exchange;             |
+|              | `functions`, `statements`, `expressions`, `subscripts`, `builtin_functions`, `lowering`, `c_values`,       |
+|              | `formatting`: parts of model.c                                                                             |
 | `external/`  | `sources`: C files of external functions; `calls`: C functions that call them; `library`: evaluation in     |
 |              | Python; `external.c`: errors, messages, Strings and external objects                                       |
 | (here)       | `assemble`: a Modelica file to a block, with the FMI variables                                             |

@@ -28,6 +28,7 @@ from .causality.hybrid_interpreter import HybridInterpreter
 from .causality.interpreter import Interpreter
 from .causality.matching import is_input
 from .external.library import callable_functions
+from .external.sources import external_archives
 from .frontend.constants import fold_constants
 from .frontend.folded_branches import folded_parameters
 from .frontend.reader import ModelReader
@@ -74,6 +75,7 @@ def _load_block(path: Path, model: str | None, options: ModelicaOptions) -> Bloc
         step_size=min((float(defaults.evaluate(clock.period)) for clock in defaults.schedule.clocks), default=_DEFAULT_STEP_SIZE),
         files=generate_c(defaults, sorted(names), sources.packages),
         resources=names,
+        archives=external_archives((f for f in defaults.model.functions.values() if f.external), sources.packages),
         exchange=_exchange(defaults.model) if has_exchange(defaults.model) else None,
     )
 

@@ -88,7 +88,7 @@ def _draw_cell(axes: Axes, x: int, y: int, cell: MapCell, size: tuple[float, flo
     known = bool(cell.runs)
     fill = colormaps[COLOUR_MAP](cell.success_rate) if known else "#EEEEEE"
     square = Rectangle((x - 0.5, y - 0.5), 1, 1, facecolor=fill, edgecolor="white", linewidth=0.8, url=link(cell) or None)
-    axes.add_patch(square)
+    axes.add_artist(square)  # without new limits of the axes, which take most of the time
     if not known or size[0] < _MIN_CELL_FOR_RATE[0] or size[1] < _MIN_CELL_FOR_RATE[1]:
         return
     ink = "black" if cell.success_rate > 0.5 else "white"

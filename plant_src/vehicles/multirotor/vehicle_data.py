@@ -83,6 +83,7 @@ class _MultirotorReader(VehicleReader):
         }
         boxes = self.read_boxes(data)
         values["hull"] = self.read_hull(data, boxes, values["mass"])
+        self.check_lift(values)
         crash_speed = self.quantity(data.get("crash_speed", 1.0), ("crash_speed",), "m/s", above=0.0)
         if self.problems:
             return None
@@ -92,6 +93,14 @@ class _MultirotorReader(VehicleReader):
             for problem in error.problems:
                 self.add_problem(problem.subject, problem.message)
             return None
+
+    def check_lift(self, values: Mapping[str, Any]) -> None:
+        """Report a multirotor that cannot fly: the thrust of all rotors at full speed is less than its weight."""
+        thrust = values["max_rotor_speed"] ** 2 * sum(rotor.thrust_coefficient for rotor in values["rotors"])
+        weight = values["mass"] * values["gravity"]
+        if not self.problems and thrust < weight:
+            text = f"it cannot fly: the thrust of all rotors at full speed is {thrust:.4g} N, its weight {weight:.4g} N"
+            self.add_problem(("rotor", "max_speed"), text)
 
     def read_hull(self, data: Mapping[str, Any], boxes: Sequence[Collision], mass: float) -> Hull:
         """Read what water acts on: the box around all boxes, the displaced volume and the drag coefficient."""
@@ -120,6 +129,9 @@ class _MultirotorReader(VehicleReader):
         zero = [0.0] * 3
         rotor_drag = self.vector_quantity(common.get("drag", zero), ("rotor", "drag"), "kg/rad", "xyz")
         body_drag = self.vector_quantity(data.get("body_drag", zero), ("body_drag",), "kg/m", "xyz")
+        for path, drag in ((("rotor", "drag"), rotor_drag), (("body_drag",), body_drag)):
+            if min(drag) < 0:
+                self.add_problem(path, f"found {list(drag)}, expected numbers of at least 0")
         return RotorEffects(
             self.quantity(common.get("time_constant", 0.0), ("rotor", "time_constant"), "s", low=0.0),
             self.quantity(common.get("inertia", 0.0), ("rotor", "inertia"), "kg.m2", low=0.0),

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from typing import Any
@@ -98,8 +99,12 @@ class _SubmergedReader(VehicleReader):
         if not min(size) > 0:
             self.add_problem(("size",), f"found {list(size)}, expected edges greater than 0")
         centre = data.get("centre_of_buoyancy", [0.0] * 3)
+        volume = self.quantity(data.get("displaced_volume", 1.0), ("displaced_volume",), "m3", above=0.0)
+        if not self.problems and volume > (box := math.prod(size)):
+            text = f"found {volume:g}, expected at most {box:.4g}, the volume of the box with the edges {list(size)} m"
+            self.add_problem(("displaced_volume",), text)
         return {
-            "displaced_volume": self.quantity(data.get("displaced_volume", 1.0), ("displaced_volume",), "m3", above=0.0),
+            "displaced_volume": volume,
             "centre_of_buoyancy": self.vector_quantity(centre, ("centre_of_buoyancy",), "m", "xyz"),
             "size": size,
             "gravity": self.quantity(data.get("gravity", 9.81), ("gravity",), "m/s2", above=0.0),

@@ -84,11 +84,21 @@ class _SurfaceVesselReader(BoatReader):
             self.add_problem(path, '"offset" is missing: two hulls have a distance from the middle')
         offset = self.quantity(data.get("offset", 0.0), (*path, "offset"), "m", low=0.0) if count == 2 else 0.0
         fullness = self.quantity(data.get("waterplane_coefficient", 1.0), (*path, "waterplane_coefficient"), "1", 0.01, 1.0)
+        if count == 2 and "offset" in data and 2 * offset < beam:
+            self.add_problem(
+                (*path, "offset"), f"found {offset:g}: the hulls overlap, expected at least half of the beam, {beam / 2:g}"
+            )
         area = count * fullness * length * beam
         moments = {
             "transverse_moment": area * (offset**2 + beam**2 / 12),
             "longitudinal_moment": fullness * area * length**2 / 12,
         }
+        reaches = {"transverse_moment": offset + beam / 2, "longitudinal_moment": length / 2}
+        for key, reach in reaches.items():
+            moments[key] = self.quantity(data.get(key, moments[key]), (*path, key), "m4", above=0.0)
+            if not self.problems and moments[key] > (limit := area * reach**2):
+                text = f"found {moments[key]:g}, expected at most {limit:.4g}: area of the waterplane times squared half extent"
+                self.add_problem((*path, key), text)
         return HullForm(
             count=count,
             length=length,
@@ -98,6 +108,6 @@ class _SurfaceVesselReader(BoatReader):
             bottom=self.quantity(data.get("bottom", 0.0), (*path, "bottom"), "m"),
             waterplane_centre=self.quantity(data.get("waterplane_centre", 0.0), (*path, "waterplane_centre"), "m"),
             waterplane_coefficient=fullness,
-            **{key: self.quantity(data.get(key, start), (*path, key), "m4", above=0.0) for key, start in moments.items()},
+            **moments,
             **{key: self.quantity(data.get(key, 0.0), (*path, key), "1", low=0.0) for key in _HULL_OPTIONAL_KEYS[5:]},
         )

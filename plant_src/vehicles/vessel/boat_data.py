@@ -93,7 +93,8 @@ class BoatReader(VehicleReader):
                 self.add_problem(path, f'"{key}" is missing, here and in "propeller"')
             place, source = ((*path, key), data) if key in data else (("propeller", key), common)
             default = numbers[_PROPELLER_DEFAULTS[key]] if key in _PROPELLER_DEFAULTS else 0.0
-            numbers[key] = self.quantity(source.get(key, default), place, unit, low=0.0)
+            limit = {"above": 0.0} if key in _REQUIRED_OF_PROPELLERS and key in source else {"low": 0.0}
+            numbers[key] = self.quantity(source.get(key, default), place, unit, **limit)
             if key == "time_constant" and 0 < numbers[key] < MIN_TIME_CONSTANT:
                 self.add_problem(place, f"found {numbers[key]}, expected 0 (no lag) or at least {MIN_TIME_CONSTANT}")
         x, y, z = self.vector_quantity(data.get("position", [0.0] * 3), (*path, "position"), "m", "xyz")

@@ -193,3 +193,52 @@ def test_the_doctor_lists_libraries(library, monkeypatch):
     monkeypatch.setenv("MODELICAPATH", str(library))
     output = CliRunner().invoke(cli, ["doctor"]).output
     assert f"{library}: Blocks 2.1.0, Constants 1.0" in output
+
+
+LIBRARY = {
+    "Search/package.mo": 'package Search annotation(version="1.0"); end Search;',
+    "Search/Vectors.mo": """within Search;
+package Vectors "return is a word in a text"
+  function first
+    input Real x;
+    output Real y;
+  algorithm
+    y := 0;
+    for k in 1:3 loop
+      if x > k then
+        y := k;
+        return;
+      end if;
+    end for;
+    y := 7;
+  end first;
+  function both
+    input Real x;
+    output Real y;
+  algorithm
+    while y < x loop
+      y := y + 1;
+      if y > 3 then
+        break;
+      end if;
+    end while;
+  end both;
+end Vectors;
+""",
+    "Search/Block.mo": "within Search;\nblock Block\n  input Real u;\n  output Real y = Vectors.first(u);\nend Block;",
+}
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ("extends Search.Block;", "Search/Vectors.mo:11: return inside a loop or a branch is not supported"),
+        ("input Real u; output Real y = Search.Vectors.both(u);", "Search/Vectors.mo:16: break inside a loop is not supported"),
+    ],
+)
+def test_an_error_in_a_library_names_its_place(tmp_path, text, place):
+    write(tmp_path, LIBRARY)
+    model = write(tmp_path, {"m/M.mo": f"block M\n  {text}\nend M;\n"}) / "m" / "M.mo"
+    with pytest.raises(InputError) as caught:
+        load_interpreter(model, options=ModelicaOptions(library_path=[tmp_path]))
+    assert str(caught.value).startswith(f"{tmp_path}/{place}")

@@ -114,7 +114,7 @@ end Shifts;""")
     ticks = values[::4]
     assert outputs(model, values) == list(np.repeat(ticks, 4))
     assert outputs(model, values, "half") == [8, 8, *np.repeat(ticks, 4)[:-2]]
-    assert outputs(model, values, "late") == [9] * 6 + list(np.repeat(ticks, 4)[:-6])
+    assert outputs(model, values, "late") == [9] * 6 + list(np.repeat(ticks[1:], 4)[:-2])
     assert outputs(model, values, "back") == [8] * 4 + list(np.repeat(ticks, 4)[:-4])
 
 
@@ -226,3 +226,76 @@ end Bad;""")
     with pytest.raises(InputError) as error:
         load_interpreter(path)
     assert message in str(error.value)
+
+
+def test_a_sampled_value_is_the_one_before_a_jump_at_the_same_time(compile_both):
+    model = compile_both("""model Jumps
+  output Real y;
+  output Boolean b;
+  output Real before(start = -1, fixed = true);
+  Clock c = Clock(0.1);
+  Real t(start = 0, fixed = true);
+  Real w;
+  Real s;
+  Boolean r;
+equation
+  der(t) = 1;
+  w = t + (if time < 0.3 then 0 else 5);
+  s = sample(w, c);
+  y = hold(s);
+  r = sample(time >= 0.3 and time < 0.5, c);
+  b = hold(r);
+  when time >= 0.3 then
+    before = pre(w);
+  end when;
+end Jumps;""")
+    model.initialize()
+    found = []
+    for k in range(60):
+        model.step(k * STEP, STEP)
+        found.append((model.get("y"), model.get("b"), model.get("before")))
+    ticks = [0.0, 0.1, 0.2, 0.3, 5.4, 5.5]
+    assert [row[0] for row in found] == pytest.approx(np.repeat(ticks, 10), abs=1e-9)
+    assert [row[1] for row in found] == list(np.repeat([False, False, False, False, True, True], 10))
+    assert [row[2] for row in found] == pytest.approx([-1] * 29 + [0.3] * 31, abs=1e-9)
+
+
+def test_a_held_value_acts_on_the_plant_after_the_sample_at_the_same_tick(compile_both):
+    model = compile_both("""model Loop
+  input Real u;
+  output Real y(start = 0, fixed = true);
+  Clock c = Clock(0.1);
+  Real w;
+  Real s;
+  Real z(start = 0);
+  Real h;
+equation
+  der(y) = h - y;
+  w = 0.3*(y + h) + 0.2*u;
+  s = sample(w, c);
+  z = 1 - s;
+  h = hold(z);
+end Loop;""")
+    values, y, h, expected = random_values(60), 0.0, 0.0, []
+    for k, u in enumerate(values):
+        if k % 10 == 0:
+            h = 1 - 0.3 * (y + h) - 0.2 * u
+        y = h + (y - h) * math.exp(-STEP)
+        expected.append(y)
+    assert outputs(model, values) == pytest.approx(expected, abs=1e-9)
+
+
+def test_a_fixed_start_value_of_a_clocked_variable_is_its_previous_value_at_the_first_tick(compile_both):
+    model = compile_both("""model Counter
+  input Real u;
+  output Real y;
+  Clock c = Clock(0.02);
+  Real s;
+  Real n(start = 3, fixed = true);
+equation
+  s = sample(u, c);
+  n = previous(n) + s;
+  y = hold(n);
+end Counter;""")
+    values = random_values(20)
+    assert outputs(model, values) == pytest.approx(np.repeat(3 + np.cumsum(values[::2]), 2), abs=1e-12)

@@ -4,15 +4,16 @@ from __future__ import annotations
 
 import ctypes
 import os
+import subprocess
 
 import numpy as np
 import pytest
-from fmpy import extract, read_model_description
+from fmpy import extract, read_model_description, simulate_fmu
 from fmpy.fmi2 import FMU2Slave
 
 from cosim.core.errors import ComponentError, InputError
 from cosim.export.fmu.package import write_fmu
-from cosim.export.modelica import load_block
+from cosim.export.modelica import load_block, load_interpreter
 
 HEADER = """#include <stddef.h>
 double mean(const double *u, size_t n);
@@ -275,3 +276,37 @@ end T;
     for _, values in model.simulate(50):
         if -1 <= values["u"] <= 2:
             assert model.get("y") == pytest.approx(np.interp(values["u"], [-1, 0, 1, 2], [2, 0, 3, 3.5]), abs=1e-14)
+
+
+PREBUILT = """model M
+  pure function third
+    input Real x;
+    output Real y;
+  external "C" y = third(x) annotation(Library="thirds", LibraryDirectory="lib");
+  end third;
+  input Real u;
+  output Real y = third(u);
+end M;
+"""
+
+
+def test_a_static_library_is_linked(tmp_path, monkeypatch, write_model):
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    (tmp_path / "lib" / "linux64").mkdir(parents=True)
+    (tmp_path / "thirds.c").write_text("double third(double x) { return x / 3; }\n")
+    subprocess.run(["/usr/bin/env", "gcc", "-c", "-fPIC", "thirds.c", "-o", "thirds.o"], cwd=tmp_path, check=True)
+    subprocess.run(["/usr/bin/env", "ar", "rcs", "lib/linux64/libthirds.a", "thirds.o"], cwd=tmp_path, check=True)
+    model = write_model(PREBUILT)
+    fmu = write_fmu(load_block(model), 3, tmp_path / "M.fmu")
+    result = simulate_fmu(str(fmu), start_values={"u": 6.0}, stop_time=0.1, output=["y"])
+    assert result["y"][-1] == 2.0
+    interpreter = load_interpreter(model)
+    interpreter.set("u", 7.5)
+    interpreter.initialize()
+    interpreter.step(0.0, 0.01)
+    assert interpreter.get("y") == 2.5
+
+
+def test_a_library_that_is_not_found_is_refused(write_model):
+    with pytest.raises(InputError, match=r"M.mo:2: third: no file of its Library annotation \(thirds.c, libthirds.a\) is found"):
+        load_block(write_model(PREBUILT))

@@ -172,6 +172,7 @@ def test_saved_states_repeat_the_motion_bit_for_bit() -> None:
 
 FAULTS: list[tuple[Callable[[dict[str, Any]], Any], str]] = [
     (lambda d: d.update(displaced_volume=-1), r"model\.displaced_volume: found -1, expected a number greater than 0"),
+    (lambda d: d.update(displaced_volume=10), r"model\.displaced_volume: found 10, expected at most 0\.06674, the volume of"),
     (lambda d: d.update(added_mass=[1, 2]), r"model\.added_mass: found \[1, 2\], expected a list of 6 numbers"),
     (lambda d: d.update(added_mass=[-1, 1, 1, 1, 1, 1]), r"model\.added_mass: found the eigenvalue -1, expected none below 0"),
     (lambda d: d.update(quadratic_damping=[-1, 1, 1, 1, 1, 1]), r"model\.quadratic_damping: found the diagonal \[-1"),

@@ -82,6 +82,9 @@ FAULTS: list[tuple[Callable[[dict[str, Any]], Any], str]] = [
     (lambda d: d.update(centre_of_mass=[4, 0, 0]), r"model\.centre_of_mass: found 4 m ahead of O: the vessel trims by"),
     (lambda d: d.update(added_mass=[-1] * 6), r"model\.added_mass: found the eigenvalue -1"),
     (lambda d: d.update(linear_damping=[-1] + [0] * 5), r"model\.linear_damping: found the diagonal"),
+    (lambda d: d["hull"].update(offset=0.1), r"model\.hull\.offset: found 0\.1: the hulls overlap"),
+    (lambda d: d["hull"].update(transverse_moment=2), r"model\.hull\.transverse_moment: found 2, expected at most 0\."),
+    (lambda d: d["propeller"].update(max_speed=0), r"model\.propeller\.max_speed: found 0, expected a number greater than 0"),
     (lambda d: d["propellers"][0].pop("position"), r'model\.propellers\.0: "position" is missing'),
     (lambda d: d["propeller"].pop("max_speed"), r'model\.propellers\.0: "max_speed" is missing, here and in "propeller"'),
     (

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from cosim_command import run_cosim
 
 from cosim.process.sandbox import find_available_sandboxes
 
@@ -28,10 +29,7 @@ def words(*arguments: object) -> list[str]:
 
 
 def cosim(folder: Path, *arguments: object, **more: str) -> subprocess.CompletedProcess[str]:
-    environment = variables(folder) | more
-    return subprocess.run(
-        words(*arguments), cwd=folder, env=environment, capture_output=True, text=True, check=False, timeout=100
-    )
+    return run_cosim(*arguments, cwd=folder, env=variables(folder) | more)
 
 
 @pytest.fixture

@@ -180,8 +180,12 @@ int main(int argc, char **argv) {
     SetStdHandle(STD_OUTPUT_HANDLE, GetStdHandle(STD_ERROR_HANDLE));
     library = LoadLibraryExA(argv[1], NULL, LOAD_WITH_ALTERED_SEARCH_PATH);
     if (!library) {
-        fail("the Windows library cannot be loaded: error %lu%s", GetLastError(),
-             GetLastError() == ERROR_MOD_NOT_FOUND ? " (a library that it needs does not exist)" : "");
+        DWORD error = GetLastError();
+        fail("the Windows library cannot be loaded: error %lu%s", error,
+             error == ERROR_MOD_NOT_FOUND    ? " (a library that it needs does not exist)"
+             : error == ERROR_NOACCESS       ? " (it crashed while it was loaded)"
+             : error == ERROR_DLL_INIT_FAILED ? " (its initialization failed)"
+                                             : "");
         return 1;
     }
     send_reply(0, false);

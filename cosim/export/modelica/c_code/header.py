@@ -18,7 +18,20 @@ from .exchange_code import exchange_declarations, has_exchange
 def struct_members(model: Model) -> dict[str, str]:
     """Return the struct member of each variable: its name as a unique C identifier."""
     members: dict[str, str] = {}
-    used = {"clock", "held", "failure", "past", "step", "no_state", "changed", "reason", "warning", "warned", "indicator"}
+    used = {
+        "clock",
+        "held",
+        "failure",
+        "past",
+        "step",
+        "event_time",
+        "no_state",
+        "changed",
+        "reason",
+        "warning",
+        "warned",
+        "indicator",
+    }
     for name in model.variables:
         member = c_identifier(name)
         while member in used:
@@ -139,6 +152,9 @@ class HeaderWriter:
                 yield f"double indicator[{len(self.model.hybrid.relations)}];"
             yield "bool changed; /* a parameter was set after the last event */"
             yield from ["double step; /* next integration step (s) */"] * is_integrated(self.model)
+            yield from ["double event_time; /* events up to this time are at the time of the last one */"] * bool(
+                self.model.hybrid.sampled
+            )
             yield from ["double no_state[2];"] * (is_integrated(self.model) and not self.model.states)
         if has_messages(self.model):
             yield "char reason[512], warning[512];"

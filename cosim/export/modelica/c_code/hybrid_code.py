@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
 from ..causality.event_limits import MAX_EVENTS, MAX_PASSES, chattering_reason, endless_reason, iterated_names
@@ -11,22 +11,10 @@ from ..causality.past_values import PAST_VALUES
 from ..model.flat_model import Model, Relation, derivative_name, is_integrated, previous_name
 from ..model.syntax_tree import Assign, Name
 from .c_values import C_TYPES, CExpression, CValue, scalar_value
+from .event_code import copy_values, event_functions
 from .formatting import function_definition
 from .model_code import ModelCode
 from .statements import StatementLowering
-
-#: the value of a variable before an event, and the present one
-ValuePair = tuple[CValue, CValue]
-
-
-def copy_values(variables: Iterable[ValuePair]) -> list[str]:
-    """Generate the assignments `target = source` of scalars and arrays."""
-    return [
-        f"memcpy({target.pointer}, {source.pointer}, sizeof {target.pointer});"
-        if target.shape
-        else f"{target.text.code} = {source.text.code};"
-        for target, source in variables
-    ]
 
 
 @dataclass
@@ -49,12 +37,12 @@ class HybridCode(ModelCode):
             *self._common_definitions(),
             f"static const bool NO_TICK[{max(clocks, 1)}] = {{false}};",
             record_function(model, values, self._make_lowering(), PAST_VALUES),
-            *event_functions(model, values, self._event(), self._endless_codes(), initial),
+            *event_functions(model, values, self._event(), self._endless_codes(), initial, self._limits()),
             function_definition("const char *model_initialize(Model *m, double time)", self._initialize_hybrid()),
         ]
         if is_integrated(model):
             definitions += [*self._hybrid_system(values)]
-        step = hybrid_step_body(clocks, is_integrated(model))
+        step = hybrid_step_body(clocks, is_integrated(model), bool(model.hybrid.sampled))
         return [
             *definitions,
             function_definition("const char *model_step(Model *m, double time, double step_size)", step),
@@ -77,6 +65,7 @@ class HybridCode(ModelCode):
             *past,
             "start_variables(m);",
             *self._clock_lines(),
+            *(["m->event_time = -INFINITY;"] if self.model.hybrid and self.model.hybrid.sampled else []),
             "for (int pass = 0; initialize(m, time); pass++) {",
             f"    if (pass == {MAX_PASSES}) fail(m, endless(m));",
             *(f"    {line}" for line in self._copy_relations()),
@@ -103,6 +92,11 @@ class HybridCode(ModelCode):
             lowering.lines.append(f"{C_TYPES[self.model.variables[name].type]} {local};")
         lowering.body(body)
         return ["(void)m;", "(void)time;", *lowering.lines]
+
+    def _limits(self) -> list[str]:
+        lowering = self._make_lowering()
+        lowering.body(self.schedule.between.limits)
+        return lowering.lines
 
     def _first_ticks(self) -> list[str]:
         """Generate the event of the clocks that tick at the start time; with inputs, it belongs to the first step."""
@@ -158,83 +152,6 @@ class HybridCode(ModelCode):
         ]
 
 
-def _differs(a: CValue, b: CValue) -> str:
-    return f"memcmp({a.pointer}, {b.pointer}, sizeof {a.pointer}) != 0" if a.shape else f"{a.text.code} != {b.text.code}"
-
-
-def memory_functions(inputs: Sequence[ValuePair], others: Sequence[ValuePair]) -> list[str]:
-    """Generate `remember`, `remember_inputs` and `inputs_changed`.
-
-    Args:
-        inputs: The values before the event and the present values of inputs.
-        others: Those of all other remembered variables.
-    """
-    return [
-        "/* Stores the values before an event, or before another evaluation in the same event. */",
-        function_definition("static void remember(Model *m)", copy_values(others) or ["(void)m;"]),
-        function_definition("static void remember_inputs(Model *m)", copy_values(inputs) or ["(void)m;"]),
-        function_definition("static bool inputs_changed(const Model *m)", ["(void)m;", f"return {_any_differs(inputs)};"]),
-    ]
-
-
-def event_functions(
-    model: Model, values: Mapping[str, CValue], evaluation: list[str], endless: Mapping[str, str], initial: list[str]
-) -> list[str]:
-    """Generate `evaluate`, `initialize` and `event`, and the functions that they use.
-
-    Args:
-        model: The flat model.
-        values: The C values of the variables.
-        evaluation: The statements of an evaluation of all equations.
-        endless: The failure code of an event iteration that does not end by the variable that changes.
-        initial: The statements of the initialization.
-
-    Returns:
-        The function definitions.
-    """
-    assert model.hybrid
-    pairs = {name: (values[previous_name(name)], values[name]) for name in model.hybrid.remembered}
-    inputs = [name for name in pairs if is_input(model.variables[name])]
-    changes = _any_differs(pairs[name] for name in model.hybrid.iterated)
-    relations = _any_differs(pairs[relation.name] for relation in model.hybrid.relations)
-    causes = [f"if ({_differs(*pairs[name])}) return {code};" for name, code in endless.items()]
-    return [
-        *memory_functions([pairs[name] for name in inputs], [pair for name, pair in pairs.items() if name not in inputs]),
-        "/* Returns the failure of an event iteration in which a value changes in each evaluation. */",
-        function_definition("static int32_t endless(const Model *m)", ["(void)m;", *causes, "return 0;"]),
-        "/* Evaluates all equations; returns whether they must be evaluated again, since values have changed. */",
-        function_definition(
-            "static bool evaluate(Model *m, double time, const bool *due)",
-            ["(void)time;", "(void)due;", *evaluation, f"return m->failure == 0 && ({changes});"],
-        ),
-        function_definition("static void event(Model *m, double time, const bool *due)", _event_lines()),
-        function_definition(
-            "static bool initialize(Model *m, double time)",
-            ["(void)time;", *initial, f"return m->failure == 0 && ({relations});"],
-        ),
-    ]
-
-
-def _any_differs(pairs: Iterable[ValuePair]) -> str:
-    return " || ".join(_differs(*pair) for pair in pairs) or "false"
-
-
-def _event_lines() -> list[str]:
-    return [
-        "remember(m);",
-        "/* flags of ticks are true in the first evaluation only */",
-        "for (int pass = 0; (evaluate(m, time, due) || due != NO_TICK) && m->failure == 0; pass++) {",
-        f"    if (pass == {MAX_PASSES}) fail(m, endless(m));",
-        "    remember(m);",
-        "    remember_inputs(m);",
-        "    due = NO_TICK;",
-        "}",
-        "remember_inputs(m);",
-        "m->changed = false;",
-        "record(m, time);",
-    ]
-
-
 def record_function(model: Model, values: Mapping[str, CValue], lowering: StatementLowering, capacity: int) -> str:
     """Generate `record`, which stores the arguments of delay()."""
     assert model.hybrid
@@ -264,8 +181,8 @@ def crossing_function(relations: Iterable[Relation], values: Mapping[str, CValue
     )
 
 
-def hybrid_step_body(clocks: int, continuous: bool) -> list[str]:
-    """Generate the body of model_step."""
+def hybrid_step_body(clocks: int, continuous: bool, inputs_first: bool) -> list[str]:
+    """Generate the body of model_step; `inputs_first`: changes of inputs are an event before a tick at the same time."""
     lines = ["const double end = time + step_size;", "m->failure = 0;"]
     tick = ["const bool tick = false;", *["const double target = end;"] * continuous]
     if clocks:
@@ -277,9 +194,16 @@ def hybrid_step_body(clocks: int, continuous: bool) -> list[str]:
         ]
     loop, at_start = [*tick], "count == 0"
     if clocks:
-        loop.append(f"const bool at_start = tick && next <= time + TOLERANCE * shortest_period(m->clock, {clocks});")
-        at_start += " && !at_start"
-    loop.append(f"if ({at_start} && (m->changed || inputs_changed(m))) event(m, time, NO_TICK);")
+        loop += [f"const bool at_start = tick && next <= time + TOLERANCE * shortest_period(m->clock, {clocks});"] * (
+            continuous or not inputs_first
+        )
+        at_start += " && !at_start" * (not inputs_first)
+    input_event = f"if ({at_start} && (m->changed || inputs_changed(m)))"
+    loop += (
+        [f"{input_event} {{", "    event(m, time, NO_TICK);", "    m->event_time = -INFINITY;", "}"]
+        if inputs_first
+        else [f"{input_event} event(m, time, NO_TICK);"]
+    )
     if continuous:
         lines.append("double reached = time;")
         loop += [

@@ -20,11 +20,13 @@ class BetweenEvents(NamedTuple):
         derivatives: Those that compute the derivatives of the states and the arguments of delay(), with constant inputs.
         indicators: Those that compute the operands of relations, with constant inputs.
         continuous: All variables that change between events, with changing inputs (Model Exchange).
+        limits: Those that compute the values of continuous variables before an event, for pre(), with constant inputs.
     """
 
     derivatives: Body
     indicators: Body
     continuous: Body
+    limits: Body = ()
 
 
 def statements_between_events(model: Model, continuous: Iterable[Statement], held: set[ScalarKey]) -> BetweenEvents:
@@ -52,10 +54,17 @@ def statements_between_events(model: Model, continuous: Iterable[Statement], hel
     }
     varying = _varying(model, order, model.states)
     inputs = [v.name for v in model.variables.values() if is_input(v)]
+    remembered = {
+        key
+        for name in model.hybrid.remembered
+        if model.variables[name].type == "Real" and name not in {*model.states, *inputs, *model.hybrid.iterated}
+        for key in scalar_keys(model.variables, Name(name))
+    }
     return BetweenEvents(
         merge_statements(required_nodes(varying, required)),
         merge_statements(required_nodes(varying, operands)),
         merge_statements(_varying(model, order, [*model.states, *inputs])),
+        merge_statements(required_nodes(varying, remembered)),
     )
 
 

@@ -59,6 +59,11 @@ def is_sampler(call: Builtin, model: Model) -> bool:
     return call.name == "sample" and (len(call.arguments) == 1 or is_clock(call.arguments[1], model))
 
 
+def samplers(trees: Any, model: Model) -> Iterator[Builtin]:
+    """Yield the calls of `sample(u)` and `sample(u, clock)`."""
+    return (item for item in walk(trees) if isinstance(item, Builtin) and is_sampler(item, model))
+
+
 def is_clocked_when(when: Any, model: Model) -> bool:
     """Return whether the condition of a when-clause is a clock."""
     return isinstance(when, When) and is_clock(when.branches[0][0], model)

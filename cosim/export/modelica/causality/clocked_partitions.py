@@ -7,10 +7,9 @@ tick do. Therefore only these become variables that a when-clause sets at a tick
 from __future__ import annotations
 
 from dataclasses import fields, is_dataclass, replace
-from math import floor
 from typing import Any
 
-from ..model.flat_model import Equation, Model, Variable, internal_variable
+from ..model.flat_model import SAMPLED, Equation, Model, Variable, internal_variable
 from ..model.syntax_tree import (
     Array,
     Assign,
@@ -28,8 +27,9 @@ from ..model.syntax_tree import (
     raise_model_error,
     referenced_variable,
 )
-from ..model.traversal import has_builtin, variable_names, walk
-from .clock_inference import CLOCKED_OPERATORS, SECTIONS, ClockInference, Rate, is_clock, is_clocked_when, is_sampler
+from ..model.traversal import has_builtin, variable_names
+from .clock_inference import CLOCKED_OPERATORS, SECTIONS, ClockInference, Rate, is_clock, is_clocked_when, is_sampler, samplers
+from .jumps import JumpSearch
 
 
 def resolve_clocks(model: Model) -> Model:
@@ -42,8 +42,7 @@ def resolve_clocks(model: Model) -> Model:
         InputError: A clock is not determined, contradictory or not supported.
     """
     sections = tuple(getattr(model, section) for section in SECTIONS)
-    samplers = (item for item in walk(sections) if isinstance(item, Builtin) and is_sampler(item, model))
-    if not has_builtin(sections, *CLOCKED_OPERATORS) and next(samplers, None) is None:
+    if not has_builtin(sections, *CLOCKED_OPERATORS) and next(samplers(sections, model), None) is None:
         return model
     return _Replacement(model).model()
 
@@ -55,7 +54,7 @@ class _Replacement:
         self._model = model
         self._clocks = ClockInference(model)
         self._variables: dict[str, Variable] = {
-            name: replace(v, variability="discrete") if self._clocks.rate(name) else v
+            name: replace(v, variability="discrete", fixed=None) if self._clocks.rate(name) else v
             for name, v in model.variables.items()
             if v.type != "Clock"
         }
@@ -63,6 +62,11 @@ class _Replacement:
         self._held: dict[tuple[Rate, Expression], Name] = {}
         self._previous_values: dict[tuple[Rate, str], Name] = {}
         self._ticks: dict[Rate, Name] = {}
+        self._jumps = JumpSearch(model)
+        self._limits: list[Equation] = []
+        sections = tuple(getattr(model, section) for section in SECTIONS)
+        #: true if a sampled value can depend on a held one, so that held values have their start values at the initialization
+        self._has_limits = any(self._jumps.may_jump(call.arguments[0]) for call in samplers(sections, model))
 
     def model(self) -> Model:
         """Return the translated model."""
@@ -73,7 +77,9 @@ class _Replacement:
             changed[node.partition(" ")[0]].append(self._translate(node, item))
         whens = [When(((_condition(*key), tuple(body)),)) for key, body in self._bodies.items()]
         sections: dict[str, Any] = {section: tuple(items) for section, items in changed.items()}
-        return replace(self._model, variables=self._variables, **sections | {"whens": (*sections["whens"], *whens)})
+        sections["whens"] += tuple(whens)
+        sections["equations"] += tuple(self._limits)
+        return replace(self._model, variables=self._variables, **sections)
 
     def _translate(self, node: str, tree: Any) -> Any:
         """Return the tree of a node without clocked operators."""
@@ -107,24 +113,33 @@ class _Replacement:
         value: Expression = self._translate(inner, call.arguments[0])
         if call.name in ("noClock", "superSample"):
             return value
+        limited = call.name == "sample" and self._jumps.may_jump(call.arguments[0])
+        if limited:
+            value = self._left_limit(value, call)
         if call.name == "hold":
-            return self._hold(self._rate(inner), value, call, with_start=True)
-        if call.name == "shiftSample":
-            rate = self._rate(inner)
-            for _ in range(floor((self._rate(node).offset - rate.offset) / rate.period)):
-                value = self._previous(rate, value, call)
+            return self._hold(self._rate(inner), value, call, with_start=True, at_start=not self._has_limits)
         if call.name == "backSample":  # the start value until the first tick of the argument
             value = self._hold(self._rate(inner), value, call, with_start=True)
-        return self._hold(self._rate(node), value, call, with_start=call.name != "sample")
+        return self._hold(self._rate(node), value, call, with_start=call.name != "sample", at_start=not limited)
 
-    def _hold(self, rate: Rate, value: Expression, call: Builtin, with_start: bool) -> Name:
-        """Return the variable with the value at the last tick."""
+    def _hold(self, rate: Rate, value: Expression, call: Builtin, with_start: bool, at_start: bool = True) -> Name:
+        """Return the variable with the value at the last tick; `at_start`: the initialization sets it, too."""
         if (rate, value) not in self._held:
             template = self._template(value, call)
             name = self._declare(f"$clocked {len(self._held) + 1}", template, with_start)
             self._held[rate, value] = name
-            self._bodies.setdefault((rate, True), []).append(Assign(name, value, call.where))
+            self._bodies.setdefault((rate, at_start), []).append(Assign(name, value, call.where))
         return self._held[rate, value]
+
+    def _left_limit(self, value: Expression, call: Builtin) -> Name:
+        """Return a variable with the value of an expression before the event."""
+        template = self._template(value, call)
+        sampled = self._declare(f"{SAMPLED}{len(self._limits)}", template, with_start=False)
+        self._variables[sampled.name] = replace(self._variables[sampled.name], variability=template.variability)
+        limit = self._declare(f"$limit {len(self._limits)}", template, with_start=False)
+        before = Builtin("pre", (sampled,), call.where)
+        self._limits += [Equation(sampled, value, call.where), Equation(limit, before, call.where)]
+        return limit
 
     def _previous(self, rate: Rate, argument: Expression, call: Builtin) -> Expression:
         """Return the value of a variable at the previous tick, before that its start value."""
@@ -167,7 +182,7 @@ class _Replacement:
 
     def _real(self) -> Variable:
         template = next(iter(self._model.variables.values()))
-        return replace(internal_variable(template, ""), type="Real", shape=(), enumeration="")
+        return replace(internal_variable(template, ""), type="Real", shape=(), enumeration="", variability="continuous")
 
 
 def _condition(rate: Rate, at_start: bool) -> Expression:

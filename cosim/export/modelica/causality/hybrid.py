@@ -16,7 +16,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from ..model.flat_model import Delay, Equation, Hybrid, Model, Relation, Variable, internal_variable, previous_name
+from ..model.flat_model import SAMPLED, Delay, Equation, Hybrid, Model, Relation, Variable, internal_variable, previous_name
 from ..model.syntax_tree import (
     Array,
     Assign,
@@ -109,9 +109,11 @@ class _Preparation:
             variable = self._variables[name]
             internal = internal_variable(variable, previous_name(name))
             self._variables[internal.name] = replace(internal, variability="discrete", start=variable.start)
-        iterated = tuple(n for n in remembered if n in self._discrete | reinitialized and not (is_input(self._variables[n])))
+        sampled = tuple(n for n in remembered if n.startswith(SAMPLED))
+        excluded = {*sampled, *(n for n in remembered if is_input(self._variables[n]))}
+        iterated = tuple(n for n in remembered if n in self._discrete | reinitialized and n not in excluded)
         relations = tuple(Relation(r.name, rewrite(r.condition, self._replace_pre)) for r in self._relations)
-        hybrid = Hybrid(relations, tuple(self._delays), remembered, iterated)
+        hybrid = Hybrid(relations, tuple(self._delays), remembered, iterated, sampled)
         return replace(model, variables=self._variables, hybrid=hybrid, **sections)
 
     # comparisons

@@ -11,24 +11,16 @@ import numpy as np
 from ....core.errors import ComponentError
 from ..model.arithmetic import EvaluationError, divide
 from ..model.flat_model import Model, derivative_name, is_integrated, previous_name
+from .dormand_prince import ERROR, NODES, WEIGHTS, weighted_sum
 from .event_limits import MAX_EVENTS, MAX_PASSES, chattering_reason, endless_reason, iterated_names
 from .interpreter import TICK_TOLERANCE, Interpreter
 from .matching import is_input
 from .past_values import PAST_VALUES, PastValues
 
 RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-7, 1e-9
+#: events at a distance (s) up to this one are at the same time for clocked sample() operators
+SAME_TIME = 1e-9
 
-_NODES = (0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0)
-_WEIGHTS: Sequence[Sequence[float]] = (
-    (),
-    (1 / 5,),
-    (3 / 40, 9 / 40),
-    (44 / 45, -56 / 15, 32 / 9),
-    (19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729),
-    (9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656),
-    (35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84),
-)
-_ERROR = (71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40)
 _COMPARISONS: dict[str, Callable[[float, float], bool]] = {
     "<": lambda a, b: a < b,
     "<=": lambda a, b: a <= b,
@@ -51,6 +43,7 @@ class HybridInterpreter(Interpreter):
         self.evaluate.past = lambda index, time: self._past[index].value(time)
         self._step = 0.0
         self._parameters_changed = False
+        self._event_time = -math.inf
 
     def set(self, name: str, value: Any) -> None:
         """Set a parameter or an input; a parameter causes an event at the start of the next step."""
@@ -63,7 +56,7 @@ class HybridInterpreter(Interpreter):
         Raises:
             ComponentError: The model has failed.
         """
-        self._step = 0.0
+        self._step, self._event_time = 0.0, -math.inf
         self._past[:] = [PastValues() for _ in self._hybrid.delays]
         self._apply_start_values(inputs=False)
         self.evaluate.previous_conditions.clear()
@@ -102,8 +95,10 @@ class HybridInterpreter(Interpreter):
             is_tick = bool(due) and tick < end - slack
             at_start = is_tick and tick <= time + slack
             target = tick if is_tick else end
-            if count == 0 and not at_start and (self._parameters_changed or self._changed(self._inputs)):
+            inputs_first = not at_start or bool(self._hybrid.sampled)
+            if count == 0 and inputs_first and (self._parameters_changed or self._changed(self._inputs)):
                 self._event("step", time, ())
+                self._event_time = -math.inf
             crossing = False
             if is_integrated(self.model) and not at_start:
                 with self._as_component_error("step", reached), np.errstate(all="ignore"):
@@ -133,9 +128,11 @@ class HybridInterpreter(Interpreter):
             raise EvaluationError(endless_reason(self._hybrid, name), self.model.variables[name].where)
 
     def _event(self, function: str, time: float, due: Sequence[int]) -> None:
-        self._remember([name for name in self._hybrid.remembered if name not in self._inputs])
         self.values["time"] = time
         with self._as_component_error(function, time), np.errstate(all="ignore"):
+            self.evaluate.execute(self.schedule.between.limits)
+            self._remember_sampled(time)
+            self._remember([name for name in self._hybrid.remembered if name not in self._inputs])
             for count in range(MAX_PASSES + 1):
                 self.evaluate.event_flags.update({("due", k): k in due for k in range(len(self.clocks))})
                 self.evaluate.execute(self.schedule.event)
@@ -149,9 +146,17 @@ class HybridInterpreter(Interpreter):
         self._parameters_changed = False
         self._record(time)
 
+    def _remember_sampled(self, time: float) -> None:
+        """Store the values of sampled variables, unless the previous event was at the same time."""
+        if self._hybrid.sampled and time > self._event_time:
+            for name in self._hybrid.sampled:
+                self.values[previous_name(name)] = self.get(name)
+        self._event_time = time + SAME_TIME
+
     def _remember(self, names: Sequence[str]) -> None:
         for name in names:
-            self.values[previous_name(name)] = self.get(name)
+            if name not in self._hybrid.sampled:
+                self.values[previous_name(name)] = self.get(name)
 
     def _changed(self, names: Sequence[str]) -> bool:
         return any(not np.array_equal(self.values[name], self.values[previous_name(name)]) for name in names)
@@ -206,14 +211,14 @@ class HybridInterpreter(Interpreter):
     def _dormand_prince(self, time: float, h: float, start: Sequence[float], slopes: list[list[float]]) -> float:
         """Advance the states from `start` with the slopes in the first row; return the error as a multiple of the tolerance."""
         del slopes[1:]
-        for node, weights in zip(_NODES[1:], _WEIGHTS[1:], strict=True):
-            self._set_states([x + h * _weighted(weights, slopes, i) for i, x in enumerate(start)])
+        for node, weights in zip(NODES[1:], WEIGHTS[1:], strict=True):
+            self._set_states([x + h * weighted_sum(weights, slopes, i) for i, x in enumerate(start)])
             slopes.append(self._slopes(time + node * h))
         largest = 0.0
         for i, (x, y) in enumerate(zip(start, self._get_states(), strict=True)):
             a, b = abs(x), abs(y)
             scale = ABSOLUTE_TOLERANCE + RELATIVE_TOLERANCE * (a if a > b else b)
-            ratio = abs(h * _weighted(_ERROR, slopes, i)) / scale
+            ratio = abs(h * weighted_sum(ERROR, slopes, i)) / scale
             if not ratio <= largest:
                 largest = ratio
         return largest
@@ -273,14 +278,6 @@ class HybridInterpreter(Interpreter):
             count += 1
         self._dormand_prince(time, right, start, slopes)
         return time + right
-
-
-def _weighted(weights: Sequence[float], slopes: Sequence[Sequence[float]], index: int) -> float:
-    total = 0.0
-    for weight, row in zip(weights, slopes, strict=True):
-        if weight:
-            total += weight * row[index]
-    return total
 
 
 def _elements(model: Model, names: Sequence[str]) -> Iterator[tuple[str, int | None]]:

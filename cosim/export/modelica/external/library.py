@@ -20,7 +20,7 @@ from ...fmu.compiler import compile_library
 from ..model.arithmetic import EvaluationError
 from ..model.flat_model import Function
 from .calls import Argument, CallSignature, call_signature
-from .sources import external_files
+from .sources import external_archives, external_files
 
 _C_TYPES: dict[str, Any] = {
     "Real": ctypes.c_double,
@@ -108,7 +108,8 @@ class ExternalLibrary:
     def _library(self) -> Any:
         """The shared library; it is compiled unless the cache contains it."""
         files = external_files(self.functions.values(), self.packages)
-        digest = sha256(repr(sorted(files.items())).encode()).hexdigest()[:24]
+        archives = {n: path.read_bytes() for n, path in external_archives(self.functions.values(), self.packages).items()}
+        digest = sha256(repr((sorted(files.items()), sorted(archives.items()))).encode()).hexdigest()[:24]
         target = cache_directory() / "modelica" / f"external-{digest}.so"
         if not target.is_file():
             with TemporaryDirectory(prefix="cosim-external-") as temporary, writing_atomically(target) as written:
@@ -116,7 +117,9 @@ class ExternalLibrary:
                 texts["external.c"] = _VISIBLE + texts["external.c"]
                 for name, text in texts.items():
                     (Path(temporary) / name).write_text(text)
-                compile_library(Path(temporary), sorted(n for n in texts if n.endswith(".c")), written)
+                for name, content in archives.items():
+                    (Path(temporary) / name).write_bytes(content)
+                compile_library(Path(temporary), [*sorted(n for n in texts if n.endswith(".c")), *archives], written)
         library = ctypes.CDLL(str(target))
         library.external_object.restype = ctypes.c_void_p
         library.external_reason.restype = ctypes.c_char_p

@@ -13,7 +13,7 @@ from .calls import declarations, definitions
 
 _INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*"([^"]+)"', re.MULTILINE)
 _URI = re.compile(r"modelica://(\w+)/?(.*)")
-_DEFAULT_FOLDERS = ("Resources/Include", "Resources/C-Sources", "Resources/Source")
+_DEFAULT_FOLDERS = ("Resources/Include", "Resources/C-Sources", "Resources/Source", "Resources/Library")
 _RUNTIME = ("external.c", "external.h", "ModelicaUtilities.h")
 #: first lines of each C file: the C code of the Standard Library is compiled without access to files and without user tables
 _OPTIONS = "#define NO_FILE_SYSTEM\n#define DUMMY_FUNCTION_USERTAB\n#line 1\n"
@@ -21,6 +21,8 @@ _OPTIONS = "#define NO_FILE_SYSTEM\n#define DUMMY_FUNCTION_USERTAB\n#line 1\n"
 _COMPANIONS = {"ModelicaStandardTables": "ModelicaStandardTablesUsertab.c"}
 #: folders of the C files of a library, beside the folder of its headers
 _SOURCE_FOLDERS = (".", "../C-Sources", "../Source")
+#: folders of the static libraries of a library, in its LibraryDirectory or beside the folder of its headers
+_LIBRARY_FOLDERS = ("linux64", ".", "../Library/linux64", "../Library")
 
 
 def external_files(functions: Iterable[Function], packages: Mapping[str, Path]) -> dict[str, str]:
@@ -46,6 +48,17 @@ def external_files(functions: Iterable[Function], packages: Mapping[str, Path]) 
     return files | {"external_calls.h": declarations(functions), "external_calls.c": definitions(functions)}
 
 
+def external_archives(functions: Iterable[Function], packages: Mapping[str, Path]) -> dict[str, Path]:
+    """Return the static libraries (file name -> file) of the Library annotations of external functions."""
+    found: dict[str, Path] = {}
+    for function in sorted(functions, key=lambda f: f.name):
+        assert function.external
+        names = [f"lib{library}.a" for library in function.external.libraries]
+        folders = [folder / sub for folder in _folders(function, packages) for sub in _LIBRARY_FOLDERS]
+        found |= {n: path for n in names if (path := next((f / n for f in folders if (f / n).is_file()), None))}
+    return found
+
+
 def _add_files(function: Function, packages: Mapping[str, Path], files: dict[str, str]) -> None:
     assert function.external
     folders = _folders(function, packages)
@@ -68,6 +81,19 @@ def _add_files(function: Function, packages: Mapping[str, Path], files: dict[str
             text = source.read_text(encoding="utf-8", errors="replace")
             files[source.name] = f"{_OPTIONS}{text}" if source.suffix == ".c" else text
             pending += _INCLUDE.findall(files[source.name])
+    _check_libraries(function, packages, files)
+
+
+def _check_libraries(function: Function, packages: Mapping[str, Path], files: Mapping[str, str]) -> None:
+    """Raise InputError if a function without Include annotation has libraries, but neither C code nor a static library."""
+    assert function.external
+    libraries = function.external.libraries
+    if function.external.include or not libraries or any(f"{n}{s}" in files for n in libraries for s in (".c", ".h")):
+        return
+    if not external_archives([function], packages):
+        names = ", ".join(f"{name}.c, lib{name}.a" for name in libraries)
+        places = ", ".join(map(str, _folders(function, packages)))
+        raise_model_error(f"{function.name}: no file of its Library annotation ({names}) is found in {places}", function.where)
 
 
 def _implementations(header: Path) -> list[Path]:

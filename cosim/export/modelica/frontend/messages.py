@@ -3,13 +3,16 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Container, Iterable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
 
 from ....core.errors import Problem
 from ..model.syntax_tree import SourceLocation
 from .sources import ModelicaSources
 
 _QUOTED = re.compile(r"['`]([\w.]+(?: = [\w.]+)?)['`]")
+_DIMENSION = re.compile(r"component dimension for ([\w.]+)")
 #: beginnings of messages that name a part of the front end
 _PHASE = re.compile(
     r"^(?:parse error: |\w+ failed: \S+ failed in \w+: (?:unsupported Flat semantic owner `[^`]*`: |"
@@ -24,6 +27,10 @@ _OPERATOR = re.compile(
 _MEANINGS = {
     "function-call assignment must retain at least one output": "terminate() and functions without results are not supported in "
     "algorithms of packages; write terminate() in a when-equation",
+    "component binding type compatibility": "the type of the binding does not fit the declaration",
+    "a non-guarded nested return": "return inside a loop or a branch is not supported; write one assignment for each branch",
+    "a proved finite arithmetic-series form": "break inside a loop is not supported; write its condition after while",
+    "expression shape mismatch": "expression shape mismatch: the sizes of the operands differ",
 }
 _COUNTS = re.compile(r"; unknowns\[.*$")
 _NOT_FOUND = " could not be compiled because resolve/parse failed"
@@ -40,8 +47,9 @@ def to_syntax_problem(file: str, line: int, message: str) -> Problem:
     return Problem(detail["what"] if detail else message, f"{file}:{detail['line'] if detail else line}")
 
 
-def to_problems(error: str, panicked: bool, name: str, path: Path, sources: ModelicaSources) -> list[Problem]:
-    """Convert the front end's message to problems, one for each informative line."""
+def to_problems(answer: Mapping[str, Any], name: str, path: Path, sources: ModelicaSources) -> list[Problem]:
+    """Convert the front end's message (see `rumoca_process`) to problems, one for each informative line."""
+    error = answer["error"]
     if panic := _PANIC.search(error):
         return [Problem(panic["what"], str(sources.locate({key: int(panic[key]) for key in ("source", "start")}) or path))]
     lines = [line.rpartition("[Resolve]:")[2].strip(" -") for line in error.splitlines()]
@@ -51,9 +59,9 @@ def to_problems(error: str, panicked: bool, name: str, path: Path, sources: Mode
     if [line for line in reasons if not line.endswith(_NOT_FOUND)] == []:
         reasons = [f"the file contains no model with the name {name}"]
     specific = [line for line in reasons if " could not be compiled: " not in line] or reasons
-    if not specific or panicked:
+    if not specific or answer["panicked"]:
         specific = [f"the Modelica front end failed on the model {name}: {' '.join(lines)}"]
-    return [_locate_problem(reason, name, path, sources) for reason in specific]
+    return [_locate_problem(reason, name, path, sources, answer["lines"]) for reason in specific]
 
 
 def _shorten(reason: str) -> str:
@@ -64,21 +72,31 @@ def _shorten(reason: str) -> str:
     return _COUNTS.sub("", _PHASE.sub("", reason))
 
 
-def _locate_problem(reason: str, name: str, path: Path, sources: ModelicaSources) -> Problem:
-    """Add a location to a reason: the one at its end, else the first line with a name that it quotes, else that of the model."""
+def _locate_problem(reason: str, name: str, path: Path, sources: ModelicaSources, part: Sequence[int] | None) -> Problem:
+    """Add a location to a reason.
+
+    It is the one at the end of the reason, else that of the class of a library that it names, else the first line with a name
+    that it quotes, in the `part` of the model (first and last line) without which there is no error, else the first line of this
+    part, else the first line of all files with such a name, else that of the model.
+    """
     if ending := _LOCATION_SUFFIX.search(reason):
         where = SourceLocation(sources.find(ending["file"]) or path, int(ending["line"]))
         return Problem(_shorten(reason[: ending.start()].rstrip()), str(where))
     meaning = _shorten(reason)
-    return Problem(meaning, str(_find_quoted_name(f"{reason} {meaning}", sources) or sources.locate_class(name)))
+    place = sources.locate_library_class(_QUOTED.findall(reason))
+    if place is None and part:
+        place = _find_quoted_name(f"{reason} {meaning}", [path], range(part[0], part[1] + 1)) or SourceLocation(path, part[0])
+    place = place or _find_quoted_name(f"{reason} {meaning}", sources.files)
+    place = place or sources.locate_in_libraries(_OPERATOR.findall(f"{reason} {meaning}"))
+    return Problem(meaning, str(place or sources.locate_class(name)))
 
 
-def _find_quoted_name(reason: str, sources: ModelicaSources) -> SourceLocation | None:
+def _find_quoted_name(reason: str, files: Iterable[Path], lines: Container[int] | None = None) -> SourceLocation | None:
     """Return the first source line with a name that a message quotes, or with an operator that it names."""
-    for quoted in (*_QUOTED.findall(reason), *_OPERATOR.findall(reason)):
+    for quoted in (*_QUOTED.findall(reason), *_DIMENSION.findall(reason), *_OPERATOR.findall(reason)):
         word = re.compile(rf"(?<![\w.]){re.escape(quoted)}(?![\w])")
-        for file in sources.files:
+        for file in files:
             for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), 1):
-                if word.search(line):
+                if (lines is None or number in lines) and word.search(line):
                     return SourceLocation(file, number)
     return None

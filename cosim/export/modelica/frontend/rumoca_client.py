@@ -13,9 +13,12 @@ from typing import Any
 
 from ....core.errors import InputError, Problem
 from ....process.failure_attribution import describe_exit_status
+from .parts import removable_parts
 
 #: limits of the child process: processor time and wall time (s), private memory and size of the flat model (bytes)
 CPU_LIMIT, TIMEOUT, MEMORY_LIMIT, OUTPUT_LIMIT = 120, 900, 2 << 30, 1 << 28
+#: numbers of parts of a model that are removed to find the one that rumoca refuses, without and with packages
+TRIALS, LIBRARY_TRIALS = 200, 8
 
 _PROGRAM = Path(__file__).with_name("rumoca_process.py")
 #: text that Rust writes when memory is exhausted
@@ -53,6 +56,8 @@ def run_rumoca(
         "model": model,
         "text": text,
         "declaration": declaration,
+        "parts": removable_parts(text[1]) if text else [],
+        "trials": LIBRARY_TRIALS if packages else TRIALS,
         "memory": MEMORY_LIMIT,
         "output_size": OUTPUT_LIMIT,
         "seconds": CPU_LIMIT,

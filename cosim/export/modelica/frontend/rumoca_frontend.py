@@ -143,7 +143,7 @@ def _flatten(sources: ModelicaSources, packages: Sequence[Path], name: str, decl
     if "syntax_errors" in answer:
         raise InputError(to_syntax_problem(*error) for error in answer["syntax_errors"])
     if "error" in answer:
-        raise InputError(to_problems(answer["error"], answer["panicked"], name, path, sources))
+        raise InputError(to_problems(answer, name, path, sources))
     flat: str = answer["flat"]
     return flat
 

@@ -1,17 +1,26 @@
 """Program of the child process in which rumoca runs, since it may crash, hang or use up the memory.
 
 It reads a request from standard input (JSON, see `main`) and writes lines of JSON: {"file": PATH} before rumoca reads a file, and
-at last one of {"flat": TEXT}, {"syntax_errors": [[PATH, line, message], ...]}, {"error": text, "panicked": bool} and
-{"version": text or null}, the version of rumoca if it is not the requested one.
+at last one of {"flat": TEXT}, {"syntax_errors": [[PATH, line, message], ...]}, {"error": text, "panicked": bool, "lines": [first,
+last] or null} and {"version": text or null}, the version of rumoca if it is not the requested one. The lines are those of the
+first part of the model without which rumoca does not report the error; they are null if the error has a place, or if there is no
+such part.
 """
 
 from __future__ import annotations
 
 import json
+import re
 import resource
 import sys
 from pathlib import Path
 from typing import Any
+
+#: the end of a message with file, line and column
+_HAS_PLACE = re.compile(r"\[[^\[\]]+:\d+:\d+\]\s*$")
+#: messages of a model whose names are resolved
+_LATER_PHASE = re.compile(r"^\w+ failed: ")
+_TOO_FEW_EQUATIONS = "(balance = -"
 
 
 def main(request: dict[str, Any]) -> None:
@@ -20,7 +29,8 @@ def main(request: dict[str, Any]) -> None:
     Args:
         request: "version" of rumoca; "files", the file of the model first; "packages", their folders; "model", its name;
             "text", the name under which a model outside a package is loaded and its text, null for one in a package;
-            "declaration", text of the model if it is not in the file; "memory" (bytes), "output_size" (bytes) and "seconds" of
+            "declaration", text of the model if it is not in the file; "parts", begin and end of each part of the text that can be
+            removed; "trials", the largest number of such trials; "memory" (bytes), "output_size" (bytes) and "seconds" of
             processor time, the limits of this process.
     """
     limits = {resource.RLIMIT_DATA: "memory", resource.RLIMIT_FSIZE: "output_size", resource.RLIMIT_CPU: "seconds"}
@@ -65,7 +75,31 @@ def _flatten(rumoca: Any, request: dict[str, Any]) -> dict[str, Any]:
             compiled = session.loads(f"{text[1]}\n{declaration}", model=model, filename=text[0])
         return {"flat": compiled.to_json("flat")}
     except BaseException as error:  # a panic of rumoca is not derived from Exception
-        return {"error": str(error) or type(error).__name__, "panicked": not isinstance(error, Exception)}
+        reason, panicked = str(error) or type(error).__name__, not isinstance(error, Exception)
+    lines = None if panicked or text is None else _find_part(session, request, reason)
+    return {"error": reason, "panicked": panicked, "lines": lines}
+
+
+def _find_part(session: Any, request: dict[str, Any], reason: str) -> list[int] | None:
+    """Return the first and last line of the first part of the model without which rumoca reports another error or none."""
+    name, text = request["text"]
+    if _HAS_PLACE.search(reason):
+        return None
+    for begin, end in request["parts"][: request["trials"]]:
+        blank = re.sub(r"[^\n]", " ", text[begin:end])
+        found = _outcome(session, request, name, f"{text[:begin]}{blank}{text[end:]}\n{request['declaration']}")
+        if found != reason and (found == "" or (_TOO_FEW_EQUATIONS not in reason and _LATER_PHASE.search(found))):
+            return [text.count("\n", 0, position) + 1 for position in (begin, end)]
+    return None
+
+
+def _outcome(session: Any, request: dict[str, Any], name: str, text: str) -> str:
+    """Return the message for a changed text, "" without an error."""
+    try:
+        session.loads(text, model=request["model"], filename=name)
+    except BaseException as error:
+        return str(error)
+    return ""
 
 
 def _write(message: dict[str, Any]) -> None:

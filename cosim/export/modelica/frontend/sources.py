@@ -3,13 +3,14 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 
 from ..model.syntax_tree import SourceLocation
 from .libraries import Library
+from .library_search import find_class, find_operator
 
 _CLASS = r"^[^/\n]*\b(?:model|block|class|function|package|record|connector|type)\s+{}\b"
 
@@ -59,6 +60,20 @@ class ModelicaSources:
         text = path.read_text(encoding="utf-8")
         declaration = re.search(_CLASS.format(re.escape(name.rpartition(".")[2])), text, re.MULTILINE)
         return SourceLocation(path, text.count("\n", 0, declaration.end()) + 1 if declaration else 1)
+
+    def locate_library_class(self, names: Iterable[str]) -> SourceLocation | None:
+        """Return the declaration of the first class of a library, or of a package beside the model, among full names."""
+        for name in names:
+            folder = self.packages.get(name.partition(".")[0])
+            if folder and "." in name and (place := find_class(folder, name.split(".")[1:])):
+                return place[0]
+        return None
+
+    def locate_in_libraries(self, operators: Iterable[str]) -> SourceLocation | None:
+        """Return the first place of an operator in the classes of libraries that the model uses."""
+        packages = {library.name: library.path for library in self.libraries if library.path.is_dir()}
+        code = self.files[0].read_text(encoding="utf-8")
+        return next((place for word in operators if packages and (place := find_operator(word, code, packages))), None)
 
     def locate(self, span: Mapping[str, int] | None) -> SourceLocation | None:
         """Return the line at which a span starts, or None for a span that is not in these files."""

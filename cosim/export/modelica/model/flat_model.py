@@ -104,6 +104,10 @@ class Function:
     external: ExternalCode | None = None
 
 
+#: beginning of the names of variables that are arguments of clocked sample() operators and can jump
+SAMPLED = "$sampled "
+
+
 @dataclass(frozen=True, slots=True)
 class Relation:
     """A comparison that changes between events; `name` is the Boolean variable that holds its value until the next event."""
@@ -130,6 +134,8 @@ class Hybrid:
     remembered: tuple[str, ...]
     #: variables of `remembered` whose change in an event requires another evaluation
     iterated: tuple[str, ...]
+    #: variables of `remembered` whose stored value is the one before the first of several events at the same time
+    sampled: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
