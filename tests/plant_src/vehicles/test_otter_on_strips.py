@@ -20,6 +20,8 @@ from plant_src.environment import sea
 from plant_src.vehicles.otter import parameters as p
 
 MODEL, GOLDEN, NUMPY = "Otter", "golden value of MSS `otter.m`", "equations a second time in NumPy"
+ACCELERATIONS = "accelerations at 1000 random states, pontoons emerged in a part of them"
+LONG_WAVES = "heave, roll and pitch over those of the wave, T 20 s"
 PAYLOADS = [0.0, 25.0, 45.0]
 ENVIRONMENT = ("wind.x", "wind.y", "wind.z", "current.x", "current.y")
 
@@ -121,8 +123,7 @@ def test_long_beam_waves(payload: float, measured: MeasurementCheck) -> None:
     basis = np.column_stack([np.cos(angle), np.sin(angle), np.ones_like(angle)])
     sizes = [np.hypot(*np.linalg.lstsq(basis, signal, rcond=None)[0][:2]) for signal in signals]
     found = np.array(sizes) / [amplitude, number * amplitude, number * amplitude]
-    text = "heave, roll and pitch over those of the wave, T 20 s"
-    measured(MODEL, text, found, [1.0, 1.0, 0.0], "1", "limit of long waves", within=0.01, case=f"{payload:g} kg")
+    measured(MODEL, LONG_WAVES, found, [1.0, 1.0, 0.0], "1", "limit of long waves", within=0.01, case=f"{payload:g} kg")
 
 
 def righting_moment(vessel: OtterOnStrips, angle: float) -> float:
