@@ -48,7 +48,7 @@ def missing_lines(shown, output):
 
 def alike(words, others):
     return len(words) == len(others) and all(
-        a == b or number(a) == pytest.approx(number(b), rel=1e-3) for a, b in zip(words, others)
+        a == b or number(a) == pytest.approx(number(b), rel=1e-3) for a, b in zip(words, others, strict=True)
     )
 
 

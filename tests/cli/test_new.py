@@ -256,6 +256,14 @@ def test_the_output_of_a_build_is_an_fmu(tmp_path):
     assert '--output: expected the name of an FMU; found "room"; did you mean "room.fmu"?' in done.stderr
 
 
+@pytest.mark.parametrize(
+    ("base", "hint"), [("ar_drone", "cosim run demo1_box --set"), ("x500", "multirotor_controller.fmu flies it")]
+)
+def test_a_new_multirotor_comes_with_a_way_to_fly_it(tmp_path: Path, base: str, hint: str) -> None:
+    done = run_cosim("new", "vehicle", "my_quad", "--from", base, cwd=tmp_path)
+    assert hint in done.stdout
+
+
 def test_a_new_boat_is_a_copy_of_the_otter(tmp_path: Path) -> None:
     done = run_cosim("new", "vehicle", "my_boat", "--from", "otter", cwd=tmp_path)
     assert done.returncode == 0, done.stderr

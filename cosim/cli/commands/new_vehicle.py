@@ -7,6 +7,7 @@ import re
 import shlex
 import shutil
 from pathlib import Path
+from typing import Any
 
 import click
 
@@ -56,13 +57,19 @@ def command(name: str, base: str, directory: Path, urdf: Path | None, mesh: Path
     else:
         shutil.copyfile(source, file)
     family = parse_object(file.read_text(encoding="utf-8")).get("family")
-    setting = f"/components/plant/arguments/vehicles/uav/model={file}"
-    demo = f"Fly Demo 1 with it:\n  cosim run demo1_box --set {shlex.quote(setting)}\n"
-    if family != "multirotor":
-        demo = f'Name it in a scenario, as a vehicle of the plant:\n  {{"model": "{file}", ...}}\n'
-    click.echo(
-        f"{file}\n\n{demo}As an FMU:\n  {shlex.join(['cosim', 'build', str(file), '--output', str(file.with_suffix('.fmu'))])}"
-    )
+    build = shlex.join(["cosim", "build", str(file), "--output", str(file.with_suffix(".fmu"))])
+    click.echo(f"{file}\n\n{_use(file, base, family)}As an FMU:\n  {build}")
+
+
+def _use(file: Path, base: str, family: Any) -> str:
+    """Return how to use the vehicle in a scenario; the controllers of Demo 1 fly multirotors like the AR.Drone only."""
+    if base == "ar_drone":
+        setting = f"/components/plant/arguments/vehicles/uav/model={file}"
+        return f"Fly Demo 1 with it:\n  cosim run demo1_box --set {shlex.quote(setting)}\n"
+    text = f'Name it in a scenario, as a vehicle of the plant:\n  {{"model": "{file}", ...}}\n'
+    if family == "multirotor":
+        text += "multirotor_controller.fmu flies it; its parameters are mass, inertia and rotors (see crazyflie_square).\n"
+    return text
 
 
 def _find_vehicle(base: str) -> Path:

@@ -1,4 +1,4 @@
-/* made from sources 2e8f05461d7c93d49f5c3a26a51c663b4a337d9a424975bc293c02a733bc1034
+/* made from sources 53df83498daf76c1da48130f835e04358b58dcc22d9a9b3a80ee1c409decf833
 
 three
 
