@@ -1,6 +1,7 @@
 """Table of the FMUs in a folder that cosim and other importers simulate with all defaults.
 
-    python tests/benchmarks/fmu_coverage.py FOLDER [--environments DIR] [--only NAME ...] [--document FILE] [--json FILE]
+    python tests/benchmarks/fmu_coverage.py FOLDER [--environments DIR] [--only NAME ...] [--time-limit SECONDS]
+        [--document FILE] [--json FILE]
 
 Tries each *.fmu below FOLDER in a process of its own with each importer, from the start to the stop time of its default
 experiment. An importer counts as successful if it reaches the stop time. Creates a virtual environment for each other importer

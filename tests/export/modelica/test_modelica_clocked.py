@@ -299,3 +299,23 @@ equation
 end Counter;""")
     values = random_values(20)
     assert outputs(model, values) == pytest.approx(np.repeat(3 + np.cumsum(values[::2]), 2), abs=1e-12)
+
+
+def test_a_clock_with_a_condition_can_act_on_its_condition(compile_both):
+    model = compile_both("""model Distance
+  output Real y;
+  Real x(start = 0, fixed = true);
+  Boolean far = x - y >= 0.25;
+  Clock c = Clock(far);
+  Real s(start = 0);
+equation
+  der(x) = 1;
+  s = sample(x, c);
+  y = hold(s);
+end Distance;""")
+    model.initialize()
+    found = []
+    for k in range(90):
+        model.step(k * STEP, STEP)
+        found.append(model.get("y"))
+    assert found == pytest.approx([0.25 * math.floor((k + 1) * STEP / 0.25 + 1e-9) for k in range(90)], abs=1e-8)

@@ -75,7 +75,7 @@ class _Replacement:
             if isinstance(item, Equation) and (is_clock(item.left, self._model) or is_clock(item.right, self._model)):
                 continue
             changed[node.partition(" ")[0]].append(self._translate(node, item))
-        whens = [When(((_condition(*key), tuple(body)),)) for key, body in self._bodies.items()]
+        whens = [When(((self._condition(*key), tuple(body)),)) for key, body in self._bodies.items()]
         sections: dict[str, Any] = {section: tuple(items) for section, items in changed.items()}
         sections["whens"] += tuple(whens)
         sections["equations"] += tuple(self._limits)
@@ -94,7 +94,7 @@ class _Replacement:
         return replace(tree, **{field.name: self._translate(node, getattr(tree, field.name)) for field in fields(tree)})
 
     def _translate_when(self, node: str, when: When) -> When:
-        return When(((_condition(self._rate(node), True), self._translate(node, when.branches[0][1])),), when.where)
+        return When(((self._condition(self._rate(node), True), self._translate(node, when.branches[0][1])),), when.where)
 
     def _rate(self, node: str) -> Rate:
         rate = self._clocks.rate(node)
@@ -121,6 +121,13 @@ class _Replacement:
         if call.name == "backSample":  # the start value until the first tick of the argument
             value = self._hold(self._rate(inner), value, call, with_start=True)
         return self._hold(self._rate(node), value, call, with_start=call.name != "sample", at_start=not limited)
+
+    def _condition(self, rate: Rate, at_start: bool) -> Expression:
+        """Return the condition of a when-clause at the ticks of a clock, `at_start`: also at the initialization."""
+        if rate.condition:  # a clock with a condition that depends on its own ticks acts in the next evaluation of the event
+            return Builtin("pre", (rate.condition,)) if self._jumps.is_held(rate.condition) else rate.condition
+        tick = Builtin("sample", (Literal(float(rate.offset), "Real"), Literal(float(rate.period), "Real")))
+        return Array((Builtin("initial", ()), tick)) if at_start and rate.offset == 0 else tick
 
     def _hold(self, rate: Rate, value: Expression, call: Builtin, with_start: bool, at_start: bool = True) -> Name:
         """Return the variable with the value at the last tick; `at_start`: the initialization sets it, too."""
@@ -183,11 +190,3 @@ class _Replacement:
     def _real(self) -> Variable:
         template = next(iter(self._model.variables.values()))
         return replace(internal_variable(template, ""), type="Real", shape=(), enumeration="", variability="continuous")
-
-
-def _condition(rate: Rate, at_start: bool) -> Expression:
-    """Return the condition of a when-clause at the ticks of a clock, `at_start`: also at the initialization."""
-    if rate.condition:
-        return rate.condition
-    tick = Builtin("sample", (Literal(float(rate.offset), "Real"), Literal(float(rate.period), "Real")))
-    return Array((Builtin("initial", ()), tick)) if at_start and rate.offset == 0 else tick

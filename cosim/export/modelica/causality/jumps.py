@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from typing import Any
 
 from ..model.flat_model import Model
@@ -47,17 +47,26 @@ class JumpSearch:
 
     def may_jump(self, expression: Expression) -> bool:
         """Return whether the value of an expression can jump at an event that is not a change of an input."""
+        return any(self._jumps(tree) for tree in self._dependences(expression))
+
+    def is_held(self, expression: Expression) -> bool:
+        """Return whether an expression depends on a value that `hold()` keeps."""
+        return any(has_builtin(tree, "hold") for tree in self._dependences(expression))
+
+    def _dependences(self, expression: Expression) -> Iterator[Any]:
+        """Yield the expression, and all equations that contain variables on which it depends."""
         pending, seen = [expression], set(self._ends)
         while pending:
             tree = pending.pop()
-            if has_builtin(tree, *_JUMPING) or any(isinstance(item, If) for item in walk(tree)):
-                return True
+            yield tree
             for name in variable_names(tree) - seen:
                 seen.add(name)
-                if name in self._assigned or _is_discrete(name, self._model.variables):
-                    return True
                 pending += self._equations.get(name, ())
-        return False
+
+    def _jumps(self, tree: Any) -> bool:
+        names = variable_names(tree) - self._ends
+        discrete = any(name in self._assigned or _is_discrete(name, self._model.variables) for name in names)
+        return discrete or has_builtin(tree, *_JUMPING) or any(isinstance(item, If) for item in walk(tree))
 
 
 def _is_discrete(name: str, variables: Mapping[str, Any]) -> bool:

@@ -18,7 +18,7 @@ from .parts import removable_parts
 #: limits of the child process: processor time and wall time (s), private memory and size of the flat model (bytes)
 CPU_LIMIT, TIMEOUT, MEMORY_LIMIT, OUTPUT_LIMIT = 120, 900, 2 << 30, 1 << 28
 #: numbers of parts of a model that are removed to find the one that rumoca refuses, without and with packages
-TRIALS, LIBRARY_TRIALS = 200, 8
+TRIALS, LIBRARY_TRIALS = 200, 3
 
 _PROGRAM = Path(__file__).with_name("rumoca_process.py")
 #: text that Rust writes when memory is exhausted
