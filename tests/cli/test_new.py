@@ -117,7 +117,7 @@ def run_pytest(folder, name):
     return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=60, env=environment)
 
 
-@pytest.mark.parametrize(("role", "language"), zip(ROLES, ["python", "c"], strict=True))
+@pytest.mark.parametrize(("role", "language"), [*zip(ROLES, ["python", "c"], strict=True)])
 def test_the_test_of_a_new_controller_passes(moved, role, language):
     done = run_pytest(moved(role, language), "my_pilot")
     assert done.returncode == 0, done.stdout

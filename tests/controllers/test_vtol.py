@@ -266,7 +266,7 @@ def erratic(rng: np.random.Generator, k: int, altitude: float, offset: np.ndarra
     return inputs | {"vehicle.contact.vessel": bool(altitude < DECK + 0.07 and rng.uniform() < 0.8)}
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(4))
 def test_agrees_with_its_restatement_on_erratic_flights(controller: Any, seed: int) -> None:
     rng = np.random.default_rng(seed)
     parameters = random_parameters(rng) if seed else DEFAULTS
