@@ -19,6 +19,7 @@ from .vehicles.multirotor.vehicle_data import read_multirotor
 from .vehicles.otter import geometry as otter
 from .vehicles.otter import interface as otter_interface
 from .vehicles.otter import parameters as otter_parameters
+from .vehicles.otter_mss import interface as otter_mss_interface
 from .vehicles.planar_vessel import interface as planar_vessel_interface
 from .vehicles.planar_vessel.vehicle_data import read_planar_vessel
 from .vehicles.strider import geometry as strider
@@ -176,6 +177,15 @@ MODELS = {
             otter_parameters.CRASH_SPEED,
             is_vessel=True,
             constant_count=otter_interface.CONSTANT_COUNT,
+        ),
+        Model(
+            "otter_mss",
+            otter_interface.VARIABLES,
+            (*VESSEL_STATES, *otter_interface.PROPELLER_STATES),
+            otter.BODY,
+            otter_parameters.CRASH_SPEED,
+            is_vessel=True,
+            constant_count=otter_mss_interface.CONSTANT_COUNT,
         ),
     )
 }

@@ -14,10 +14,8 @@ import numpy as np
 
 from cosim.core.errors import InputError, Problem
 
+from .vehicles.common.convex_points import outermost_points
 from .vehicles.common.visual_mesh import MAX_TRIANGLES
-
-#: largest number of points of a convex piece
-MAX_POINTS = 64
 
 _DIGITS = 6  # of coordinates in vehicle files (m)
 
@@ -47,21 +45,9 @@ def load_mesh(path: Path, scale: Sequence[float] = (1.0, 1.0, 1.0)) -> Any:
 
 
 def convex_pieces(mesh: Any) -> list[np.ndarray]:
-    """Return the points (m) of the convex hull of each connected part, at most MAX_POINTS each.
-
-    A hull with more points is replaced by its outermost points in MAX_POINTS directions, which lie evenly on a sphere.
-    """
+    """Return the points (m) of the convex hull of each connected part, at most MAX_POINTS each."""
     parts = mesh.split(only_watertight=False)
-    hulls = [np.asarray(part.convex_hull.vertices) for part in (parts if len(parts) else [mesh])]
-    return [points if len(points) <= MAX_POINTS else _outermost(points) for points in hulls]
-
-
-def _outermost(points: np.ndarray) -> np.ndarray:
-    height = 1 - 2 * (np.arange(MAX_POINTS) + 0.5) / MAX_POINTS
-    angle, radius = np.pi * (1 + 5**0.5) * np.arange(MAX_POINTS), np.sqrt(1 - height**2)
-    directions = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), height])
-    chosen: np.ndarray = points[np.unique(np.argmax(points @ directions.T, axis=0))]
-    return chosen
+    return [outermost_points(np.asarray(part.convex_hull.vertices)) for part in (parts if len(parts) else [mesh])]
 
 
 def piece_data(points: np.ndarray, source: str) -> dict[str, Any]:

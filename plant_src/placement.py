@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
-from .json_reader import Numbers
+from .json_reader import JsonPath, JsonReader, Numbers
 from .vehicles.common.shapes import Body
 from .vehicles.model import Model
 
@@ -23,6 +24,12 @@ class ContactSurface(NamedTuple):
 
 
 DRY = ContactSurface()
+
+
+def read_surface(reader: JsonReader, spec: Mapping[str, Any], path: JsonPath) -> ContactSurface:
+    """Read the keys "friction" and "restitution" of an object."""
+    friction = reader.number(spec.get("friction", 1.0), (*path, "friction"), 0.0)
+    return ContactSurface(friction, reader.number(spec.get("restitution", 0.0), (*path, "restitution"), 0.0, 1.0))
 
 
 @dataclass(frozen=True)

@@ -19,11 +19,12 @@ from cosim.core.errors import ComponentError, InputError, Problem, did_you_mean
 from . import world_settings
 from .catalogue import MODELS
 from .environment.environment_model import EnvironmentModel
-from .physics.body import ContactBody, InvalidStateError, create_platform
+from .physics.body import ContactBody, InvalidStateError
 from .physics.client import connect, preconnect, pybullet
 from .physics.compiled_equations import library_path
 from .physics.contacts import overlap_depths
 from .physics.failures import FLAG_COUNT
+from .physics.fixed_bodies import create_fixed_bodies
 from .physics.fleet import Fleet, FleetState
 from .scene import replay
 from .variable_views import recorded_others, variable_views, views_in_parts
@@ -56,14 +57,13 @@ class World(Component):
     Args:
         instance_name: Name of the component.
         vehicles: Name to object with the keys "model" (in `catalogue.VEHICLE_MODELS`), "position" of the centre of mass
-            ([x, y, z], of vessels [x, y], m) and, optionally, "motion" ("planar" or "6dof"), "hull" ("paper" for the
-            Strider of the paper), "yaw" (rad), "velocity_body"
-            ([u, v, w], m/s), "rates" ([p, q, r], rad/s), "parameters" (name to value) and "crash_speed" (m/s), the change of
-            velocity by a collision above which the vehicle has crashed. "friction" (default 1) and "restitution" (default 0) are
-            those of its surface; the values of two bodies in contact are multiplied.
-        platforms: Name to object with the keys "size" (edges [x, y, z], m), "position" (centre [x, y, z], m) and, optionally,
-            "friction" and "restitution".
+            ([x, y, z], of vessels [x, y], m) and, optionally, "motion" ("planar" or "6dof"), "hull" ("paper" for the Strider
+            of the paper), "yaw" (rad), "velocity_body" ([u, v, w], m/s), "rates" ([p, q, r], rad/s), "parameters" (name to
+            value) and "crash_speed" (m/s), the change of velocity by a collision above which it has crashed. "friction" (default
+            1) and "restitution" (default 0) are those of its surface; the values of two bodies in contact are multiplied.
+        platforms: Name to object with "size" (edges [x, y, z], m), "position" (centre, m), optionally "friction", "restitution".
         environment: Object that `environment/settings.py` describes; waves and gusts start with the run.
+        obstacles: Name to object with the key "mesh" and those of `obstacles.py`.
 
     Raises:
         InputError: With all problems; their subjects are paths of the arguments.
@@ -78,9 +78,10 @@ class World(Component):
         vehicles: Mapping[str, Any],
         platforms: Mapping[str, Any] | None = None,
         environment: Mapping[str, Any] | None = None,
+        obstacles: Mapping[str, Any] | None = None,
     ):
         settings = world_settings.read_world_settings(
-            vehicles, {} if platforms is None else platforms, {} if environment is None else environment
+            vehicles, *({} if argument is None else argument for argument in (platforms, environment, obstacles))
         )
         self._name = instance_name
         self._bullet_step, self._step_size, self._start_time = np.zeros(1), math.nan, 0.0
@@ -118,12 +119,11 @@ class World(Component):
         return frames(result, camera, times, size)
 
     def _populate(self, settings: WorldSettings) -> None:
-        platforms = {create_platform(self._client, platform): platform.name for platform in settings.platforms}
+        fixed = create_fixed_bodies(self._client, settings.platforms, settings.obstacles)
         shared = {"step_size": self._bullet_step, "highest_water": self._highest_water}
-        self._fleet = Fleet(self._client, settings.vehicles, settings.platforms, shared, self._flags, platforms)
+        self._fleet = Fleet(self._client, settings.vehicles, fixed.boxes, shared, self._flags, fixed.names)
         self._advance, self._contacts, self._failures = self._fleet.advance, self._fleet.contacts, self._fleet.failures
-        paths = {number: f"platforms.{name}" for number, name in platforms.items()}
-        self._check_overlaps(paths | {body.body_id: f"vehicles.{body.name}" for body in self._fleet.bodies})
+        self._check_overlaps(fixed.paths | {body.body_id: f"vehicles.{body.name}" for body in self._fleet.bodies})
         self._environment = EnvironmentModel(
             settings.environment,
             settings.sea,

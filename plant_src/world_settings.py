@@ -16,7 +16,8 @@ from .environment import settings
 from .environment.sea import Sea
 from .environment.settings import EnvironmentSettings
 from .json_reader import JsonPath, JsonReader, Numbers
-from .placement import ContactSurface, Platform, VehiclePlacement
+from .obstacles import Obstacle, read_obstacles
+from .placement import ContactSurface, Platform, VehiclePlacement, read_surface
 from .vehicles.common.shapes import Body
 from .vehicles.model import Model
 
@@ -33,17 +34,19 @@ class WorldSettings:
 
     vehicles: Sequence[VehiclePlacement]
     platforms: Sequence[Platform]
+    obstacles: Sequence[Obstacle]
     environment: EnvironmentSettings
     sea: Sea
 
 
-def read_world_settings(vehicles: Any, platforms: Any, environment: Any) -> WorldSettings:
+def read_world_settings(vehicles: Any, platforms: Any, environment: Any, obstacles: Any) -> WorldSettings:
     """Read the arguments of a world.
 
     Args:
         vehicles: JSON object, name to vehicle.
         platforms: JSON object, name to platform.
         environment: JSON object, see `environment/settings.py`.
+        obstacles: JSON object, name to obstacle, see `obstacles.py`.
 
     Raises:
         InputError: With all problems; the subject of each is the path of the setting in the component.
@@ -51,13 +54,15 @@ def read_world_settings(vehicles: Any, platforms: Any, environment: Any) -> Worl
     reader = _WorldSettingsReader()
     placements = [reader.read_vehicle(name, spec) for name, spec in reader.read_named_objects(vehicles, ("vehicles",)).items()]
     boxes = [reader.read_platform(name, spec) for name, spec in reader.read_named_objects(platforms, ("platforms",)).items()]
+    meshes = read_obstacles(obstacles, reader)
     environment_settings = settings.read_environment(reader, environment)
     if vehicles == {}:
         reader.add_problem(("vehicles",), "found no vehicle, expected at least one")
     if reader.problems:
         raise InputError(reader.problems)
     sea = environment_settings.sea()
-    return WorldSettings([_with_waves(sea, vehicle) for vehicle in placements if vehicle], boxes, environment_settings, sea)
+    afloat = [_with_waves(sea, vehicle) for vehicle in placements if vehicle]
+    return WorldSettings(afloat, boxes, meshes, environment_settings, sea)
 
 
 class _WorldSettingsReader(JsonReader):
@@ -77,7 +82,7 @@ class _WorldSettingsReader(JsonReader):
         valid = len(self.problems) == problem_count
         body = self.collision_body(model, parameters, (*path, "parameters")) if valid else model.body
         crash_speed = self.number(spec.get("crash_speed", model.crash_speed), (*path, "crash_speed"), 0.0)
-        return VehiclePlacement(name, model, tuple(parameters.values()), body, crash_speed, self.read_surface(spec, path))
+        return VehiclePlacement(name, model, tuple(parameters.values()), body, crash_speed, read_surface(self, spec, path))
 
     def read_hull(self, model: Model, spec: Mapping[str, Any], path: JsonPath) -> dict[str, float]:
         """Return the parameters of the hull with the name "hull", none if the vehicle has its default one."""
@@ -87,11 +92,6 @@ class _WorldSettingsReader(JsonReader):
             self.add_problem((*path, "hull"), f"found {spec['hull']!r}; {model.name} has one hull only, remove the key")
             return {}
         return dict(model.hulls[self.choice(spec["hull"], (*path, "hull"), tuple(model.hulls))])
-
-    def read_surface(self, spec: Mapping[str, Any], path: JsonPath) -> ContactSurface:
-        """Read friction and restitution."""
-        friction = self.number(spec.get("friction", 1.0), (*path, "friction"), 0.0)
-        return ContactSurface(friction, self.number(spec.get("restitution", 0.0), (*path, "restitution"), 0.0, 1.0))
 
     def read_initial_state(self, model: Model, spec: Mapping[str, Any], path: JsonPath) -> dict[str, float]:
         """Read position, yaw, velocity and rates; return the parameters `initial.*`."""
@@ -165,7 +165,7 @@ class _WorldSettingsReader(JsonReader):
         if not all(edge > 0 for edge in size):
             self.add_problem((*path, "size"), f"found {list(size)}, expected edges greater than 0")
         position = self.vector(spec.get("position", [0.0] * 3), (*path, "position"), "xyz")
-        return Platform(name, size, position, self.read_surface(spec, path))
+        return Platform(name, size, position, read_surface(self, spec, path))
 
 
 def _with_waves(sea: Sea, vehicle: VehiclePlacement) -> VehiclePlacement:

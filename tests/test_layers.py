@@ -39,6 +39,7 @@ PLANT_LAYERS = (
     "manoeuvre_track",
     "vehicles",
     "placement",
+    "obstacles",
     "catalogue",
     "vehicle_block",
     "schema_parts",

@@ -164,7 +164,7 @@ def join_alternatives(names: Iterable[str]) -> str:
 
 
 def did_you_mean(name: str, valid: Iterable[str]) -> str:
-    """Return a hint for the end of a message: the most similar valid name, else up to 8 valid names, else "".
+    """Return a hint for the end of a message: the most similar valid name, else up to 12 valid names, else "".
 
     A name that differs by two swapped neighbouring letters counts as the most similar one. For a name with dots, names that begin
     with the same component come first; others must be nearly equal.
@@ -197,7 +197,7 @@ def _did_you_mean(name: str, names: tuple[str, ...]) -> str:
     same = [other for other in names if other.lower() == name.lower()]
     if near := same or [other for other in names if other in swapped] or _close_matches(name, names):
         return f'; did you mean "{near[0]}"?'
-    if 0 < len(names) <= 8:
+    if 0 < len(names) <= 12:
         return f"; valid: {', '.join(names)}"
     return ""
 

@@ -28,6 +28,7 @@ from .python_stack import innermost_line, request_stack
 from .run_files.live_csv_writer import LiveCsvWriter
 from .supervised_child import run_child
 from .temporary_folders import temporary_run_folder
+from .waiting_time import waiting_time
 
 #: interval at which the supervisor checks the child (s)
 POLL_INTERVAL = 0.05
@@ -37,6 +38,9 @@ INTERRUPT_TIMEOUT = 3.0
 
 #: time after which a process that was stopped from outside (SIGSTOP) is killed (s)
 STOP_TIMEOUT = 5.0
+
+#: largest ratio of the wall time of a call to its deadline, on a busy machine
+MAX_EXTENSION = 4.0
 
 #: number of searches for orphaned processes; each one may find children of the processes killed before
 _MAX_ORPHAN_SCANS = 10
@@ -140,6 +144,8 @@ class _Supervisor:
     _output: ForeignOutput = field(init=False)
     _progress: tuple[int, ...] = ()
     _progress_time: float = field(default_factory=time.monotonic)
+    #: see `waiting_time`, at the last progress (s)
+    _waiting_time: float = 0.0
     _interrupt_time: float = 0.0
     #: time at which the child was stopped from outside; 0 while it runs
     _stop_time: float = 0.0
@@ -195,8 +201,8 @@ class _Supervisor:
         deadline = journal.deadline  # read before `progress`: a later deadline might belong to the next call
         progress = journal[CHANGE_COUNT], journal[STEP_COUNT], journal[CALL_NUMBER]
         if progress != self._progress:
-            self._progress, self._progress_time = progress, now
-        elif now - self._progress_time > deadline:
+            self._progress, self._progress_time, self._waiting_time = progress, now, waiting_time(self.child)
+        elif now - self._progress_time > deadline and self._exceeds(deadline, now):
             self._timeout_reason = f"did not return within {deadline:g} s"
             request_stack(self.child, self.stack)
             os.kill(self.child, signal.SIGKILL)
@@ -207,6 +213,11 @@ class _Supervisor:
             os.kill(self.child, signal.SIGKILL)
         if self._interrupt_time and now - self._interrupt_time > INTERRUPT_TIMEOUT:
             os.kill(self.child, signal.SIGKILL)
+
+    def _exceeds(self, deadline: float, now: float) -> bool:
+        """Return whether a call exceeds a deadline (s) without the time in which a busy machine gave it no processor."""
+        waiting = waiting_time(self.child) - self._waiting_time
+        return now - self._progress_time - waiting > deadline or now - self._progress_time > MAX_EXTENSION * deadline
 
     def _forward_interrupt(self) -> None:
         """Send SIGINT to the child for the first interrupt, SIGKILL for the second."""

@@ -1,7 +1,7 @@
-"""JSON files that the arguments of components name, for example vehicle files.
+"""Files that the arguments of components name, for example vehicle files and meshes.
 
-A text in "arguments" that ends in ".json" stands for the content of this file. Its path starts from the folder of the file that
-contains the text.
+A text in "arguments" that ends in ".json" stands for the content of this file, and the name of an STL, OBJ or GLB file at the key
+"mesh" for its triangles (`mesh_files.py`). Paths start from the folder of the file that contains the text.
 """
 
 from __future__ import annotations
@@ -12,7 +12,9 @@ from pathlib import Path
 from typing import Any
 
 from ..core.errors import InputError, Problem
+from . import mesh_files
 from .json_document import Document, JsonPath, Origin, read_document
+from .mesh_files import read_mesh
 
 SUFFIX = ".json"
 
@@ -54,6 +56,9 @@ def include_in_setting(keys: Sequence[str], value: Any, folder: Path) -> tuple[A
     files: list[Path] = []
 
     def read(text: str, _path: JsonPath) -> Any:
+        if not text.endswith(SUFFIX):
+            files.append(folder / text)
+            return read_mesh(folder / text)
         file = read_document(folder / text)
         if file.problems:
             raise InputError(file.problems)
@@ -65,12 +70,17 @@ def include_in_setting(keys: Sequence[str], value: Any, folder: Path) -> tuple[A
 
 
 def _replace_names(value: Any, path: JsonPath, content: Callable[[str, JsonPath], Any]) -> Any:
-    """Return a value in which each name of a JSON file is replaced by content(name, path of the name)."""
+    """Return a value in which each name of a file is replaced by content(name, path of the name)."""
     if isinstance(value, dict):
         return {key: _replace_names(each, (*path, key), content) for key, each in value.items()}
     if isinstance(value, list):
         return [_replace_names(each, (*path, i), content) for i, each in enumerate(value)]
-    return content(value, path) if isinstance(value, str) and value.endswith(SUFFIX) else value
+    return content(value, path) if isinstance(value, str) and _names_file(value, path) else value
+
+
+def _names_file(text: str, path: JsonPath) -> bool:
+    """Return whether a text names a file to include."""
+    return text.endswith(SUFFIX) or (path[-1:] == ("mesh",) and text.lower().endswith(mesh_files.SUFFIXES))
 
 
 class _Inclusion:
@@ -92,6 +102,9 @@ class _Inclusion:
 
     def _content(self, text: str, path: JsonPath) -> Any:
         try:
+            if not text.endswith(SUFFIX):
+                self.files.append(self._document.file.parent / text)
+                return read_mesh(self.files[-1])
             file = read_document(self._document.file.parent / text)
         except InputError as error:
             where = self._document.where(path)

@@ -164,6 +164,9 @@ class ParameterSpec(Spec):
     start: float | None = key("first value; default: the middle of the bounds", 1.5, default=None)
     scale: Scale = key("scale on which the method searches", "log", default="linear")
     whole: bool = key("only whole numbers, for example for a seed", True, default=False)
+    multiple_of: float | None = key(
+        "only multiples of this number, for example of the step size for the time of an event", 0.01, default=None, gt=0
+    )
 
     @model_validator(mode="after")
     def _possible(self) -> ParameterSpec:
@@ -173,6 +176,10 @@ class ParameterSpec(Spec):
             raise ValueError('expected "start" between "min" and "max"')
         if self.whole and math.ceil(self.min) > math.floor(self.max):
             raise ValueError('expected a whole number between "min" and "max"')
+        if self.multiple_of and self.whole:
+            raise ValueError('expected "whole" or "multiple_of", found both')
+        if self.multiple_of and math.ceil(self.min / self.multiple_of) > math.floor(self.max / self.multiple_of):
+            raise ValueError('expected a multiple of "multiple_of" between "min" and "max"')
         return self
 
 

@@ -31,6 +31,9 @@ def _value(spec: ParameterSpec, coordinate: float) -> float:
     value = interpolate(coordinate, spec.min, spec.max, spec.scale == "log")
     if spec.whole:
         return min(max(round(value), math.ceil(spec.min)), math.floor(spec.max))
+    if unit := spec.multiple_of:
+        count = min(max(round(value / unit), math.ceil(spec.min / unit)), math.floor(spec.max / unit))
+        return float(f"{count * unit:.12g}")
     return min(max(float(f"{value:.12g}"), spec.min), spec.max)
 
 

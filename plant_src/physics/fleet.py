@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ..placement import Platform, VehiclePlacement
+from ..placement import VehiclePlacement
 from ..vehicles.common.step_status import INVALID_STATE, LEAVES_SAFE_BOX, MAY_FAIL
 from .body import ContactBody, InvalidStateError
 from .clearance import BoundingBox, Clearance
@@ -53,11 +53,11 @@ class Fleet:
     Args:
         client: Number of the Bullet client.
         vehicles: Vehicles to create.
-        platforms: Platforms, which exist in Bullet already.
+        fixed: Bounding boxes of platforms and obstacles, which exist in Bullet already.
         shared: Arrays of shape (1,) that the owner may change between steps: "step_size", the duration of a step (s), and
             "highest_water", the height of the highest possible water surface (m).
         flags: Flags of each vehicle (`failures.py`), shape (vehicles, FLAG_COUNT).
-        platform_names: Name of each platform by its number in Bullet.
+        fixed_names: Name of each platform and obstacle by its number in Bullet.
 
     Attributes:
         bodies: Contact body of each vehicle.
@@ -72,10 +72,10 @@ class Fleet:
         self,
         client: int,
         vehicles: Sequence[VehiclePlacement],
-        platforms: Sequence[Platform],
+        fixed: Sequence[BoundingBox],
         shared: Mapping[str, np.ndarray],
         flags: np.ndarray,
-        platform_names: Mapping[int, str],
+        fixed_names: Mapping[int, str],
     ):
         self._client, self._flags = client, flags
         self._memory = memory = VehicleArrays([body_class(vehicle.model).array_sizes(vehicle.model) for vehicle in vehicles])
@@ -84,10 +84,9 @@ class Fleet:
             for vehicle, arrays in zip(vehicles, memory.of_vehicle, strict=True)
         ]
         self.inputs, self.outputs = memory.of_all_vehicles["inputs"], memory.of_all_vehicles["outputs"]
-        self.failures = Failures(self.bodies, vehicles, flags, memory.of_all_vehicles["step_status"], platform_names)
+        self.failures = Failures(self.bodies, vehicles, flags, memory.of_all_vehicles["step_status"], fixed_names)
         self.contacts = Contacts(client, self.bodies, self.outputs, flags, self.failures)
         movable = [body.bounding_box(vehicle.body) for body, vehicle in zip(self.bodies, vehicles, strict=True)]
-        fixed = [_platform_bounding_box(platform) for platform in platforms]
         distances = (memory.of_all_vehicles[name] for name in ("endpoints", "reference_position", "safe_distance"))
         self.clearance = Clearance(movable, fixed, *distances)
         self._predict, self._correct = [body.predict for body in self.bodies], [body.correct for body in self.bodies]
@@ -216,9 +215,3 @@ class Fleet:
     def free_state(self, state: FleetState) -> None:
         """Release the memory of a state in Bullet."""
         pybullet.removeState(state.bullet, physicsClientId=self._client)
-
-
-def _platform_bounding_box(platform: Platform) -> BoundingBox:
-    x, y, z = platform.position
-    half_x, half_y, half_z = (edge / 2 for edge in platform.size)
-    return BoundingBox((x - half_x, y - half_y, z - half_z), (x + half_x, y + half_y, z + half_z))

@@ -218,7 +218,7 @@ def _read_arguments(vehicles: Any, platforms: Any, sub_steps: Any) -> tuple[dict
     specs = {
         name: {**spec, "model": VEHICLE_MODELS[name]} if isinstance(spec, Mapping) else spec for name, spec in vehicles.items()
     }
-    settings = world_settings.read_world_settings(specs, platforms, {})
+    settings = world_settings.read_world_settings(specs, platforms, {}, {})
     return {vehicle.name: vehicle for vehicle in settings.vehicles}, list(settings.platforms)
 
 

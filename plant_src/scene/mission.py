@@ -12,6 +12,7 @@ from cosim.core.errors import InputError
 from cosim.results import Result
 
 from ..catalogue import models_of
+from ..obstacles import Obstacle, obstacles_of
 from ..recorded_motion import touchdown_row
 from ..vehicles.common.shapes import Quaternion
 
@@ -20,11 +21,12 @@ APPROACH_TIME = 8.0  # s before touchdown that belong to the landing
 
 @dataclass(frozen=True)
 class Mission:
-    """Result with its vehicles (signal prefix -> name or data of the vehicle) and the platforms of its plant."""
+    """Result with its vehicles (signal prefix -> name or data of the vehicle), and platforms and obstacles of its plant."""
 
     result: Result
     vehicles: Mapping[str, Any]
     platforms: Mapping[str, Mapping[str, Sequence[float]]]
+    obstacles: Sequence[Obstacle] = ()
 
     def position(self, vehicle: str, row: int) -> list[float]:
         """Return the position of a vehicle's centre of mass (m, world)."""
@@ -69,5 +71,5 @@ def mission_of_result(result: Result) -> Mission:
         arguments = component.get("arguments", {})
         if vehicles := arguments.get("vehicles"):
             models = {f"{name}.{vehicle}": spec["model"] for vehicle, spec in vehicles.items()}
-            return Mission(result, models, arguments.get("platforms", {}))
+            return Mission(result, models, arguments.get("platforms", {}), obstacles_of(arguments))
     raise InputError("the scene needs a result whose scenario has a plant with vehicles")

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from typing import Literal, NamedTuple
+from typing import Any, Literal, NamedTuple
 
 import numpy as np
 
+from ..obstacles import Obstacle
 from ..vehicles.common.shapes import Quaternion, Vector
 from ..vehicles.model import Model
 from ..vehicles.strider import geometry as strider_geometry
@@ -175,7 +176,14 @@ def single_tree_parts(x: float, y: float, random: np.random.Generator) -> Iterat
         yield Part("sphere", (radius,), (x + float(east), y + float(north), level * height), leaves)
 
 
-def static_parts(platforms: Mapping[str, Mapping[str, Sequence[float]]]) -> list[Part]:
-    """Return the parts of trees and platforms; `shores` and `sky_and_water` draw land, water and sky."""
+def obstacle_part(obstacle: Obstacle) -> Part:
+    """Return the mesh of an obstacle."""
+    corners = obstacle.triangles.reshape(-1, 3)
+    x, y, z = ((corners.min(axis=0) + corners.max(axis=0)) / 2).tolist()
+    return Part("mesh", tuple((corners - [x, y, z]).ravel().tolist()), (x, y, z), obstacle.colour)
+
+
+def static_parts(platforms: Mapping[str, Any], obstacles: Sequence[Obstacle]) -> list[Part]:
+    """Return the parts of platforms and obstacles (JSON objects by name, obstacles)."""
     decks = [part for platform in platforms.values() for part in platform_parts(platform["size"], platform["position"])]
-    return [*tree_parts(), *decks]
+    return [*decks, *map(obstacle_part, obstacles)]

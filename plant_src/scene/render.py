@@ -11,7 +11,7 @@ from cosim.core.errors import InputError, did_you_mean
 
 from .cameras import CAMERAS, View
 from .mission import Mission
-from .parts import static_parts
+from .parts import static_parts, tree_parts
 from .shores import add_land
 from .sky_and_water import (
     FAR_HILLS_COLOUR,
@@ -135,7 +135,7 @@ class Scene:
 
     def __init__(self, mission: Mission):
         self.mission = mission
-        self.static = SolidRenderer(static_parts(mission.platforms))
+        self.static = SolidRenderer([*tree_parts(), *static_parts(mission.platforms, mission.obstacles)])
         self.vehicles = SolidRenderer(*(vehicle_parts(model) for model in mission.vehicles.values()))
         self._last_background: Background | None = None
 

@@ -14,7 +14,8 @@ import numpy as np
 from ..catalogue import models_of
 from ..environment import sea
 from ..environment.sea import Sea
-from .parts import platform_parts
+from ..obstacles import obstacles_of
+from .parts import static_parts
 from .vehicle_parts import vehicle_parts
 
 Scene = dict[str, Any]
@@ -46,11 +47,11 @@ def world_scene(name: str, scenario: Mapping[str, Any], models: Mapping[str, Any
     arguments = scenario["components"][name].get("arguments", {})
     models = models or {vehicle: spec["model"] for vehicle, spec in arguments["vehicles"].items()}
     vehicles = {f"{name}.{vehicle}": model for vehicle, model in models.items()}
-    platforms = arguments.get("platforms", {}).values()
+    fixed = static_parts(arguments.get("platforms", {}), obstacles_of(arguments))
     waves = _waves(sea(arguments.get("environment", {})))
     return {
         **_scene(vehicles, scenario),
-        "fixed": [part._asdict() for spec in platforms for part in platform_parts(spec["size"], spec["position"])],
+        "fixed": [part._asdict() for part in fixed],
         "water": {"waves": waves, "gain": f"{name}.environment.wave_gain"},
     }
 

@@ -34,7 +34,7 @@ def test_a_log_message_is_short(caplog):
 
 
 def test_a_similar_signal_of_the_same_component_comes_first():
-    names = ["usv.heading_reference", "uav.altitude_command", *(f"a.x{i}" for i in range(9))]
+    names = ["usv.heading_reference", "uav.altitude_command", *(f"a.x{i}" for i in range(12))]
     assert did_you_mean("uav.altitude_reference", names) == '; did you mean "uav.altitude_command"?'
     assert did_you_mean("uav.altitude_reference", [names[0], *names[2:]]) == ""
     assert did_you_mean("uva.altitude_command", names) == '; did you mean "uav.altitude_command"?'

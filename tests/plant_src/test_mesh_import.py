@@ -20,6 +20,7 @@ from plant_src.catalogue import model_from_data
 from plant_src.mesh_import import vehicle_from_mesh
 from plant_src.scene.vehicle_parts import vehicle_parts
 from plant_src.urdf import vehicle_from_urdf
+from plant_src.vehicles.common.convex_points import MAX_POINTS
 
 trimesh = pytest.importorskip("trimesh")
 
@@ -82,7 +83,7 @@ def test_a_vehicle_stands_on_its_convex_pieces(tmp_path: Path) -> None:
 
 def test_a_round_piece_keeps_its_extent() -> None:
     (points,) = mesh_import.convex_pieces(trimesh.creation.icosphere(4, 0.5))
-    assert len(points) <= mesh_import.MAX_POINTS
+    assert len(points) <= MAX_POINTS
     assert np.linalg.norm(points, axis=1) == pytest.approx(np.full(len(points), 0.5))
     assert np.ptp(points, axis=0).min() > 0.9
 

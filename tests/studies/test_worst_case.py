@@ -62,6 +62,19 @@ def test_whole_numbers_are_searched_from_python(lag):
     assert found.counterexamples[0].is_file()
 
 
+def test_multiples_are_searched_so_that_a_fault_falls_on_a_communication_point(make_lag):
+    """The lag falls towards 0 until its input becomes 5; the later it does, the smaller is the end value."""
+    lag = make_lag(events=[{"time": 0.05, "set": {"lag.u": 5.0}}])
+    fault = {"name": "t", "set": "/events/0/time", "min": 0.005, "max": 0.098, "multiple_of": 0.01}
+    found = cosim.worst_case(
+        written(lag, parameters=[fault], success=[{"kpi": "end.value", "min": 2.0}]), output_dir=lag.folder / "out", workers=1
+    )
+    assert {each.parameters["t"] for each in found.attempts} <= {n / 100 for n in range(1, 10)}
+    assert all(each.severity < 10 for each in found.attempts)
+    assert found.worst.parameters == {"t": 0.09}
+    assert len({each.severity for each in found.attempts}) > 1
+
+
 def test_a_failed_run_is_the_worst(make_lag):
     lag = make_lag(components={"lag": {"fmu": "lag.fmu", "parameters": {"fault": SEGV_ORDER}}})
     method = {"kind": "nelder_mead", "evaluations": 2}

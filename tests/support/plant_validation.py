@@ -34,6 +34,7 @@ MODELS = (
     "Strider, planar",
     "Strider, six degrees of freedom",
     "Otter",
+    "Otter of MSS",
     "Waves",
     "Wind and current",
     "Contact",

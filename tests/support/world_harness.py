@@ -25,8 +25,9 @@ class WorldHarness:
         vehicles: Mapping[str, Any],
         platforms: Mapping[str, Any] | None = None,
         environment: Mapping[str, Any] | None = None,
+        obstacles: Mapping[str, Any] | None = None,
     ):
-        self.world = World("plant", vehicles, platforms, environment)
+        self.world = World("plant", vehicles, platforms, environment, obstacles)
         self.inputs, self.outputs = _ports(self.world, "input"), _ports(self.world, "output")
         self.world.bind(self.inputs, self.outputs)
         self.world.enter_initialization_mode(0.0, 1e3)

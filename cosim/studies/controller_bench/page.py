@@ -8,6 +8,7 @@ from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any
 
+from ...core.text import count_noun
 from ...core.version import __version__
 from ...report.pages import render_page
 from ...report.tables import format_number
@@ -54,6 +55,7 @@ def write_bench_page(
     text = render_page(
         "bench.html",
         role=Path(role).stem,
+        counts=f"{count_noun(len(controllers), 'controller')} in {count_noun(len(controllers[0].scenarios), 'scenario')}",
         reference=reference,
         reference_cost=1e6 * reference_cost,
         controllers=controllers,

@@ -1,4 +1,4 @@
-"""Reader of the triangles that pictures show of a vehicle."""
+"""Reader of triangles: those that pictures show of a vehicle, and those of obstacles."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from cosim.core.errors import InputError
 
-from ...json_reader import JsonReader
+from ...json_reader import JsonPath, JsonReader
 
 #: largest number of triangles
 MAX_TRIANGLES = 20_000
@@ -27,7 +27,15 @@ def read_visual(data: Mapping[str, Any]) -> np.ndarray | None:
     if "visual" not in data:
         return None
     reader = JsonReader()
-    mesh = reader.read_object(data["visual"], ("visual",), ("vertices", "faces"), ("source", "note"))
+    triangles = read_triangles(reader, data["visual"], ("visual",))
+    if reader.problems:
+        raise InputError(reader.problems)
+    return triangles
+
+
+def read_triangles(reader: JsonReader, value: Any, path: JsonPath) -> np.ndarray | None:
+    """Read {"vertices": [[x, y, z], ...], "faces": [[a, b, c], ...]}; return triangles (n, 3, 3), None if they are invalid."""
+    mesh = reader.read_object(value, path, ("vertices", "faces"), ("source", "note"))
     try:
         vertices, faces = np.array(mesh.get("vertices"), np.float64), np.array(mesh.get("faces"), np.int64)
     except (TypeError, ValueError):
@@ -35,8 +43,7 @@ def read_visual(data: Mapping[str, Any]) -> np.ndarray | None:
     lists = vertices.ndim == faces.ndim == 2 and vertices.shape[1] == faces.shape[1] == 3 and np.isfinite(vertices).all()
     text = f"expected vertices [[x, y, z], ...] and 1 to {MAX_TRIANGLES} faces [[a, b, c], ...] of them"
     if not lists or not 0 < len(faces) <= MAX_TRIANGLES or not (0 <= faces.min() <= faces.max() < len(vertices)):
-        reader.add_problem(("visual",), text)
-    if reader.problems:
-        raise InputError(reader.problems)
+        reader.add_problem(path, text)
+        return None
     triangles: np.ndarray = vertices[faces]
     return triangles

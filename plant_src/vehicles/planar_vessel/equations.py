@@ -37,5 +37,5 @@ VESSEL = PlanarVessel(
 
 def block() -> Block:
     """Return the planar vessel for export."""
-    text = "Vessel in the horizontal plane with up to 16 propellers and 8 rudders"
+    text = "Vessel in the horizontal plane with up to 16 propellers and 16 rudders"
     return planar_vessel_block(VESSEL, text, (MAX_PROPELLERS, MAX_RUDDERS))

@@ -24,7 +24,9 @@ _ORIGIN = ca.SX.zeros(3)  # of the body frame; the centre of mass
 _STRIPS = equivalent_strips(
     ca.SX([0, 0, -CENTRE_OF_MASS_HEIGHT]), (ca.SX(p.TRANSVERSE_MOMENT), ca.SX(p.LONGITUDINAL_MOMENT)), ca.SX(p.WATERPLANE_AREA)
 )
-_TWIN_HULL = TwinHull(_STRIPS, *(ca.SX(x) for x in (HULL_BEAM, p.MEAN_DRAUGHT, p.HULL_DEPTH, p.WATERPLANE_AREA)))
+_TWIN_HULL = TwinHull(
+    _STRIPS, beam=ca.SX(HULL_BEAM), draught=ca.SX(p.MEAN_DRAUGHT), depth=ca.SX(p.HULL_DEPTH), area=ca.SX(p.WATERPLANE_AREA)
+)
 _CENTRE_OF_BUOYANCY = ca.SX([0, 0, -CENTRE_OF_MASS_HEIGHT - p.MEAN_DRAUGHT / 2])
 _WEIGHT_DENSITY = WATER_DENSITY * GRAVITY  # N/m3
 _RIGID_BODY_MASS_MATRIX = np.diag([MASS] * 3 + list(INERTIA))

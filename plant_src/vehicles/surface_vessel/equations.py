@@ -45,5 +45,5 @@ VESSEL = SurfaceVessel(
 
 def block() -> Block:
     """Return the floating vessel for export."""
-    text = "Vessel afloat in six degrees of freedom with up to 16 propellers and 8 rudders"
+    text = "Vessel afloat in six degrees of freedom with up to 16 propellers and 16 rudders"
     return surface_vessel_block(VESSEL, text, (MAX_PROPELLERS, MAX_RUDDERS))

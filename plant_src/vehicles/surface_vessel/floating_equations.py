@@ -12,13 +12,13 @@ from cosim.export.equations.c_code import call_in_c
 from cosim.export.equations.fmu_code import as_block
 from cosim.export.fmu.block import Block
 
-from ..common import kinematics
 from ..common.named_values import NamedValues
 from ..common.rigid_body import symmetric_matrix
 from ..vessel import floating_maps, propulsion, vessel_equations
 from ..vessel.called_rate import with_called_rate
 from ..vessel.hull import Hull, LoadArguments, load_of_force_at, rigid_body_mass_matrix
-from ..vessel.strips import STATION_COUNT, Immersion, Strips, TwinHull, equivalent_strips, immersion
+from ..vessel.hydrostatics import Ballast, improved_equilibrium, weight_and_buoyancy
+from ..vessel.strips import Strips, TwinHull, equivalent_strips, immersion
 from ..vessel.wave_loads import GRAVITY
 from .interface import states, variables
 from .surface_vessel import SurfaceVessel
@@ -142,17 +142,15 @@ def _equilibrium(constants: NamedValues) -> ca.SX:
 def _improved_equilibrium(state: ca.SX, constants: NamedValues) -> ca.SX:
     """Return height of O (m), roll and pitch (rad) after one step towards the equilibrium."""
     form, weight_density = twin_hull(constants), GRAVITY * constants["water_density"]
-    middle, area = form.strips.centre, constants["waterplane_area"]
-    volume = constants["mass"] / constants["water_density"]
-    lever = middle[2] - constants["draught"] / 2 - constants["centre_of_mass"][2]
+    area, volume = constants["waterplane_area"], constants["mass"] / constants["water_density"]
+    lever = form.strips.centre[2] - constants["draught"] / 2 - constants["centre_of_mass"][2]
     moments = ca.vertcat(constants["transverse_moment"], constants["longitudinal_moment"])
-    stiffness = weight_density * ca.vertcat(area, moments + volume * lever)
-    attitude = kinematics.rotation_matrix(kinematics.quaternion_from_euler(state[1], state[2], ca.SX(0)))
-    up = attitude[2, :].T
-    load = restoring(immersion(form, up, state[0], ca.SX.zeros(2 * STATION_COUNT)), up, constants)
-    force, moment = ca.dot(load[0:3], up), load[3:6] - ca.cross(middle, load[0:3])
-    angles = moment[0:2] / stiffness[1:3]
-    return state + ca.vertcat(force / stiffness[0] + middle[0] * angles[1], angles)
+    return improved_equilibrium(state, form, ballast(constants), weight_density * ca.vertcat(area, moments + volume * lever))
+
+
+def ballast(constants: NamedValues) -> Ballast:
+    """Return the weight of the vessel."""
+    return Ballast(constants["mass"], constants["centre_of_mass"], constants["water_density"])
 
 
 def hull(constants: NamedValues) -> Hull:
@@ -189,14 +187,7 @@ def water_loads(constants: NamedValues, now: LoadArguments) -> ca.SX:
     surface = ca.vertcat(-now.water.slopes[1], now.water.slopes[0], 0)
     depth = now.water.heave - ca.dot(surface, form.strips.centre) - now.height
     thrust = propulsion.propeller_loads(speed, now.relative_velocity, depth, up - surface, now.inputs, constants)
-    return restoring(under_water, up, constants) + under_water.wetness * moving + thrust
-
-
-def restoring(under_water: Immersion, up: ca.SX, constants: NamedValues) -> ca.SX:
-    """Return the load tau (6) of weight and buoyancy for the vertical axis in the body frame."""
-    weight = load_of_force_at(constants["centre_of_mass"], -GRAVITY * constants["mass"] * up)
-    density = GRAVITY * constants["water_density"]
-    return weight + density * ca.vertcat(under_water.volume * up, ca.cross(under_water.moment, up))
+    return weight_and_buoyancy(under_water, up, ballast(constants)) + under_water.wetness * moving + thrust
 
 
 def damping(constants: NamedValues, flow: ca.SX) -> ca.SX:

@@ -17,7 +17,7 @@ from ..common.interface import parameter
 from ..common.shapes import Vector
 
 #: largest numbers of propellers and rudders
-MAX_PROPELLERS, MAX_RUDDERS = 16, 8
+MAX_PROPELLERS, MAX_RUDDERS = 16, 16
 
 #: shortest time constant of a propeller with a lag (s), because the integration steps take 5 ms
 MIN_TIME_CONSTANT = 0.01

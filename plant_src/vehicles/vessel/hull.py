@@ -113,6 +113,8 @@ class Hull:
         wave_table: Wave components, see `wave_loads.wave_table`.
         loads: Function for the load tau (6) of water, air and propulsion, without added mass.
         frame: Function from the orientation to the rotations.
+        centre_in_velocity_axes: Centre of mass in the velocity frame (m), shape (3,); None: `centre_of_mass`. The inertia is in
+            the velocity frame as well.
     """
 
     mass: ca.SX
@@ -128,6 +130,12 @@ class Hull:
     wave_table: ca.SX
     loads: Callable[[LoadArguments], ca.SX]
     frame: Callable[[ca.SX], Frame] = level_frame
+    centre_in_velocity_axes: ca.SX | None = None
+
+    @property
+    def velocity_centre(self) -> ca.SX:
+        """Centre of mass in the velocity frame (m), shape (3,)."""
+        return self.centre_of_mass if self.centre_in_velocity_axes is None else self.centre_in_velocity_axes
 
     def initial_state(self, initial: NamedValues, actuators: int = 0) -> ca.SX:
         """Return the state from the parameters `initial.*`, with `actuators` further states of 0.
@@ -147,7 +155,7 @@ class Hull:
         frame = self.frame(orientation)
         origin = initial["initial.position"] - (frame.attitude @ self.centre_of_mass)[0:2]
         rates = initial["initial.rates"] + ca.vertcat(water.rates, 0)
-        velocity = initial["initial.velocity_body"] + frame.to_world.T @ water.velocity - ca.cross(rates, self.centre_of_mass)
+        velocity = initial["initial.velocity_body"] + frame.to_world.T @ water.velocity - ca.cross(rates, self.velocity_centre)
         return ca.vertcat(origin, height, orientation, velocity, rates, time, ca.SX.zeros(actuators))
 
     def rate(self, state: ca.SX, inputs: NamedValues) -> ca.SX:
@@ -176,8 +184,8 @@ class Hull:
     def _rigid_body_coriolis(self, nu: ca.SX) -> ca.SX:
         """Return C_RB(nu) nu in terms of the angular velocity (Fossen 2021, section 3.3)."""
         velocity, rates = nu[0:3], nu[3:6]
-        force = self.mass * ca.cross(rates, velocity + ca.cross(rates, self.centre_of_mass))
-        return ca.vertcat(force, ca.cross(rates, self.inertia @ rates) + ca.cross(self.centre_of_mass, force))
+        force = self.mass * ca.cross(rates, velocity + ca.cross(rates, self.velocity_centre))
+        return ca.vertcat(force, ca.cross(rates, self.inertia @ rates) + ca.cross(self.velocity_centre, force))
 
     def _external_load(self, frame: Frame, inputs: NamedValues) -> ca.SX:
         force, torque = inputs["external_force"], inputs["external_torque"]
@@ -195,7 +203,7 @@ class Hull:
             orientation,
             kinematics.euler_angles(orientation),
             origin_velocity + ca.cross(angular_velocity, to_centre),
-            nu[0:3] + ca.cross(nu[3:6], self.centre_of_mass),
+            nu[0:3] + ca.cross(nu[3:6], self.velocity_centre),
             nu[3:6],
             state[0:3] + to_deck,
             origin_velocity + ca.cross(angular_velocity, to_deck),

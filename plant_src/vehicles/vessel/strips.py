@@ -2,11 +2,13 @@
 
 Each hull is divided into `STATION_COUNT` boxes of equal length. Their spacing and their distance from the centre line are those
 of points with the moments of inertia of the waterplane, so that the static stiffness is exact. A hull that leaves the water loses
-its buoyancy, so that the righting moment has a limit, and the vessel can capsize.
+its buoyancy, so that the righting moment has a limit, and the vessel can capsize. The bottoms are level, or each station has its
+own (`TwinHull.boxes`).
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -34,9 +36,9 @@ class Strips:
     offset: ca.SX
 
     @property
-    def positions(self) -> list[tuple[ca.SX, ca.SX]]:
-        """Positions ahead and to port of the centre (m)."""
-        return [(station * self.spacing, side * self.offset) for side in (1, -1) for station in _STATIONS]
+    def stations(self) -> list[ca.SX]:
+        """Positions of the stations ahead of the centre, from bow to stern (m)."""
+        return [station * self.spacing for station in _STATIONS]
 
     @property
     def mean_scale(self) -> ca.SX:
@@ -63,6 +65,25 @@ def equivalent_strips(centre: ca.SX, moments: tuple[ca.SX, ca.SX], area: ca.SX) 
     return Strips(centre, ca.sqrt(longitudinal / area / _MEAN_SQUARE), ca.sqrt(transverse / area))
 
 
+@dataclass(frozen=True, eq=False)
+class Box:
+    """Boxes of both hulls at one station.
+
+    Attributes:
+        depth: Height (m).
+        middle: Height of the middle above O (m).
+        draught: Draught at rest (m).
+        volume_share: Volume over the mean of all stations.
+        wet_share: Weight of the station in `Immersion.wetness`, whose mean over the stations is 1.
+    """
+
+    depth: ca.SX
+    middle: ca.SX
+    draught: ca.SX
+    volume_share: ca.SX | float = 1.0
+    wet_share: ca.SX | float = 1.0
+
+
 @dataclass(frozen=True)
 class TwinHull:
     """Two hulls of boxes.
@@ -71,8 +92,9 @@ class TwinHull:
         strips: Positions of the boxes.
         beam: Beam of a hull (m).
         draught: Mean draught at rest (m).
-        depth: Height of the boxes (m).
+        depth: Mean height of the boxes (m).
         area: Area of the waterplane of both hulls (m2).
+        stations: Boxes from bow to stern if they differ; otherwise their bottoms are `draught` below the waterplane.
     """
 
     strips: Strips
@@ -80,6 +102,13 @@ class TwinHull:
     draught: ca.SX
     depth: ca.SX
     area: ca.SX
+    stations: Sequence[Box] = ()
+
+    @property
+    def boxes(self) -> Sequence[Box]:
+        """Boxes from bow to stern."""
+        level = Box(self.depth, self.strips.centre[2] - self.draught + self.depth / 2, self.draught)
+        return self.stations or [level] * STATION_COUNT
 
 
 @dataclass(frozen=True)
@@ -109,19 +138,31 @@ def immersion(hull: TwinHull, up: ca.SX, height: ca.SX, elevations: ca.SX) -> Im
         height: Height of the origin O above the still water (m).
         elevations: Elevations of the water at the strips (m).
     """
-    strips, depth = hull.strips, hull.depth
-    extent = ca.fmax(depth * ca.fabs(up[2]), ca.fmax(hull.beam * ca.fabs(up[1]), strips.spacing * ca.fabs(up[0])))
-    scale = 1 / extent
-    middle = strips.centre[2] - hull.draught + depth / 2
-    lowest_shift = depth * depth * up[2] * scale / 2
-    base = height + up[0] * strips.centre[0] + up[1] * strips.centre[1] + up[2] * middle
+    boxes, offset = hull.boxes, hull.strips.offset
+    cuts = {box: _cut(hull, box, up, height) for box in boxes}
+    reference = boxes[0].middle
     total, moment, wetness = ca.SX(0), ca.SX.zeros(3), ca.SX(0)
-    for k, (x, y) in enumerate(strips.positions):
-        share = ca.fmin(1, ca.fmax(0, 0.5 + scale * (elevations[k] - base - up[0] * x - up[1] * y)))
-        wet = ca.fmin(1, share * (2 * depth / hull.draught))
-        total += share
-        moment += share * ca.vertcat(x, y, lowest_shift * (share - 1))
-        wetness += wet * (2 - wet)
-    volume = hull.area * depth / STRIP_COUNT
-    centre = ca.vertcat(strips.centre[0:2], middle)
+    for k, (box, x) in enumerate(zip(boxes, hull.strips.stations, strict=True)):
+        scale, lowest_shift, base = cuts[box]
+        heights = base + up[0] * x + up[1] * offset, base + up[0] * x - up[1] * offset
+        levels = elevations[k] - heights[0], elevations[k + STATION_COUNT] - heights[1]
+        port, starboard = (ca.fmin(1, ca.fmax(0, 0.5 + scale * level)) for level in levels)
+        # sums and differences of both hulls, so that a symmetric vessel has no moment at all about its long axis
+        part, difference = box.volume_share * (port + starboard), box.volume_share * (port - starboard)
+        raised = box.volume_share * lowest_shift * (port * (port - 1) + starboard * (starboard - 1))
+        total += part
+        moment += ca.vertcat(part * x, difference * offset, part * (box.middle - reference) + raised)
+        wet = [ca.fmin(1, share * (2 * box.depth / box.draught)) for share in (port, starboard)]
+        wetness += box.wet_share * sum(share * (2 - share) for share in wet)
+    volume = hull.area * hull.depth / STRIP_COUNT
+    centre = ca.vertcat(hull.strips.centre[0:2], reference)
     return Immersion(volume * total, volume * (moment + total * centre), wetness / STRIP_COUNT)
+
+
+def _cut(hull: TwinHull, box: Box, up: ca.SX, height: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Return immersed share over water level (1/m), lever of the share's centre (m), height (m) of a box at the centre line."""
+    centre, depth = hull.strips.centre, box.depth
+    extent = ca.fmax(depth * ca.fabs(up[2]), ca.fmax(hull.beam * ca.fabs(up[1]), hull.strips.spacing * ca.fabs(up[0])))
+    scale = 1 / extent
+    base = height + up[0] * centre[0] + up[1] * centre[1] + up[2] * box.middle
+    return scale, depth * depth * up[2] * scale / 2, base

@@ -51,7 +51,7 @@ def test_catamaran_in_waves_and_current_follows_its_equations(duration: float, m
         0.0,
         "m",
         "DOP853",
-        within=1e-5,
+        within=1e-6,
         case=f"{duration:g} s",
     )
 

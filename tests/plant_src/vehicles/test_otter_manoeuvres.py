@@ -1,4 +1,4 @@
-"""Turning circle and zig-zag scenarios of the Otter against the independent implementation in NumPy."""
+"""Turning circle and zig-zag scenarios of the Otter of MSS against the independent implementation in NumPy."""
 
 import math
 
@@ -81,7 +81,7 @@ def test_the_measures_are_those_of_the_independent_implementation(manoeuvre, mea
     name, kpis, expected = manoeuvre
     for measure, value in expected.items():
         found, case = kpis[f"{name}.{measure}"], f"{name}, {measure}"
-        measured("Otter", "IMO measures from 100/100 rad/s", found, value, "m, s, rad", NUMPY, relative=1e-4, case=case)
+        measured("Otter of MSS", "IMO measures from 100/100 rad/s", found, value, "m, s, rad", NUMPY, relative=1e-4, case=case)
 
 
 def test_a_manoeuvre_before_the_recording_is_refused():

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 import numpy as np
 import pytest
@@ -106,8 +106,9 @@ def response(waves: Sea, period: float, periods: int = 12) -> tuple[float, float
     return heave / amplitude, slope / (number * amplitude)
 
 
-def at_sea(waves: Sea, **more: object) -> WorldHarness:
+def at_sea(waves: Sea, vehicle: Mapping[str, object] | None = None, **more: object) -> WorldHarness:
     """The vessel in regular waves; their settings are found from the components."""
+    vehicle = vehicle or vessel_settings([0.0, 0.0], motion="6dof", **more)
     period = 2 * np.pi / waves.frequency[0]
     settings = {"seed": 1, "waves": {"significant_height": 1.0, "peak_period": 1.0, "components": 1}}
     unit = sea(settings)
@@ -115,7 +116,7 @@ def at_sea(waves: Sea, **more: object) -> WorldHarness:
     height = waves.amplitude[0] / unit.amplitude[0]
     environment = {"seed": 1, "waves": {**settings["waves"], "significant_height": height, "peak_period": period * share}}
     environment["waves"]["direction"] = float(waves.direction[0])
-    return WorldHarness({"usv": vessel_settings([0.0, 0.0], motion="6dof", **more)}, environment=environment)
+    return WorldHarness({"usv": vehicle}, environment=environment)
 
 
 def test_long_beam_waves(measured: MeasurementCheck) -> None:

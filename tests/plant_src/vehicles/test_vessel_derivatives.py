@@ -27,7 +27,7 @@ SHORT_CRESTED = {
 def rate_function(model: Any, given: Mapping[str, Any]) -> tuple[Any, list[str]]:
     """Return the function from state and inputs to the rate, and the names of the inputs."""
     parameters = np.concatenate([np.ravel(given.get(v.name, v.start)) for v in model.variables if v.causality == "parameter"])
-    constants = casadi.DM(model.derived_parameters(casadi.SX(parameters)))
+    constants = casadi.evalf(model.derived_parameters(casadi.SX(parameters)))
     names = [variable.name for variable in model.elements("input")]
     state, inputs = casadi.SX.sym("x", len(model.states)), casadi.SX.sym("u", len(names))
     return casadi.Function("rate", [state, inputs], [model.derivatives(state, inputs, casadi.SX(constants))]), names

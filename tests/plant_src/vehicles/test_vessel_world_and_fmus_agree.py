@@ -28,6 +28,7 @@ VESSELS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "strider": ({"model": "strider"}, {"thrust": 1.0, "rudder_angle": 0.1}),
     "strider_6dof": ({"model": "strider", "motion": "6dof"}, {"thrust": 1.0, "rudder_angle": 0.1}),
     "otter": ({"model": "otter", "parameters": {"payload_mass": 10.0}}, {"propeller_speed": [80.0, 60.0]}),
+    "otter_mss": ({"model": "otter_mss", "parameters": {"payload_mass": 10.0}}, {"propeller_speed": [80.0, 60.0]}),
 }
 MOTION = [
     f"{group}.{axis}"

@@ -79,7 +79,7 @@ def test_motion_of_the_water_agrees_with_linear_theory(measured: MeasurementChec
     attitude = Rotation.from_euler("ZYX", [0.7, 0.1, -0.2]).as_matrix()
     offset, spacing = (np.abs(POINTS).max(axis=0) / [2, 1])[::-1]
     layout = strips.Strips(ca.SX.zeros(3), ca.SX(spacing), ca.SX(offset))
-    hull = strips.TwinHull(layout, *(ca.SX(x) for x in (BEAM, BOX_DRAUGHT, BEAM, AREA)))
+    hull = strips.TwinHull(layout, ca.SX(BEAM), ca.SX(BOX_DRAUGHT), ca.SX(BEAM), ca.SX(AREA))
     table = wave_loads.wave_table(hull, *columns)
     water = wave_loads.water_motion(ca.SX([3.0, -2.0]), ca.SX(attitude), ca.SX(11.0), layout, ca.SX(1), ca.SX(count), table)
     points = [3.0, -2.0] + POINTS @ attitude[:2, :2].T

@@ -15,8 +15,8 @@ _INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*"([^"]+)"', re.MULTILINE)
 _URI = re.compile(r"modelica://(\w+)/?(.*)")
 _DEFAULT_FOLDERS = ("Resources/Include", "Resources/C-Sources", "Resources/Source", "Resources/Library")
 _RUNTIME = ("external.c", "external.h", "ModelicaUtilities.h")
-#: first lines of each C file: the C code of the Standard Library is compiled without access to files and without user tables
-_OPTIONS = "#define NO_FILE_SYSTEM\n#define DUMMY_FUNCTION_USERTAB\n#line 1\n"
+#: first lines of each C file: the Standard Library has neither files nor user tables, and its time is 0 (no random results)
+_OPTIONS = "#define NO_FILE_SYSTEM\n#define NO_TIME\n#define NO_PID\n#define DUMMY_FUNCTION_USERTAB\n#line 1\n"
 #: C file of the Standard Library that another one needs without including its header
 _COMPANIONS = {"ModelicaStandardTables": "ModelicaStandardTablesUsertab.c"}
 #: folders of the C files of a library, beside the folder of its headers

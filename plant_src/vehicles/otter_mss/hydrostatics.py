@@ -1,4 +1,4 @@
-"""Hydrostatics and damping of the Otter with its payload, by the formulas of MSS (`parameters.py`)."""
+"""Hydrostatics of the Otter with its payload, by the formulas of MSS (`../otter/parameters.py`)."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from dataclasses import dataclass
 
 import casadi as ca
 
+from ..otter import parameters as p
 from ..vessel.hull import transformation_matrix
-from . import parameters as p
 
 
 @dataclass(frozen=True)
@@ -31,7 +31,7 @@ def hydrostatics(mass: ca.SX, centre: ca.SX) -> Hydrostatics:
     """Return the hydrostatics for a mass (kg) and a centre of mass (m, body frame)."""
     volume = mass / p.WATER_DENSITY
     draught = volume / (2 * p.BLOCK_COEFFICIENT * p.PONTOON_BEAM * p.LENGTH)
-    moments = ca.SX([p.TRANSVERSE_MOMENT, p.LONGITUDINAL_MOMENT])
+    moments = ca.SX([p.TRANSVERSE_MOMENT, p.MSS_LONGITUDINAL_MOMENT])
     buoyancy_height = (5 * draught / 2 - volume / (2 * p.LENGTH * p.PONTOON_BEAM)) / 3
     metacentric_heights = buoyancy_height + moments / volume - (draught + centre[2])
     weight = p.WATER_DENSITY * p.GRAVITY
@@ -39,19 +39,3 @@ def hydrostatics(mass: ca.SX, centre: ca.SX) -> Hydrostatics:
     to_flotation = transformation_matrix(ca.SX(p.CENTRE_OF_FLOTATION))[2:5, 2:5]
     compliance = ca.inv(to_flotation.T @ ca.diag(stiffness) @ to_flotation)
     return Hydrostatics(draught, stiffness, compliance, volume / p.WATERPLANE_AREA)
-
-
-def linear_damping(mass: ca.SX, stiffness: ca.SX) -> ca.SX:
-    """Return the diagonal of the linear damping D, shape (6,), for the diagonal of M and `Hydrostatics.stiffness`."""
-    frequencies = ca.sqrt(stiffness / mass[2:5])
-    oscillating = 2 * ca.SX(p.DAMPING_RATIOS) * frequencies * mass[2:5]
-    sway, yaw = p.DAMPING_TIME_CONSTANTS
-    return ca.vertcat(p.MAX_THRUST / p.MAX_SPEED, mass[1] / sway, oscillating, mass[5] / yaw)
-
-
-def cross_flow_drag(draught: ca.SX) -> ca.SX:
-    """Return the cross-flow drag of one station over its squared velocity (N s2/m2) for a draught (m)."""
-    slenderness, coefficients = zip(*p.CROSS_FLOW_DRAG_CURVE, strict=True)
-    inside = ca.fmin(ca.fmax(p.PONTOON_BEAM / (2 * draught), slenderness[0]), slenderness[-1])
-    coefficient = ca.pw_lin(inside, ca.DM(slenderness), ca.DM(coefficients))
-    return p.WATER_DENSITY / 2 * draught * coefficient * p.LENGTH / (p.STATION_COUNT - 1)

@@ -1,0 +1,1 @@
+"""The Otter exactly as in the Marine Systems Simulator: linear restoring."""

@@ -1,0 +1,136 @@
+"""Equations of motion of the Otter exactly as in MSS; README.md has the loads, `vehicles/README.md` the rest."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+
+import casadi as ca
+
+from cosim.export.equations.fmu_code import as_block
+from cosim.export.fmu.block import Block
+
+from ..common import kinematics
+from ..common.named_values import NamedValues, initial_parameters
+from ..otter import parameters as p
+from ..otter.geometry import BODY
+from ..otter.interface import PROPELLER_STATES, VARIABLES
+from ..otter.loads import added_mass, cross_flow_drag, damping, linear_damping, mass_properties, otter_model, propulsion, wind
+from ..vessel import floating_maps, vessel_equations
+from ..vessel import hull as vessel
+from ..vessel.hull import Frame, Hull, LoadArguments, load_of_force_at, transformation_matrix
+from ..vessel.strips import TwinHull, equivalent_strips
+from . import hydrostatics
+
+_CENTRE_OF_FLOTATION = ca.SX(p.CENTRE_OF_FLOTATION)
+_STRIPS = equivalent_strips(
+    _CENTRE_OF_FLOTATION, (ca.SX(p.TRANSVERSE_MOMENT), ca.SX(p.MSS_LONGITUDINAL_MOMENT)), ca.SX(p.WATERPLANE_AREA)
+)
+
+
+def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
+    """Return the constants of the equations."""
+    payload, own = parameters["payload_mass"], mass_properties(parameters)
+    added = added_mass(own.inertia)
+    mass_matrix = vessel.rigid_body_mass_matrix(own.mass, own.centre, own.inertia) + ca.diag(added)
+    floating = hydrostatics.hydrostatics(own.mass, own.centre)
+    constants = {
+        **initial_parameters(parameters),
+        "mass": own.mass,
+        "centre_of_mass": own.centre,
+        "inertia": own.inertia,
+        "added_mass": added,
+        "inverse_mass_matrix": ca.inv(mass_matrix),
+        "draught": floating.draught,
+        "stiffness": floating.stiffness,
+        "compliance": floating.compliance,
+        "damping": linear_damping(ca.diag(mass_matrix), floating.stiffness),
+        "drag": cross_flow_drag(floating.draught),
+        "payload_force": -payload * p.GRAVITY,
+        "payload_position": parameters["payload_position"],
+        "propeller_time_constant": parameters["propeller_time_constant"],
+        "wave.count": parameters["wave.count"],
+        "wave_table": vessel_equations.wave_table_of(parameters, _twin_hull(floating.mean_draught)),
+    }
+    return constants | {"equilibrium": _equilibrium(constants)}
+
+
+def trim(constants: Mapping[str, ca.SX], attitude: ca.SX) -> ca.SX:
+    """Return height of O (m), roll and pitch (rad) due to the payload for a rotation matrix body to world, shape (3,)."""
+    force = attitude.T @ ca.vertcat(0, 0, constants["payload_force"])
+    load = load_of_force_at(constants["payload_position"], force)
+    return constants["compliance"] @ load[2:5]
+
+
+def _equilibrium(constants: Mapping[str, ca.SX]) -> ca.SX:
+    """Return the trim at rest by fixed-point iteration, which reduces the error to less than a tenth in each step."""
+    equilibrium = ca.SX.zeros(3)
+    for _ in range(20):
+        orientation = kinematics.quaternion_from_euler(equilibrium[1], equilibrium[2], ca.SX(0))
+        equilibrium = trim(constants, kinematics.rotation_matrix(orientation))
+    return equilibrium
+
+
+def frame(constants: NamedValues, orientation: ca.SX) -> Frame:
+    """Return the rotations: as in MSS, velocities are expressed in the frame with the Euler angles of the hull minus the trim.
+
+    The current is rotated by the yaw angle only, as in MSS.
+    """
+    attitude = kinematics.rotation_matrix(orientation)
+    roll, pitch, yaw = ca.vertsplit(kinematics.euler_angles(orientation))
+    _, roll_at_rest, pitch_at_rest = ca.vertsplit(trim(constants, attitude))
+    level = roll - roll_at_rest, pitch - pitch_at_rest
+    to_world = kinematics.rotation_matrix(kinematics.quaternion_from_euler(*level, yaw))
+    spin = kinematics.euler_to_body_rates(roll, pitch) @ kinematics.body_to_euler_rates(*level)
+    return Frame(attitude, to_world, spin, kinematics.rotation_matrix(kinematics.quaternion_about_z(yaw)).T)
+
+
+def hull(constants: NamedValues) -> Hull:
+    """Return the vessel with these constants."""
+    added = ca.diag(constants["added_mass"])
+    return Hull(
+        mass=constants["mass"],
+        centre_of_mass=constants["centre_of_mass"],
+        inertia=constants["inertia"],
+        added_mass=added,
+        coriolis_added_mass=added,
+        inverse_mass_matrix=constants["inverse_mass_matrix"],
+        deck_centre=ca.SX(p.DECK_CENTRE),
+        equilibrium=constants["equilibrium"],
+        strips=_STRIPS,
+        wave_count=constants["wave.count"],
+        wave_table=constants["wave_table"],
+        loads=lambda now: (
+            propulsion(constants, now)
+            + damping(constants, now)
+            + restoring(constants, now)
+            + wind(now)
+            + now.froude_krylov_load(constants["mass"], constants["centre_of_mass"], _STRIPS)
+        ),
+        frame=lambda orientation: frame(constants, orientation),
+    )
+
+
+def _twin_hull(draught: ca.SX) -> TwinHull:
+    """Return the pontoons for a mean draught (m)."""
+    return TwinHull(_STRIPS, ca.SX(p.PONTOON_BEAM), draught, ca.SX(p.PONTOON_TOP - p.PONTOON_BOTTOM), ca.SX(p.WATERPLANE_AREA))
+
+
+def restoring(constants: NamedValues, now: LoadArguments) -> ca.SX:
+    """Return the restoring load tau, linear in heave, roll and pitch relative to the trim and to the water surface."""
+    angles = kinematics.euler_angles(now.orientation)[0:2]
+    displacement = ca.vertcat(now.height, angles) - trim(constants, now.frame.attitude)
+    to_flotation = transformation_matrix(_CENTRE_OF_FLOTATION)[2:5, 2:5]
+    surface = ca.vertcat(now.water.heave, now.water.slopes)
+    load = -to_flotation.T @ (constants["stiffness"] * (to_flotation @ displacement - surface))
+    return ca.vertcat(0, 0, load, 0)
+
+
+VESSEL = vessel_equations.VesselModel(
+    "otter_mss", "Maritime Robotics Otter of MSS with linear restoring", VARIABLES, derive_constants, hull, PROPELLER_STATES
+)
+
+
+def block() -> Block:
+    """Return the Otter of MSS for export."""
+    model = otter_model(VESSEL)
+    return as_block(model, floating_maps.FloatingContactMaps(model, VESSEL, floating_maps.constant_body(BODY)).functions())
