@@ -3,6 +3,7 @@
 import json
 import re
 from collections import Counter
+from inspect import signature
 from pathlib import Path
 
 import pytest
@@ -11,13 +12,14 @@ from jsonschema import Draft202012Validator
 import cosim
 from cosim.export.sources import vehicle_file_schema
 from cosim.scenario import json_schema
+from plant_src.world import World
 
 ROOT = Path(__file__).parents[2]
 SCENARIO = json_schema()
 DEFINITIONS = SCENARIO["$defs"]
 MULTIROTOR = vehicle_file_schema()["oneOf"][0]
-#: members of the arguments of a world
-WORLD_KEYS = ("vehicles", "platforms", "environment")
+#: arguments of a world
+WORLD_KEYS = signature(World).parameters
 #: files of the reader, and shipped ones in their place
 OWN_FILES = {"my_quad.json": "../plant_src/vehicles/data/x500.json", "my_boat.json": "../plant_src/vehicles/data/heron.json"}
 #: language of fragments, in docs/ beside that of complete files
