@@ -9,8 +9,6 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from cosim.core.errors import InputError
 
@@ -46,6 +44,9 @@ class Obstacle:
     @cached_property
     def parts(self) -> list[np.ndarray]:
         """Triangles of each connected part; triangles are connected by common corners."""
+        from scipy.sparse import coo_array
+        from scipy.sparse.csgraph import connected_components
+
         _, corners = np.unique(self.triangles.reshape(-1, 3), axis=0, return_inverse=True)
         faces = corners.reshape(-1, 3)
         links = np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]]])

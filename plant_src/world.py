@@ -135,6 +135,9 @@ class World(Component):
         self._has_environment = bool(self._environment.update_functions)
         for name in self._environment.vessels_without_wave_motion:
             component_log.log_message(self._name, component_log.WARNING, f"the planar vessel {name} does not move with the waves")
+        if self._environment.wind_is_without_effect:
+            text = "the wind acts on no vehicle, because their air drag (air_drag, body_drag, rotor_drag) is 0"
+            component_log.log_message(self._name, component_log.WARNING, text)
 
     def _check_overlaps(self, names: Mapping[int, str]) -> None:
         """Raise InputError if vehicles or platforms overlap initially."""

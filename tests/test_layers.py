@@ -181,3 +181,10 @@ def test_importing_and_helping_load_nothing_heavy(statement):
     code = f"import sys; {statement}; print(*(m for m in {HEAVY!r} if m in sys.modules), file=sys.stderr)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stderr.split() == []
+
+
+def test_a_world_loads_neither_scipy_nor_matplotlib():
+    """A run imports the world in each new process."""
+    code = "import sys, plant_src.world; print(*({'scipy', 'matplotlib', 'casadi', 'trimesh'} & set(sys.modules)))"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    assert done.stdout.split() == []

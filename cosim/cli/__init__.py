@@ -38,7 +38,7 @@ COMMANDS = {
     "validate": ("validate", "Validate FMUs against the FMI standard without running them."),
     "build": ("build", "Export controllers and plants to fmus/."),
     "init": ("init", "Create a project with a controller, a scenario, its reference, tests and CI."),
-    "new": ("new", "Create a controller with a scenario in which it runs."),
+    "new": ("new", "Create a controller, a scenario, or a vehicle."),
     "list": ("list", "List the shipped scenarios, sweeps, vehicle models, roles of controllers and KPIs."),
     "schema": ("schema", "Print the JSON Schema of scenarios, sweeps or tunings."),
     "doctor": ("doctor", "Print which packages, tools and sandboxes are available on this machine."),

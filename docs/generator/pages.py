@@ -94,7 +94,9 @@ def _kpi_parts(entry: Entry) -> Iterator[str]:
     function = load_object(f"{path.name}:{name}", path.parent)
     units, senses = getattr(function, "units", {}), getattr(function, "better", {})
     rows = ((code(value), code(units.get(value, "")), senses.get(value, "")) for value in dict.fromkeys((*units, *senses)))
+    reference = f"cosim:{entry.name}" if ".py:" in entry.name else entry.name
     yield f"::: {entry.name.partition(':')[0].removesuffix('.py').replace('/', '.')}.{name}"
+    yield code(f'"python": "{reference}"')
     yield table(("value", "unit", "better"), rows)
 
 

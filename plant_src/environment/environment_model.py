@@ -35,6 +35,9 @@ UpdateFunction = Callable[[float], None]
 #: function of x, y (m) and the time since the start (s) to the height of the water surface (m)
 WaterLevel = Callable[[float, float, float], float]
 
+#: beginnings of the names of the parameters by which wind acts on a vehicle
+AIR_DRAG_PARAMETERS = ("air_drag", "body_drag", "rotor_drag", "translational_lift")
+
 #: distance (m) above all crests within which a multirotor needs the water level; more than the way of a step
 WATER_MARGIN = 1.0
 
@@ -60,6 +63,7 @@ class EnvironmentModel:
         output_variables: Variables of `outputs`.
         update_functions: Functions that write the environment inputs, empty without wind, waves, current and ground effect.
         vessels_without_wave_motion: Names of planar vessels in waves.
+        wind_is_without_effect: There is wind, and all coefficients of air drag of all vehicles are 0.
     """
 
     def __init__(
@@ -83,6 +87,8 @@ class EnvironmentModel:
         self.vessels_without_wave_motion = [
             body.name for body in bodies if environment.waves and body.model.is_vessel and body not in self._wave_vessels
         ]
+        has_wind = environment.wind is not None and any(environment.wind.velocity)
+        self.wind_is_without_effect = has_wind and not any(any(_air_drag(vehicle)) for vehicle in vehicles)
         self._wave_gain: Any = self._input_view("wave_gain") if environment.waves else np.ones(1).data
         self._elevation = sea.elevation_function()
         self._highest_water: Any = highest_water.data
@@ -142,6 +148,12 @@ class EnvironmentModel:
 def _bodies_with_input(bodies: Sequence[ContactBody], name: str) -> list[ContactBody]:
     """Return the vehicles that have an environment input."""
     return [body for body in bodies if any(variable.name == name for variable in body.model.environment_inputs)]
+
+
+def _air_drag(vehicle: VehiclePlacement) -> list[float]:
+    """Return the coefficients of air drag of a vehicle; [1] if they are no parameters."""
+    values = zip(vehicle.model.slots("parameter"), vehicle.parameters, strict=True)
+    return [value for name, value in values if name.startswith(AIR_DRAG_PARAMETERS)] or [1.0]
 
 
 def _input_data(body: ContactBody, name: str) -> Any:

@@ -34,8 +34,8 @@ from .interface import ENVIRONMENT_INPUTS
 from .rigid_body import RigidBody
 from .step_status import INVALID_STATE, LEAVES_SAFE_BOX, MAX_STATE_NORM, MAY_FAIL
 
-#: integration steps per step of the world, which is at most 10 ms long
-SUB_STEPS = 2
+#: longest step of the world (s)
+MAX_WORLD_STEP = 0.01
 
 #: elements of a twist, and of a force with its torque
 TWIST_SIZE = 6
@@ -137,7 +137,8 @@ def predicted_state(
     model: ContinuousModel, state: ca.SX, inputs: ca.SX, environment_inputs: ca.SX, constants: ca.SX, step: ca.SX
 ) -> ca.SX:
     """Return the state after a step (s) without contact."""
-    return model.integrate(state, ca.vertcat(inputs, environment_inputs), constants, step, SUB_STEPS)
+    sub_steps = round(MAX_WORLD_STEP / model.max_sub_step)
+    return model.integrate(state, ca.vertcat(inputs, environment_inputs), constants, step, sub_steps)
 
 
 def correct_function(

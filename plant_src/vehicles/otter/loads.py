@@ -119,4 +119,4 @@ class OtterModel(ContinuousModel):
 
 def otter_model(vessel: VesselModel) -> ContinuousModel:
     """Return the model to export."""
-    return vessel.create_continuous_model(OtterModel, max_sub_step=0.01, vessel=vessel)
+    return vessel.create_continuous_model(OtterModel, vessel=vessel)

@@ -20,6 +20,9 @@ from .hull import Hull
 from .strips import TwinHull
 from .wave_loads import SURFACE_SUM, WAVE_SUM, wave_table
 
+#: longest integration step (s); the motion of vessels is slow, and each stage evaluates the waves
+MAX_STEP = 0.01
+
 
 def wave_table_of(parameters: NamedValues, hull: TwinHull) -> ca.SX:
     """Return the table of wave components (`wave_loads.wave_table`) from the parameters `wave.*`."""
@@ -78,6 +81,7 @@ class VesselModel:
             lambda x, _u, c: ca.vertcat(self.hull_with(c).observe(x), ca.SX.zeros(len(WORLD_OUTPUTS))),
             normalised_state,
             derived_parameters=self.constants.vector,
+            max_sub_step=MAX_STEP,
             callees=[WAVE_SUM, SURFACE_SUM, *self.callees],
             **options,
         )

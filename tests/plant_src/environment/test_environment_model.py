@@ -204,6 +204,15 @@ def test_a_planar_vessel_in_waves_gives_a_warning(caplog: pytest.LogCaptureFixtu
     assert "the planar vessel usv does not move with the waves" in caplog.text
 
 
+@pytest.mark.parametrize(("drag", "warned"), [({}, True), (DRAG, False)])
+def test_wind_that_acts_on_no_vehicle_causes_a_warning(
+    caplog: pytest.LogCaptureFixture, drag: dict[str, float], warned: bool
+) -> None:
+    with caplog.at_level(logging.WARNING):
+        World("plant", {"uav": quadcopter_settings([0, 0, 2], parameters=drag)}, environment={"wind": {"speed": 4.0}}).free()
+    assert ("the wind acts on no vehicle" in caplog.text) == warned
+
+
 @pytest.mark.parametrize(
     ("spec", "message"),
     [
