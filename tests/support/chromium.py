@@ -14,7 +14,7 @@ SOFTWARE_RENDERING_FLAGS = ("--use-gl=angle", "--use-angle=swiftshader")
 
 
 @contextmanager
-def open_browser(flags: Sequence[str] = SOFTWARE_RENDERING_FLAGS) -> Iterator:
+def open_browser(flags: Sequence[str] = ()) -> Iterator:
     """Playwright's Browser of an installed Chromium; skips the test where either is missing."""
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
     path = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
