@@ -81,6 +81,7 @@ def render_report(result: Result, outcomes: Sequence[CheckOutcome], figures: Ite
         facts=list(_facts(result)),
         cards=[_check_row(outcome, units) for outcome in outcomes],
         kpis=_group_kpis(result.kpis, units),
+        kpi_notes=result.metadata.get("kpi_notes", []),
         warnings=result.metadata.get("warnings", []),
         figures=(_figure_element(name, svg) for name, svg in figures),
         d=build_diagram(about["system"]) if about["system"] else None,
