@@ -101,7 +101,7 @@ class World(Component):
 
     @classmethod
     def warm(cls, **arguments: Any) -> None:
-        """Construct a world with the same arguments, so that forked processes inherit what it loads, and preconnect a Bullet client.
+        """Construct a world, so that forked processes inherit what it loads, and preconnect a Bullet client.
 
         The equations of all vehicle models are unpacked too, because a run may have other vehicles.
         """
