@@ -11,12 +11,13 @@ import math
 import re
 from bisect import bisect_right
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
-from functools import cached_property
+from dataclasses import dataclass, field, replace
+from functools import cached_property, lru_cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..core.errors import InputError, Problem, nearest_file
+from ..core.json_values import copy_json
 from ..core.paths import open_text
 from ..core.text import acceptable_text, shorten, text_problem
 
@@ -56,13 +57,13 @@ class Document:
     #: the scenario is a dict and no file; `file` lies in the folder from which relative paths start
     is_dict: bool = False
 
-    def where(self, path: Sequence[str | int]) -> str:
+    def where(self, path: JsonPath) -> str:
         """Return "file:line:column: $.json.path", with the position of the deepest part of `path` that exists.
 
         A text such as "0" is taken as an index where the value is a list.
         File and JSON path are those in which the value was written. For a value that the caller has set it is its JSON pointer.
         """
-        known = path = self._with_indices(path)
+        known = path = path if path in self.offsets else self._with_indices(path)
         if setting := next((path[:n] for n in range(len(path), 0, -1) if path[:n] in self.settings), None):
             return self._where_set(path, setting)
         while known and known not in self.origins and known not in self.offsets:
@@ -148,6 +149,13 @@ def read_document(file: Path) -> Document:
         raise InputError(f'cannot read "{file}": {error.strerror}{nearest_file(file)}') from None
     except UnicodeDecodeError as error:
         raise InputError(f'"{file}" is not UTF-8 text: {error.reason} at byte {error.start}') from None
+    parsed = _parse_file(file, text)
+    own: dict[str, Any] = {"problems": [*parsed.problems], "removed": set(), "settings": {}, "set_documents": {}}
+    return replace(parsed, value=copy_json(parsed.value), **own)
+
+
+@lru_cache(8)  # studies read the same files for each run
+def _parse_file(file: Path, text: str) -> Document:
     return parse_document(Document(file, text))
 
 
