@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from .api.single_fmu import simulate
     from .core.component import Component, Variable
     from .core.errors import CheckError, ComponentError, CosimError, InputError
-    from .results.kpi import Prefix, Signal, better, units
+    from .results.kpi import NoValue, Prefix, Signal, better, no_value, units
     from .studies.functions import regress, sweep, tune, worst_case
 
 __all__ = [
@@ -28,6 +28,7 @@ __all__ = [
     "ComponentError",
     "CosimError",
     "InputError",
+    "NoValue",
     "Prefix",
     "Result",
     "Signal",
@@ -39,6 +40,7 @@ __all__ = [
     "linearize",
     "load",
     "margins",
+    "no_value",
     "regress",
     "run",
     "simulate",
@@ -54,7 +56,7 @@ _MODULES = {
     **dict.fromkeys(("Result", "Simulation", "load", "run"), "api"),
     **dict.fromkeys(("Component", "Variable"), "core.component"),
     **dict.fromkeys(("CheckError", "ComponentError", "CosimError", "InputError"), "core.errors"),
-    **dict.fromkeys(("Prefix", "Signal", "better", "units"), "results.kpi"),
+    **dict.fromkeys(("NoValue", "Prefix", "Signal", "better", "no_value", "units"), "results.kpi"),
     **dict.fromkeys(("regress", "sweep", "tune", "worst_case"), "studies.functions"),
     "compare": "api.comparison",
     "linearize": "analysis.linearization",

@@ -20,14 +20,23 @@ import math
 import numpy as np
 
 from .results import Result
-from .results.kpi import Signal, better, first_crossing_time, units
-from .results.signal_analysis import control_error, integrate, require, row_slice, step_response, time_average
+from .results.kpi import Signal, better, no_value, units
+from .results.signal_analysis import (
+    control_error,
+    first_crossing_time,
+    integrate,
+    require,
+    row_slice,
+    step_response,
+    time_average,
+)
 
 FOREVER = math.inf
 
 
 @better(value="lower")
 @units(value="{signal}")
+@no_value("no rows from start to stop, or {signal} is NaN")
 def rms(
     result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
 ) -> dict[str, float]:
@@ -37,6 +46,7 @@ def rms(
 
 
 @units(value="{signal}")
+@no_value("no rows from start to stop, or {signal} is NaN")
 def mean(
     result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
 ) -> dict[str, float]:
@@ -45,6 +55,7 @@ def mean(
 
 
 @units(value="{signal}")
+@no_value("no rows from start to stop, or {signal} is NaN")
 def maximum(
     result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
 ) -> dict[str, float]:
@@ -54,6 +65,7 @@ def maximum(
 
 
 @units(value="{signal}")
+@no_value("no rows from start to stop, or {signal} is NaN")
 def minimum(
     result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
 ) -> dict[str, float]:
@@ -64,6 +76,7 @@ def minimum(
 
 @better(value="lower")
 @units(value="{signal}")
+@no_value("no rows from start to stop, or {signal} is NaN")
 def peak(
     result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
 ) -> dict[str, float]:
@@ -73,6 +86,7 @@ def peak(
 
 
 @units(value="{signal}")
+@no_value("no rows from start to stop, or {signal} is NaN")
 def final(result: Result, signal: Signal, target: Signal | float = 0.0, stop: float = FOREVER) -> dict[str, float]:
     """Return the error in the last row."""
     _, error = control_error(result, signal, target, -FOREVER, stop)
@@ -81,6 +95,7 @@ def final(result: Result, signal: Signal, target: Signal | float = 0.0, stop: fl
 
 @better(value="lower")
 @units(value="{signal}.s")
+@no_value("no rows from start to stop, or {signal} is NaN")
 def iae(
     result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
 ) -> dict[str, float]:
@@ -91,6 +106,7 @@ def iae(
 
 @better(value="lower")
 @units(value="{signal}2.s")
+@no_value("no rows from start to stop, or {signal} is NaN")
 def ise(
     result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
 ) -> dict[str, float]:
@@ -101,6 +117,7 @@ def ise(
 
 @better(value="lower")
 @units(value="{signal}.s2")
+@no_value("no rows from start to stop, or {signal} is NaN")
 def itae(
     result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
 ) -> dict[str, float]:
@@ -111,6 +128,7 @@ def itae(
 
 @better(value="lower")
 @units(value="J")
+@no_value("no rows from start to stop, or {effort} is NaN")
 def energy(
     result: Result, effort: Signal, flow: Signal | float = 1.0, start: float = -FOREVER, stop: float = FOREVER
 ) -> dict[str, float]:
@@ -129,6 +147,7 @@ def energy(
 
 
 @better(value="lower")
+@no_value("no rows from start to stop, or {signal} is NaN")
 def saturation_share(
     result: Result,
     signal: Signal,
@@ -158,6 +177,7 @@ def saturation_share(
 
 @better(value="lower")
 @units(value="s")
+@no_value("{signal} does not reach {level}")
 def time_to_reach(
     result: Result, signal: Signal, level: float, start: float = -FOREVER, stop: float = FOREVER
 ) -> dict[str, float]:
@@ -178,6 +198,7 @@ def time_to_reach(
 
 @better(value="lower")
 @units(value="s")
+@no_value("{signal} makes no step, or does not reach the fraction")
 def rise_time(
     result: Result,
     signal: Signal,
@@ -206,6 +227,7 @@ def rise_time(
 
 
 @better(value="lower")
+@no_value("{signal} makes no step")
 def overshoot(
     result: Result,
     signal: Signal,
@@ -221,6 +243,7 @@ def overshoot(
 
 @better(value="lower")
 @units(value="s")
+@no_value("{signal} is outside the band at the end")
 def settling_time(
     result: Result,
     signal: Signal,

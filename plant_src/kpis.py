@@ -14,7 +14,7 @@ import numpy as np
 
 from cosim.results import Result
 from cosim.results.checks import Number
-from cosim.results.kpi import Prefix, Signal, better, declared_units, units
+from cosim.results.kpi import NoValue, Prefix, Signal, better, declared_units, no_value, units
 from cosim.results.signal_analysis import require, row_slice
 
 from . import deck_frame
@@ -31,6 +31,7 @@ from .recorded_motion import distance_from_line, horizontal_distance, touchdown_
     final_lateral_error="lower",
 )
 @units(time="s", lateral_error="m", touchdown_speed="m/s", tangential_speed="m/s", slide="m", final_lateral_error="m")
+@no_value("{vehicle} touches no vessel after a flight")
 def landing(result: Result, vehicle: Prefix, deck: Prefix) -> dict[str, Number]:
     """Evaluate the landing of a multirotor on a vessel in the world frame.
 
@@ -69,7 +70,7 @@ def landing(result: Result, vehicle: Prefix, deck: Prefix) -> dict[str, Number]:
         "slide": deck_frame.slide_distance(result, vehicle, deck, row),
         "bounces": int(np.count_nonzero(contact[row + 1 :] & ~contact[row:-1])),
         "landed_at_end": landed,
-        "final_lateral_error": float(distance[-1]) if landed else math.nan,
+        "final_lateral_error": float(distance[-1]) if landed else NoValue(f"{vehicle} does not touch a vessel at the end"),
     }
 
 
@@ -99,6 +100,7 @@ def _values_without_landing() -> dict[str, Number]:
     deck_heave="m",
     peak_force="N",
 )
+@no_value("{vehicle} touches no vessel after a flight")
 def touchdown(result: Result, vehicle: Prefix, deck: Prefix, mass: float) -> dict[str, Number]:
     """Evaluate a touchdown in the axes of a deck that may roll, pitch, heave and turn.
 
@@ -167,15 +169,21 @@ def descent(result: Result, vehicle: Prefix, mode: Signal, descending: float) ->
     """
     modes = result[mode]
     rows, row = np.flatnonzero(modes == descending), touchdown_row(result, vehicle)
-    landed = row is not None and rows.size > 0
+    if row is None:
+        duration: float = NoValue(f"{vehicle} touches no vessel after a flight")
+    elif not rows.size:
+        duration = NoValue(f"{mode} is never {descending:g}, the mode of the descent")
+    else:
+        duration = float(result.time[row] - result.time[rows[0]])
     return {
-        "time_to_land": float(result.time[row] - result.time[rows[0]]) if landed else math.nan,
+        "time_to_land": duration,
         "aborts": int(np.count_nonzero((modes[:-1] == descending) & (modes[1:] < descending))),
     }
 
 
 @better(reached="higher", all_reached="higher", time="lower")
 @units(time="s")
+@no_value("{vehicle} did not reach this waypoint")
 def waypoints(
     result: Result,
     vehicle: Prefix,
@@ -224,6 +232,7 @@ def waypoints(
 
 @better(rms="lower", max="lower", leg="lower")
 @units(rms="m", max="m", leg="m")
+@no_value("{vehicle} did not begin this leg")
 def cross_track(
     result: Result,
     vehicle: Prefix,
@@ -272,6 +281,7 @@ def cross_track(
 
 @better(rms="lower", max="lower")
 @units(rms="m", max="m")
+@no_value("no rows between start and stop")
 def tracking(result: Result, vehicle: Prefix, target: Prefix, start: float, stop: float = math.inf) -> dict[str, Number]:
     """Evaluate the horizontal distance between a vehicle and the target that it follows.
 
@@ -293,6 +303,7 @@ def tracking(result: Result, vehicle: Prefix, target: Prefix, start: float, stop
 
 @better(stopped_at_end="higher")
 @units(stop_time="s", final_speed="rad/s", max_speed="rad/s")
+@no_value("a rotor turns at the end")
 def motors(result: Result, rotor_speed: Prefix, threshold: float = 1.0) -> dict[str, Number]:
     """Evaluate from the commanded rotor speeds if and when the motors were switched off.
 
@@ -325,6 +336,7 @@ def motors(result: Result, rotor_speed: Prefix, threshold: float = 1.0) -> dict[
 
 @better(crashed="lower", ditched="lower")
 @units(time="s")
+@no_value("{vehicle} neither crashed nor ditched")
 def failures(result: Result, vehicle: Prefix) -> dict[str, Number]:
     """Evaluate whether a vehicle of a world crashed or ditched.
 

@@ -10,7 +10,7 @@ import numpy as np
 
 from cosim.core.errors import InputError
 from cosim.results import Result
-from cosim.results.kpi import first_crossing_time
+from cosim.results.signal_analysis import first_crossing_time
 
 Point = Sequence[float]
 CENTRE_OF_MASS: Point = (0.0, 0.0, 0.0)

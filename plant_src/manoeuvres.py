@@ -21,8 +21,8 @@ import numpy as np
 
 from cosim.results import Result
 from cosim.results.checks import Number
-from cosim.results.kpi import Prefix, better, first_crossing_time, units
-from cosim.results.signal_analysis import require
+from cosim.results.kpi import Prefix, better, no_value, units
+from cosim.results.signal_analysis import first_crossing_time, require
 
 from .manoeuvre_track import CENTRE_OF_MASS, Point, Track, track
 
@@ -40,6 +40,7 @@ DEGREE = math.pi / 180  # rad
     period="s",
     steady_speed="m/s",
 )
+@no_value("{vehicle} did not turn far enough")
 def turning_circle(
     result: Result, vehicle: Prefix, start: float, length: float, midships: Point = CENTRE_OF_MASS
 ) -> dict[str, Number]:
@@ -104,6 +105,7 @@ def _speed_over_ground(result: Result, vehicle: str, time: float) -> float:
 
 @better(overshoot="lower", initial_turning_time="lower", reach="lower")
 @units(overshoot="rad", execute="s", initial_turning_time="s", reach="s", period="s")
+@no_value("the heading of {vehicle} did not change far enough")
 def zigzag(result: Result, vehicle: Prefix, start: float, angle: float = 10 * DEGREE, overshoots: int = 2) -> dict[str, Number]:
     """Evaluate a zig-zag test (IMO MSC.137(76), 5.2.3).
 
@@ -168,6 +170,7 @@ def _time_back_on_course(motion: Track, reversal: float) -> float:
 
 @better(distance="lower", distance_lengths="lower", time="lower")
 @units(distance="m", time="s")
+@no_value("the heading of {vehicle} did not change far enough")
 def initial_turning(
     result: Result, vehicle: Prefix, start: float, length: float, angle: float = 10 * DEGREE, midships: Point = CENTRE_OF_MASS
 ) -> dict[str, Number]:
@@ -197,6 +200,7 @@ def initial_turning(
 
 @better(track_reach="lower", track_reach_lengths="lower", head_reach="lower", lateral_deviation="lower", time="lower")
 @units(track_reach="m", head_reach="m", lateral_deviation="m", time="s")
+@no_value("{vehicle} did not slow down far enough")
 def stopping(
     result: Result, vehicle: Prefix, start: float, length: float, speed: float = 0.0, midships: Point = CENTRE_OF_MASS
 ) -> dict[str, Number]:

@@ -99,11 +99,16 @@ class World(Component):
         self._variables_by_name = {variable.name: (variable, values) for variable, values in self._variables_with_values()}
         self.variables = [variable for variable, _ in self._variables_by_name.values()]
 
-    @staticmethod
-    def warm() -> None:
-        """Unpack the equations of all vehicle models and preconnect a Bullet client."""
+    @classmethod
+    def warm(cls, **arguments: Any) -> None:
+        """Construct a world, so that forked processes inherit what it loads, and preconnect a Bullet client.
+
+        The equations of all vehicle models are unpacked too, because a run may have other vehicles.
+        """
         for binary in {model.binary for model in MODELS.values()}:
             library_path(binary)
+        with component_log.discarding_messages():
+            cls("warm", **arguments).free()
         preconnect()
 
     @staticmethod
@@ -152,7 +157,7 @@ class World(Component):
     def _variables_with_values(self) -> Iterator[tuple[Variable, np.ndarray]]:
         """Yield every variable with a view of its values."""
         for body, flags in zip(self._fleet.bodies, self._flags, strict=True):
-            prefixed = [replace(variable, name=f"{body.name}.{variable.name}") for variable in body.model.variables]
+            prefixed = body.model.variables_of(body.name)
             yield from views_in_parts([v for v in prefixed if v.causality == "input"], body.inputs)
             yield from variable_views([v for v in prefixed if v.causality == "output"], {_FLOAT: body.outputs, _FLAG: flags})
             yield from _constants(body, f"/components/{self._name}/arguments/vehicles/{body.name}/parameters")

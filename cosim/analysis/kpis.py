@@ -10,13 +10,14 @@ from __future__ import annotations
 import math
 
 from ..results import Result
-from ..results.kpi import better, units
+from ..results.kpi import better, no_value, units
 from .loop_margins import margins as loop_margins
 from .recorded_run import recorded_scenario
 
 
 @better(gain_margin="higher", phase_margin="higher", delay_margin="higher", disk_margin="higher", stable="higher")
 @units(gain_margin="dB", phase_margin="deg", delay_margin="s")
+@no_value("a loop of {components} is unstable, or its linear model is not valid")
 def margins(
     result: Result, components: str, at: float, loops: list[str] | None = None, duration: float | None = None
 ) -> dict[str, float | bool]:

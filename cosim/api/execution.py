@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import math
+from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from typing import Any
@@ -12,8 +13,8 @@ from ..engine import Termination
 from ..engine.plan_run import SimulationOutcome
 from ..process.float_mode import default_float_mode
 from ..results import Kpis, Result
-from ..results.checks import CheckOutcome, evaluate_all_checks, evaluate_checks
-from ..results.kpi import evaluate_kpis, kpi_senses, kpi_units
+from ..results.checks import CheckOutcome, Number, evaluate_all_checks, evaluate_checks
+from ..results.kpi import NoValue, evaluate_kpis, kpi_notes, kpi_senses, kpi_units
 from ..results.non_finite import warn_non_finite
 from ..scenario import PreparedRun
 
@@ -54,19 +55,34 @@ def _add_timings(first: Mapping[str, float], second: Mapping[str, float]) -> dic
 
 def _evaluate_run(result: Result, prepared: PreparedRun) -> Execution:
     """Evaluate all KPIs and checks; the others are also evaluated if a KPI fails."""
-    kpis = Kpis()
+    values: dict[str, Number] = {}
     failures: list[BaseException] = []
     functions = prepared.kpis()
     for kpi in functions:
         try:
             with _adding_location(prepared, "kpis", prepared.index_of_kpi(kpi[0])):
-                kpis.update(evaluate_kpis(result, [kpi]))
+                values.update(evaluate_kpis(result, [kpi]))
         except (CosimError, KeyboardInterrupt) as error:
             failures.append(error)
-    about = {"kpi_units": kpi_units(functions, kpis, result.units), "kpi_senses": kpi_senses(functions, kpis)}
+    kpis = Kpis({name: math.nan if isinstance(value, NoValue) else value for name, value in values.items()})
+    about = {
+        "kpi_units": kpi_units(functions, kpis, result.units),
+        "kpi_senses": kpi_senses(functions, kpis),
+        "kpi_notes": kpi_notes(values, _signals_of_optional_kpis(prepared, functions, result)),
+    }
     checks = evaluate_all_checks(kpis, prepared.checks)
     evaluated = replace(result, kpis=kpis, metadata={**result.metadata, **about}, checks=checks)
     return Execution(evaluated, failures[0] if failures else None)
+
+
+def _signals_of_optional_kpis(
+    prepared: PreparedRun, functions: Iterable[tuple[str, Any, Mapping[str, Any]]], result: Result
+) -> Iterator[tuple[str, dict[str, str]]]:
+    """Yield name and signals by argument of each optional KPI, since a signal may have another meaning in a user's component."""
+    for name, _, arguments in functions:
+        signals = {key: value for key, value in arguments.items() if isinstance(value, str) and value in result}
+        if signals and name in prepared.optional_kpis:
+            yield name, signals
 
 
 def evaluate_scenario_checks(prepared: PreparedRun, result: Result) -> list[CheckOutcome]:

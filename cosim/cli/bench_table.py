@@ -21,6 +21,9 @@ _COLOURS = {"better": "[green]better[/]", "worse": "[red]worse[/]", "": ""}
 
 def print_ranking(ranking: Ranking, candidate: str) -> None:
     """Print the achievements of a candidate and of the shipped controller, the better one first."""
+    if not ranking.candidate.scenarios:
+        click.echo(f"\nno scenario feeds all inputs of {candidate}")
+        return
     standings = {candidate: ranking.candidate, "shipped": ranking.shipped}
     names = list(standings) if ranking.verdict == "above" else list(standings)[::-1]
     width = max(map(len, names))

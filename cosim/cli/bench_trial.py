@@ -16,6 +16,9 @@ if TYPE_CHECKING:
     from ..studies.controller_bench.ranking import ScenarioKpis
     from ..studies.controller_bench.score import KpiComparison, RunKpis
 
+#: beginnings of log messages on standard error
+LOG_LEVELS = ("DEBUG ", "INFO ", "WARNING ")
+
 
 @dataclass(frozen=True)
 class ControllerTrial:
@@ -54,6 +57,21 @@ class TrialResult:
         """Name of the scenario."""
         return self.trial.file.stem
 
+    @property
+    def unfed_inputs(self) -> list[str]:
+        """Problems of the inputs of the candidate that the scenario does not feed; empty if it was refused for another reason."""
+        from ..scenario.wiring import NO_MATCHING_OUTPUT
+
+        problems = [line for line in self.outcome.details if not line.startswith(LOG_LEVELS)]
+        if self.outcome.code != 2 or not all(NO_MATCHING_OUTPUT in line for line in problems):
+            return []
+        return [line[line.index(": input ") + 2 :] for line in problems]
+
+    @property
+    def is_applicable(self) -> bool:
+        """False if the scenario does not feed an input of the candidate."""
+        return not self.unfed_inputs
+
     @cached_property
     def kpis(self) -> ScenarioKpis:
         """KPIs of the candidate and of the shipped controller, with the checks of the scenario."""
@@ -62,7 +80,7 @@ class TrialResult:
 
         candidate = RunKpis.read(self.trial.candidate_folder) if self.outcome.code in (0, 3) else None
         checks = json.loads(self.trial.file.read_text(encoding="utf-8-sig"))["checks"]
-        return ScenarioKpis(candidate, RunKpis.read(self.trial.shipped_folder), checks)
+        return ScenarioKpis(candidate, RunKpis.read(self.trial.shipped_folder), checks, self.is_applicable)
 
     def rows(self) -> list[KpiComparison]:
         """Return the compared KPIs; none if the run did not reach its end."""

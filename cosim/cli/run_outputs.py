@@ -153,10 +153,9 @@ def _print_kpis(outcome: RunOutcome) -> None:
             if not check.passed:
                 click.echo(f"check not met: {check}", err=True)
     from ..report.tables import print_kpis
-    from ..results.kpi import kpi_units
 
-    result = outcome.result
-    print_kpis(result.kpis, outcome.checks, kpi_units(outcome.prepared.kpis(), result.kpis, result.units))
+    result, about = outcome.result, outcome.result.metadata
+    print_kpis(result.kpis, outcome.checks, about.get("kpi_units"), notes=about.get("kpi_notes", ()))
 
 
 def _write_report(outcome: RunOutcome) -> None:

@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import logging
 import time
+from collections.abc import Iterator
+from contextlib import contextmanager
 
 from .text import SPACES, escape_control_characters, shorten
 
@@ -34,6 +36,17 @@ def log_message(component: str, level: int, text: str) -> None:
 def discard_messages() -> None:
     """Discard all messages of components in this process."""
     logging.getLogger(LOGGER_NAME).disabled = True
+
+
+@contextmanager
+def discarding_messages() -> Iterator[None]:
+    """Discard the messages of components within the block."""
+    logger = logging.getLogger(LOGGER_NAME)
+    disabled, logger.disabled = logger.disabled, True
+    try:
+        yield
+    finally:
+        logger.disabled = disabled
 
 
 def _is_within_rate_limit() -> bool:

@@ -14,6 +14,7 @@ from ..results import Result
 from ..results.checks import CheckOutcome, Number
 from ..results.files import to_json_types, writing_atomically
 from .diagram import build_diagram
+from .failure import find_failure
 from .pages import embed_json, render_page, safe_markup
 from .replay import replay_data
 from .tables import format_number
@@ -69,22 +70,25 @@ def render_report(result: Result, outcomes: Sequence[CheckOutcome], figures: Ite
     if not len(result.time):
         raise InputError(f"the result {result.metadata.get('name', '')} has no rows, so there is nothing to report")
     about, units = _metadata_with_defaults(result), result.metadata.get("kpi_units", {})
+    failure = find_failure(result, outcomes)
     return render_page(
         "report.html",
         about=about,
         crash=result.termination if result.crashed else "",
+        failure=failure,
         checks=len(outcomes),
         failed=sum(not outcome.passed for outcome in outcomes),
         facts=list(_facts(result)),
         cards=[_check_row(outcome, units) for outcome in outcomes],
         kpis=_group_kpis(result.kpis, units),
+        kpi_notes=result.metadata.get("kpi_notes", []),
         warnings=result.metadata.get("warnings", []),
         figures=(_figure_element(name, svg) for name, svg in figures),
         d=build_diagram(about["system"]) if about["system"] else None,
         scenario=json.dumps(about["scenario"], indent=1, ensure_ascii=False),
         timings=list(_timings(result)),
         versions=[*about["versions"].items(), *about["machine"].items()],
-        data=embed_json(replay_data([result])),
+        data=embed_json({**replay_data([result]), "failure": failure and failure._asdict()}),
     )
 
 

@@ -106,6 +106,7 @@ class RunFile(_Part):
     timing: dict[str, float] = {}
     units: dict[str, str] = {}
     kpi_units: dict[str, str] = {}
+    kpi_notes: list[str] = []
     warnings: list[str] = []
     live_events: list[Any] = []
     terminated_by: _Termination | None = None

@@ -23,6 +23,7 @@ def print_kpis(
     outcomes: Sequence[CheckOutcome] = (),
     units: Mapping[str, str] | None = None,
     file: TextIO | None = None,
+    notes: Sequence[str] = (),
 ) -> None:
     """Print a table of all KPIs with their units and checks; print nothing if there are none.
 
@@ -35,6 +36,7 @@ def print_kpis(
         outcomes: The outcomes of the scenario's checks; a KPI that was not evaluated is shown without a value.
         units: The units by name (see `cosim.results.kpi.kpi_units`).
         file: The output stream; default: standard output.
+        notes: Lines below the table, such as the reasons of missing values.
     """
     values = {**kpis, **{o.check["kpi"]: o.value for o in outcomes if o.check["kpi"] not in kpis}}
     if not values:
@@ -49,6 +51,7 @@ def print_kpis(
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [_join_cells(row, widths) for row in rows]
     lines.insert(1, ("-" if plain else "─") * (sum(widths[:4]) + 3 * len(widths)))
+    lines += map(escape_control_characters, notes)
     file.write("\n".join((*lines, "")))
 
 

@@ -21,7 +21,15 @@ from typing import Any, Literal, NamedTuple, TypeVar
 
 import numpy as np
 
-from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, InputError, Problem, describe_exception, did_you_mean
+from ..core.errors import (
+    PASS_THROUGH_EXCEPTIONS,
+    ComponentError,
+    InputError,
+    Problem,
+    abbreviate_names,
+    describe_exception,
+    did_you_mean,
+)
 from ..core.units import multiply_units, split_unit
 from .checks import Number
 from .result import Result
@@ -34,6 +42,24 @@ KpiFunction = TypeVar("KpiFunction", bound=Callable[..., Any])
 
 #: name of an argument, in a declared unit
 _PLACEHOLDER = re.compile(r"\{(\w+)\}")
+
+
+class NoValue(float):
+    """NaN as a value of a KPI, with the reason for which there is no number.
+
+        return {"time": NoValue("plant.uav touches no vessel")}
+
+    Attributes:
+        reason: The reason, shown below the table of KPIs.
+    """
+
+    reason: str
+
+    def __new__(cls, reason: str) -> NoValue:
+        """Return NaN with a reason."""
+        value = super().__new__(cls, math.nan)
+        value.reason = str(reason)
+        return value
 
 
 class ResultFunction(NamedTuple):
@@ -83,6 +109,13 @@ class ResultFunction(NamedTuple):
         except BaseException as error:
             raise self.failure(kind, describe_exception(error)) from error
 
+    def reason_without_value(self) -> str:
+        """Return the reason that `no_value` declared, with the values of the arguments."""
+        bound = inspect.signature(self.function).bind(None, **self.arguments)
+        bound.apply_defaults()
+        reason: str = getattr(self.function, "no_value", "the function returned NaN")
+        return reason.format_map(bound.arguments)
+
     def failure(self, kind: str, reason: str) -> ComponentError:
         """Return a ComponentError that names this function."""
         return ComponentError(f'{kind} "{self.name}"', self.function.__name__, reason)
@@ -129,6 +162,26 @@ def better(**sense: Literal["lower", "higher"]) -> Callable[[KpiFunction], KpiFu
     return declare
 
 
+def no_value(reason: str) -> Callable[[KpiFunction], KpiFunction]:
+    """Declare the reason for which values of a KPI are NaN, unless they are `NoValue`.
+
+        @no_value("{signal} does not reach {level}")
+        def time_to_reach(result: Result, signal: Signal, level: float) -> dict[str, float]: ...
+
+    Args:
+        reason: The reason; "{level}" is the value of the argument `level`.
+
+    Returns:
+        A decorator that returns the function itself.
+    """
+
+    def declare(function: KpiFunction) -> KpiFunction:
+        vars(function)["no_value"] = reason
+        return function
+
+    return declare
+
+
 def declared_units(function: Callable[..., Any]) -> Mapping[str, str]:
     """Return the units that `units` declared, by name of the value."""
     unit_of: Mapping[str, str] = getattr(function, "units", {})
@@ -143,7 +196,7 @@ def evaluate_kpis(result: Result, kpis: Iterable[tuple[str, Callable[..., Any], 
         kpis: Name, function and arguments of each KPI.
 
     Returns:
-        All values by "name.key", in the order of the KPIs. NaN: not applicable to this run.
+        All values by "name.key", in the order of the KPIs; a NaN is a `NoValue`.
 
     Raises:
         InputError: Arguments of a KPI do not match its function, or a signal was not recorded.
@@ -165,28 +218,9 @@ def _checked_number(evaluation: ResultFunction, key: str, value: Any) -> Number:
         raise evaluation.failure("KPI", f'"{key}" is larger than any double')
     if not isinstance(number, Number):
         raise evaluation.failure("KPI", f'"{key}" is {type(value).__name__}, expected a number or Boolean')
+    if math.isnan(number) and not isinstance(number, NoValue):
+        return NoValue(evaluation.reason_without_value())
     return number
-
-
-def first_crossing_time(time: np.ndarray, values: np.ndarray, level: float) -> float:
-    """Return the first time at which the polyline through the rows reaches a level.
-
-    Args:
-        time: Times (s), shape (rows,).
-        values: Values, shape (rows,).
-        level: The level, reached from below.
-
-    Returns:
-        Time (s), interpolated linearly; NaN if the level is never reached.
-    """
-    above = np.flatnonzero(values >= level)
-    if not above.size:
-        return math.nan
-    row = above[0]
-    if row == 0:
-        return float(time[0])
-    fraction = (level - values[row - 1]) / (values[row] - values[row - 1])
-    return float(time[row - 1] + fraction * (time[row] - time[row - 1]))
 
 
 def kpi_units(
@@ -224,6 +258,23 @@ def _resolve_unit(declared: str, arguments: Mapping[str, Any], signal_units: Map
         return ""
     (unit, power), *others = factors
     return unit if power == 1 and not others else multiply_units(factors)
+
+
+def kpi_notes(kpis: Mapping[str, Number], taken: Iterable[tuple[str, Mapping[str, Any]]] = ()) -> list[str]:
+    """Return lines that give the reason of each value that is missing, and the signals that KPIs took.
+
+    Args:
+        kpis: Values by name.
+        taken: Names of KPIs and of their signals by argument, such as ("descent", {"mode": "uav.mode"}).
+    """
+    names_of: dict[str, list[str]] = {}
+    for name, value in kpis.items():
+        if isinstance(value, NoValue):
+            names_of.setdefault(value.reason, []).append(name)
+    reasons = [f"{abbreviate_names(names, 3)}: {reason}" for reason, names in names_of.items()]
+    return reasons + [
+        f"{name}: {argument} is the signal {signal}" for name, signals in taken for argument, signal in signals.items()
+    ]
 
 
 def kpi_senses(kpis: Iterable[tuple[str, Callable[..., Any], Mapping[str, Any]]], names: Iterable[str]) -> dict[str, str]:

@@ -100,3 +100,24 @@ def time_average(time: np.ndarray, values: np.ndarray) -> float:
     if not time.size:
         return math.nan
     return integrate(time, values) / float(time[-1] - time[0]) if time[-1] > time[0] else float(values.mean())
+
+
+def first_crossing_time(time: np.ndarray, values: np.ndarray, level: float) -> float:
+    """Return the first time at which the polyline through the rows reaches a level.
+
+    Args:
+        time: Times (s), shape (rows,).
+        values: Values, shape (rows,).
+        level: The level, reached from below.
+
+    Returns:
+        Time (s), interpolated linearly; NaN if the level is never reached.
+    """
+    above = np.flatnonzero(values >= level)
+    if not above.size:
+        return math.nan
+    row = above[0]
+    if row == 0:
+        return float(time[0])
+    fraction = (level - values[row - 1]) / (values[row] - values[row - 1])
+    return float(time[row - 1] + fraction * (time[row] - time[row - 1]))

@@ -18,7 +18,7 @@ from ..core.errors import Problem, did_you_mean
 from .evaluation_schema import CallSpec, FunctionSpec
 from .json_pointer import find_value, pointer_keys
 from .name_resolution import Target, UnknownNameError, resolve_name
-from .named_functions import declared_arguments, definition_problem, unknown_signals, wrong_types
+from .named_functions import RECORDED_INPUTS, declared_arguments, definition_problem, unknown_signals, wrong_types
 from .nested_systems import Node
 from .schema import ScenarioSpec
 from .schema_types import INVALID, accepted
@@ -74,7 +74,8 @@ class FunctionResolver:
             found += [Problem(text, self.root.where(kind, i, "arguments", argument)) for argument, text in unknown]
         if found and found[0].message:
             noun = "KPI" if kind == "kpis" else "figure"
-            self.left_out.append(replace(found[0], message=f'{noun} "{spec.name}" is left out: {found[0].message}'))
+            reason = found[0].message.removesuffix(RECORDED_INPUTS)
+            self.left_out.append(replace(found[0], message=f'{noun} "{spec.name}" is left out: {reason}'))
         return INVALID if found else resolved
 
     def _resolve_arguments(self, spec: C, problems: list[Problem], *path: str | int) -> C:

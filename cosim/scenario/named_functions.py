@@ -20,6 +20,9 @@ from .nested_systems import Node
 from .schema import ScenarioSpec
 from .schema_types import accepted
 
+#: end of the message about a signal that is not recorded
+RECORDED_INPUTS = ' (inputs are recorded if "record" names them)'
+
 
 def find_function_problems(
     root: Node, declared: ScenarioSpec, spec: ScenarioSpec, signals: Collection[str] | None
@@ -133,7 +136,7 @@ def _reason(value: str, root: Node, names: Collection[str]) -> str:
         return f': the component "{component}" is removed; also remove by null what needs it, or mark it as optional'
     if component not in root.spec.components:
         return f': the scenario has no component "{component}"{did_you_mean(component, root.spec.components)}'
-    return f'{did_you_mean(value, names)} (inputs are recorded if "record" names them)'
+    return f"{did_you_mean(value, names)}{RECORDED_INPUTS}"
 
 
 def _kpi_name_problem(kpi: str, kpis: Sequence[FunctionSpec], folder: Path) -> str:

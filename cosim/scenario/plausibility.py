@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 from ..core.component import Component, Variable
@@ -26,7 +27,8 @@ def find_warnings(prepared: PreparedRun) -> list[Problem]:
 
 def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
     """Yield the warnings that concern the results: functions left out, end of the run, late times, connections, FMU files."""
-    yield from prepared.left_out
+    if left_out := prepared.left_out:
+        yield replace(left_out[0], message="; ".join(problem.message for problem in left_out))
     yield from _late_events(prepared)
     yield from _late_kpis(prepared)
     if prepared.plan.end_warning:

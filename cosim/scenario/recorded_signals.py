@@ -60,6 +60,8 @@ def _signal_endpoints(components: Mapping[str, Component], causalities: Sequence
 def _matching_names(pattern: str, names: PrefixIndex) -> list[str]:
     if "*" not in pattern:
         return [name for name in names.with_prefix(pattern)[:1] if name == pattern]
+    if pattern.find("*") == len(pattern) - 1:
+        return list(names.with_prefix(pattern[:-1]))
     first, *middle, last = map(re.escape, pattern.split("*"))
     # atomic groups prevent backtracking: the time is at most proportional to the lengths of pattern and name multiplied
     parts = "".join(f"(?>.*?{part})" for part in middle if part)

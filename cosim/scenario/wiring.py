@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
+from functools import cached_property
 from typing import NamedTuple
 
 from ..core.component import Component
@@ -14,6 +15,9 @@ from .name_resolution import SlotIndex, Target, UnknownNameError, resolve_name
 from .nested_systems import Node
 from .schema import ConnectionSpec
 from .schema_types import INVALID, accepted
+
+#: words of the problem of an input that a prefix or a pattern does not feed
+NO_MATCHING_OUTPUT = "has no matching output"
 
 
 class _Candidate(NamedTuple):
@@ -109,9 +113,8 @@ class Wiring:
         """Connect an input to the output of each source with the same name after the prefix, or at the "*" of a pattern."""
         unmatched = [source for source in sources if rest not in source.outputs]
         if unmatched and end not in self._inputs_with_values:
-            expected, (component, _) = unmatched[0].expected_name(rest), unmatched[0].target
-            hint = did_you_mean(expected, (f"{component}.{name}" for name in unmatched[0].outputs.values()))
-            self._unmatched_inputs[end] = Problem(f"input {end} has no matching output {expected}{hint}", where)
+            text = f"input {end} {NO_MATCHING_OUTPUT} {unmatched[0].expected_name(rest)}"
+            self._unmatched_inputs[end] = Problem(text + self._output_hint(unmatched[0], rest), where)
         if unmatched:
             return
         connections = [
@@ -129,6 +132,21 @@ class Wiring:
             for i, (source, gain) in enumerate(zip(sources, spec.gains, strict=True))
         ]
         self._add(_Candidate(connections, is_variable=rest == ""))
+
+    def _output_hint(self, source: _Source, rest: str) -> str:
+        """Return a hint at a similar name below the source's prefix, else at an output of any component with the same end."""
+        if not rest.startswith("."):
+            return did_you_mean(
+                source.expected_name(rest), (f"{source.target.component}.{name}" for name in source.outputs.values())
+            )
+        hint = did_you_mean(rest[1:], (name[1:] for name in source.outputs))
+        same = (name for name in self._output_names if name.endswith(rest) and "did you mean" not in hint)
+        return next((f"; connect {name} to it" for name in same), hint)
+
+    @cached_property
+    def _output_names(self) -> list[str]:
+        outputs = ((name, v) for name, c in self._components.items() for v in c.variables if v.causality == "output")
+        return [f"{name}.{slot}" for name, variable in outputs for slot in variable.scalar_names]
 
     def _add(self, new: _Candidate) -> None:
         first = new.connections[0]

@@ -34,26 +34,27 @@ class Channel:
 
 
 class ColouredNoise:
-    """Several channels of noise; `noise[k]` holds their values from k GRID_STEP to (k + 1) GRID_STEP.
+    """Several channels of noise for each of several names; `noise[k]` holds the values from k GRID_STEP to (k + 1) GRID_STEP.
 
     A step of the grid is x1 <- a x1 + n1, x2 <- a (x2 + g x1) + n2, with correlated white noises n1 and n2.
 
     Args:
         seed: Seed of all random numbers of the world.
-        name: Name of this noise; other names give independent noise.
-        channels: Filters.
+        names: Names, which have independent noise; that of a name does not depend on the others.
+        channels: Filters of each name.
     """
 
-    def __init__(self, seed: int, name: str, channels: Sequence[Channel]):
-        self._seed, self._name = seed, name
-        deviation, time_constant, lead = np.array([(c.deviation, c.time_constant, c.lead) for c in channels]).T[:, :, None]
+    def __init__(self, seed: int, names: Sequence[str], channels: Sequence[Channel]):
+        self._seed, self._names, self._channel_count = seed, names, len(channels)
+        filters = [(c.deviation, c.time_constant, c.lead) for c in channels] * len(names)
+        deviation, time_constant, lead = np.array(filters).T[:, :, None]
         p = deviation**2 / (lead**2 + (1 - lead) ** 2 / 2 + lead * (1 - lead))
         self._g = g = GRID_STEP / time_constant
         self._a = a = np.exp(-g)
         self._lead = lead
         propagated = a**2 * np.array([p, p * (g + 1 / 2), p * (g**2 + g + 1 / 2)])  # P11, P12, P22 after a step without noise
         self._noise_root = _covariance_root(*(np.array([p, p / 2, p / 2]) - propagated))
-        white = generator(seed, name).standard_normal((2, len(channels), 1))
+        white = self._white_noise((), 1)
         #: x1 and x2 at the start of each block computed so far
         self._block_start_states = [_correlated(_covariance_root(p, p / 2, p / 2), white)]
         self._block_number, self._values = -1, [()]
@@ -63,7 +64,7 @@ class ColouredNoise:
         return self.values_in_block(number)[row]
 
     def values_in_block(self, number: int) -> Sequence[tuple[float, ...]]:
-        """Return the values of all channels at the grid indices from `number` BLOCK_LENGTH on, a tuple for each index."""
+        """Return the values of all names and channels from the grid index `number` BLOCK_LENGTH on, a tuple for each index."""
         if number != self._block_number:
             for missing in range(len(self._block_start_states) - 1, number):
                 self._compute(missing)
@@ -72,8 +73,7 @@ class ColouredNoise:
 
     def _compute(self, number: int) -> None:
         """Compute one block, whose start states must be known."""
-        white = generator(self._seed, self._name, str(number)).standard_normal((2, len(self._a), BLOCK_LENGTH))
-        n1, n2 = _correlated(self._noise_root, white)
+        n1, n2 = _correlated(self._noise_root, self._white_noise((str(number),), BLOCK_LENGTH))
         start1, start2 = self._block_start_states[number]
         x1 = _first_order_recursion(self._a, start1, n1)
         x2 = _first_order_recursion(self._a, start2, self._a * self._g * x1[:, :-1] + n2)
@@ -82,8 +82,13 @@ class ColouredNoise:
         values = self._lead * x1[:, :-1] + (1 - self._lead) * x2[:, :-1]
         self._block_number, self._values = number, list(zip(*self._map_channels(values).tolist(), strict=True))
 
+    def _white_noise(self, part: Sequence[str], count: int) -> np.ndarray:
+        """Return two white noises of all names and channels, shape (2, names x channels, count)."""
+        shape = (2, self._channel_count, count)
+        return np.concatenate([generator(self._seed, name, *part).standard_normal(shape) for name in self._names], axis=1)
+
     def _map_channels(self, values: np.ndarray) -> np.ndarray:
-        """Map channel values, shape (channels, BLOCK_LENGTH), to the published values; a hook for subclasses."""
+        """Map channel values, shape (names x channels, BLOCK_LENGTH), to the published values; a hook for subclasses."""
         return values
 
 

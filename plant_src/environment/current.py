@@ -36,7 +36,7 @@ class Variation:
 
     def create_noise(self, seed: int) -> ColouredNoise:
         """Return the variation of the current, which is the same for all vessels."""
-        return ColouredNoise(seed, "current", [Channel(self.standard_deviation, self.time_constant)] * 2)
+        return ColouredNoise(seed, ["current"], [Channel(self.standard_deviation, self.time_constant)] * 2)
 
 
 @dataclass(frozen=True)

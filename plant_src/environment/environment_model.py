@@ -196,27 +196,24 @@ class _WindUpdate:
     def __init__(self, wind: Wind, seed: int, mean: Any, vehicles: Sequence[ContactBody], published: Any):
         self._profile, self._mean, self._published = wind.profile, mean, published
         turbulence = wind.turbulence
-        self._gusts = [DrydenGusts(wind, turbulence, seed, body.name) for body in vehicles] if turbulence else []
+        self._gusts = DrydenGusts(wind, turbulence, seed, [body.name for body in vehicles]) if turbulence and vehicles else None
         self._vehicles = [
             (_input_data(body, "wind.x"), 3 * _DOUBLE_SIZE * k, body.outputs[2:].data) for k, body in enumerate(vehicles)
         ]
-        #: gusts of all vehicles in the current block of noise
         self._block_number = -1
-        self._gust_block: Sequence[Sequence[tuple[float, ...]]] = [[(0.0, 0.0, 0.0)] * len(vehicles)] * BLOCK_LENGTH
+        #: x, y and z of the gusts at all vehicles, for each grid point of the current block of noise
+        self._gust_block: Sequence[tuple[float, ...]] = [(0.0,) * 3 * len(vehicles)] * BLOCK_LENGTH
 
     def update(self, time: float) -> None:
         """Write the wind at a time (s)."""
         mean_x, mean_y, mean_z = _unpack_vector(self._mean)
         number, row = divmod(int(time / GRID_STEP + _GRID_TOLERANCE), BLOCK_LENGTH)
         if number != self._block_number and self._gusts:
-            self._block_number, self._gust_block = (
-                number,
-                list(zip(*(gusts.values_in_block(number) for gusts in self._gusts), strict=True)),
-            )
-        profile, published = self._profile, self._published
-        for (wind, offset, height), (gust_x, gust_y, gust_z) in zip(self._vehicles, self._gust_block[row], strict=True):
+            self._block_number, self._gust_block = number, self._gusts.values_in_block(number)
+        profile, published, gusts = self._profile, self._published, iter(self._gust_block[row])
+        for wind, offset, height in self._vehicles:
             fraction = profile(height[0]) if profile else 1.0
-            x, y, z = fraction * mean_x + gust_x, fraction * mean_y + gust_y, fraction * mean_z + gust_z
+            x, y, z = fraction * mean_x + next(gusts), fraction * mean_y + next(gusts), fraction * mean_z + next(gusts)
             _pack_vector(wind, 0, x, y, z)
             _pack_vector(published, offset, x, y, z)
 

@@ -9,8 +9,9 @@ edge.
 from __future__ import annotations
 
 import math
+import struct
 from collections.abc import Sequence
-from typing import TYPE_CHECKING, Any, NamedTuple
+from typing import TYPE_CHECKING, Any
 
 from .sea import Sea
 
@@ -22,11 +23,10 @@ if TYPE_CHECKING:
 MAX_WAVE_EFFECT_HEIGHT = 5.0
 
 
-class Surface(NamedTuple):
-    """A surface below a point: its height (m, world frame) and its share of the disc around the point (1)."""
+#: a surface below a point: its height (m, world frame) and its share of the disc around the point (1)
+Surface = tuple[float, float]
 
-    height: float
-    share: float
+_unpack_vector, _unpack_quaternion = struct.Struct("3d").unpack_from, struct.Struct("4d").unpack_from
 
 
 class DeckSurface:
@@ -36,25 +36,24 @@ class DeckSurface:
         half_x, half_y, _ = max(vessel.model.body.boxes, key=lambda box: box.position[2] + box.half_extents[2]).half_extents
         self._half_x, self._half_y, self._bounding_radius = half_x, half_y, half_x + half_y
         slots = vessel.model.slots("output")
-        self._outputs: Any = vessel.outputs.data
-        self._centre, self._orientation = slots.index("deck.position.x"), slots.index("orientation.w")
+        self._centre: Any = vessel.outputs[slots.index("deck.position.x") :].data
+        self._orientation: Any = vessel.outputs[slots.index("orientation.w") :].data
 
     def below(self, x: float, y: float, radius: float) -> Surface | None:
         """Return the plane of the deck at (x, y), or None if a disc of this radius (m) is beside the deck."""
-        c, q, outputs = self._centre, self._orientation, self._outputs
-        dx, dy = x - outputs[c], y - outputs[c + 1]
-        reach = self._bounding_radius + radius
-        if abs(dx) > reach or abs(dy) > reach:
+        centre_x, centre_y, centre_z = _unpack_vector(self._centre)
+        dx, dy, reach = x - centre_x, y - centre_y, self._bounding_radius + radius
+        if not (-reach <= dx <= reach and -reach <= dy <= reach):
             return None
-        qw, qx, qy, qz = outputs[q], outputs[q + 1], outputs[q + 2], outputs[q + 3]
+        qw, qx, qy, qz = _unpack_quaternion(self._orientation)
         normal_x, normal_y, normal_z = 2 * (qx * qz + qw * qy), 2 * (qy * qz - qw * qx), 1 - 2 * (qx * qx + qy * qy)
         if normal_z <= 0:
             return None
         dz = -(normal_x * dx + normal_y * dy) / normal_z
         forward = (1 - 2 * (qy * qy + qz * qz)) * dx + 2 * (qx * qy + qw * qz) * dy + 2 * (qx * qz - qw * qy) * dz
         left = 2 * (qx * qy - qw * qz) * dx + (1 - 2 * (qx * qx + qz * qz)) * dy + 2 * (qy * qz + qw * qx) * dz
-        share = _share_of_strip(self._half_x, forward, radius) * _share_of_strip(self._half_y, left, radius)
-        return Surface(outputs[c + 2] + dz, share) if share > 0 else None
+        share = _share_of_rectangle(self._half_x, self._half_y, forward, left, radius)
+        return (centre_z + dz, share) if share > 0 else None
 
 
 class PlatformSurface:
@@ -67,19 +66,23 @@ class PlatformSurface:
 
     def below(self, x: float, y: float, radius: float) -> Surface | None:
         """Return the plane of the top, or None if a disc of this radius (m) around (x, y) is beside the platform."""
-        share = _share_of_strip(self._half_x, x - self._x, radius)
-        if share:
-            share *= _share_of_strip(self._half_y, y - self._y, radius)
-        return Surface(self._height, share) if share else None
+        share = _share_of_rectangle(self._half_x, self._half_y, x - self._x, y - self._y, radius)
+        return (self._height, share) if share > 0 else None
+
+
+def _share_of_rectangle(half_x: float, half_y: float, x: float, y: float, radius: float) -> float:
+    """Return the share of a disc at a position (m) above a rectangle around the origin."""
+    inside_x, inside_y = half_x - abs(x), half_y - abs(y)
+    if inside_x >= radius and inside_y >= radius:
+        return 1.0
+    if inside_x <= -radius or inside_y <= -radius:
+        return 0.0
+    return _share_of_strip(half_x, x, radius) * _share_of_strip(half_y, y, radius)
 
 
 def _share_of_strip(half_width: float, position: float, radius: float) -> float:
     """Return the share of a disc at a position (m) above a strip around 0."""
     near, far = half_width - abs(position), half_width + abs(position)
-    if near >= radius:
-        return 1.0
-    if near <= -radius:
-        return 0.0
     return max(_share_of_half_plane(near, radius) + _share_of_half_plane(far, radius) - 1, 0.0)
 
 
@@ -112,17 +115,12 @@ class GroundDistance:
             time: Time of the waves (s).
             wave_gain: Factor on all amplitudes (1).
         """
-        solid = self._solid_surface(x, y, z, radius)
-        if solid:  # decks and platforms hide the water
-            return z - solid.height, solid.share
-        surface = wave_gain * self._elevation(x, y, time) if z < MAX_WAVE_EFFECT_HEIGHT and self._elevation else 0.0
-        return max(z - surface, 0.0), 1.0
-
-    def _solid_surface(self, x: float, y: float, z: float, radius: float) -> Surface | None:
-        """Return the highest deck or platform below a disc that is not above its centre."""
-        highest: Surface | None = None
+        highest, share = -math.inf, 0.0
         for surface_below in self._surfaces_below:
             surface = surface_below(x, y, radius)
-            if surface and surface.height <= z and (highest is None or surface.height > highest.height):
-                highest = surface
-        return highest
+            if surface and highest < surface[0] <= z:
+                highest, share = surface
+        if share:  # decks and platforms hide the water
+            return z - highest, share
+        level = wave_gain * self._elevation(x, y, time) if z < MAX_WAVE_EFFECT_HEIGHT and self._elevation else 0.0
+        return max(z - level, 0.0), 1.0

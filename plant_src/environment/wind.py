@@ -16,7 +16,7 @@ vehicles are independent.
 from __future__ import annotations
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -93,14 +93,15 @@ def logarithmic_profile(roughness: float, reference_height: float) -> WindProfil
 
 
 class DrydenGusts(ColouredNoise):
-    """Turbulence at one vehicle (m/s, world frame)."""
+    """Turbulence at several vehicles (m/s, world frame): x, y and z of each vehicle in order."""
 
-    def __init__(self, wind: Wind, turbulence: Turbulence, seed: int, vehicle: str):
+    def __init__(self, wind: Wind, turbulence: Turbulence, seed: int, vehicles: Sequence[str]):
         x, y, _ = wind.velocity
         direction = math.atan2(y, x)
         self._cos, self._sin = math.cos(direction), math.sin(direction)
-        super().__init__(seed, f"wind/{vehicle}", turbulence.channels())
+        super().__init__(seed, [f"wind/{vehicle}" for vehicle in vehicles], turbulence.channels())
 
     def _map_channels(self, values: np.ndarray) -> np.ndarray:
-        u, v, w = values
-        return np.array([self._cos * u - self._sin * v, self._sin * u + self._cos * v, w])
+        u, v, w = values[0::3], values[1::3], values[2::3]
+        x, y = self._cos * u - self._sin * v, self._sin * u + self._cos * v
+        return np.stack([x, y, w], axis=1).reshape(values.shape)

@@ -87,5 +87,4 @@ def _release(client: int) -> None:
 
 def preconnect() -> None:
     """Connect a Bullet client that forked processes inherit; this saves most of 25 ms per run."""
-    if not _spare_clients:
-        _spare_clients.append(_SpareClient(_take_client(), is_used=False))
+    _spare_clients.append(_SpareClient(_take_client(), is_used=False))

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import islice
 
@@ -82,6 +82,16 @@ class Model:
     def variables(self) -> tuple[Variable, ...]:
         """Variables of a vehicle in a world: all but the environment inputs."""
         return tuple(variable for variable in self.interface if variable.name not in ENVIRONMENT_INPUTS)
+
+    @cached_property
+    def _variables_by_vehicle(self) -> dict[str, Sequence[Variable]]:
+        return {}
+
+    def variables_of(self, vehicle: str) -> Sequence[Variable]:
+        """Return the variables of a vehicle with its name as prefix; they are kept for the next world."""
+        if vehicle not in self._variables_by_vehicle:
+            self._variables_by_vehicle[vehicle] = [replace(each, name=f"{vehicle}.{each.name}") for each in self.variables]
+        return self._variables_by_vehicle[vehicle]
 
     @cached_property
     def environment_inputs(self) -> tuple[Variable, ...]:

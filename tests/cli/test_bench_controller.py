@@ -178,7 +178,7 @@ def test_a_problem_inside_a_nested_system_keeps_its_position(folder):
 
 
 def test_entries_about_missing_variables_are_removed_and_noted(folder):
-    done = bench(folder, keeper(folder))
+    done = bench(folder, keeper(folder), "--verbose")
     assert done.returncode == 3
     assert 'note: sail: kpi "away" is left out: the candidate has no "usv.distance"' in done.stdout
     assert 'note: sail: "usv.waypoint_count" is left out: the candidate has no such variable' in done.stdout
@@ -188,13 +188,30 @@ def test_entries_about_missing_variables_are_removed_and_noted(folder):
     assert "reference" not in written
 
 
-def test_equal_notes_of_several_scenarios_are_one_line(folder):
+def test_notes_of_several_scenarios_stand_once_after_the_ranking(folder):
     (folder / "scenarios/row.json").write_text(json.dumps({**SAIL, "name": "row"}))
-    note = '"usv.waypoint_count" is left out: the candidate has no such variable'
-    brief, full = bench(folder, keeper(folder)).stdout, bench(folder, keeper(folder), "--verbose").stdout
-    assert f"note: 2 scenarios: {note}" in brief
-    assert brief.count(note) == 1
-    assert all(f"note: {name}: {note}" in full for name in ("row", "sail"))
+    ranking, notes = bench(folder, keeper(folder)).stdout.split("\n\n")[-2:]
+    assert ranking.splitlines()[-1].startswith("Keeper is worse than the shipped controller")
+    assert notes.splitlines() == [
+        "note: variables that the controller lacks (number of scenarios): "
+        "speed_command (2), acceptance_radius (2), waypoint_count (2), waypoint_x (2), waypoint_y (2), heading_P (2)",
+        'note: left out (number of scenarios): kpi "away" without "distance" (2)',
+    ]
+
+
+def test_a_scenario_that_does_not_feed_an_input_is_not_applicable(folder):
+    """A measuring vessel, of which only the position is connected, has no output for the candidate's heading."""
+    measured = {**SAIL, "name": "measured", "connections": SAIL["connections"][1:]}
+    measured["connections"].append({"from": "vessel.position", "to": "usv.vehicle.position"})
+    measured["connections"].append({"from": "vessel.attitude", "to": "usv.vehicle.attitude"})
+    measured["connections"].append({"from": "vessel.position", "to": "usv.vehicle"})
+    (folder / "scenarios/measured.json").write_text(json.dumps(measured))
+    done = bench(folder, keeper(folder, ["vehicle.position.x", "vehicle.rates.r", "vehicle.velocity.x"]))
+    assert done.stdout.splitlines()[0] == (
+        "n/a     measured                     not applicable: input usv.vehicle.rates.r has no matching output "
+        "vessel.position.rates.r; connect vessel.rates.r to it (and 1 more input)"
+    )
+    assert "2. Keeper   0 of 1 scenario passed" in done.stdout
 
 
 @pytest.fixture(scope="module")

@@ -12,6 +12,8 @@ import pytest
 from cosim_command import run_cosim
 from probe_fmus import build_probe_fmu
 
+from cosim.core import resources
+
 ROOT = Path(__file__).parents[2]
 BLOCKS = ROOT / "tests/scenario/pythonfmu_blocks.py"
 
@@ -140,6 +142,7 @@ def test_a_failing_kpi_keeps_the_result_and_the_other_kpis(tmp_path):
 FREED = """
 from pathlib import Path
 
+from cosim.core import resources
 from cosim.core.component import Component
 from cosim.core.errors import ComponentError
 
@@ -312,6 +315,11 @@ def test_info_prints_which_capabilities_are_used(tmp_path):
     capabilities = next(line for line in lines if line.startswith("capabilities"))
     assert "inputs can be linear within a step, derivatives of outputs" in capabilities
     assert next(line for line in lines if line.startswith("not used")).split() == ["not", "used", "canRunAsynchronuously"]
+
+
+def test_info_names_the_program_that_an_fmu_needs():
+    lines = cosim("info", resources.root() / "fmus/python/mixer.fmu").stdout.splitlines()
+    assert "needs         Python on the host, with the packages that its class imports" in lines
 
 
 def test_info_prints_properties_and_variables(probe):

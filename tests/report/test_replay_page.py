@@ -287,6 +287,13 @@ def test_the_diagram_of_one_component_is_as_large_as_its_texts(open_page, flight
     assert rectangle["width"] == pytest.approx(WIDTH, abs=2)
 
 
+def test_the_report_of_a_failed_run_opens_before_the_failure(open_page, flight_result, tmp_path):
+    write_report(replace(flight_result, metadata={"failure": "usv: stopped"}), [], [], tmp_path / "report.html")
+    opened = open_page(tmp_path / "report.html")
+    assert opened.time == 14
+    assert [mark.get_attribute("title") for mark in opened.page.locator(".spans b").all()] == ["failure at 16.00 s"]
+
+
 def test_the_report_escapes_texts_of_the_scenario(open_page, flight_result, tmp_path):
     evil = "</script><script>window.caught = true</script><img src=x onerror='window.caught = true'>"
     result = replace(flight_result, metadata={"scenario": {"description": evil}, "name": evil, "warnings": [evil]})

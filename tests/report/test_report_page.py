@@ -17,8 +17,10 @@ from cosim.core import resources
 from cosim.core.errors import InputError
 from cosim.core.recording import Recording
 from cosim.report import pages
+from cosim.report.failure import find_failure
 from cosim.report.run_page import write_report
 from cosim.results import Result, write_run
+from cosim.results.checks import CheckOutcome
 from cosim.scenario import load
 
 
@@ -103,6 +105,23 @@ def test_failed_checks_are_at_the_top(flight_result, tmp_path):
     texts = Reader((tmp_path / "report.html").read_text()).texts
     assert texts[1] == "✗ 4 of 5 checks passed"
     assert "✗ not met: equals true" in texts
+    assert "The replay opens at t = 14 s. Mark × at t = 16 s: waypoints.all_reached not met." in texts
+
+
+@pytest.mark.parametrize(
+    ("metadata", "failure"),
+    [
+        ({"failure": "uav: do_step failed at t = 16 s"}, (16.0, "failure", 14.0)),
+        ({"terminated_by": {"time": 16.0, "outcome": "crash", "since": 15.5}}, (15.5, "crash", 13.5)),
+        ({}, (11.0, "landing.lateral_error not met", 9.0)),
+    ],
+)
+def test_the_moment_of_a_failure_depends_on_its_kind(flight_result, metadata, failure):
+    """The landing of which the touchdown counts is not met, unless the run ended early."""
+    result = replace(flight_result, metadata=metadata, kpis={"landing.time": 11.0})
+    outcomes = [CheckOutcome({"kpi": "landing.lateral_error", "max": 0.1}, 0.2, passed=False)]
+    assert find_failure(result, outcomes) == failure
+    assert find_failure(replace(result, metadata={}), []) is None
 
 
 def short_run(folder):

@@ -164,3 +164,34 @@ def test_statistics_are_grouped_by_the_levels_of_each_factor(lag):
 def test_a_json_pointer_changes_the_scenario(lag):
     lag.run_command("sweep", lag.write(factors=[{"name": "stop", "set": "/stop_time", "values": [0.1, 0.3]}]))
     assert [float(row["end.value"]) for row in lag.table()] == [lag_output(10), lag_output(30)]
+
+
+_PREPARED = """
+from cosim import Component
+
+
+class Prepared(Component):
+    variables, has_state, binds_everything, given = [], False, True, None
+
+    @classmethod
+    def warm(cls, **arguments):
+        cls.given = arguments
+
+    def __init__(self, instance_name, rate):
+        if self.given != {"rate": 2}:
+            raise ValueError(f"warm was called with {self.given}")
+
+    def do_step(self, time, step_size):
+        pass
+"""
+
+
+def test_a_component_class_prepares_all_runs_with_its_arguments(make_lag):
+    lag = make_lag()
+    (lag.folder / "prepared.py").write_text(_PREPARED)
+    content = json.loads((lag.folder / "lag.json").read_text())
+    content["components"]["prepared"] = {"python": "prepared.py:Prepared", "arguments": {"rate": 2}}
+    (lag.folder / "lag.json").write_text(json.dumps(content))
+    levels = {"prepared": {}, "changed": {"/components/prepared/arguments/rate": 3}}
+    assert lag.run_command("sweep", lag.write(factors=[{"name": "level", "levels": levels}])).code == 0, lag.last_result
+    assert [row["status"] for row in lag.table()] == ["ok", "ok"]

@@ -13,20 +13,21 @@ import click
 
 from ...core.errors import InputError, Problem
 from ...core.processors import available_processors
-from ...core.text import count_noun
 from ...studies.regression_runs import check_unique_names, default_folder, find_scenario_files
-from .. import current_command_line, supervision
-from ..bench_table import print_comparison, print_ranking, print_side_by_side
+from .. import supervision
+from ..bench_notes import print_omissions, print_trial
+from ..bench_table import print_ranking, print_side_by_side
 from ..bench_trial import ControllerTrial, TrialResult, run_trials
 from ..completion import complete_role, complete_scenario
 from ..messages import print_json
 from ..output_options import json_option
-from .regress import EXIT_CODE_SEVERITY, print_outcome
+from .regress import EXIT_CODE_SEVERITY
 
 if TYPE_CHECKING:
     from ...studies.controller_bench.page import BenchedController
     from ...studies.controller_bench.ranking import Ranking
     from ...studies.controller_bench.score import KpiComparison
+    from ...studies.controller_bench.substitution import Omission
 
 #: file in which the child process that examines the candidate returns its results
 _PREPARED_FILE = "bench.json"
@@ -57,8 +58,8 @@ _COSTS_FILE = "costs.json"
 )
 @click.option("--jobs", type=click.IntRange(min=1), help="Number of scenarios at a time; default: one per processor.")
 @json_option(
-    "an object with candidate, role, ranking, scenarios (name, code, seconds, problems, kpis) and notes; of several controllers: "
-    "role, reference and controllers, objects with the same keys, cost (s per step) and cost_ratio"
+    "an object with candidate, role, ranking, scenarios (name, applicable, code, seconds, problems, kpis) and notes; of several "
+    "controllers: role, reference and controllers, objects with the same keys, cost (s per step) and cost_ratio"
 )
 def command(
     controllers: tuple[str, ...],
@@ -77,8 +78,9 @@ def command(
     compare all KPIs with those of the shipped controller and of the candidate's last run.
 
     Several controllers, or those of --all, are shown side by side: a table here and the page bench.html in the output directory,
-    with the processor time per step of each. Exit code 0: all checks passed; 1: a component failed; 2: the controller's variables
-    do not fit the role; 3: a check failed.
+    with the processor time per step of each. A scenario that does not feed an input of the controller is not applicable ("n/a")
+    and does not count. Exit code 0: all checks passed; 1: a component failed; 2: the controller's variables do not fit the role,
+    or no scenario is applicable; 3: a check failed.
     """
     from ...scenario.settings import parse_settings
     from ...studies.controller_bench.role import read_role
@@ -118,12 +120,22 @@ class _Trials:
 
     @property
     def exit_code(self) -> int:
-        return min((result.outcome.code for result in self.results), key=EXIT_CODE_SEVERITY.index)
+        codes = [result.outcome.code for result in self.results if result.is_applicable]
+        return min(codes, key=EXIT_CODE_SEVERITY.index, default=2)
+
+    @property
+    def omissions(self) -> list[tuple[str, Omission]]:
+        """Names of scenarios, and what is left out of each."""
+        from ...studies.controller_bench.substitution import Omission
+
+        found = self.prepared["omissions"]
+        return [(each["scenario"], Omission(each["entry"], each["variable"])) for each in found]
 
     def as_json(self) -> dict[str, Any]:
         scenarios = [
             {
                 "name": result.name,
+                "applicable": result.is_applicable,
                 "code": result.outcome.code,
                 "seconds": result.outcome.seconds,
                 "problems": result.outcome.details,
@@ -131,8 +143,9 @@ class _Trials:
             }
             for result in self.results
         ]
+        notes = [f"{scenario}: {each}" for scenario, each in self.omissions]
         summary = {**asdict(self.ranking), "verdict": self.ranking.verdict}
-        return {"candidate": self.name, "ranking": summary, "scenarios": scenarios, "notes": self.prepared["notes"]}
+        return {"candidate": self.name, "ranking": summary, "scenarios": scenarios, "notes": notes}
 
 
 class _RefusedError(Exception):
@@ -162,8 +175,8 @@ class _Bench:
         if self.as_json:
             print_json({"role": self.role, **trials.as_json()})
         else:
-            _print_notes(trials.prepared["notes"])
             print_ranking(trials.ranking, trials.name)
+            print_omissions(trials.omissions)
         return trials.exit_code
 
     def run_all(self, sources: Sequence[str]) -> int:
@@ -206,8 +219,9 @@ class _Bench:
         for result in run_trials(trials, self.jobs):
             results.append(result)
             if not self.as_json:
-                _print_trial(result, name)
-        return _Trials(source, name, prepared, results, rank([result.kpis for result in results], prepared["goals"]))
+                print_trial(result, name)
+        ranking = rank([result.kpis for result in results if result.is_applicable], prepared["goals"])
+        return _Trials(source, name, prepared, results, ranking)
 
     def _measure_costs(self, everything: Sequence[_Trials]) -> tuple[str, list[float]]:
         """Return the name of the reference, its processor time per step (s) and that of each controller, in a child process."""
@@ -254,15 +268,15 @@ def _write_scenarios(controller: str, role_name: str, files: Sequence[Path], fol
     if problems := interface_problems(role, variables, settings):
         raise InputError([Problem(problem.message, controller) for problem in problems])
     rmtree(folder / "scenarios", ignore_errors=True)
-    written, notes = [], []
+    written, omissions = [], []
     for file in files:
         substitution = ControllerSubstitution(role, candidate, variables, file, settings)
         if path := substitution.write((folder / "scenarios").absolute()):
             written.append({"file": path, "original": file, "component": substitution.replaced_components[0]})
-            notes += [f"{file.stem}: {note}" for note in dict.fromkeys(substitution.notes)]
+            omissions += [{"scenario": file.stem, **asdict(each)} for each in dict.fromkeys(substitution.omissions)]
     if not written:
         raise InputError(f'no scenario has a component with the role "{role.name}": {role.description}')
-    write_json({"scenarios": written, "notes": notes, "goals": role.goals}, folder / _PREPARED_FILE)
+    write_json({"scenarios": written, "omissions": omissions, "goals": role.goals}, folder / _PREPARED_FILE)
     return 0
 
 
@@ -274,24 +288,6 @@ def _make_trials(written: Sequence[Mapping[str, str]], folder: Path, shipped: Pa
         )
         for each in written
     ]
-
-
-def _print_trial(result: TrialResult, candidate: str) -> None:
-    """Print a line about a scenario and its problems; with --verbose also all KPIs."""
-    print_outcome(result.outcome)
-    if current_command_line().verbosity > 0:
-        print_comparison(result.rows(), candidate)
-
-
-def _print_notes(notes: Sequence[str]) -> None:
-    """Print what is left out of the scenarios; equal notes of several scenarios on one line, unless --verbose is given."""
-    scenarios: dict[str, list[str]] = {}
-    for name, _, text in (note.partition(": ") for note in notes):
-        scenarios.setdefault(text, []).append(name)
-    for text, names in scenarios.items():
-        is_grouped = len(names) > 1 and current_command_line().verbosity <= 0
-        for where in [count_noun(len(names), "scenario")] if is_grouped else names:
-            click.echo(f"note: {where}: {text}")
 
 
 def _row_as_json(row: KpiComparison) -> dict[str, Any]:

@@ -79,6 +79,8 @@ def _kpi_rows(scenario: str, controllers: Sequence[BenchedController]) -> Iterat
 
 
 def _cell(name: str, run: ScenarioKpis) -> dict[str, Any]:
+    if not run.is_applicable:
+        return {"text": "n/a", "failed": False, "limits": ""}
     if run.candidate is None or name not in run.candidate.kpis:
         return {"text": "", "failed": run.candidate is None, "limits": ""}
     outcomes = evaluate_all_checks(run.candidate.kpis, [check for check in run.checks if check["kpi"] == name])

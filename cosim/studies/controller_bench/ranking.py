@@ -13,11 +13,15 @@ from .score import RunKpis, compare_values, merge_senses
 
 @dataclass(frozen=True)
 class ScenarioKpis:
-    """KPIs of both controllers in a scenario (None: the run did not reach its end), and the checks of the scenario."""
+    """KPIs of both controllers in a scenario (None: the run did not reach its end), and the checks of the scenario.
+
+    `is_applicable` is False if the scenario does not feed an input of the candidate.
+    """
 
     candidate: RunKpis | None
     shipped: RunKpis | None
     checks: Sequence[Mapping[str, Any]]
+    is_applicable: bool = True
 
 
 @dataclass

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from ...core.errors import InputError, did_you_mean
+from ...core.errors import InputError
 from ...results.files import write_json
 from ...scenario.component_schema import SOURCES
 from ...scenario.evaluation_schema import FunctionSpec
@@ -28,6 +28,24 @@ NameFilter = Callable[[str], bool]
 _SEPARATOR = re.compile(r"[.\[]")
 
 
+@dataclass(frozen=True)
+class Omission:
+    """Entry of a scenario that is left out because the candidate lacks a variable.
+
+    Attributes:
+        entry: 'kpi "descent"' or 'figure "landing"'; "" for a value of the variable or a connection to it.
+        variable: full name of the variable.
+    """
+
+    entry: str
+    variable: str
+
+    def __str__(self) -> str:
+        if self.entry:
+            return f'{self.entry} is left out: the candidate has no "{self.variable}"'
+        return f'"{self.variable}" is left out: the candidate has no such variable'
+
+
 @dataclass
 class ControllerSubstitution:
     """Substitution of the candidate for the controllers of a role in one scenario.
@@ -39,7 +57,7 @@ class ControllerSubstitution:
         file: the scenario's file.
         parameters: parameters of the candidate in addition to those of the scenario.
         replaced_components: full names of the replaced components.
-        notes: messages about removed entries.
+        omissions: removed entries.
     """
 
     role: Role
@@ -48,7 +66,7 @@ class ControllerSubstitution:
     file: Path
     parameters: Mapping[str, Any] = field(default_factory=dict)
     replaced_components: list[str] = field(default_factory=list)
-    notes: list[str] = field(default_factory=list)
+    omissions: list[Omission] = field(default_factory=list)
     _folder: Path = field(init=False)
 
     def write(self, folder: Path) -> Path | None:
@@ -178,14 +196,13 @@ class ControllerSubstitution:
             absent = (name for name in needed if name not in spec.arguments)
             missing += [f"{sources[0]}.{name}" for name in absent if not any(known(f"{source}.{name}") for source in sources)]
         if missing:
-            self.notes.append(f'{what} is left out: the candidate has no "{missing[0]}"')
+            self.omissions.append(Omission(what, missing[0]))
         return not missing
 
     def _is_kept(self, known: NameFilter, name: str) -> bool:
         if known(name):
             return True
-        hint = did_you_mean(name.partition(".")[2], self.interface.names) if len(self.interface.names) > 8 else ""
-        self.notes.append(f'"{name}" is left out: the candidate has no such variable{hint}')
+        self.omissions.append(Omission("", name))
         return False
 
 

@@ -13,6 +13,7 @@ import os
 import socket
 import sys
 import tempfile
+from collections import deque
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from importlib import import_module
@@ -26,7 +27,7 @@ from ...core.errors import CosimError
 from ...process.limits import detach, thread_count
 from ...process.temporary_folders import temporary_run_folder
 from ...scenario import load_scenario
-from ...scenario.named_functions import function_problem, load_function
+from ...scenario.named_functions import find_function_problems, load_function
 from ...scenario.nested_systems import Scenario
 from .job import READY, Job, StudyContext
 from .run import FmuFiles, ReplayRequest, supervised_check, supervised_run
@@ -84,13 +85,13 @@ def _preload(context: StudyContext) -> Iterator[tuple[Path, FmuFile]]:
 def _preload_components(scenario: Scenario) -> None:
     """Import the Python files of a scenario; a file that takes longer than its deadline ends this process."""
     for node, name in scenario.root.leaves():
-        if reference := node.spec.components[name].python:
+        component = node.spec.components[name]
+        if component.python:
             with _ending_after(scenario.spec.deadlines.load):
-                if warm := getattr(load_object(reference, node.folder), "warm", None):
-                    warm()
+                if warm := getattr(load_object(component.python, node.folder), "warm", None):
+                    warm(**component.arguments)
     with _ending_after(scenario.spec.deadlines.load):
-        for kpi in (*scenario.spec.kpis, *scenario.spec.figures):
-            function_problem(kpi, scenario.root.folder)
+        deque(find_function_problems(scenario.root, scenario.spec, scenario.spec, None), maxlen=0)
         for kpi in scenario.spec.kpis:
             load_function(kpi.python, scenario.root.folder)
 

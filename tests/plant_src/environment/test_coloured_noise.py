@@ -18,7 +18,7 @@ FAST, SLOW = 0.02, 0.5  # time constants (s)
 
 
 def sampled(*channels: Channel, seed: int = 1, count: int = COUNT) -> np.ndarray:
-    noise = ColouredNoise(seed, "test", channels)
+    noise = ColouredNoise(seed, ["test"], channels)
     return np.array([noise[k] for k in range(count)]).T
 
 
@@ -69,14 +69,14 @@ def test_channels_do_not_depend_on_each_other(first_order):
 
 
 def test_noise_is_a_function_of_its_index():
-    noise, other = (ColouredNoise(3, "uav", [Channel(1.0, 0.3, 1.7)]) for _ in range(2))
+    noise, other = (ColouredNoise(3, ["uav"], [Channel(1.0, 0.3, 1.7)]) for _ in range(2))
     expected = [noise[k] for k in range(3000)]
     for k in (2999, 0, 511, 512, 2047, 1, 2999):
         assert other[k] == expected[k]
 
 
 def test_other_names_and_seeds_give_independent_noise():
-    noises = [ColouredNoise(seed, name, [Channel(1.0, 0.3)]) for seed, name in ((1, "uav"), (1, "usv"), (2, "uav"))]
+    noises = [ColouredNoise(seed, [name], [Channel(1.0, 0.3)]) for seed, name in ((1, "uav"), (1, "usv"), (2, "uav"))]
     assert len({noise[100] for noise in noises}) == 3
 
 
@@ -91,7 +91,7 @@ def dryden(omega: np.ndarray, deviation: float, length: float, speed: float, tra
 @pytest.fixture(scope="module")
 def gusts() -> tuple[Turbulence, np.ndarray]:
     turbulence = Turbulence(turbulence_intensities(5.0, 6.096), 6.096, 5.0)
-    made = DrydenGusts(Wind((5.0, 0.0, 0.0), turbulence), turbulence, 1, "uav")
+    made = DrydenGusts(Wind((5.0, 0.0, 0.0), turbulence), turbulence, 1, ["uav"])
     return turbulence, np.array([made[k] for k in range(250_000)]).T
 
 
@@ -126,5 +126,5 @@ def test_scales_are_those_of_the_standard():
 def test_gusts_lie_along_the_wind():
     """Turned by the wind's direction, the same noise: u along it, v to the left."""
     turbulence = Turbulence((1.0, 0.3, 0.2), 10.0, 5.0)
-    east, north = (DrydenGusts(Wind(velocity, turbulence), turbulence, 1, "uav")[40] for velocity in ((5.0, 0, 0), (0, 5.0, 0)))
+    east, north = (DrydenGusts(Wind(velocity, turbulence), turbulence, 1, ["uav"])[40] for velocity in ((5.0, 0, 0), (0, 5.0, 0)))
     assert north == pytest.approx((-east[1], east[0], east[2]))

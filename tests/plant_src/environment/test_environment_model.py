@@ -213,6 +213,15 @@ def test_wind_that_acts_on_no_vehicle_causes_a_warning(
     assert ("the wind acts on no vehicle" in caplog.text) == warned
 
 
+def test_a_world_that_prepares_a_study_leaves_the_warnings_to_the_runs(caplog: pytest.LogCaptureFixture) -> None:
+    arguments: dict[str, Any] = {"vehicles": {"uav": quadcopter_settings([0, 0, 2])}, "environment": {"wind": {"speed": 4.0}}}
+    with caplog.at_level(logging.WARNING):
+        World.warm(**arguments)
+        assert not caplog.text
+        World("plant", **arguments).free()
+    assert "the wind acts on no vehicle" in caplog.text
+
+
 @pytest.mark.parametrize(
     ("spec", "message"),
     [

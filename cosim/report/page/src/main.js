@@ -4,6 +4,7 @@ import "./style.css";
 import { build, connectSignals, connectTime, connectView } from "./controls.js";
 import { Live } from "./live.js";
 import { LivePlayer, Player } from "./player.js";
+import { marksOf } from "./marks.js";
 import { Plots } from "./plots.js";
 import { Run } from "./run.js";
 import { showSpans } from "./spans.js";
@@ -12,11 +13,13 @@ import { onThemeChange, themeButtons } from "./theme.js";
 import { View } from "./view.js";
 
 const REDRAW = 500; // ms between two updates of a growing run
+const SAME = 0.1; // s between the mark of a scene and a failure that it marks
 
 async function start(root, data) {
   const live = data.live && new Live(data.live);
   const runs = live ? [await live.begin()] : await Promise.all(data.runs.map(Run.decoded));
   const page = build(root);
+  if (data.failure) markFailure(data.scene.marks, data.failure, runs[0]);
   const command = live && commander(page, live);
   const player = live ? new LivePlayer(live, command) : new Player(runs[0].first, Math.max(...runs.map((run) => run.last)));
   connectTime(page, player);
@@ -24,19 +27,24 @@ async function start(root, data) {
   if (view) {
     player.onChange(() => view.update(player.time));
     connectView(page, view, data.scene, "group");
-    showSpans(page, runs[0], data.scene);
   }
+  showSpans(page, runs[0], data.scene);
   const plots = new Plots(page.plots, runs, player, data.scene.marks);
   for (const patterns of data.scene.plots) plots.add(patterns);
   connectSignals(page, runs[0], plots);
   onThemeChange(() => (view?.recolour(), plots.recolour()));
-  player.tell();
+  player.seek(data.failure ? data.failure.opens : player.time);
   animate(player, view);
   if (live) {
     player.seek(player.last);
     watch(live, page, command, { player, view, plots, scene: data.scene });
   }
   return { player, view, plots, runs, live };
+}
+
+/** Add a mark for the failure of a run, unless the scene marks it already. */
+function markFailure(marks, { time, label }, run) {
+  if (!marksOf(run, marks).some((mark) => Math.abs(mark.time - time) < SAME)) marks.push({ time, label, colour: "#d55e00" });
 }
 
 /** Show new rows until the run has ended; then the page is an ordinary replay. */

@@ -1,9 +1,11 @@
-// Marks: moments at which a Boolean signal first becomes true, such as a crash.
+// Marks: moments at which a Boolean signal first becomes true, such as a crash, and the moment of a failure.
 import { label } from "./markers.js";
 
 /** The marks of a scene that a run has reached: {time, label, colour, on}. */
 export function marksOf(run, marks) {
-  return marks.filter(({ signal }) => run.has(signal)).flatMap((mark) => {
+  return marks.flatMap((mark) => {
+    if (mark.time !== undefined) return [mark];
+    if (!run.has(mark.signal)) return [];
     const row = run.values(mark.signal).findIndex(Boolean);
     return row < 0 ? [] : [{ ...mark, row, time: run.time[row] }];
   });
