@@ -56,7 +56,7 @@ class UrdfFile:
             raise self.error(self.root, f"found <{self.root.tag}>, expected <robot>")
         for element in self.root.iter():
             if element.tag.startswith("xacro:"):
-                raise self.error(element, f"found <{element.tag}>; expand the file with xacro first")
+                raise InputError(Problem(f"found <{element.tag}>; expand the file with xacro first", self.where(element)))
 
     def _by_name(self, tag: str) -> dict[str, ET.Element]:
         """Return the elements with this tag by name."""
