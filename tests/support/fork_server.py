@@ -186,6 +186,7 @@ def run_in_child(arguments: list[str], output: str) -> None:
     try:
         set_current_journal(None)
         prepare_child(str(Path.cwd()), output, {}, os.devnull, "auto", [])
+        sys.stdout, sys.stderr = (open(number, "w", closefd=False) for number in (1, 2))  # noqa: SIM115
         run_and_exit({"arguments": arguments, "observe": False})
     finally:
         os._exit(1)
