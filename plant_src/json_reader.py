@@ -55,8 +55,14 @@ class JsonReader:
         """Read an object with any keys."""
         if isinstance(value, Mapping):
             return value
-        self.add_problem(path, f"found {value!r}, expected an object {{...}}")
+        if not self._is_reported(path):
+            self.add_problem(path, f"found {value!r}, expected an object {{...}}")
         return {}
+
+    def _is_reported(self, path: JsonPath) -> bool:
+        """Return whether the value at `path` is already reported as missing."""
+        *parent, key = path or ("",)
+        return Problem(f'"{key}" is missing', ".".join(parent), ("arguments", *parent)) in self.problems
 
     def vector(self, value: Any, path: JsonPath, axes: Sequence[str]) -> Numbers:
         """Read a list of finite numbers, one for each of `axes`."""

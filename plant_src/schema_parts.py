@@ -59,13 +59,25 @@ def list_schema(items: Schema, description: str, longest: int | None) -> Schema:
     return {"type": "array", "items": items, "minItems": 1, **limit, "description": description}
 
 
-def place_schema(hub: str, thrust: str) -> dict[str, Schema]:
-    """Return the schema of the keys that say where a rotor, thruster or propeller is."""
-    return {
+def placed_schema(hub: str, thrust: str, properties: Mapping[str, Schema], required: tuple[str, ...]) -> Schema:
+    """Return the schema of a rotor, thruster or propeller with a place, or with a link of a URDF file in place of it.
+
+    Args:
+        hub: The point at `position`, in words.
+        thrust: The force along `axis`, in words.
+        properties: Other keys.
+        required: Required keys; a link stands for position and axis.
+    """
+    place = {
         "position": vector_schema("m", f"{hub}, body frame", 3),
         "axis": vector_schema("1", f"direction of the {thrust}, body frame", 3),
         "label": {**TEXT, "description": "place in words"},
     }
+    link = {**TEXT, "description": "link of the URDF file in place of position and axis, for `cosim new vehicle --urdf`"}
+    schema = object_schema({**place, "link": link, **properties}, ())
+    others = [key for key in required if key not in ("position", "axis")]
+    del schema["required"]
+    return {**schema, "anyOf": [{"required": list(required)}, {"required": ["link", *others]}]}
 
 
 def quantity_schema(unit: str, description: str, *, positive: bool = False, signed: bool = False) -> Schema:

@@ -9,7 +9,7 @@ from .schema_parts import (
     list_schema,
     matrix_schema,
     object_schema,
-    place_schema,
+    placed_schema,
     quantity_schema,
     vector_schema,
 )
@@ -43,7 +43,7 @@ def _multirotor_schema() -> Schema:
         },
         multirotor.ROTOR_KEYS,
     )
-    each = object_schema({**place_schema("hub", "thrust"), **_turns(), **_rotor_coefficients()}, ("position", "turns"))
+    each = placed_schema("hub", "thrust", {**_turns(), **_rotor_coefficients()}, ("position", "turns"))
     return family_schema(
         "multirotor",
         {
@@ -74,10 +74,8 @@ def _submerged_schema() -> Schema:
         },
         submerged.THRUSTER_KEYS,
     )
-    each = object_schema(
-        {**place_schema("centre of the propeller", "thrust at a positive speed"), **_turns(), **coefficients},
-        ("position", "axis"),
-    )
+    keys = {**_turns(), **coefficients}
+    each = placed_schema("centre of the propeller", "thrust at a positive speed", keys, ("position", "axis"))
     matrices = {
         name: matrix_schema(text, 6)
         for name, text in (

@@ -9,7 +9,7 @@ from .schema_parts import (
     list_schema,
     matrix_schema,
     object_schema,
-    place_schema,
+    placed_schema,
     quantity_schema,
     vector_schema,
 )
@@ -54,7 +54,7 @@ def planar_vessel_schema() -> Schema:
 
 def _vessel_properties(size: int, velocities: str) -> dict[str, Schema]:
     quantities = _propeller_quantities()
-    each = object_schema({**place_schema("centre of the propeller", "thrust at a positive speed"), **quantities}, ("position",))
+    each = placed_schema("centre of the propeller", "thrust at a positive speed", quantities, ("position",))
     return {
         "centre_of_mass": vector_schema("m", "centre of mass from the origin", 3),
         "added_mass": matrix_schema(f"added mass, {velocities}: diagonal or rows", size),

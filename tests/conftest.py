@@ -9,6 +9,7 @@ from ball_fmus import ball, balls
 from chromium import open_browser
 from plant_validation import MeasurementCheck, ValidationReport
 from probe_fmus import probe, probes
+from quick_compiler import compile_without_optimization
 
 from cosim.core.processors import available_processors
 from cosim.engine import EXECUTORS
@@ -22,6 +23,7 @@ def pytest_addoption(parser):
 
 
 def pytest_configure(config):
+    compile_without_optimization()
     if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in the background of a script; commands would inherit it
         signal.signal(signal.SIGINT, signal.default_int_handler)
     target = config.getoption("--validation")

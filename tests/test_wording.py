@@ -11,9 +11,12 @@ OPENINGS = ("What", "Whether", "When", "How", "Where", "Of", "Who", "Which", "Th
 
 def docstrings(path):
     """Yield the first lines of the docstrings of a file."""
-    for node in ast.walk(ast.parse(path.read_text())):
+    waiting = [ast.parse(path.read_text())]
+    while waiting:
+        node = waiting.pop()
         if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
             yield (ast.get_docstring(node) or "").partition("\n")[0]
+        waiting += [child for child in ast.iter_child_nodes(node) if isinstance(child, ast.stmt | ast.excepthandler)]
 
 
 @pytest.mark.parametrize("package", ["cosim", "plant_src", "controllers", "tests"])

@@ -9,8 +9,10 @@ from __future__ import annotations
 import ast
 import math
 import operator
+import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from keyword import iskeyword
 from typing import Any, NamedTuple
 
 from .errors import did_you_mean
@@ -20,6 +22,7 @@ Reader = Callable[[], float]
 
 #: longest expression (characters)
 _MAX_LENGTH = 1000
+_WORD = re.compile(r"[A-Za-z_]+")
 _BINARY_OPERATORS: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Add: operator.add,
     ast.Sub: operator.sub,
@@ -127,7 +130,9 @@ def parse_syntax(text: str) -> ast.expr:
     try:
         return ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        raise ValueError(f'"{text}" is not an expression: {getattr(error, "msg", error)}') from None
+        reserved = [word for word in _WORD.findall(text) if iskeyword(word) and word not in ("and", "or", "not")]
+        reason = f'"{reserved[0]}" is a reserved word of Python' if reserved else getattr(error, "msg", error)
+        raise ValueError(f'"{text}" is not an expression: {reason}') from None
 
 
 def check_node(node: ast.AST, conditions: bool = False) -> None:

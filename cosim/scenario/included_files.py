@@ -42,8 +42,8 @@ def include_files(document: Document) -> Document:
     )
 
 
-def include_in_setting(keys: Sequence[str], value: Any, folder: Path) -> tuple[Any, list[Path]]:
-    """Return the value of a setting in which the contents of files replace their names, and these files.
+def include_in_setting(keys: Sequence[str], value: Any, folder: Path) -> tuple[Any, list[Path], dict[JsonPath, Document]]:
+    """Return the value of a setting in which the contents of files replace their names, these files, and JSON files by path.
 
     Args:
         keys: Keys of the JSON pointer that is set.
@@ -54,8 +54,9 @@ def include_in_setting(keys: Sequence[str], value: Any, folder: Path) -> tuple[A
         InputError: A file cannot be read.
     """
     files: list[Path] = []
+    documents: dict[JsonPath, Document] = {}
 
-    def read(text: str, _path: JsonPath) -> Any:
+    def read(text: str, path: JsonPath) -> Any:
         if not text.endswith(SUFFIX):
             files.append(folder / text)
             return read_mesh(folder / text)
@@ -63,10 +64,11 @@ def include_in_setting(keys: Sequence[str], value: Any, folder: Path) -> tuple[A
         if file.problems:
             raise InputError(file.problems)
         files.append(file.file)
+        documents[path] = file
         return file.value
 
     is_argument = len(keys) > 2 and keys[0] == "components" and keys[2] == "arguments"
-    return (_replace_names(value, (), read) if is_argument else value), files
+    return (_replace_names(value, (), read) if is_argument else value), files, documents
 
 
 def _replace_names(value: Any, path: JsonPath, content: Callable[[str, JsonPath], Any]) -> Any:

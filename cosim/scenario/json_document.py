@@ -52,6 +52,8 @@ class Document:
     removed: set[JsonPath] = field(default_factory=set)
     #: JSON pointers of the caller's settings by the paths of the values that they set
     settings: dict[JsonPath, str] = field(default_factory=dict)
+    #: files that these settings name, by the paths of the values that are read from them
+    set_documents: dict[JsonPath, Document] = field(default_factory=dict)
     #: the scenario is a dict and no file; `file` lies in the folder from which relative paths start
     is_dict: bool = False
 
@@ -62,8 +64,8 @@ class Document:
         File and JSON path are those in which the value was written. For a value that the caller has set it is its JSON pointer.
         """
         known = path = path if path in self.offsets else self._with_indices(path)
-        if pointer := next((self.settings[known[:n]] for n in range(len(known), 0, -1) if known[:n] in self.settings), None):
-            return f'setting "{pointer}"' + ("" if known in self.settings else f": {json_path(path)}")
+        if setting := next((path[:n] for n in range(len(path), 0, -1) if path[:n] in self.settings), None):
+            return self._where_set(path, setting)
         while known and known not in self.origins and known not in self.offsets:
             known = known[:-1]
         if (origin := self.origins.get(known)) and origin.document is not self:
@@ -71,6 +73,14 @@ class Document:
         if self.is_dict:
             return f"scenario: {json_path(path)}"
         return f"{self.position(self.offsets.get(known, 0))}: {json_path(path)}"
+
+    def _where_set(self, path: JsonPath, setting: JsonPath) -> str:
+        """Return the JSON pointer of a setting, and the position in the file that it names."""
+        text = f'setting "{self.settings[setting]}"'
+        for n in range(len(path), len(setting) - 1, -1):
+            if document := self.set_documents.get(path[:n]):
+                return f"{text}: {document.where(path[n:])}"
+        return text if path == setting else f"{text}: {json_path(path)}"
 
     def _with_indices(self, path: Sequence[str | int]) -> JsonPath:
         """Return a path whose keys are numbers where the value is a list."""
@@ -140,7 +150,8 @@ def read_document(file: Path) -> Document:
     except UnicodeDecodeError as error:
         raise InputError(f'"{file}" is not UTF-8 text: {error.reason} at byte {error.start}') from None
     parsed = _parse_file(file, text)
-    return replace(parsed, value=copy_json(parsed.value), problems=[*parsed.problems], removed=set(), settings={})
+    own: dict[str, Any] = {"problems": [*parsed.problems], "removed": set(), "settings": {}, "set_documents": {}}
+    return replace(parsed, value=copy_json(parsed.value), **own)
 
 
 @lru_cache(8)  # studies read the same files for each run

@@ -39,7 +39,7 @@ def apply_settings(document: Document, settings: Mapping[str, Any], folder: Path
             change = relocating(Path(), None) if folder is None else relocating(folder, document.file.parent)
             try:
                 keys = json_pointer.pointer_keys(name)
-                value, files = include_in_setting(keys, move_objects(document, keys, value), folder or Path())
+                value, files, documents = include_in_setting(keys, move_objects(document, keys, value), folder or Path())
                 value = change_pointed(name, value, change)
             except InputError as error:
                 problems += [Problem(problem.message, problem.where or f'setting "{name}"') for problem in error.problems]
@@ -47,6 +47,9 @@ def apply_settings(document: Document, settings: Mapping[str, Any], folder: Path
             document.bases += tuple(files)
             if text := _set_value(document, name, value):
                 problems.append(Problem(text, f'setting "{name}"'))
+                continue
+            path = json_pointer.value_path(document.value, name)
+            document.set_documents |= {(*path, *inner): file for inner, file in documents.items()}
         else:
             variables[name] = value
     return variables, problems

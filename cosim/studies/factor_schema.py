@@ -122,7 +122,11 @@ class DistributionSpec(Spec):
 class FactorSpec(Spec):
     """A factor that varies: variables or JSON pointers with their values, or named levels with several settings each."""
 
-    name: FactorName = key("name of the factor and of its column in the tables", "speed")
+    name: FactorName = key(
+        "name of the factor and of its column in the tables; names of other columns (`run`, `seed`, `mean` and so on) are "
+        "reserved",
+        "speed",
+    )
     set: SettingPaths | None = key(
         "variable or JSON pointer; of several, all get the same value", "usv.speed_command", default=None
     )

@@ -45,11 +45,14 @@ def find_scenario_files(paths: Iterable[Path]) -> Iterator[Path]:
     """Yield the scenario files for files, names of shipped scenarios and folders.
 
     Raises:
-        InputError: if a file does not exist or a folder has no scenarios.
+        InputError: if a file does not exist, a folder has no scenarios, or a name is that of a folder and of a shipped scenario.
     """
     for path in paths:
         if not path.is_dir():
             yield find_scenario(path)
+        elif str(path) in resources.shipped_names("scenarios/*.json"):
+            shipped = resources.root() / "scenarios" / f"{path}.json"
+            raise InputError(f'"{path}" is a folder here and a shipped scenario: write {path.absolute()} or {shipped}')
         elif files := sorted(path.glob("*.json")):
             yield from files
         else:

@@ -12,6 +12,8 @@ import pytest
 from cosim_command import run_cosim
 from probe_fmus import build_probe_fmu
 
+from cosim.core import resources
+
 ROOT = Path(__file__).parents[2]
 BLOCKS = ROOT / "tests/scenario/pythonfmu_blocks.py"
 
@@ -140,6 +142,7 @@ def test_a_failing_kpi_keeps_the_result_and_the_other_kpis(tmp_path):
 FREED = """
 from pathlib import Path
 
+from cosim.core import resources
 from cosim.core.component import Component
 from cosim.core.errors import ComponentError
 
@@ -256,7 +259,7 @@ def test_check_prints_the_expanded_system(tmp_path):
     assert "a.y -> b.u  (delay 2)" in done.stdout
     assert "1. a" in done.stdout
     assert "every 3 s" in done.stdout
-    assert "unconnected inputs of a\n  u\n" in done.stdout
+    assert "inputs of a that nothing feeds; they keep their start values\n  0: u\n" in done.stdout
 
 
 def test_simulate_runs_one_fmu(probe, tmp_path):
@@ -312,6 +315,11 @@ def test_info_prints_which_capabilities_are_used(tmp_path):
     capabilities = next(line for line in lines if line.startswith("capabilities"))
     assert "inputs can be linear within a step, derivatives of outputs" in capabilities
     assert next(line for line in lines if line.startswith("not used")).split() == ["not", "used", "canRunAsynchronuously"]
+
+
+def test_info_names_the_program_that_an_fmu_needs():
+    lines = cosim("info", resources.root() / "fmus/python/mixer.fmu").stdout.splitlines()
+    assert "needs         Python on the host, with the packages that its class imports" in lines
 
 
 def test_info_prints_properties_and_variables(probe):

@@ -135,6 +135,8 @@ def test_missing_and_unreadable_scenarios_are_refused(folder):
     scenario(folder, name="aimless")
     assert regress(folder).returncode == 2
     assert 'no shipped scenario "colling"' in regress(folder, "colling").stderr
+    (folder / "free_flight").mkdir()
+    assert '"free_flight" is a folder here and a shipped scenario: write ' in regress(folder, "free_flight").stderr
     (folder / "scenarios/aimless.json").write_text("{]")
     assert "aimless.json:1:2:" in regress(folder).stdout
     (folder / "scenarios/aimless.json").write_text("[" * 100_000)

@@ -49,7 +49,7 @@ class Compiled:
     def __init__(self, block: Block, folder: Path, *options: str):
         for name, text in block.files.items():
             (folder / name).write_text(text)
-        command = ["gcc", "-std=c11", "-O2", "-ffp-contract=off", "-Wall", "-Werror", "-fPIC", "-shared", f"-I{SHELL}", *options]
+        command = ["gcc", "-std=c11", "-O0", "-ffp-contract=off", "-Wall", "-Werror", "-fPIC", "-shared", f"-I{SHELL}", *options]
         subprocess.run([*command, "model.c", "-o", "model.so", "-lm"], cwd=folder, check=True)
         self.library = ctypes.CDLL(str(folder / "model.so"))
         for name in ("model_initialize", "model_step"):

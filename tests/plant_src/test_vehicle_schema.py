@@ -66,3 +66,19 @@ def test_unknown_keys_are_refused_by_both(family: str) -> None:
         parent["masss"] = 1
         assert not VALIDATOR.is_valid(changed)
         assert not is_accepted(changed)
+
+
+def test_a_part_with_a_link_of_a_urdf_file_needs_no_place() -> None:
+    changed = copy.deepcopy(EXAMPLES["multirotor"])
+    turns = changed["rotors"][0]["turns"]
+    changed["rotors"][0] = {"link": "front_left", "turns": turns}
+    assert VALIDATOR.is_valid(changed)
+    changed["rotors"][0] = {"turns": turns}
+    assert not VALIDATOR.is_valid(changed)
+
+
+def test_a_missing_object_is_one_problem() -> None:
+    changed = {key: value for key, value in EXAMPLES["surface_vessel"].items() if key != "hull"}
+    with pytest.raises(InputError) as refusal:
+        model_from_data(changed, "vehicle")
+    assert [problem.message for problem in refusal.value.problems] == ['"hull" is missing']

@@ -8,7 +8,9 @@ from typing import Any
 
 import pytest
 
+from cosim.core import resources
 from cosim.core.errors import InputError
+from cosim.scenario import load
 from cosim.scenario.nested_systems import load_scenario
 
 COMPONENT = """
@@ -86,3 +88,12 @@ def test_a_file_that_cannot_be_included_is_named(text: str | None, message: str,
 def test_included_files_belong_to_the_files_of_the_scenario(tmp_path: Path) -> None:
     (tmp_path / "one.json").write_text('{"mass": 1}')
     assert tmp_path / "one.json" in load_scenario(scenario(tmp_path, {"a": "one.json"})).files()
+
+
+def test_a_problem_in_a_file_that_a_setting_names_has_its_line(tmp_path: Path) -> None:
+    pointer, boat = "/components/plant/arguments/vehicles/usv/model", tmp_path / "boat.json"
+    data = json.loads((resources.root() / "plant_src/vehicles/data/blueboat.json").read_text())
+    boat.write_text(json.dumps({key: value for key, value in data.items() if key != "hull"}))
+    with pytest.raises(InputError) as refusal:
+        load("demo1_box", {pointer: str(boat)})
+    assert str(refusal.value) == f'setting "{pointer}": {boat}:1:1: $: "hull" is missing'

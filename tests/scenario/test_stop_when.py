@@ -17,7 +17,7 @@ END = {"name": "end", "when": "a.y > 3", "for": 2}
         ({"when": "a.yy > 3"}, '$.stop_when[0].when: no recorded signal "a.yy"; did you mean "a.y"?'),
         ({"when": "a.u > 3"}, '$.stop_when[0].when: no recorded signal "a.u"; did you mean "a.y"?'),
         ({"when": "a.y >"}, '$.stop_when[0].when: "a.y >" is not an expression: invalid syntax'),
-        ({"when": "import os"}, '$.stop_when[0].when: "import os" is not an expression: invalid syntax'),
+        ({"when": "import os"}, '$.stop_when[0].when: "import os" is not an expression: "import" is a reserved word of Python'),
         ({"for": -1}, "$.stop_when[0].for: expected 0 s or more; found -1"),
         ({"outcome": "crashed"}, "$.stop_when[0].outcome: expected 'crash' or 'decided'; found \"crashed\""),
     ],

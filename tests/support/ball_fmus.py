@@ -118,7 +118,7 @@ def build_ball_fmu(version: int, folder: Path, interface: str = "ME") -> Path:
     """Build the FMU of an FMI major version; only that of FMI 1.0 has the interface "CS"."""
     compiler = os.environ.get("CC") or shutil.which("cc") or "gcc"
     library, target = folder / f"ball{version}.so", folder / f"ball{version}{interface}.fmu"
-    options = ["-shared", "-fPIC", "-O2", f"-DFMI={version}", f"-I{HEADERS}"]
+    options = ["-shared", "-fPIC", "-O0", f"-DFMI={version}", f"-I{HEADERS}"]
     subprocess.run([compiler, *options, SOURCE, "-o", library, "-lm"], check=True)
     with ZipFile(target, "w") as archive:
         archive.writestr("modelDescription.xml", description_1(interface) if version == 1 else model_description(version))

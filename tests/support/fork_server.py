@@ -3,6 +3,7 @@
 Reads one JSON object per line (see `cosim_command.ForkServer.run`) and answers {"code", "seconds", "processes"}: the exit code
 as `subprocess` defines it, the wall time, and the ids of processes that outlived the command. Those are killed; this process is
 their subreaper. With "observe" the file "changes" in the working directory lists what the command changed in its process.
+With "wait": false the answer is the process id of the command, and {"poll": id} asks for its exit code, null while it runs.
 """
 
 from __future__ import annotations
@@ -21,28 +22,54 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from quick_compiler import compile_without_optimization
+
 from cosim.cli import main
 from cosim.components.fmi import file_cache
+from cosim.components.python_import import load_object
+from cosim.core import resources
 from cosim.engine import ExecutorKind, executor_class, plan_run
+from cosim.report.figures import draw_nothing
 
 PRELOADED = (
-    "api",
+    "api.single_fmu",
+    "components.conformance",
     "components.fmi",
     "components.input_table",
-    "report.tables",
+    "components.python_fmu",
+    "report.drawing_process",
     "report.figures",
+    "report.finished_run",
+    "report.junit",
     "report.run_page",
+    "report.tables",
+    "results.comparison.reference",
     "scenario.nested_systems",
-    "cli.commands.check",
-    "cli.commands.regress",
-    "cli.commands.run",
-    "cli.commands.simulate",
+    *(f"cli.commands.{name}" for name in ("bench_controller", "check", "regress", "run", "simulate", "sweep")),
+    "cli.bench_table",
     "cli.messages",
     "components.fmi.isolated.isolated_fmu",
+    "process.sandbox.bubblewrap",
     "process.supervised_child",
     "process.supervisor",
     "scenario.plausibility",
+    "studies.controller_bench.page",
+    "studies.controller_bench.step_cost",
 )
+#: modules that the commands import late, and some that those import by name
+OTHERS = (
+    "fmpy.fmi2",
+    "fmpy.fmi3",
+    "rich.console",
+    "rich.table",
+    "rich._emoji_codes",
+    "email.parser",
+    "concurrent.futures.thread",
+)
+OTHERS += ("encodings.utf_8_sig", "encodings.ascii", "encodings.unicode_escape", "pydantic.root_model", "pydantic.type_adapter")
+OTHERS += ("jinja2.debug", "pythonfmu.builder", "numpy.ma")
+#: classes and functions of shipped scenarios
+SHIPPED = ("world.py:World", "kpis.py:waypoints", "figures.py:paths")
 PR_SET_CHILD_SUBREAPER = 36
 
 
@@ -50,15 +77,28 @@ def serve_requests() -> dict[str, Any] | None:
     """Answer requests until the input ends; in a child that is to run a command, return the request."""
     for line in sys.stdin:
         request = json.loads(line)
+        if "poll" in request:
+            print(json.dumps(exit_code(request["poll"])), flush=True)
+            continue
         began = time.monotonic()
         child = os.fork()
         if child == 0:
             prepare_child(**request)
             return dict(request)
-        code = wait_for_exit(child, began + request["limit"])
-        answer = {"code": code, "seconds": time.monotonic() - began, "processes": end_orphans()}
-        print(json.dumps(answer), flush=True)
+        print(json.dumps(judge_child(child, began, request["limit"]) if request["wait"] else child), flush=True)
     return None
+
+
+def judge_child(child: int, began: float, limit: float) -> dict[str, Any]:
+    """Wait for a command and return the answer about it."""
+    code = wait_for_exit(child, began + limit)
+    return {"code": code, "seconds": time.monotonic() - began, "processes": end_orphans()}
+
+
+def exit_code(child: int) -> int | None:
+    """Exit code of the child, None while it runs."""
+    ended, status = os.waitpid(child, os.WNOHANG)
+    return os.waitstatus_to_exitcode(status) if ended else None
 
 
 def prepare_child(folder: str, output: str, environment: dict[str, str], stdin: str, executor: ExecutorKind, **_: Any) -> None:
@@ -77,13 +117,11 @@ def prepare_child(folder: str, output: str, environment: dict[str, str], stdin: 
 
 def wait_for_exit(child: int, limit: float) -> int:
     """Exit code of the child, which is killed when it has not ended by the limit."""
-    while True:
-        ended, status = os.waitpid(child, os.WNOHANG)
-        if ended:
-            return os.waitstatus_to_exitcode(status)
+    while (code := exit_code(child)) is None:
         if time.monotonic() > limit:
             os.kill(child, signal.SIGKILL)
         time.sleep(0.005)
+    return code
 
 
 def children() -> list[int]:
@@ -151,11 +189,16 @@ def run_observed(arguments: list[str]) -> None:
 
 
 if __name__ == "__main__":
-    ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
+    compile_without_optimization()
+    if "--without-orphans" not in sys.argv:
+        ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     for module in PRELOADED:
         import_module(f"cosim.{module}")
-    for module in ("fmpy.fmi2", "fmpy.fmi3", "rich.console", "rich.table", "email.parser"):
+    for module in OTHERS:
         import_module(module)
+    for reference in SHIPPED:
+        load_object(reference, resources.root() / "plant_src")
+    draw_nothing()
     gc.freeze()
     request = serve_requests()
     if request:

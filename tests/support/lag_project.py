@@ -5,8 +5,6 @@ from __future__ import annotations
 import csv
 import json
 import os
-import subprocess
-import sys
 from collections.abc import Callable
 from contextlib import chdir, redirect_stderr, redirect_stdout
 from dataclasses import dataclass
@@ -14,6 +12,7 @@ from io import StringIO
 from pathlib import Path
 from typing import Any
 
+from cosim_command import StartedCommand
 from fault_fmu import FaultFmus
 
 from cosim.cli import CommandLine, cli, run_guarded
@@ -61,10 +60,9 @@ class LagProject:
         self.last_result = CommandResult(code, out.getvalue(), err.getvalue())
         return self.last_result
 
-    def start_command(self, *words: object) -> subprocess.Popen[str]:
+    def start_command(self, *words: object) -> StartedCommand:
         """Start a command in a separate process."""
-        command = [sys.executable, "-m", "cosim", *map(str, words)]
-        return subprocess.Popen(command, cwd=self.folder, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+        return StartedCommand(*words, cwd=self.folder, env=os.environ)
 
     def table(self, folder: str = "runs/sweep", file: str = "table.csv") -> list[dict[str, str]]:
         """Read a CSV file of the results as one dictionary per row."""

@@ -29,7 +29,7 @@ def build_probe_fmu(version: int, folder: Path, identifier: str = "probe", name:
     compiler = os.environ.get("CC") or shutil.which("cc") or "gcc"
     library, target = folder / f"{name}.so", folder / f"{name}.fmu"
     source = PROBE_SOURCES / f"{name}.c"
-    subprocess.run([compiler, "-shared", "-fPIC", "-O2", f"-I{HEADERS}", source, "-o", library], check=True)
+    subprocess.run([compiler, "-shared", "-fPIC", "-O0", f"-I{HEADERS}", source, "-o", library], check=True)
     with ZipFile(target, "w") as archive:
         description = (PROBE_SOURCES / f"{name}.xml").read_text()
         archive.writestr("modelDescription.xml", description.replace("<CoSimulation ", f"<CoSimulation {flags} "))

@@ -16,6 +16,7 @@ from ..output_options import json_option
 
 if TYPE_CHECKING:
     from ...components.fmi import FmuFile
+    from ...components.fmi.description import FmuDescription
 
 
 #: length to which start values are shortened in the table (characters)
@@ -79,7 +80,6 @@ def _properties(file: FmuFile) -> dict[str, str]:
         "early return": about.may_return_early,
         "directional derivatives": about.directional_derivatives,
         "one instance per process": about.once_per_process,
-        "needs an external tool": about.needs_execution_tool,
         "own memory management": "canNotUseMemoryManagementFunctions" in about.capabilities,
     }
     unused = [name for name in about.capabilities if name.lower() not in _USED_CAPABILITIES]
@@ -94,9 +94,19 @@ def _properties(file: FmuFile) -> dict[str, str]:
         "tolerance": f"{experiment.tolerance:g}" if experiment.tolerance else "",
         "states": str(about.state_count) if about.interface == "model-exchange" else "",
         "capabilities": ", ".join(name for name, has in used.items() if has),
+        "needs": _needed_tool(about),
         "not used": ", ".join(unused),
         "sha256": file.sha256,
     }
+
+
+def _needed_tool(about: FmuDescription) -> str:
+    """Return the program without which the FMU does not run; "" if it needs none."""
+    if not about.needs_execution_tool:
+        return ""
+    if about.generation_tool.startswith("PythonFMU"):
+        return "Python on the host, with the packages that its class imports"
+    return about.generation_tool or "the program that made it, which it does not name"
 
 
 def _variable_as_json(variable: Variable) -> dict[str, Any]:

@@ -63,9 +63,6 @@ MIN_REYNOLDS_NUMBER = 1e4
 RESIDUARY_PEAK, RESIDUARY_PEAK_FROUDE_NUMBER = 4.6e-3, 0.4
 RUDDER_AREA = 0.0064  # m2 [paper]
 
-#: diameter of the propeller ahead of the rudder [assumed] (m): the height of a square rudder
-PROPELLER_DIAMETER = 0.08
-
 #: lift coefficient at and beyond the stall angle [paper]
 RUDDER_MAX_LIFT_COEFFICIENT = 1.2
 

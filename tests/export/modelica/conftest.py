@@ -22,7 +22,7 @@ CTYPES = {"Float64": ctypes.c_double, "Int32": ctypes.c_int32, "Enumeration": ct
 GCC = [
     "gcc",
     "-std=c11",
-    "-O2",
+    "-O0",
     "-ffp-contract=off",
     "-Wall",
     "-Wextra",
@@ -31,7 +31,7 @@ GCC = [
     "-fPIC",
     "-shared",
 ]  #: for the C code of external functions
-LENIENT_GCC = ["gcc", "-std=c11", "-O2", "-ffp-contract=off", "-fPIC", "-w", "-c"]
+LENIENT_GCC = ["gcc", "-std=c11", "-O0", "-ffp-contract=off", "-fPIC", "-w", "-c"]
 GENERATED = ("model.c", "layout.c", "external.c", "external_calls.c")
 
 TICKS = 500  # default number of steps with random inputs

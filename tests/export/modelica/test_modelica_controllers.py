@@ -17,10 +17,10 @@ TICKS = 500
 
 @pytest.mark.parametrize("path", CONTROLLERS, ids=lambda path: path.stem)
 def test_shipped_controllers_agree_with_the_interpreter(compile_both, path):
-    """Run 25 ticks with default parameters, then 100 ticks with random ones."""
+    """Run 10 ticks with default parameters, then 50 ticks with random ones."""
     model = compile_both(path)
     model.initialize()
-    assert len(list(model.run(25))) == 25
+    assert len(list(model.run(10))) == 10
     rng = np.random.default_rng(1)
     for parameter in model.c.block.variables:
         if parameter.causality == "parameter" and parameter.type == "Float64":
@@ -28,7 +28,7 @@ def test_shipped_controllers_agree_with_the_interpreter(compile_both, path):
             model.c.set(parameter.name, value)
             model.python.set(parameter.name, value)
     model.initialize()
-    assert len(list(model.run(100, seed=1))) == 100
+    assert len(list(model.run(50, seed=1))) == 50
 
 
 PID = """package P

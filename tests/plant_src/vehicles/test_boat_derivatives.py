@@ -19,7 +19,7 @@ from plant_src.vehicles.vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS, Pro
 casadi = pytest.importorskip("casadi")
 
 RANDOM = np.random.default_rng(8)
-STATES = 400  # of each family; half of those of floating vessels with one hull, half with two
+STATES = 100  # of each family; half of those of floating vessels with one hull, half with two
 SEA = {"seed": 5, "waves": {"significant_height": 0.4, "peak_period": 2.5, "direction": 0.7, "spreading": 4, "components": 9}}
 
 

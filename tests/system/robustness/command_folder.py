@@ -11,6 +11,8 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+from cosim_command import StartedCommand
+
 TICKER = Path(__file__).parent / "slow_counter.py"
 
 
@@ -28,6 +30,7 @@ class CommandFolder:
     def __init__(self, folder: Path):
         self.folder, self.tmp, self.out = folder, folder / "tmp", folder / "out"
         self.tmp.mkdir(parents=True)
+        self._sessions: set[int] = set()
 
     def scenario(self, stop: float = 1000.0, **more: Any) -> Path:
         """A scenario with a ticker; its keys are replaced by `more`, those of the ticker's arguments by `arguments`."""
@@ -43,9 +46,16 @@ class CommandFolder:
         path.write_text(json.dumps(content))
         return path
 
-    def start(self, *arguments: object, environment: dict[str, str] | None = None, **more: Any) -> subprocess.Popen[str]:
-        command = [sys.executable, "-m", "cosim", *map(str, arguments)]
+    def start(
+        self, *arguments: object, environment: dict[str, str] | None = None, **more: Any
+    ) -> subprocess.Popen[str] | StartedCommand:
+        """Start a command: with an environment or options of `subprocess.Popen` as a program, else in a forked process."""
         variables = {**os.environ, "TMPDIR": str(self.tmp), "WORKPLACE": str(self.folder), **(environment or {})}
+        if environment is None and not more:
+            process = StartedCommand(*arguments, cwd=self.folder, env=variables)
+            self._sessions.add(process.pid)
+            return process
+        command = [sys.executable, "-m", "cosim", *map(str, arguments)]
         usual = {"cwd": self.folder, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
         return subprocess.Popen(command, env=variables, **{**usual, **more})
 
@@ -59,9 +69,21 @@ class CommandFolder:
         return bool(wait_until((self.folder / name).exists))
 
     def processes(self) -> list[int]:
-        """Processes that were started here and are still there."""
+        """Processes that were started here and are still there.
+
+        Programs have the mark in their environment; processes that were only forked share a session or the working directory.
+        """
         mark = f"WORKPLACE={self.folder}\0".encode()
-        return [int(entry.name) for entry in Path("/proc").iterdir() if entry.name.isdigit() and mark in _environment(entry)]
+        entries = [entry for entry in Path("/proc").iterdir() if entry.name.isdigit()]
+        return [int(entry.name) for entry in entries if mark in _environment(entry) or self._is_forked_here(entry)]
+
+    def _is_forked_here(self, process: Path) -> bool:
+        try:
+            state, *_, session = (process / "stat").read_text().rpartition(")")[2].split()[:4]
+            here = (process / "cwd").readlink()
+        except OSError:
+            return False
+        return state != "Z" and (int(session) in self._sessions or here == self.folder)
 
     def leftovers(self) -> list[str]:
         """Everything that should not be there when a command has ended: processes, temporary files, hidden files."""

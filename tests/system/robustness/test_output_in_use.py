@@ -39,6 +39,7 @@ def running(workplace: CommandFolder):
 @pytest.mark.parametrize("isolation", ["run", "none", "fmu"])
 def test_a_second_run_into_the_same_folder_is_refused(workplace, running, isolation):
     assert refused(workplace.run(*RUN, "--isolation", isolation), "out", running.pid)
+    assert wait_until((workplace.out / "result.csv").exists)
     running.send_signal(signal.SIGINT)
     running.communicate(timeout=30)
     assert running.returncode == 130

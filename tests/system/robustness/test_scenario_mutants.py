@@ -80,7 +80,7 @@ def test_the_scenario_is_good_before_it_is_changed(folder):
     assert write(folder, SCENARIO, INNER_SYSTEM)
 
 
-@in_parts(250, 100_000)
+@in_parts(100, 100_000)
 def test_mutated_scenarios(folder, count):
     results = set()
 
@@ -93,7 +93,7 @@ def test_mutated_scenarios(folder, count):
     assert results == {True, False}
 
 
-@in_parts(100, 20_000)
+@in_parts(50, 20_000)
 def test_mutated_nested_systems(folder, count):
     results = set()
 
@@ -106,7 +106,7 @@ def test_mutated_nested_systems(folder, count):
     assert results == {True, False}
 
 
-@in_parts(150, 20_000)
+@in_parts(60, 20_000)
 def test_mutated_texts(folder, count):
     """Characters changed, so that most of them are no JSON any more."""
     text = json.dumps(SCENARIO)
@@ -121,7 +121,7 @@ def test_mutated_texts(folder, count):
     change()
 
 
-@in_parts(15, 5_000)
+@in_parts(8, 5_000)
 def test_mutated_shipped_scenarios(tmp_path_factory, count):
     """All that is shipped stands beside the mutant, so that its paths are right."""
     root = tmp_path_factory.mktemp("shipped")
