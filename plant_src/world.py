@@ -90,7 +90,7 @@ class World(Component):
         self._flags = np.zeros((len(settings.vehicles), FLAG_COUNT), _FLAG)
         self._flags_data = self._flags.reshape(-1).data
         self._bound_inputs: dict[str, np.ndarray] = {}
-        self._client, self._release = connect(self)
+        self._client, self._release = connect(self, settings.body_count)
         try:
             self._populate(settings)
         except BaseException:

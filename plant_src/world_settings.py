@@ -38,6 +38,12 @@ class WorldSettings:
     environment: EnvironmentSettings
     sea: Sea
 
+    @property
+    def body_count(self) -> int:
+        """Number of bodies in Bullet."""
+        fixed = len(self.platforms) + sum(len(mesh.parts) if mesh.is_convex else 1 for mesh in self.obstacles)
+        return len(self.vehicles) + fixed
+
 
 def read_world_settings(vehicles: Any, platforms: Any, environment: Any, obstacles: Any) -> WorldSettings:
     """Read the arguments of a world.

@@ -71,9 +71,11 @@ def _shown_path(path: Path) -> str:
 
 @cache
 def _page_assets() -> dict[str, Any]:
-    script, style = ((TEMPLATE_FOLDER / "bundle" / f"replay.{kind}").read_text(encoding="utf-8") for kind in ("js", "css"))
+    names = ("replay.js", "tables.js", "replay.css")
+    script, table_script, style = ((TEMPLATE_FOLDER / "bundle" / name).read_text(encoding="utf-8") for name in names)
     return {
         "script": safe_markup(script.replace("</script", "<\\/script")),
+        "table_script": safe_markup(table_script),
         "style": safe_markup(style),
         "policy": CONTENT_SECURITY_POLICY,
     }

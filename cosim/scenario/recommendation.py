@@ -21,7 +21,7 @@ def recommend(system: System) -> list[str]:
     within = [c for c in system.connections if not c.delay]
     for group in (group for group in groups if not iterated.issuperset(group)):
         lines += _coupling(system, [c for c in within if {c.source.component, c.target.component} <= set(group)], group)
-    return lines or ["the algorithm fits: values flow from earlier to later stages, or their couplings are solved"]
+    return lines or ["none: components get values of the same step; only values that are fed back are one step old, or iterated"]
 
 
 def _late_values(system: System, connections: Sequence[Connection], groups: Sequence[Sequence[str]]) -> Iterator[str]:

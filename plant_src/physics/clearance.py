@@ -42,6 +42,9 @@ class Clearance:
         endpoints: Input: centres of mass at the start and the predicted end of the step (m), 6 numbers for each vehicle.
         reference_position: Output: positions from which the safe distances count (m), 3 numbers for each vehicle.
         safe_distance: Output: safe distances along x, y and z (m), 3 numbers for each vehicle.
+
+    Attributes:
+        near_pairs: Near pairs of the last search, as indices of vehicles, then platforms; None before the first search.
     """
 
     def __init__(
@@ -59,8 +62,7 @@ class Clearance:
         #: share of the gap that a vehicle may use: half of it beside a vehicle, all of it beside a platform
         self._gap_fraction = np.concatenate([np.full(count, 0.5), np.ones(len(platforms))])[:, None]
         self._indices = np.arange(count)
-        #: near pairs of the last search, as indices of vehicles, then platforms; None: no search yet
-        self._near_pairs: list[tuple[int, int]] | None = None
+        self.near_pairs: list[tuple[int, int]] | None = None
         self._endpoint_data: Any = endpoints.data
         self._boxes = [(*low, *high) for low, high in np.concatenate([self._vehicles, self._platforms]).tolist()]
 
@@ -69,7 +71,7 @@ class Clearance:
         gaps = self._gaps()
         largest_gap = gaps.max(axis=2, keepdims=True)
         near = largest_gap < NEAR_DISTANCE
-        self._near_pairs = [(one, other) for one, other in np.argwhere(np.triu(near[:, :, 0], 1)).tolist()]
+        self.near_pairs = [(one, other) for one, other in np.argwhere(np.triu(near[:, :, 0], 1)).tolist()]
         limits = np.where((gaps < largest_gap) | near, math.inf, (gaps - NEAR_DISTANCE) * self._gap_fraction)
         self._safe_distance[:] = limits.min(axis=1)
         self._reference_position[:] = self._endpoints[:, 1]
@@ -78,14 +80,14 @@ class Clearance:
 
     def invalidate(self) -> None:
         """Discard the result of the last search, because vehicles have been moved."""
-        self._near_pairs = None
+        self.near_pairs = None
 
     def is_valid(self) -> bool:
         """Return whether all near pairs of the last search are still near.
 
         Within the safe distances a new search would then find the same vehicles.
         """
-        return self._near_pairs is not None and all(self._gap(*pair) < NEAR_DISTANCE for pair in self._near_pairs)
+        return self.near_pairs is not None and all(self._gap(*pair) < NEAR_DISTANCE for pair in self.near_pairs)
 
     def _gap(self, vehicle: int, other: int) -> float:
         """Return the largest gap along an axis (m) between a vehicle and a vehicle or platform, as in `_gaps`."""

@@ -15,6 +15,7 @@ from ..vehicles.common.step_status import INVALID_STATE, LEAVES_SAFE_BOX, MAY_FA
 from .body import ContactBody, InvalidStateError
 from .clearance import BoundingBox, Clearance
 from .client import pybullet
+from .contact_memory import ContactMemory
 from .contacts import Contacts, touching_pairs
 from .failures import Failures
 from .vehicle_arrays import VehicleArrays
@@ -86,6 +87,7 @@ class Fleet:
         self.inputs, self.outputs = memory.of_all_vehicles["inputs"], memory.of_all_vehicles["outputs"]
         self.failures = Failures(self.bodies, vehicles, flags, memory.of_all_vehicles["step_status"], fixed_names)
         self.contacts = Contacts(client, self.bodies, self.outputs, flags, self.failures)
+        self._contact_memory = ContactMemory(client, self.bodies, vehicles, fixed)
         movable = [body.bounding_box(vehicle.body) for body, vehicle in zip(self.bodies, vehicles, strict=True)]
         distances = (memory.of_all_vehicles[name] for name in ("endpoints", "reference_position", "safe_distance"))
         self.clearance = Clearance(movable, fixed, *distances)
@@ -120,6 +122,8 @@ class Fleet:
         if self._near_vehicles_outdated or any(self._step_status):
             self._handle_step_status()
         if self._active_bodies:
+            if self._contact_memory.is_unsafe():
+                self._forget_contact_points()
             self._solve_contacts()
         for correct in self._correct:
             correct()
@@ -141,6 +145,7 @@ class Fleet:
     def _update_near_vehicles(self) -> None:
         """Activate the bodies of the vehicles that are near something, and deactivate the others."""
         near = self.clearance.find_near_vehicles()
+        self._contact_memory.watch(self.clearance.near_pairs or ())
         if near != self._is_near:
             for body, is_near, was_near in zip(self.bodies, near, self._is_near, strict=True):
                 if is_near != was_near:
@@ -167,6 +172,11 @@ class Fleet:
             for body in self._active_bodies:
                 body.reset_pose()
             self._step_bullet()
+
+    def _forget_contact_points(self) -> None:
+        self._remove_contact_points()
+        for body in self._active_bodies:
+            body.reset_pose()
 
     def _step_bullet(self) -> None:
         client = self._client
@@ -196,6 +206,7 @@ class Fleet:
 
     def set_state(self, state: FleetState) -> None:
         """Restore a state."""
+        # Bullet keeps the points of a pair that has none in the state
         if not touching_pairs(self._client) <= state.touching_pairs:
             self._remove_contact_points()
         pybullet.restoreState(state.bullet, physicsClientId=self._client)
@@ -207,7 +218,7 @@ class Fleet:
         self.contacts.has_contacts = bool(state.flags.any())
 
     def _remove_contact_points(self) -> None:
-        """Separate all vehicles, because Bullet keeps the points of a pair that has none in the state to restore."""
+        """Move all vehicles out of the reach of each other, so that Bullet has no contact points."""
         for body in self._active_bodies:
             body.set_active(False)
         pybullet.performCollisionDetection(self._client)

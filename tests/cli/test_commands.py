@@ -259,7 +259,7 @@ def test_check_prints_the_expanded_system(tmp_path):
     assert "a.y -> b.u  (delay 2)" in done.stdout
     assert "1. a" in done.stdout
     assert "every 3 s" in done.stdout
-    assert "unconnected inputs of a\n  u\n" in done.stdout
+    assert "inputs of a that nothing feeds; they keep their start values\n  0: u\n" in done.stdout
 
 
 def test_simulate_runs_one_fmu(probe, tmp_path):

@@ -16,6 +16,7 @@ from ..messages import print_json
 from ..output_options import json_option
 
 if TYPE_CHECKING:
+    from ...core.component import Variable
     from ...scenario import PreparedRun
 
 
@@ -41,8 +42,8 @@ def command(
     """Check SCENARIO without running it and print the expanded system.
 
     SCENARIO is a JSON file or the name of a shipped scenario. Prints components, processes, stages, connections and unit
-    conversions, and recommends an algorithm. Probable mistakes are warnings: a forgotten connection, a missing reference, an
-    event after the end.
+    conversions, and recommends an order of the components. Probable mistakes are warnings: a forgotten connection, a missing
+    reference, an event after the end.
     --isolation and --sandbox only affect the printed processes. The JSON of --expanded has absolute paths: a file with it is a
     scenario that runs anywhere on this machine.
     """
@@ -132,7 +133,9 @@ def _print_processes(prepared: PreparedRun, isolation: str, sandbox: str | None)
 
 
 def _print_stages(prepared: PreparedRun) -> None:
-    click.echo("\nstages, in order (the components of a line may step in parallel)")
+    given = prepared.spec.algorithm is not None and prepared.spec.algorithm.stages is not None
+    reason = 'the "stages" of the scenario' if given else "the default: a component steps after those that feed it"
+    click.echo(f"\norder within a step: {reason}; components of one line may step in parallel")
     _print_nested_stages(prepared.system.stages, "  ")
 
 
@@ -148,7 +151,7 @@ def _print_nested_stages(stages: Sequence[Stage], indent: str) -> None:
 def _print_recommendation(prepared: PreparedRun) -> None:
     from ...scenario.recommendation import recommend
 
-    click.echo("\nrecommended algorithm")
+    click.echo("\nrecommendation for the order")
     for line in recommend(prepared.system):
         click.echo(f"  {line}")
 
@@ -164,9 +167,24 @@ def _print_connections(prepared: PreparedRun) -> None:
 
 
 def _print_unconnected_inputs(prepared: PreparedRun) -> None:
-    """Print the inputs that keep their start values."""
-    for name, slots in _unconnected_inputs(prepared).items():
-        click.echo(f"\nunconnected inputs of {name}\n  {', '.join(slots)}")
+    """Print the inputs that nothing feeds or sets, with the start values that they keep."""
+    from ...scenario.plausibility import unconnected_inputs
+
+    inputs: dict[str, dict[str, list[str]]] = {}
+    for end, variable in unconnected_inputs(prepared).items():
+        inputs.setdefault(end.component, {}).setdefault(_start_text(variable), []).append(end.scalar)
+    for name, slots_of in inputs.items():
+        click.echo(f"\ninputs of {name} that nothing feeds; they keep their start values")
+        for value, slots in slots_of.items():
+            click.echo(f"  {value}: {', '.join(slots)}")
+
+
+def _start_text(variable: Variable) -> str:
+    """Return the start value of a scalar input as text."""
+    start = variable.start
+    if isinstance(start, bool):
+        return str(start).lower()
+    return f"{start:g}" if isinstance(start, int | float) else "value of the component" if start is None else str(start)
 
 
 def _unconnected_inputs(prepared: PreparedRun) -> dict[str, list[str]]:

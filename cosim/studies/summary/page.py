@@ -1,4 +1,4 @@
-"""Page `sweep.html` with the results of a sweep; it needs neither network nor scripts."""
+"""Page `sweep.html` with the results of a sweep; it needs no network."""
 
 from __future__ import annotations
 

@@ -85,9 +85,9 @@ def test_a_search_is_valid_exactly_as_long_as_its_near_pairs_are_near() -> None:
         before = places.near_vehicles()
         places.endpoints += random.uniform(-NEAR_DISTANCE / 2, NEAR_DISTANCE / 2, places.endpoints.shape)
         valid = places.clearance.is_valid()
-        pairs = places.clearance._near_pairs
+        pairs = places.clearance.near_pairs
         seen.add((valid, before == places.near_vehicles()))
-        assert valid == set(map(tuple, pairs)).issubset(map(tuple, places.clearance._near_pairs))
+        assert valid == set(map(tuple, pairs)).issubset(map(tuple, places.clearance.near_pairs))
     assert len(seen) > 1
 
 

@@ -9,7 +9,8 @@ import { Plots } from "./plots.js";
 import { Run } from "./run.js";
 import { showSpans } from "./spans.js";
 import { commander, steer } from "./steering.js";
-import { onThemeChange, themeButtons } from "./theme.js";
+import { onThemeChange } from "./theme.js";
+import { themeButtons } from "./theme_button.js";
 import { View } from "./view.js";
 
 const REDRAW = 500; // ms between two updates of a growing run
@@ -44,7 +45,7 @@ async function start(root, data) {
 
 /** Add a mark for the failure of a run, unless the scene marks it already. */
 function markFailure(marks, { time, label }, run) {
-  if (!marksOf(run, marks).some((mark) => Math.abs(mark.time - time) < SAME)) marks.push({ time, label, colour: "#d55e00" });
+  if (!marksOf(run, marks).some((mark) => Math.abs(mark.time - time) < SAME)) marks.push({ time, label, colour: "#c62828" });
 }
 
 /** Show new rows until the run has ended; then the page is an ordinary replay. */

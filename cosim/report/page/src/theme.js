@@ -1,5 +1,6 @@
 // Colours of the scene and the plots in light and dark.
 import { Vector3 } from "three";
+import { themeName } from "./theme_button.js";
 
 /** Direction to the sun. */
 export const SUN = new Vector3(-0.45, -0.6, 0.66).normalize();
@@ -15,24 +16,10 @@ export const THEMES = {
   },
 };
 
-export function themeName() {
-  const chosen = document.documentElement.dataset.theme;
-  return chosen ?? (matchMedia("(prefers-color-scheme: dark)").matches ? "dark" : "light");
-}
-
 export const theme = () => THEMES[themeName()];
 
 /** Call `listener` when the theme changes between light and dark. */
 export function onThemeChange(listener) {
   matchMedia("(prefers-color-scheme: dark)").addEventListener("change", listener);
   new MutationObserver(listener).observe(document.documentElement, { attributeFilter: ["data-theme"] });
-}
-
-/** Buttons that switch between the light and the dark theme. */
-export function themeButtons(root) {
-  for (const button of root.querySelectorAll("[data-toggle-theme]")) {
-    button.addEventListener("click", () => {
-      document.documentElement.dataset.theme = themeName() === "dark" ? "light" : "dark";
-    });
-  }
 }

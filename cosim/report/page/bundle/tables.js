@@ -1,0 +1,1 @@
+(()=>{function n(){return document.documentElement.dataset.theme??(matchMedia("(prefers-color-scheme: dark)").matches?"dark":"light")}function t(e){for(let o of e.querySelectorAll("[data-toggle-theme]"))o.addEventListener("click",()=>{document.documentElement.dataset.theme=n()==="dark"?"light":"dark"})}t(document);})();
