@@ -19,7 +19,7 @@ def run_shell(command, folder):
 
 
 def test_a_program(fmus):
-    """As a shell starts it; the other tests close the streams of a forked process."""
+    """Started by a shell; the other tests close the streams of a forked process."""
     path = scenario(fmus.folder, fmus(2), record={"signals": ["lag.y"]})
     done = run_shell(f"{sys.executable} -m cosim run {path} --no-report --output-dir out {ALL_CLOSED}", fmus.folder)
     assert done.returncode == 0, done.stderr
