@@ -153,13 +153,14 @@ BAD = {
         in_model("Real z;", "y = z;\nalgorithm\n  z := u;\n  z := z + {1, 2};"),
         "M.mo:9: expression shape mismatch",
     ),
-    "shape in a called function": (
+    "shape in a function that a function calls": (
         in_model(
-            "function f\n    input Real a;\n    output Real r;\n  protected\n    Real c[2];\n  algorithm\n"
-            "    c := {a, 2};\n    r := c*{1, 2, 3};\n  end f;",
+            "function f\n    input Real a;\n    output Real r;\n  algorithm\n    r := g(a);\n  end f;\n"
+            "  function g\n    input Real a;\n    output Real r;\n  protected\n    Real c[2];\n  algorithm\n"
+            "    c := {a, 2};\n    r := c*{1, 2, 3};\n  end g;",
             "y = f(u);",
         ),
-        "M.mo:11: expression shape mismatch",
+        "M.mo:17: expression shape mismatch",
     ),
     "loop in the second algorithm": (
         in_model(
