@@ -5,8 +5,10 @@ import os
 import subprocess
 import sys
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
+from cosim_command import run_cosim
 
 from cosim import pytest_plugin
 
@@ -34,7 +36,9 @@ OPTIONS = ("-p", "no:cacheprovider")
 
 @pytest.fixture
 def run_pytest(folder, monkeypatch, capsys):
-    """Function that runs pytest in the folder, in this process; returns exit code and output."""
+    """Function that runs pytest in the folder, in this process, with forked commands; returns exit code and output."""
+    forked = SimpleNamespace(run=lambda command, **_: run_cosim(*command[3:]), DEVNULL=subprocess.DEVNULL)
+    monkeypatch.setattr("cosim.studies.regression.subprocess", forked)
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
     monkeypatch.setenv("PYTEST_ADDOPTS", "")
     monkeypatch.chdir(folder)

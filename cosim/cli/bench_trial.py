@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import json
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..studies.regression import Regression, RegressionOutcome
 from ..studies.regression_runs import run_in_parallel
@@ -82,12 +82,28 @@ class TrialResult:
         checks = json.loads(self.trial.file.read_text(encoding="utf-8-sig"))["checks"]
         return ScenarioKpis(candidate, RunKpis.read(self.trial.shipped_folder), checks, self.is_applicable)
 
+    def as_json(self) -> dict[str, Any]:
+        """Return the result as JSON."""
+        return {
+            "name": self.name,
+            "applicable": self.is_applicable,
+            "code": self.outcome.code,
+            "seconds": self.outcome.seconds,
+            "problems": self.outcome.details,
+            "kpis": [_row_as_json(row) for row in self.rows()],
+        }
+
     def rows(self) -> list[KpiComparison]:
         """Return the compared KPIs; none if the run did not reach its end."""
         from ..studies.controller_bench.score import compare_kpis
 
         candidate, shipped, checks = self.kpis.candidate, self.kpis.shipped, list(self.kpis.checks)
         return compare_kpis(candidate, shipped, self.previous, checks) if candidate else []
+
+
+def _row_as_json(row: KpiComparison) -> dict[str, Any]:
+    checks = [{**outcome.check, "passed": outcome.passed} for outcome in row.checks]
+    return {**asdict(row), "checks": checks}
 
 
 def run_trials(trials: Sequence[ControllerTrial], jobs: int) -> Iterator[TrialResult]:

@@ -20,7 +20,8 @@ def respond(controller: Any, seconds: float, step: dict[str, float], mass: float
     """From rest at the origin, the step after one tick: time histories of the quadcopter's outputs and of the throttle."""
     plant = controller("ar_drone")
     loops = [controller(name, {"mass": mass} if name == "altitude_controller" else {}) for name in LOOPS]
-    bus: dict[str, Any] = {f"vehicle.{v.name}": plant.get(v.name) for v in plant.outputs} | {"reset": False, "motor_share": 1.0}
+    outputs = [variable.name for kind in plant.outputs.values() for variable in kind]
+    bus: dict[str, Any] = {f"vehicle.{name}": plant.get(name) for name in outputs} | {"reset": False, "motor_share": 1.0}
     rows = []
     for _ in range(round(seconds / 0.01)):
         for loop in loops:

@@ -31,6 +31,8 @@ TIMES = [
     "0e5",
     "1/2/3",
 ]
+#: keys of times; elsewhere these texts are like others
+TIME_KEYS = {"start_time", "stop_time", "step_size", "period", "delay", "interval", "time"}
 NUMBERS = [0, 1, -1, 2, 0.5, 1.0, -0.0, 1e300, 2**53, 2**53 + 1, -(2**53)]
 TEXTS = ["", "a", "a.y", "auto", "fmu", "staged", "linear", "error", "a b"]
 OTHERS = [None, True, False, [], [1], ["a"], [["a"]], [None], [{}], [True, "x", 1.5], {}, {"a": 1}, {"a": {}}]
@@ -87,7 +89,7 @@ def mutants(document, path):
             target = target[key]
         return copied, target
 
-    for value in [*TIMES, *NUMBERS, *TEXTS, *OTHERS]:
+    for value in [*(TIMES if last in TIME_KEYS else TIMES[:2]), *NUMBERS, *TEXTS, *OTHERS]:
         changed, target = mutant()
         target[last] = value
         yield repr(value), changed

@@ -16,8 +16,9 @@ from pathlib import Path
 from typing import Any
 
 #: `limit`: time limit of a command (s); `executor`: its kind;
-#: `observe`: report what the command changed in its process; `wait`: answer when the command has ended
-CONDITIONS = {"limit": 120, "stdin": os.devnull, "executor": "auto", "observe": False, "wait": True}
+#: `observe`: report what the command changed in its process; `wait`: answer when the command has ended;
+#: `closed`: numbers of closed standard streams
+CONDITIONS = {"limit": 120, "stdin": os.devnull, "executor": "auto", "observe": False, "wait": True, "closed": ()}
 
 
 class ForkServer:
@@ -120,8 +121,17 @@ class StartedCommand:
     def communicate(self, timeout: float = 120.0) -> tuple[str, str]:
         """Wait for the end and return what was written to both streams."""
         self.wait(timeout)
-        out, err = (Path(self._output.name, name).read_text(encoding="utf-8", errors="replace") for name in ("stdout", "stderr"))
-        return out, err
+        return self._text("stdout"), self._text("stderr")
+
+    def first_line(self) -> str:
+        """Wait for the first line of the output, or for the end of the command, and return the line."""
+        while "\n" not in self._text("stdout") and self.poll() is None:
+            time.sleep(0.005)
+        return self._text("stdout").partition("\n")[0]
+
+    def _text(self, name: str) -> str:
+        file = Path(self._output.name, name)
+        return file.read_text(encoding="utf-8", errors="replace") if file.exists() else ""
 
 
 def run_cosim(

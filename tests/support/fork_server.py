@@ -14,12 +14,15 @@ import gc
 import json
 import locale
 import os
+import shutil
 import signal
+import subprocess
 import sys
 import tempfile
 import time
 from importlib import import_module
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 from quick_compiler import compile_without_optimization
@@ -29,7 +32,9 @@ from cosim.components.fmi import file_cache
 from cosim.components.python_import import load_object
 from cosim.core import resources
 from cosim.engine import ExecutorKind, executor_class, plan_run
+from cosim.process.journal import set_current_journal
 from cosim.report.figures import draw_nothing
+from cosim.studies import regression
 
 PRELOADED = (
     "api.single_fmu",
@@ -101,7 +106,9 @@ def exit_code(child: int) -> int | None:
     return os.waitstatus_to_exitcode(status) if ended else None
 
 
-def prepare_child(folder: str, output: str, environment: dict[str, str], stdin: str, executor: ExecutorKind, **_: Any) -> None:
+def prepare_child(
+    folder: str, output: str, environment: dict[str, str], stdin: str, executor: ExecutorKind, closed: list[int], **_: Any
+) -> None:
     """Make this process like a new one: session, working directory, environment, standard streams, executor."""
     os.setsid()
     os.chdir(folder)
@@ -113,6 +120,9 @@ def prepare_child(folder: str, output: str, environment: dict[str, str], stdin: 
         file = os.open(name, flags | os.O_CREAT | os.O_TRUNC * (number > 0), 0o666)
         os.dup2(file, number)
         os.close(file)
+    for number in closed:  # the interpreter starts with None in place of the stream
+        os.close(number)
+        setattr(sys, ("stdin", "stdout", "stderr")[number], None)
 
 
 def wait_for_exit(child: int, limit: float) -> int:
@@ -152,9 +162,34 @@ def run_and_exit(request: dict[str, Any]) -> None:
     except SystemExit as ended:
         code = ended.code if isinstance(ended.code, int) else 1
     atexit._run_exitfuncs()
+    for stream in filter(None, (sys.stdout, sys.stderr)):
+        stream.flush()
+    os._exit(code)
+
+
+def run_forked(command: list[str], **_: Any) -> subprocess.CompletedProcess[str]:
+    """Run `python -m cosim ...` like `subprocess.run` with captured texts, in a process forked from this one."""
     sys.stdout.flush()
     sys.stderr.flush()
-    os._exit(code)
+    output = tempfile.mkdtemp()  # the exit functions of the child would remove a TemporaryDirectory
+    child = os.fork()
+    if child == 0:
+        run_in_child(command[3:], output)
+    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
+    texts = [Path(output, name).read_text(encoding="utf-8", errors="replace") for name in ("stdout", "stderr")]
+    shutil.rmtree(output)
+    return subprocess.CompletedProcess(command, code, *texts)
+
+
+def run_in_child(arguments: list[str], output: str) -> None:
+    """Run a command in this process, which was just forked, and end it."""
+    try:
+        set_current_journal(None)
+        prepare_child(str(Path.cwd()), output, {}, os.devnull, "auto", [])
+        sys.stdout, sys.stderr = (open(number, "w", closefd=False) for number in (1, 2))  # noqa: SIM115
+        run_and_exit({"arguments": arguments, "observe": False})
+    finally:
+        os._exit(1)
 
 
 def process_state() -> dict[str, Any]:
@@ -190,6 +225,7 @@ def run_observed(arguments: list[str]) -> None:
 
 if __name__ == "__main__":
     compile_without_optimization()
+    regression.subprocess = SimpleNamespace(run=run_forked, DEVNULL=subprocess.DEVNULL)  # type: ignore[assignment]
     if "--without-orphans" not in sys.argv:
         ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     for module in PRELOADED:

@@ -3,8 +3,7 @@
 from __future__ import annotations
 
 import json
-import subprocess
-import sys
+import os
 import time
 from http.client import HTTPConnection
 from pathlib import Path
@@ -12,6 +11,7 @@ from typing import Any
 from urllib.parse import urlsplit
 
 import numpy as np
+from cosim_command import StartedCommand
 
 
 class HttpReply:
@@ -29,10 +29,9 @@ class LiveRun:
 
     def __init__(self, folder: Path, scenario: object, *options: str):
         self.out = folder / "out"
-        command = [sys.executable, "-m", "cosim", "run", str(scenario), "--view", "--no-report", "--output-dir", str(self.out)]
-        pipes = {"stdout": subprocess.PIPE, "stderr": subprocess.STDOUT}
-        self.process = subprocess.Popen([*command, *options], text=True, cwd=folder, **pipes)
-        self.url = self.process.stdout.readline().removeprefix("live view: ").strip()
+        words = ("run", scenario, "--view", "--no-report", "--output-dir", self.out)
+        self.process = StartedCommand(*words, *options, cwd=folder, env=os.environ)
+        self.url = self.process.first_line().removeprefix("live view: ").strip()
         parts = urlsplit(self.url)
         self.host, self.path = parts.netloc, parts.path
         self.version = -1
@@ -85,8 +84,8 @@ class LiveRun:
         return self.wait()
 
     def wait(self) -> int:
-        self.output = self.process.communicate(timeout=60)[0]
-        return self.process.returncode
+        self.output = "".join(self.process.communicate(timeout=60))
+        return self.process.wait()
 
     def run_metadata(self) -> Any:
         return json.loads((self.out / "run.json").read_text())

@@ -26,7 +26,6 @@ from .regress import EXIT_CODE_SEVERITY
 if TYPE_CHECKING:
     from ...studies.controller_bench.page import BenchedController
     from ...studies.controller_bench.ranking import Ranking
-    from ...studies.controller_bench.score import KpiComparison
     from ...studies.controller_bench.substitution import Omission
 
 #: file in which the child process that examines the candidate returns its results
@@ -131,18 +130,16 @@ class _Trials:
         found = self.prepared["omissions"]
         return [(each["scenario"], Omission(each["entry"], each["variable"])) for each in found]
 
+    def first_applicable(self) -> Mapping[str, str]:
+        """Return the first scenario that feeds all inputs of the controller."""
+        scenarios = zip(self.prepared["scenarios"], self.results, strict=True)
+        found: Mapping[str, str] | None = next((each for each, result in scenarios if result.is_applicable), None)
+        if found:
+            return found
+        raise InputError(f"no scenario feeds all inputs of {self.name}, so that its cost cannot be measured")
+
     def as_json(self) -> dict[str, Any]:
-        scenarios = [
-            {
-                "name": result.name,
-                "applicable": result.is_applicable,
-                "code": result.outcome.code,
-                "seconds": result.outcome.seconds,
-                "problems": result.outcome.details,
-                "kpis": [_row_as_json(row) for row in result.rows()],
-            }
-            for result in self.results
-        ]
+        scenarios = [result.as_json() for result in self.results]
         notes = [f"{scenario}: {each}" for scenario, each in self.omissions]
         summary = {**asdict(self.ranking), "verdict": self.ranking.verdict}
         return {"candidate": self.name, "ranking": summary, "scenarios": scenarios, "notes": notes}
@@ -226,7 +223,7 @@ class _Bench:
     def _measure_costs(self, everything: Sequence[_Trials]) -> tuple[str, list[float]]:
         """Return the name of the reference, its processor time per step (s) and that of each controller, in a child process."""
         file = self.output_dir / Path(self.role).stem / _COSTS_FILE
-        measured = [(trials.source, trials.prepared["scenarios"][0]) for trials in everything]
+        measured = [(trials.source, trials.first_applicable()) for trials in everything]
         found = _in_child(lambda: _write_costs(self.role, measured, file), file)
         return found["reference"], found["costs"]
 
@@ -288,8 +285,3 @@ def _make_trials(written: Sequence[Mapping[str, str]], folder: Path, shipped: Pa
         )
         for each in written
     ]
-
-
-def _row_as_json(row: KpiComparison) -> dict[str, Any]:
-    checks = [{**outcome.check, "passed": outcome.passed} for outcome in row.checks]
-    return {**asdict(row), "checks": checks}

@@ -119,7 +119,7 @@ BAD = {
             "function f\n    input Real a;\n    input Real b;\n    output Real r;\n  algorithm\n    r := a + b;\n  end f;",
             "y = f(u);",
         ),
-        "M.mo:9: invalid call of function `f`: input `b` has no argument an",
+        "M.mo:12: invalid call of function `f`: input `b` has no argument an",
     ),
     "array to scalar": (
         in_model("Real v[3];", "v = {1, 2, 3};\n  y = v;"),
@@ -147,7 +147,28 @@ BAD = {
     ),
     "Real subscript": (
         in_model("Real v[3];", "v = {1, 2, 3};\n  y = v[u];"),
-        "M.mo:6: invalid array subscript",
+        "M.mo:7: invalid array subscript",
+    ),
+    "shape in the last statement of an algorithm": (
+        in_model("Real z;", "y = z;\nalgorithm\n  z := u;\n  z := z + {1, 2};"),
+        "M.mo:9: expression shape mismatch",
+    ),
+    "shape in a function that a function calls": (
+        in_model(
+            "function f\n    input Real a;\n    output Real r;\n  algorithm\n    r := g(a);\n  end f;\n"
+            "  function g\n    input Real a;\n    output Real r;\n  protected\n    Real c[2];\n  algorithm\n"
+            "    c := {a, 2};\n    r := c*{1, 2, 3};\n  end g;",
+            "y = f(u);",
+        ),
+        "M.mo:17: expression shape mismatch",
+    ),
+    "loop in the second algorithm": (
+        in_model(
+            "discrete Real a(start = 0);\n  discrete Real z[3](each start = 0);",
+            "y = z[1] + a;\nalgorithm\n  when sample(0, 0.1) then\n    a := pre(a) + u;\n  end when;\nalgorithm\n"
+            "  when sample(0, 0.1) then\n    for i in 1:3 loop\n      z[i] := z[i] + u;\n    end for;\n  end when;",
+        ),
+        "M.mo:15: unsupported model algorithm",
     ),
     "too many subscripts": (
         in_model("Real v[3];", "v = {1, 2, 3};\n  y = v[1, 2];"),

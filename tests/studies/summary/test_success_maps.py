@@ -7,7 +7,6 @@ from itertools import combinations
 
 import pytest
 from matplotlib import colormaps
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.colors import to_hex
 from matplotlib.patches import Rectangle
 from matplotlib.text import Text
@@ -144,7 +143,7 @@ def test_texts_are_inside_the_figure_and_do_not_overlap(tmp_path, name):
     (found,) = success_maps(sweep_of(tmp_path, factors=factors, maps=[spec]), [])
     with figure_style():
         figure = draw_map(found)
-        FigureCanvasAgg(figure).draw()
+        figure.draw_without_rendering()
         texts = [text for text in figure.findobj(Text) if text.get_visible() and text.get_text()]
         places = {text: text.get_window_extent() for text in texts}
     for text, place in places.items():

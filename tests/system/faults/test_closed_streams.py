@@ -10,42 +10,50 @@ from fault_fmu import STEP_COUNT, lag_output, scenario
 
 import cosim
 
-CLOSED = ["2>&-", "<&- >&-", "<&- >&- 2>&-"]
+#: closed streams in the words of a shell
+ALL_CLOSED = "<&- >&- 2>&-"
 
 
 def run_shell(command, folder):
     return subprocess.run(["/bin/sh", "-c", command], cwd=folder, capture_output=True, text=True, check=False)
 
 
-@pytest.mark.parametrize("closed", CLOSED)
-def test_run(fmus, closed):
+def test_a_program(fmus):
+    """Started by a shell; the other tests close the streams of a forked process."""
+    path = scenario(fmus.folder, fmus(2), record={"signals": ["lag.y"]})
+    done = run_shell(f"{sys.executable} -m cosim run {path} --no-report --output-dir out {ALL_CLOSED}", fmus.folder)
+    assert done.returncode == 0, done.stderr
+    assert len(cosim.Result.from_csv(fmus.folder / "out/result.csv").time) == STEP_COUNT + 1
+
+
+@pytest.mark.parametrize("closed", [(2,), (0, 1), (0, 1, 2)])
+def test_run(fmus, runner, closed):
     """Output of the FMU reaches no file of the run."""
     path = scenario(fmus.folder, fmus(2, "DoStep 6 flood_stdout"), record={"signals": ["lag.y"]})
-    done = run_shell(f"{sys.executable} -m cosim run {path} --no-report --output-dir out {closed}", fmus.folder)
-    assert done.returncode == 0, done.stderr
+    done = runner.cosim(fmus.folder, "run", path, "--no-report", "--output-dir", "out", closed=closed, observe=False)
+    assert done.code == 0, done.err
     result = cosim.Result.from_csv(fmus.folder / "out/result.csv")
     assert [len(result.time), result["lag.y"][-1]] == [STEP_COUNT + 1, lag_output(STEP_COUNT)]
 
 
 @pytest.mark.parametrize("isolation", ["none", "fmu"])
-def test_run_with_another_isolation(fmus, isolation):
-    path = scenario(fmus.folder, fmus(3))
-    command = f"{sys.executable} -m cosim run {path} --no-report --isolation {isolation} --output-dir out <&- >&- 2>&-"
-    assert run_shell(command, fmus.folder).returncode == 0
+def test_run_with_another_isolation(fmus, runner, isolation):
+    words = ("run", scenario(fmus.folder, fmus(3)), "--no-report", "--isolation", isolation, "--output-dir", "out")
+    assert runner.cosim(fmus.folder, *words, closed=(0, 1, 2), observe=False).code == 0
     assert len(cosim.Result.from_csv(fmus.folder / "out/result.csv").time) == STEP_COUNT + 1
 
 
 @pytest.mark.parametrize(("order", "code"), [("DoStep 6 segv", 1), ("DoStep 6 error", 1), ("", 2)])
-def test_exit_codes_stay(fmus, order, code):
+def test_exit_codes_stay(fmus, runner, order, code):
     path = scenario(fmus.folder, fmus(2, order), **({} if order else {"stop_time": -1}))
-    command = f"{sys.executable} -m cosim run {path} --no-report --output-dir out <&- >&- 2>&-"
-    assert run_shell(command, fmus.folder).returncode == code
+    words = ("run", path, "--no-report", "--output-dir", "out")
+    assert runner.cosim(fmus.folder, *words, closed=(0, 1, 2), observe=False).code == code
 
 
 @pytest.mark.parametrize("command", ["check fault.json", "simulate lag.fmu", "--version"])
-def test_other_commands(fmus, command):
+def test_other_commands(fmus, runner, command):
     scenario(fmus.folder, fmus(2))
-    assert run_shell(f"{sys.executable} -m cosim {command} >&- 2>&-", fmus.folder).returncode == 0
+    assert runner.cosim(fmus.folder, *command.split(), closed=(1, 2), observe=False).code == 0
 
 
 @pytest.mark.parametrize("isolation", ["none", "fmu"])

@@ -75,9 +75,10 @@ def _shorten(reason: str) -> str:
 def _locate_problem(reason: str, name: str, path: Path, sources: ModelicaSources, part: Sequence[int] | None) -> Problem:
     """Add a location to a reason.
 
-    It is the one at the end of the reason, else that of the class of a library that it names, else the first line with a name
-    that it quotes, in the `part` of the model (first and last line) without which there is no error, else the first line of this
-    part, else the first line of all files with such a name, else that of the model.
+    It is the first of these that exists: the one at the end of the reason; that of the class of a library that it names; the
+    first line with a name that it quotes, in the `part` of the model (first and last line) to which the error is due; the first
+    line of the model's file with an operator that it names; the first line of this part; the first line of all files with such a
+    name; that of the model.
     """
     if ending := _LOCATION_SUFFIX.search(reason):
         where = SourceLocation(sources.find(ending["file"]) or path, int(ending["line"]))
@@ -85,7 +86,8 @@ def _locate_problem(reason: str, name: str, path: Path, sources: ModelicaSources
     meaning = _shorten(reason)
     place = sources.locate_library_class(_QUOTED.findall(reason))
     if place is None and part:
-        place = _find_quoted_name(f"{reason} {meaning}", [path], range(part[0], part[1] + 1)) or SourceLocation(path, part[0])
+        place = _find_quoted_name(f"{reason} {meaning}", [path], range(part[0], part[1] + 1))
+        place = place or _find_name(_OPERATOR.findall(reason), [path]) or SourceLocation(path, part[0])
     place = place or _find_quoted_name(f"{reason} {meaning}", sources.files)
     place = place or sources.locate_in_libraries(_OPERATOR.findall(f"{reason} {meaning}"))
     return Problem(meaning, str(place or sources.locate_class(name)))
@@ -93,7 +95,12 @@ def _locate_problem(reason: str, name: str, path: Path, sources: ModelicaSources
 
 def _find_quoted_name(reason: str, files: Iterable[Path], lines: Container[int] | None = None) -> SourceLocation | None:
     """Return the first source line with a name that a message quotes, or with an operator that it names."""
-    for quoted in (*_QUOTED.findall(reason), *_DIMENSION.findall(reason), *_OPERATOR.findall(reason)):
+    return _find_name((*_QUOTED.findall(reason), *_DIMENSION.findall(reason), *_OPERATOR.findall(reason)), files, lines)
+
+
+def _find_name(names: Iterable[str], files: Iterable[Path], lines: Container[int] | None = None) -> SourceLocation | None:
+    """Return the first source line with one of these names, the first name first."""
+    for quoted in names:
         word = re.compile(rf"(?<![\w.]){re.escape(quoted)}(?![\w])")
         for file in files:
             for number, line in enumerate(file.read_text(encoding="utf-8").splitlines(), 1):

@@ -1,4 +1,4 @@
-"""Parts of a Modelica text that can be removed in order to find the one that the front end refuses: equations and bindings."""
+"""Parts of a Modelica text that are changed in order to find the one that the front end refuses: equations, values, bindings."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def removable_parts(text: str) -> list[tuple[int, int]]:
     >>> [text[begin:end] for begin, end in removable_parts(text)]
     ['y = x;', '= 1']
     """
-    tokens = [(m[0], m.start(), m.end()) for m in _TOKEN.finditer(text) if m.lastgroup != "comment"]
+    tokens = _tokens(text)
     equations: list[tuple[int, int]] = []
     bindings: list[tuple[int, int]] = []
     k = 0
@@ -31,6 +31,27 @@ def removable_parts(text: str) -> list[tuple[int, int]]:
         in_section = tokens[k][0] in _SECTIONS
         k = _read_section(tokens, k + 1, equations) if in_section else _read_declaration(tokens, k, bindings)
     return equations + bindings
+
+
+def assigned_values(text: str) -> list[tuple[int, int]]:
+    """Return begin and end of the right side of each assignment, also inside loops and branches, and then of each equation.
+
+    >>> text = "model M Real x; algorithm if a then x := 1; end if; equation y = x; end M;"
+    >>> [text[begin:end] for begin, end in assigned_values(text)]
+    ['1', 'x']
+    """
+    tokens = _tokens(text)
+    sides: dict[str, list[tuple[int, int]]] = {":=": [], "=": []}
+    for begin, end in removable_parts(text):
+        inside = [k for k, token in enumerate(tokens) if begin <= token[1] < end]
+        for k in _outside_of_parentheses(tokens, inside[0], inside[-1]):
+            if tokens[k][0] in sides and k > inside[0]:
+                sides[tokens[k][0]].append((tokens[k + 1][1], tokens[_end_of_simple(tokens, k)][1]))
+    return sides[":="] + sides["="]
+
+
+def _tokens(text: str) -> list[Token]:
+    return [(m[0], m.start(), m.end()) for m in _TOKEN.finditer(text) if m.lastgroup != "comment"]
 
 
 def _read_section(tokens: Sequence[Token], k: int, parts: list[tuple[int, int]]) -> int:

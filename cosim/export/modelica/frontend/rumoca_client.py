@@ -13,11 +13,11 @@ from typing import Any
 
 from ....core.errors import InputError, Problem
 from ....process.failure_attribution import describe_exit_status
-from .parts import removable_parts
+from .parts import assigned_values, removable_parts
 
 #: limits of the child process: processor time and wall time (s), private memory and size of the flat model (bytes)
 CPU_LIMIT, TIMEOUT, MEMORY_LIMIT, OUTPUT_LIMIT = 120, 900, 2 << 30, 1 << 28
-#: numbers of parts of a model that are removed to find the one that rumoca refuses, without and with packages
+#: numbers of parts of a model that are changed to find the one that rumoca refuses, without and with packages
 TRIALS, LIBRARY_TRIALS = 200, 3
 
 _PROGRAM = Path(__file__).with_name("rumoca_process.py")
@@ -56,6 +56,7 @@ def run_rumoca(
         "model": model,
         "text": text,
         "declaration": declaration,
+        "values": assigned_values(text[1]) if text else [],
         "parts": removable_parts(text[1]) if text else [],
         "trials": LIBRARY_TRIALS if packages else TRIALS,
         "memory": MEMORY_LIMIT,

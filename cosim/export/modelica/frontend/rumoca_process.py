@@ -3,8 +3,7 @@
 It reads a request from standard input (JSON, see `main`) and writes lines of JSON: {"file": PATH} before rumoca reads a file, and
 at last one of {"flat": TEXT}, {"syntax_errors": [[PATH, line, message], ...]}, {"error": text, "panicked": bool, "lines": [first,
 last] or null} and {"version": text or null}, the version of rumoca if it is not the requested one. The lines are those of the
-first part of the model without which rumoca does not report the error; they are null if the error has a place, or if there is no
-such part.
+first part of the model to which the error is due; they are null if the error has a place, or if there is no such part.
 """
 
 from __future__ import annotations
@@ -13,6 +12,7 @@ import json
 import re
 import resource
 import sys
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
@@ -20,6 +20,7 @@ from typing import Any
 _HAS_PLACE = re.compile(r"\[[^\[\]]+:\d+:\d+\]\s*$")
 #: messages of a model whose names are resolved
 _LATER_PHASE = re.compile(r"^\w+ failed: ")
+_FUNCTION = re.compile(r"\bfunction\s+(\w+)")
 _TOO_FEW_EQUATIONS = "(balance = -"
 
 
@@ -29,9 +30,9 @@ def main(request: dict[str, Any]) -> None:
     Args:
         request: "version" of rumoca; "files", the file of the model first; "packages", their folders; "model", its name;
             "text", the name under which a model outside a package is loaded and its text, null for one in a package;
-            "declaration", text of the model if it is not in the file; "parts", begin and end of each part of the text that can be
-            removed; "trials", the largest number of such trials; "memory" (bytes), "output_size" (bytes) and "seconds" of
-            processor time, the limits of this process.
+            "declaration", text of the model if it is not in the file; "values", begin and end of the right side of each
+            assignment and equation; "parts", those of each part of the text that can be removed; "trials", the largest number of
+            each; "memory" (bytes), "output_size" (bytes) and "seconds" of processor time, the limits of this process.
     """
     limits = {resource.RLIMIT_DATA: "memory", resource.RLIMIT_FSIZE: "output_size", resource.RLIMIT_CPU: "seconds"}
     for kind, name in limits.items():
@@ -81,22 +82,40 @@ def _flatten(rumoca: Any, request: dict[str, Any]) -> dict[str, Any]:
 
 
 def _find_part(session: Any, request: dict[str, Any], reason: str) -> list[int] | None:
-    """Return the first and last line of the first part of the model without which rumoca reports another error or none."""
-    name, text = request["text"]
+    """Return the first and last line of the first part of the model to which rumoca's error is due.
+
+    It is the value with a constant in place of which there is no error, else the part without which there is another one or none.
+    """
+    text = request["text"][1]
     if _HAS_PLACE.search(reason):
         return None
+    due = [each for each in request["values"][: request["trials"]] if _is_due(session, request, each, reason)]
+    functions = "|".join(_FUNCTION.findall(text))
+    called = re.compile(rf"\b(?:{functions})\s*\(") if functions else None
+    own = [(begin, end) for begin, end in due if not (called and called.search(text, begin, end))]  # not in a function it calls
+    for begin, end in own or due:
+        return [text.count("\n", 0, position) + 1 for position in (begin, end)]
     for begin, end in request["parts"][: request["trials"]]:
-        blank = re.sub(r"[^\n]", " ", text[begin:end])
-        found = _outcome(session, request, name, f"{text[:begin]}{blank}{text[end:]}\n{request['declaration']}")
+        found = _outcome(session, request, begin, end, "")
         if found != reason and (found == "" or (_TOO_FEW_EQUATIONS not in reason and _LATER_PHASE.search(found))):
             return [text.count("\n", 0, position) + 1 for position in (begin, end)]
     return None
 
 
-def _outcome(session: Any, request: dict[str, Any], name: str, text: str) -> str:
-    """Return the message for a changed text, "" without an error."""
+def _is_due(session: Any, request: dict[str, Any], value: Sequence[int], reason: str) -> bool:
+    """Return whether there is no error with 0 or false in place of a value."""
+    begin, end = value
+    found = _outcome(session, request, begin, end, "0")
+    return found == "" or (found != reason and _outcome(session, request, begin, end, "false") == "")
+
+
+def _outcome(session: Any, request: dict[str, Any], begin: int, end: int, replacement: str) -> str:
+    """Return the message for a text of which a part is replaced, "" without an error."""
+    name, text = request["text"]
+    blank = re.sub(r"[^\n]", " ", text[begin:end])
+    changed = f"{text[:begin]}{replacement}{blank}{text[end:]}\n{request['declaration']}"
     try:
-        session.loads(text, model=request["model"], filename=name)
+        session.loads(changed, model=request["model"], filename=name)
     except BaseException as error:
         return str(error)
     return ""
