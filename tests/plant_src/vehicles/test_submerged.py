@@ -239,13 +239,6 @@ def start_at(height: float) -> np.ndarray:
 
 
 @pytest.mark.long
-def test_a_minute_with_all_effects(measured: MeasurementCheck) -> None:
-    start = start_at(-50.0)
-    error = np.linalg.norm(simulated(start, 60, 0.01) - reference(start, 60), axis=1)
-    measured(MODEL, "place in 60 s with thrusters, loads and current", error, 0.0, "m", "DOP853", within=1e-6)
-
-
-@pytest.mark.long
 def test_shorter_steps_converge_at_the_surface(measured: MeasurementCheck) -> None:
     """The kinks of the buoyancy at the surface limit the order."""
     start = start_at(-0.1)
