@@ -27,6 +27,7 @@ PAIRS = (1, 2, 4, 8, 16, 32, 64)
 SPACING = 20.0  # between pairs (m)
 HOVER = 345.0  # rad/s
 FLYING, LANDED = 5.0, 0.3249  # height of the quadcopter (m)
+ABOVE_WAVES = 0.55  # from which it drops onto a deck in waves (m)
 WEATHER = {"seed": 7, "sea_state": 3, "wind": {"speed": 5.0, "turbulence": {}}}
 DRAG = {f"{part}_drag.{axis}": value for part, value in (("rotor", 5e-5), ("body", 0.02)) for axis in "xyz"}
 #: largest cost of one pair per step (us) on an idle machine
@@ -184,3 +185,22 @@ def test_many_pairs_in_weather() -> None:
         per_pair[count] = row.cost / count
     print("  us per pair: " + ", ".join(f"{count}: {cost:.1f}" for count, cost in per_pair.items()))
     assert per_pair[64] < 2 * per_pair[1]
+
+
+def test_fifty_vehicles() -> None:
+    """25 pairs in one world, as ratio to real time."""
+    print_heading("50 vehicles in one world")
+    six = {"motion": "6dof"}
+    worlds = {
+        "planar, in flight": BoundWorld(pairs(25, FLYING), speed=HOVER),
+        "planar, landed": BoundWorld(pairs(25, LANDED)),
+        "6 DOF in weather, in flight": BoundWorld(pairs(25, FLYING, **six), WEATHER, HOVER),
+        "6 DOF in weather, landed": BoundWorld(pairs(25, ABOVE_WAVES, **six), WEATHER),
+    }
+    for name, bound in worlds.items():
+        bound.run(250 if "landed" in name else 20)
+    assert sum(worlds["6 DOF in weather, landed"].world.get(f"uav{k}.contact.vessel") for k in range(25)) > 20
+    rows = measure_rounds({name: lambda b=bound: b.run(40) for name, bound in worlds.items()})
+    print_rows("25 pairs", rows)
+    for row in rows:
+        print(f"  {row.name}: {STEP * 1e6 / row.cost:.1f} times real time")

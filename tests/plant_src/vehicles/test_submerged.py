@@ -11,13 +11,17 @@ import numpy as np
 import pytest
 from plant_fmu import PlantFmu
 from plant_validation import MeasurementCheck
+from scipy.integrate import solve_ivp
+from submerged_reference import derivative
 from world_harness import WorldHarness
 
 from cosim.core import resources
 from cosim.core.errors import InputError
+from plant_src.catalogue import MODELS
 from plant_src.world import World
 
 MODEL = "Submerged vehicles"
+BLUEROV = MODELS["bluerov2_heavy"].craft
 FILE = resources.root() / "plant_src/vehicles/data/bluerov2_heavy.json"
 MASS, VOLUME, CENTRE_OF_BUOYANCY, HEIGHT, GRAVITY, SALT_WATER = 13.5, 0.0134, 0.01, 0.254, 9.81, 1025.0
 NEUTRAL = {"displaced_volume": MASS / SALT_WATER, "centre_of_buoyancy.z": 0.0}
@@ -194,3 +198,51 @@ def test_an_impossible_vehicle_is_refused_with_its_path(change: Callable[[dict[s
     with pytest.raises(InputError, match=text) as caught:
         World("plant", {"rov": {"model": data, "position": [0, 0, -2]}})
     assert all(str(problem).startswith("vehicles.rov.model") for problem in caught.value.problems)
+
+
+def sequence(duration: float) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Speeds of the thrusters, external force and torque, and current, other ones every second."""
+    random = np.random.default_rng(11)
+    return [
+        (120 * random.standard_normal(8), 3 * random.standard_normal(6), 0.3 * random.standard_normal(2))
+        for _ in range(round(duration))
+    ]
+
+
+def reference(start: np.ndarray, duration: float) -> np.ndarray:
+    """The place after each second by DOP853."""
+    state, places = start, []
+    for speeds, loads, current in sequence(duration):
+        water = np.array([*current, 0.0])
+        rate = lambda _t, x, held=(speeds, loads, water): derivative(BLUEROV, x, *held)  # noqa: E731
+        state = solve_ivp(rate, (0, 1), state, "DOP853", rtol=1e-9, atol=1e-10).y[:, -1]
+        places.append(state[:3])
+    return np.array(places)
+
+
+def simulated(start: np.ndarray, duration: float, step: float) -> np.ndarray:
+    """The place after each second by the FMU."""
+    names = (*(f"position.{a}" for a in "xyz"), *(f"velocity_body.{a}" for a in "uvw"), *(f"rates.{a}" for a in "pqr"))
+    values = np.concatenate([start[:3], start[7:13]])
+    fmu, places = PlantFmu("bluerov2_heavy", {f"initial.{n}": v for n, v in zip(names, values, strict=True)}), []
+    for speeds, loads, current in sequence(duration):
+        fmu.set({f"thruster_speed[{k}]": value for k, value in enumerate(speeds, 1)})
+        kinds = [f"external_{kind}.{axis}" for kind in ("force", "torque") for axis in "xyz"]
+        fmu.set(dict(zip((*kinds, "current.x", "current.y"), (*loads, *current), strict=True)))
+        fmu.step(step, round(1 / step))
+        places.append(fmu.vector("position"))
+    return np.array(places)
+
+
+def start_at(height: float) -> np.ndarray:
+    return np.concatenate([[0, 0, height, 1, 0, 0, 0], [0.3, -0.1, 0.0, 0.1, 0.2, -0.3], np.zeros(8)])
+
+
+@pytest.mark.long
+def test_shorter_steps_converge_at_the_surface(measured: MeasurementCheck) -> None:
+    """The kinks of the buoyancy at the surface limit the order."""
+    start = start_at(-0.1)
+    expected = reference(start, 3)
+    errors = [np.abs(simulated(start, 3, step) - expected).max() for step in (0.01, 0.0025)]
+    assert errors[1] < errors[0] / 2
+    measured(MODEL, "place in 3 s at the surface", errors[0], 0.0, "m", "DOP853", within=1e-6)
