@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -33,6 +33,9 @@ from .vehicles.submerged.vehicle_data import read_submerged
 from .vehicles.surface_vessel import interface as surface_vessel_interface
 from .vehicles.surface_vessel.vehicle_data import read_surface_vessel
 from .vehicles.vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS
+
+#: lists of a vehicle file whose elements may name a link of a URDF file in place of position and axis
+NAMED_LISTS = ("rotors", "thrusters", "propellers")
 
 #: keys of a vehicle file of any family besides those of its family
 COMMON_KEYS = ("family", "name", "description", "sources", "validity", "visual", "$schema")
@@ -135,11 +138,23 @@ def model_from_data(data: Mapping[str, Any], name: str = "") -> Model:
     Raises:
         InputError: With all problems; the subject of each begins with "arguments" and continues with the path in the data.
     """
+    if link := next(_named_links(data), None):
+        raise InputError(link)
     family = data.get("family")
     if family not in FAMILIES:
         hint = did_you_mean(family, FAMILIES) if isinstance(family, str) else f", expected one of: {', '.join(FAMILIES)}"
-        raise InputError([Problem(f"found {family!r}{hint}", "family", ("arguments", "family"))])
+        found = f"found {family!r}" if "family" in data else '"family" is missing'
+        raise InputError([Problem(f"{found}{hint}", "family", ("arguments", "family"))])
     return replace(FAMILIES[family](str(data.get("name", name)), data), visual=read_visual(data))
+
+
+def _named_links(data: Mapping[str, Any]) -> Iterator[Problem]:
+    """Yield a problem for each rotor, thruster or propeller whose place is a link of a URDF file."""
+    for key in NAMED_LISTS:
+        for i, element in enumerate(found if isinstance(found := data.get(key), list) else []):
+            if isinstance(element, Mapping) and "link" in element:
+                text = f"found the link {element['link']!r}: `cosim new vehicle --urdf FILE` replaces it by position and axis"
+                yield Problem(text, f"{key}.{i}.link", ("arguments", key, str(i), "link"))
 
 
 #: name -> model

@@ -8,16 +8,27 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
-from cosim.core.errors import InputError, Problem
+from cosim.core.errors import InputError, Problem, nearest_file
 
 from .vehicles.common.convex_points import outermost_points
 from .vehicles.common.visual_mesh import MAX_TRIANGLES
 
 _DIGITS = 6  # of coordinates in vehicle files (m)
+
+#: formats that trimesh reads without further packages
+FORMATS = "STL, OBJ, GLB, PLY"
+
+
+class ImportedVehicle(NamedTuple):
+    """Data of a vehicle, centre of mass in the frame of the imported file (m), and probable mistakes in that file."""
+
+    data: dict[str, Any]
+    centre: list[float]
+    warnings: list[str]
 
 
 def load_mesh(path: Path, scale: Sequence[float] = (1.0, 1.0, 1.0)) -> Any:
@@ -28,12 +39,16 @@ def load_mesh(path: Path, scale: Sequence[float] = (1.0, 1.0, 1.0)) -> Any:
         scale: Factors along x, y and z, for example 0.001 for coordinates in mm.
 
     Raises:
-        InputError: trimesh is not installed, or the file cannot be read or has no triangles.
+        InputError: trimesh is not installed, or the file cannot be read, has another format or no triangles.
     """
     try:
         import trimesh
     except ModuleNotFoundError:
         raise InputError('reading meshes needs trimesh: pip install "fmi-cosim[mesh]"') from None
+    if not path.is_file():
+        raise InputError(Problem(f"the file does not exist{nearest_file(path)}", str(path)))
+    if path.suffix[1:].lower() not in trimesh.available_formats():
+        raise InputError(Problem(f'the format "{path.suffix}" is not read; convert the file to one of {FORMATS}', str(path)))
     try:
         mesh: Any = trimesh.load(path, force="mesh")
     except Exception as error:
@@ -61,7 +76,7 @@ def visual_data(triangles: np.ndarray, source: str) -> dict[str, Any]:
     return {"vertices": vertices.tolist(), "faces": faces.reshape(-1, 3).tolist(), "source": source}
 
 
-def vehicle_from_mesh(path: Path, data: Mapping[str, Any], scale: float = 1.0) -> dict[str, Any]:
+def vehicle_from_mesh(path: Path, data: Mapping[str, Any], scale: float = 1.0) -> ImportedVehicle:
     """Return the data of a vehicle with the inertia, collision shape and appearance of a mesh.
 
     Args:
@@ -96,4 +111,4 @@ def vehicle_from_mesh(path: Path, data: Mapping[str, Any], scale: float = 1.0) -
         result.setdefault("inertia", {"value": ((inertia + inertia.T) / 2).tolist(), "unit": "kg.m2", "source": uniform})
     if is_vessel:
         result.setdefault("centre_of_mass", {"value": centre.tolist(), "unit": "m", "source": uniform})
-    return result
+    return ImportedVehicle(result, centre.tolist(), [])

@@ -26,6 +26,7 @@ from .physics.contacts import overlap_depths
 from .physics.failures import FLAG_COUNT
 from .physics.fixed_bodies import create_fixed_bodies
 from .physics.fleet import Fleet, FleetState
+from .plausibility import vehicle_warnings
 from .scene import replay
 from .variable_views import recorded_others, variable_views, views_in_parts
 from .world_settings import INITIAL_PREFIX, WAVE_PREFIX, WorldSettings
@@ -138,6 +139,9 @@ class World(Component):
             self._highest_water,
         )
         self._has_environment = bool(self._environment.update_functions)
+        for vehicle in settings.vehicles:
+            for warning in vehicle_warnings(vehicle.model):
+                component_log.log_message(self._name, component_log.WARNING, f"{vehicle.name}: {warning}")
         for name in self._environment.vessels_without_wave_motion:
             component_log.log_message(self._name, component_log.WARNING, f"the planar vessel {name} does not move with the waves")
         if self._environment.wind_is_without_effect:

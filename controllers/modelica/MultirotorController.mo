@@ -32,9 +32,9 @@ block MultirotorController "Holds a multirotor of any layout at a position: from
   parameter Real mass(unit = "kg") = 0.443892 "As the controller believes it";
   parameter Real inertia[3](each unit = "kg.m2") = {0.002835, 0.002821, 0.005131} "About the body axes";
   parameter Integer rotor_count(min = 3, max = 8) = 4;
-  parameter Real rotor_x[8](each unit = "m") = {0.1815, 0, -0.1815, 0, 0, 0, 0, 0} "Places ahead of the centre; they balance: sums of x, y,";
-  parameter Real rotor_y[8](each unit = "m") = {0, 0.1815, 0, -0.1815, 0, 0, 0, 0} "x y and of these times the sense are zero";
-  parameter Real rotor_sense[8](each unit = "1") = {1, -1, 1, -1, 0, 0, 0, 0} "In which the reaction of a rotor turns the body; 0: no rotor";
+  parameter Real rotor_x[8](each unit = "m") = {0.1815, 0, -0.1815, 0, 0, 0, 0, 0} "Places ahead of the centre; the sums of x, y, x y and of these times the sense are 0";
+  parameter Real rotor_y[8](each unit = "m") = {0, 0.1815, 0, -0.1815, 0, 0, 0, 0} "Places to port of the centre; balanced as rotor_x";
+  parameter Real rotor_sense[8](each unit = "1") = {1, -1, 1, -1, 0, 0, 0, 0} "1: turns clockwise seen from above, its reaction turns the body to port; -1: counter-clockwise; 0: no rotor";
   parameter Real thrust_coefficient(unit = "N.s2/rad2") = 8.24e-6 "Thrust of a rotor over its squared speed";
   parameter Real torque_coefficient(unit = "N.m.s2/rad2") = 2.38e-7 "Reaction torque of a rotor over its squared speed";
   parameter Real rotor_speed_max(unit = "rad/s") = 523.5988;

@@ -50,6 +50,13 @@ def print_log() -> list[str]:
     return collector.texts
 
 
+def collect_log() -> list[str]:
+    """Print no message of the logger "cosim" from now on; return the list that collects the texts of warnings and errors."""
+    collector = _WarningCollector()
+    logging.getLogger("cosim").handlers[:] = [collector]
+    return collector.texts
+
+
 def print_line(text: str) -> None:
     """Print a text that may contain foreign text as one line of standard output; line breaks in it are escaped."""
     click.echo(escape_control_characters(text, keep=SPACES))

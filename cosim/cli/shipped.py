@@ -1,4 +1,4 @@
-"""Lists of what cosim ships: scenarios, sweeps, vehicle models, roles of controllers and KPIs."""
+"""Lists of what cosim ships: scenarios, sweeps, vehicle models, controllers, roles of controllers and KPIs."""
 
 from __future__ import annotations
 
@@ -49,6 +49,24 @@ def _list_models() -> Iterator[Entry]:
             yield Entry(source.name, readme.read_text(encoding="utf-8").partition("\n")[0].lstrip("# "), str(readme))
 
 
+def shipped_fmus() -> dict[str, Path]:
+    """Return the shipped FMUs by name; of those with the same name the one for FMI 2.0."""
+    folders = ("fmus", "fmus/python", "fmus/c", "fmus/fmi3")
+    files = [path for folder in folders for path in sorted((resources.root() / folder).glob("*.fmu"))]
+    return {path.stem: path for path in reversed(files)}
+
+
+def _list_controllers() -> Iterator[Entry]:
+    """Yield the FMUs that are exported from `controllers/`, with the descriptions in them."""
+    from ..components.fmi import FmuFile
+    from ..export.sources import find_sources
+
+    folder, files = resources.root() / "controllers", shipped_fmus()
+    names = {source.name for source in find_sources(resources.root()) if folder in source.path.parents}
+    for name in sorted(names & files.keys()):
+        yield Entry(name, FmuFile(files[name]).description.description, str(files[name]))
+
+
 def _list_kpis() -> Iterator[Entry]:
     """Yield the public functions of the files from which shipped scenarios name KPIs, and the first lines of their docstrings."""
     for name, path in sorted(_kpi_files().items()):
@@ -79,6 +97,7 @@ CATALOGUE: Mapping[str, Callable[[], Iterator[Entry]]] = {
     "scenarios": lambda: _list_documents("scenarios/*.json"),
     "sweeps": lambda: _list_documents("scenarios/sweeps/*.json"),
     "models": _list_models,
+    "controllers": _list_controllers,
     "roles": lambda: _list_documents("scenarios/roles/*.json"),
     "kpis": _list_kpis,
 }

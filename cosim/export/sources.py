@@ -86,7 +86,12 @@ def _load_equations(path: Path, _model: str | None, _options: ModelicaOptions | 
 _VEHICLE_PROGRAM = "plant_src/vehicle_block.py"
 _URDF_READER = "plant_src/urdf.py:vehicle_from_urdf"
 _MESH_READER = "plant_src/mesh_import.py:vehicle_from_mesh"
+_VEHICLE_CHECK = "plant_src/plausibility.py:examine_vehicle"
 _VEHICLE_SCHEMA = "plant_src/vehicle_schema.py:vehicle_schema"
+
+
+#: data of a vehicle, its centre of mass in the frame of the imported file (m), and warnings
+ImportedVehicle = tuple[dict[str, Any], list[float], list[str]]
 
 
 def _load_vehicle(path: Path, _model: str | None, _options: ModelicaOptions | None) -> Block:
@@ -104,23 +109,26 @@ def vehicle_file_schema() -> dict[str, Any]:
     return create_schema()
 
 
-def vehicle_from_urdf(urdf: Path, data: Mapping[str, Any]) -> dict[str, Any]:
+def vehicle_from_urdf(urdf: Path, data: Mapping[str, Any]) -> ImportedVehicle:
     """Return the data of a vehicle with mass, inertia and collision shape of a URDF file.
 
     Args:
         urdf: URDF file.
         data: Further data of the vehicle; its rotors and thrusters may name links of the URDF file.
 
+    Returns:
+        Data, centre of mass in the root frame (m), and warnings.
+
     Raises:
         InputError: The URDF file cannot be read, or does not describe one rigid body.
     """
     from ..components.python_import import load_object
 
-    read: Callable[[Path, Mapping[str, Any]], dict[str, Any]] = load_object(_URDF_READER, resources.root())
+    read: Callable[[Path, Mapping[str, Any]], ImportedVehicle] = load_object(_URDF_READER, resources.root())
     return read(urdf, data)
 
 
-def vehicle_from_mesh(mesh: Path, data: Mapping[str, Any], scale: float) -> dict[str, Any]:
+def vehicle_from_mesh(mesh: Path, data: Mapping[str, Any], scale: float) -> ImportedVehicle:
     """Return the data of a vehicle with inertia, collision shape and appearance of a mesh.
 
     Args:
@@ -128,13 +136,31 @@ def vehicle_from_mesh(mesh: Path, data: Mapping[str, Any], scale: float) -> dict
         data: Further data of the vehicle, with its mass.
         scale: Factor on all coordinates.
 
+    Returns:
+        Data, centre of mass in the frame of the mesh (m), and warnings.
+
     Raises:
         InputError: The mesh cannot be read or encloses no volume, or the data have no mass.
     """
     from ..components.python_import import load_object
 
-    read: Callable[[Path, Mapping[str, Any], float], dict[str, Any]] = load_object(_MESH_READER, resources.root())
+    read: Callable[[Path, Mapping[str, Any], float], ImportedVehicle] = load_object(_MESH_READER, resources.root())
     return read(mesh, data, scale)
+
+
+def examine_vehicle(data: Mapping[str, Any], name: str) -> tuple[float, list[str]]:
+    """Read the data of a vehicle as a scenario does.
+
+    Returns:
+        Mass (kg), and warnings about probable mistakes.
+
+    Raises:
+        InputError: With all problems of the data; the subject of each begins with "arguments" and continues with the path.
+    """
+    from ..components.python_import import load_object
+
+    examine: Callable[[Mapping[str, Any], str], tuple[float, list[str]]] = load_object(_VEHICLE_CHECK, resources.root())
+    return examine(data, name)
 
 
 SOURCE_KINDS = (

@@ -1,6 +1,6 @@
 """Scenarios and nested systems that extend another one.
 
-- "extends" names a file, with or without ".json", or a shipped scenario.
+- "extends" names a file, with or without ".json", a file that cosim ships ("cosim:..."), or a shipped scenario.
 - Objects are merged key by key. Every other value replaces that of the base. `null` removes a key.
 - The lists `connections`, `kpis`, `figures` and `checks` of the base are changed by an object whose keys are the names of
   elements: `to`, `name`, `name` and `kpi`. New names are appended.
@@ -20,7 +20,7 @@ from ..core import paths
 from ..core.errors import InputError, Problem, did_you_mean
 from ..core.size_limits import MAX_LEVELS
 from .component_schema import SOURCES
-from .file_paths import change_paths, find_scenario, relocating, resolve_shipped_paths
+from .file_paths import change_paths, find_scenario, path_in, relocating, resolve_shipped_paths
 from .included_files import include_files
 from .json_document import Document, JsonPath, Origin, read_document
 from .schema import KEYED_LISTS, NOT_INHERITED
@@ -71,7 +71,7 @@ def _read_base(document: Document, name: Any, extending: tuple[Path, ...]) -> Do
     where = document.where(("extends",))
     if not isinstance(name, str):
         raise InputError([Problem("expected the path of a file or the name of a shipped scenario", where)])
-    near = document.file.parent / (name if name.endswith(".json") else f"{name}.json")
+    near = path_in(document.file.parent, name if name.endswith(".json") else f"{name}.json")
     try:
         file = near if paths.is_file(near) or name.endswith(".json") else find_scenario(name)
         if paths.resolve_path(file) in extending:

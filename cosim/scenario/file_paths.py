@@ -24,7 +24,7 @@ _PATH_KEYS, _PATH_LIST_KEYS, _REFERENCE_KEYS = ("fmu", "system", "file"), ("libr
 
 
 def find_scenario(scenario: str | Path) -> Path:
-    """Return the path of a scenario file that is given by its path or by the name of a shipped scenario.
+    """Return the path of a scenario file, given by its path with or without ".json", or by the name of a shipped scenario.
 
     Raises:
         InputError: There is neither such a file nor a shipped scenario of this name, or it is an FMU or a Python file.
@@ -37,16 +37,23 @@ def find_scenario(scenario: str | Path) -> Path:
     if path.suffix == ".json" or paths.is_file(path):
         return path
     names = resources.shipped_names("scenarios/*.json")
+    if str(scenario) not in names and paths.is_file(completed := path.with_name(f"{path.name}.json")):
+        return completed
     if str(scenario) not in names:
         raise InputError(f'no scenario file and no shipped scenario "{scenario}"{did_you_mean(str(scenario), names)}')
     return resources.root() / "scenarios" / f"{scenario}.json"
+
+
+def path_in(folder: Path, text: str) -> Path:
+    """Return the file that a path in a file of `folder` names; with "cosim:" it starts from the files that cosim ships."""
+    return resources.root() / text.removeprefix(SHIPPED) if text.startswith(SHIPPED) else folder / text
 
 
 def relocating(old_folder: Path, new_folder: Path | None) -> PathChange:
     """Return a function that changes paths relative to one folder into paths relative to another one; None: absolute paths."""
 
     def change(text: str) -> str:
-        path = resources.root() / text.removeprefix(SHIPPED) if text.startswith(SHIPPED) else old / text
+        path = path_in(old, text)
         stays_absolute = new is None or Path(text).is_absolute()
         changed = os.path.normpath(path) if stays_absolute else os.path.relpath(path, new)
         return changed.replace(os.sep, "/")

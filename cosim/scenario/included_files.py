@@ -1,7 +1,8 @@
 """Files that the arguments of components name, for example vehicle files and meshes.
 
-A text in "arguments" that ends in ".json" stands for the content of this file, and the name of an STL, OBJ or GLB file at the key
-"mesh" for its triangles (`mesh_files.py`). Paths start from the folder of the file that contains the text.
+A text in "arguments" of a component or of the scene that ends in ".json" stands for the content of this file, and the name of an
+STL, OBJ or GLB file at the key "mesh" for its triangles (`mesh_files.py`). Paths start from the folder of the file that contains
+the text.
 """
 
 from __future__ import annotations
@@ -20,21 +21,23 @@ SUFFIX = ".json"
 
 
 def include_files(document: Document) -> Document:
-    """Replace the names of JSON files in the arguments of all components by the contents of these files.
+    """Replace the names of JSON files in the arguments of all components and of the scene by the contents of these files.
 
     Problems of an included value name the file and line in which it was written. A file that cannot be read is a problem of the
     result.
     """
-    components = document.value.get("components") if isinstance(document.value, dict) else None
-    if not isinstance(components, dict):
-        return document
-    inclusion = _Inclusion(document)
-    included = {name: inclusion.include_in(name, component) for name, component in components.items()}
+    value = document.value if isinstance(document.value, dict) else {}
+    components, inclusion = value.get("components"), _Inclusion(document)
+    included: dict[str, Any] = {}
+    if isinstance(components, dict):
+        included["components"] = {name: inclusion.include_in(each, "components", name) for name, each in components.items()}
+    if "scene" in value:
+        included["scene"] = inclusion.include_in(value["scene"], "scene")
     if not (inclusion.files or inclusion.problems):
         return document
     return replace(
         document,
-        value={**document.value, "components": included},
+        value={**value, **included},
         problems=[*document.problems, *inclusion.problems],
         invalid_paths=[*document.invalid_paths, *inclusion.invalid_paths],
         origins={**document.origins, **inclusion.origins},
@@ -67,7 +70,9 @@ def include_in_setting(keys: Sequence[str], value: Any, folder: Path) -> tuple[A
         documents[path] = file
         return file.value
 
-    is_argument = len(keys) > 2 and keys[0] == "components" and keys[2] == "arguments"
+    is_argument = tuple(keys[:2]) == ("scene", "arguments") or (
+        len(keys) > 2 and (keys[0], keys[2]) == ("components", "arguments")
+    )
     return (_replace_names(value, (), read) if is_argument else value), files, documents
 
 
@@ -95,12 +100,11 @@ class _Inclusion:
         self.problems: list[Problem] = []
         self.invalid_paths: list[JsonPath] = []
 
-    def include_in(self, name: str, component: Any) -> Any:
-        """Return a component whose arguments contain the included files."""
-        if not isinstance(component, dict) or "arguments" not in component:
-            return component
-        path = ("components", name, "arguments")
-        return {**component, "arguments": _replace_names(component["arguments"], path, self._content)}
+    def include_in(self, value: Any, *path: str) -> Any:
+        """Return the component or scene at `path` with arguments that contain the included files."""
+        if not isinstance(value, dict) or "arguments" not in value:
+            return value
+        return {**value, "arguments": _replace_names(value["arguments"], (*path, "arguments"), self._content)}
 
     def _content(self, text: str, path: JsonPath) -> Any:
         try:

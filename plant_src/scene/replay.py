@@ -56,12 +56,12 @@ def world_scene(name: str, scenario: Mapping[str, Any], models: Mapping[str, Any
     }
 
 
-def free(scenario: Mapping[str, Any], vehicles: Mapping[str, str]) -> Scene:
+def free(scenario: Mapping[str, Any], vehicles: Mapping[str, Any]) -> Scene:
     """Return the scene of a scenario with plant FMUs instead of a world.
 
     Args:
         scenario: Scenario as a JSON object.
-        vehicles: Vehicle of the catalogue by component ({"quadcopter": "ar_drone"}).
+        vehicles: Vehicle of the catalogue, or data of a vehicle, by component ({"quadcopter": "ar_drone"}).
 
     Returns:
         Scene description.

@@ -328,6 +328,10 @@ def test_info_prints_properties_and_variables(probe):
     assert "Co-Simulation" in done.stdout
     assert "y_start" in done.stdout
     assert cosim("info", "missing.fmu").returncode == 2
+    named = cosim("info", "multirotor_controller").stdout
+    assert named == cosim("info", "cosim:fmus/multirotor_controller.fmu").stdout
+    assert "model         multirotor_controller" in named
+    assert 'did you mean "multirotor_controller"?' in cosim("info", "multirotor_controler").stderr
 
 
 def test_openmodelica_requires_a_source_and_a_target(tmp_path):

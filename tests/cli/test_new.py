@@ -208,8 +208,8 @@ def test_files_are_overwritten_only_with_force(tmp_path):
 @pytest.mark.parametrize(
     ("name", "language", "message"),
     [
-        ("keeper", "pyton", 'there is no language "pyton"; did you mean "python"?'),
-        ("keeper", "ada", 'there is no language "ada"; valid: python, modelica, c'),
+        ("keeper", "pyton", 'there is no template for the language "pyton"; did you mean "python"?'),
+        ("keeper", "ada", 'there is no template for the language "ada"; valid: python, modelica, c'),
         (
             "my-keeper",
             "c",

@@ -46,7 +46,9 @@ def catamaran(folder: Path, suffix: str, scale: float = 1.0) -> Path:
 
 @pytest.mark.parametrize("suffix", ["stl", "obj", "glb"])
 def test_a_mesh_gives_inertia_pieces_and_appearance(tmp_path: Path, suffix: str) -> None:
-    data = vehicle_from_mesh(catamaran(tmp_path, suffix, 1000.0), without(OTTER, "inertia", "boxes", "centre_of_mass"), 0.001)
+    data = vehicle_from_mesh(
+        catamaran(tmp_path, suffix, 1000.0), without(OTTER, "inertia", "boxes", "centre_of_mass"), 0.001
+    ).data
     volumes, places = np.array([0.1725, 0.1725, 0.024]), np.array([[0, -0.395, 0.07], [0, 0.395, 0.07], [0, 0, 0.39]])
     edges = np.array([[2, 0.25, 0.345], [2, 0.25, 0.345], [1.2, 1, 0.02]])
     centre = volumes @ places / volumes.sum()
@@ -71,7 +73,7 @@ def test_a_vehicle_stands_on_its_convex_pieces(tmp_path: Path) -> None:
     """A cone on its base: the box around it would stand as high, but a wall beside its tip meets the box only."""
     mesh = trimesh.creation.cone(0.3, 0.6)
     mesh.export(tmp_path / "cone.stl")
-    data = vehicle_from_mesh(tmp_path / "cone.stl", without(QUADCOPTER, "inertia", "boxes"))
+    data = vehicle_from_mesh(tmp_path / "cone.stl", without(QUADCOPTER, "inertia", "boxes")).data
     start = {"uav": {"model": data, "position": [0, 0, 0.2]}}
     wall = {"size": [0.1, 1, 0.1], "position": [0.25, 0, 0.55]}
     trial = WorldHarness(start, {"ground": {"size": [4, 4, 0.1], "position": [0, 0, -0.05]}, "wall": wall})
@@ -100,7 +102,7 @@ def test_meshes_of_a_urdf_file_collide_and_are_shown(tmp_path: Path) -> None:
     )
     parts = without(OTTER, "mass", "inertia", "centre_of_mass", "boxes")
     parts["propellers"] = [{"link": "port"}]
-    data = vehicle_from_urdf(tmp_path / "boat.urdf", parts)
+    data = vehicle_from_urdf(tmp_path / "boat.urdf", parts).data
     assert data["centre_of_mass"]["value"] == [0, 0, 0.1]
     assert data["propellers"][0]["position"] == pytest.approx([-0.9, 0.395, -0.1])
     assert np.array(data["boxes"][0]["points"])[:, 0].max() == pytest.approx(1.1)
@@ -111,7 +113,7 @@ def test_meshes_of_a_urdf_file_collide_and_are_shown(tmp_path: Path) -> None:
 
 
 def test_faults_are_named(tmp_path: Path) -> None:
-    with pytest.raises(InputError, match=r"missing\.stl: cannot be read"):
+    with pytest.raises(InputError, match=r"missing\.stl: the file does not exist"):
         vehicle_from_mesh(tmp_path / "missing.stl", QUADCOPTER)
     file = catamaran(tmp_path, "stl")
     with pytest.raises(InputError, match='"mass" is missing in the accompanying file'):

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from click.testing import CliRunner
+from click.testing import CliRunner, Result
 from scipy.spatial.transform import Rotation
 from world_harness import WorldHarness
 
@@ -45,7 +45,7 @@ def robot(body: str = BODY, shape: str = '<cylinder radius="0.01" length="0.04"/
 
 def imported(folder: Path, text: str, data: dict[str, Any] = DATA) -> dict[str, Any]:
     (file := folder / "quad.urdf").write_text(text)
-    return vehicle_from_urdf(file, data)
+    return vehicle_from_urdf(file, data).data
 
 
 def test_mass_and_inertia_are_those_of_all_links(tmp_path: Path) -> None:
@@ -90,35 +90,99 @@ def test_the_vehicle_hovers(tmp_path: Path) -> None:
 
 
 FAULTS = [
-    ("<robot", "cannot be read"),
-    (robot(shape='<capsule radius="1"/>'), 'link "front_left": found the collision geometry capsule, expected box'),
-    (robot(BODY.replace('<mass value="0.8"/>', "")), 'link "base": <inertial> needs <mass>'),
+    ("<robot", "cannot be read as XML"),
+    ("<xml/>", ":1: found <xml>, expected <robot>"),
+    ("<robot>\n<xacro:include/></robot>", ":2: found <xacro:include>; expand the file with xacro first"),
+    (robot(shape='<capsule radius="1"/>'), ':3: link "front_left", capsule: found the geometry capsule, expected box'),
+    (robot(shape='<mesh filename="arm.stl"/>'), ':3: link "front_left", mesh: .*arm.stl: the file does not exist'),
+    (robot(shape='<sphere radius="0"/>'), ':3: link "front_left", sphere: found the edges .* expected all greater than 0'),
+    (robot(BODY.replace('<mass value="0.8"/>', "")), ':1: link "base", inertial: <mass> is missing'),
+    (robot(BODY.replace('value="0.8"', 'value="0,8"')), ":1: link \"base\", mass: found '0,8', expected a number$"),
+    (robot(BODY.replace('value="0.8"', 'value="${m}"')), r"mass: found '\${m}', expected a number; expand it with xacro first"),
+    (robot(BODY.replace('value="0.8"', 'value="-0.8"')), ':1: link "base", mass: found -0.8, expected at least 0'),
+    (robot(BODY.replace('iyy="0.005"', "")), ':2: link "base", inertia: "iyy" is missing'),
+    (robot(BODY.replace('izz="0.008"', 'izz="0.08"')), r':2: link "base", inertia: found the principal moments \['),
     (
-        robot().replace('<parent link="base"/><child link="rear_left"/>', '<parent link="x"/><child link="rear_left"/>'),
-        "no joints connect",
+        robot().replace('<link name="rear_left">', '<link name="front_left">'),
+        '"front_left": the name is used twice, first in line 3',
     ),
+    (robot().replace('name="to_rear_left"', 'name="to_front_left"'), 'joint "to_front_left": the name is used twice'),
+    (robot().replace('"base"/><child link="rear_left"', '"bas"/><child link="rear_left"'), 'no link "bas"; did you mean "base"'),
+    (robot().replace('<child link="rear_left"', '<child link="front_left"'), 'is the child of the joint "to_front_left" too'),
     ("<robot name='x'><link name='a'/><link name='b'/></robot>", r"found the root links \['a', 'b'\], expected one"),
     ("<robot name='x'><link name='a'/></robot>", "found the mass 0"),
 ]
 
 
 @pytest.mark.parametrize(("text", "message"), FAULTS)
-def test_what_is_no_rigid_body_is_refused(tmp_path: Path, text: str, message: str) -> None:
-    with pytest.raises(InputError, match=message):
+def test_a_fault_names_file_line_and_link(tmp_path: Path, text: str, message: str) -> None:
+    with pytest.raises(InputError, match=f"quad.urdf.*{message}"):
         imported(tmp_path, text)
 
 
-def test_an_unknown_link_is_refused_with_the_nearest_name(tmp_path: Path) -> None:
-    data = {**DATA, "rotors": [{"link": "front_lft", "turns": "clockwise"}]}
-    with pytest.raises(InputError, match='rotors: no link "front_lft"; did you mean "front_left"'):
-        imported(tmp_path, robot(), data)
+def test_a_mesh_of_another_format_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "arm.dae").touch()
+    with pytest.raises(InputError, match=r'link "front_left", mesh: .* the format ".dae" is not read; .* STL, OBJ, GLB, PLY'):
+        imported(tmp_path, robot(shape='<mesh filename="arm.dae"/>'))
+
+
+def test_a_link_without_mass_is_a_warning(tmp_path: Path) -> None:
+    (file := tmp_path / "quad.urdf").write_text(robot(re.sub("<inertial>.*</inertial>", "", BODY, flags=re.DOTALL)))
+    assert vehicle_from_urdf(file, DATA).warnings == [f'{file}:1: link "base" has a shape but no <inertial>: its mass is 0']
+
+
+def test_primitive_visual_shapes_are_drawn(tmp_path: Path) -> None:
+    """The volume inside the triangles (divergence theorem) is that of the shape: its faces point outwards."""
+    shapes = '<box size="1 2 3"/>', '<cylinder radius="0.5" length="2"/>', '<sphere radius="0.5"/>'
+    exact = 6.0, np.pi / 2, np.pi / 6
+    for shape, volume in zip(shapes, exact, strict=True):
+        visual = f"<visual><origin xyz='0 0 7'/><geometry>{shape}</geometry></visual><collision>"
+        mesh = imported(tmp_path, robot(BODY.replace("<collision>", visual)))["visual"]
+        a, b, c = np.moveaxis(np.array(mesh["vertices"])[np.array(mesh["faces"])], 1, 0)
+        assert np.einsum("ij,ij", a, np.cross(b, c)) / 6 == pytest.approx(volume, rel=0.04)
+        assert np.mean(mesh["vertices"], axis=0) == pytest.approx([0, 0, 7 - 0.022], abs=1e-6)
+
+
+LINK_FAULTS: list[tuple[dict[str, Any], str]] = [
+    ({"link": "rear_lft"}, r'rotors\[1\].link: no link "rear_lft"; did you mean "rear_left"'),
+    ({"link": "front_left"}, r'rotors\[1\].link: found the link "front_left" of rotors\[0\] again'),
+    ({"position": [0, 0, 0]}, r'rotors\[1\].position: found "link" and "position", expected one of them'),
+]
+
+
+@pytest.mark.parametrize(("change", "message"), LINK_FAULTS)
+def test_a_fault_of_a_rotor_names_the_accompanying_file(tmp_path: Path, change: dict[str, Any], message: str) -> None:
+    data = json.loads(EXAMPLE)
+    data["rotors"][1] |= change
+    outcome = new_vehicle(tmp_path, robot(), data)
+    assert re.search(rf"parts.json:1:\d+: \$.{message}", str(outcome.exception))
+    assert not (tmp_path / "my_quad.json").exists()
+
+
+def test_what_a_scenario_refuses_is_not_written(tmp_path: Path) -> None:
+    """Links without --urdf, a missing family, rotors that push downwards."""
+    (tmp_path / "parts.json").write_text(EXAMPLE)
+    arguments = ["my_quad", "--from", str(tmp_path / "parts.json"), "--directory", str(tmp_path)]
+    outcome = CliRunner().invoke(command, arguments)
+    assert "rotors[0].link: found the link 'front_left': `cosim new vehicle --urdf FILE` replaces it" in str(outcome.exception)
+    outcome = new_vehicle(tmp_path, robot(), {key: value for key, value in DATA.items() if key != "family"})
+    assert 'parts.json:1:1: $.family: "family" is missing, expected one of: multirotor' in str(outcome.exception)
+    outcome = new_vehicle(tmp_path, robot().replace('rpy="0.1 ', 'rpy="3.1 '), DATA)
+    assert "it cannot fly: the thrust of all rotors at full speed is -32.37 N" in str(outcome.exception)
+    assert not (tmp_path / "my_quad.json").exists()
+
+
+def new_vehicle(folder: Path, text: str, data: dict[str, Any]) -> Result:
+    """Run `cosim new vehicle my_quad --from parts.json --urdf quad.urdf`."""
+    (folder / "quad.urdf").write_text(text)
+    (folder / "parts.json").write_text(json.dumps(data))
+    arguments = ["my_quad", "--from", str(folder / "parts.json"), "--urdf", str(folder / "quad.urdf")]
+    return CliRunner().invoke(command, [*arguments, "--directory", str(folder)])
 
 
 def test_the_command_writes_the_vehicle_file(tmp_path: Path) -> None:
-    (tmp_path / "quad.urdf").write_text(robot())
-    (tmp_path / "parts.json").write_text(json.dumps(DATA))
-    arguments = ["my_quad", "--from", str(tmp_path / "parts.json"), "--urdf", str(tmp_path / "quad.urdf")]
-    outcome = CliRunner().invoke(command, [*arguments, "--directory", str(tmp_path)])
+    outcome = new_vehicle(tmp_path, robot(), DATA)
     assert outcome.exit_code == 0, outcome.output
+    assert "my_quad.json: mass 1 kg, centre of mass [0, 0, 0.022] m in quad.urdf" in outcome.output
     written = json.loads((tmp_path / "my_quad.json").read_text())
     assert model_from_data(written, "my_quad").body.mass == pytest.approx(1.0)

@@ -97,3 +97,13 @@ def test_a_problem_in_a_file_that_a_setting_names_has_its_line(tmp_path: Path) -
     with pytest.raises(InputError) as refusal:
         load("demo1_box", {pointer: str(boat)})
     assert str(refusal.value) == f'setting "{pointer}": {boat}:1:1: $: "hull" is missing'
+
+
+def test_the_scene_includes_files(tmp_path: Path) -> None:
+    (tmp_path / "boat.json").write_text('{"mass": 1}')
+    scene = {"python": "cosim:plant_src/scene/replay.py:free", "arguments": {"vehicles": {"usv": "boat.json"}}}
+    loaded = load_scenario(scenario(tmp_path, {}, scene=scene))
+    assert loaded.spec.scene is not None
+    assert loaded.spec.scene.arguments == {"vehicles": {"usv": {"mass": 1}}}
+    scene["arguments"] = {"vehicles": {"usv": "ship.json"}}
+    assert 'ship.json"' in str(load_scenario(scenario(tmp_path, {}, scene=scene)).problems[0])

@@ -38,3 +38,14 @@ def test_dictionaries_and_settings_name_shipped_files():
 def test_shipped_files_that_do_not_exist_are_refused():
     with pytest.raises(cosim.InputError, match=r'fmus/strder.fmu" does not exist'):
         cosim.run(document(vessel={"fmu": "cosim:fmus/strder.fmu"}))
+
+
+def test_a_shipped_nested_system_is_extended(tmp_path, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    changed = {"altitude": {"fmu": "cosim:fmus/altitude_controller.fmu", "parameters": {"altitude_P": 100.0}}}
+    system = {"extends": "cosim:scenarios/systems/ar_drone_cascaded.json", "components": changed}
+    (tmp_path / "control.json").write_text(json.dumps(system))
+    scenario = {"extends": "demo1_box", "name": "own", "components": {"uav": {"system": "control.json"}}, "stop_time": 0.1}
+    (tmp_path / "own.json").write_text(json.dumps(scenario))
+    with cosim.load("own") as simulation:  # a file of the working directory, without ".json"
+        assert simulation.get("uav.altitude.altitude_P") == 100.0

@@ -12,7 +12,7 @@ from ...core.system import Group, Stage
 from ...core.text import count_noun
 from .. import strict_sandbox, supervision
 from ..completion import complete_scenario
-from ..messages import print_json
+from ..messages import collect_log, print_json
 from ..output_options import json_option
 
 if TYPE_CHECKING:
@@ -49,10 +49,10 @@ def command(
     """
     from ...scenario import load
     from ...scenario.nested_systems import load_scenario
-    from ...scenario.plausibility import find_warnings
     from ...scenario.settings import parse_settings
 
     fmu_isolation: Literal["fmu", "none"] = "fmu" if isolation == "fmu" else "none"
+    logged = collect_log()
     prepared = load(scenario, parse_settings(settings), isolation=fmu_isolation, sandbox=bool(sandbox))
     try:
         if problems := prepared.figure_problems():
@@ -61,7 +61,7 @@ def command(
             print_json(load_scenario(scenario, parse_settings(settings)).expanded())
             return
         if as_json:
-            print_json(_describe(prepared, find_warnings(prepared)))
+            print_json(_describe(prepared, _warnings(prepared, logged)))
             return
         _print_components(prepared)
         _print_processes(prepared, isolation, sandbox)
@@ -70,9 +70,16 @@ def command(
             _print_connections(prepared)
             _print_unconnected_inputs(prepared)
         _print_recommendation(prepared)
-        _print_verdict(prepared, find_warnings(prepared))
+        _print_verdict(prepared, _warnings(prepared, logged))
     finally:
         prepared.free()
+
+
+def _warnings(prepared: PreparedRun, logged: Sequence[str]) -> list[Problem]:
+    """Return the warnings about a scenario, and those that its components have logged while they were made."""
+    from ...scenario.plausibility import find_warnings
+
+    return [*find_warnings(prepared), *(Problem(text.removeprefix("WARNING ")) for text in logged)]
 
 
 def _describe(prepared: PreparedRun, warnings: Sequence[Problem]) -> dict[str, Any]:

@@ -8,11 +8,15 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
+from ...core import resources
 from ...core.component import Variable
+from ...core.errors import InputError, did_you_mean
 from ...core.text import shorten
+from ...scenario.file_paths import SHIPPED
 from .. import current_command_line
 from ..messages import print_json, print_line
 from ..output_options import json_option
+from ..shipped import shipped_fmus
 
 if TYPE_CHECKING:
     from ...components.fmi import FmuFile
@@ -44,17 +48,20 @@ _USED_CAPABILITIES = {
 
 
 @click.command()
-@click.argument("fmu", type=click.Path(path_type=Path))
+@click.argument("fmu")
 @click.option("--locals", "with_locals", is_flag=True, help="Also list local variables.")
 @json_option(
     "an object with properties and variables, a list of name, type, causality, variability, unit, shape, start, minimum, "
     "maximum, items and description"
 )
-def command(fmu: Path, with_locals: bool, as_json: bool) -> None:
-    """Print the properties and variables of FMU: version, capabilities, platforms, inputs, outputs and parameters."""
+def command(fmu: str, with_locals: bool, as_json: bool) -> None:
+    """Print the properties and variables of FMU: version, capabilities, platforms, inputs, outputs and parameters.
+
+    FMU is a file, the name of a shipped FMU such as multirotor_controller, or its path as in scenarios ("cosim:fmus/...").
+    """
     from ...components.fmi import FmuFile
 
-    file = FmuFile(fmu)
+    file = FmuFile(_find_fmu(fmu))
     groups = ["input", "output", "structuralParameter", "parameter", "calculatedParameter", *(["local"] if with_locals else [])]
     variables = {kind: [v for v in file.description.variables if v.causality == kind] for kind in groups}
     properties = {name: value for name, value in _properties(file).items() if value}
@@ -66,6 +73,18 @@ def command(fmu: Path, with_locals: bool, as_json: bool) -> None:
         print_line(f"{name:13} {value}")
     for causality, group in variables.items():
         _print_variables(causality, group)
+
+
+def _find_fmu(fmu: str) -> Path:
+    """Return the path of an FMU that is given by its path, or by the name or path of a shipped FMU."""
+    if fmu.startswith(SHIPPED):
+        return resources.root() / fmu.removeprefix(SHIPPED)
+    path, files = Path(fmu), shipped_fmus()
+    if path.suffix or path.exists():
+        return path
+    if fmu not in files:
+        raise InputError(f'no FMU file and no shipped FMU "{fmu}"{did_you_mean(fmu, files)}')
+    return files[fmu]
 
 
 def _properties(file: FmuFile) -> dict[str, str]:

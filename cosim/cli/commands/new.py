@@ -107,7 +107,7 @@ def controller(name: str, language: str | None, role: str, library: bool, direct
         raise click.UsageError(f"Missing option '--language': {', '.join(LANGUAGES)}")
     for kind, chosen, known in (("language", language, LANGUAGES), ("role", role, ROLES)):
         if chosen not in known:
-            raise InputError(f'there is no {kind} "{chosen}"{did_you_mean(chosen, known)}')
+            raise InputError(f'there is no template for the {kind} "{chosen}"{did_you_mean(chosen, known)}')
     if library and language != "modelica":
         raise InputError(f"--library needs --language modelica, found --language {language}")
     role = LIBRARY_ROLE if library else role

@@ -5,15 +5,15 @@ from __future__ import annotations
 import json
 import re
 import shlex
-import shutil
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 import click
 
 from ...core import resources
 from ...core.errors import InputError, Problem, did_you_mean
-from ...core.json_values import parse_object
+from ...scenario.json_document import Document, read_document
 
 
 @click.command()
@@ -43,22 +43,59 @@ def command(name: str, base: str, directory: Path, urdf: Path | None, mesh: Path
     """
     if not re.fullmatch(r"[A-Za-z_]\w*", name):
         raise InputError(f'"{name}" is not a name of a vehicle: expected letters, digits and "_"')
-    file, source = directory / f"{name}.json", _find_vehicle(base)
+    file, source = directory / f"{name}.json", read_document(_find_vehicle(base))
     if file.exists() and not force:
         raise InputError([Problem("exists; --force overwrites it", str(file))])
+    vehicle = _vehicle(source, name, urdf, mesh, mesh_scale)
     directory.mkdir(parents=True, exist_ok=True)
-    if urdf or mesh:
-        from ...export.sources import vehicle_from_mesh, vehicle_from_urdf
-
-        data = parse_object(source.read_text(encoding="utf-8"))
-        data = vehicle_from_urdf(urdf, data) if urdf else data
-        data = vehicle_from_mesh(mesh, data, mesh_scale) if mesh else data
-        file.write_text(json.dumps(data, indent=4) + "\n", encoding="utf-8")
-    else:
-        shutil.copyfile(source, file)
-    family = parse_object(file.read_text(encoding="utf-8")).get("family")
+    text = json.dumps(vehicle.data, indent=4) + "\n" if urdf or mesh else source.text
+    file.write_text(text, encoding="utf-8")
+    for warning in vehicle.warnings:
+        click.echo(f"WARNING {warning}", err=True)
     build = shlex.join(["cosim", "build", str(file), "--output", str(file.with_suffix(".fmu"))])
-    click.echo(f"{file}\n\n{_use(file, base, family)}As an FMU:\n  {build}")
+    click.echo(f"{file}: {vehicle.balance}\n\n{_use(file, base, vehicle.data['family'])}As an FMU:\n  {build}")
+
+
+class _Vehicle(NamedTuple):
+    """Data of a vehicle; mass and centre of mass in words; warnings about probable mistakes."""
+
+    data: Mapping[str, Any]
+    balance: str
+    warnings: Sequence[str]
+
+
+def _vehicle(source: Document, name: str, urdf: Path | None, mesh: Path | None, mesh_scale: float) -> _Vehicle:
+    """Return the data of a vehicle file with those of a URDF file or mesh.
+
+    Raises:
+        InputError: A scenario would refuse the data; each problem names the file and the place in it.
+    """
+    from ...export.sources import examine_vehicle, vehicle_from_mesh, vehicle_from_urdf
+
+    if source.problems or not isinstance(source.value, dict):
+        raise InputError(source.problems or [Problem("expected a JSON object with the data of a vehicle", str(source.file))])
+    data, balance, warnings = source.value, "", list[str]()
+    try:
+        for file in filter(None, (urdf, mesh)):
+            read = vehicle_from_urdf(file, data) if file is urdf else vehicle_from_mesh(file, data, mesh_scale)
+            data, warnings = read[0], [*warnings, *read[2]]
+            centre = ", ".join(f"{round(coordinate, 9) + 0.0:.4g}" for coordinate in read[1])
+            balance += f", centre of mass [{centre}] m in {file.name}"
+        mass, found = examine_vehicle(data, name)
+    except InputError as error:
+        imported = {} if data is source.value else dict.fromkeys(data.keys() - source.value.keys(), urdf or mesh)
+        raise InputError([_located(problem, source, imported) for problem in error.problems]) from None
+    return _Vehicle(data, f"mass {mass:.4g} kg{balance}", [*warnings, *found])
+
+
+def _located(problem: Problem, source: Document, imported: Mapping[str, Path | None]) -> Problem:
+    """Return a problem of the data with its place in the vehicle file, or with the file from which its key was imported."""
+    path = problem.subject[1:]
+    if problem.subject[:1] != ("arguments",):
+        return problem
+    if path and path[0] in imported:
+        return Problem(problem.message, f"{imported[path[0]]}: {'.'.join(path)}")
+    return Problem(problem.message, source.where(path))
 
 
 def _use(file: Path, base: str, family: Any) -> str:
@@ -80,6 +117,8 @@ def _find_vehicle(base: str) -> Path:
         if not (path := Path(base)).is_file():
             raise InputError(f'file "{base}" does not exist')
         return path
+    if Path(base).is_file():
+        raise InputError(Problem("expected a vehicle file (.json); --urdf and --mesh read other files", base))
     files = vehicle_files(resources.root())
     if base not in files:
         raise InputError(f'no vehicle file and no shipped vehicle "{base}"{did_you_mean(base, files)}')

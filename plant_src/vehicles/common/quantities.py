@@ -12,7 +12,7 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from cosim.core.units import Unit, parse_unit
+from cosim.core.units import KNOWN_UNITS, Unit, parse_unit
 
 from ...json_reader import JsonPath, JsonReader, Numbers
 
@@ -56,10 +56,10 @@ class QuantityReader(JsonReader):
         try:
             found = parse_unit(name)
         except (TypeError, ValueError, AttributeError):
-            self.add_problem(path, f"found {name!r}, expected a unit such as {expected.name!r}")
+            self.add_problem(path, f"found {name!r}, expected a unit such as {_offered(expected)}")
             return 1.0
         if found.exponents != expected.exponents or found.offset != expected.offset:
-            self.add_problem(path, f"found {name!r}, expected a unit that converts to {expected.name!r}")
+            self.add_problem(path, f"found {name!r}, expected a unit that converts to {_offered(expected)}")
             return 1.0
         return found.factor / expected.factor
 
@@ -76,6 +76,12 @@ class QuantityReader(JsonReader):
     def vector_quantity(self, value: Any, path: JsonPath, unit: str, axes: Sequence[str]) -> Numbers:
         """Read a list of one quantity for each of `axes` (in SI units)."""
         return self.vector(self.si_value(value, path, unit), path, axes)
+
+
+def _offered(unit: Unit) -> str:
+    """Return the name of a unit, and those of the other known units of the same quantity."""
+    others = [name for name, known in KNOWN_UNITS.items() if known.exponents == unit.exponents and name != unit.name]
+    return ", ".join(map(repr, (unit.name, *others)))
 
 
 def _scaled(value: Any, factor: float) -> Any:

@@ -118,6 +118,11 @@ class Airframe:
         x, y, z = hubs.mean(axis=0).tolist()
         return (x, y, z), float(np.hypot(hubs[:, 0] - x, hubs[:, 1] - y).max()) + self.rotor_radius
 
+    @property
+    def lift(self) -> float:
+        """Sum of the thrusts of all rotors at full speed along z (N, body frame)."""
+        return self.max_rotor_speed**2 * sum(rotor.thrust_coefficient * rotor.axis[2] for rotor in self.rotors)
+
     def _problem(self, text: str, *subject: str) -> Problem:
         return Problem(text, f"airframe {self.name}: {'.'.join(subject)}", subject)
 

@@ -105,10 +105,16 @@ def _rotor_parameters(airframe: Airframe, slots: int) -> Iterator[Variable]:
     thrust = [rotor.thrust_coefficient for rotor in rotors]
     yield _rotor_array("thrust_coefficient", "N.s2/rad2", "thrust over squared speed", thrust, slots)
     torque = [rotor.torque_sign * rotor.torque_coefficient for rotor in rotors]
-    text = "reaction torque on the body about the axis over squared speed"
+    text = "signed reaction torque on the body about the axis over squared speed; this sign counts for the torque"
     yield _rotor_array("torque_coefficient", "N.m.s2/rad2", text, torque, slots)
     signs = [rotor.torque_sign for rotor in rotors]
-    yield _rotor_array("torque_sign", "1", "sign of the reaction torque; the rotor turns the other way", signs, slots)
+    yield _rotor_array(
+        "torque_sign",
+        "1",
+        "1: clockwise seen from the tip of the axis, -1: counter-clockwise; counts for rotor inertia only",
+        signs,
+        slots,
+    )
     yield _parameter("max_rotor_speed", "rad/s", "upper limit of the rotor speeds", airframe.max_rotor_speed)
     yield _parameter("rotor_radius", "m", "radius of the rotors", airframe.rotor_radius)
 

@@ -83,24 +83,22 @@ class _MultirotorReader(VehicleReader):
         }
         boxes = self.read_boxes(data)
         values["hull"] = self.read_hull(data, boxes, values["mass"])
-        self.check_lift(values)
         crash_speed = self.quantity(data.get("crash_speed", 1.0), ("crash_speed",), "m/s", above=0.0)
         if self.problems:
             return None
-        try:
-            return MultirotorData(Airframe(name, **values), boxes, crash_speed)
-        except InputError as error:
-            for problem in error.problems:
-                self.add_problem(problem.subject, problem.message)
+        airframe = self.construct(lambda: Airframe(name, **values))
+        if airframe is None:
             return None
+        self.check_lift(airframe)
+        return MultirotorData(airframe, boxes, crash_speed)
 
-    def check_lift(self, values: Mapping[str, Any]) -> None:
-        """Report a multirotor that cannot fly: the thrust of all rotors at full speed is less than its weight."""
-        thrust = values["max_rotor_speed"] ** 2 * sum(rotor.thrust_coefficient for rotor in values["rotors"])
-        weight = values["mass"] * values["gravity"]
-        if not self.problems and thrust < weight:
-            text = f"it cannot fly: the thrust of all rotors at full speed is {thrust:.4g} N, its weight {weight:.4g} N"
-            self.add_problem(("rotor", "max_speed"), text)
+    def check_lift(self, airframe: Airframe) -> None:
+        """Report a multirotor that cannot fly: the thrust of all rotors at full speed along z is less than its weight."""
+        weight = airframe.mass * airframe.gravity
+        if airframe.lift < weight:
+            path = ("rotors", "0", "axis") if airframe.lift < 0 else ("rotor", "max_speed")
+            thrust = f"the thrust of all rotors at full speed is {airframe.lift:.4g} N along z"
+            self.add_problem(path, f"it cannot fly: {thrust}, its weight {weight:.4g} N")
 
     def read_hull(self, data: Mapping[str, Any], boxes: Sequence[Collision], mass: float) -> Hull:
         """Read what water acts on: the box around all boxes, the displaced volume and the drag coefficient."""

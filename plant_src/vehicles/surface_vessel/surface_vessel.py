@@ -13,6 +13,7 @@ from cosim.core.errors import Problem
 from ..common.inertia import inertia_problems
 from ..common.shapes import Body, Shape
 from ..vessel.boat import Boat
+from .equilibrium import rest
 
 
 @dataclass(frozen=True)
@@ -103,9 +104,21 @@ class SurfaceVessel(Boat):
             heights = ", ".join(f"{height:.4g}" for height in self.metacentric_heights)
             text = f"the vessel is not stable: its metacentric heights (transverse, longitudinal) are {heights} m, expected > 0"
             yield self.problem(text, "hull")
-        elif abs(trim := (self.centre_of_mass[0] - self.hull.waterplane_centre) / self.metacentric_heights[1]) > math.radians(20):
-            text = f"found {self.centre_of_mass[0]:g} m ahead of O: the vessel trims by {math.degrees(trim):.3g} degrees"
+        elif text := self._imbalance():
             yield self.problem(text, "centre_of_mass")
+
+    def _imbalance(self) -> str:
+        """Return why the vessel does not rest with its deck above the water; "" if it does."""
+        x, y, _ = self.centre_of_mass
+        if x == self.hull.waterplane_centre and y == 0:
+            return ""
+        found = f"found {x - self.hull.waterplane_centre:g} m ahead of the centre of the waterplane and {y:g} m to port"
+        if (attitude := rest(self)) is None:
+            return f"{found}: the vessel capsizes"
+        if attitude.freeboard > 0:
+            return ""
+        heel, trim = math.degrees(attitude.heel), math.degrees(attitude.trim)
+        return f"{found}: at rest it heels by {heel:.3g} and trims by {trim:.3g} degrees, a deck edge is under water"
 
     def body(self, boxes: tuple[Shape, ...]) -> Body:
         """Return the rigid body for Bullet, whose frame has its origin in O; products of inertia have no influence on contact."""

@@ -75,7 +75,14 @@ def test_the_collision_shape_turns_with_yaw() -> None:
 
 FAULTS: list[tuple[Callable[[dict[str, Any]], Any], str]] = [
     (lambda d: d.update(mass=0), r"uav\.model\.mass: found 0, expected a number greater than 0"),
-    (lambda d: d.update(mass={"value": 1, "unit": "m"}), r"model\.mass\.unit: found 'm', expected a unit that converts to 'kg'"),
+    (
+        lambda d: d.update(mass={"value": 1, "unit": "m"}),
+        r"model\.mass\.unit: found 'm', expected a unit that converts to 'kg', 'g'$",
+    ),
+    (
+        lambda d: d["rotor"].update(max_speed={"value": 5000, "unit": "1/min"}),
+        r"max_speed\.unit: found '1/min', expected a unit that converts to 'rad/s', 'rpm'",
+    ),
     (lambda d: d.update(mass={"value": 1, "unit": 3}), r"model\.mass\.unit: found 3, expected a unit such as 'kg'"),
     (lambda d: d.pop("inertia"), r'model: "inertia" is missing'),
     (lambda d: d.update(inertia=[1, 1, 3]), r"model\.inertia: .* expected none greater than the sum of the other two"),
