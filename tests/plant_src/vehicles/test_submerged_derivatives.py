@@ -52,14 +52,14 @@ CRAFT = Craft(
 )
 
 
-def test_derivatives_equal_those_of_numpy_at_random_states(measured: MeasurementCheck) -> None:
+def test_derivatives_equal_those_of_numpy_at_1000_random_states(measured: MeasurementCheck) -> None:
     equations = SubmergedEquations(CRAFT, MAX_THRUSTERS)
     starts = [v.start for v in variables(CRAFT) if v.causality == "parameter"]
     constants = ca.DM(equations.constants.vector(ca.SX(np.concatenate([np.ravel(start) for start in starts]))))
     symbols = [ca.SX.sym("", size) for size in (13 + MAX_THRUSTERS, MAX_THRUSTERS + 9)]
     rate = ca.Function("rate", symbols, [equations.rate(*symbols, ca.SX(constants))])
     worst, surfaced = 0.0, 0
-    for _ in range(250):
+    for _ in range(1000):
         quaternion = RANDOM.standard_normal(4)
         state = np.concatenate([RANDOM.standard_normal(3), quaternion / np.linalg.norm(quaternion), RANDOM.standard_normal(6)])
         state = np.concatenate([state, RANDOM.uniform(-LIMIT, LIMIT, MAX_THRUSTERS)])
@@ -72,7 +72,7 @@ def test_derivatives_equal_those_of_numpy_at_random_states(measured: Measurement
     assert surfaced > 75
     measured(
         "Submerged vehicles",
-        "derivatives at 250 random states, 16 thrusters, full matrices, below and at the surface",
+        "derivatives at 1000 random states, 16 thrusters, full matrices, below and at the surface",
         worst,
         0.0,
         "1",

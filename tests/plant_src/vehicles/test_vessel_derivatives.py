@@ -17,7 +17,7 @@ from plant_src.vehicles.common.interface import MAX_WAVE_COMPONENTS
 
 casadi = pytest.importorskip("casadi")
 
-STATES = 250
+STATES = 1000
 SHORT_CRESTED = {
     "seed": 5,
     "waves": {"significant_height": 0.3, "peak_period": 2.0, "direction": 0.7, "spreading": 4, "components": 9},
@@ -74,7 +74,7 @@ def test_planar_catamaran_at_random_states(hull: str, measured: MeasurementCheck
         worst.append(np.abs(found - expected).max() / np.linalg.norm(expected))
     measured(
         "Strider, planar",
-        "accelerations at 250 random states",
+        "accelerations at 1000 random states",
         worst,
         0.0,
         "1",
@@ -106,7 +106,7 @@ def test_catamaran_at_random_states(measured: MeasurementCheck) -> None:
     assert emerged > STATES / 4
     measured(
         "Strider, six degrees of freedom",
-        "accelerations at 250 random states, hulls emerged in a part of them",
+        "accelerations at 1000 random states, hulls emerged in a part of them",
         worst,
         0.0,
         "1",
