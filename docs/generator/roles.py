@@ -44,7 +44,7 @@ def _group_titles(roles: Iterable[RoleSpec]) -> dict[Rows, str]:
 
 
 def _role_section(name: str, role: RoleSpec, titles: Mapping[Rows, str]) -> str:
-    kinds = {"input": role.inputs, "output": role.outputs, "parameter": role.parameters}
+    kinds: dict[str, Mapping[str, Source]] = {"input": role.inputs, "output": role.outputs, "parameter": role.parameters}
     rows = (_row(kind, name, source, titles) for kind, variables in kinds.items() for name, source in variables.items())
     return f"## {name}\n\n{plain(role.description)}\n\n{table(('kind', 'name', 'unit', 'meaning'), rows)}"
 
