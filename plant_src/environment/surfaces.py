@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..vehicles.multirotor.surroundings import SURFACE_COLUMNS
+from ..vehicles.common.interface import SURFACE_COLUMNS
 
 if TYPE_CHECKING:
     from ..physics.body import ContactBody

@@ -16,12 +16,8 @@ from cosim.export.equations.c_code import Callee, call_in_c
 
 from ..common import kinematics
 from ..common.elementary_functions import arctangent
-from ..common.interface import MAX_WAVE_COMPONENTS
+from ..common.interface import MAX_WAVE_COMPONENTS, SURFACE_COLUMNS
 from ..common.water_surface import WAVE_COLUMNS, create_elevation_function
-
-#: elements of a row of the table of surfaces: half edges along forward and left (m), centre of the top (m, world frame) and
-#: orientation (quaternion w, x, y, z) of a rectangle
-SURFACE_COLUMNS = 9
 
 #: height above the still water (m) from which waves are ignored, because they do not affect a rotor
 MAX_WAVE_EFFECT_HEIGHT = 5.0

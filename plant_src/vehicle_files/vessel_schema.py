@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+from ..vehicles.planar_vessel import vehicle_data as planar
+from ..vehicles.surface_vessel import vehicle_data as surface
+from ..vehicles.vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS
 from .schema_parts import (
     TEXT,
     Schema,
@@ -13,9 +16,6 @@ from .schema_parts import (
     quantity_schema,
     vector_schema,
 )
-from .vehicles.planar_vessel import vehicle_data as planar
-from .vehicles.surface_vessel import vehicle_data as surface
-from .vehicles.vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS
 
 
 def surface_vessel_schema() -> Schema:

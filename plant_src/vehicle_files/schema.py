@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
-from .catalogue import FAMILIES
+from ..catalogue import FAMILIES
+from ..vehicles.multirotor import vehicle_data as multirotor
+from ..vehicles.submerged import vehicle_data as submerged
 from .schema_parts import (
     Schema,
     family_schema,
@@ -13,8 +15,6 @@ from .schema_parts import (
     quantity_schema,
     vector_schema,
 )
-from .vehicles.multirotor import vehicle_data as multirotor
-from .vehicles.submerged import vehicle_data as submerged
 from .vessel_schema import planar_vessel_schema, surface_vessel_schema
 
 
