@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -12,20 +13,22 @@ from ..results.comparison import Comparison, Tolerance, Verdict
 from ..results.comparison.comparison import Comparer, match_tolerances
 
 WIDTH, HEIGHT = 7.16, 1.7  # in, of the figure and of each panel
-OUTSIDE_COLOUR = "#D55E00"
+TUBE_COLOUR, OUTSIDE_COLOUR = "#0072B2", "#D55E00"
 
 
 def draw_tubes(
     result: Result, reference: Result, tolerances: Mapping[str, Tolerance], comparison: Comparison, max_signals: int = 4
 ) -> Figure:
-    """Draw the signals with the largest deviations over time, a panel each, with their tolerance tubes.
+    """Draw the signals with the largest deviations over time with their tolerance tubes, and beside them the deviations.
+
+    A tube that is narrow compared with the range of a signal is visible only in the panel of the deviation.
 
     Args:
         result: The result that was compared.
         reference: The reference.
         tolerances: Tolerances by pattern of signal names.
         comparison: The outcome of the comparison.
-        max_signals: The largest number of panels.
+        max_signals: The largest number of signals.
     """
     worst = [verdict for verdict in comparison.worst if reference[verdict.signal].dtype != object][:max_signals]
     figure = Figure(figsize=(WIDTH, HEIGHT * max(len(worst), 1)), layout="constrained")
@@ -33,27 +36,36 @@ def draw_tubes(
         figure.text(0.5, 0.5, "nothing can be compared", ha="center")
         return figure
     chosen, comparer = match_tolerances(tolerances, list(reference)), Comparer(result, reference)
-    panels = figure.subplots(len(worst), sharex=True, squeeze=False)[:, 0]
-    for axes, verdict in zip(panels, worst, strict=True):
-        _draw_panel(axes, comparer, verdict, chosen[verdict.signal], result, reference)
-    handles = {label: handle for axes in panels for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
+    panels = figure.subplots(len(worst), 2, sharex=True, squeeze=False)
+    for row, verdict in zip(panels, worst, strict=True):
+        name = verdict.signal
+        _draw_row(row, comparer, verdict, chosen[name], result[name], reference[name])
+        row[0].set_title(name, loc="left")
+        row[1].set_title("result - reference", loc="left")
+        row[0].set_ylabel(reference.units.get(name) or result.units.get(name) or "")
+    handles = {label: handle for axes in panels.flat for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)}
     figure.legend(handles.values(), handles, loc="outside upper right", ncols=4)
-    panels[-1].set_xlabel("time (s)")
+    for axes in panels[-1]:
+        axes.set_xlabel("time (s)")
     return figure
 
 
-def _draw_panel(
-    axes: Axes, comparer: Comparer, verdict: Verdict, tolerance: Tolerance, result: Result, reference: Result
+def _draw_row(
+    row: Sequence[Axes], comparer: Comparer, verdict: Verdict, tolerance: Tolerance, result: np.ndarray, reference: np.ndarray
 ) -> None:
-    name = verdict.signal
-    tube = comparer.tube(name, tolerance)
-    axes.fill_between(tube.time, tube.lower, tube.upper, color="#0072B2", alpha=0.2, linewidth=0, label="tube")
-    axes.plot(reference.time, reference[name], "--", color="#0072B2", label="reference", linewidth=0.9)
-    axes.plot(result.time, result[name], color="black", label="result", linewidth=0.9)
-    if not verdict.passed:
-        axes.axvline(verdict.time, color=OUTSIDE_COLOUR, linewidth=0.8)
-        values, outside = comparer.points.interpolate_result(result[name]), comparer.is_outside(name, tolerance)
-        axes.plot(tube.time[outside], values[outside], ".", color=OUTSIDE_COLOUR, markersize=2, label="outside")
-    axes.set_xlim(reference.time[0], reference.time[-1])
-    axes.set_title(name, loc="left")
-    axes.set_ylabel(reference.units.get(name) or result.units.get(name) or "")
+    """Draw a signal and its tube in the first of two panels, and both minus the reference in the second."""
+    tube, points = comparer.tube(verdict.signal, tolerance), comparer.points
+    values, base = points.interpolate_result(result.astype(float)), points.interpolate_reference(reference.astype(float))
+    for axes, shift in zip(row, (np.zeros(len(base)), base), strict=True):
+        axes.fill_between(
+            tube.time, tube.lower - shift, tube.upper - shift, color=TUBE_COLOUR, alpha=0.2, linewidth=0, label="tube"
+        )
+        axes.plot(tube.time, base - shift, "--", color=TUBE_COLOUR, label="reference", linewidth=0.9)
+        axes.plot(tube.time, values - shift, color="black", label="result", linewidth=0.9)
+        if not verdict.passed:
+            outside = comparer.is_outside(verdict.signal, tolerance)
+            axes.axvline(verdict.time, color=OUTSIDE_COLOUR, linewidth=0.8)
+            axes.plot(
+                tube.time[outside], values[outside] - shift[outside], ".", color=OUTSIDE_COLOUR, markersize=2, label="outside"
+            )
+        axes.set_xlim(tube.time[0], tube.time[-1])

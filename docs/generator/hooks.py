@@ -10,7 +10,8 @@ from pathlib import Path
 from commands import commands_page
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
-from pages import kpis_page, python_page, roles_page, scenarios_page, variables_page
+from pages import kpis_page, python_page, scenarios_page, variables_page
+from roles import roles_page
 from schema_keys import scenario_keys_page, study_keys_page
 
 ROOT = Path(__file__).parents[2]

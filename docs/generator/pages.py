@@ -1,11 +1,10 @@
-"""Reference of the Python interface, variables, roles, KPIs and shipped scenarios."""
+"""Reference of the Python interface, variables, KPIs and shipped scenarios."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator
 from itertools import groupby
 from pathlib import Path
-from typing import Any
 
 from markdown_parts import code, page, plain, table
 
@@ -15,7 +14,6 @@ from cosim.components.fmi import FmuFile
 from cosim.components.python_import import load_object
 from cosim.core import resources
 from cosim.core.component import Variable
-from cosim.studies.controller_bench.role import Role, read_role
 
 #: public names that the package `cosim` does not contain
 OTHERS = ("cosim.core.component.StepResult", "cosim.core.units.parse_unit")
@@ -55,25 +53,6 @@ def _variable_rows(variables: Iterable[Variable], causality: str) -> Iterator[tu
             unit = variable.unit.name if variable.unit else "1" if variable.type.startswith("Float") else variable.type
             start = "" if variable.start is None or causality == "output" else f"{variable.start:g}"
             yield code(variable.name), plain(unit), start, plain(variable.description)
-
-
-def roles_page() -> str:
-    """Return the page with the variables that a controller of each role receives and returns."""
-    intro = (
-        "A role is a place for a controller. A controller declares the inputs and parameters that it uses; it must have all "
-        "outputs. `cosim bench-controller CONTROLLER --role ROLE` runs a controller in every scenario with the role."
-    )
-    return page("Roles of controllers", intro, *(_role_section(read_role(entry.name)) for entry in CATALOGUE["roles"]()))
-
-
-def _role_section(role: Role) -> str:
-    kinds: dict[str, dict[str, Any]] = {"input": role.inputs, "output": role.outputs, "parameter": role.parameters}
-    rows = (
-        (kind, code(name), plain(unit.name) if unit else "")
-        for kind, variables in kinds.items()
-        for name, unit in variables.items()
-    )
-    return f"## {role.name}\n\n{plain(role.description)}\n\n{table(('kind', 'name', 'unit'), rows)}"
 
 
 def kpis_page() -> str:

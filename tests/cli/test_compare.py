@@ -79,6 +79,17 @@ def test_the_figure_shows_the_tube_and_the_violations(tmp_path):
         assert np.abs(pixels - colour).max(axis=1).min() < 2
 
 
+def test_the_tube_is_visible_in_the_deviation_where_the_signal_hides_it(tmp_path):
+    """A tube of 0.02 around a sine of 2: less than a pixel in the panel of the signal, all of the panel of the deviation."""
+    picture = tmp_path / "tubes.png"
+    result, reference = csv(tmp_path / "a.csv", offset=0.005), csv(tmp_path / "b.csv")
+    assert cosim("compare", result, reference, "--absolute", "0.01", "--plot", picture).returncode == 0
+    tube = np.abs(255 * imread(picture)[:, :, :3] - (204, 227, 240)).max(axis=2) < 2
+    left, right = np.array_split(tube[50:], 2, axis=1)
+    assert left.mean() < 0.02
+    assert right.mean() > 0.3
+
+
 def test_the_figure_shows_missing_and_non_finite_signals(tmp_path):
     text = csv(tmp_path / "a.csv").read_text().replace("\n1,", "\n1,NaN #", 1)
     broken = tmp_path / "broken.csv"

@@ -7,7 +7,7 @@ Each role is a JSON file; the shipped ones are in scenarios/roles/. Paths in it 
      "inputs": {"vehicle": {"outputs_of": "../../fmus/strider.fmu"},            all outputs of an FMU, with this prefix
                 "target": {"outputs_of": "../../fmus/strider.fmu", "below": "deck"},
                 "altitude_command": "m"},                                       a single variable and its unit
-     "outputs": {"thrust": "N", "rotor_speed[1]": "rad/s"},
+     "outputs": {"thrust": {"unit": "N", "description": "Positive: forward"}, "rotor_speed[1]": "rad/s"},
      "parameters": {"speed_command": "m/s"},
      "goals": ["waypoints.reached", "waypoints.time*"],                         KPIs that rank controllers, the first one first
      "cost_reference": "../../fmus/ar_drone_geometric.fmu",                     costs per step are ratios to that of this FMU
@@ -39,16 +39,23 @@ class OutputsSpec(Spec):
     below: str = ""
 
 
+class VariableSpec(Spec):
+    """Unit and meaning of a single variable; no unit: any."""
+
+    unit: str = ""
+    description: str
+
+
 class RoleSpec(Spec):
     """Schema of a role's file."""
 
     description: str
     controllers: list[str]
-    inputs: dict[str, str | OutputsSpec]
-    outputs: dict[str, str]
+    inputs: dict[str, str | VariableSpec | OutputsSpec]
+    outputs: dict[str, str | VariableSpec]
     goals: list[str] = []
     cost_reference: str | None = None
-    parameters: dict[str, str] = {}
+    parameters: dict[str, str | VariableSpec] = {}
     stand_ins: dict[str, str] = {}
 
 
@@ -81,22 +88,26 @@ def read_role(role: str) -> Role:
     Raises:
         InputError: with all problems of the file, or if there is no such role.
     """
-    file = _find_role(role)
-    document = read_document(file)
-    spec = _validate_role(document)
+    file, spec = read_role_file(role)
     folder = file.parent.resolve()
     inputs = [item for name, source in spec.inputs.items() for item in _input_units(name, source, folder)]
     return Role(
         file.stem,
         spec.description,
         dict(inputs),
-        {name: _parse_unit(unit) for name, unit in spec.outputs.items()},
-        {name: _parse_unit(unit) for name, unit in spec.parameters.items()},
+        {name: _parse_unit(source) for name, source in spec.outputs.items()},
+        {name: _parse_unit(source) for name, source in spec.parameters.items()},
         tuple(spec.goals),
         tuple((folder / path).resolve() for path in spec.controllers),
         {(folder / path).resolve(): (folder / system).resolve() for path, system in spec.stand_ins.items()},
         (folder / spec.cost_reference).resolve() if spec.cost_reference else None,
     )
+
+
+def read_role_file(role: str) -> tuple[Path, RoleSpec]:
+    """Return the path and the content of the file of a role, given as for `read_role`; the same errors are raised."""
+    file = _find_role(role)
+    return file, _validate_role(read_document(file))
 
 
 def role_names() -> list[str]:
@@ -121,8 +132,8 @@ def _validate_role(document: Document) -> RoleSpec:
         raise InputError(Problem(found["msg"], document.where(found["loc"])) for found in error.errors()) from None
 
 
-def _input_units(name: str, source: str | OutputsSpec, folder: Path) -> list[tuple[str, Unit | None]]:
-    if isinstance(source, str):
+def _input_units(name: str, source: str | VariableSpec | OutputsSpec, folder: Path) -> list[tuple[str, Unit | None]]:
+    if not isinstance(source, OutputsSpec):
         return [(name, _parse_unit(source))]
     outputs = (v for v in FmuFile(folder / source.outputs_of).description.variables if v.causality == "output")
     prefix = f"{source.below}." if source.below else ""
@@ -134,7 +145,8 @@ def _input_units(name: str, source: str | OutputsSpec, folder: Path) -> list[tup
     ]
 
 
-def _parse_unit(text: str) -> Unit | None:
+def _parse_unit(source: str | VariableSpec) -> Unit | None:
+    text = source if isinstance(source, str) else source.unit
     try:
         return parse_unit(text) if text else None
     except ValueError as error:
