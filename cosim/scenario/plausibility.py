@@ -7,17 +7,14 @@ from collections.abc import Iterator
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
-from ..core.component import Component, Variable
 from ..core.errors import Problem
 from ..core.paths import is_file
-from ..core.system import Endpoint, System, incompatibility
-from ..core.text import count_noun
+from ..core.system import Endpoint
 from ..engine.transfer_plan import unit_conversion
+from .missing_connections import VariablesByEndpoint, find_missing_connections
 
 if TYPE_CHECKING:
     from .prepared_run import PreparedRun
-
-VariablesByEndpoint = dict[Endpoint, Variable]
 
 
 def find_warnings(prepared: PreparedRun) -> list[Problem]:
@@ -43,20 +40,10 @@ def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
 
 
 def _missing_connections(prepared: PreparedRun) -> Iterator[Problem]:
-    """Yield a warning for the first output with the name of an unconnected input, or for components without connected input."""
-    system, inputs = prepared.system, unconnected_inputs(prepared)
-    outputs = _outputs_by_name(system) if inputs else {}
-    sources = {end: source for end, variable in inputs.items() if (source := _matching_output(end, variable, outputs))}
-    texts = []
-    if sources:
-        (end, source), more = next(iter(sources.items())), len(sources) - 1
-        others = f" and {count_noun(more, 'more input')}" if more else ""
-        shown_source = next((port for port, inner in system.aliases.items() if inner == source), source)
-        texts.append(f"nothing feeds or sets {end}{others}, but there is an output {shown_source}: is a connection missing?")
-    elif system.connections:
-        isolated = [name for name, component in system.components.items() if _has_no_fed_input(name, component, inputs)]
-        texts += [f"nothing feeds or sets an input of {', '.join(isolated)}: are connections missing?"] if isolated else []
-    yield from (Problem(text, prepared.root.where("connections")) for text in texts)
+    """Yield a warning for each component with inputs that probably lack a connection, and one for components without any."""
+    where = prepared.root.where("connections")
+    for text in find_missing_connections(prepared.system, unconnected_inputs(prepared)):
+        yield Problem(text, where)
 
 
 def _double_conversions(prepared: PreparedRun) -> Iterator[Problem]:
@@ -74,12 +61,6 @@ def _double_conversions(prepared: PreparedRun) -> Iterator[Problem]:
             yield Problem(text, prepared.root.where("connections"))
 
 
-def _has_no_fed_input(name: str, component: Component, unconnected: VariablesByEndpoint) -> bool:
-    """Return whether a component has inputs and all of them are unconnected."""
-    slots = [slot for variable in component.variables if variable.causality == "input" for slot in variable.scalar_names]
-    return bool(slots) and all(Endpoint(name, slot) in unconnected for slot in slots)
-
-
 def unconnected_inputs(prepared: PreparedRun) -> VariablesByEndpoint:
     """Return the scalar inputs that no connection, start value or event sets, with their variables."""
     system = prepared.system
@@ -94,39 +75,6 @@ def unconnected_inputs(prepared: PreparedRun) -> VariablesByEndpoint:
         for slot in variable.scalar_names
         if (end := Endpoint(name, slot)) not in connected
     }
-
-
-def _outputs_by_name(system: System) -> dict[str, VariablesByEndpoint]:
-    """Return all scalar outputs by the names that a matching input may have; unconnected outputs come first."""
-    connected = {connection.source for connection in system.connections}
-    ends = {
-        Endpoint(name, slot): variable
-        for name, component in system.components.items()
-        for variable in component.variables
-        if variable.causality == "output"
-        for slot in variable.scalar_names
-    }
-    outputs: dict[str, VariablesByEndpoint] = {}
-    for end in sorted(ends, key=connected.__contains__):
-        for name in _lookup_names(end.scalar):
-            outputs.setdefault(name, {})[end] = ends[end]
-    return outputs
-
-
-def _matching_output(end: Endpoint, variable: Variable, outputs: dict[str, VariablesByEndpoint]) -> Endpoint | None:
-    """Return an output of another component that has the name of an input and can be connected to it."""
-    for name in _lookup_names(end.scalar):
-        for source, other in outputs.get(name, {}).items():
-            is_specific = name in (end.scalar, source.scalar) or "." in name
-            if is_specific and source.component != end.component and not incompatibility(other, variable):
-                return source
-    return None
-
-
-def _lookup_names(slot: str) -> list[str]:
-    """Return the names of a scalar with and without the name of the vehicle: "uav.position.x" and "position.x"."""
-    rest = slot.partition(".")[2]
-    return [slot, rest] if rest else [slot]
 
 
 def _missing_reference(prepared: PreparedRun) -> Iterator[Problem]:

@@ -238,14 +238,15 @@ def test_a_figure_of_unrecorded_signals_is_refused_only_with_a_report(tmp_path):
 
 
 def test_check_and_run_warn_about_a_forgotten_connection(tmp_path):
-    components = {"plant": {"python": f"{BLOCKS}:Plant"}, "pilot": {"python": f"{BLOCKS}:Controller"}}
+    pilot = {"python": f"{BLOCKS}:Controller", "parameters": {"offset": 0.0}}
+    components = {"plant": {"python": f"{BLOCKS}:Plant"}, "pilot": pilot}
     file = scenario(tmp_path, components=components, connections=[{"from": "plant.ship", "to": "pilot.vehicle"}])
     checked, ran = cosim("check", file), cosim("run", file, cwd=tmp_path)
     for done in (checked, ran):
         assert done.returncode == 0
         (warning,) = done.stderr.splitlines()
         assert warning.startswith(f"WARNING {file}:1:")
-        assert "nothing feeds or sets plant.ship.motor[1] and 1 more input, but there is an output pilot.motor[1]" in warning
+        assert "nothing feeds or sets plant.ship.motor[1], plant.ship.motor[2], but there is an output pilot.motor[1]" in warning
     assert "1 warning." in checked.stdout
     assert "No warnings" not in checked.stdout
     assert warning in json.loads((tmp_path / "runs/small/run.json").read_text())["warnings"]

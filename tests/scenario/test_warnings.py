@@ -21,19 +21,67 @@ def warnings_of(file):
 
 
 def ship(folder, connections, parameters=(), **more):
-    components = {"plant": folder.block("Plant"), "pilot": folder.block("Controller", parameters=dict(parameters))}
+    components = {
+        "plant": folder.block("Plant"),
+        "pilot": folder.block("Controller", parameters={"offset": 0.0, **dict(parameters)}),
+    }
     return warnings_of(folder.scenario(components, connections, **more))
 
 
 @pytest.mark.parametrize(
     ("left", "line"),
     [
-        (0, "nothing feeds or sets plant.ship.motor[1] and 1 more input, but there is an output pilot.motor[1]"),
+        (0, "nothing feeds or sets plant.ship.motor[1], plant.ship.motor[2], but there is an output pilot.motor[1]"),
         (1, "nothing feeds or sets pilot.vehicle.position.x, but there is an output plant.ship.position.x"),
     ],
 )
 def test_a_missing_connection_is_recognized_by_matching_names(folder, left, line):
     assert ship(folder, [BOTH[left]]) == [f"connections: {line}: is a connection missing?"]
+
+
+KEEPS = 'it keeps its start value until a connection feeds or "parameters" set it'
+OWN_BLOCK = """
+from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Real
+
+INPUTS = ("position.x", "position.y", "altitude", "speed", "rotor_speeed", "gust.x", "gust.y")
+
+
+class Own(Fmi2Slave):
+    def __init__(self, **arguments):
+        super().__init__(**arguments)
+        self.values = dict.fromkeys(INPUTS, 0.0)
+        for name in INPUTS:
+            getter, setter = (lambda n=name: self.values[n]), (lambda v, n=name: self.values.update({n: v}))
+            self.register_variable(Real(name, causality=Fmi2Causality.input, getter=getter, setter=setter))
+        self.reset = False
+        self.register_variable(Boolean("reset", causality=Fmi2Causality.input))
+        self.rotor_speed = self.height = 0.0
+        for name in ("rotor_speed", "height"):
+            self.register_variable(Real(name, causality=Fmi2Causality.output))
+
+    def do_step(self, current_time, step_size):
+        return True
+"""
+
+
+def own_pair(folder, connections, **more):
+    (folder.path / "own.py").write_text(OWN_BLOCK)
+    components = {"plant": {"python": "own.py:Own"}, "pilot": {"python": "own.py:Own", **more}}
+    confirmed = {"position": [0.0, 0.0], "altitude": 0.0, "speed": 0.0, "rotor_speeed": 0.0}
+    components["plant"]["parameters"] = confirmed
+    return warnings_of(folder.scenario(components, [connection("plant.height", f"pilot.{name}") for name in connections]))
+
+
+def test_a_forgotten_number_of_a_component_with_mostly_fed_inputs_is_named_with_the_most_similar_output(folder):
+    fed = ["position.x", "position.y", "altitude", "speed"]
+    line = f"connections: nothing feeds or sets pilot.rotor_speeed: {KEEPS}; the output nearest by name is plant.rotor_speed"
+    assert own_pair(folder, fed) == [line]  # gust.* and reset keep their start values on purpose
+    assert own_pair(folder, fed, parameters={"rotor_speeed": 0.0}) == []
+    assert own_pair(folder, ["altitude"]) == []  # few inputs of the component are in use
+
+
+def test_the_other_elements_of_a_vector_that_outputs_feed_in_part_are_named(folder):
+    assert own_pair(folder, ["gust.x"]) == [f"connections: nothing feeds or sets pilot.gust.y: {KEEPS}"]
 
 
 def test_components_without_any_connected_input_cause_warnings(folder):
