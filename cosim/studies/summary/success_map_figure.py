@@ -96,7 +96,7 @@ def _draw_cell(axes: Axes, x: int, y: int, cell: MapCell, size: tuple[float, flo
     ink = "black" if cell.success_rate > 0.5 else "white"
     roomy = size[0] >= _MIN_CELL_FOR_INTERVAL[0] and size[1] >= _MIN_CELL_FOR_INTERVAL[1]
     ratio = min(size[0] / _MIN_CELL_FOR_INTERVAL[0], size[1] / _MIN_CELL_FOR_INTERVAL[1], _MAX_FONT_RATIO) if roomy else 1.0
-    style = {"ha": "center", "va": "center", "color": ink}
+    style: dict[str, Any] = {"ha": "center", "va": "center", "color": ink}
     axes.text(x, y + 0.24 * roomy, _percent(cell.success_rate), fontsize=ratio * _RATE_FONT_SIZE, **style)
     if roomy:
         low, high = cell.interval
