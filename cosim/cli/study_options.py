@@ -150,7 +150,7 @@ class _ProgressLines:
 
 
 def print_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Print a table whose first column is text; the others are numbers."""
+    """Print a table whose first column and column "unit" are text; the others are numbers."""
     from rich import box
     from rich.table import Table
 
@@ -158,7 +158,7 @@ def print_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
     for i, name in enumerate(header):
-        table.add_column(cell_text(name), justify="right" if i else "left", overflow="fold")
+        table.add_column(cell_text(name), justify="left" if i == 0 or name == "unit" else "right", overflow="fold")
     for row in rows:
         table.add_row(*map(cell_text, row))
     table_console(width=200).print(table, "")

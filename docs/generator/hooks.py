@@ -10,7 +10,7 @@ from pathlib import Path
 from commands import commands_page
 from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
-from pages import kpis_page, python_page, scenarios_page, variables_page
+from pages import kpis_page, python_page, scenarios_page, units_page, variables_page
 from roles import roles_page
 from schema_keys import scenario_keys_page, study_keys_page
 
@@ -26,6 +26,7 @@ REFERENCE = {
     "study_keys": study_keys_page,
     "python": python_page,
     "variables": variables_page,
+    "units": units_page,
     "roles": roles_page,
     "kpis": kpis_page,
     "scenarios": scenarios_page,

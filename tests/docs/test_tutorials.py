@@ -105,6 +105,12 @@ def test_a_reader_can_follow_the_page(page, tmp_path, monkeypatch):
             process.wait()
 
 
+@pytest.mark.parametrize("page", sorted((DOCS / "tutorials").glob("*.md")), ids=lambda page: page.stem)
+def test_a_tutorial_names_the_folder_of_its_commands_before_the_first_one(page):
+    beginning = page.read_text().partition("\n## ")[0]
+    assert re.search(r"\b[Rr]un (all|the first) commands? in .*\bfolder\b|run all commands in it", beginning)
+
+
 def test_every_block_is_found():
     """The pattern of blocks misses none, and no block stands for nothing."""
     for page in PAGES:

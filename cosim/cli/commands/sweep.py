@@ -35,8 +35,9 @@ _MAX_PRINTED = 20
 @click.option("--parquet", is_flag=True, help="Also write table.parquet (extra `parquet`).")
 @click.option("--replays", is_flag=True, help="Also write the 3-D replay of one run of each cell of the maps.")
 @json_option(
-    "an object with name, folder, runs, finished, failed, failure_causes (cause, runs, first_run) and groups, whose entries have "
-    "labels, runs, distinct, passed, success_rate, interval (95 %) and kpis; the first group is all runs and has the kpis"
+    "an object with name, folder, runs, finished, failed, units (by KPI), failure_causes (cause, runs, first_run) and groups, "
+    "whose entries have labels, runs, distinct, passed, success_rate, interval (95 %) and kpis; the first group is all runs and "
+    "has the kpis"
 )
 @study_options.study_options
 def command(sweep: str, output_dir: Path | None, parquet: bool, replays: bool, as_json: bool, **study: Any) -> int:
@@ -124,9 +125,10 @@ def _print_summary(sweep: Sweep, summary: SweepSummary) -> None:
     if not summary.groups:
         return
     numbers = summary.groups[0].statistics()
-    kpis = [[name, *(f"{found[key]:.4g}" for key in ("mean", "std", "min", "median", "max"))] for name, found in numbers]
+    columns = ("mean", "std", "min", "median", "max")
+    kpis = [[name, summary.units.get(name, ""), *(f"{found[key]:.4g}" for key in columns)] for name, found in numbers]
     if kpis:
-        study_options.print_table(["KPI", "mean", "std", "min", "median", "max"], kpis)
+        study_options.print_table(["KPI", "unit", *columns], kpis)
     if sweep.criteria or summary.failed:
         study_options.print_table(
             ["runs", "n", "success", "95 % interval"], [_success_row(group) for group in _first(summary.groups, "success.csv")]
@@ -165,6 +167,7 @@ def _summary_as_json(sweep: Sweep, summary: SweepSummary, folder: Path) -> dict[
         "runs": len(sweep),
         "finished": summary.finished,
         "failed": summary.failed,
+        "units": dict(summary.units),
         "failure_causes": [{"cause": cause, "runs": count, "first_run": first} for cause, count, first in summary.failure_causes],
         "groups": groups,
     }

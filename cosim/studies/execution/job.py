@@ -34,6 +34,7 @@ class Record:
     Attributes:
         key: key of the run.
         kpis: KPIs by name; empty after a failure.
+        units: units of the KPIs that have one.
         failure: cause of a failure; empty: the run reached its end.
         seconds: wall time (s).
         output: end of the text that components printed, of a failed run.
@@ -44,6 +45,7 @@ class Record:
     failure: str = ""
     seconds: float = 0.0
     output: str = ""
+    units: Mapping[str, str] = field(default_factory=dict)
 
     def to_json(self) -> str:
         """Return the record as one line of JSON without its empty fields."""
@@ -64,11 +66,13 @@ class Record:
             raise ValueError("a field of the record has another type")
         if not all(map(is_number, record.kpis.values())):
             raise ValueError("a KPI of the record is not a number")
+        if not all(isinstance(unit, str) for unit in record.units.values()):
+            raise ValueError("a unit of the record is not a text")
         bytes.fromhex(record.key)
         return record
 
 
-_FIELD_TYPES: Mapping[str, Any] = {"key": str, "kpis": dict, "failure": str, "seconds": float | int, "output": str}
+_FIELD_TYPES: Mapping[str, Any] = {"key": str, "kpis": dict, "failure": str, "seconds": float | int, "output": str, "units": dict}
 
 
 @dataclass(frozen=True)

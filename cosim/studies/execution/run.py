@@ -22,7 +22,7 @@ from ...process.journal import EXIT_CODE, Phase, current_journal
 from ...process.run_files.folder import keeping_run_files
 from ...process.supervisor import SupervisedOutcome, run_supervised
 from ...results import Result
-from ...results.kpi import evaluate_kpis
+from ...results.kpi import evaluate_kpis, kpi_units
 from ...scenario import PreparedRun, load
 from .job import Job, Record, StudyContext
 
@@ -106,8 +106,9 @@ def _run_job(context: StudyContext, job: Job, fmu_files: FmuFiles, reply: IO[str
     with keeping_run_files(Path(tempfile.gettempdir()) / "run"), simulating(prepared.plan) as outcome:
         if outcome.failure:
             raise outcome.failure
-        kpis = evaluate_kpis(Result(outcome.recording, metadata=prepared.origin), prepared.kpis())
-        _write_reply(reply, {"kpis": kpis})
+        result, functions = Result(outcome.recording, metadata=prepared.origin), prepared.kpis()
+        kpis = evaluate_kpis(result, functions)
+        _write_reply(reply, {"kpis": kpis, "units": _known_units(kpi_units(functions, kpis, result.units))})
         _results_written()
 
 
@@ -123,8 +124,12 @@ def _run_with_replay(replay: ReplayRequest, context: StudyContext, job: Job, fmu
         write_replay([replace(result, metadata={**result.metadata, "name": replay.title})], Path(replay.page))
         if execution.failure:
             raise execution.failure
-        _write_reply(reply, {"kpis": result.kpis})
+        _write_reply(reply, {"kpis": result.kpis, "units": _known_units(result.metadata["kpi_units"])})
         _results_written()
+
+
+def _known_units(units: Mapping[str, str]) -> dict[str, str]:
+    return {name: unit for name, unit in units.items() if unit}
 
 
 def _set_deadline(context: StudyContext) -> None:

@@ -9,6 +9,7 @@ from __future__ import annotations
 import os
 import time
 from collections.abc import Iterable, Iterator
+from dataclasses import replace
 from pathlib import Path
 
 from ...core.errors import InputError, OutputError, write_error
@@ -56,6 +57,8 @@ class RunStore:
             raise write_error(f'cannot write "{self.path}": {error.strerror}', error) from None
         #: number of lines that are not records; their runs are treated as not finished
         self.unreadable_lines = 0
+        #: units of the KPIs of all records; a line holds only those that no earlier line has
+        self.units: dict[str, str] = {}
         self._positions: dict[bytes, int] = {}
         self._end = self._synced = 0.0
         self._size = self._read(retry_failed)
@@ -74,6 +77,7 @@ class RunStore:
                     break
                 if record:
                     self._index(record, size, retry)
+                    self.units |= record.units
                 self.unreadable_lines += record is None
                 size += len(line)
         return size
@@ -97,13 +101,15 @@ class RunStore:
         Raises:
             OutputError: if it cannot be written, as on a full disk.
         """
-        line = record.to_json().encode() + b"\n"
+        new_units = {name: unit for name, unit in record.units.items() if self.units.get(name) != unit}
+        line = replace(record, units=new_units).to_json().encode() + b"\n"
         try:
             if os.write(self._file, line) != len(line):
                 raise OSError(28, "No space left on device")
         except OSError as error:
             os.ftruncate(self._file, self._size)
             raise OutputError(f'cannot write "{self.path}": {error.strerror}') from None
+        self.units |= new_units
         self._positions[bytes.fromhex(record.key)] = self._size
         self._size += len(line)
         if time.monotonic() - self._synced > _SYNC_INTERVAL:

@@ -43,6 +43,7 @@ def write_sweep_page(sweep: Sweep, summary: SweepSummary, maps: Sequence[Success
     remove_files(
         folder, *(path.name for path in folder.glob(f"{MAP_NAME}*") if _MAP_FILE.fullmatch(path.name) and path.name not in drawn)
     )
+    statistics = overall.statistics() if overall else ()
     cells = list(_shown_cells(sweep, maps, folder))
     text = render_page(
         "sweep.html",
@@ -51,11 +52,11 @@ def write_sweep_page(sweep: Sweep, summary: SweepSummary, maps: Sequence[Success
         summary=summary,
         overall=overall,
         design=list(_design_rows(sweep)),
-        criteria=[_criterion(check) for check in sweep.criteria],
+        criteria=[_criterion(check, summary.units) for check in sweep.criteria],
         maps=[_write_map(sweep, each, folder) for each in maps],
         commands=[cell for cell in cells if cell["link"].startswith(PAGE_FILE)],
         replays=[cell for cell in cells if not cell["link"].startswith(PAGE_FILE)],
-        kpis=[(name, _shown_numbers(numbers)) for name, numbers in overall.statistics()] if overall else [],
+        kpis=[(name, summary.units.get(name, ""), _shown_numbers(numbers)) for name, numbers in statistics],
         version=__version__,
         file=sweep.study_file.document.file,
     )
@@ -63,10 +64,10 @@ def write_sweep_page(sweep: Sweep, summary: SweepSummary, maps: Sequence[Success
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
-def _criterion(check: Mapping[str, Any]) -> tuple[str, str]:
-    """Return a criterion as (KPI, limits)."""
+def _criterion(check: Mapping[str, Any], units: Mapping[str, str]) -> tuple[str, str]:
+    """Return a criterion as (KPI, limits with their unit)."""
     (outcome,) = evaluate_checks({check["kpi"]: 0.0}, [check])
-    return check["kpi"], outcome.limits
+    return check["kpi"], f"{outcome.limits} {units.get(check['kpi'], '')}".rstrip()
 
 
 def _shown_numbers(numbers: Mapping[str, float]) -> dict[str, str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from os.path import normpath
 from pathlib import Path
@@ -21,11 +21,19 @@ from .table import write_csv, write_csv_rows, write_parquet
 
 @dataclass(frozen=True)
 class SweepSummary:
-    """Summary of a sweep: number of finished runs, groups of runs (the first holds all of them), and causes of failures."""
+    """Summary of a sweep.
+
+    Attributes:
+        finished: number of finished runs.
+        groups: groups of runs; the first one holds all of them.
+        failure_causes: cause, number of runs and first run.
+        units: units of the KPIs that have one.
+    """
 
     finished: int
     groups: list[RunGroup]
     failure_causes: list[tuple[str, int, int]]
+    units: Mapping[str, str]
 
     @property
     def failed(self) -> int:
@@ -57,7 +65,7 @@ def write_sweep_files(sweep: Sweep, run_store: RunStore, folder: Path, parquet: 
     write_csv_rows([*factors, *AGGREGATE_COLUMNS], statistics, folder / "aggregates.csv")
     write_csv_rows([*factors, *SUCCESS_COLUMNS], (_success_row(group, factors) for group in groups), folder / "success.csv")
     write_csv_rows(["run", *factors, "failure", "output", "command"], _failure_rows(sweep, rows()), folder / "failures.csv")
-    summary = SweepSummary(groups[0].runs if groups else 0, groups, failure_causes(rows()))
+    summary = SweepSummary(groups[0].runs if groups else 0, groups, failure_causes(rows()), run_store.units)
     write_json(_sweep_metadata(sweep, summary), folder / "sweep.json")
     return summary
 
@@ -102,6 +110,7 @@ def _sweep_metadata(sweep: Sweep, summary: SweepSummary) -> dict[str, Any]:
         "cosim": cosim_fingerprint(),
         "sha256": dict(sweep.study.bundle.files),
         "success": sweep.criteria,
+        "units": dict(summary.units),
         "runs": len(sweep),
         "finished": summary.finished,
         "failed": summary.failed,

@@ -200,32 +200,33 @@ def test_an_impossible_vehicle_is_refused_with_its_path(change: Callable[[dict[s
     assert all(str(problem).startswith("vehicles.rov.model") for problem in caught.value.problems)
 
 
-def sequence(duration: float) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
-    """Speeds of the thrusters, external force and torque, and current, other ones every second."""
+def sequence(duration: float, strength: float = 1.0) -> list[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+    """Speeds of the thrusters, external force and torque, and current, other ones every second; `strength` scales the loads."""
     random = np.random.default_rng(11)
+    root = np.sqrt(strength)
     return [
-        (120 * random.standard_normal(8), 3 * random.standard_normal(6), 0.3 * random.standard_normal(2))
+        (120 * root * random.standard_normal(8), 3 * strength * random.standard_normal(6), 0.3 * random.standard_normal(2))
         for _ in range(round(duration))
     ]
 
 
-def reference(start: np.ndarray, duration: float) -> np.ndarray:
+def reference(start: np.ndarray, duration: float, strength: float = 1.0) -> np.ndarray:
     """The place after each second by DOP853."""
     state, places = start, []
-    for speeds, loads, current in sequence(duration):
+    for speeds, loads, current in sequence(duration, strength):
         water = np.array([*current, 0.0])
         rate = lambda _t, x, held=(speeds, loads, water): derivative(BLUEROV, x, *held)  # noqa: E731
-        state = solve_ivp(rate, (0, 1), state, "DOP853", rtol=1e-9, atol=1e-10).y[:, -1]
+        state = solve_ivp(rate, (0, 1), state, "DOP853", rtol=1e-12, atol=1e-13).y[:, -1]
         places.append(state[:3])
     return np.array(places)
 
 
-def simulated(start: np.ndarray, duration: float, step: float) -> np.ndarray:
+def simulated(start: np.ndarray, duration: float, step: float, strength: float = 1.0) -> np.ndarray:
     """The place after each second by the FMU."""
     names = (*(f"position.{a}" for a in "xyz"), *(f"velocity_body.{a}" for a in "uvw"), *(f"rates.{a}" for a in "pqr"))
     values = np.concatenate([start[:3], start[7:13]])
     fmu, places = PlantFmu("bluerov2_heavy", {f"initial.{n}": v for n, v in zip(names, values, strict=True)}), []
-    for speeds, loads, current in sequence(duration):
+    for speeds, loads, current in sequence(duration, strength):
         fmu.set({f"thruster_speed[{k}]": value for k, value in enumerate(speeds, 1)})
         kinds = [f"external_{kind}.{axis}" for kind in ("force", "torque") for axis in "xyz"]
         fmu.set(dict(zip((*kinds, "current.x", "current.y"), (*loads, *current), strict=True)))
@@ -238,6 +239,12 @@ def start_at(height: float) -> np.ndarray:
     return np.concatenate([[0, 0, height, 1, 0, 0, 0], [0.3, -0.1, 0.0, 0.1, 0.2, -0.3], np.zeros(8)])
 
 
+def growth(start: np.ndarray, strength: float) -> np.ndarray:
+    """Change of the place (m) after each second of a minute over a change of the rates (rad/s) at the start."""
+    changed = start + np.repeat([0.0, 1e-7, 0.0], [10, 3, 8])
+    return np.abs(simulated(changed, 60, 0.0025, strength) - simulated(start, 60, 0.0025, strength)).max(axis=1) / 1e-7
+
+
 @pytest.mark.long
 def test_shorter_steps_converge_at_the_surface(measured: MeasurementCheck) -> None:
     """The kinks of the buoyancy at the surface limit the order."""
@@ -246,3 +253,24 @@ def test_shorter_steps_converge_at_the_surface(measured: MeasurementCheck) -> No
     errors = [np.abs(simulated(start, 3, step) - expected).max() for step in (0.01, 0.0025)]
     assert errors[1] < errors[0] / 2
     measured(MODEL, "place in 3 s at the surface", errors[0], 0.0, "m", "DOP853", within=1e-6)
+
+
+@pytest.mark.long
+def test_a_minute_below_the_surface(measured: MeasurementCheck) -> None:
+    """Loads that the righting moment limits: the vehicle stays near its equilibrium, and errors do not grow."""
+    start = start_at(-50.0)
+    error = np.abs(simulated(start, 60, 0.01, 0.2) - reference(start, 60, 0.2)).max()
+    measured(MODEL, "place in 60 s below the surface", error, 0.0, "m", "DOP853", within=1e-6)
+    assert growth(start, 0.2).max() < 1
+
+
+@pytest.mark.long
+def test_shorter_steps_converge_in_a_minute_of_tumbling(measured: MeasurementCheck) -> None:
+    """Torques above the righting moment turn the vehicle over again and again; its motion amplifies every small difference."""
+    start = start_at(-50.0)
+    expected = reference(start, 60)
+    errors = {step: np.abs(simulated(start, 60, step) - expected).max() for step in (0.01, 0.0025, 0.00125)}
+    assert errors[0.01] > 20 * errors[0.0025] > 100 * errors[0.00125]
+    for step, error in errors.items():
+        measured(MODEL, "place in 60 s of tumbling", error, 0.0, "m", "DOP853", within=2e-3, case=f"{1000 * step:g} ms")
+    assert growth(start, 1.0)[-1] > 100
