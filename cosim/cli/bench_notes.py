@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 from collections.abc import Iterable, Sequence
 from typing import TYPE_CHECKING
 
@@ -15,6 +16,35 @@ from .commands.regress import print_outcome
 if TYPE_CHECKING:
     from ..studies.controller_bench.substitution import Omission
     from .bench_trial import TrialResult
+
+
+class BenchProgress:
+    """Headings of the controllers of a benchmark, with the time that the others probably take.
+
+    Args:
+        count: number of controllers.
+        quiet: print nothing.
+    """
+
+    def __init__(self, count: int, quiet: bool) -> None:
+        self._count, self._quiet, self._finished, self._began = count, quiet, -1, time.perf_counter()
+
+    def print_next(self, name: str) -> None:
+        """Print the number and the name of the controller that runs next."""
+        self._finished += 1
+        rest = ""
+        if self._finished:
+            seconds = (time.perf_counter() - self._began) / self._finished * (self._count - self._finished)
+            rest = f", about {f'{seconds:.0f} s' if seconds < 100 else f'{seconds / 60:.0f} min'} left"
+        self._print(f"{name} (controller {self._finished + 1} of {self._count}{rest})")
+
+    def print_costs(self) -> None:
+        """Print that the costs are measured now."""
+        self._print("measuring the processor time per step")
+
+    def _print(self, text: str) -> None:
+        if not self._quiet:
+            click.echo(text)
 
 
 def print_trial(result: TrialResult, candidate: str) -> None:
@@ -34,26 +64,24 @@ def _print_not_applicable(result: TrialResult) -> None:
     click.echo(f"n/a     {result.name:<28} not applicable: {first}{more}")
 
 
-def print_omissions(omissions: Sequence[tuple[str, Omission]]) -> None:
+def print_omissions(omissions: Sequence[tuple[str, Omission]], controller: str = "") -> None:
     """Print what is left out of the scenarios: a line of variables and one of KPIs and figures; with --verbose, a line for each.
 
     Args:
         omissions: names of scenarios, and what is left out of each.
+        controller: name of the controller, if there are several.
     """
-    if not omissions:
-        return
-    click.echo()
+    begin = f"note: {controller}: " if controller else "note: "
     if current_command_line().verbosity > 0:
         for scenario, each in omissions:
-            click.echo(f"note: {scenario}: {each}")
+            click.echo(f"{begin}{scenario}: {each}")
         return
-    names = [(scenario, each.entry, each.variable.partition(".")[2]) for scenario, each in omissions]
     names = [(scenario, each.entry, each.variable.partition(".")[2]) for scenario, each in omissions]
     variables = [(scenario, name) for scenario, entry, name in names if not entry]
     entries = [(scenario, f'{entry} without "{name}"') for scenario, entry, name in names if entry]
     for heading, items in (("variables that the controller lacks", variables), ("left out", entries)):
         if items:
-            click.echo(f"note: {heading} (number of scenarios): {_count_scenarios(items)}")
+            click.echo(f"{begin}{heading} (number of scenarios): {_count_scenarios(items)}")
 
 
 def _count_scenarios(items: Iterable[tuple[str, str]]) -> str:

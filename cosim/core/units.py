@@ -12,8 +12,10 @@ import re
 import unicodedata
 from collections.abc import Iterable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 
-BASE_UNITS = ("kg", "m", "s", "A", "K", "mol", "cd", "rad")
+from .errors import did_you_mean
+from .unit_table import BASE_UNITS, OFFSETS, PREFIXED, PREFIXES, UNPREFIXED
 
 
 @dataclass(frozen=True, slots=True)
@@ -44,46 +46,9 @@ class Unit:
         return self.factor / other.factor, (self.offset - other.offset) / other.factor
 
 
-def _define_unit(name: str, factor: float = 1.0, offset: float = 0.0, **exponents: int) -> Unit:
-    return Unit(name, tuple(exponents.get(base, 0) for base in BASE_UNITS), factor, offset)
-
-
 KNOWN_UNITS = {
-    unit.name: unit
-    for unit in (
-        _define_unit("1"),
-        _define_unit("%", 0.01),
-        *(_define_unit(base, **{base: 1}) for base in BASE_UNITS),
-        _define_unit("g", 1e-3, kg=1),
-        _define_unit("mm", 1e-3, m=1),
-        _define_unit("cm", 1e-2, m=1),
-        _define_unit("km", 1e3, m=1),
-        _define_unit("ms", 1e-3, s=1),
-        _define_unit("min", 60.0, s=1),
-        _define_unit("h", 3600.0, s=1),
-        _define_unit("d", 86400.0, s=1),
-        _define_unit("l", 1e-3, m=3),
-        _define_unit("deg", math.pi / 180, rad=1),
-        _define_unit("rev", 2 * math.pi, rad=1),
-        _define_unit("rpm", 2 * math.pi / 60, rad=1, s=-1),
-        _define_unit("kn", 1852 / 3600, m=1, s=-1),
-        _define_unit("degC", 1.0, 273.15, K=1),
-        _define_unit("degF", 5 / 9, 459.67 * 5 / 9, K=1),
-        _define_unit("degRk", 5 / 9, K=1),
-        _define_unit("Hz", s=-1),
-        _define_unit("N", kg=1, m=1, s=-2),
-        _define_unit("kN", 1e3, kg=1, m=1, s=-2),
-        _define_unit("Pa", kg=1, m=-1, s=-2),
-        _define_unit("bar", 1e5, kg=1, m=-1, s=-2),
-        _define_unit("J", kg=1, m=2, s=-2),
-        _define_unit("W", kg=1, m=2, s=-3),
-        _define_unit("kW", 1e3, kg=1, m=2, s=-3),
-        _define_unit("C", s=1, A=1),
-        _define_unit("V", kg=1, m=2, s=-3, A=-1),
-        _define_unit("Ohm", kg=1, m=2, s=-3, A=-2),
-        _define_unit("F", kg=-1, m=-2, s=4, A=2),
-        _define_unit("T", kg=1, s=-2, A=-1),
-    )
+    name: Unit(name, exponents, factor, OFFSETS.get(name, 0.0))
+    for name, (factor, exponents) in {**PREFIXED, **UNPREFIXED}.items()
 }
 #: common spellings -> Modelica syntax, after Unicode compatibility normalization, which converts superscripts
 _SPELLINGS = {
@@ -92,6 +57,7 @@ _SPELLINGS = {
     "°C": "degC",
     "°": "deg",
     "Ω": "Ohm",
+    "μ": "u",
     "−": "-",
     **dict.fromkeys("·⋅∙•*×", "."),
     " .": ".",
@@ -121,18 +87,31 @@ def parse_unit(text: str) -> Unit:
         ValueError: The syntax is wrong or a unit is unknown.
     """
     normalized = _normalize(text)
-    if normalized in KNOWN_UNITS:
-        return replace(KNOWN_UNITS[normalized], name=text)
+    if found := _find_unit(normalized):
+        return replace(found, name=text)
     exponents, scale = [0] * len(BASE_UNITS), 1.0
     for symbol, power in _split_factors(text):
-        unit = KNOWN_UNITS.get(symbol)
+        unit = _find_unit(symbol)
         if unit is None or unit.offset:
-            raise ValueError(f'unknown unit "{symbol}" in "{text}"')
+            place = "" if symbol == text else f' in "{text}"'
+            hint = did_you_mean(symbol, KNOWN_UNITS) if len(symbol) > 2 else ""
+            raise ValueError(f'unknown unit "{symbol}"{place}{hint}')
         scale *= _power(unit.factor, power)
         exponents = [e + power * k for e, k in zip(exponents, unit.exponents, strict=True)]
     if not 0 < scale < math.inf:
         raise ValueError(f'the unit "{text}" is too small or too large')
     return Unit(text, tuple(exponents), scale)
+
+
+@lru_cache(4096)
+def _find_unit(symbol: str) -> Unit | None:
+    """Return a known unit, with or without an SI prefix; None if there is none."""
+    if symbol in KNOWN_UNITS:
+        return KNOWN_UNITS[symbol]
+    for prefix, factor in PREFIXES.items():
+        if symbol.startswith(prefix) and (rest := symbol[len(prefix) :]) in PREFIXED:
+            return replace(KNOWN_UNITS[rest], name=symbol, factor=factor * KNOWN_UNITS[rest].factor)
+    return None
 
 
 def _power(factor: float, power: int) -> float:

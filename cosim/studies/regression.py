@@ -96,7 +96,8 @@ class Regression:
             outcome = self._update_reference(run) if self.update else self._compare(run)
         except CosimError as error:
             return RegressionOutcome(self.file.stem, error.exit_code, "cannot be compared", tuple(str(error).splitlines()))
-        return replace(outcome, summary="; ".join(filter(None, (outcome.summary, run.result.termination))))
+        ending = "" if run.result.crashed else run.result.termination  # a crash is one of the details
+        return replace(outcome, summary="; ".join(filter(None, (outcome.summary, ending))))
 
     def _compare(self, run: _FinishedRun) -> RegressionOutcome:
         failed = run.failed_checks()

@@ -1,4 +1,4 @@
-"""Reference of the Python interface, variables, KPIs and shipped scenarios."""
+"""Reference of the Python interface, variables, units, KPIs and shipped scenarios."""
 
 from __future__ import annotations
 
@@ -14,6 +14,8 @@ from cosim.components.fmi import FmuFile
 from cosim.components.python_import import load_object
 from cosim.core import resources
 from cosim.core.component import Variable
+from cosim.core.unit_table import BASE_UNITS, PREFIXED, PREFIXES, UNPREFIXED
+from cosim.core.units import KNOWN_UNITS, multiply_units
 
 #: public names that the package `cosim` does not contain
 OTHERS = ("cosim.core.component.StepResult", "cosim.core.units.parse_unit")
@@ -33,6 +35,32 @@ def variables_page() -> str:
         "`vehicle.NAME`. The world frame is east-north-up, the body frame forward-left-up; all quantities are in SI units."
     )
     return page("Variables", intro, *(_model_section(entry) for entry in CATALOGUE["models"]()))
+
+
+def units_page() -> str:
+    """Return the page with the known units and SI prefixes."""
+    intro = (
+        "These units are known in the attribute `units` of Python classes, in Modelica models, vehicle files and roles. "
+        "Connections of variables with different units of one quantity are converted. A unit is written as in Modelica: "
+        "`kg.m2/s3`, `W/(m2.K)`; common spellings such as `N·m`, `m/s²`, `°C` and `µF` are understood. "
+        "An FMU may define any other unit by the SI base units. Quantities with a logarithmic scale, such as `dB`, are not known."
+    )
+    prefixes = ((code(name), f"{factor:g}") for name, factor in PREFIXES.items())
+    return page(
+        "Units",
+        intro,
+        f"## Units with prefixes\n\n{table(('unit', 'in SI base units'), map(_unit_row, PREFIXED))}",
+        f"## Units without prefixes\n\n{table(('unit', 'in SI base units'), map(_unit_row, UNPREFIXED))}",
+        f"## Prefixes\n\n{table(('prefix', 'factor'), prefixes)}",
+    )
+
+
+def _unit_row(name: str) -> tuple[str, str]:
+    """Return a unit, and its value in SI base units."""
+    unit = KNOWN_UNITS[name]
+    base = multiply_units(zip(BASE_UNITS, unit.exponents, strict=True))
+    offset = f", zero at {unit.offset:g} K" if unit.offset else ""
+    return code(name), f"{unit.factor:.10g}{'' if base == '1' else f' {base}'}{offset}"
 
 
 def _model_section(entry: Entry) -> str:

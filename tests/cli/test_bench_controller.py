@@ -256,7 +256,8 @@ def test_several_controllers_are_shown_side_by_side_with_their_costs(folder):
     done = bench(folder, lazy(folder), keeper(folder), ROOT / "fmus/strider_autopilot.fmu")
     assert done.returncode == 3, done.stdout + done.stderr
     lines = done.stdout.splitlines()
-    rows = [line.split() for line in lines[lines.index("") + 3 : -2]]
+    cost_line = lines.index("cost: smallest processor time per step; ratio: to ar_drone_geometric")
+    rows = [line.split() for line in lines[lines.index("") + 3 : cost_line]]
     assert rows[0][:7] == ["strider_autopilot", "1", "of", "1", "2", "of", "2"]
     costs = {row[0]: float(row[-2]) for row in rows}
     ratios = {row[0]: float(row[-1]) for row in rows}
@@ -264,11 +265,32 @@ def test_several_controllers_are_shown_side_by_side_with_their_costs(folder):
     assert costs["Keeper"] > 3 * costs["strider_autopilot"] > 0
     assert 0.05 < ratios["strider_autopilot"] < 3
     assert costs["lazy"] / ratios["lazy"] == pytest.approx(costs["Keeper"] / ratios["Keeper"], rel=0.02)
-    assert lines[-2] == "cost: smallest processor time per step; ratio: to ar_drone_geometric"
+    assert [line.partition(" (number")[0] for line in lines[cost_line + 1 : -1]] == [
+        "note: Keeper: variables that the controller lacks",
+        "note: Keeper: left out",
+    ]
     page = (folder / lines[-1].removeprefix("page: ")).read_text()
     assert page.index("strider_autopilot</td>") < page.index("lazy</td>")
+    _, first, *others = page.split("<h2>")[1:3][-1].partition("<thead>")[2].partition("</thead>")[0].split('<th class="number">')
+    assert [each.partition("<")[0] for each in (first, *others)] == ["lazy", "Keeper", "strider_autopilot"]
     assert 'class="number missed" title="check: equals true">no' in page
     assert "http" not in page.split("<body>")[1]
+
+
+def test_failures_of_shipped_controllers_do_not_affect_the_exit_code_of_an_own_one(folder):
+    """The role of a user's project, whose shipped controller is weak; the own controller is the reference of the costs."""
+    fmu, role = str(ROOT / "fmus/strider_autopilot.fmu"), json.loads((ROOT / "scenarios/roles/vessel_autopilot.json").read_text())
+    role["inputs"]["vehicle"]["outputs_of"] = str(ROOT / "fmus/strider.fmu")
+    role |= {"controllers": [str(lazy(folder)), fmu], "cost_reference": fmu}
+    (folder / "own.json").write_text(json.dumps(role))
+    done = bench(folder, fmu, "--all", role="own.json")
+    assert done.returncode == 0, done.stdout + done.stderr
+    lines = done.stdout.splitlines()
+    assert lines[0] == "strider_autopilot (controller 1 of 2)"
+    assert lines[2].startswith("lazy (controller 2 of 2, about ")
+    assert "FAILED  sail" in done.stdout
+    ratios = {line.split()[0]: line.split()[-1] for line in lines if " of 1 " in line}
+    assert ratios["strider_autopilot"] == "1"
 
 
 @pytest.mark.parametrize(

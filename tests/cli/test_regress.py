@@ -89,21 +89,26 @@ def test_a_changed_result_fails_with_signal_time_and_changes(folder):
 
 def test_every_scenario_of_a_folder_is_reported(folder):
     scenario(folder, name="aimless")
+    melted = {"name": "melted", "when": "body.temperature < 60", "outcome": "crash"}
+    scenario(folder, name="cold", stop_when=[melted], **CHECK)
     scenario(folder, name="crashing", rate=99, **CHECK)
     scenario(folder, name="good", rate=0.9, **CHECK)
     scenario(folder, name="warm", rate=0.1, **CHECK)
     done = regress(folder, "scenarios", "--junit", "junit.xml")
     assert done.returncode == 1
     assert [line.split()[:2] for line in done.stdout.splitlines() if line[0] != " "] == [
+        ["FAILED", "cold"],
         ["FAILED", "crashing"],
         ["passed", "good"],
         ["FAILED", "warm"],
-        ["3", "scenarios,"],
+        ["4", "scenarios,"],
     ]
+    assert done.stdout.count("crashed at t = ") == 1
     assert "body: do_step failed at t = 0 s: ValueError: no body cools that fast" in done.stdout
     assert "end.value is 48.5" in done.stdout
     cases = etree.parse(folder / "junit.xml").getroot().findall("testsuite/testcase")
     assert {case.get("name"): [part.tag for part in case] for case in cases} == {
+        "cold": ["failure"],
         "crashing": ["error"],
         "good": [],
         "warm": ["failure"],

@@ -2,7 +2,8 @@ import math
 
 import pytest
 
-from cosim.core.units import BASE_UNITS, Unit, multiply_units, named_unit, parse_unit
+from cosim.core.unit_table import BASE_UNITS, PREFIXED, PREFIXES, UNPREFIXED
+from cosim.core.units import Unit, multiply_units, named_unit, parse_unit
 
 
 @pytest.mark.parametrize(
@@ -97,6 +98,50 @@ def test_degrees_become_radians():
 def test_units_of_the_modelica_standard_library_are_converted(text, like, value, expected):
     factor, offset = parse_unit(text).conversion(parse_unit(like))
     assert factor * value + offset == pytest.approx(expected, rel=1e-12)
+
+
+@pytest.mark.parametrize(
+    ("text", "like", "value", "expected"),
+    [
+        ("mA", "A", 5, 5e-3),
+        ("mV", "V", 2, 2e-3),
+        ("kHz", "1/s", 1, 1e3),
+        ("t", "kg", 1.5, 1500),
+        ("H", "V.s/A", 1, 1),
+        ("Wb", "V.s", 1, 1),
+        ("F", "A.s/V", 1, 1),
+        ("T", "Wb/m2", 1, 1),
+        ("S", "1/Ohm", 1, 1),
+        ("µF", "F", 1, 1e-6),
+        ("kN.m", "N.m", 1, 1e3),
+        ("Nm", "N.m", 1, 1),
+        ("kWh", "MJ", 1, 3.6),
+        ("hPa", "mbar", 1, 1),
+        ("psi", "Pa", 1, 6894.757293168),
+        ("nmi/h", "kn", 1, 1),
+        ("lbf.ft", "N.m", 1, 1.3558179483314),
+        ("mAh", "C", 1, 3.6),
+        ("dm3", "l", 1, 1),
+    ],
+)
+def test_technical_units_and_si_prefixes_are_converted(text, like, value, expected):
+    unit, target = parse_unit(text), parse_unit(like)
+    assert unit.exponents == target.exponents
+    factor, _ = unit.conversion(target)
+    assert factor * value == pytest.approx(expected, rel=1e-12)
+
+
+def test_no_prefixed_unit_has_the_name_of_another_unit_with_another_meaning():
+    prefixed = {f"{prefix}{name}": (prefix, name) for prefix in PREFIXES for name in PREFIXED}
+    assert len(prefixed) == len(PREFIXES) * len(PREFIXED)
+    for text, (prefix, name) in prefixed.items():
+        assert parse_unit(text).factor == pytest.approx(PREFIXES[prefix] * PREFIXED[name][0], rel=1e-15)
+    assert set(prefixed).intersection({*PREFIXED, *UNPREFIXED}) == {"kg"}
+
+
+def test_an_unknown_unit_is_refused_with_the_nearest_one():
+    with pytest.raises(ValueError, match=r'unknown unit "ohm" in "ohm\.m"; did you mean "Ohm"'):
+        parse_unit("ohm.m")
 
 
 def test_celsius_becomes_kelvin():

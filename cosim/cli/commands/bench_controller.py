@@ -15,7 +15,7 @@ from ...core.errors import InputError, Problem
 from ...core.processors import available_processors
 from ...studies.regression_runs import check_unique_names, default_folder, find_scenario_files
 from .. import supervision
-from ..bench_notes import print_omissions, print_trial
+from ..bench_notes import BenchProgress, print_omissions, print_trial
 from ..bench_table import print_ranking, print_side_by_side
 from ..bench_trial import ControllerTrial, TrialResult, run_trials
 from ..completion import complete_role, complete_scenario
@@ -79,7 +79,7 @@ def command(
     Several controllers, or those of --all, are shown side by side: a table here and the page bench.html in the output directory,
     with the processor time per step of each. A scenario that does not feed an input of the controller is not applicable ("n/a")
     and does not count. Exit code 0: all checks passed; 1: a component failed; 2: the controller's variables do not fit the role,
-    or no scenario is applicable; 3: a check failed.
+    or no scenario is applicable; 3: a check failed. The controllers that --all adds to a named CONTROLLER do not affect it.
     """
     from ...scenario.settings import parse_settings
     from ...studies.controller_bench.role import read_role
@@ -92,7 +92,7 @@ def command(
     bench = _Bench(role, files, output_dir, jobs or available_processors(), as_json)
     if len(sources) == 1 and not with_shipped:
         return bench.run_one(sources[0], parse_settings(settings))
-    return bench.run_all(sources)
+    return bench.run_all(sources, number_of_own=len(set(controllers)) or len(sources))
 
 
 def _check_sources(sources: Sequence[str], settings: Sequence[str]) -> None:
@@ -173,26 +173,28 @@ class _Bench:
             print_json({"role": self.role, **trials.as_json()})
         else:
             print_ranking(trials.ranking, trials.name)
+            click.echo("\n" if trials.omissions else "", nl=False)
             print_omissions(trials.omissions)
         return trials.exit_code
 
-    def run_all(self, sources: Sequence[str]) -> int:
-        """Benchmark several controllers and show them side by side."""
+    def run_all(self, sources: Sequence[str], number_of_own: int) -> int:
+        """Benchmark several controllers, show them side by side, and return the exit code of the first `number_of_own`."""
+        from ...studies.controller_bench.candidate import parse_source
         from ...studies.controller_bench.page import order, write_bench_page
 
-        everything = []
+        everything: list[_Trials] = []
+        progress = BenchProgress(len(sources), quiet=self.as_json)
         try:
             for source in sources:
-                if not self.as_json:
-                    click.echo(f"{source}:")
+                progress.print_next(parse_source(source).name)
                 everything.append(self._run_trials(source, {}))
+            progress.print_costs()
             reference, costs = self._measure_costs(everything)
         except _RefusedError as refused:
             return refused.code
         benched = [_side(trials, cost, costs[0]) for trials, cost in zip(everything, costs[1:], strict=True)]
-        ordered = order(benched)
         page = self.output_dir / Path(self.role).stem / "bench.html"
-        write_bench_page(self.role, reference, costs[0], ordered, page)
+        write_bench_page(self.role, reference, costs[0], benched, page)
         if self.as_json:
             shown = [
                 {**trials.as_json(), "cost": each.cost, "cost_ratio": each.cost_ratio}
@@ -200,9 +202,11 @@ class _Bench:
             ]
             print_json({"role": self.role, "reference": reference, "reference_cost": costs[0], "controllers": shown})
         else:
-            print_side_by_side(ordered, reference)
+            print_side_by_side(order(benched), reference)
+            for trials in everything:
+                print_omissions(trials.omissions, trials.name)
             click.echo(f"page: {page}")
-        return min((trials.exit_code for trials in everything), key=EXIT_CODE_SEVERITY.index)
+        return min((trials.exit_code for trials in everything[:number_of_own]), key=EXIT_CODE_SEVERITY.index)
 
     def _run_trials(self, source: str, settings: Mapping[str, Any]) -> _Trials:
         from ...studies.controller_bench.candidate import parse_source

@@ -70,7 +70,9 @@ def command(
     from ...core import resources
     from ...export.build import build
     from ...export.build_check import check_fmus
+    from ..messages import print_log
 
+    print_log()
     root = resources.root()
     if check:
         if sources or output:

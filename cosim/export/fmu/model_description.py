@@ -7,6 +7,7 @@ from typing import Any
 from xml.etree import ElementTree
 
 from ...core import units
+from ...core.unit_table import BASE_UNITS
 from .block import Block, BlockVariable
 from .interface import TableRow, start_values, variable_table
 
@@ -158,7 +159,7 @@ def add_units(root: Element, names: Collection[str]) -> None:
     definitions = _add_element(root, "UnitDefinitions")
     for name in sorted(names):
         unit = units.parse_unit(name)
-        exponents = {base: exponent for base, exponent in zip(units.BASE_UNITS, unit.exponents, strict=True) if exponent}
+        exponents = {base: exponent for base, exponent in zip(BASE_UNITS, unit.exponents, strict=True) if exponent}
         scale = {"factor": unit.factor if unit.factor != 1 else None, "offset": unit.offset or None}
         _add_element(_add_element(definitions, "Unit", name=name), "BaseUnit", **exponents, **scale)
 

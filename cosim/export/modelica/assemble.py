@@ -12,8 +12,6 @@ from typing import Any
 
 import numpy as np
 
-from ...core import units
-from ...core.component import Causality, Variability
 from ...core.errors import InputError, Problem
 from ..fmu.block import Block, BlockVariable, Exchange
 from .c_code.emit import generate_c
@@ -39,14 +37,13 @@ from .model.arithmetic import EvaluationError
 from .model.flat_model import Model, Variable, derivative_name
 from .model.syntax_tree import raise_model_error
 from .model.traversal import variable_names
+from .units import FmiRole, check_units
 
 _FMI_TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "Enumeration": "Enumeration"}
 _DEFAULT_STEP_SIZE = 0.01
 
 #: largest number of values of all variables; an array has one per element
 MAX_MODEL_SIZE = 1_000_000
-
-FmiRole = tuple[Causality, Variability]
 
 
 def load_block(path: Path, model: str | None = None, options: ModelicaOptions = DEFAULT_OPTIONS) -> Block:
@@ -174,8 +171,10 @@ def _source_root(files: Sequence[Path]) -> Path:
 
 def _block_variables(defaults: Interpreter) -> list[BlockVariable]:
     names = struct_members(defaults.model)
-    roles = ((v, _fmi_role(v, defaults)) for v in defaults.model.variables.values())
-    return [_block_variable(v, names[v.name], role, defaults) for v, role in roles if role]
+    roles = [(v, role) for v in defaults.model.variables.values() if (role := _fmi_role(v, defaults))]
+    dropped = check_units(roles)
+    known = ((replace(v, unit="") if v.unit in dropped else v, role) for v, role in roles)
+    return [_block_variable(v, names[v.name], role, defaults) for v, role in known]
 
 
 def _fmi_role(variable: Variable, defaults: Interpreter) -> FmiRole | None:
@@ -216,7 +215,7 @@ def _block_variable(variable: Variable, member: str, role: FmiRole, defaults: In
         causality=role[0],
         variability=role[1],
         start=_to_python(defaults.get(variable.name)),
-        unit=_known_unit(variable.unit, role),
+        unit=variable.unit,
         shape=variable.shape,
         description=variable.description,
         minimum=None if variable.minimum is None else float(np.min(defaults.evaluate(variable.minimum))),
@@ -225,15 +224,6 @@ def _block_variable(variable: Variable, member: str, role: FmiRole, defaults: In
         type_name=variable.enumeration,
         quantity=variable.quantity,
     )
-
-
-def _known_unit(unit: str, role: FmiRole) -> str:
-    """Return the unit, or "" for a parameter with a unit that has no conversion, for example dB."""
-    try:
-        units.parse_unit(unit or "1")
-    except ValueError:
-        return unit if role[0] in ("input", "output") else ""
-    return unit
 
 
 def _literals(variable: Variable, model: Model) -> tuple[str, ...]:

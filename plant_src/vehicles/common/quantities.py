@@ -12,6 +12,8 @@ import math
 from collections.abc import Mapping, Sequence
 from typing import Any
 
+from cosim.core.errors import abbreviate_names
+from cosim.core.unit_table import PREFIXED
 from cosim.core.units import KNOWN_UNITS, Unit, parse_unit
 
 from ...json_reader import JsonPath, JsonReader, Numbers
@@ -80,8 +82,9 @@ class QuantityReader(JsonReader):
 
 def _offered(unit: Unit) -> str:
     """Return the name of a unit, and those of the other known units of the same quantity."""
+    prefixed = [f"{prefix}{unit.name}" for prefix in "mk" if unit.name in PREFIXED]
     others = [name for name, known in KNOWN_UNITS.items() if known.exponents == unit.exponents and name != unit.name]
-    return ", ".join(map(repr, (unit.name, *others)))
+    return abbreviate_names(map(repr, (unit.name, *prefixed, *others)))
 
 
 def _scaled(value: Any, factor: float) -> Any:

@@ -258,3 +258,28 @@ def test_only_models_have_values_when_building(tmp_path):
     (tmp_path / "a.py").write_text("")
     with pytest.raises(InputError, match="only parameters of Modelica models can be set"):
         build_to(tmp_path / "a.py", None, tmp_path / "a.fmu", values={"n": 3})
+
+
+def test_an_unknown_unit_of_a_parameter_is_left_out_with_a_warning_that_names_the_line(write_model, caplog):
+    path = write_model("""model M
+  parameter Real gain(unit = "dB") = 3;
+  parameter Real current(unit = "mA") = 4;
+  input Real u;
+  output Real y(unit = "kHz");
+equation
+  y = gain*u + current;
+end M;""")
+    units = {variable.name: variable.unit for variable in load_block(path).variables}
+    assert (units["gain"], units["current"], units["y"]) == ("", "mA", "kHz")
+    assert [record.getMessage() for record in caplog.records] == [f'{path}:2: gain: the FMU states no unit: unknown unit "dB"']
+
+
+def test_an_unknown_unit_of_an_input_or_output_is_refused_with_its_line(write_model):
+    path = write_model("""model M
+  input Real u(unit = "Volt");
+  output Real y;
+equation
+  y = u;
+end M;""")
+    with pytest.raises(InputError, match=r'M\.mo:2: u: unknown unit "Volt"'):
+        load_block(path)

@@ -77,7 +77,7 @@ FAULTS: list[tuple[Callable[[dict[str, Any]], Any], str]] = [
     (lambda d: d.update(mass=0), r"uav\.model\.mass: found 0, expected a number greater than 0"),
     (
         lambda d: d.update(mass={"value": 1, "unit": "m"}),
-        r"model\.mass\.unit: found 'm', expected a unit that converts to 'kg', 'g'$",
+        r"model\.mass\.unit: found 'm', expected a unit that converts to 'kg', 'g', 't', 'lb'$",
     ),
     (
         lambda d: d["rotor"].update(max_speed={"value": 5000, "unit": "1/min"}),
