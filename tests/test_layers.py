@@ -52,6 +52,8 @@ PLANT_LAYERS = (
     "plausibility",
     "physics",
     "environment",
+    "environment_schema",
+    "world_schema",
     "world_settings",
     "deck_frame",
     "recorded_motion",

@@ -271,6 +271,8 @@ def test_several_controllers_are_shown_side_by_side_with_their_costs(folder):
     ]
     page = (folder / lines[-1].removeprefix("page: ")).read_text()
     assert page.index("strider_autopilot</td>") < page.index("lazy</td>")
+    _, first, *others = page.split("<h2>")[1:3][-1].partition("<thead>")[2].partition("</thead>")[0].split('<th class="number">')
+    assert [each.partition("<")[0] for each in (first, *others)] == ["lazy", "Keeper", "strider_autopilot"]
     assert 'class="number missed" title="check: equals true">no' in page
     assert "http" not in page.split("<body>")[1]
 

@@ -46,6 +46,24 @@ def test_a_phone_shows_the_picture_first(report):
     assert all(abs(x) < 0.9 for x in report(places))
 
 
+def test_a_text_on_a_neutral_background_stands_where_the_picture_will_be(report, chromium):
+    """The page as it is before its script has run, and after the first frame."""
+    context = chromium.new_context(java_script_enabled=False)
+    before = context.new_page()
+    before.goto(report.page.url)
+    loading = before.get_by_text("Loading the replay")
+    assert loading.is_visible()
+    assert loading.bounding_box()["height"] >= 320
+    context.close()
+    report.until("document.querySelector('.stage').dataset.drawn")
+    assert report("getComputedStyle(document.querySelector('.stage')).backgroundColor") not in (
+        "rgba(0, 0, 0, 0)",
+        "rgb(0, 0, 0)",
+    )
+    assert report("document.querySelectorAll('.loading').length") == 1
+    assert not report.page.locator(".loading").is_visible()
+
+
 def test_the_keyboard_reaches_every_control(report):
     assert report(UNREACHABLE) == []
     report.page.keyboard.press("Tab")

@@ -193,9 +193,8 @@ class _Bench:
         except _RefusedError as refused:
             return refused.code
         benched = [_side(trials, cost, costs[0]) for trials, cost in zip(everything, costs[1:], strict=True)]
-        ordered = order(benched)
         page = self.output_dir / Path(self.role).stem / "bench.html"
-        write_bench_page(self.role, reference, costs[0], ordered, page)
+        write_bench_page(self.role, reference, costs[0], benched, page)
         if self.as_json:
             shown = [
                 {**trials.as_json(), "cost": each.cost, "cost_ratio": each.cost_ratio}
@@ -203,7 +202,7 @@ class _Bench:
             ]
             print_json({"role": self.role, "reference": reference, "reference_cost": costs[0], "controllers": shown})
         else:
-            print_side_by_side(ordered, reference)
+            print_side_by_side(order(benched), reference)
             for trials in everything:
                 print_omissions(trials.omissions, trials.name)
             click.echo(f"page: {page}")

@@ -51,14 +51,23 @@ def order(controllers: Sequence[BenchedController]) -> list[BenchedController]:
 def write_bench_page(
     role: str, reference: str, reference_cost: float, controllers: Sequence[BenchedController], path: Path
 ) -> None:
-    """Write a page with ranks, costs per step, and the checked KPIs and goals in every scenario, a column per controller."""
+    """Write a page with ranks, costs per step, and the checked KPIs and goals in every scenario.
+
+    Args:
+        role: the role, or its file.
+        reference: name of the controller whose cost is 1.
+        reference_cost: its processor time per step (s).
+        controllers: the controllers in the order of their columns; a table ranks them.
+        path: file to write.
+    """
     text = render_page(
         "bench.html",
         role=Path(role).stem,
         counts=f"{count_noun(len(controllers), 'controller')} in {count_noun(len(controllers[0].scenarios), 'scenario')}",
         reference=reference,
         reference_cost=1e6 * reference_cost,
-        controllers=controllers,
+        controllers=order(controllers),
+        columns=[each.name for each in controllers],
         scenarios=[(name, list(_kpi_rows(name, controllers))) for name in controllers[0].scenarios],
         version=__version__,
     )

@@ -24,6 +24,8 @@ CellLink = Callable[[MapCell], str]
 COLOUR_MAP = "cividis"
 #: smallest cells that show their success rate, and its interval too (width and height in inches)
 _MIN_CELL_FOR_RATE, _MIN_CELL_FOR_INTERVAL = (0.3, 0.17), (0.44, 0.34)
+#: font sizes of rate and interval in the smallest cells that show both, and the largest ratio of those in larger cells to them
+_RATE_FONT_SIZE, _INTERVAL_FONT_SIZE, _MAX_FONT_RATIO = 7.0, 5.2, 1.35
 #: longest colour bar (in)
 _MAX_COLOUR_BAR_LENGTH = 1.6
 #: room for labels before the first layout (in)
@@ -93,11 +95,13 @@ def _draw_cell(axes: Axes, x: int, y: int, cell: MapCell, size: tuple[float, flo
         return
     ink = "black" if cell.success_rate > 0.5 else "white"
     roomy = size[0] >= _MIN_CELL_FOR_INTERVAL[0] and size[1] >= _MIN_CELL_FOR_INTERVAL[1]
-    axes.text(x, y + 0.2 * roomy, _percent(cell.success_rate), ha="center", va="center", color=ink, fontsize=7)
+    ratio = min(size[0] / _MIN_CELL_FOR_INTERVAL[0], size[1] / _MIN_CELL_FOR_INTERVAL[1], _MAX_FONT_RATIO) if roomy else 1.0
+    style: dict[str, Any] = {"ha": "center", "va": "center", "color": ink}
+    axes.text(x, y + 0.24 * roomy, _percent(cell.success_rate), fontsize=ratio * _RATE_FONT_SIZE, **style)
     if roomy:
         low, high = cell.interval
         detail = f"{cell.passed}/{len(cell.runs)}\n{100 * low:.0f}–{100 * high:.0f} %"
-        axes.text(x, y - 0.19, detail, ha="center", va="center", color=ink, fontsize=4.6, linespacing=1.15)
+        axes.text(x, y - 0.2, detail, fontsize=ratio * _INTERVAL_FONT_SIZE, linespacing=1.15, **style)
 
 
 def _percent(share: float) -> str:

@@ -86,6 +86,9 @@ def test_a_phone_shows_names_on_one_line_and_scrolls_only_tables_and_maps(chromi
     assert opened.evaluate(LOW_CONTRAST) == []
     figure = "(figure) => figure.scrollWidth - figure.clientWidth"
     assert opened.locator(".figures figure").first.evaluate(figure) <= 0  # a map of few cells is not cut
+    assert opened.evaluate("[...document.querySelectorAll('.stacked')].every((part) => part.scrollWidth <= part.clientWidth)")
+    heights = "[...document.querySelectorAll('.figures g[id^=text]')].map((text) => text.getBoundingClientRect().height)"
+    assert min(opened.evaluate(heights)) > 5  # px, without the descent: letters of at least 8 px
     context.close()
 
 

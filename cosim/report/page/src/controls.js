@@ -5,7 +5,7 @@ const PAUSE = '<svg viewBox="0 0 16 16"><path d="M4 2.5h3v11H4zM9 2.5h3v11H9z"/>
 const FULL = '<svg viewBox="0 0 16 16"><path d="M2 6V2h4v1.6H3.6V6zm8-4h4v4h-1.6V3.6H10zM3.6 10v2.4H6V14H2v-4zm8.8 0H14v4h-4v-1.6h2.4z"/></svg>';
 
 const PAGE = `
-<div class="stage"><canvas aria-label="3-D replay"></canvas>
+<div class="stage"><p class="loading">Loading the 3-D view …</p><canvas aria-label="3-D replay"></canvas>
   <div class="overlay"><div class="chips" role="group" aria-label="Vehicles"></div>
   <div class="cameras segmented" role="group" aria-label="Camera"></div></div></div>
 <div class="bar">

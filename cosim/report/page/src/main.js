@@ -35,7 +35,7 @@ async function start(root, data) {
   connectSignals(page, runs[0], plots);
   onThemeChange(() => (view?.recolour(), plots.recolour()));
   player.seek(data.failure ? data.failure.opens : player.time);
-  animate(player, view);
+  animate(player, view, page.stage);
   if (live) {
     player.seek(player.last);
     watch(live, page, command, { player, view, plots, scene: data.scene });
@@ -76,11 +76,13 @@ function sceneView(page, scene, runs) {
   return null;
 }
 
-function animate(player, view) {
+/** Draw every frame; the first one, which may take seconds, replaces the text in the stage. */
+function animate(player, view, stage) {
   let former;
   const frame = (now) => {
     player.advance(former === undefined ? 0 : (now - former) / 1000);
     view?.draw(now, player.playing ? now - former : 0);
+    if (former === undefined) stage.dataset.drawn = "true";
     former = now;
     requestAnimationFrame(frame);
   };
