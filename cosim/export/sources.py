@@ -87,7 +87,10 @@ _VEHICLE_PROGRAM = "plant_src/vehicle_files/block.py"
 _URDF_READER = "plant_src/vehicle_files/urdf.py:vehicle_from_urdf"
 _MESH_READER = "plant_src/vehicle_files/mesh_import.py:vehicle_from_mesh"
 _VEHICLE_CHECK = "plant_src/vehicle_files/plausibility.py:examine_vehicle"
-_VEHICLE_SCHEMA = "plant_src/vehicle_files/schema.py:vehicle_schema"
+#: file and class of the shipped plant
+WORLD = "plant_src/world.py:World"
+_WORLD_SCHEMA = "plant_src/schemas/world.py:world_schema"
+_VEHICLE_SCHEMA = "plant_src/schemas/vehicle.py:vehicle_schema"
 
 
 #: data of a vehicle, its centre of mass in the frame of the imported file (m), and warnings
@@ -99,6 +102,14 @@ def _load_vehicle(path: Path, _model: str | None, _options: ModelicaOptions | No
 
     create_block: Callable[[Path], Block] = load_object(f"{_VEHICLE_PROGRAM}:vehicle_block", resources.root())
     return create_block(path)
+
+
+def world_schema() -> dict[str, Any]:
+    """Return the JSON Schema of the arguments of the shipped plant."""
+    from ..components.python_import import load_object
+
+    create_schema: Callable[[], dict[str, Any]] = load_object(_WORLD_SCHEMA, resources.root())
+    return create_schema()
 
 
 def vehicle_file_schema() -> dict[str, Any]:

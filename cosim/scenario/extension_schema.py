@@ -6,6 +6,7 @@ concern several keys hold for the merged file alone and are left out.
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping
 from typing import Any
 
@@ -36,6 +37,31 @@ def editor_schema(nested: bool = False) -> Schema:
         "else": {"$ref": f"#/$defs/{name}"},
         "$defs": {**definitions, **changes, **roots},
     }
+
+
+def with_arguments(schema: Schema, file_and_class: str, arguments: Schema) -> Schema:
+    """Return the schema of scenarios or nested systems with that of the arguments of a component class in Python.
+
+    It applies to components in files that extend no other file.
+
+    Args:
+        schema: result of `editor_schema`.
+        file_and_class: end of the component's key "python".
+        arguments: schema of the arguments, with its own `$defs`.
+    """
+    root = {key: value for key, value in arguments.items() if key != "$defs"}
+    name = f"ArgumentsOf{file_and_class.rpartition(':')[2]}"
+    condition: Schema = {
+        "properties": {"python": {"type": "string", "pattern": f"{re.escape(file_and_class)}$"}},
+        "required": ["python"],
+    }
+    definitions = schema["$defs"]
+    component = {
+        **definitions["ComponentSpec"],
+        "if": condition,
+        "then": {"properties": {"arguments": {"$ref": f"#/$defs/{name}"}}},
+    }
+    return {**schema, "$defs": {**definitions, **arguments["$defs"], name: root, "ComponentSpec": component}}
 
 
 def _change_of_root(full: Schema, definitions: Mapping[str, Schema]) -> Schema:

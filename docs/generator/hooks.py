@@ -12,7 +12,7 @@ from mkdocs.config.defaults import MkDocsConfig
 from mkdocs.structure.files import File, Files
 from pages import kpis_page, python_page, scenarios_page, units_page, variables_page
 from roles import roles_page
-from schema_keys import scenario_keys_page, study_keys_page
+from schema_keys import scenario_keys_page, study_keys_page, world_keys_page
 
 ROOT = Path(__file__).parents[2]
 #: documents outside of docs/ that the navigation contains; others are found by links
@@ -24,6 +24,7 @@ REFERENCE = {
     "commands": commands_page,
     "scenario_keys": scenario_keys_page,
     "study_keys": study_keys_page,
+    "world_keys": world_keys_page,
     "python": python_page,
     "variables": variables_page,
     "units": units_page,

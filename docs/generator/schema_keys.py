@@ -9,6 +9,7 @@ from typing import Any
 
 from markdown_parts import code, page, plain, table
 
+from cosim.export.sources import world_schema
 from cosim.scenario import json_schema
 from cosim.studies.schema import SweepSpec, TuneSpec, WorstCaseSpec, study_json_schema
 
@@ -23,6 +24,22 @@ def scenario_keys_page() -> str:
         "`cosim schema` prints the schema of this page. [Scenarios](../scenarios.md) explains how the keys work together.",
         *_sections("Scenario", scenario),
         *_sections("Nested system", nested, scenario["$defs"]),
+    )
+
+
+def world_keys_page() -> str:
+    """Return the page with the arguments of the shipped plant, and the functions of its 3-D scenes."""
+    return page(
+        "Arguments of the plant",
+        'A scenario gives these arguments to the component `{"python": "cosim:plant_src/world.py:World", "arguments": {...}}`. '
+        "[The plant](../../plant_src/README.md) explains the models, and "
+        "[Put the shipped plant into your scenario](../how_to/use_the_plant.md) shows an example. "
+        "An editor completes these keys with the schema of `cosim schema`. SI units; the world frame is east-north-up.",
+        *_sections("World", world_schema()),
+        "## Scenes",
+        'The key `"scene"` of a scenario names one of these functions for the 3-D replay, for example '
+        '`{"python": "cosim:plant_src/scene/replay.py:world_scene", "arguments": {"name": "plant"}}`. cosim passes `scenario`.',
+        *(f"::: plant_src.scene.replay.{name}" for name in ("world_scene", "free")),
     )
 
 

@@ -33,6 +33,7 @@ def _schema(kind: str | None) -> dict[str, Any]:
         from ...export.sources import vehicle_file_schema
 
         return vehicle_file_schema()
-    from ...scenario.extension_schema import editor_schema
+    from ...export.sources import WORLD, world_schema
+    from ...scenario.extension_schema import editor_schema, with_arguments
 
-    return editor_schema(kind == "nested")
+    return with_arguments(editor_schema(kind == "nested"), WORLD, world_schema())

@@ -12,7 +12,7 @@ from plant_src.catalogue import MODELS
 
 AR_DRONE, BLUEBOAT, BLUEROV, CRAZYFLIE = "AR.Drone 2.0 in flight", "BlueBoat", "BlueROV2 Heavy", "Crazyflie 2.1"
 CYBERSHIP, HERON, OTTER = "CyberShip II", "Heron", "Otter at sea"
-RUNS, BENDERS = "runs of a BlueBoat, 2024", "flight data, Benders 2020"
+RUNS, LAKE, BENDERS = "runs of a BlueBoat, 2024", "runs of a Kingfisher, 2018", "flight data, Benders 2020"
 GRAVITY = 9.81
 
 
@@ -145,9 +145,20 @@ def test_cybership_turns_by_its_rudders(measured, angle: int) -> None:
     )  # fmt: skip
 
 
-def test_heron_top_speed(measured) -> None:
-    top = run(vessel("heron"), [100.0, 100.0], 20)[-1]
-    measured(HERON, "speed at full power", top, 1.7, "m/s", "maker", relative=0.15)
+def test_heron_runs_straight(measured) -> None:
+    speeds = run(vessel("heron"), [100.0, 100.0], 20)
+    measured(HERON, "speed at full power", speeds[-1], 1.7, "m/s", "maker", relative=0.15)
+    measured(HERON, "speed at full power, on a lake", speeds[-1], 1.5, "m/s", LAKE, relative=0.05)
+    measured(HERON, "acceleration from 0.5 to 1.0 m/s", time_between(speeds, 0.5, 1.0), 0.73, "s", LAKE, relative=0.2)
+
+
+def test_heron_turns(measured) -> None:
+    """A turn from rest with one jet ahead and the other astern."""
+    trial = vessel("heron")
+    headings = np.degrees(run(trial, [-100.0, 100.0], 3.85, lambda trial: trial["usv.attitude.yaw"]))
+    measured(HERON, "turn from 10 to 40 degrees", time_between(headings, 10, 40), 1.0, "s", LAKE, relative=0.25)
+    measured(HERON, "turn from 40 to 80 degrees (identified)", time_between(headings, 40, 80), 1.73, "s", LAKE, relative=0.05)
+    measured(HERON, "speed after 80 degrees", speed(trial), 0.92, "m/s", LAKE, relative=0.15)
 
 
 def test_otter_top_speed(measured) -> None:

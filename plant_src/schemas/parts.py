@@ -11,6 +11,9 @@ from ..vehicles.common.quantities import TEXT_KEYS
 Schema = dict[str, Any]
 
 TEXT: Schema = {"type": "string"}
+NUMBER: Schema = {"type": "number"}
+POSITIVE: Schema = {"type": "number", "exclusiveMinimum": 0}
+AT_LEAST_0: Schema = {"type": "number", "minimum": 0}
 _MATRIX_ROW: Schema = {"type": "array", "items": {"type": "number"}}
 
 
@@ -104,3 +107,45 @@ def with_unit(value: Schema, unit: str, description: str) -> Schema:
     """Return the schema of a value, or of an object with value, unit and source."""
     given = object_schema({"value": {**value, "description": "in `unit`"}, "unit": TEXT}, ("value",))
     return {"anyOf": [value, given], "description": f"{description} [{unit}]"}
+
+
+def documented_object(description: str, properties: dict[str, Schema], required: tuple[str, ...]) -> Schema:
+    """Return the schema of an object with exactly these keys, for the reference and editors."""
+    return {
+        "type": "object",
+        "description": description,
+        "properties": properties,
+        "required": list(required),
+        "additionalProperties": False,
+    }
+
+
+def reference(kind: str) -> Schema:
+    """Return a reference to the schema `kind` of the same file."""
+    return {"$ref": f"#/$defs/{kind}"}
+
+
+def documented_part(kind: str, description: str, example: Schema) -> Schema:
+    """Return the schema of an object of a kind of the same file."""
+    return {**reference(kind), "description": description, "examples": [example]}
+
+
+def documented_value(kind: Schema, description: str, unit: str, example: float, default: float | None = None) -> Schema:
+    """Return the schema of a value with what the reference shows of it; no default: None."""
+    shown: Schema = {} if default is None else {"default": default}
+    return {**kind, "description": description, "unit": unit, "examples": [example], **shown}
+
+
+def documented_vector(
+    description: str,
+    unit: str,
+    example: list[float],
+    default: list[float] | None = None,
+    *,
+    least: int | None = None,
+    most: int | None = None,
+) -> Schema:
+    """Return the schema of a list of numbers, as long as the example or from `least` to `most`."""
+    size = {"minItems": least or len(example), "maxItems": most or len(example)}
+    shown: Schema = {} if default is None else {"default": default}
+    return {"type": "array", "items": NUMBER, **size, "description": description, "unit": unit, "examples": [example], **shown}

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..vehicles.planar_vessel import vehicle_data as planar
 from ..vehicles.surface_vessel import vehicle_data as surface
 from ..vehicles.vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS
-from .schema_parts import (
+from .parts import (
     TEXT,
     Schema,
     family_schema,
