@@ -63,6 +63,12 @@ def test_mass_and_inertia_are_those_of_all_links(tmp_path: Path) -> None:
     assert np.array(data["inertia"]["value"]) == pytest.approx(expected, rel=1e-12, abs=1e-15)
 
 
+def test_a_mass_of_the_accompanying_file_does_not_scale_the_inertia(tmp_path: Path) -> None:
+    data = imported(tmp_path, robot(), {**DATA, "mass": 2.0})
+    assert data["mass"] == 2.0
+    assert data["inertia"] == imported(tmp_path, robot())["inertia"]
+
+
 def test_rotors_are_at_their_links_relative_to_the_centre_of_mass(tmp_path: Path) -> None:
     model = model_from_data(imported(tmp_path, robot()), "quad")
     assert model.airframe is not None
