@@ -156,7 +156,7 @@ def check_node(node: ast.AST, conditions: bool = False) -> None:
         case ast.Call(func=ast.Name(id=name), args=[_, *_] as arguments, keywords=[]):
             _check_call(name, arguments, conditions)
             operands = ()
-        case _ if _spelt_name(node):
+        case _ if spelt_name(node):
             operands = ()
         case _:
             more = ", comparisons, and, or, not" if conditions else ""
@@ -175,23 +175,23 @@ def _check_call(name: str, arguments: Sequence[ast.AST], conditions: bool) -> No
         raise ValueError(f'"{name}" takes {FUNCTIONS[name].expected}, found {len(arguments)}')
 
 
-def _spelt_name(node: ast.AST) -> str:
-    """Return the name that a node spells, such as "landing.time[2]" or "plant.a[1,2]"; "" for any other node."""
+def spelt_name(node: ast.AST) -> str:
+    """Return the name that a syntax node spells, such as "landing.time[2]" or "plant.a[1,2]"; "" for any other node."""
     match node:
         case ast.Name(id=name):
             return name
         case ast.Attribute(value=inner, attr=name):
-            return f"{outer}.{name}" if (outer := _spelt_name(inner)) else ""
+            return f"{outer}.{name}" if (outer := spelt_name(inner)) else ""
         case ast.Subscript(value=inner, slice=ast.Constant(value=int(index))):
-            return f"{outer}[{index}]" if (outer := _spelt_name(inner)) else ""
-        case ast.Subscript(value=inner, slice=ast.Tuple(elts=elements)) if outer := _spelt_name(inner):
+            return f"{outer}[{index}]" if (outer := spelt_name(inner)) else ""
+        case ast.Subscript(value=inner, slice=ast.Tuple(elts=elements)) if outer := spelt_name(inner):
             indices = [element.value for element in elements if isinstance(element, ast.Constant)]
             return f"{outer}[{','.join(map(str, indices))}]" if len(indices) == len(elements) else ""
     return ""
 
 
 def _names(node: ast.AST) -> Iterator[str]:
-    if name := _spelt_name(node):
+    if name := spelt_name(node):
         yield name
         return
     for child in ast.iter_child_nodes(node):
@@ -235,4 +235,4 @@ def _bind_operation(node: ast.AST, reader: Callable[[str], Reader]) -> Callable[
         case ast.Call(func=ast.Name(id=name), args=arguments):
             terms, function = [_bind(argument, reader) for argument in arguments], FUNCTIONS[name].call
             return lambda: function(*(term() for term in terms))
-    return reader(_spelt_name(node))
+    return reader(spelt_name(node))

@@ -7,6 +7,7 @@
 #define Py_LIMITED_API 0x030B0000
 #include <Python.h>
 
+#include <math.h>
 #include <stdbool.h>
 #include <stdint.h>
 #include <string.h>
@@ -28,13 +29,13 @@ static unsigned x87_control(void) {
     return word;
 }
 
-enum { INTERFACE = 6 };                              /* also in native_executor.py, where it is described */
+enum { INTERFACE = 7 };                              /* also in native_executor.py, where it is described */
 enum { WARNING = 1, DISCARD = 2 };                   /* FMI statuses; 0 is OK, everything but OK and WARNING is bad */
 /* Codes passed to `on_status` like an FMI status. They exceed 32 bits, so no FMU can return them. */
 #define FLOAT_MODE_CHANGED (INT64_C(1) << 33)
 #define FLOAT_TRAPS_ENABLED (INT64_C(1) << 34)
 #define NOT_FINITE (INT64_C(1) << 35)
-#define VALUES_CHANGED (INT64_C(1) << 36)
+#define CONDITIONS_CHANGED (INT64_C(1) << 36)
 #define PYTHON_EXCEPTION INT64_MIN
 enum { CONTINUE = 0, END_AFTER_STEP = 1, END_BEFORE_STEP = 2 }; /* answers of `on_status`; the last one discards the macro step */
 enum { MARKER_CALL = 0, MARKER_STEPS = 1, MARKER_ROWS = 2 };    /* marker: number of the current call, completed steps, rows */
@@ -113,8 +114,17 @@ typedef struct {
 
 typedef struct { const char *source; const Py_ssize_t *indices; Py_ssize_t count, item_size, position; } RowPart;
 
-/* A value on which a stop condition depends, and its bytes at the last recorded point. */
-typedef struct { const char *source; size_t size; char last[8]; } WatchedValue;
+/* Instructions of a stop condition; cosim/engine/condition_code.py describes them. */
+typedef enum {
+    PUSH, LOAD, ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER, NEGATE, NOT, ABS, SQRT, EXP, LOG, MIN, MAX, LT, LE, GT, GE, EQ, NE, AND, OR,
+    TRUTH
+} InstructionKind;
+enum { MAX_STACK_DEPTH = 512 };                      /* more than an expression of 1000 characters needs */
+
+typedef struct { InstructionKind kind; double value; const char *source; char source_kind; Py_ssize_t skip; } Instruction;
+
+/* `met`: whether it was met at the last recorded point, -1 before the first one. */
+typedef struct { Instruction *instructions; Py_ssize_t count, depth; int met; } Condition;
 
 typedef struct {
     PyObject_HEAD
@@ -134,9 +144,9 @@ typedef struct {
     RowPart *row_parts;
     Py_ssize_t row_part_count;
     char *row;                  /* address of the next row */
-    WatchedValue *watched_values;
-    Py_ssize_t watched_value_count;
-    int64_t wake_point;         /* from here on VALUES_CHANGED is reported even if no value has changed */
+    Condition *conditions;
+    Py_ssize_t condition_count;
+    int64_t wake_point;         /* from here on CONDITIONS_CHANGED is reported even without a change */
     PackedStep *packed_steps;
     StepCalls *step_calls;
     uint32_t *references;       /* value references of the step calls */
@@ -477,15 +487,74 @@ static int record_row(Program *p, int64_t n) {
 }
 
 /* Report to `on_status` that the stop conditions may have changed at the recorded point n. */
-static int report_changed_values(Program *p, int64_t n) {
-    if (!p->watched_value_count || n % p->record_every) return 0;
-    bool changed = n >= p->wake_point;
-    for (WatchedValue *value = p->watched_values; value < p->watched_values + p->watched_value_count; value++)
-        if (memcmp(value->last, value->source, value->size)) {
-            memcpy(value->last, value->source, value->size);
-            changed = true;
+static double nan_unless_finite(double value, double a, double b) {
+    return isfinite(value) || !isfinite(a) || !isfinite(b) ? value : NAN;
+}
+
+/* Value of an operation on the topmost value `b` and the one below it, `a`; NaN where Python raises an exception. */
+static double apply_operation(InstructionKind kind, double a, double b) {
+    switch (kind) {
+    case ADD: return a + b;
+    case SUBTRACT: return a - b;
+    case MULTIPLY: return a * b;
+    case DIVIDE: return b == 0 ? NAN : a / b;
+    case POWER: return nan_unless_finite(pow(a, b), a, b);
+    case MIN: return b < a ? b : a;
+    case MAX: return b > a ? b : a;
+    case LT: return a < b;
+    case LE: return a <= b;
+    case GT: return a > b;
+    case GE: return a >= b;
+    case EQ: return a == b;
+    case NE: return a != b;
+    case NEGATE: return -b;
+    case NOT: return !b;
+    case ABS: return fabs(b);
+    case SQRT: return sqrt(b);
+    case EXP: return nan_unless_finite(exp(b), b, 0);
+    case LOG: return nan_unless_finite(log(b), b, 0);
+    default: return b != 0; /* TRUTH */
+    }
+}
+
+static bool is_binary(InstructionKind kind) { return (kind >= ADD && kind <= POWER) || (kind >= MIN && kind <= NE); }
+
+static bool is_met(const Condition *condition) {
+    double stack[MAX_STACK_DEPTH];
+    Py_ssize_t depth = 0;
+    for (Py_ssize_t i = 0; i < condition->count; i++) {
+        const Instruction *instruction = condition->instructions + i;
+        InstructionKind kind = instruction->kind;
+        if (kind == PUSH || kind == LOAD) {
+            stack[depth++] = kind == PUSH ? instruction->value : as_double(instruction->source, instruction->source_kind, 0);
+        } else if (kind == AND || kind == OR) {
+            bool met = stack[depth - 1] != 0;
+            if (met == (kind == OR)) {
+                stack[depth - 1] = met;
+                i += instruction->skip;
+            } else {
+                depth--;
+            }
+        } else {
+            bool binary = is_binary(kind);
+            double b = stack[depth - 1], a = binary ? stack[depth - 2] : 0;
+            depth -= binary;
+            stack[depth - 1] = apply_operation(kind, a, b);
         }
-    return changed ? report_status(p, -1, VALUES_CHANGED) : 0;
+        if (depth && isnan(stack[depth - 1])) return false;
+    }
+    return stack[0] != 0;
+}
+
+static int report_changed_conditions(Program *p, int64_t n) {
+    if (!p->condition_count || n % p->record_every) return 0;
+    bool changed = n >= p->wake_point;
+    for (Condition *condition = p->conditions; condition < p->conditions + p->condition_count; condition++) {
+        int met = is_met(condition);
+        changed |= met != condition->met;
+        condition->met = met;
+    }
+    return changed ? report_status(p, -1, CONDITIONS_CHANGED) : 0;
 }
 
 /* ---- packing steps, after their durations have been measured --------------------------------------------------------- */
@@ -634,7 +703,7 @@ static int run_macro_steps(Program *p, int64_t first, int64_t count, double orig
         if (!all_finite(p) && report_status(p, -1, NOT_FINITE) < 0) return -1;
         if (record_row(p, n + 1) < 0) return -1;
         p->marker[MARKER_STEPS] = n + 1;
-        if (report_changed_values(p, n + 1) < 0) return -1;
+        if (report_changed_conditions(p, n + 1) < 0) return -1;
         if (--left < 0) {
             left = steps_per_check;
             if (check_signals(p) < 0) return -1;
@@ -823,16 +892,31 @@ static PyObject *add_row_part(Program *p, PyObject *arguments) {
     Py_RETURN_NONE;
 }
 
-static PyObject *add_watched_value(Program *p, PyObject *arguments) {
-    unsigned long long source, size;
-    if (!PyArg_ParseTuple(arguments, "KK", &source, &size)) return NULL;
-    WatchedValue value = {.source = pointer(source), .size = (size_t)size};
-    if (value.size > sizeof value.last) return PyErr_SetString(PyExc_ValueError, "a watched value has at most 8 bytes"), NULL;
-    memcpy(value.last, value.source, value.size);
-    WatchedValue *values = PyMem_Realloc(p->watched_values, (size_t)(p->watched_value_count + 1) * sizeof value);
-    if (!values) return PyErr_NoMemory();
-    p->watched_values = values;
-    p->watched_values[p->watched_value_count++] = value;
+static PyObject *begin_condition(Program *p, PyObject *unused) {
+    Condition *conditions = PyMem_Realloc(p->conditions, (size_t)(p->condition_count + 1) * sizeof *conditions);
+    if (!conditions) return PyErr_NoMemory();
+    p->conditions = conditions;
+    p->conditions[p->condition_count++] = (Condition){.met = -1};
+    Py_RETURN_NONE;
+}
+
+static PyObject *add_instruction(Program *p, PyObject *arguments) {
+    unsigned long long source;
+    int kind, source_kind;
+    Instruction instruction = {0};
+    if (!PyArg_ParseTuple(arguments, "idKCn", &kind, &instruction.value, &source, &source_kind, &instruction.skip)) return NULL;
+    instruction.kind = (InstructionKind)kind;
+    instruction.source = pointer(source);
+    instruction.source_kind = (char)source_kind;
+    Condition *condition = p->conditions + p->condition_count - 1;
+    bool removes = is_binary(instruction.kind) || instruction.kind == AND || instruction.kind == OR;
+    condition->depth += (instruction.kind == PUSH || instruction.kind == LOAD) - removes;
+    if (condition->depth > MAX_STACK_DEPTH) return PyErr_SetString(PyExc_ValueError, "the condition is nested too deeply"), NULL;
+    Instruction *instructions =
+        PyMem_Realloc(condition->instructions, (size_t)(condition->count + 1) * sizeof *instructions);
+    if (!instructions) return PyErr_NoMemory();
+    condition->instructions = instructions;
+    condition->instructions[condition->count++] = instruction;
     Py_RETURN_NONE;
 }
 
@@ -905,7 +989,8 @@ static void deallocate(Program *p) {
     clear(p);
     PyMem_Free(p->operations);
     PyMem_Free(p->row_parts);
-    PyMem_Free(p->watched_values);
+    for (Py_ssize_t i = 0; i < p->condition_count; i++) PyMem_Free(p->conditions[i].instructions);
+    PyMem_Free(p->conditions);
     PyMem_Free(p->packed_steps);
     PyMem_Free(p->step_calls);
     PyMem_Free(p->references);
@@ -930,9 +1015,10 @@ static PyMethodDef methods[] = {
     {"set_recording", (PyCFunction)set_recording, METH_VARARGS,
      "Set the recording interval (macro steps) and the content of a row."},
     {"add_row_part", (PyCFunction)add_row_part, METH_VARARGS, "Add indexed values of one type to each row."},
-    {"add_watched_value", (PyCFunction)add_watched_value, METH_VARARGS, "Add a value that a stop condition depends on."},
+    {"begin_condition", (PyCFunction)begin_condition, METH_NOARGS, "Begin a stop condition."},
+    {"add_instruction", (PyCFunction)add_instruction, METH_VARARGS, "Add an instruction of the stop condition."},
     {"set_wake_point", (PyCFunction)set_wake_point, METH_VARARGS,
-     "Set the point from which on changed values are reported even without a change."},
+     "Set the point from which on changed conditions are reported even without a change."},
     {"set_row_address", (PyCFunction)set_row_address, METH_VARARGS, "Set the address at which the next row is written."},
     {"step_durations", (PyCFunction)step_durations, METH_NOARGS,
      "Return (call number, shortest duration in ns) of all doStep calls."},
@@ -954,9 +1040,12 @@ static struct PyModuleDef module = {PyModuleDef_HEAD_INIT, "_native", "The nativ
 
 static const struct { const char *name; int64_t value; } constants[] = {
     {"INTERFACE", INTERFACE}, {"FLOAT_MODE_CHANGED", FLOAT_MODE_CHANGED}, {"FLOAT_TRAPS_ENABLED", FLOAT_TRAPS_ENABLED},
-    {"NOT_FINITE", NOT_FINITE}, {"VALUES_CHANGED", VALUES_CHANGED}, {"CONTINUE", CONTINUE}, {"END_AFTER_STEP", END_AFTER_STEP},
+    {"NOT_FINITE", NOT_FINITE}, {"CONDITIONS_CHANGED", CONDITIONS_CHANGED}, {"CONTINUE", CONTINUE}, {"END_AFTER_STEP", END_AFTER_STEP},
     {"END_BEFORE_STEP", END_BEFORE_STEP}, {"MARKER_CALL", MARKER_CALL},
-    {"MARKER_STEPS", MARKER_STEPS}, {"MARKER_ROWS", MARKER_ROWS}, {"MEASURED_STEPS", MEASURED_STEPS},
+    {"MARKER_STEPS", MARKER_STEPS}, {"MARKER_ROWS", MARKER_ROWS}, {"MEASURED_STEPS", MEASURED_STEPS}, {"PUSH", PUSH},
+    {"LOAD", LOAD}, {"ADD", ADD}, {"SUBTRACT", SUBTRACT}, {"MULTIPLY", MULTIPLY}, {"DIVIDE", DIVIDE}, {"POWER", POWER},
+    {"NEGATE", NEGATE}, {"NOT", NOT}, {"ABS", ABS}, {"SQRT", SQRT}, {"EXP", EXP}, {"LOG", LOG}, {"MIN", MIN}, {"MAX", MAX},
+    {"LT", LT}, {"LE", LE}, {"GT", GT}, {"GE", GE}, {"EQ", EQ}, {"NE", NE}, {"AND", AND}, {"OR", OR}, {"TRUTH", TRUTH},
 };
 
 static int add_object(PyObject *self, const char *name, PyObject *object) {

@@ -23,7 +23,7 @@ except ImportError:  # installed without a C compiler
     _native = None  # type: ignore[assignment]  # a module cannot be declared optional
 
 #: number of the interface of `_native.c`; raised with every change of a function, an argument, a code or the marker
-INTERFACE = 6
+INTERFACE = 7
 #: average number of values in contiguous runs from which a run is copied as a block of memory
 MIN_BLOCK_VALUES = 8
 #: most macro steps per call; the first call is shorter, because it measures the durations of the steps
@@ -67,8 +67,11 @@ class NativeExecutor(Executor):
         doubles, singles = (_address_and_length(by_item_size.get(size, np.zeros(0))) for size in (8, 4))
         self._program.set_monitored_floats(*doubles, *singles)
         self._add_recording()
-        for values in self.stop_conditions.monitored_values():
-            self._program.add_watched_value(_address(values), values.itemsize)
+        for instructions in self.stop_conditions.instructions():
+            self._program.begin_condition()
+            for each, source in instructions:
+                kind = source.dtype.char.translate(_STRUCT_CODES)
+                self._program.add_instruction(getattr(_native, each.operation), each.value, _address(source), kind, each.skip)
 
     def _native_transfers(self, transfer: Transfer) -> int:
         in_loop = all(transfer not in phase.transfers for phase in self.plan.phases)
@@ -174,7 +177,7 @@ class NativeExecutor(Executor):
         if status == _native.FLOAT_TRAPS_ENABLED:
             self._restore_float_traps(self.completed_steps + 1)
             return _native.CONTINUE
-        if status == _native.VALUES_CHANGED:
+        if status == _native.CONDITIONS_CHANGED:
             self._check_stop_conditions(self.completed_steps)
             self._program.set_wake_point(self.stop_conditions.wake_point)
         else:

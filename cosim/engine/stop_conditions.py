@@ -9,6 +9,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.expressions import Expression, Reader
+from .condition_code import Instruction, compile_condition
 from .layout import ArrayPosition
 from .plan import Plan
 from .settings import StopCondition, StopOutcome
@@ -67,11 +68,17 @@ class StopConditions:
         index = position.offset
         return lambda: float(values[index])
 
-    def monitored_values(self) -> Iterator[np.ndarray]:
-        """Yield an array of one element for each signal that a condition depends on."""
-        for name in dict.fromkeys(name for condition in self._conditions for name in condition.expression.names):
-            position = self._position(name)
-            yield self._plan.outputs.arrays[position.dtype][position.offset : position.offset + 1]
+    def instructions(self) -> Iterator[list[tuple[Instruction, np.ndarray]]]:
+        """Yield for each condition its instructions in C, each with an array that begins with the value that it loads."""
+        for condition in self._conditions:
+            yield [(each, self._values_from(each.name)) for each in compile_condition(condition.expression.tree)]
+
+    def _values_from(self, name: str) -> np.ndarray:
+        """Return the values from that of a signal on; an empty array without a name."""
+        if not name:
+            return np.zeros(0)
+        position = self._position(name)
+        return self._plan.outputs.arrays[position.dtype][position.offset :]
 
     def check(self, n: int) -> MetCondition | None:
         """Evaluate all conditions at the recorded communication point `n`, and return the one that ends the simulation."""
