@@ -87,7 +87,6 @@ class World(Component):
         self._name = instance_name
         self._bullet_step, self._step_size, self._start_time = np.zeros(1), math.nan, 0.0
         self._step_fractions: Sequence[float] = ()
-        self._highest_water = np.full(1, settings.sea.highest_elevation)
         self._flags = np.zeros((len(settings.vehicles), FLAG_COUNT), _FLAG)
         self._flags_data = self._flags.reshape(-1).data
         self._bound_inputs: dict[str, np.ndarray] = {}
@@ -126,8 +125,7 @@ class World(Component):
 
     def _populate(self, settings: WorldSettings) -> None:
         fixed = create_fixed_bodies(self._client, settings.platforms, settings.obstacles)
-        shared = {"step_size": self._bullet_step, "highest_water": self._highest_water}
-        self._fleet = Fleet(self._client, settings.vehicles, fixed.boxes, shared, self._flags, fixed.names)
+        self._fleet = Fleet(self._client, settings.vehicles, fixed.boxes, self._bullet_step, self._flags, fixed.names)
         self._advance, self._contacts, self._failures = self._fleet.advance, self._fleet.contacts, self._fleet.failures
         self._check_overlaps(fixed.paths | {body.body_id: f"vehicles.{body.name}" for body in self._fleet.bodies})
         self._environment = EnvironmentModel(
@@ -136,7 +134,6 @@ class World(Component):
             settings.vehicles,
             settings.platforms,
             self._fleet.bodies,
-            self._highest_water,
         )
         self._has_environment = bool(self._environment.update_functions)
         for vehicle in settings.vehicles:

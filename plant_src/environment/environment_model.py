@@ -38,7 +38,6 @@ class EnvironmentModel:
         vehicles: All vehicles.
         platforms: All platforms.
         bodies: Contact body of each vehicle.
-        highest_water: Output: height that no crest exceeds (m), shape (1,).
 
     Attributes:
         values: Inputs and outputs, which are the whole state: everything else is a function of time and seed.
@@ -58,7 +57,6 @@ class EnvironmentModel:
         vehicles: Sequence[VehiclePlacement],
         platforms: Sequence[Platform],
         bodies: Sequence[ContactBody],
-        highest_water: np.ndarray,
     ):
         self._wind_vehicles = _bodies_with_input(bodies, "wind.x") if environment.wind else []
         self._wave_vessels = [body for body in bodies if isinstance(body, FloatingBody)] if environment.waves else []
@@ -76,8 +74,9 @@ class EnvironmentModel:
         self.wind_is_without_effect = has_wind and not any(any(_air_drag(vehicle)) for vehicle in vehicles)
         self._wave_gain: Any = self._input_view("wave_gain") if environment.waves else np.ones(1).data
         self._elevation = sea.elevation_function()
-        self._highest_water: Any = highest_water.data
         self._highest_elevation = sea.highest_elevation
+        #: height that no crest exceeds (m)
+        self._highest_water: Any = np.full(1, sea.highest_elevation).data
         for body in _bodies_with_input(bodies, "water_level"):
             input_data(body, "water_level")[0] = 0.0
         self.update_functions = list(self._create_updates(environment, bodies))

@@ -90,8 +90,7 @@ class ContactBody:
         Args:
             client: Number of the Bullet client.
             vehicle: Vehicle to create.
-            arrays: Arrays of the sizes that `array_sizes` returns, and those that all vehicles share: "step_size" (s) and
-                "highest_water" (m).
+            arrays: Arrays of the sizes that `array_sizes` returns, and "step_size" (s), which all vehicles share.
         """
         self.name, self.model, self._client = vehicle.name, vehicle.model, client
         parameters = np.array(vehicle.model.equation_parameters(vehicle.parameters))
@@ -172,7 +171,7 @@ class FreeBody(ContactBody):
     ARRAY_SIZES = {**ContactBody.ARRAY_SIZES, "compensating_torque": 3}
     INITIALIZE_ARRAYS: ClassVar[ArrayNames] = (("parameters", "principal_axes"), ContactBody.INITIALIZE_ARRAYS[1])
     PREDICT_ARRAYS: ClassVar[ArrayNames] = (
-        (*PREDICT_ARGUMENTS, "principal_axes", "highest_water"),
+        (*PREDICT_ARGUMENTS, "principal_axes"),
         (*PREDICT_RESULTS, "compensating_torque", "bullet_pose", "endpoints", "step_status"),
     )
 

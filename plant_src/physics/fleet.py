@@ -55,8 +55,7 @@ class Fleet:
         client: Number of the Bullet client.
         vehicles: Vehicles to create.
         fixed: Bounding boxes of platforms and obstacles, which exist in Bullet already.
-        shared: Arrays of shape (1,) that the owner may change between steps: "step_size", the duration of a step (s), and
-            "highest_water", the height of the highest possible water surface (m).
+        step_size: Duration of a step (s), shape (1,); the owner may change it between steps.
         flags: Flags of each vehicle (`failures.py`), shape (vehicles, FLAG_COUNT).
         fixed_names: Name of each platform and obstacle by its number in Bullet.
 
@@ -74,14 +73,14 @@ class Fleet:
         client: int,
         vehicles: Sequence[VehiclePlacement],
         fixed: Sequence[BoundingBox],
-        shared: Mapping[str, np.ndarray],
+        step_size: np.ndarray,
         flags: np.ndarray,
         fixed_names: Mapping[int, str],
     ):
         self._client, self._flags = client, flags
         self._memory = memory = VehicleArrays([body_class(vehicle.model).array_sizes(vehicle.model) for vehicle in vehicles])
         self.bodies: list[ContactBody] = [
-            body_class(vehicle.model)(client, vehicle, {**arrays, **shared})
+            body_class(vehicle.model)(client, vehicle, {**arrays, "step_size": step_size})
             for vehicle, arrays in zip(vehicles, memory.of_vehicle, strict=True)
         ]
         self.inputs, self.outputs = memory.of_all_vehicles["inputs"], memory.of_all_vehicles["outputs"]

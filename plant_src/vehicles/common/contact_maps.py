@@ -8,9 +8,9 @@
     contact_correct     state at the start, predicted state, commanded twist, Bullet's twist, constants, step size
                         -> state, magnitude of the contact impulse (0 without contact), outputs
 
-Each kind of body has further arguments and results: a free body the orientation of its principal axes and the height of the
-highest possible water surface, a planar one its vertical load, a floating one its contact impulse. Floating vessels also
-export `water_elevation` (`common/water_surface.py`), and multirotors `surroundings` (`multirotor/surroundings.py`).
+Each kind of body has further arguments and results: a free body the orientation of its principal axes, a planar one its
+vertical load, a floating one its contact impulse. Floating vessels also export `water_elevation` (`common/water_surface.py`),
+and multirotors `surroundings` (`multirotor/surroundings.py`).
 
 The twist that Bullet changes in contact, times the mass and inertia of Bullet's body, gives the contact impulse. Divided by the
 mass and inertia of the vehicle it is added to the predicted velocity. In contact the published velocity is Bullet's mean velocity
@@ -36,6 +36,9 @@ from .step_status import INVALID_STATE, LEAVES_SAFE_BOX, MAX_STATE_NORM, MAY_FAI
 
 #: longest step of the world (s)
 MAX_WORLD_STEP = 0.01
+
+#: speed (m/s) that the water surface does not exceed vertically; its slope is at most 1
+MAX_SURFACE_SPEED = 10.0
 
 #: elements of a twist, and of a force with its torque
 TWIST_SIZE = 6
@@ -68,16 +71,22 @@ class FreeContactMaps:
     def _predict_function(self) -> ca.Function:
         arguments = predict_symbols(self.model)
         state, end, step = arguments[0], predicted_state(self.model, *arguments[:5]), arguments[4]
-        axes, highest_water = create_symbols(principal_axes=4, highest_water=1)
+        (axes,) = create_symbols(principal_axes=4)
         linear = (end[0:3] - state[0:3]) / step
         angular = kinematics.rotation_vector(kinematics.quaternion_product(end[3:7], kinematics.conjugate(state[3:7]))) / step
         # cancels the gyroscopic torque that Bullet adds to its body
         torque = ca.cross(angular, self.rigid_body(arguments[3]).inertia_in_world(state[3:7]) @ angular)
         twist, endpoints = ca.vertcat(linear, angular), ca.vertcat(state[0:3], end[0:3])
-        may_fail = ca.logic_or(end[2] < highest_water, is_upside_down(end[3:7]))
+        may_fail = ca.logic_or(self._may_be_in_water(end, *arguments[2:5:2]), is_upside_down(end[3:7]))
         status = step_status(end, endpoints, arguments, may_fail)
         results = [state, end, twist, twist, torque, principal_pose(state, axes), endpoints, status]
-        return ca.Function("contact_predict", [*arguments, axes, highest_water], results)
+        return ca.Function("contact_predict", [*arguments, axes], results)
+
+    def _may_be_in_water(self, end: ca.SX, environment_inputs: ca.SX, step: ca.SX) -> ca.SX:
+        """Return whether the surface can reach the centre of mass in a step; its level is that at the start of the step."""
+        environment = [variable.name for variable in self.model.elements("input") if variable.name in ENVIRONMENT_INPUTS]
+        level = environment_inputs[environment.index("water_level")]
+        return end[2] < level + step * (MAX_SURFACE_SPEED + ca.norm_2(end[7:10]))
 
     def _correct_function(self) -> ca.Function:
         start, predicted, twist, bullet_twist, constants, step = arguments = correct_symbols(self.model)

@@ -11,5 +11,5 @@ MAX_STATE_NORM = 1e5
 #: valid; the vehicle leaves the box in which it cannot meet anything; an input or the state is not finite, or too large
 VALID, LEAVES_SAFE_BOX, INVALID_STATE = 0.0, 1.0, 2.0
 
-#: the vehicle ends upside down, or a multirotor below the highest possible water surface
+#: the vehicle ends upside down, or a multirotor where the water surface may be
 MAY_FAIL = 4.0
