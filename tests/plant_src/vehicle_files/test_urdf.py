@@ -16,12 +16,12 @@ from world_harness import WorldHarness
 from cosim.cli.commands.new_vehicle import command
 from cosim.core.errors import InputError
 from plant_src.catalogue import model_from_data
-from plant_src.urdf import vehicle_from_urdf
+from plant_src.vehicle_files.urdf import vehicle_from_urdf
 
 ARM = 0.2
 ANGLES = {"front_left": 45, "rear_left": 135, "rear_right": 225, "front_right": 315}
 #: the example of the documentation
-PAGE = Path(__file__).parents[2] / "plant_src/vehicles/data/README.md"
+PAGE = Path(__file__).parents[3] / "plant_src/vehicles/data/README.md"
 (EXAMPLE,) = re.findall(r'^```json\n(\{"family": "multirotor".*?)^```$', PAGE.read_text(), re.MULTILINE | re.DOTALL)
 DATA: dict[str, Any] = json.loads(EXAMPLE)
 BODY = """<link name="base"><inertial><origin xyz="0 0 0.02" rpy="0 0 0.5"/><mass value="0.8"/>
