@@ -86,6 +86,12 @@ def test_a_new_controller_declares_the_variables_of_its_role(moved, role, langua
     assert done.returncode == 0, done.stderr
 
 
+def test_the_scenario_of_a_new_controller_gets_no_recommendations_and_warnings(moved, role):
+    done = cosim("check", "my_pilot/my_pilot.json", cwd=moved(role, "python"))
+    assert "recommendation for the order\n  none: " in done.stdout
+    assert "No warnings." in done.stdout
+
+
 def test_all_languages_give_the_same_trajectory(moved, role):
     ours, theirs, reference = (
         Result.from_csv(moved(role, one) / "runs/my_pilot/result.csv") for one in ("modelica", "c", "python")
