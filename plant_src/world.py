@@ -26,9 +26,9 @@ from .physics.contacts import overlap_depths
 from .physics.failures import FLAG_COUNT
 from .physics.fixed_bodies import create_fixed_bodies
 from .physics.fleet import Fleet, FleetState
-from .plausibility import vehicle_warnings
 from .scene import replay
 from .variable_views import recorded_others, variable_views, views_in_parts
+from .vehicle_files.plausibility import vehicle_warnings
 from .world_settings import INITIAL_PREFIX, WAVE_PREFIX, WorldSettings
 
 if TYPE_CHECKING:

@@ -93,7 +93,7 @@ def evaluate_scenario_checks(prepared: PreparedRun, result: Result) -> list[Chec
         result: A result with KPIs.
 
     Returns:
-        The outcome of each check, in the order of the scenario. A check of an optional KPI that was left out is not met.
+        The outcome of each check, in the order of the scenario. A check of an optional KPI that was left out fails.
 
     Raises:
         InputError: A check names a KPI that the result does not have.

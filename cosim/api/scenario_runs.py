@@ -93,7 +93,7 @@ def run(
         **options: `stop_time`, `step_size`, `real_time`, `late`, `isolation` and `sandbox`, see `load`.
 
     Returns:
-        The recorded signals, KPIs and outcomes of the checks. A check that is not met raises no error.
+        The recorded signals, KPIs and outcomes of the checks. A failed check raises no error.
 
     Raises:
         InputError: The scenario cannot be run, or a KPI refuses its arguments.

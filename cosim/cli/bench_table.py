@@ -30,7 +30,7 @@ def print_ranking(ranking: Ranking, candidate: str) -> None:
     click.echo()
     for place, name in enumerate(names, 1):
         found = standings[name]
-        checks = f"{found.met} of {count_noun(found.checks, 'check')} met"
+        checks = f"{found.met} of {count_noun(found.checks, 'check')} passed"
         place = 1 if ranking.verdict == "equal" else place
         click.echo(f"{place}. {name:{width}}  {found.passed} of {count_noun(found.scenarios, 'scenario')} passed, {checks}")
     goals = [
@@ -43,7 +43,7 @@ def print_ranking(ranking: Ranking, candidate: str) -> None:
 
 
 def print_side_by_side(controllers: Sequence[BenchedController], reference: str) -> None:
-    """Print a line per controller: scenarios passed, checks met and costs per step.
+    """Print a line per controller: scenarios passed, checks passed and costs per step.
 
     Args:
         controllers: the controllers, the best first.
@@ -105,5 +105,5 @@ def _format_value(value: Number | None) -> str:
 
 
 def _format_checks(row: KpiComparison) -> str:
-    words = ("[green]{} met[/]" if outcome.passed else "[bold red]{} not met[/]" for outcome in row.checks)
+    words = ("[green]{} passed[/]" if outcome.passed else "[bold red]{} failed[/]" for outcome in row.checks)
     return ", ".join(word.format(outcome.limits) for word, outcome in zip(words, row.checks, strict=True))

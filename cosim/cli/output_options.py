@@ -48,7 +48,7 @@ QUIET = click.Option(
     is_eager=True,
     expose_value=False,
     callback=_be_quiet,
-    help="Print only warnings, errors and unmet checks, to standard error; with --json also the JSON text.",
+    help="Print only warnings, errors and failed checks, to standard error; with --json also the JSON text.",
 )
 VERBOSE = click.Option(
     ["-v", "--verbose"],

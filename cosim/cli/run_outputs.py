@@ -145,13 +145,13 @@ def _write_result_files(outcome: RunOutcome) -> None:
 
 
 def _print_kpis(outcome: RunOutcome) -> None:
-    """Print the table of KPIs; with --quiet, print only the checks that are not met."""
+    """Print the table of KPIs; with --quiet, print only the failed checks."""
     if outcome.options.as_json:
         return
     if current_command_line().verbosity < 0:
         for check in outcome.checks:
             if not check.passed:
-                click.echo(f"check not met: {check}", err=True)
+                click.echo(f"check failed: {check}", err=True)
     from ..report.tables import print_kpis
 
     result, about = outcome.result, outcome.result.metadata
@@ -210,12 +210,12 @@ def _print_summary(outcome: RunOutcome) -> None:
 
 
 def _summarize_checks(checks: Sequence[CheckOutcome]) -> str:
-    """Return a line that says how many checks are met, and which ones are not; "" if there are none."""
+    """Return a line that says how many checks passed, and which ones failed; "" if there are none."""
     if not checks:
         return ""
-    unmet = "".join(f"\n  {check}" for check in checks if not check.passed)
-    met = sum(check.passed for check in checks)
-    return f"{met} of {count_noun(len(checks), 'check')} met{unmet and ', not met:'}{unmet}\n"
+    failed = "".join(f"\n  {check}" for check in checks if not check.passed)
+    passed = sum(check.passed for check in checks)
+    return f"{passed} of {count_noun(len(checks), 'check')} passed{failed and ', failed:'}{failed}\n"
 
 
 def _print_termination(outcome: RunOutcome) -> None:

@@ -83,14 +83,14 @@ def _load_equations(path: Path, _model: str | None, _options: ModelicaOptions | 
 
 
 #: program whose function `vehicle_block` makes the block of a vehicle file
-_VEHICLE_PROGRAM = "plant_src/vehicle_block.py"
-_URDF_READER = "plant_src/urdf.py:vehicle_from_urdf"
-_MESH_READER = "plant_src/mesh_import.py:vehicle_from_mesh"
-_VEHICLE_CHECK = "plant_src/plausibility.py:examine_vehicle"
+_VEHICLE_PROGRAM = "plant_src/vehicle_files/block.py"
+_URDF_READER = "plant_src/vehicle_files/urdf.py:vehicle_from_urdf"
+_MESH_READER = "plant_src/vehicle_files/mesh_import.py:vehicle_from_mesh"
+_VEHICLE_CHECK = "plant_src/vehicle_files/plausibility.py:examine_vehicle"
 #: file and class of the shipped plant
 WORLD = "plant_src/world.py:World"
-_WORLD_SCHEMA = "plant_src/world_schema.py:world_schema"
-_VEHICLE_SCHEMA = "plant_src/vehicle_schema.py:vehicle_schema"
+_WORLD_SCHEMA = "plant_src/schemas/world.py:world_schema"
+_VEHICLE_SCHEMA = "plant_src/schemas/vehicle.py:vehicle_schema"
 
 
 #: data of a vehicle, its centre of mass in the frame of the imported file (m), and warnings

@@ -22,7 +22,7 @@ class Failure(NamedTuple):
 
 
 def find_failure(result: Result, outcomes: Sequence[CheckOutcome]) -> Failure | None:
-    """Return the failure of a run; None if it ended with all checks met.
+    """Return the failure of a run; None if it ended with all checks passed.
 
     A component that failed: the last row. A crash: the time at which its condition was met. A check: the value `time` of the same
     KPI function (of a touchdown, for example) if there is one, else the last row.
@@ -35,7 +35,7 @@ def find_failure(result: Result, outcomes: Sequence[CheckOutcome]) -> Failure | 
     elif failed:
         name = failed[0].check["kpi"]
         time = float(result.kpis.get(f"{name.partition('.')[0]}.time", math.nan))
-        time, label = time if math.isfinite(time) else float(result.time[-1]), f"{name} not met"
+        time, label = time if math.isfinite(time) else float(result.time[-1]), f"check of {name} failed"
     else:
         return None
     return Failure(time, label, max(float(result.time[0]), time - LEAD_TIME))

@@ -43,7 +43,7 @@ class FunctionSpec(CallSpec):
 
 
 class CheckSpec(Spec):
-    """A requirement on a KPI value; a run passes if it meets all checks."""
+    """A requirement on a KPI value; a run passes if all its checks pass."""
 
     model_config = ConfigDict(json_schema_extra=_CHECK_RULES)
 

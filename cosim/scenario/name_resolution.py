@@ -13,7 +13,7 @@ import numpy as np
 
 from ..core.binary_text import parse_binary
 from ..core.component import Component, Variable
-from ..core.errors import did_you_mean
+from ..core.errors import abbreviate_names, did_you_mean
 from ..core.text import shorten, text_problem
 from .nested_systems import Node
 from .schema import ScenarioSpec
@@ -167,8 +167,10 @@ def check_assignment(
         if len(value) != len(names):
             raise ValueError(f'"{text}" takes {len(names)} values, found {len(value)}')
         return {each: _check_value(variables[each], element) for each, element in zip(names, value, strict=True)}
-    settable = [v.name for v in variables.values() if v.causality in ("parameter", "input")]
-    raise UnknownNameError(f'component "{name}" has no variable "{text}"{did_you_mean(text, settable)}')
+    settable = [v.name for causality in ("parameter", "input") for v in variables.values() if v.causality == causality]
+    valid = abbreviate_names(re.sub(r"\[\d+\]$", "", each) for each in settable)
+    hint = did_you_mean(text, settable) or (valid and f"; valid: {valid}")
+    raise UnknownNameError(f'component "{name}" has no variable "{text}"{hint}')
 
 
 def _with_element(

@@ -28,6 +28,18 @@ _TIME_PATTERN = rf"^[-+]?{_UNSIGNED_TIME}"
 _POSITIVE_TIME_PATTERN = rf"^\+?(?=[0-9.]*[1-9]){_UNSIGNED_TIME}"
 
 
+class PlacedError(ValueError):
+    """Violation that a validator of a whole object finds in a part of it.
+
+    Attributes:
+        path: Keys and indices of the part, from the validated object.
+    """
+
+    def __init__(self, message: str, *path: str | int) -> None:
+        super().__init__(message)
+        self.path = path
+
+
 def _parse_time(value: Any) -> Fraction:
     is_time = re.fullmatch(_TIME_PATTERN, value) if isinstance(value, str) else isinstance(value, int | float)
     if isinstance(value, bool) or not is_time:

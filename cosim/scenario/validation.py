@@ -19,7 +19,7 @@ from ..core.json_values import copy_json
 from ..core.text import REPLACEMENT, count_noun
 from .json_document import Document
 from .schema import SystemSpec
-from .schema_types import INVALID
+from .schema_types import INVALID, PlacedError
 
 S = TypeVar("S", bound=SystemSpec)
 
@@ -150,7 +150,8 @@ def _may_mean(key: str, required: str) -> bool:
 
 
 def _error_path(detail: Any) -> tuple[str | int, ...]:
-    return tuple(key for key in detail["loc"] if key != "[key]")
+    place = getattr(detail.get("ctx", {}).get("error"), "path", ())
+    return (*(key for key in detail["loc"] if key != "[key]"), *place)
 
 
 def _error_message(kind: type[BaseModel], path: Sequence[str | int], detail: Any) -> str:
@@ -161,7 +162,8 @@ def _error_message(kind: type[BaseModel], path: Sequence[str | int], detail: Any
         case "missing":
             return f'the key "{path[-1]}" is missing'
         case "value_error":
-            return f"{detail['ctx']['error']}; found {found}"
+            error = detail["ctx"]["error"]
+            return str(error) if not path or isinstance(error, PlacedError) else f"{error}; found {found}"
         case "dict_type" | "model_type":
             is_removal = detail["input"] is None and len(path) == 2 and path[0] == "components"
             hint = '; a scenario that "extends" this one removes a component by null' if is_removal else ""

@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, Field, StringConstraints, model_validator
 
 from ..core.errors import did_you_mean
-from ..scenario.schema_types import Integer, NameList, Spec, key
+from ..scenario.schema_types import Integer, NameList, PlacedError, Spec, key
 
 #: arguments of each distribution; `min` and `max` of truncated_normal are optional
 DISTRIBUTIONS = {
@@ -162,3 +162,19 @@ class FactorSpec(Spec):
         for level in (self.levels or {}).values():
             yield from level.items()
         yield from ((path, value) for path in self.set or () for value in self.values or (None,))
+
+    def has_labels(self, sampled: bool) -> bool:
+        """Return whether the factor has levels that can be shown along an axis; `sampled`: the design is not full factorial."""
+        if self.values is not None:
+            return not any(isinstance(value, list | dict) for value in self.values)
+        return self.levels is not None or not sampled
+
+
+def check_level_counts(factors: Sequence[FactorSpec]) -> None:
+    """Raise PlacedError if a factor of a full factorial design has no number of levels."""
+    for i, factor in enumerate(factors):
+        for kind in ("range", "distribution"):
+            part = getattr(factor, kind)
+            if part and part.count is None:
+                text = f'the factor "{factor.name}" needs a "count" in a full factorial design'
+                raise PlacedError(text, "factors", i, kind)

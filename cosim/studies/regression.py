@@ -169,7 +169,7 @@ class _FinishedRun:
         return checks
 
     def failed_checks(self, checks_only: bool = False) -> list[str]:
-        """Return the checks that are not met, after the crash that ended the run early (unless `checks_only`)."""
+        """Return the failed checks, after the crash that ended the run early (unless `checks_only`)."""
         from ..results.checks import evaluate_all_checks
 
         kpis = {name: math.nan if value is None else value for name, value in self.result.kpis.items()}

@@ -3,16 +3,25 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterable
+from collections.abc import Sequence
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, StringConstraints, model_validator
 
 from ..core.errors import did_you_mean
 from ..scenario.evaluation_schema import CheckSpec
-from ..scenario.schema_types import Integer, NameList, Spec, key, schema_of
-from .factor_schema import TRIAL_COLUMNS, FactorSpec, Scale, SettingPaths, check_log_scale, check_order, reject_column_names
-from .setting_conflicts import check_conflicts
+from ..scenario.schema_types import Integer, NameList, PlacedError, Spec, key, schema_of
+from .factor_schema import (
+    TRIAL_COLUMNS,
+    FactorSpec,
+    Scale,
+    SettingPaths,
+    check_level_counts,
+    check_log_scale,
+    check_order,
+    reject_column_names,
+)
+from .setting_conflicts import Setter, check_conflicts
 
 
 class SeedsSpec(Spec):
@@ -43,7 +52,8 @@ class MapSpec(Spec):
 
     @model_validator(mode="after")
     def _different(self) -> MapSpec:
-        _check_unique("axes of a map", self.factors)
+        if repeated := _first_repeated(self.factors):
+            raise ValueError(f'two axes of a map are called "{repeated}"')
         return self
 
 
@@ -120,22 +130,19 @@ class SweepSpec(StudySpec):
 
     @model_validator(mode="after")
     def _consistent(self) -> SweepSpec:
-        names = [factor.name for factor in self.factors]
-        _check_unique("factors", names)
-        seeds = [("seed", [(path, None) for path in self.seeds.set])] if self.seeds else []
-        check_conflicts(self.settings, [*((factor.name, factor.settings()) for factor in self.factors), *seeds])
+        names = _unique_names("factors", self.factors)
+        seeds = [Setter("seed", ("seeds",), [(path, None) for path in self.seeds.set])] if self.seeds else []
+        factors = (Setter(factor.name, ("factors", i), factor.settings()) for i, factor in enumerate(self.factors))
+        check_conflicts(self.settings, [*factors, *seeds])
         if not names and self.seeds is None:
             raise ValueError('expected "factors", "seeds" or both')
-        for name in (name for group in self.by for name in group):
+        for i, name in ((i, name) for i, group in enumerate(self.by) for name in group):
             if name not in (*names, "seed"):
-                raise ValueError(f'"by" names no factor "{name}"{did_you_mean(name, [*names, "seed"])}')
-        for each in self.maps:
-            _check_map(each, self)
+                raise PlacedError(f'"by" names no factor "{name}"{did_you_mean(name, [*names, "seed"])}', "by", i)
+        for i, each in enumerate(self.maps):
+            _check_map(i, each, self)
         if self.design.kind == "full_factorial":
-            for factor in self.factors:
-                part = factor.range or factor.distribution
-                if part and part.count is None:
-                    raise ValueError(f'the factor "{factor.name}" needs a "count" in a full factorial design')
+            check_level_counts(self.factors)
         return self
 
     def run_counts(self) -> dict[CountPath, int]:
@@ -224,10 +231,8 @@ class TuneSpec(StudySpec):
 
     @model_validator(mode="after")
     def _consistent(self) -> TuneSpec:
-        _check_unique("parameters", [parameter.name for parameter in self.parameters])
-        cases = [setting for case in self.cases for setting in case.items()]
-        parameters = [(each.name, [(path, None) for path in each.set]) for each in self.parameters]
-        check_conflicts(self.settings, [("cases", cases), *parameters])
+        cases = Setter("cases", ("cases",), [setting for case in self.cases for setting in case.items()])
+        check_conflicts(self.settings, [cases, *_parameter_setters(self.parameters)])
         return self
 
     def run_counts(self) -> dict[CountPath, int]:
@@ -255,8 +260,7 @@ class WorstCaseSpec(StudySpec):
 
     @model_validator(mode="after")
     def _consistent(self) -> WorstCaseSpec:
-        _check_unique("parameters", [parameter.name for parameter in self.parameters])
-        check_conflicts(self.settings, [(each.name, [(path, None) for path in each.set]) for each in self.parameters])
+        check_conflicts(self.settings, _parameter_setters(self.parameters))
         return self
 
     def run_counts(self) -> dict[CountPath, int]:
@@ -264,26 +268,31 @@ class WorstCaseSpec(StudySpec):
         return self.method.run_counts()
 
 
-def _check_unique(what: str, names: Iterable[str]) -> None:
-    names = list(names)
-    if repeated := [name for i, name in enumerate(names) if name in names[:i]]:
-        raise ValueError(f'two {what} are called "{repeated[0]}"')
+def _parameter_setters(parameters: Sequence[ParameterSpec]) -> list[Setter]:
+    """Return the settings of parameters, whose names must differ."""
+    _unique_names("parameters", parameters)
+    return [Setter(each.name, ("parameters", i), [(path, None) for path in each.set]) for i, each in enumerate(parameters)]
 
 
-def _check_map(map_: MapSpec, sweep: SweepSpec) -> None:
-    """Raise ValueError if a factor of a map does not exist or has no levels."""
-    known = [each.name for each in sweep.factors if _has_labels(each, sweep.design.kind != "full_factorial")]
+def _unique_names(kind: str, entries: Sequence[FactorSpec | ParameterSpec]) -> list[str]:
+    """Return the names of factors or parameters; raise PlacedError if two are equal."""
+    names = [each.name for each in entries]
+    if repeated := _first_repeated(names):
+        raise PlacedError(f'two {kind} are called "{repeated}"', kind, len(names) - 1 - names[::-1].index(repeated), "name")
+    return names
+
+
+def _first_repeated(names: Sequence[str]) -> str | None:
+    return next((name for i, name in enumerate(names) if name in names[:i]), None)
+
+
+def _check_map(index: int, map_: MapSpec, sweep: SweepSpec) -> None:
+    """Raise PlacedError if a factor of a map does not exist or has no levels."""
+    known = [each.name for each in sweep.factors if each.has_labels(sweep.design.kind != "full_factorial")]
     known += ["seed"] if sweep.seeds else []
     for name in map_.factors:
         if name not in known:
-            raise ValueError(f'"maps" names no factor with levels "{name}"{did_you_mean(name, known)}')
-
-
-def _has_labels(factor: FactorSpec, sampled: bool) -> bool:
-    """Return whether a factor has levels that can be shown along an axis."""
-    if factor.values is not None:
-        return not any(isinstance(value, list | dict) for value in factor.values)
-    return factor.levels is not None or not sampled
+            raise PlacedError(f'"maps" names no factor with levels "{name}"{did_you_mean(name, known)}', "maps", index)
 
 
 def study_json_schema(kind: type[BaseModel]) -> dict[str, Any]:

@@ -6,6 +6,7 @@ from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
 from ..scenario.json_pointer import pointer_keys
+from ..scenario.schema_types import PlacedError
 
 
 class _Setting(NamedTuple):
@@ -53,25 +54,33 @@ def _nested_paths(path: tuple[str, ...], value: Any) -> Iterator[tuple[str, ...]
         yield from _nested_paths((*path, key), inner)
 
 
-def check_conflicts(common: Mapping[str, Any], setters: Iterable[tuple[str, Iterable[tuple[str, Any]]]]) -> None:
-    """Raise ValueError if one of two settings would have no effect.
+class Setter(NamedTuple):
+    """Factor, parameter, seeds or cases: its name, its path in the study file, and its settings."""
+
+    name: str
+    path: tuple[str | int, ...]
+    settings: Iterable[tuple[str, Any]]
+
+
+def check_conflicts(common: Mapping[str, Any], setters: Iterable[Setter]) -> None:
+    """Raise PlacedError if one of two settings would have no effect.
 
     Args:
         common: settings of all runs. Setters may override them; variables among them may change parts of objects that setters
             set.
-        setters: (name, settings) of factors, seeds, cases or parameters, in the order in which they are applied.
+        setters: factors, seeds, cases or parameters, in the order in which they are applied.
     """
     defaults = _expand_settings("the settings", common.items())
     known = {each.path: each for each in defaults if not each.is_pointer}
     pointers_by_path = _pointers_by_ancestor(defaults)
-    for name, pairs in setters:
+    for name, path, pairs in setters:
         settings = _expand_settings(f'"{name}"', pairs)
         for each in settings:
             other = known.get(each.path)
             if other and (other not in defaults or not (each.is_nested or each.name == other.name)):
-                raise ValueError(each.conflict_message(other))
+                raise PlacedError(each.conflict_message(other), *path)
             if each.is_pointer and (other := pointers_by_path.get(each.path)):
-                raise ValueError(f'"{each.name}" of {each.owner} replaces "{other.name}" of {other.owner}')
+                raise PlacedError(f'"{each.name}" of {each.owner} replaces "{other.name}" of {other.owner}', *path)
         known |= {each.path: each for each in settings}
         pointers_by_path |= _pointers_by_ancestor(settings)
 

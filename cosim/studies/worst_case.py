@@ -30,9 +30,9 @@ class Attempt:
 
     Attributes:
         parameters: Values of the parameters by name.
-        severity: Largest excess of a KPI over its limit, as a fraction of the limit; negative: all checks are met.
+        severity: Largest excess of a KPI over its limit, as a fraction of the limit; negative: all checks passed.
         reason: The check that is missed by most or is closest to its limit, or the failure of the run.
-        passed: The run met all checks.
+        passed: All checks of the run passed.
     """
 
     parameters: Mapping[str, float]

@@ -1,4 +1,4 @@
-"""Environment model: computes wind, current, waves and ground distance and writes the environment inputs of all vehicles."""
+"""Environment model: computes wind, current, waves and the surfaces below and writes the environment inputs of all vehicles."""
 
 from __future__ import annotations
 
@@ -11,13 +11,14 @@ import numpy as np
 
 from cosim.core.component import Variable
 
+from ..physics.compiled_equations import bind_arrays, load_library
 from ..physics.vessel_bodies import FloatingBody
 from ..vehicles.common.interface import CURRENT_INPUTS, WAVE_GAIN_INPUT, WIND_INPUTS, scalar_variable
 from .coloured_noise import BLOCK_LENGTH, GRID_STEP
 from .current import Current
-from .ground_distance import GroundDistance
 from .sea import Sea
 from .settings import EnvironmentSettings
+from .surfaces import SurfaceTable
 from .wind import DrydenGusts, Wind
 
 if TYPE_CHECKING:
@@ -28,7 +29,6 @@ _GRID_TOLERANCE = 1e-6  # in grid steps of the noise; times are not exact multip
 _DOUBLE_SIZE = struct.calcsize("d")
 _pack_vector, _unpack_vector = struct.Struct("3d").pack_into, struct.Struct("3d").unpack_from
 _pack_pair, _unpack_pair = struct.Struct("2d").pack_into, struct.Struct("2d").unpack_from
-_unpack_pose = struct.Struct("7d").unpack_from
 
 #: function of the time since the start (s)
 UpdateFunction = Callable[[float], None]
@@ -38,7 +38,7 @@ WaterLevel = Callable[[float, float, float], float]
 #: beginnings of the names of the parameters by which wind acts on a vehicle
 AIR_DRAG_PARAMETERS = ("air_drag", "body_drag", "rotor_drag", "translational_lift")
 
-#: distance (m) above all crests within which a multirotor needs the water level; more than the way of a step
+#: distance (m) above all crests within which a vehicle needs the water level; more than the way of a step
 WATER_MARGIN = 1.0
 
 
@@ -96,11 +96,11 @@ class EnvironmentModel:
         for body in _bodies_with_input(bodies, "water_level"):
             _input_data(body, "water_level")[0] = 0.0
         self.update_functions = list(self._create_updates(environment, bodies))
-        if affected := _multirotors_in_ground_effect(vehicles, bodies):
-            vessels = [body for body in bodies if body.model.is_vessel]
-            self.update_functions.append(
-                _GroundDistanceUpdate(affected, GroundDistance(vessels, platforms, sea), self._wave_gain).update
-            )
+        all_multirotors = _bodies_with_input(bodies, "ground_distance")
+        if multirotors := all_multirotors if environment.waves else _multirotors_in_ground_effect(vehicles, bodies):
+            surfaces = SurfaceTable([body for body in bodies if body.model.is_vessel], platforms)
+            update = _SurroundingsUpdate(multirotors, surfaces, sea, self._wave_gain, self._highest_water)
+            self.update_functions.append(update.update)
         first = 3 * len(self._wind_vehicles)
         self._elevations = [
             (body.elevation_function(len(sea.phase), sea.component_table()), first + k)
@@ -121,8 +121,8 @@ class EnvironmentModel:
             yield _CurrentUpdate(current, seed, self._input_view("current.x"), _bodies_with_input(bodies, "current.x")).update
         if environment.waves:
             yield self._update_highest_water
-            if multirotors := _bodies_with_input(bodies, "water_level"):
-                yield _WaterLevelUpdate(multirotors, self.water_level, self._highest_water).update
+            if submerged := [body for body in _bodies_with_input(bodies, "water_level") if body.model.craft]:
+                yield _WaterLevelUpdate(submerged, self.water_level, self._highest_water).update
         if self._wave_vessels:
             gains = [_input_data(body, "wave_gain") for body in self._wave_vessels]
             yield lambda _time: _set_all(gains, self._wave_gain[0])
@@ -158,8 +158,12 @@ def _air_drag(vehicle: VehiclePlacement) -> list[float]:
 
 def _input_data(body: ContactBody, name: str) -> Any:
     """Return a memoryview of a vehicle's environment inputs from the named one on; it is faster than NumPy for few numbers."""
-    names = [variable.name for variable in body.model.environment_inputs]
-    return body.environment_inputs[names.index(name) :].data
+    return body.environment_inputs[_input_index(body, name) :].data
+
+
+def _input_index(body: ContactBody, name: str) -> int:
+    """Return the index of a scalar environment input, or of the first element of an array."""
+    return [variable.name for variable in body.model.environment_inputs].index(name)
 
 
 def _set_all(inputs: Sequence[Any], value: float) -> None:
@@ -244,20 +248,22 @@ class _CurrentUpdate:
 
 
 class _WaterLevelUpdate:
-    """Update of the height of the water surface at multirotors; those above all crests need none."""
+    """Update of the height of the water surface at submerged vehicles; those above all crests need none."""
 
-    def __init__(self, multirotors: Sequence[ContactBody], water_level: WaterLevel, highest_water: Any):
+    def __init__(self, vehicles: Sequence[ContactBody], water_level: WaterLevel, highest_water: Any):
         self._water_level, self._highest_water = water_level, highest_water
-        self._vehicles = [
-            (_input_data(body, "water_level"), body.outputs.data, max(body.bounding_box(body.model.body).high) + WATER_MARGIN)
-            for body in multirotors
-        ]
+        self._vehicles = [(_input_data(body, "water_level"), body.outputs.data, _reach(body)) for body in vehicles]
 
     def update(self, time: float) -> None:
         """Write the water levels at a time (s)."""
         highest = self._highest_water[0]
         for level, outputs, reach in self._vehicles:
             level[0] = self._water_level(outputs[0], outputs[1], time) if outputs[2] - reach < highest else -highest
+
+
+def _reach(body: ContactBody) -> float:
+    """Return the distance (m) of the centre of mass above all crests within which a vehicle needs the water level."""
+    return max(body.bounding_box(body.model.body).high) + WATER_MARGIN
 
 
 def _multirotors_in_ground_effect(vehicles: Sequence[VehiclePlacement], bodies: Sequence[ContactBody]) -> list[ContactBody]:
@@ -269,31 +275,47 @@ def _multirotors_in_ground_effect(vehicles: Sequence[VehiclePlacement], bodies: 
     ]
 
 
-class _GroundDistanceUpdate:
-    """Update of the height of multirotors above the surface below them."""
+class _SurroundingsUpdate:
+    """Update of the surface below multirotors and of the height of the water at them.
 
-    def __init__(self, multirotors: Sequence[ContactBody], ground_distance: GroundDistance, wave_gain: Any):
-        self._ground_distance, self._gain = ground_distance, wave_gain
-        self._vehicles = [
-            (_input_data(body, "ground_distance"), body.outputs.data, *(body.model.rotor_disc or ((0.0, 0.0, 0.0), 0.0)))
+    Args:
+        multirotors: Multirotors to update.
+        surfaces: Decks and platforms.
+        sea: Realisation of the waves.
+        wave_gain: Memoryview of the factor on all amplitudes (1).
+        highest_water: Memoryview of the height that no crest exceeds (m).
+    """
+
+    def __init__(
+        self,
+        multirotors: Sequence[ContactBody],
+        surfaces: SurfaceTable,
+        sea: Sea,
+        wave_gain: Any,
+        highest_water: Any,
+    ):
+        self._gain, self._highest_water, self._update_surfaces = wave_gain, highest_water, surfaces.update
+        sea_values, waves = np.array([0.0, 1.0, len(sea.phase), 0.0]), sea.component_table()
+        self._sea: Any = sea_values.data
+        self._calls = [
+            bind_arrays(
+                load_library(body.model.binary).surroundings,
+                [body.outputs, _disc(body), sea_values, waves, surfaces.count, surfaces.rows],
+                [body.environment_inputs[_input_index(body, "ground_distance") :]],
+            )
             for body in multirotors
         ]
 
     def update(self, time: float) -> None:
-        """Write the ground distances and shares at a time (s)."""
-        for surface, outputs, centre, radius in self._vehicles:
-            x, y, z, *q = _unpack_pose(outputs)
-            dx, dy, dz = _rotate(q, centre)
-            surface[0], surface[1] = self._ground_distance.distance_and_share(x + dx, y + dy, z + dz, radius, time, self._gain[0])
+        """Write the surroundings at a time (s)."""
+        self._update_surfaces()
+        sea = self._sea
+        sea[0], sea[1], sea[3] = time, self._gain[0], self._highest_water[0]
+        for call in self._calls:
+            call()
 
 
-def _rotate(q: Sequence[float], vector: Sequence[float]) -> tuple[float, float, float]:
-    """Rotate a body vector into the world frame by a unit quaternion (w, x, y, z)."""
-    w, qx, qy, qz = q
-    x, y, z = vector
-    tx, ty, tz = 2 * (qy * z - qz * y), 2 * (qz * x - qx * z), 2 * (qx * y - qy * x)
-    return (
-        x + w * tx + qy * tz - qz * ty,
-        y + w * ty + qz * tx - qx * tz,
-        z + w * tz + qx * ty - qy * tx,
-    )
+def _disc(body: ContactBody) -> np.ndarray:
+    """Return the argument `disc` of the compiled function `surroundings`."""
+    (x, y, z), radius = body.model.rotor_disc or ((0.0, 0.0, 0.0), 0.0)
+    return np.array([x, y, z, radius, _reach(body)])

@@ -134,8 +134,8 @@ def test_a_controller_that_fails_checks_ranks_below_however_many_kpis_are_better
     path = lazy(folder)
     worse = bench(folder, path)
     assert worse.stdout.splitlines()[-3:-1] == [
-        "1. shipped  1 of 1 scenario passed, 2 of 2 checks met",
-        "2. lazy     0 of 1 scenario passed, 0 of 2 checks met",
+        "1. shipped  1 of 1 scenario passed, 2 of 2 checks passed",
+        "2. lazy     0 of 1 scenario passed, 0 of 2 checks passed",
     ]
     assert worse.stdout.splitlines()[-1].startswith(
         "lazy is worse than the shipped controller (waypoints.reached 0 better, 1 worse;"

@@ -323,6 +323,26 @@ def test_info_names_the_program_that_an_fmu_needs():
     assert "needs         Python on the host, with the packages that its class imports" in lines
 
 
+def test_info_describes_python_classes_and_modelica_models(tmp_path):
+    described = cosim("info", f"{BLOCKS}:Gain")
+    assert described.stdout.splitlines()[0] == f"class         {BLOCKS}:Gain", described.stderr
+    assert "inputs (1)" in described.stdout
+    (tmp_path / "Twice.mo").write_text("model Twice\n  input Real u;\n  output Real y;\nequation\n  y = 2*u;\nend Twice;")
+    model = cosim("info", tmp_path / "Twice.mo:Twice").stdout
+    assert "model         twice" in model
+    assert "inputs (1)" in model
+    assert cosim("info", BLOCKS).stderr == f"{BLOCKS}: expected the name of a class, as in {BLOCKS}:Class\n"
+    assert 'did you mean "Gain"?' in cosim("info", f"{BLOCKS}:Gian").stderr
+
+
+def test_an_unknown_variable_of_a_component_with_many_is_refused_with_some_valid_names():
+    done = cosim("run", "free_flight", "--set", "usv.kp=3")
+    assert done.stderr.startswith(
+        'setting "usv.kp": component "usv" has no variable "kp"; valid: speed_command, acceptance_radius'
+    )
+    assert " more\n" in done.stderr
+
+
 def test_info_prints_properties_and_variables(probe):
     done = cosim("info", probe)
     assert done.returncode == 0

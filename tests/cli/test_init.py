@@ -29,6 +29,9 @@ def folder(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def made(folder):
+    (folder / "my controllers/tests").mkdir(parents=True)
+    for name in ("notes.txt", "tests/own.py"):
+        (folder / "my controllers" / name).touch()
     return run("cosim", "init", "my controllers", cwd=folder)
 
 
@@ -38,7 +41,8 @@ def project(folder, made):
     listed = {Path(line).relative_to("my controllers").as_posix() for line in made.stdout.splitlines() if line.startswith("my ")}
     root = folder / "my controllers"
     files = {path.relative_to(root).as_posix() for path in root.rglob("*") if path.is_file() and "runs" not in path.parts}
-    assert files - listed <= {"scenarios/references/course.json"}
+    assert files - listed <= {"scenarios/references/course.json", "notes.txt", "tests/own.py"}
+    assert "\nleft as they are: notes.txt, tests/own.py\n" in made.stdout
     assert "__pycache__" not in str(files)
     return root
 
@@ -66,6 +70,7 @@ def test_a_changed_controller_fails_the_regression(project, tmp_path):
     done = run("cosim", "regress", cwd=own)
     assert done.returncode == 3
     assert "vessel.attitude.yaw leaves its tube at t = " in done.stdout
+    assert "changed since the reference was made: ../controllers/speed_keeper.py\n" in done.stdout
 
 
 def test_a_run_writes_the_figure_and_the_replay_of_the_readme(project):

@@ -86,6 +86,12 @@ def test_a_new_controller_declares_the_variables_of_its_role(moved, role, langua
     assert done.returncode == 0, done.stderr
 
 
+def test_the_scenario_of_a_new_controller_gets_no_recommendations_and_warnings(moved, role):
+    done = cosim("check", "my_pilot/my_pilot.json", cwd=moved(role, "python"))
+    assert "recommendation for the order\n  none: " in done.stdout
+    assert "No warnings." in done.stdout
+
+
 def test_all_languages_give_the_same_trajectory(moved, role):
     ours, theirs, reference = (
         Result.from_csv(moved(role, one) / "runs/my_pilot/result.csv") for one in ("modelica", "c", "python")
@@ -179,6 +185,17 @@ def test_an_fmu_older_than_its_source_is_recognized(moved, language, tmp_path):
     source = folder / MADE[language][-1]
     source.write_text(source.read_text() + "\n")
     assert FmuFile(folder / "my_pilot.fmu").changed_sources() == [source.name]
+
+
+def test_an_fmu_of_a_class_that_imports_another_file_is_not_older_than_its_source(moved, tmp_path):
+    folder = shutil.copytree(moved("vessel_autopilot", "python") / "my_pilot", tmp_path / "my_pilot")
+    (folder / "bold.py").write_text("from my_pilot import MyPilot\n\n\nclass Bold(MyPilot):\n    pass\n")
+    assert cosim("build", "bold.py", "--output", "bold.fmu", cwd=folder).returncode == 0
+    assert FmuFile(folder / "bold.fmu").changed_sources() == []
+    (folder / "bold.py").write_text("from my_pilot import MyPilot\n\n\nclass Bold(MyPilot):\n    gain = 2\n")
+    assert FmuFile(folder / "bold.fmu").changed_sources() == ["bold.py"]
+    (folder / "bold.py").write_text("from my_pilot import\n")
+    assert FmuFile(folder / "bold.fmu").changed_sources() == ["bold.py"]
 
 
 def test_a_run_of_an_fmu_older_than_its_source_warns(moved, tmp_path):

@@ -74,7 +74,7 @@ def test_quiet_prints_only_what_is_wrong(tmp_path):
     good = run_cosim("run", talker(tmp_path), "--quiet", cwd=tmp_path)
     assert (good.returncode, good.stdout, good.stderr) == (0, "", "")
     bad = run_cosim("run", talker(tmp_path, largest=1.0), "--quiet", cwd=tmp_path)
-    assert (bad.returncode, bad.stdout, bad.stderr) == (3, "", "check not met: end.value is 2, expected at most 1.0\n")
+    assert (bad.returncode, bad.stdout, bad.stderr) == (3, "", "check failed: end.value is 2, expected at most 1.0\n")
     both = run_cosim("run", tmp_path / "talk.json", "--quiet", "--json", cwd=tmp_path)
     assert json.loads(both.stdout)["exit_code"] == 3
     regressed = run_cosim("regress", tmp_path / "talk.json", "-q", cwd=tmp_path)

@@ -69,6 +69,19 @@ def test_pages_are_read_and_searched_as_files_without_a_network(site, chromium):
 
 #: a page of each kind
 SAMPLES = ("index", "docs/tutorials/own_boat", "docs/how_to/swap_controller", "docs/reference/python", "docs/controllers")
+SAMPLES += ("docs/reference/kpis", "docs/reference/world_keys", "docs/validation")
+
+CUT_TABLES = "[...document.querySelectorAll('.md-typeset__scrollwrap')].filter((one) => one.scrollWidth > one.clientWidth).length"
+#: titles of which a word stands on two lines
+BROKEN_TITLES = """[...document.querySelectorAll("h1, h2, h3")].filter((title) => {
+  const texts = document.createTreeWalker(title, NodeFilter.SHOW_TEXT);
+  while (texts.nextNode()) for (const word of texts.currentNode.data.matchAll(/[A-Za-z0-9]+/g)) {
+    const range = document.createRange();
+    range.setStart(texts.currentNode, word.index);
+    range.setEnd(texts.currentNode, word.index + word[0].length);
+    if (new Set([...range.getClientRects()].map((box) => Math.round(box.top))).size > 1) return true;
+  }
+}).map((title) => title.innerText)"""
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])
@@ -79,6 +92,8 @@ def test_pages_fit_a_phone_and_are_legible(site, chromium, scheme):
     for name in SAMPLES:
         page.goto((site / f"{name}.html").as_uri())
         assert page.evaluate("document.documentElement.scrollWidth") == 360, name
+        assert page.evaluate(CUT_TABLES) == 0, name
+        assert page.evaluate(BROKEN_TITLES) == [], name
         assert page.evaluate(LOW_CONTRAST) == [], name
     assert complaints == []
     context.close()

@@ -9,7 +9,7 @@ import cosim
 
 @pytest.fixture(scope="session")
 def flight_result():
-    """Demo 1 until shortly after the landing: one of its five checks is not met, it has not been round the box."""
+    """Demo 1 until shortly after the landing: one of its five checks fails, it has not been round the box."""
     return cosim.run("demo1_box", stop_time=16)
 
 

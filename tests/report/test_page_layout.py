@@ -13,7 +13,7 @@ SIZES = ((1280, 800), (768, 1024), (360, 740))
 
 @pytest.fixture(scope="module")
 def report(open_page, flight_result, tmp_path_factory):
-    """The report of a flight with a check that is not met, which has the longest label."""
+    """The report of a flight with a failed check, which has the longest label."""
     file = tmp_path_factory.mktemp("report") / "report.html"
     checks = [
         {"kpi": "landing.touchdown_speed", "min": 0.123456, "max": 0.234567},

@@ -104,8 +104,8 @@ def test_failed_checks_are_at_the_top(flight_result, tmp_path):
     assert invoke(report, tmp_path).exit_code == 0
     texts = Reader((tmp_path / "report.html").read_text()).texts
     assert texts[1] == "✗ 4 of 5 checks passed"
-    assert "✗ not met: equals true" in texts
-    assert "The replay opens at t = 14 s. Mark × at t = 16 s: waypoints.all_reached not met." in texts
+    assert "✗ failed: equals true" in texts
+    assert "The replay opens at t = 14 s. Mark × at t = 16 s: check of waypoints.all_reached failed." in texts
 
 
 @pytest.mark.parametrize(
@@ -113,11 +113,11 @@ def test_failed_checks_are_at_the_top(flight_result, tmp_path):
     [
         ({"failure": "uav: do_step failed at t = 16 s"}, (16.0, "failure", 14.0)),
         ({"terminated_by": {"time": 16.0, "outcome": "crash", "since": 15.5}}, (15.5, "crash", 13.5)),
-        ({}, (11.0, "landing.lateral_error not met", 9.0)),
+        ({}, (11.0, "check of landing.lateral_error failed", 9.0)),
     ],
 )
 def test_the_moment_of_a_failure_depends_on_its_kind(flight_result, metadata, failure):
-    """The landing of which the touchdown counts is not met, unless the run ended early."""
+    """The landing of which the touchdown counts failed, unless the run ended early."""
     result = replace(flight_result, metadata=metadata, kpis={"landing.time": 11.0})
     outcomes = [CheckOutcome({"kpi": "landing.lateral_error", "max": 0.1}, 0.2, passed=False)]
     assert find_failure(result, outcomes) == failure

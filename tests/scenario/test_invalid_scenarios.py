@@ -37,7 +37,7 @@ def test_all_problems_are_reported_at_once(folder):
         "8:4: $.connections[2].from: a.u is an input, expected an output",
         '8:34: $.connections[3].from: unknown component "d"; valid: a, b, c',
         '10:64: $.record.signals[0]: no variable matches "a.z"; did you mean "a.y"?',
-        '12:35: $.events[0].set["a.q"]: component "a" has no variable "q"; valid: u, k',
+        '12:35: $.events[0].set["a.q"]: component "a" has no variable "q"; valid: k, u',
         '10:16: $.algorithm.stages: unknown component "e"; valid: b',
         "12:13: $.events[0]: event time 0.5 s lies between two communication points (1.0 s apart)",
         '11:11: $.kpis[0]: file "none.py" does not exist',

@@ -73,8 +73,8 @@ def command(
     """Benchmark each CONTROLLER in every scenario with its role.
 
     CONTROLLER is an FMU, my.py:Class, my.mo:Model or the JSON file of a nested system. It replaces the shipped controller. The
-    summary ranks both: the one that meets more checks is above; then the goals of the role decide. --verbose prints tables that
-    compare all KPIs with those of the shipped controller and of the candidate's last run.
+    summary ranks both by passed checks, then by the goals of the role. --verbose prints tables that compare all KPIs with those
+    of the shipped controller and of the candidate's last run.
 
     Several controllers, or those of --all, are shown side by side: a table here and the page bench.html in the output directory,
     with the processor time per step of each. A scenario that does not feed an input of the controller is not applicable ("n/a")

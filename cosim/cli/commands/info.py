@@ -1,8 +1,8 @@
-"""`cosim info`: properties and variables of an FMU."""
+"""`cosim info`: properties and variables of an FMU, a Python class or a Modelica model."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -25,6 +25,9 @@ if TYPE_CHECKING:
 
 #: length to which start values are shortened in the table (characters)
 _MAX_START_LENGTH = 40
+
+#: suffix of a source file -> kind of the members that a reference names
+_MEMBERS = {".py": "Class", ".mo": "Model"}
 
 _INTERFACE_NAMES: Mapping[str, str] = {"co-simulation": "Co-Simulation", "model-exchange": "Model Exchange"}
 
@@ -57,22 +60,52 @@ _USED_CAPABILITIES = {
 def command(fmu: str, with_locals: bool, as_json: bool) -> None:
     """Print the properties and variables of FMU: version, capabilities, platforms, inputs, outputs and parameters.
 
-    FMU is a file, the name of a shipped FMU such as multirotor_controller, or its path as in scenarios ("cosim:fmus/...").
+    FMU is a file, the name of a shipped FMU such as multirotor_controller, or its path as in scenarios ("cosim:fmus/..."). It
+    may also be file.py:Class, which is imported and constructed, or file.mo:Model, which is compiled.
     """
-    from ...components.fmi import FmuFile
-
-    file = FmuFile(_find_fmu(fmu))
+    found, all_variables = _describe(fmu)
     groups = ["input", "output", "structuralParameter", "parameter", "calculatedParameter", *(["local"] if with_locals else [])]
-    variables = {kind: [v for v in file.description.variables if v.causality == kind] for kind in groups}
-    properties = {name: value for name, value in _properties(file).items() if value}
+    variables = {kind: [v for v in all_variables if v.causality == kind] for kind in groups}
+    properties = {name: value for name, value in found.items() if value}
     if as_json:
-        found = [_variable_as_json(variable) for group in variables.values() for variable in group]
-        print_json({"properties": properties, "variables": found})
+        listed = [_variable_as_json(variable) for group in variables.values() for variable in group]
+        print_json({"properties": properties, "variables": listed})
         return
     for name, value in properties.items():
         print_line(f"{name:13} {value}")
     for causality, group in variables.items():
         _print_variables(causality, group)
+
+
+def _describe(source: str) -> tuple[dict[str, str], Sequence[Variable]]:
+    """Return properties and variables of an FMU, of file.py:Class, or of file.mo:Model."""
+    from ...components.fmi import FmuFile
+
+    file, _, name = source.rpartition(":")
+    if Path(source).suffix in _MEMBERS:
+        kind = _MEMBERS[Path(source).suffix]
+        raise InputError(f"{source}: expected the name of a {kind.lower()}, as in {source}:{kind}")
+    if file.endswith(".py"):
+        return _describe_class(source)
+    if file.endswith(".mo"):
+        from ...export.build import cached_fmu
+
+        fmu = FmuFile(cached_fmu(Path(file), name))
+    else:
+        fmu = FmuFile(_find_fmu(source))
+    return _properties(fmu), fmu.description.variables
+
+
+def _describe_class(reference: str) -> tuple[dict[str, str], Sequence[Variable]]:
+    from ...components.python_class import load_component
+
+    component = load_component(reference, Path(), "component", {})
+    used = {
+        "variable step size": component.variable_step,
+        "state can be saved and restored": component.has_state,
+        "inputs can be linear within a step": component.interpolates_inputs,
+    }
+    return {"class": reference, "capabilities": ", ".join(name for name, has in used.items() if has)}, component.variables
 
 
 def _find_fmu(fmu: str) -> Path:

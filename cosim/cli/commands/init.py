@@ -13,7 +13,7 @@ from typing import Any
 import click
 
 from ...core import resources
-from ...core.errors import InputError, Problem
+from ...core.errors import InputError, Problem, abbreviate_names
 from ...core.version import __version__
 from ...studies.regression import Regression
 
@@ -44,7 +44,10 @@ def command(directory: Path, force: bool) -> int:
     present = [directory / name for name in (*_PROJECT_FILES, _PLANT) if (directory / name).exists()]
     if present and not force:
         raise InputError([Problem("exists; --force overwrites it", str(path)) for path in present])
+    untouched = _other_entries(directory)
     _write_project(directory)
+    if untouched:
+        click.echo(f"left as they are: {abbreviate_names(untouched)}")
     outcome = Regression(directory / "scenarios/course.json", directory / "runs/course", update=True).run()
     for folder in {(directory / name).parent for name in _PROJECT_FILES}:
         shutil.rmtree(folder / "__pycache__", ignore_errors=True)
@@ -55,6 +58,17 @@ def command(directory: Path, force: bool) -> int:
     commands = ("pip install -r requirements.txt", "cosim run scenarios/course.json", "cosim regress", "python -m pytest")
     click.echo("\n".join(f"  {line}" for line in (f"cd {shlex.quote(str(directory))}", *commands)))
     return 0
+
+
+def _other_entries(directory: Path) -> list[str]:
+    """Return the files and folders that do not belong to the project, in the folders into which it is written."""
+    own = {Path(name) for name in (*_PROJECT_FILES, _PLANT)}
+    folders = {parent for path in own for parent in path.parents}
+    found = [
+        path for folder in sorted(folders) if (directory / folder).is_dir() for path in sorted((directory / folder).iterdir())
+    ]
+    names = [(path.relative_to(directory), "/" if path.is_dir() else "") for path in found]
+    return [f"{name.as_posix()}{end}" for name, end in names if name not in own | folders]
 
 
 def _write_project(directory: Path) -> None:

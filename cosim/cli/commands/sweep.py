@@ -124,9 +124,9 @@ def _write_maps_and_page(
 def _print_summary(sweep: Sweep, summary: SweepSummary) -> None:
     if not summary.groups:
         return
-    numbers = summary.groups[0].statistics()
+    numbers = summary.groups[0].shown_statistics()
     columns = ("mean", "std", "min", "median", "max")
-    kpis = [[name, summary.units.get(name, ""), *(f"{found[key]:.4g}" for key in columns)] for name, found in numbers]
+    kpis = [[name, summary.units.get(name, ""), *(found[key] for key in columns)] for name, found in numbers]
     if kpis:
         study_options.print_table(["KPI", "unit", *columns], kpis)
     if sweep.criteria or summary.failed:

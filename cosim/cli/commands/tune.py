@@ -37,7 +37,7 @@ def command(tuning: str, output_dir: Path | None, as_json: bool, worst: bool, **
     every point; 2: the tuning was refused; 3: no point meets the constraints, or none has a value; 130: interrupted.
 
     --worst searches wind, waves, faults and seeds for the run that misses its checks the most. Writes trials.csv, worst.json and
-    the worst runs as scenarios to the output directory. Exit code 0: all runs meet the checks; 3: a run does not.
+    the worst runs as scenarios to the output directory. Exit code 0: the checks of all runs passed; 3: one failed.
     """
     if worst:
         return _find_worst(tuning, output_dir, as_json, **study)
@@ -114,7 +114,7 @@ def _print_worst(search: WorstCase, files: list[Path]) -> None:
     for each, file in zip(shown, files, strict=False):
         click.echo(f"{each.reason}\n  cosim run {file}")
     broken = sum(not each.passed for each in search.attempts)
-    verdict = f"{broken} miss a check" if files else f"all meet the checks; closest: {shown[0].reason}"
+    verdict = f"a check of {broken} failed" if files else f"all checks passed; closest: {shown[0].reason}"
     click.echo(f"{count_noun(len(search.attempts), 'run')}: {verdict}")
 
 

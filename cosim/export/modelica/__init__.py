@@ -28,7 +28,8 @@ The package rumoca parses, checks and flattens a model. The order of computation
 |              | `formatting`: parts of model.c                                                                             |
 | `external/`  | `sources`: C files of external functions; `calls`: C functions that call them; `library`: evaluation in     |
 |              | Python; `external.c`: errors, messages, Strings and external objects                                       |
-| (here)       | `assemble`: a Modelica file to a block, with the FMI variables; `units`: their units                       |
+| (here)       | `assemble`: a Modelica file to a block, with the FMI variables; `units`: their units; `imbalance`: names  |
+|              | in messages about unbalanced models                                                                        |
 
 Sampled models, in a communication step from t to t + h:
 

@@ -33,6 +33,7 @@ from .frontend.reader import ModelReader
 from .frontend.rumoca_frontend import DEFAULT_OPTIONS, ModelicaOptions, flatten_model
 from .frontend.sources import ModelicaSources
 from .frontend.strings import fold_strings, string_parameters
+from .imbalance import explain_imbalance
 from .model.arithmetic import EvaluationError
 from .model.flat_model import Model, Variable, derivative_name
 from .model.syntax_tree import raise_model_error
@@ -113,7 +114,12 @@ def _refusing_deep_nesting(path: Path) -> Iterator[None]:
 
 
 def _flatten(path: Path, model: str | None, options: ModelicaOptions) -> tuple[Interpreter, ModelicaSources]:
-    json, sources = flatten_model(Path(path), model, options)
+    try:
+        json, sources = flatten_model(Path(path), model, options)
+    except InputError as error:
+        if options.supplement:
+            raise
+        raise explain_imbalance(error, lambda text: _flatten(path, model, replace(options, supplement=text))) from None
     return analyse(json, sources, model or Path(path).stem), sources
 
 

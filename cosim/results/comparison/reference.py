@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import math
-from collections import defaultdict
-from collections.abc import Mapping
+from collections import Counter, defaultdict
+from collections.abc import Collection, Mapping
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -24,6 +24,8 @@ MAX_ROW_DISTANCE = 64
 TOLERANCE_FRACTION = 0.25
 #: fraction of the half width of a tube to which values are rounded
 ROUNDING_FRACTION = 0.01
+#: largest number of Python files of a folder that have a hash each; those of larger folders have one
+MAX_SINGLE_MODULES = 5
 
 _PROVENANCE_KEYS = ("versions", "machine", "sha256")
 
@@ -105,19 +107,27 @@ def write_reference(result: Result, path: Path, tolerances: Mapping[str, Toleran
 
 
 def _provenance(metadata: Mapping[str, Any]) -> dict[str, Any]:
-    """Return the versions, machine and hashes of `run.json`, with one hash for the Python files of a folder."""
-    provenance = {key: metadata.get(key) for key in _PROVENANCE_KEYS}
-    return {**provenance, "sha256": _join_modules(metadata.get("sha256") or {})}
-
-
-def _join_modules(hashes: Mapping[str, str]) -> dict[str, str]:
-    folders: dict[str, list[str]] = defaultdict(list)
-    for name in sorted(hashes):
-        folder = name.rpartition("/")[0]
-        folders[f"{folder}/*.py".lstrip("/") if name.endswith(".py") else name].append(f"{name} {hashes[name]}\n")
+    """Return the versions, machine and hashes of `run.json`, with one hash for the Python files of a folder with many of them."""
+    hashes = metadata.get("sha256") or {}
+    counts = Counter(map(_modules_of, hashes))
     return {
-        folder: sha256("".join(lines).encode()).hexdigest() if folder not in hashes else hashes[folder]
-        for folder, lines in sorted(folders.items())
+        **{key: metadata.get(key) for key in _PROVENANCE_KEYS},
+        "sha256": _join_modules(hashes, {name for name, count in counts.items() if count > MAX_SINGLE_MODULES}),
+    }
+
+
+def _modules_of(name: str) -> str:
+    """Return the pattern of the Python files in the folder of a Python file, such as "a/*.py"; "" for another file."""
+    return f"{name.rpartition('/')[0]}/*.py".lstrip("/") if name.endswith(".py") else ""
+
+
+def _join_modules(hashes: Mapping[str, str], joined: Collection[str]) -> dict[str, str]:
+    """Return the hashes of files, with one for all Python files that one of the patterns `joined` stands for."""
+    lines: dict[str, list[str]] = defaultdict(list)
+    for name in sorted(hashes):
+        lines[pattern if (pattern := _modules_of(name)) in joined else name].append(f"{name} {hashes[name]}\n")
+    return {
+        name: hashes[name] if name in hashes else sha256("".join(own).encode()).hexdigest() for name, own in sorted(lines.items())
     }
 
 
@@ -128,10 +138,12 @@ def describe_provenance_changes(before: Mapping[str, Any], after: Mapping[str, A
         before: Provenance of the reference, as in its JSON file.
         after: Metadata of the run.
     """
-    changes, now = [], _provenance(after)
+    changes = []
     for key in _PROVENANCE_KEYS:
-        old, new = before.get(key), now[key] or {}
+        old, new = before.get(key), after.get(key) or {}
         old = old if isinstance(old, dict) else {}
+        if key == "sha256":
+            new = _join_modules(new, old.keys())
         names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
         changes += [name if key == "sha256" else f"{name} {old.get(name)} -> {new.get(name)}" for name in names]
     return changes

@@ -39,7 +39,7 @@ class BenchedController:
 
 
 def order(controllers: Sequence[BenchedController]) -> list[BenchedController]:
-    """Return the controllers by checks met, then scenarios passed, then goals; the best first."""
+    """Return the controllers by checks passed, then scenarios passed, then goals; the best first."""
 
     def key(each: BenchedController) -> list[int]:
         goals = [counts["better"] - counts["worse"] for counts in each.ranking.goals.values()]

@@ -30,9 +30,9 @@ class Standing:
 
     Attributes:
         scenarios: number of scenarios.
-        passed: number of scenarios that ended with all checks met.
+        passed: number of scenarios that ended with all checks passed.
         checks: number of checks.
-        met: number of checks that were met.
+        met: number of checks that passed.
     """
 
     scenarios: int = 0

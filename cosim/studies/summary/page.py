@@ -10,7 +10,6 @@ from typing import Any
 from ...core.version import __version__
 from ...report.figures import figure_to_svg, save_figure
 from ...report.pages import render_page, safe_markup
-from ...report.tables import format_number
 from ...results.checks import evaluate_checks
 from ...results.files import remove_files, writing_atomically
 from ..design import Design
@@ -43,7 +42,7 @@ def write_sweep_page(sweep: Sweep, summary: SweepSummary, maps: Sequence[Success
     remove_files(
         folder, *(path.name for path in folder.glob(f"{MAP_NAME}*") if _MAP_FILE.fullmatch(path.name) and path.name not in drawn)
     )
-    statistics = overall.statistics() if overall else ()
+    statistics = overall.shown_statistics() if overall else ()
     cells = list(_shown_cells(sweep, maps, folder))
     text = render_page(
         "sweep.html",
@@ -56,7 +55,7 @@ def write_sweep_page(sweep: Sweep, summary: SweepSummary, maps: Sequence[Success
         maps=[_write_map(sweep, each, folder) for each in maps],
         commands=[cell for cell in cells if cell["link"].startswith(PAGE_FILE)],
         replays=[cell for cell in cells if not cell["link"].startswith(PAGE_FILE)],
-        kpis=[(name, summary.units.get(name, ""), _shown_numbers(numbers)) for name, numbers in statistics],
+        kpis=[(name, summary.units.get(name, ""), numbers) for name, numbers in statistics],
         version=__version__,
         file=sweep.study_file.document.file,
     )
@@ -68,11 +67,6 @@ def _criterion(check: Mapping[str, Any], units: Mapping[str, str]) -> tuple[str,
     """Return a criterion as (KPI, limits with their unit)."""
     (outcome,) = evaluate_checks({check["kpi"]: 0.0}, [check])
     return check["kpi"], f"{outcome.limits} {units.get(check['kpi'], '')}".rstrip()
-
-
-def _shown_numbers(numbers: Mapping[str, float]) -> dict[str, str]:
-    """Return the statistics of a KPI as texts, "-" without a value."""
-    return {name: format_number(value) for name, value in numbers.items()}
 
 
 def _design_rows(sweep: Sweep) -> Iterator[tuple[str, str]]:

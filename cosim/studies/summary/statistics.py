@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ...report.tables import format_number
 from ..design import Design
 from ..factor_schema import QUANTILES
 from ..sweep import SweepRow
@@ -49,6 +50,7 @@ class RunGroup:
         failed: number of runs that failed.
         passed: number of successes.
         kpis: finite values of each KPI.
+        booleans: names of the KPIs with the values true and false.
     """
 
     labels: Mapping[str, Any]
@@ -57,6 +59,7 @@ class RunGroup:
     failed: int = 0
     passed: int = 0
     kpis: dict[str, array[float]] = field(default_factory=dict)
+    booleans: set[str] = field(default_factory=set)
     _shared_keys: set[str] = field(default_factory=set)
 
     def add(self, row: SweepRow) -> None:
@@ -69,6 +72,8 @@ class RunGroup:
         self.passed += row.passed
         for name, value in row.record.kpis.items():
             values = self.kpis.setdefault(name, array("d"))
+            if isinstance(value, bool):
+                self.booleans.add(name)
             if math.isfinite(value):
                 values.append(value)
 
@@ -89,6 +94,14 @@ class RunGroup:
             quantiles = dict(zip(QUANTILES, np.quantile(values, list(QUANTILES.values())).tolist(), strict=True))
             spread = float(values.std(ddof=1)) if len(column) > 1 else math.nan
             yield name, {"count": len(column), "mean": float(values.mean()), "std": spread, **quantiles}
+
+    def shown_statistics(self) -> Iterator[tuple[str, dict[str, str]]]:
+        """Yield (KPI, statistics as texts), "-" without a value; the mean of a Boolean is the share of true values."""
+        for name, numbers in self.statistics():
+            shown = {key: format_number(value) for key, value in numbers.items()}
+            if name in self.booleans:
+                shown = {**dict.fromkeys(shown, ""), "count": shown["count"], "mean": f"{100 * numbers['mean']:.3g} %"}
+            yield name, shown
 
 
 def groupings(design: Design, by: Iterable[Sequence[str]]) -> list[tuple[str, ...]]:

@@ -10,7 +10,7 @@
 
 Each kind of body has further arguments and results: a free body the orientation of its principal axes and the height of the
 highest possible water surface, a planar one its vertical load, a floating one its contact impulse. Floating vessels also
-export `water_elevation` (`vessel/wave_loads.py`).
+export `water_elevation` (`common/water_surface.py`), and multirotors `surroundings` (`multirotor/surroundings.py`).
 
 The twist that Bullet changes in contact, times the mass and inertia of Bullet's body, gives the contact impulse. Divided by the
 mass and inertia of the vehicle it is added to the predicted velocity. In contact the published velocity is Bullet's mean velocity

@@ -98,6 +98,10 @@ ENVIRONMENT_INPUTS = frozenset(
 #: upper limit of the number of wave components
 MAX_WAVE_COMPONENTS = 64
 
+#: elements of a row of the table of surfaces: half edges along forward and left (m), centre of the top (m, world frame) and
+#: orientation (quaternion w, x, y, z) of a rectangle
+SURFACE_COLUMNS = 9
+
 
 def _wave_parameter(name: str, unit: str, description: str, minimum: float | None = None) -> Variable:
     start = (0.0,) * MAX_WAVE_COMPONENTS

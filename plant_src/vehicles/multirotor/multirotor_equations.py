@@ -55,10 +55,12 @@ from ..common.rigid_body import (
     rigid_body_rate,
     symmetric_matrix,
 )
+from ..common.water_surface import SURFACE_SUM
 from . import water
 from .airframe import Airframe, RotorEffects
 from .interface import states, variables
 from .loads import RotorFunctions, gyroscopic_torque, rotor_table, still_air_loads
+from .surroundings import create_surroundings_function
 
 _EFFECTS = [effect.name for effect in fields(RotorEffects)]
 
@@ -274,6 +276,7 @@ def multirotor_block(airframe: Airframe, description: str, rotor_slots: int | No
     """
     equations = MultirotorEquations(airframe, rotor_slots or len(airframe.rotors))
     step, functions = free_step(equations), equations.rotor_functions
+    surroundings, surroundings_callee = create_surroundings_function()
     model = Multirotor(
         airframe.name,
         description,
@@ -283,8 +286,8 @@ def multirotor_block(airframe: Airframe, description: str, rotor_slots: int | No
         equations.rate,
         lambda state, _inputs, _constants: ca.vertcat(motion_of_state(state), ca.SX.zeros(len(WORLD_OUTPUTS))),
         derived_parameters=equations.constants.vector,
-        callees=[step, functions.inflow_reductions, functions.load_sum],
+        callees=[step, functions.inflow_reductions, functions.load_sum, surroundings_callee, SURFACE_SUM],
         free_step=step.function,
     )
     maps = contact_maps.FreeContactMaps(model, lambda c: rigid_body(equations.constants.by_name(c)), motion_of_state)
-    return as_block(model, maps.functions())
+    return as_block(model, [*maps.functions(), surroundings])

@@ -30,9 +30,9 @@ from ..common.contact_maps import (
     step_status,
 )
 from ..common.shapes import Body
+from ..common.water_surface import create_elevation_function
 from .hull import Frame, Hull
 from .vessel_equations import VesselModel
-from .wave_loads import create_elevation_function
 
 
 class _Impulse(NamedTuple):

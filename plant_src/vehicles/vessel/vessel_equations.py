@@ -16,9 +16,10 @@ from cosim.export.equations.model import ContinuousModel
 from ..common import kinematics
 from ..common.interface import VESSEL_STATES, WORLD_OUTPUTS
 from ..common.named_values import ConstantsMap, NamedValues, values_by_name, variables_of
+from ..common.water_surface import SURFACE_SUM
 from .hull import Hull
 from .strips import TwinHull
-from .wave_loads import SURFACE_SUM, WAVE_SUM, wave_table
+from .wave_loads import WAVE_SUM, wave_table
 
 #: longest integration step (s); the motion of vessels is slow, and each stage evaluates the waves
 MAX_STEP = 0.01

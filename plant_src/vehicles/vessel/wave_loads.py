@@ -23,7 +23,6 @@ from .strips import STRIP_COUNT, Strips, TwinHull
 GRAVITY = 9.81  # m/s2
 
 _COLUMN_COUNT = 8  # of the wave table: amplitude, kx, ky, frequency, phase, velocity along x, y and z
-_SURFACE_COLUMN_COUNT = 5  # needed for the elevation: the first five
 
 
 @dataclass(frozen=True)
@@ -97,23 +96,8 @@ def _wave_term() -> ca.Function:
     return ca.Function("wave", [common, row], [ca.vertcat(*elevations, *velocities, *accelerations)])
 
 
-def _elevation_term() -> ca.Function:
-    """Return the function of one component of the free surface: (x, y, time) and a row of the table to the elevation."""
-    place, row = ca.SX.sym("place", 3), ca.SX.sym("row", _SURFACE_COLUMN_COUNT)
-    amplitude, kx, ky, frequency, phase = ca.vertsplit(row)
-    angle = kx * place[0] + ky * place[1] - frequency * place[2] + phase
-    return ca.Function("elevation_term", [place, row], [amplitude * sine_and_cosine(angle)[1]])
-
-
-#: sums over all components, which the equations call as loops in C
+#: sum over all components, which the equations call as a loop in C
 WAVE_SUM = sum_over_rows("waves", _wave_term(), MAX_WAVE_COMPONENTS)
-SURFACE_SUM = sum_over_rows("surface", _elevation_term(), MAX_WAVE_COMPONENTS)
-
-
-def create_elevation_function() -> ca.Function:
-    """Return the exported function from (x, y, time), number and table of components to the elevation (m)."""
-    place, count, rows = ca.SX.sym("place", 3), ca.SX.sym("count"), ca.SX.sym("rows", MAX_WAVE_COMPONENTS, _SURFACE_COLUMN_COUNT)
-    return ca.Function("water_elevation", [place, count, ca.vec(rows)], [SURFACE_SUM(place, count, rows)])
 
 
 def water_motion(

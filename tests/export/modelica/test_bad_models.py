@@ -192,8 +192,14 @@ BAD = {
         in_model("Real a(unit = 3);", "a = u;\n  y = a;"),
         "M.mo:4: modifier `unit` for builtin component `a` of type `Real`",
     ),
-    "too few equations": (in_model("Real a;"), "M.mo:1: unbalanced model: 1 equations, 2 unknowns (balance = -1)"),
-    "too many equations": (in_model("", "y = u;\n  y = 2*u;"), "M.mo:6: unbalanced model: 2 equations, 1 unknowns (balance = 1)"),
+    "too few equations": (
+        in_model("Real a;"),
+        "M.mo:4: unbalanced model: 1 equations, 2 unknowns (balance = -1): no equation determines a",
+    ),
+    "too many equations": (
+        in_model("", "y = u;\n  y = 2*u;"),
+        "M.mo:7: unbalanced model: 2 equations, 1 unknowns (balance = 1): this equation is one too many, the others determine y",
+    ),
     "singular: variable in no equation": (
         in_model("Real a;\n  Real b;", "a = u;\n  a = y;\n  y = 1;"),
         "M.mo:9: the equations do not determine b, and this equation",
@@ -209,7 +215,7 @@ BAD = {
     ),
     "constraint between states": (
         in_model("Real a(start=1);\n  Real b;", "der(a) = u;\n  der(b) = u;\n  a + b = 1;\n  y = a;"),
-        "M.mo:7: unbalanced model: 4 equations, 3 unknowns (balance = 1)",
+        "M.mo:9: unbalanced model: 4 equations, 3 unknowns (balance = 1): this equation is one too many",
     ),
     "dependent parameters in a circle": (
         in_model("parameter Real a = b;\n  parameter Real b = a;"),
@@ -239,7 +245,7 @@ BAD = {
     ),
     "different variables in branches": (
         in_model("Real a;\n  Real b;", "if u > 0 then\n    a = 1;\n  else\n    b = 1;\n  end if;\n  y = a;"),
-        "M.mo:1: unbalanced model: 2 equations, 3 unknowns (balance = -1)",
+        "M.mo:4: unbalanced model: 2 equations, 3 unknowns (balance = -1): no equation determines a",
     ),
     "if-equation without else": (
         in_model("", "if u > 0 then\n    y = 1;\n  end if;"),
@@ -253,7 +259,7 @@ BAD = {
         in_model("Integer n;", "n = 1;\n  y = der(n);"),
         "M.mo:7: der() argument must have type `Real`, found `Integer`",
     ),
-    "der of an input": (in_model("", "y = der(u);"), "M.mo:6: der(...) must name a coordinate classified as a continuous"),
+    "der of an input": (in_model("", "y = der(u);"), "M.mo:6: der() needs a variable with a derivative: inputs, "),
     "pre of a continuous variable": (
         in_model("Real x;", "der(x) = u;\n  y = pre(x);"),
         "M.mo:7: pre(`x`) names a continuous coordinate where the read is n",

@@ -87,4 +87,18 @@ def test_a_run_that_fails_its_own_comparison_is_refused(run, tolerances, reason,
 def test_changes_name_what_is_different():
     later = {"versions": {"numpy": "3"}, "machine": {"system": "Linux"}, "sha256": {"a.fmu": "13", "b.py": "7"}}
     assert describe_provenance_changes(METADATA, METADATA) == []
-    assert describe_provenance_changes(METADATA, later) == ["numpy 2 -> 3", "a.fmu", "*.py"]
+    assert describe_provenance_changes(METADATA, later) == ["numpy 2 -> 3", "a.fmu", "b.py"]
+
+
+def test_a_changed_module_is_named_unless_its_folder_has_many(tmp_path):
+    few = {f"controllers/{name}.py": "1" for name in ("a", "b")}
+    many = {f"plant/m{i}.py": "1" for i in range(9)}
+    run = Result(swing().recording, metadata={**METADATA, "sha256": few | many})
+    write_reference(run, tmp_path / "r.csv", TOLERANCES)
+    made_by = json.loads((tmp_path / "r.json").read_text())
+    assert sorted(made_by["sha256"]) == ["controllers/a.py", "controllers/b.py", "plant/*.py"]
+    assert describe_provenance_changes(made_by, run.metadata) == []
+    changed = {"sha256": few | many | {"controllers/b.py": "2", "plant/m3.py": "2"}}
+    assert describe_provenance_changes(made_by, {**run.metadata, **changed}) == ["controllers/b.py", "plant/*.py"]
+    older = {**made_by, "sha256": {"controllers/*.py": "one hash of all"}}  # references of older versions
+    assert describe_provenance_changes(older, {**run.metadata, "sha256": few}) == ["controllers/*.py"]

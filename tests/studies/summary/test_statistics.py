@@ -59,6 +59,13 @@ def test_the_standard_deviation_of_one_value_is_nan():
     group.add(row(0, 2.0))
     ((_, found),) = group.statistics()
     assert np.isnan(found["std"])
+    assert dict(group.shown_statistics())["k"]["std"] == "-"
+
+
+def test_of_a_boolean_the_share_of_true_values_is_shown():
+    (group,) = group_rows(lambda: [row(run, run > 0) for run in range(15)], [])
+    (shown,) = (numbers for _, numbers in group.shown_statistics())
+    assert {key: text for key, text in shown.items() if text} == {"count": "15", "mean": "93.3 %"}
 
 
 def test_the_most_frequent_cause_comes_first():

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
 
+from ....core.errors import InputError, Problem
 from ..model.flat_model import Equation, Model
 from ..model.syntax_tree import (
     Assign,
@@ -39,6 +40,31 @@ def reference_of(key: ScalarKey, model: Model) -> Name | Index:
         position.insert(0, number % size)
         number //= size
     return Index(Name(name), tuple(Literal(k + 1, "Integer") for k in position)) if shape else Name(name)
+
+
+class SingularError(InputError):
+    """Structurally singular system of equations.
+
+    Attributes:
+        undetermined: Variables that no equation determines, with the places of their declarations.
+        surplus: Places of the equations that determine no variable, with the variables that they contain.
+    """
+
+    def __init__(
+        self,
+        undetermined: Sequence[tuple[str, SourceLocation | None]],
+        surplus: Sequence[tuple[SourceLocation | None, Sequence[str]]],
+    ):
+        self.undetermined, self.surplus = undetermined, surplus
+        names = ", ".join(name for name, _ in undetermined)
+        where = surplus[0][0] if surplus else undetermined[0][1]
+        if undetermined and surplus:
+            text = f"the equations do not determine {names}, and this equation contradicts others"
+        elif surplus:
+            text = "this equation is superfluous: the others determine all its variables"
+        else:
+            text = f"no equation gives {undetermined[0][0]} a value"
+        super().__init__(Problem(text, str(where or "")))
 
 
 @dataclass
@@ -127,14 +153,10 @@ class EquationSystem:
     def _check(self, matched: dict[int, ScalarKey]) -> None:
         missing = set(self.unknowns) - set(matched.values())
         surplus = [equation for number, equation in enumerate(self._scalar) if number not in matched]
-        if surplus and missing:
-            names = ", ".join(sorted({name for name, _ in missing}))
-            raise_model_error(f"the equations do not determine {names}, and this equation contradicts others", surplus[0].where)
-        if surplus:
-            raise_model_error("this equation is superfluous: the others determine all its variables", surplus[0].where)
-        if missing:
-            name = min(missing)[0]
-            raise_model_error(f"no equation gives {name} a value", self.model.variables[name].where)
+        if surplus or missing:
+            variables = [(name, self.model.variables[name].where) for name in sorted({name for name, _ in missing})]
+            equations = [(each.where, sorted({name for name, _ in self._keys(each)})) for each in surplus]
+            raise SingularError(variables, equations)
 
     def _solve_component(self, numbers: list[int], matched: dict[int, ScalarKey]) -> Assign | Solve | For:
         if len(numbers) == 1:

@@ -27,6 +27,8 @@ _OPERATOR = re.compile(
 _MEANINGS = {
     "function-call assignment must retain at least one output": "terminate() and functions without results are not supported in "
     "algorithms of packages; write terminate() in a when-equation",
+    "must name a coordinate classified as a continuous state": "der() needs a variable with a derivative: inputs, discrete "
+    "variables and parameters have none; filter an input u first, T*der(x) = u - x, and use der(x)",
     "component binding type compatibility": "the type of the binding does not fit the declaration",
     "a non-guarded nested return": "return inside a loop or a branch is not supported; write one assignment for each branch",
     "a proved finite arithmetic-series form": "break inside a loop is not supported; write its condition after while",
@@ -51,7 +53,9 @@ def to_problems(answer: Mapping[str, Any], name: str, path: Path, sources: Model
     """Convert the front end's message (see `rumoca_process`) to problems, one for each informative line."""
     error = answer["error"]
     if panic := _PANIC.search(error):
-        return [Problem(panic["what"], str(sources.locate({key: int(panic[key]) for key in ("source", "start")}) or path))]
+        return [
+            Problem(_shorten(panic["what"]), str(sources.locate({key: int(panic[key]) for key in ("source", "start")}) or path))
+        ]
     lines = [line.rpartition("[Resolve]:")[2].strip(" -") for line in error.splitlines()]
     reasons = [line for line in dict.fromkeys(lines) if line and not line.startswith("Related failures")]
     if any(line.startswith("unresolved extends base class") for line in reasons):

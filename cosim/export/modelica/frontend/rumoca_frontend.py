@@ -41,10 +41,12 @@ class ModelicaOptions:
     Attributes:
         library_path: Folders that are searched for libraries before those of MODELICAPATH.
         values: Values of parameters by name, as JSON values or texts of Modelica expressions; also of structural parameters.
+        supplement: Modelica text of further declarations and equations of the model.
     """
 
     library_path: Sequence[Path] = ()
     values: Mapping[str, Any] = field(default_factory=dict)
+    supplement: str = ""
 
 
 DEFAULT_OPTIONS = ModelicaOptions()
@@ -71,7 +73,7 @@ def flatten_model(
     packages, name = find_packages(path, text), model_name(path, text, model)
     files = [path, *(file for package in packages for file in sorted(package.rglob("*.mo")) if file != path)]
     libraries = find_libraries(files, library_folders(options.library_path), [package.name for package in packages])
-    declaration = modified_model(name, options.values)
+    declaration = modified_model(name, options.values, options.supplement)
     links = link_libraries(libraries) if libraries else None
     sources = ModelicaSources(files, libraries, links, None if _WITHIN.search(text) else replace_terminate(text))
     if not libraries:
@@ -100,8 +102,8 @@ def _check_names(flat: Mapping[str, Any], values: Mapping[str, Any], model: str)
         raise InputError(problems)
 
 
-def modified_model(name: str, values: Mapping[str, Any]) -> str:
-    """Return the declaration of the model MODIFIED_MODEL with values of parameters, "" without values.
+def modified_model(name: str, values: Mapping[str, Any], supplement: str = "") -> str:
+    """Return the declaration of the model MODIFIED_MODEL with values of parameters and a supplement, "" without both.
 
     Raises:
         InputError: A name is not that of a component, or a value cannot be one of a parameter.
@@ -110,7 +112,8 @@ def modified_model(name: str, values: Mapping[str, Any]) -> str:
     if problems:
         raise InputError(problems)
     modifiers = ", ".join(_modifier(*each) for each in values.items())
-    return f"model {MODIFIED_MODEL} extends {name}({modifiers}); end {MODIFIED_MODEL};" if modifiers else ""
+    base = f"{name}({modifiers})" if modifiers else name
+    return f"model {MODIFIED_MODEL} extends {base}; {supplement} end {MODIFIED_MODEL};" if modifiers or supplement else ""
 
 
 def _modifier(name: str, value: Any) -> str:

@@ -8,12 +8,12 @@ from typing import Any
 
 import numpy as np
 
-from .catalogue import model_from_data
-from .vehicles.model import Model
-from .vehicles.multirotor.airframe import Airframe, Rotor
-from .vehicles.submerged.craft import Thruster
-from .vehicles.surface_vessel.surface_vessel import SurfaceVessel
-from .vehicles.vessel.actuators import Propeller
+from ..catalogue import model_from_data
+from ..vehicles.model import Model
+from ..vehicles.multirotor.airframe import Airframe, Rotor
+from ..vehicles.submerged.craft import Thruster
+from ..vehicles.surface_vessel.surface_vessel import SurfaceVessel
+from ..vehicles.vessel.actuators import Propeller
 
 #: largest distance of a rotor from the centre of mass over the median of all rotors, and over the farthest corner of the boxes
 MAX_ROTOR_DISTANCE = 5.0

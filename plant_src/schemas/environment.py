@@ -2,11 +2,11 @@
 
 from __future__ import annotations
 
-from .environment.sea import MAX_COMPONENTS
-from .environment.settings import MAX_SIGNIFICANT_HEIGHT, MAX_SPREADING, REFERENCE_HEIGHT, TURBULENCE_HEIGHT
-from .environment.spectrum import GAMMA, MAX_GAMMA, MIN_GAMMA, SIGNIFICANT_HEIGHTS, SPECTRA
-from .environment.wind import MAX_HEIGHT, MIN_HEIGHT
-from .schema_parts import (
+from ..environment.sea import MAX_COMPONENTS
+from ..environment.settings import MAX_SIGNIFICANT_HEIGHT, MAX_SPREADING, REFERENCE_HEIGHT, TURBULENCE_HEIGHT
+from ..environment.spectrum import GAMMA, MAX_GAMMA, MIN_GAMMA, SIGNIFICANT_HEIGHTS, SPECTRA
+from ..environment.wind import MAX_HEIGHT, MIN_HEIGHT
+from .parts import (
     AT_LEAST_0,
     NUMBER,
     POSITIVE,

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
-from .catalogue import FAMILIES
-from .schema_parts import (
+from ..catalogue import FAMILIES
+from ..vehicles.multirotor import vehicle_data as multirotor
+from ..vehicles.submerged import vehicle_data as submerged
+from .parts import (
     Schema,
     family_schema,
     list_schema,
@@ -13,9 +15,7 @@ from .schema_parts import (
     quantity_schema,
     vector_schema,
 )
-from .vehicles.multirotor import vehicle_data as multirotor
-from .vehicles.submerged import vehicle_data as submerged
-from .vessel_schema import planar_vessel_schema, surface_vessel_schema
+from .vessel import planar_vessel_schema, surface_vessel_schema
 
 
 def vehicle_schema() -> Schema:

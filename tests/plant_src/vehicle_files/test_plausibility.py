@@ -12,7 +12,7 @@ import pytest
 
 from cosim.core import resources
 from plant_src.catalogue import MODELS, model_from_data
-from plant_src.plausibility import vehicle_warnings
+from plant_src.vehicle_files.plausibility import vehicle_warnings
 from plant_src.world import World
 
 DATA = {

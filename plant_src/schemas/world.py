@@ -5,10 +5,10 @@ Defaults, limits and lists of names are those of the readers.
 
 from __future__ import annotations
 
-from .environment_schema import environment_schemas
-from .obstacles import CONCRETE
-from .placement import DRY
-from .schema_parts import (
+from ..obstacles import CONCRETE
+from ..placement import DRY
+from .environment import environment_schemas
+from .parts import (
     AT_LEAST_0,
     NUMBER,
     POSITIVE,

@@ -12,7 +12,7 @@ import pytest
 from cosim.core import resources
 from cosim.core.errors import InputError
 from plant_src.catalogue import FAMILIES, model_from_data
-from plant_src.vehicle_schema import vehicle_schema
+from plant_src.schemas.vehicle import vehicle_schema
 
 FILES = sorted((resources.root() / "plant_src/vehicles/data").glob("*.json"))
 VALIDATOR = jsonschema.Draft202012Validator(vehicle_schema())

@@ -14,13 +14,13 @@ import numpy as np
 
 from cosim.core.errors import InputError, Problem, did_you_mean
 
+from ..catalogue import NAMED_LISTS
+from ..vehicles.common.inertia import inertia_problems
+from ..vehicles.common.quantities import QuantityReader
 from . import mesh_import
-from .catalogue import NAMED_LISTS
 from .mesh_import import ImportedVehicle
 from .primitive_shapes import box_triangles, cylinder_triangles, sphere_triangles
 from .urdf_file import UrdfFile
-from .vehicles.common.inertia import inertia_problems
-from .vehicles.common.quantities import QuantityReader
 
 _AXES = np.eye(3)
 

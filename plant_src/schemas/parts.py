@@ -5,8 +5,8 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-from .catalogue import COMMON_KEYS
-from .vehicles.common.quantities import TEXT_KEYS
+from ..catalogue import COMMON_KEYS
+from ..vehicles.common.quantities import TEXT_KEYS
 
 Schema = dict[str, Any]
 

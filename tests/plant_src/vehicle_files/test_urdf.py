@@ -16,12 +16,12 @@ from world_harness import WorldHarness
 from cosim.cli.commands.new_vehicle import command
 from cosim.core.errors import InputError
 from plant_src.catalogue import model_from_data
-from plant_src.urdf import vehicle_from_urdf
+from plant_src.vehicle_files.urdf import vehicle_from_urdf
 
 ARM = 0.2
 ANGLES = {"front_left": 45, "rear_left": 135, "rear_right": 225, "front_right": 315}
 #: the example of the documentation
-PAGE = Path(__file__).parents[2] / "plant_src/vehicles/data/README.md"
+PAGE = Path(__file__).parents[3] / "plant_src/vehicles/data/README.md"
 (EXAMPLE,) = re.findall(r'^```json\n(\{"family": "multirotor".*?)^```$', PAGE.read_text(), re.MULTILINE | re.DOTALL)
 DATA: dict[str, Any] = json.loads(EXAMPLE)
 BODY = """<link name="base"><inertial><origin xyz="0 0 0.02" rpy="0 0 0.5"/><mass value="0.8"/>
@@ -61,6 +61,12 @@ def test_mass_and_inertia_are_those_of_all_links(tmp_path: Path) -> None:
         expected = expected + turn @ np.diag([1e-6, 2e-6, 3e-6]) @ turn.T + 0.05 * (arm @ arm * np.eye(3) - np.outer(arm, arm))
     assert data["mass"]["value"] == pytest.approx(1.0, rel=1e-15)
     assert np.array(data["inertia"]["value"]) == pytest.approx(expected, rel=1e-12, abs=1e-15)
+
+
+def test_a_mass_of_the_accompanying_file_does_not_scale_the_inertia(tmp_path: Path) -> None:
+    data = imported(tmp_path, robot(), {**DATA, "mass": 2.0})
+    assert data["mass"] == 2.0
+    assert data["inertia"] == imported(tmp_path, robot())["inertia"]
 
 
 def test_rotors_are_at_their_links_relative_to_the_centre_of_mass(tmp_path: Path) -> None:

@@ -2,7 +2,10 @@
 
 from __future__ import annotations
 
-from .schema_parts import (
+from ..vehicles.planar_vessel import vehicle_data as planar
+from ..vehicles.surface_vessel import vehicle_data as surface
+from ..vehicles.vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS
+from .parts import (
     TEXT,
     Schema,
     family_schema,
@@ -13,9 +16,6 @@ from .schema_parts import (
     quantity_schema,
     vector_schema,
 )
-from .vehicles.planar_vessel import vehicle_data as planar
-from .vehicles.surface_vessel import vehicle_data as surface
-from .vehicles.vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS
 
 
 def surface_vessel_schema() -> Schema:

@@ -14,7 +14,7 @@ from cosim.cli.commands.schema import _schema
 from cosim.core import resources
 from cosim.core.errors import InputError
 from plant_src.json_reader import JsonReader
-from plant_src.world_schema import world_schema
+from plant_src.schemas.world import world_schema
 from plant_src.world_settings import read_world_settings
 
 SCHEMA = world_schema()

@@ -1,0 +1,1 @@
+"""JSON Schemas of the arguments of a world and of vehicle files, for editors and the reference; the readers check the values."""

@@ -1,0 +1,1 @@
+"""Vehicle files: their equations and plausibility, and their import from URDF and meshes."""
