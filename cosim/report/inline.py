@@ -7,6 +7,7 @@ from collections.abc import Iterator, Sequence
 from typing import TYPE_CHECKING
 
 from ..core.errors import CosimError, InputError
+from ..core.text import count_noun
 from ..results import Result
 from .figures import STYLE, draw_figure, figure_style, figure_to_svg
 from .run_page import render_report
@@ -28,7 +29,7 @@ def result_as_html(result: Result) -> str:
     The frame has its own origin, so that scripts of the report have no access to the notebook.
     """
     name, failure = (str(result.metadata.get(key) or "") for key in ("name", "failure"))
-    rows = f"{len(result.time)} rows of {len(result)} signals"
+    rows = f"{count_noun(len(result.time), 'row')} of {count_noun(len(result), 'signal')}"
     lines = [f"<p><b>{html.escape(name or 'Result')}</b>: {rows}</p>"]
     lines += [f"<p>ended early: {html.escape(failure)}</p>"] if failure else []
     if result.kpis:

@@ -16,8 +16,10 @@ VariablesByEndpoint = dict[Endpoint, Variable]
 _MAX_NAMES = 4
 
 
-def find_missing_connections(system: System, unconnected: VariablesByEndpoint) -> Iterator[str]:
-    """Yield a text for each component with inputs that probably lack a connection, and one for all without a fed input.
+def find_missing_connections(system: System, unconnected: VariablesByEndpoint) -> Iterator[tuple[str, str]]:
+    """Yield (component, text) for each component with inputs that probably lack a connection.
+
+    One pair ("", text) names the components of which no input is fed.
 
     An input probably lacks a connection if an output has its name, if outputs feed other elements of its vector, or if it is a
     single number and half of the component's inputs or more (vectors count once) are fed or set. Vectors of which no element is
@@ -39,9 +41,12 @@ def find_missing_connections(system: System, unconnected: VariablesByEndpoint) -
         if is_isolated and not sources:
             isolated.append(name)
         elif suspects:
-            yield f"nothing feeds or sets {abbreviate_names(map(str, suspects), _MAX_NAMES)}{_hint(system, suspects, sources)}"
+            yield (
+                name,
+                f"nothing feeds or sets {abbreviate_names(map(str, suspects), _MAX_NAMES)}{_hint(system, suspects, sources)}",
+            )
     if isolated and system.connections:
-        yield f"nothing feeds or sets an input of {', '.join(isolated)}: are connections missing?"
+        yield "", f"nothing feeds or sets an input of {', '.join(isolated)}: are connections missing?"
 
 
 def _input_slots(name: str, component: Component) -> list[Endpoint]:

@@ -41,9 +41,9 @@ def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
 
 def _missing_connections(prepared: PreparedRun) -> Iterator[Problem]:
     """Yield a warning for each component with inputs that probably lack a connection, and one for components without any."""
-    where = prepared.root.where("connections")
-    for text in find_missing_connections(prepared.system, unconnected_inputs(prepared)):
-        yield Problem(text, where)
+    for name, text in find_missing_connections(prepared.system, unconnected_inputs(prepared)):
+        found = prepared.root.find_component(name)
+        yield Problem(text, found[0].where("components", found[1]) if found else prepared.root.where("connections"))
 
 
 def _double_conversions(prepared: PreparedRun) -> Iterator[Problem]:

@@ -18,7 +18,7 @@ ROOT = Path(__file__).parents[2]
 #: documents outside of docs/ that the navigation contains; others are found by links
 STARTS = ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md", "plant_src/README.md")
 #: files that the theme loads
-ASSETS = tuple(f"docs/generator/assets/{name}" for name in ("iframe-worker.js", "site.css", "narrow_pages.js"))
+ASSETS = tuple(f"docs/generator/assets/{name}" for name in ("iframe-worker.js", "site.css", "names_and_tables.js"))
 #: generated pages
 REFERENCE = {
     "commands": commands_page,

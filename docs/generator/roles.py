@@ -46,15 +46,15 @@ def _group_titles(roles: Iterable[RoleSpec]) -> dict[Rows, str]:
 def _role_section(name: str, role: RoleSpec, titles: Mapping[Rows, str]) -> str:
     kinds: dict[str, Mapping[str, Source]] = {"input": role.inputs, "output": role.outputs, "parameter": role.parameters}
     rows = (_row(kind, name, source, titles) for kind, variables in kinds.items() for name, source in variables.items())
-    return f"## {name}\n\n{plain(role.description)}\n\n{table(('kind', 'name', 'unit', 'meaning'), rows)}"
+    return f"## {name}\n\n{plain(role.description)}\n\n{table(('name', 'kind', 'unit', 'meaning'), rows)}"
 
 
 def _row(kind: str, name: str, source: Source, titles: Mapping[Rows, str]) -> tuple[str, ...]:
     if isinstance(source, OutputsSpec):
         title = titles[_signals(source)].lower()
-        return kind, code(f"{name}.NAME"), "", f"each of the [{title}](#{title.replace(' ', '-')})"
+        return code(f"{name}.NAME"), kind, "", f"each of the [{title}](#{title.replace(' ', '-')})"
     variable = VariableSpec(unit=source, description="") if isinstance(source, str) else source
-    return kind, code(name), plain(variable.unit), plain(variable.description)
+    return code(name), kind, plain(variable.unit), plain(variable.description)
 
 
 def _signals(source: OutputsSpec) -> Rows:

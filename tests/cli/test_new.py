@@ -187,6 +187,17 @@ def test_an_fmu_older_than_its_source_is_recognized(moved, language, tmp_path):
     assert FmuFile(folder / "my_pilot.fmu").changed_sources() == [source.name]
 
 
+def test_an_fmu_of_a_class_that_imports_another_file_is_not_older_than_its_source(moved, tmp_path):
+    folder = shutil.copytree(moved("vessel_autopilot", "python") / "my_pilot", tmp_path / "my_pilot")
+    (folder / "bold.py").write_text("from my_pilot import MyPilot\n\n\nclass Bold(MyPilot):\n    pass\n")
+    assert cosim("build", "bold.py", "--output", "bold.fmu", cwd=folder).returncode == 0
+    assert FmuFile(folder / "bold.fmu").changed_sources() == []
+    (folder / "bold.py").write_text("from my_pilot import MyPilot\n\n\nclass Bold(MyPilot):\n    gain = 2\n")
+    assert FmuFile(folder / "bold.fmu").changed_sources() == ["bold.py"]
+    (folder / "bold.py").write_text("from my_pilot import\n")
+    assert FmuFile(folder / "bold.fmu").changed_sources() == ["bold.py"]
+
+
 def test_a_run_of_an_fmu_older_than_its_source_warns(moved, tmp_path):
     folder = shutil.copytree(moved("vessel_autopilot", "c") / "my_pilot", tmp_path / "my_pilot")
     with (folder / "my_pilot.c").open("a") as source:

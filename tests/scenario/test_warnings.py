@@ -31,12 +31,12 @@ def ship(folder, connections, parameters=(), **more):
 @pytest.mark.parametrize(
     ("left", "line"),
     [
-        (0, "nothing feeds or sets plant.ship.motor[1], plant.ship.motor[2], but there is an output pilot.motor[1]"),
-        (1, "nothing feeds or sets pilot.vehicle.position.x, but there is an output plant.ship.position.x"),
+        (0, "plant: nothing feeds or sets plant.ship.motor[1], plant.ship.motor[2], but there is an output pilot.motor[1]"),
+        (1, "pilot: nothing feeds or sets pilot.vehicle.position.x, but there is an output plant.ship.position.x"),
     ],
 )
 def test_a_missing_connection_is_recognized_by_matching_names(folder, left, line):
-    assert ship(folder, [BOTH[left]]) == [f"connections: {line}: is a connection missing?"]
+    assert ship(folder, [BOTH[left]]) == [f"components.{line}: is a connection missing?"]
 
 
 KEEPS = 'it keeps its start value until a connection feeds or "parameters" set it'
@@ -74,14 +74,14 @@ def own_pair(folder, connections, **more):
 
 def test_a_forgotten_number_of_a_component_with_mostly_fed_inputs_is_named_with_the_most_similar_output(folder):
     fed = ["position.x", "position.y", "altitude", "speed"]
-    line = f"connections: nothing feeds or sets pilot.rotor_speeed: {KEEPS}; the output nearest by name is plant.rotor_speed"
+    line = f"components.pilot: nothing feeds or sets pilot.rotor_speeed: {KEEPS}; the output nearest by name is plant.rotor_speed"
     assert own_pair(folder, fed) == [line]  # gust.* and reset keep their start values on purpose
     assert own_pair(folder, fed, parameters={"rotor_speeed": 0.0}) == []
     assert own_pair(folder, ["altitude"]) == []  # few inputs of the component are in use
 
 
 def test_the_other_elements_of_a_vector_that_outputs_feed_in_part_are_named(folder):
-    assert own_pair(folder, ["gust.x"]) == [f"connections: nothing feeds or sets pilot.gust.y: {KEEPS}"]
+    assert own_pair(folder, ["gust.x"]) == [f"components.pilot: nothing feeds or sets pilot.gust.y: {KEEPS}"]
 
 
 def test_components_without_any_connected_input_cause_warnings(folder):

@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
@@ -14,6 +15,7 @@ from zlib import crc32
 from ...core.errors import InputError
 from ...process.journal import suspending_deadline
 from ...process.temporary_folders import FMU_PREFIX, LockedFolder
+from ..sibling_imports import read_with_relative_imports
 from . import file_cache
 from .description import FmuDescription, build_description
 from .file_cache import ExtractedFolder, FileKey
@@ -33,6 +35,14 @@ from .preflight.fmu_platform import current_platform
 
 #: files that `cosim build` copies into an FMU
 _SOURCE_SUFFIXES = (".py", ".mo", ".c", ".h")
+
+
+def _contents_in_fmu(source: Path) -> Iterator[bytes]:
+    """Yield what `cosim build` may have made of a source: the file, and a Python file with relative imports."""
+    yield source.read_bytes()
+    if source.suffix == ".py":
+        with suppress(SyntaxError, ValueError):  # such a file has not been exported
+            yield read_with_relative_imports(source, source.parent).encode()
 
 
 @dataclass(frozen=True)
@@ -135,7 +145,7 @@ class FmuFile:
         """Return whether the FMU contains files with the name of a source, but none with its content."""
         names = (f"resources/{source.name}", f"sources/{source.name}")
         copies = [self.examination.members[name] for name in names if name in self.examination.members]
-        return bool(copies) and crc32(source.read_bytes()) not in copies
+        return bool(copies) and not any(crc32(content) in copies for content in _contents_in_fmu(source))
 
     @cached_property
     def sha256(self) -> str:

@@ -62,7 +62,7 @@ def test_four_thrusters_drive_it_at_the_speed_of_their_thrust(sense: int, advanc
     force = 4 * 3.8e-4 * 200.0**2 * np.sqrt(0.5)
     speed = terminal_speed(force, 13.7 + 4 * advance * 200.0 / 2, 141.0)
     found = sense * fmu.get("velocity_body.u").item()
-    case = f"[{'with inflow' if advance else 'forward' if sense > 0 else 'reverse'}]"
+    case = "with inflow" if advance else "forward" if sense > 0 else "reverse"
     measured(MODEL, "speed by four thrusters", found, speed, "m/s", "closed form", relative=1e-3, case=case)
 
 

@@ -1,5 +1,7 @@
-// Narrow pages: a table that is wider than the page shows each row as a block, with its headings; long names in titles break at points.
+// Names in titles and tables break only at points, underscores, slashes and colons. On narrow pages a table that is wider than the page
+// shows each row as a block, with its headings.
 const NARROW = 600; // px
+const BREAK = /(?<=[._/:])(?=[A-Za-z])/;
 
 function stackWideTables() {
   for (const table of document.querySelectorAll(".md-typeset table:not([class])")) {
@@ -13,10 +15,10 @@ function stackWideTables() {
 }
 
 function breakNames() {
-  for (const title of document.querySelectorAll(".md-typeset :is(h1, h2, h3, h4)")) {
-    const texts = document.createTreeWalker(title, NodeFilter.SHOW_TEXT), found = [];
-    while (texts.nextNode()) if (/[._]\w/.test(texts.currentNode.data)) found.push(texts.currentNode);
-    for (const text of found) text.replaceWith(...text.data.split(/(?<=[._])(?=\w)/).flatMap((part, i) => (i ? [document.createElement("wbr"), part] : [part])));
+  for (const element of document.querySelectorAll(".md-typeset :is(h1, h2, h3, h4, td code)")) {
+    const texts = document.createTreeWalker(element, NodeFilter.SHOW_TEXT), found = [];
+    while (texts.nextNode()) if (BREAK.test(texts.currentNode.data)) found.push(texts.currentNode);
+    for (const text of found) text.replaceWith(...text.data.split(BREAK).flatMap((part, i) => (i ? [document.createElement("wbr"), part] : [part])));
   }
 }
 
