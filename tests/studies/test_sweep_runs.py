@@ -104,7 +104,7 @@ def test_units_of_kpis_are_shown_also_when_a_sweep_is_continued(lag):
         assert [line[1] for line in lines if line[:1] == ["own.end"]] == ["m/s"]
         assert [line[1] for line in lines if line[:1] == ["own.count"]] == ["2"]
         page = (lag.folder / "runs/sweep/sweep.html").read_text()
-        assert '<td class="name">own.end</td><td class="soft">m/s</td>' in page
+        assert '<td class="name">own.end</td><td class="soft" data-label="unit">m/s</td>' in page
         assert "<code>own.end</code> max 10.0 m/s" in page
         assert json.loads((lag.folder / "runs/sweep/sweep.json").read_text())["units"] == {"own.end": "m/s"}
     assert [sorted(record) for record in lag.records()] == [["key", "kpis", "seconds", "units"], ["key", "kpis", "seconds"]]
