@@ -16,6 +16,7 @@ from ...core import resources
 from ...core.errors import InputError, Problem
 from ...core.version import __version__
 from ...studies.regression import Regression
+from ..forked_commands import forked_commands
 
 _TEMPLATES = Path(__file__).parents[1] / "templates"
 #: template of each file of a new project
@@ -45,7 +46,8 @@ def command(directory: Path, force: bool) -> int:
     if present and not force:
         raise InputError([Problem("exists; --force overwrites it", str(path)) for path in present])
     _write_project(directory)
-    outcome = Regression(directory / "scenarios/course.json", directory / "runs/course", update=True).run()
+    with forked_commands(1) as run_command:
+        outcome = Regression(directory / "scenarios/course.json", directory / "runs/course", True, run_command).run()
     for folder in {(directory / name).parent for name in _PROJECT_FILES}:
         shutil.rmtree(folder / "__pycache__", ignore_errors=True)
     if outcome.code:
