@@ -9,7 +9,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..studies.regression import Regression, RegressionOutcome
+from ..studies.regression import CommandRunner, Regression, RegressionOutcome
 from ..studies.regression_runs import run_in_parallel
 
 if TYPE_CHECKING:
@@ -22,26 +22,27 @@ LOG_LEVELS = ("DEBUG ", "INFO ", "WARNING ")
 
 @dataclass(frozen=True)
 class ControllerTrial:
-    """Scenario with the candidate, the original scenario, and the output directories of both."""
+    """Scenario with the candidate, the original scenario, the output directories of both, and the function that runs commands."""
 
     file: Path
     original: Path
     candidate_folder: Path
     shipped_folder: Path
+    run_command: CommandRunner
 
     def run(self) -> TrialResult:
         """Run the scenario with the candidate and return the result."""
         from ..studies.controller_bench.score import RunKpis
 
         last = RunKpis.read(self.candidate_folder)
-        return TrialResult(self, Regression(self.file, self.candidate_folder, update=False).run(), last)
+        return TrialResult(self, Regression(self.file, self.candidate_folder, False, self.run_command).run(), last)
 
     def run_shipped(self) -> None:
         """Run the original scenario unless the results of its last run are up to date."""
         from ..studies.controller_bench.score import is_current
 
         if not is_current(self.shipped_folder, self.original):
-            Regression(self.original, self.shipped_folder, update=False).run()
+            Regression(self.original, self.shipped_folder, False, self.run_command).run()
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,7 @@ import math
 import subprocess
 import sys
 import time
-from collections.abc import Collection, Iterator, Mapping, Sequence
+from collections.abc import Callable, Collection, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
@@ -66,13 +66,31 @@ class RegressionOutcome:
     seconds: float = 0.0
 
 
+#: runs a `cosim` command, given by its words, in a separate process and returns the exit code and standard error
+CommandRunner = Callable[[Sequence[str]], subprocess.CompletedProcess[str]]
+
+
+def run_in_new_process(words: Sequence[str]) -> subprocess.CompletedProcess[str]:
+    """Run a `cosim` command in a new process."""
+    command = [sys.executable, "-m", "cosim", *words]
+    return subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)  # noqa: S603
+
+
 @dataclass(frozen=True)
 class Regression:
-    """Regression test of a scenario file with an output directory; with `update`, its reference is written again."""
+    """Regression test of a scenario file.
+
+    Attributes:
+        file: the scenario file.
+        directory: output directory.
+        update: the reference is written again.
+        run_command: runs commands of `cosim`.
+    """
 
     file: Path
     directory: Path
     update: bool
+    run_command: CommandRunner = run_in_new_process
 
     def run(self) -> RegressionOutcome:
         """Run the scenario by `cosim run` in a separate process and check its results, or update the reference."""
@@ -80,8 +98,7 @@ class Regression:
         return replace(self._run(), seconds=time.perf_counter() - began)
 
     def _run(self) -> RegressionOutcome:
-        command = [sys.executable, "-m", "cosim", "run", str(self.file), "--no-report", "--output-dir", str(self.directory)]
-        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)  # noqa: S603
+        done = self.run_command(["run", str(self.file), "--no-report", "--output-dir", str(self.directory)])
         if done.returncode < 0:
             return RegressionOutcome(
                 self.file.stem, 1, "did not run to its end", (f"cosim run: ended by signal {-done.returncode}",)
@@ -123,8 +140,7 @@ class Regression:
 
     def _write_report(self, *options: str) -> list[str]:
         """Write the report of the run by `cosim report` in a separate process, and return a line that names it."""
-        command = [sys.executable, "-m", "cosim", "report", str(self.directory), *options]
-        done = subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)  # noqa: S603
+        done = self.run_command(["report", str(self.directory), *options])
         return [f"see {self.directory / 'report.html'}"] if done.returncode == 0 else [f"no report: {done.stderr.strip()}"]
 
     def _update_reference(self, run: _FinishedRun) -> RegressionOutcome:

@@ -4,18 +4,29 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import AbstractContextManager, nullcontext
 from pathlib import Path
 from typing import TypeVar
 
 from ..core import resources
 from ..core.errors import InputError
 from ..scenario import find_scenario
-from .regression import EXPECTATION_KEYS, Regression, RegressionOutcome, has_keys
+from .regression import EXPECTATION_KEYS, CommandRunner, Regression, RegressionOutcome, has_keys, run_in_new_process
 
 T = TypeVar("T")
 
+#: makes, for a number of threads, the context in which commands can be run
+CommandContext = Callable[[int], AbstractContextManager[CommandRunner]]
 
-def run_regressions(paths: Iterable[Path], update: bool, output_dir: Path, jobs: int) -> Iterator[RegressionOutcome]:
+
+def new_processes(_threads: int) -> AbstractContextManager[CommandRunner]:
+    """Return a context in which each command runs in a new process."""
+    return nullcontext(run_in_new_process)
+
+
+def run_regressions(
+    paths: Iterable[Path], update: bool, output_dir: Path, jobs: int, commands: CommandContext = new_processes
+) -> Iterator[RegressionOutcome]:
     """Run all scenarios that have checks or a reference, and yield their outcomes in order.
 
     Args:
@@ -23,6 +34,7 @@ def run_regressions(paths: Iterable[Path], update: bool, output_dir: Path, jobs:
         update: Write the references instead of comparing with them.
         output_dir: Folder of the folders of results.
         jobs: Number of scenarios that run at a time.
+        commands: Makes the context in which `cosim run` is called.
 
     Raises:
         InputError: There is no such scenario, or two files have the same name.
@@ -32,7 +44,9 @@ def run_regressions(paths: Iterable[Path], update: bool, output_dir: Path, jobs:
     if not files:
         raise InputError('found no scenario with a "reference" (or, without --update, with "checks")')
     check_unique_names(files)
-    yield from run_in_parallel([Regression(file, output_dir / file.stem, update).run for file in files], jobs)
+    with commands(min(jobs, len(files))) as run_command:
+        work = [Regression(file, output_dir / file.stem, update, run_command).run for file in files]
+        yield from run_in_parallel(work, jobs)
 
 
 def default_folder() -> Path:

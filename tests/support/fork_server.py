@@ -14,15 +14,12 @@ import gc
 import json
 import locale
 import os
-import shutil
 import signal
-import subprocess
 import sys
 import tempfile
 import time
 from importlib import import_module
 from pathlib import Path
-from types import SimpleNamespace
 from typing import Any
 
 from quick_compiler import compile_without_optimization
@@ -32,9 +29,7 @@ from cosim.components.fmi import file_cache
 from cosim.components.python_import import load_object
 from cosim.core import resources
 from cosim.engine import ExecutorKind, executor_class, plan_run
-from cosim.process.journal import set_current_journal
 from cosim.report.figures import draw_nothing
-from cosim.studies import regression
 
 PRELOADED = (
     "api.single_fmu",
@@ -167,31 +162,6 @@ def run_and_exit(request: dict[str, Any]) -> None:
     os._exit(code)
 
 
-def run_forked(command: list[str], **_: Any) -> subprocess.CompletedProcess[str]:
-    """Run `python -m cosim ...` like `subprocess.run` with captured texts, in a process forked from this one."""
-    sys.stdout.flush()
-    sys.stderr.flush()
-    output = tempfile.mkdtemp()  # the exit functions of the child would remove a TemporaryDirectory
-    child = os.fork()
-    if child == 0:
-        run_in_child(command[3:], output)
-    code = os.waitstatus_to_exitcode(os.waitpid(child, 0)[1])
-    texts = [Path(output, name).read_text(encoding="utf-8", errors="replace") for name in ("stdout", "stderr")]
-    shutil.rmtree(output)
-    return subprocess.CompletedProcess(command, code, *texts)
-
-
-def run_in_child(arguments: list[str], output: str) -> None:
-    """Run a command in this process, which was just forked, and end it."""
-    try:
-        set_current_journal(None)
-        prepare_child(str(Path.cwd()), output, {}, os.devnull, "auto", [])
-        sys.stdout, sys.stderr = (open(number, "w", closefd=False) for number in (1, 2))  # noqa: SIM115
-        run_and_exit({"arguments": arguments, "observe": False})
-    finally:
-        os._exit(1)
-
-
 def process_state() -> dict[str, Any]:
     """Return the process state that no FMU may change."""
     own = ctypes.CDLL(None)
@@ -225,7 +195,6 @@ def run_observed(arguments: list[str]) -> None:
 
 if __name__ == "__main__":
     compile_without_optimization()
-    regression.subprocess = SimpleNamespace(run=run_forked, DEVNULL=subprocess.DEVNULL)  # type: ignore[assignment]
     if "--without-orphans" not in sys.argv:
         ctypes.CDLL(None).prctl(PR_SET_CHILD_SUBREAPER, 1, 0, 0, 0)
     for module in PRELOADED:

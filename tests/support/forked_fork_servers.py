@@ -12,10 +12,11 @@ from multiprocessing.reduction import DupFd
 from types import SimpleNamespace
 from typing import Any
 
+from cosim.api.run_modules import RUN_MODULES
 from cosim.studies.execution import fork_server
 
 _CONTEXT = multiprocessing.get_context("forkserver")
-_CONTEXT.set_forkserver_preload(["cosim.api", fork_server.__name__, *fork_server._PRELOADED_MODULES])
+_CONTEXT.set_forkserver_preload([fork_server.__name__, *RUN_MODULES])
 
 
 class ForkedServer:

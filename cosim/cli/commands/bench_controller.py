@@ -19,6 +19,7 @@ from ..bench_notes import BenchProgress, print_omissions, print_trial
 from ..bench_table import print_ranking, print_side_by_side
 from ..bench_trial import ControllerTrial, TrialResult, run_trials
 from ..completion import complete_role, complete_scenario
+from ..forked_commands import forked_commands
 from ..messages import print_json
 from ..output_options import json_option
 from .regress import EXIT_CODE_SEVERITY
@@ -27,6 +28,7 @@ if TYPE_CHECKING:
     from ...studies.controller_bench.page import BenchedController
     from ...studies.controller_bench.ranking import Ranking
     from ...studies.controller_bench.substitution import Omission
+    from ...studies.regression import CommandRunner
 
 #: file in which the child process that examines the candidate returns its results
 _PREPARED_FILE = "bench.json"
@@ -215,12 +217,13 @@ class _Bench:
         name = parse_source(source).name
         folder = self.output_dir / Path(self.role).stem / name
         prepared = _in_child(lambda: _write_scenarios(source, self.role, self.files, folder, settings), folder / _PREPARED_FILE)
-        trials = _make_trials(prepared["scenarios"], folder, self.output_dir / "shipped")
         results = []
-        for result in run_trials(trials, self.jobs):
-            results.append(result)
-            if not self.as_json:
-                print_trial(result, name)
+        with forked_commands(self.jobs) as run_command:
+            trials = _make_trials(prepared["scenarios"], folder, self.output_dir / "shipped", run_command)
+            for result in run_trials(trials, self.jobs):
+                results.append(result)
+                if not self.as_json:
+                    print_trial(result, name)
         ranking = rank([result.kpis for result in results if result.is_applicable], prepared["goals"])
         return _Trials(source, name, prepared, results, ranking)
 
@@ -281,11 +284,9 @@ def _write_scenarios(controller: str, role_name: str, files: Sequence[Path], fol
     return 0
 
 
-def _make_trials(written: Sequence[Mapping[str, str]], folder: Path, shipped: Path) -> list[ControllerTrial]:
+def _make_trials(
+    written: Sequence[Mapping[str, str]], folder: Path, shipped: Path, run_command: CommandRunner
+) -> list[ControllerTrial]:
     """Return the trials of the written scenarios."""
-    return [
-        ControllerTrial(
-            Path(each["file"]), Path(each["original"]), folder / Path(each["file"]).stem, shipped / Path(each["file"]).stem
-        )
-        for each in written
-    ]
+    files = [(Path(each["file"]), Path(each["original"])) for each in written]
+    return [ControllerTrial(file, original, folder / file.stem, shipped / file.stem, run_command) for file, original in files]

@@ -16,6 +16,7 @@ from ...core import resources
 from ...core.errors import InputError, Problem, abbreviate_names
 from ...core.version import __version__
 from ...studies.regression import Regression
+from ..forked_commands import forked_commands
 
 _TEMPLATES = Path(__file__).parents[1] / "templates"
 #: template of each file of a new project
@@ -48,7 +49,8 @@ def command(directory: Path, force: bool) -> int:
     _write_project(directory)
     if untouched:
         click.echo(f"left as they are: {abbreviate_names(untouched)}")
-    outcome = Regression(directory / "scenarios/course.json", directory / "runs/course", update=True).run()
+    with forked_commands(1) as run_command:
+        outcome = Regression(directory / "scenarios/course.json", directory / "runs/course", True, run_command).run()
     for folder in {(directory / name).parent for name in _PROJECT_FILES}:
         shutil.rmtree(folder / "__pycache__", ignore_errors=True)
     if outcome.code:

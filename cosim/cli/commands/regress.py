@@ -14,6 +14,7 @@ from ...studies.regression import RegressionOutcome
 from ...studies.regression_runs import default_folder, run_regressions
 from .. import current_command_line
 from ..completion import complete_scenario
+from ..forked_commands import forked_commands
 from ..messages import print_json, print_verdict
 from ..output_options import json_option
 
@@ -47,7 +48,8 @@ def command(
     Exit code 0: all passed; 1: a component failed; 2: a scenario was refused; 3: a check or comparison failed.
     """
     outcomes = []
-    for outcome in run_regressions(scenarios or [default_folder()], update, output_dir, jobs or available_processors()):
+    count = jobs or available_processors()
+    for outcome in run_regressions(scenarios or [default_folder()], update, output_dir, count, forked_commands):
         outcomes.append(outcome)
         if not as_json:
             print_outcome(outcome)

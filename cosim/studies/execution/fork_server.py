@@ -21,6 +21,7 @@ from pathlib import Path
 from signal import ITIMER_REAL, SIG_DFL, SIGALRM, SIGKILL, setitimer, signal
 from typing import Any
 
+from ...api.run_modules import RUN_MODULES
 from ...components.fmi import FmuFile
 from ...components.python_import import load_object
 from ...core.errors import CosimError
@@ -32,18 +33,6 @@ from ...scenario.nested_systems import Scenario
 from .job import READY, Job, StudyContext
 from .run import FmuFiles, ReplayRequest, supervised_check, supervised_run
 
-#: modules that a run imports lazily
-_PRELOADED_MODULES = (
-    "fmpy.fmi1",
-    "fmpy.fmi2",
-    "fmpy.fmi3",
-    "cosim.components.conformance",
-    "cosim.components.fmi.isolated.isolated_fmu",
-    "cosim.components.python_class",
-    "cosim.engine.native_executor",
-    "numpy.random",
-)
-
 
 def serve_forks(control: socket.socket) -> None:
     """Receive the study context, preload it, and fork workers until the connection `control` is closed."""
@@ -53,7 +42,7 @@ def serve_forks(control: socket.socket) -> None:
     context = StudyContext(Path(request["scenario"]), Path(request["root"]), request["deadline"], tuple(request["fmus"]))
     with temporary_run_folder() as folder:
         tempfile.tempdir = os.environ["TMPDIR"] = folder
-        for module in _PRELOADED_MODULES:
+        for module in RUN_MODULES:
             import_module(module)
         fmu_files = dict(_preload(context)) if request["preload"] else {}
         gc.freeze()
