@@ -129,12 +129,13 @@ def _text_width(lines: Iterable[str], size: float, weight: str = "normal") -> fl
     return max((_line_width(line, size, weight) for line in lines if line.strip()), default=0.0)
 
 
-@lru_cache(4096)  # wrapping measures the same words again and again, 0.3 ms each
+@lru_cache(4096)  # wrapping measures the same words again and again
 def _line_width(line: str, size: float, weight: str) -> float:
     from matplotlib.font_manager import FontProperties
-    from matplotlib.textpath import TextPath
+    from matplotlib.textpath import text_to_path
 
-    return float(TextPath((0, 0), line, prop=FontProperties(size=size, weight=weight)).get_extents().x1) / 72
+    font = FontProperties(size=size, weight=weight)
+    return float(text_to_path.get_text_width_height_descent(line, font, ismath=False)[0]) / 72
 
 
 def _every_nth_label(texts: Sequence[str], space: float) -> dict[int, str]:

@@ -17,6 +17,7 @@ from cosim.export.fmu.block import Block, BlockVariable
 from cosim.export.modelica import assemble, load_block, load_interpreter
 from cosim.export.modelica.causality.interpreter import Interpreter
 from cosim.export.modelica.frontend import rumoca_client
+from cosim.export.modelica.frontend.rumoca_frontend import DEFAULT_OPTIONS
 
 CTYPES = {"Float64": ctypes.c_double, "Int32": ctypes.c_int32, "Enumeration": ctypes.c_int32, "Boolean": ctypes.c_bool}
 GCC = [
@@ -184,7 +185,7 @@ def compile_both(
 ) -> Callable[..., CompiledAndInterpreted]:
     """Return a function that compiles and interprets a model, given as text or as a file.
 
-    The front end, which takes most of the time, runs once for both.
+    Front end and analysis, which take most of the time, run once for both.
     """
 
     if shutil.which("gcc") is None:
@@ -195,8 +196,8 @@ def compile_both(
         folder = tmp_path / "c" / path.stem
         folder.mkdir(parents=True)
         with monkeypatch.context() as patch:
-            flat = assemble.flatten_model(path, model)
-            patch.setattr(assemble, "flatten_model", lambda *_arguments: flat)
+            flat = assemble._flatten(path, model, DEFAULT_OPTIONS)
+            patch.setattr(assemble, "_flatten", lambda *_arguments: flat)
             return CompiledAndInterpreted(CompiledBlock(load_block(path, model), folder), load_interpreter(path, model))
 
     return open_model

@@ -122,7 +122,7 @@ def test_small_cells_have_no_text(tmp_path):
 
 WORDS = {"name": "landing controller", "levels": {"inverse kinematics": {}, "incremental nonlinear dynamic inversion": {}}}
 STEPS = SPEED | {"values": [0.0137 * i for i in range(40)]}
-MANY = {"name": "sensor", "levels": {f"sensor_number_{i}": {} for i in range(16)}}
+MANY = {"name": "sensor", "levels": {f"sensor_number_{i}": {} for i in range(8)}}
 WIDE = {"name": "WWWW", "levels": {"MMMM WWWW MMMM WWWW": {}, "iiiiiiiiii WWWWWWWWWWWWWW": {}}}
 CROWDED = {
     "long names up": ([WORDS, SPEED], {"x": "speed", "y": "landing controller"}),
