@@ -4,13 +4,14 @@ from __future__ import annotations
 
 from collections import Counter
 from collections.abc import Sequence
+from contextlib import suppress
 from itertools import islice, pairwise
 from pathlib import Path
 
 import numpy as np
 import pydantic_core
 
-from ..core.csv_text import format_header, quote_cell, read_rows
+from ..core.csv_text import format_header, parse_number_rows, parse_rows, quote_cell, read_text
 from ..core.errors import InputError, Problem
 from ..core.recording import Recording
 from .files import iterate_chunks, writing_atomically
@@ -73,15 +74,16 @@ def read_csv(path: str | Path) -> Recording:
         InputError: The file cannot be read, with the line of each problem.
     """
     path = Path(path)
-    header, rows = read_rows(path)
-    _check_table(path, header, rows)
-    rows = [row for row in rows if row]
-    time, *columns = map(_parse_column, zip(*rows, strict=True)) if rows else [np.empty(0)] * len(header)
+    text = read_text(path)
+    table: tuple[list[str], Sequence[Sequence[float] | Sequence[str]]] = parse_number_rows(text) or parse_rows(path, text)
+    header, rows = table[0], [row for row in table[1] if row]
+    _check_table(path, *table)
+    time, *columns = map(_to_column, zip(*rows, strict=True)) if rows else [np.empty(0)] * len(header)
     recording = Recording(time, dict(zip(header[1:], columns, strict=True)), dict.fromkeys(header[1:], ""))
     return _convert_time(path, recording)
 
 
-def _check_table(path: Path, header: Sequence[str], rows: Sequence[Sequence[str]]) -> None:
+def _check_table(path: Path, header: Sequence[str], rows: Sequence[Sequence[object]]) -> None:
     problems = []
     if header[:1] != ["time"]:
         problems.append(Problem(f'the first column is "{"".join(header[:1])}", expected "time"', f"{path}:1"))
@@ -92,6 +94,15 @@ def _check_table(path: Path, header: Sequence[str], rows: Sequence[Sequence[str]
         problems.append(Problem(f"{length} cells, expected {len(header)} as in the header", f"{path}:{line}"))
     if problems:
         raise InputError(problems)
+
+
+def _to_column(cells: Sequence[float] | Sequence[str]) -> np.ndarray:
+    """Return the array of the texts or numbers of a column."""
+    types = set(map(type, cells))
+    if str not in types:
+        with suppress(OverflowError):
+            return np.array(cells, dtype=np.int64 if types == {int} else np.float64)
+    return _parse_column([str(cell) for cell in cells])
 
 
 def _parse_column(cells: Sequence[str]) -> np.ndarray:
