@@ -14,12 +14,12 @@ import difflib
 import errno
 import traceback
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
-from .text import MAX_QUOTATION_LENGTH, escape_control_characters, shorten
+from .text import MAX_QUOTATION_LENGTH, count_noun, escape_control_characters, shorten
 from .user_code import innermost_user_line
 
 #: exceptions that are not a failure of the foreign code they pass through; all others are, even if not derived from Exception
@@ -161,6 +161,26 @@ def join_alternatives(names: Iterable[str]) -> str:
     """
     different = dict.fromkeys(names)
     return f"{'one of ' if len(different) > 1 else ''}{abbreviate_names(different)}"
+
+
+def merge_problems(problems: Iterable[Problem], beginning: str) -> list[Problem]:
+    """Return different problems; of those in a file with the same message, the first one stands for all, with their number.
+
+    Args:
+        problems: The problems in their order.
+        beginning: Beginning of the messages of problems that have the same cause if they are equal.
+    """
+    groups: dict[tuple[str, str], list[Problem]] = {}
+    for each in dict.fromkeys(problems):
+        place = each.where.partition(":")[0] if each.message.startswith(beginning) else each.where
+        groups.setdefault((each.message, place), []).append(each)
+    return [_with_count(group[0], len(group)) for group in groups.values()]
+
+
+def _with_count(problem: Problem, count: int) -> Problem:
+    if count == 1:
+        return problem
+    return replace(problem, message=f"{problem.message}; {count_noun(count - 1, 'more place')} likewise")
 
 
 def did_you_mean(name: str, valid: Iterable[str]) -> str:

@@ -13,7 +13,7 @@ from typing import Any
 from ..components.fmi import FmuFile, Isolation
 from ..components.input_table import read_input_table
 from ..core.component import Component, Variable, count_scalars
-from ..core.errors import InputError, Problem
+from ..core.errors import InputError, Problem, merge_problems
 from ..core.size_limits import MAX_SCALARS, require_at_most
 from ..core.system import Connection, Endpoint, System
 from ..engine.pacer import LatePolicy
@@ -97,7 +97,7 @@ class SystemBuilder:
         self.problems += [*resolver.problems, *find_function_problems(self.root, self.spec, resolved, signals)]
         self.spec, self.left_out = without_placeholders(resolved), resolver.left_out
         if self.problems:
-            raise InputError(dict.fromkeys(self.problems))
+            raise InputError(merge_problems(self.problems, "unknown component"))
         return plan
 
     def _settings(self, aliases: Mapping[str, Endpoint], real_time: float | None, late: LatePolicy) -> Settings:

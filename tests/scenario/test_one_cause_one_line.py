@@ -223,6 +223,12 @@ def test_one_mistake_in_a_nested_system_gives_one_line(folder, text, words):
     assert words in line
 
 
+def test_a_missing_component_is_one_line_with_the_number_of_its_places(folder):
+    wires = [connection("a", "b"), connection("helm.y", "b.u"), connection("helm.y", "a.u")]
+    (line,) = refusal(folder, json.dumps(SCENARIO | {"connections": wires, "events": [{"time": 1, "set": {"helm.k": 1.0}}]}))
+    assert '$.connections[1].from: unknown component "helm"; valid: a, b; 2 more places likewise' in line
+
+
 def test_a_mistake_hides_no_other_mistake(folder):
     text = TEXT.replace('"k": 3.0', '"k": NaN').replace('"b.y"]', '"b.z"]').replace('"step": 5', '"steps": 5')
     assert [line.partition(": ")[2] for line in refusal(folder, text)] == [
