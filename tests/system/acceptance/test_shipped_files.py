@@ -92,7 +92,6 @@ def test_the_manifest_lists_exactly_the_fmus():
     assert listed == {label(path) for path in FMUS}
 
 
-@pytest.mark.slow
 @pytest.mark.parametrize("path", SCENARIOS, ids=label)
 def test_scenarios_meet_their_checks_and_their_first_seconds_are_finite(path):
     """Later a measurement may be missing, as after a fault."""

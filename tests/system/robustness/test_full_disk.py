@@ -18,8 +18,6 @@ from command_folder import TICKER, CommandFolder
 import cosim
 from cosim.core import resources
 
-pytestmark = pytest.mark.slow
-
 FULL = "No space left on device"
 RUN = ("--output-dir", "out")
 FMU = resources.root() / "fmus" / "strider_autopilot.fmu"

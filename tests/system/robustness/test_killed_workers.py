@@ -17,7 +17,7 @@ from command_folder import TICKER, CommandFolder, child_processes, wait_until
 import cosim
 
 DESCRIPTORS = Path("/proc/self/fd")
-pytestmark = [pytest.mark.slow, pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")]
+pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="looks into /proc")
 
 
 @pytest.fixture

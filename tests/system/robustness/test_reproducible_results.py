@@ -16,8 +16,6 @@ from command_folder import CommandFolder
 import cosim
 from cosim.core import resources
 
-pytestmark = pytest.mark.slow
-
 FMUS = resources.root() / "fmus"
 #: environments, folder, further options
 SURROUNDINGS = {

@@ -10,8 +10,6 @@ from pathlib import Path
 
 import pytest
 
-pytestmark = pytest.mark.slow
-
 GROWTH = Path(__file__).parent / "resource_growth.py"
 MEGABYTE = 1 << 20
 #: growth of a long measurement that is allowed, without Bullet and with it (bytes)

@@ -23,8 +23,6 @@ from cosim.core import resources
 from cosim.scenario import load
 from cosim.scenario.json_document import read_document
 
-pytestmark = pytest.mark.slow
-
 #: what a problem may begin with: file, line and column, or what was set from outside
 PLACE = re.compile(r"^(\S.*\.\w+:\d+:\d+: |\S.*: |setting |cannot read )")
 
