@@ -53,6 +53,8 @@ _OUTPUT_TYPES: Mapping[str, tuple[type, Callable[[Any], Any]]] = {
     "Boolean": (bool, _to_bool),
     "String": (object, _to_str),  # of no type without a check of its characters
 }
+#: FMI type -> what a message about an output expects
+_EXPECTED = {"Float64": "a number", "Int32": "an integer of 32 bits", "Boolean": "True or False", "String": "a text"}
 
 
 class PythonFmuComponent(Component):
@@ -128,9 +130,8 @@ class PythonFmuComponent(Component):
             try:
                 array[index] = value if value.__class__ is usual_type else convert(value)
             except (TypeError, ValueError, OverflowError):
-                raise TypeError(
-                    f'output "{name}" is {shorten(repr(value))}, expected a value of type {self._types[name]}'
-                ) from None
+                text = f'output "{name}" is {shorten(repr(value))}, expected {_EXPECTED[self._types[name]]}'
+                raise ComponentError(self._name, "get_outputs", text, self._time) from None
 
     def get_state(self) -> Any:
         """Return the slave's own state, or a snapshot of its attributes."""
@@ -154,7 +155,7 @@ class PythonFmuComponent(Component):
         """Call a method of the slave, convert its exceptions to ComponentError and forward its log messages."""
         try:
             return call(*arguments)
-        except PASS_THROUGH_EXCEPTIONS:
+        except (*PASS_THROUGH_EXCEPTIONS, ComponentError):
             raise
         except BaseException as error:
             raise ComponentError(self._name, function, describe_exception(error), self._time) from error

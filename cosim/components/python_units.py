@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Collection, Mapping
 from typing import Any
 
-from ..core.errors import InputError, Problem, did_you_mean
+from ..core.errors import InputError, Problem, abbreviate_names
 from ..core.units import parse_unit
 
 
@@ -31,7 +31,8 @@ def checked_units(units: Any, types: Mapping[str, str]) -> Mapping[str, str]:
 
 def _find_problem(name: str, unit: str, numbers: Collection[str]) -> str:
     if name not in numbers:
-        return f'names "{name}", which is not a variable of type Real{did_you_mean(name, numbers)}'
+        registered = abbreviate_names(numbers) or "none"
+        return f'names "{name}", but no register_variable of type Real does; registered: {registered}'
     try:
         parse_unit(unit)
     except ValueError as error:

@@ -180,13 +180,17 @@ def did_you_mean(name: str, valid: Iterable[str]) -> str:
 
 
 def nearest_file(path: Path) -> str:
-    """Return a hint for the end of a message about a missing file: the most similar name in its folder, else ""."""
+    """Return a hint for the end of a message about a missing file: the most similar name in its folder, else its files, else "".
+
+    Files are those with the same ending, up to 12.
+    """
     try:
-        names = tuple(each.name for each in path.parent.iterdir() if not path.suffix or each.suffix == path.suffix)
+        names = tuple(sorted(each.name for each in path.parent.iterdir() if not path.suffix or each.suffix == path.suffix))
     except (OSError, ValueError):
         return ""
-    near = [name for name in names if Path(name).stem == path.name] or _close_matches(path.name, names)
-    return f'; did you mean "{near[0]}"?' if near else ""
+    if near := [name for name in names if Path(name).stem == path.name] or _close_matches(path.name, names):
+        return f'; did you mean "{near[0]}"?'
+    return f'; files in "{path.parent}": {abbreviate_names(names, 12)}' if names and path.suffix else ""
 
 
 @lru_cache(16)  # the same wrong name often occurs several times

@@ -50,6 +50,8 @@ KNOWN_UNITS = {
     name: Unit(name, exponents, factor, OFFSETS.get(name, 0.0))
     for name, (factor, exponents) in {**PREFIXED, **UNPREFIXED}.items()
 }
+#: abbreviations that are no units, in lower case -> the unit
+_ABBREVIATIONS = {"mps": "m/s", "kmh": "km/h", "kph": "km/h", "mps2": "m/s2"}
 #: common spellings -> Modelica syntax, after Unicode compatibility normalization, which converts superscripts
 _SPELLINGS = {
     "**": "",
@@ -94,13 +96,20 @@ def parse_unit(text: str) -> Unit:
         unit = _find_unit(symbol)
         if unit is None or unit.offset:
             place = "" if symbol == text else f' in "{text}"'
-            hint = did_you_mean(symbol, KNOWN_UNITS) if len(symbol) > 2 else ""
-            raise ValueError(f'unknown unit "{symbol}"{place}{hint}')
+            raise ValueError(f'unknown unit "{symbol}"{place}{_hint_at_unit(symbol)}')
         scale *= _power(unit.factor, power)
         exponents = [e + power * k for e, k in zip(exponents, unit.exponents, strict=True)]
     if not 0 < scale < math.inf:
         raise ValueError(f'the unit "{text}" is too small or too large')
     return Unit(text, tuple(exponents), scale)
+
+
+def _hint_at_unit(symbol: str) -> str:
+    """Return a hint at the unit that a symbol probably means; short symbols resemble too many units by chance."""
+    if meaning := _ABBREVIATIONS.get(symbol.lower()):
+        return f'; did you mean "{meaning}"?'
+    names = KNOWN_UNITS if len(symbol) > 3 else [name for name in KNOWN_UNITS if name.lower() == symbol.lower()]
+    return did_you_mean(symbol, names)
 
 
 @lru_cache(4096)

@@ -60,7 +60,7 @@ def test_degrees_cannot_become_newtons(tmp_path, exported):
 @pytest.mark.parametrize(
     ("units", "message"),
     [
-        ({"z": "rad"}, r'names "z", which is not a variable of type Real; valid: x, y'),
+        ({"xx": "rad"}, 'names "xx", but no register_variable of type Real does; registered: x, y$'),
         ({"y": "radd"}, r'contains "radd" for "y": unknown unit'),
         (["y"], "is not a dict of names of variables and units"),
     ],

@@ -16,6 +16,12 @@ def test_the_most_similar_file_of_the_folder_is_named(tmp_path, name, hint):
     assert nearest_file(tmp_path / name) == hint
 
 
+def test_without_a_similar_name_the_files_of_the_folder_are_named(tmp_path):
+    for present in ("tether.fmu", "house.fmu", "tether.py"):
+        (tmp_path / present).touch()
+    assert nearest_file(tmp_path / "ropes.fmu") == f'; files in "{tmp_path}": house.fmu, tether.fmu'
+
+
 def test_a_missing_fmu_and_a_missing_scenario_are_refused_with_the_hint(tmp_path):
     (tmp_path / "room.fmu").touch()
     (tmp_path / "heating.json").touch()

@@ -1,4 +1,5 @@
 import math
+import re
 
 import pytest
 
@@ -142,6 +143,12 @@ def test_no_prefixed_unit_has_the_name_of_another_unit_with_another_meaning():
 def test_an_unknown_unit_is_refused_with_the_nearest_one():
     with pytest.raises(ValueError, match=r'unknown unit "ohm" in "ohm\.m"; did you mean "Ohm"'):
         parse_unit("ohm.m")
+
+
+@pytest.mark.parametrize(("text", "hint"), [("mps", '; did you mean "m/s"?'), ("psj", "")])
+def test_a_short_unknown_unit_has_no_hint_at_a_unit_that_resembles_it_by_chance(text, hint):
+    with pytest.raises(ValueError, match=f'^unknown unit "{text}"{re.escape(hint)}$'):
+        parse_unit(text)
 
 
 def test_celsius_becomes_kelvin():

@@ -44,6 +44,14 @@ def test_values_must_have_the_type_of_their_variables(folder, parameters, line):
     assert line in found[0]
 
 
+@pytest.mark.parametrize(
+    ("value", "end"), [("4.5", 'found "4.5"; write 4.5 without quotes'), ("true", 'found "true"'), ("4,5", 'found "4,5"')]
+)
+def test_a_number_in_quotes_is_refused_with_a_hint(folder, probes, value, end):
+    (line,) = folder.problems({"a": {"fmu": str(probes[2]), "parameters": {"y_start": value}}})
+    assert line.endswith(f'"y_start" is of type Float64, {end}')
+
+
 def test_ranges_of_an_fmu_are_respected(folder, probes):
     found = folder.problems({"a": {"fmu": str(probes[2]), "parameters": {"y_start": 11}}})
     assert len(found) == 1

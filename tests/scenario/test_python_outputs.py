@@ -61,19 +61,19 @@ def test_a_value_that_converts_without_loss_is_accepted(kind, value, expected):
 
 
 @pytest.mark.parametrize(
-    ("kind", "value", "type_"),
+    ("kind", "value", "expected"),
     [
-        (Real, None, "Float64"),
-        (Real, "1.5", "Float64"),
-        (Real, np.zeros(2), "Float64"),
-        (Integer, 2.7, "Int32"),
-        (Integer, 2**31, "Int32"),
-        (Integer, np.int64(2**31), "Int32"),
-        (Boolean, "False", "Boolean"),
-        (Boolean, 2, "Boolean"),
-        (String, 5, "String"),
+        (Real, None, "a number"),
+        (Real, "1.5", "a number"),
+        (Real, np.zeros(2), "a number"),
+        (Integer, 2.7, "an integer of 32 bits"),
+        (Integer, 2**31, "an integer of 32 bits"),
+        (Integer, np.int64(2**31), "an integer of 32 bits"),
+        (Boolean, "False", "True or False"),
+        (Boolean, 2, "True or False"),
+        (String, 5, "a text"),
     ],
 )
-def test_any_other_value_is_an_error_that_names_the_output(kind, value, type_):
-    with pytest.raises(ComponentError, match=f'output "y" is .*, expected a value of type {type_}'):
+def test_any_other_value_is_an_error_that_names_the_output(kind, value, expected):
+    with pytest.raises(ComponentError, match=f'output "y" is .*, expected {expected}$'):  # and no line of cosim itself
         last(kind, value)

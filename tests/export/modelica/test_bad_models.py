@@ -153,6 +153,28 @@ BAD = {
         in_model("Real v[3];", "v = {1, 2, 3};\n  y = v[0];"),
         "M.mo:7: subscript 0 for `v` is out of bounds for dimension of size",
     ),
+    "loop beyond the size": (
+        in_model("Real v[3];", "for i in 1:4 loop\n    v[i] = i*u;\n  end for;\n  y = v[1];"),
+        "M.mo:6: subscript 4 for `v` is out of bounds for dimension of size 3",
+    ),
+    "loop beyond the size of a component": (
+        in_model(
+            "parameter Integer n = 2;\n  connector C\n    Real w[2];\n  end C;\n  C c[n];",
+            "y = c[1].w[1];\n  for i in 1:n, j in 1:3 loop\n    c[i].w[j] = u;\n  end for;",
+        ),
+        "M.mo:6: subscript 3 for `c.w` is out of bounds for dimension of size 2",
+    ),
+    "loop beyond the size of a column": (
+        in_model(
+            "Real v[3, 2];",
+            "y = v[1, 1];\n  for i in 1:3 loop\n    for j in 1:3 loop\n      v[i, j] = u;\n    end for;\n  end for;",
+        ),
+        "M.mo:7: subscript 3 for `v` is out of bounds for dimension of size 2",
+    ),
+    "loop of an algorithm beyond the size": (
+        in_model("Real v[3];", "y = v[1];\nalgorithm\n  for i in 1:4 loop\n    v[i] := i*u;\n  end for;"),
+        "M.mo:8: the range of a loop in an algorithm differs from the",
+    ),
     "Real subscript": (
         in_model("Real v[3];", "v = {1, 2, 3};\n  y = v[u];"),
         "M.mo:7: invalid array subscript",

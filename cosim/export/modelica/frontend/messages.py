@@ -32,6 +32,8 @@ _MEANINGS = {
     "component binding type compatibility": "the type of the binding does not fit the declaration",
     "a non-guarded nested return": "return inside a loop or a branch is not supported; write one assignment for each branch",
     "a proved finite arithmetic-series form": "break inside a loop is not supported; write its condition after while",
+    "range and subscript must cover one declared array axis exactly": "the range of a loop in an algorithm differs from the "
+    "declared size of an array that it subscripts",
     "expression shape mismatch": "expression shape mismatch: the sizes of the operands differ",
 }
 _COUNTS = re.compile(r"; unknowns\[.*$")

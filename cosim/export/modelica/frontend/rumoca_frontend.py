@@ -145,6 +145,9 @@ def _flatten(sources: ModelicaSources, packages: Sequence[Path], name: str, decl
         raise InputError(_version_problem(answer["version"]))
     if "syntax_errors" in answer:
         raise InputError(to_syntax_problem(*error) for error in answer["syntax_errors"])
+    if "out_of_bounds" in answer:
+        found = dict.fromkeys((reason, sources.locate(span) or path) for reason, span in answer["out_of_bounds"])
+        raise InputError(Problem(reason, str(place)) for reason, place in found)
     if "error" in answer:
         raise InputError(to_problems(answer, name, path, sources))
     flat: str = answer["flat"]

@@ -1,9 +1,10 @@
 """Program of the child process in which rumoca runs, since it may crash, hang or use up the memory.
 
 It reads a request from standard input (JSON, see `main`) and writes lines of JSON: {"file": PATH} before rumoca reads a file, and
-at last one of {"flat": TEXT}, {"syntax_errors": [[PATH, line, message], ...]}, {"error": text, "panicked": bool, "lines": [first,
-last] or null} and {"version": text or null}, the version of rumoca if it is not the requested one. The lines are those of the
-first part of the model to which the error is due; they are null if the error has a place, or if there is no such part.
+at last one of {"flat": TEXT}, {"syntax_errors": [[PATH, line, message], ...]}, {"out_of_bounds": [[message, span], ...]},
+{"error": text, "panicked": bool, "lines": [first, last] or null} and {"version": text or null}, the version of rumoca if it is
+not the requested one. The lines are those of the first part of the model to which the error is due; they are null if the error
+has a place, or if there is no such part.
 """
 
 from __future__ import annotations
@@ -22,6 +23,9 @@ _HAS_PLACE = re.compile(r"\[[^\[\]]+:\d+:\d+\]\s*$")
 _LATER_PHASE = re.compile(r"^\w+ failed: ")
 _FUNCTION = re.compile(r"\bfunction\s+(\w+)")
 _TOO_FEW_EQUATIONS = "(balance = -"
+#: name of a model that reads the last element of each array
+_LAST_ELEMENTS = "CosimLastElements"
+_OUT_OF_BOUNDS = re.compile(r"(subscript \d+ for \S+ is out of bounds for dimension of size \d+)[^\[]*\[[^\[\]]*:(\d+):\d+\]")
 
 
 def main(request: dict[str, Any]) -> None:
@@ -74,11 +78,46 @@ def _flatten(rumoca: Any, request: dict[str, Any]) -> dict[str, Any]:
             compiled = session.load(path, model=model)
         else:  # the text under a name without a folder, because rumoca reads all files beside an existing file
             compiled = session.loads(f"{text[1]}\n{declaration}", model=model, filename=text[0])
-        return {"flat": compiled.to_json("flat")}
+        flat = compiled.to_json("flat")
+        outside = _find_subscripts_out_of_bounds(session, request, flat)
+        return {"out_of_bounds": outside} if outside else {"flat": flat}
     except BaseException as error:  # a panic of rumoca is not derived from Exception
         reason, panicked = str(error) or type(error).__name__, not isinstance(error, Exception)
     lines = None if panicked or text is None else _find_part(session, request, reason)
     return {"error": reason, "panicked": panicked, "lines": lines}
+
+
+def _find_subscripts_out_of_bounds(session: Any, request: dict[str, Any], document: str) -> list[tuple[str, Any]]:
+    """Return message and span of each for-equation with a subscript beyond the declared size of an array.
+
+    rumoca enlarges such an array without a message. It refuses the same subscript outside a for-equation, so a further model
+    with one declaration in each line reads the last element of each array.
+    """
+    try:
+        flat = json.loads(document)
+    except RecursionError:  # the parent process refuses this document
+        return []
+    loops = flat["structured_equations"]
+    arrays = {name: node["dims"] for name, node in flat["variables"].items() if loops and node["dims"] and all(node["dims"])}
+    if not arrays:
+        return []
+    name, text = request["text"] or ("<values>", "")
+    begin = f"{text}\n{request['declaration']}\nmodel {_LAST_ELEMENTS} extends {request['model']};\n"
+    lines = [f"Integer cosimSize{k} = size({{{array}{size}}}, 1);" for k, (array, size) in enumerate(arrays.items())]
+    try:
+        session.loads(
+            "\n".join([f"{begin}{lines[0]}", *lines[1:], f"end {_LAST_ELEMENTS};"]), model=_LAST_ELEMENTS, filename=name
+        )
+    except BaseException as error:
+        first, found = begin.count("\n") + 1, _OUT_OF_BOUNDS.findall(str(error))
+        names = [(reason, list(arrays)[int(line) - first]) for reason, line in found]
+        return [(reason, _find_loop(loops, array) or flat["variables"][array]["source_span"]) for reason, array in names]
+    return []
+
+
+def _find_loop(loops: list[dict[str, Any]], array: str) -> Any:
+    """Return the span of the first for-equation that contains an array."""
+    return next((loop["span"] for loop in loops if f'"name": {json.dumps(array)}' in json.dumps(loop["template"])), None)
 
 
 def _find_part(session: Any, request: dict[str, Any], reason: str) -> list[int] | None:
