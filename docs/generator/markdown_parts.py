@@ -6,12 +6,13 @@ import re
 from collections.abc import Iterable, Sequence
 
 _SPECIAL = re.compile(r"[*_\[\]<>|\\]")
+_BAR = re.compile(r"(?<!\\)\|")
 GENERATED = "*This page is generated from the code.*"
 
 
 def table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> str:
-    """Return a table; "" without rows. Columns that are empty in all rows are left out."""
-    rows = [tuple(" ".join(cell.split()) for cell in row) for row in rows]
+    """Return a table; "" without rows. Columns that are empty in all rows are left out; `|` in a cell is escaped."""
+    rows = [tuple(_BAR.sub(r"\|", " ".join(cell.split())) for cell in row) for row in rows]
     used = [i for i in range(len(header)) if any(row[i] for row in rows)]
     lines = [[header[i] for i in used], ["---" for _ in used], *([row[i] for i in used] for row in rows)]
     return "\n".join(f"| {' | '.join(line)} |" for line in lines) + "\n" if rows else ""

@@ -9,6 +9,8 @@ import time
 
 import pytest
 
+pytestmark = pytest.mark.slow
+
 SETUPS = {
     "bash": (["bash", "--norc", "--noprofile", "-i"], 'eval "$(_COSIM_COMPLETE=bash_source cosim)"'),
     "zsh": (["zsh", "-f", "-i"], 'autoload -Uz compinit; compinit -D -u; eval "$(_COSIM_COMPLETE=zsh_source cosim)"'),

@@ -18,6 +18,8 @@ from world_harness import WorldHarness
 import cosim
 from cosim.export.build import build_to
 
+pytestmark = pytest.mark.slow
+
 ROOT = Path(__file__).parents[2]
 DEMO = ROOT / "scenarios/demo1_box.json"
 ARGUMENTS = json.loads((ROOT / "plant_src/world_fmu.json").read_text())

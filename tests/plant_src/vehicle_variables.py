@@ -66,7 +66,8 @@ def _parameter_rows(label: str, model: Model) -> Iterator[str]:
             lengths = ["n"] if model.equations and len(variable.shape) == 1 else variable.shape
             size = f"[{','.join(f'1..{length}' for length in lengths)}]" if lengths else ""
             default = "" if model.equations else ", ".join(f"{value:.7g}" for value in np.ravel(variable.start))
-            yield f"| {label} | `{variable.name}{size}` | {unit} | {default} | {variable.description} |"
+            meaning = variable.description.replace("|", "\\|")
+            yield f"| {label} | `{variable.name}{size}` | {unit} | {default} | {meaning} |"
 
 
 def _rotor_rows() -> Iterator[str]:
@@ -91,7 +92,8 @@ def _rows(variables: list[Variable], labels: dict[str, str]) -> Iterator[str]:
         for parts in dict.fromkeys(map(tuple, users.values())):
             names = [labels[vehicle] for vehicle, used in users.items() if tuple(used) == parts]
             name = pattern.format("\\|".join(part for part in parts))
-            yield f"| `{name}` | {unit} | {meaning} | {'all' if len(names) == len(labels) else ', '.join(names)} |"
+            text = meaning.replace("|", "\\|")
+            yield f"| `{name}` | {unit} | {text} | {'all' if len(names) == len(labels) else ', '.join(names)} |"
 
 
 def _split(name: str, description: str) -> tuple[str, str, str, str]:

@@ -13,6 +13,8 @@ from lag_project import SEGV_ORDER, descendants, is_alive
 import cosim
 from cosim.core.resources import root
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("distributed")
 
 LEVELS = {f"run {run}": {"lag.y_start": 1 + run / 100, "lag.fault": SEGV_ORDER if run == 3 else ""} for run in range(8)}

@@ -14,6 +14,8 @@ import time
 import pytest
 from lag_project import descendants, is_alive
 
+pytestmark = pytest.mark.slow
+
 RUNS = 14
 #: runs of about a tenth of a second
 SWEEP = {

@@ -14,6 +14,8 @@ from live_run import LiveRun, wait_until
 from cosim.report.live import server as live_server
 from cosim.report.live.server import MAX_CONNECTIONS, MAX_HEAD_LENGTH, LiveServer
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):

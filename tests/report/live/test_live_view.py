@@ -18,6 +18,8 @@ import cosim
 from cosim.report.live.live_view import open_browser
 from cosim.results import Result
 
+pytestmark = pytest.mark.slow
+
 STOP = 3.0
 FORCE = "vessel.external_force.y"
 
