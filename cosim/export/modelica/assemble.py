@@ -28,7 +28,6 @@ from .causality.matching import is_input
 from .external.library import callable_functions
 from .external.sources import external_archives
 from .frontend.constants import fold_constants
-from .frontend.declared_sizes import check_declared_sizes
 from .frontend.folded_branches import folded_parameters
 from .frontend.reader import ModelReader
 from .frontend.rumoca_frontend import DEFAULT_OPTIONS, ModelicaOptions, flatten_model
@@ -126,7 +125,6 @@ def _flatten(path: Path, model: str | None, options: ModelicaOptions) -> tuple[I
 
 def analyse(json: Mapping[str, Any], sources: ModelicaSources, name: str) -> Interpreter:
     """Convert the document of the front end to an interpreter of the model."""
-    check_declared_sizes(json, sources)
     flat = ModelReader(json, sources).read_model(name)
     structural = flat.structural | folded_parameters(json, sources) | string_parameters(flat) | clock_parameters(flat)
     flat = replace(

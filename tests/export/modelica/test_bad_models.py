@@ -19,14 +19,6 @@ def in_model(declarations: str, equations: str = "y = u;") -> str:
 
 #: name -> text of the file, beginning of the message
 BAD = {
-    "a loop beyond the end of an array": (
-        in_model("output Real v[3];", "y = u; for i in 1:4 loop v[i] = i*u; end for;"),
-        "M.mo:4: v: declared with size 3, but a loop assigns elements up to 4",
-    ),
-    "a loop beyond the end of an array of a parametrized size": (
-        in_model("parameter Integer n = 2; Real [n] v;", "y = u; for i in 1:3 loop v[i] = i*u; end for;"),
-        "M.mo:4: v: declared with size 2, but a loop assigns elements up to 3",
-    ),
     "missing semicolon": (in_model("Real a"), "M.mo:4: unexpected `a`"),
     "missing end": ("model M\n  Real x;\nequation\n  x = 1;\n", "M.mo:5: unexpected end of input"),
     "wrong end name": (

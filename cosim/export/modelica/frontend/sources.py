@@ -80,16 +80,8 @@ class ModelicaSources:
         path = self._by_hash.get(span["source"]) if span else None
         if span is None or path is None:
             return None
-        return SourceLocation(path, self._content(path).count(b"\n", 0, span["start"]) + 1)
-
-    def _content(self, path: Path) -> bytes:
-        return path.read_bytes() if self.text is None or path != self.files[0] else self.text.encode()
-
-    def read(self, span: Mapping[str, int]) -> tuple[str, str]:
-        """Return the text of a span and that after it; two empty texts for a span that is not in these files."""
-        path = self._by_hash.get(span["source"])
-        content = self._content(path) if path else b""
-        return content[span["start"] : span["end"]].decode(), content[span["end"] :].decode()
+        content = path.read_bytes() if self.text is None or path != self.files[0] else self.text.encode()
+        return SourceLocation(path, content.count(b"\n", 0, span["start"]) + 1)
 
 
 def display_name(path: Path) -> str:
