@@ -11,5 +11,6 @@ import pytest
 def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     """Mark the tests of this folder before pytest deselects tests by their markers."""
     for item in items:
-        if item.path.is_relative_to(Path(__file__).parent):
+        longer = any(item.get_closest_marker(name) for name in ("long", "fuzz", "benchmark"))
+        if item.path.is_relative_to(Path(__file__).parent) and not longer:
             item.add_marker(pytest.mark.slow)
