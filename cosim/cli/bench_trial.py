@@ -22,10 +22,20 @@ LOG_LEVELS = ("DEBUG ", "INFO ", "WARNING ")
 
 @dataclass(frozen=True)
 class ControllerTrial:
-    """Scenario with the candidate, the original scenario, the output directories of both, and the function that runs commands."""
+    """Scenario with the candidate and the original scenario.
+
+    Attributes:
+        file: the scenario with the candidate.
+        original: the original scenario.
+        own_name: name of the controller of the original scenario.
+        candidate_folder: output directory of the scenario with the candidate.
+        shipped_folder: output directory of the original scenario.
+        run_command: function that runs commands.
+    """
 
     file: Path
     original: Path
+    own_name: str
     candidate_folder: Path
     shipped_folder: Path
     run_command: CommandRunner
@@ -81,7 +91,8 @@ class TrialResult:
 
         candidate = RunKpis.read(self.trial.candidate_folder) if self.outcome.code in (0, 3) else None
         checks = json.loads(self.trial.file.read_text(encoding="utf-8-sig"))["checks"]
-        return ScenarioKpis(candidate, RunKpis.read(self.trial.shipped_folder), checks, self.is_applicable)
+        shipped = RunKpis.read(self.trial.shipped_folder)
+        return ScenarioKpis(candidate, shipped, checks, self.is_applicable, self.trial.own_name)
 
     def as_json(self) -> dict[str, Any]:
         """Return the result as JSON."""

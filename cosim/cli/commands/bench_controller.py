@@ -1,8 +1,9 @@
-"""`cosim bench-controller`: benchmark of a controller against the shipped one."""
+"""`cosim bench-controller`: benchmark of controllers against those that the scenarios contain."""
 
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -15,7 +16,7 @@ from ...core.errors import InputError, Problem
 from ...core.processors import available_processors
 from ...studies.regression_runs import check_unique_names, default_folder, find_scenario_files
 from .. import supervision
-from ..bench_notes import BenchProgress, print_omissions, print_trial
+from ..bench_notes import BenchProgress, print_omissions, print_trial, summarize_omissions
 from ..bench_table import print_ranking, print_side_by_side
 from ..bench_trial import ControllerTrial, TrialResult, run_trials
 from ..completion import complete_role, complete_scenario
@@ -74,12 +75,12 @@ def command(
 ) -> int:
     """Benchmark each CONTROLLER in every scenario with its role.
 
-    CONTROLLER is an FMU, my.py:Class, my.mo:Model or the JSON file of a nested system. It replaces the shipped controller. The
-    summary ranks both by passed checks, then by the goals of the role. --verbose prints tables that compare all KPIs with those
-    of the shipped controller and of the candidate's last run.
+    CONTROLLER is an FMU, my.py:Class, my.mo:Model or the JSON file of a nested system. It replaces the scenario's own controller,
+    which is the one that the scenario file contains. The summary ranks both by passed checks, then by the goals of the role. The
+    page bench.html in the output directory shows the checked KPIs and goals. --verbose prints tables that compare all KPIs with
+    those of the scenario's own controller and of the candidate's last run.
 
-    Several controllers, or those of --all, are shown side by side: a table here and the page bench.html in the output directory,
-    with the processor time per step of each. A scenario that does not feed an input of the controller is not applicable ("n/a")
+    Several controllers, or those of --all, are shown side by side, with the processor time per step of each. A scenario that does not feed an input of the controller is not applicable ("n/a")
     and does not count. Exit code 0: all checks passed; 1: a component failed; 2: the controller's variables do not fit the role,
     or no scenario is applicable; 3: a check failed. The controllers that --all adds to a named CONTROLLER do not affect it.
     """
@@ -146,6 +147,14 @@ class _Trials:
         summary = {**asdict(self.ranking), "verdict": self.ranking.verdict}
         return {"candidate": self.name, "ranking": summary, "scenarios": scenarios, "notes": notes}
 
+    def as_benched(self, cost: float = math.nan, reference_cost: float = math.nan) -> BenchedController:
+        """Return the controller as the page shows it; costs in s per step."""
+        from ...studies.controller_bench.page import BenchedController
+
+        kpis = {result.name: result.kpis for result in self.results}
+        notes, goals = summarize_omissions(self.omissions), tuple(self.prepared["goals"])
+        return BenchedController(self.name, self.ranking, kpis, goals, notes, cost, cost / reference_cost)
+
 
 class _RefusedError(Exception):
     """A controller was refused or crashed while it was examined; the child process has printed why."""
@@ -165,18 +174,26 @@ class _Bench:
     jobs: int
     as_json: bool
 
+    @property
+    def _page(self) -> Path:
+        return self.output_dir / Path(self.role).stem / "bench.html"
+
     def run_one(self, source: str, settings: Mapping[str, Any]) -> int:
-        """Benchmark a controller against the shipped one."""
+        """Benchmark a controller against those that the scenarios contain."""
+        from ...studies.controller_bench.page import write_bench_page
+
         try:
             trials = self._run_trials(source, settings)
         except _RefusedError as refused:
             return refused.code
+        write_bench_page(self.role, [trials.as_benched()], self._page)
         if self.as_json:
             print_json({"role": self.role, **trials.as_json()})
         else:
             print_ranking(trials.ranking, trials.name)
             click.echo("\n" if trials.omissions else "", nl=False)
             print_omissions(trials.omissions)
+            click.echo(f"page: {self._page}")
         return trials.exit_code
 
     def run_all(self, sources: Sequence[str], number_of_own: int) -> int:
@@ -194,9 +211,8 @@ class _Bench:
             reference, costs = self._measure_costs(everything)
         except _RefusedError as refused:
             return refused.code
-        benched = [_side(trials, cost, costs[0]) for trials, cost in zip(everything, costs[1:], strict=True)]
-        page = self.output_dir / Path(self.role).stem / "bench.html"
-        write_bench_page(self.role, reference, costs[0], benched, page)
+        benched = [trials.as_benched(cost, costs[0]) for trials, cost in zip(everything, costs[1:], strict=True)]
+        write_bench_page(self.role, benched, self._page, reference, costs[0])
         if self.as_json:
             shown = [
                 {**trials.as_json(), "cost": each.cost, "cost_ratio": each.cost_ratio}
@@ -207,7 +223,7 @@ class _Bench:
             print_side_by_side(order(benched), reference)
             for trials in everything:
                 print_omissions(trials.omissions, trials.name)
-            click.echo(f"page: {page}")
+            click.echo(f"page: {self._page}")
         return min((trials.exit_code for trials in everything[:number_of_own]), key=EXIT_CODE_SEVERITY.index)
 
     def _run_trials(self, source: str, settings: Mapping[str, Any]) -> _Trials:
@@ -253,13 +269,6 @@ def _write_costs(role_name: str, measured: Sequence[tuple[str, Mapping[str, str]
     return 0
 
 
-def _side(trials: _Trials, cost: float, reference_cost: float) -> BenchedController:
-    from ...studies.controller_bench.page import BenchedController
-
-    kpis = {result.name: result.kpis for result in trials.results}
-    return BenchedController(trials.name, trials.ranking, kpis, tuple(trials.prepared["goals"]), cost, cost / reference_cost)
-
-
 def _write_scenarios(controller: str, role_name: str, files: Sequence[Path], folder: Path, settings: Mapping[str, Any]) -> int:
     """Examine the candidate and write the scenarios that use it; runs in a child process, since it executes foreign code."""
     from ...results.files import write_json
@@ -276,7 +285,9 @@ def _write_scenarios(controller: str, role_name: str, files: Sequence[Path], fol
     for file in files:
         substitution = ControllerSubstitution(role, candidate, variables, file, settings)
         if path := substitution.write((folder / "scenarios").absolute()):
-            written.append({"file": path, "original": file, "component": substitution.replaced_components[0]})
+            places, own_names = zip(*substitution.replaced_components.items(), strict=True)
+            own_name = ", ".join(dict.fromkeys(own_names))
+            written.append({"file": path, "original": file, "component": places[0], "own_name": own_name})
             omissions += [{"scenario": file.stem, **asdict(each)} for each in dict.fromkeys(substitution.omissions)]
     if not written:
         raise InputError(f'no scenario has a component with the role "{role.name}": {role.description}')
@@ -288,5 +299,8 @@ def _make_trials(
     written: Sequence[Mapping[str, str]], folder: Path, shipped: Path, run_command: CommandRunner
 ) -> list[ControllerTrial]:
     """Return the trials of the written scenarios."""
-    files = [(Path(each["file"]), Path(each["original"])) for each in written]
-    return [ControllerTrial(file, original, folder / file.stem, shipped / file.stem, run_command) for file, original in files]
+    found = [(Path(each["file"]), Path(each["original"]), each["own_name"]) for each in written]
+    return [
+        ControllerTrial(file, original, own_name, folder / file.stem, shipped / file.stem, run_command)
+        for file, original, own_name in found
+    ]
