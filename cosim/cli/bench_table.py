@@ -41,7 +41,8 @@ def print_ranking(ranking: Ranking, candidate: str) -> None:
         if any(counts.values())
     ]
     words = {"above": "is better than", "equal": "equals", "below": "is worse than"}
-    click.echo(f"{candidate} {words[ranking.verdict]} the scenarios' own controllers" + (f" ({'; '.join(goals)})" if goals else ""))
+    verdict = f"{candidate} {words[ranking.verdict]} the scenarios' own controllers"
+    click.echo(f"{verdict} ({'; '.join(goals)})" if goals else verdict)
 
 
 def print_side_by_side(controllers: Sequence[BenchedController], reference: str) -> None:

@@ -80,9 +80,10 @@ def command(
     page bench.html in the output directory shows the checked KPIs and goals. --verbose prints tables that compare all KPIs with
     those of the scenario's own controller and of the candidate's last run.
 
-    Several controllers, or those of --all, are shown side by side, with the processor time per step of each. A scenario that does not feed an input of the controller is not applicable ("n/a")
-    and does not count. Exit code 0: all checks passed; 1: a component failed; 2: the controller's variables do not fit the role,
-    or no scenario is applicable; 3: a check failed. The controllers that --all adds to a named CONTROLLER do not affect it.
+    Several controllers, or those of --all, are shown side by side, with the processor time per step of each. A scenario that
+    does not feed an input of the controller is not applicable ("n/a") and does not count. Exit code 0: all checks passed; 1: a
+    component failed; 2: the controller's variables do not fit the role, or no scenario is applicable; 3: a check failed. The
+    controllers that --all adds to a named CONTROLLER do not affect it.
     """
     from ...scenario.settings import parse_settings
     from ...studies.controller_bench.role import read_role

@@ -74,9 +74,7 @@ def write_bench_page(
         reference_cost=1e6 * reference_cost,
         controllers=order(controllers),
         columns=[each.name for each in controllers],
-        scenarios=[
-            (name, run.own_name, list(_kpi_rows(name, controllers))) for name, run in controllers[0].scenarios.items()
-        ],
+        scenarios=[(name, run.own_name, list(_kpi_rows(name, controllers))) for name, run in controllers[0].scenarios.items()],
         version=__version__,
     )
     with writing_atomically(path) as temporary:

@@ -15,8 +15,8 @@ from .score import RunKpis, compare_values, merge_senses
 class ScenarioKpis:
     """KPIs of both controllers in a scenario (None: the run did not reach its end), and the checks of the scenario.
 
-    `is_applicable` is False if the scenario does not feed an input of the candidate. `own_name` is the name of the controller that
-    the scenario contains, such as "ar_drone_cascaded".
+    `is_applicable` is False if the scenario does not feed an input of the candidate. `own_name` is the name of the controller
+    that the scenario contains, such as "ar_drone_cascaded".
     """
 
     candidate: RunKpis | None
