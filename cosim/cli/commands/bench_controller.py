@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -16,9 +15,9 @@ from ...core.errors import InputError, Problem
 from ...core.processors import available_processors
 from ...studies.regression_runs import check_unique_names, default_folder, find_scenario_files
 from .. import supervision
-from ..bench_notes import BenchProgress, print_omissions, print_trial, summarize_omissions
+from ..bench_notes import BenchProgress, print_omissions, print_trial
 from ..bench_table import print_ranking, print_side_by_side
-from ..bench_trial import ControllerTrial, TrialResult, run_trials
+from ..bench_trial import ControllerTrial, ControllerTrials, run_trials
 from ..completion import complete_role, complete_scenario
 from ..forked_commands import forked_commands
 from ..messages import print_json
@@ -26,9 +25,6 @@ from ..output_options import json_option
 from .regress import EXIT_CODE_SEVERITY
 
 if TYPE_CHECKING:
-    from ...studies.controller_bench.page import BenchedController
-    from ...studies.controller_bench.ranking import Ranking
-    from ...studies.controller_bench.substitution import Omission
     from ...studies.regression import CommandRunner
 
 #: file in which the child process that examines the candidate returns its results
@@ -111,52 +107,6 @@ def _check_sources(sources: Sequence[str], settings: Sequence[str]) -> None:
         raise InputError(f'2 controllers are called "{repeated}": their results would go to one folder')
 
 
-@dataclass(frozen=True)
-class _Trials:
-    """Results of a controller in all scenarios, what its preparation returned, and its ranking against the shipped controller."""
-
-    source: str
-    name: str
-    prepared: Mapping[str, Any]
-    results: Sequence[TrialResult]
-    ranking: Ranking
-
-    @property
-    def exit_code(self) -> int:
-        codes = [result.outcome.code for result in self.results if result.is_applicable]
-        return min(codes, key=EXIT_CODE_SEVERITY.index, default=2)
-
-    @property
-    def omissions(self) -> list[tuple[str, Omission]]:
-        """Names of scenarios, and what is left out of each."""
-        from ...studies.controller_bench.substitution import Omission
-
-        found = self.prepared["omissions"]
-        return [(each["scenario"], Omission(each["entry"], each["variable"])) for each in found]
-
-    def first_applicable(self) -> Mapping[str, str]:
-        """Return the first scenario that feeds all inputs of the controller."""
-        scenarios = zip(self.prepared["scenarios"], self.results, strict=True)
-        found: Mapping[str, str] | None = next((each for each, result in scenarios if result.is_applicable), None)
-        if found:
-            return found
-        raise InputError(f"no scenario feeds all inputs of {self.name}, so that its cost cannot be measured")
-
-    def as_json(self) -> dict[str, Any]:
-        scenarios = [result.as_json() for result in self.results]
-        notes = [f"{scenario}: {each}" for scenario, each in self.omissions]
-        summary = {**asdict(self.ranking), "verdict": self.ranking.verdict}
-        return {"candidate": self.name, "ranking": summary, "scenarios": scenarios, "notes": notes}
-
-    def as_benched(self, cost: float = math.nan, reference_cost: float = math.nan) -> BenchedController:
-        """Return the controller as the page shows it; costs in s per step."""
-        from ...studies.controller_bench.page import BenchedController
-
-        kpis = {result.name: result.kpis for result in self.results}
-        notes, goals = summarize_omissions(self.omissions), tuple(self.prepared["goals"])
-        return BenchedController(self.name, self.ranking, kpis, goals, notes, cost, cost / reference_cost)
-
-
 class _RefusedError(Exception):
     """A controller was refused or crashed while it was examined; the child process has printed why."""
 
@@ -202,7 +152,7 @@ class _Bench:
         from ...studies.controller_bench.candidate import parse_source
         from ...studies.controller_bench.page import order, write_bench_page
 
-        everything: list[_Trials] = []
+        everything: list[ControllerTrials] = []
         progress = BenchProgress(len(sources), quiet=self.as_json)
         try:
             for source in sources:
@@ -227,7 +177,7 @@ class _Bench:
             click.echo(f"page: {self._page}")
         return min((trials.exit_code for trials in everything[:number_of_own]), key=EXIT_CODE_SEVERITY.index)
 
-    def _run_trials(self, source: str, settings: Mapping[str, Any]) -> _Trials:
+    def _run_trials(self, source: str, settings: Mapping[str, Any]) -> ControllerTrials:
         from ...studies.controller_bench.candidate import parse_source
         from ...studies.controller_bench.ranking import rank
 
@@ -242,9 +192,9 @@ class _Bench:
                 if not self.as_json:
                     print_trial(result, name)
         ranking = rank([result.kpis for result in results if result.is_applicable], prepared["goals"])
-        return _Trials(source, name, prepared, results, ranking)
+        return ControllerTrials(source, name, prepared, results, ranking)
 
-    def _measure_costs(self, everything: Sequence[_Trials]) -> tuple[str, list[float]]:
+    def _measure_costs(self, everything: Sequence[ControllerTrials]) -> tuple[str, list[float]]:
         """Return the name of the reference, its processor time per step (s) and that of each controller, in a child process."""
         file = self.output_dir / Path(self.role).stem / _COSTS_FILE
         measured = [(trials.source, trials.first_applicable()) for trials in everything]
