@@ -47,6 +47,7 @@ PLANT_LAYERS = (
     "schemas",
     "world_settings",
     "deck_frame",
+    "landing_kpis",
     "kpis",
     "manoeuvres",
     "scene",

@@ -54,6 +54,16 @@ def test_signals_in_arguments_of_functions_are_checked_before_the_run(folder, ar
     assert f"$.kpis[0].arguments.{line}" in found
 
 
+def test_a_function_may_come_from_a_file_beside_the_named_one(folder):
+    (folder.path / "f.py").write_text(FUNCTIONS)
+    (folder.path / "g.py").write_text("from f import good as best, missing\n")
+    kpi = {"name": "k", "python": "g.py:best", "arguments": {"sgnal": "a.y"}}
+    (found,) = folder.problems({"a": folder.block("Gain")}, kpis=[kpi])
+    assert found.endswith('$.kpis[0]: "best" takes no argument "sgnal"; did you mean "signal"?')
+    (found,) = folder.problems({"a": folder.block("Gain")}, kpis=[{**kpi, "python": "g.py:missing"}])
+    assert found.endswith('$.kpis[0]: "g.py" defines no function "missing"; valid: best')
+
+
 TYPED = """
 from collections.abc import Sequence
 from cosim.results.kpi import Prefix, Signal
