@@ -29,6 +29,10 @@ def refused(**arguments: Any) -> InputError:
         ({**UAV, "model": 7}, "vehicles.uav.model: found 7, expected the name of a vehicle model, or its data: ar_drone, "),
         ({"position": [0.0, 0.0, 2.0]}, 'vehicles.uav: "model" is missing'),
         ({"model": "ar_drone"}, 'vehicles.uav: "position" is missing'),
+        (
+            {"model": "ar_drone", "positon": [0.0, 0.0, 2.0]},
+            'vehicles.uav.positon: unknown key "positon"; did you mean "position"',
+        ),
         ({**UAV, "yow": 1.0}, r'vehicles.uav.yow: unknown key "yow"; did you mean "yaw"\?'),
         (quadcopter_settings([0.0, 0.0]), r"vehicles.uav.position: found \[0.0, 0.0\], expected a list of 3 numbers \[x, y, z\]"),
         (vessel_settings([0.0, 0.0, 0.1]), r"vehicles.uav.position: found .* expected a list of 2 numbers \[x, y\]"),
