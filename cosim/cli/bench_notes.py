@@ -72,16 +72,18 @@ def print_omissions(omissions: Sequence[tuple[str, Omission]], controller: str =
         controller: name of the controller, if there are several.
     """
     begin = f"note: {controller}: " if controller else "note: "
-    if current_command_line().verbosity > 0:
-        for scenario, each in omissions:
-            click.echo(f"{begin}{scenario}: {each}")
-        return
+    is_verbose = current_command_line().verbosity > 0
+    for line in [f"{scenario}: {each}" for scenario, each in omissions] if is_verbose else summarize_omissions(omissions):
+        click.echo(f"{begin}{line}")
+
+
+def summarize_omissions(omissions: Sequence[tuple[str, Omission]]) -> list[str]:
+    """Return a line of ignored settings and one of KPIs and figures that are left out, each with its number of scenarios."""
     names = [(scenario, each.entry, each.variable.partition(".")[2]) for scenario, each in omissions]
-    variables = [(scenario, name) for scenario, entry, name in names if not entry]
+    settings = [(scenario, name) for scenario, entry, name in names if not entry]
     entries = [(scenario, f'{entry} without "{name}"') for scenario, entry, name in names if entry]
-    for heading, items in (("variables that the controller lacks", variables), ("left out", entries)):
-        if items:
-            click.echo(f"{begin}{heading} (number of scenarios): {_count_scenarios(items)}")
+    headings = {"ignored settings, for which the controller has no variable": settings, "left out": entries}
+    return [f"{heading} (number of scenarios): {_count_scenarios(items)}" for heading, items in headings.items() if items]
 
 
 def _count_scenarios(items: Iterable[tuple[str, str]]) -> str:

@@ -16,15 +16,17 @@ if TYPE_CHECKING:
     from ..studies.controller_bench.ranking import Ranking
     from ..studies.controller_bench.score import KpiComparison
 
+#: heading of the values of the controller that a scenario contains
+OWN_CONTROLLER = "scenario's own"
 _COLOURS = {"better": "[green]better[/]", "worse": "[red]worse[/]", "": ""}
 
 
 def print_ranking(ranking: Ranking, candidate: str) -> None:
-    """Print the achievements of a candidate and of the shipped controller, the better one first."""
+    """Print the achievements of a candidate and of the scenarios' own controllers, the better one first."""
     if not ranking.candidate.scenarios:
         click.echo(f"\nno scenario feeds all inputs of {candidate}")
         return
-    standings = {candidate: ranking.candidate, "shipped": ranking.shipped}
+    standings = {candidate: ranking.candidate, OWN_CONTROLLER: ranking.shipped}
     names = list(standings) if ranking.verdict == "above" else list(standings)[::-1]
     width = max(map(len, names))
     click.echo()
@@ -39,7 +41,8 @@ def print_ranking(ranking: Ranking, candidate: str) -> None:
         if any(counts.values())
     ]
     words = {"above": "is better than", "equal": "equals", "below": "is worse than"}
-    click.echo(f"{candidate} {words[ranking.verdict]} the shipped controller" + (f" ({'; '.join(goals)})" if goals else ""))
+    verdict = f"{candidate} {words[ranking.verdict]} the scenarios' own controllers"
+    click.echo(f"{verdict} ({'; '.join(goals)})" if goals else verdict)
 
 
 def print_side_by_side(controllers: Sequence[BenchedController], reference: str) -> None:
@@ -66,7 +69,7 @@ def print_side_by_side(controllers: Sequence[BenchedController], reference: str)
 
 
 def print_comparison(rows: Sequence[KpiComparison], candidate: str) -> None:
-    """Print one line per KPI: values of the candidate, of the shipped controller and of the last run, verdicts and checks.
+    """Print one line per KPI: values of the candidate, the scenario's own controller and the last run, verdicts and checks.
 
     Args:
         rows: the KPIs; without any, nothing is printed.
@@ -83,13 +86,13 @@ def print_comparison(rows: Sequence[KpiComparison], candidate: str) -> None:
     for header in (
         "unit",
         candidate,
-        "shipped",
+        OWN_CONTROLLER,
         "",
         *(("last run", "") if with_last else ()),
         *(("check",) if with_checks else ()),
     ):
         table.add_column(
-            cell_text(header), justify="right" if header in (candidate, "shipped", "last run") else "left", overflow="fold"
+            cell_text(header), justify="right" if header in (candidate, OWN_CONTROLLER, "last run") else "left", overflow="fold"
         )
     for row in rows:
         cells = [row.name, row.unit, _format_value(row.candidate), _format_value(row.shipped)]

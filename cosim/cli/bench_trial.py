@@ -3,18 +3,24 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Iterator, Sequence
+import math
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..core.errors import InputError
 from ..studies.regression import CommandRunner, Regression, RegressionOutcome
 from ..studies.regression_runs import run_in_parallel
+from .bench_notes import summarize_omissions
+from .commands.regress import EXIT_CODE_SEVERITY
 
 if TYPE_CHECKING:
-    from ..studies.controller_bench.ranking import ScenarioKpis
+    from ..studies.controller_bench.page import BenchedController
+    from ..studies.controller_bench.ranking import Ranking, ScenarioKpis
     from ..studies.controller_bench.score import KpiComparison, RunKpis
+    from ..studies.controller_bench.substitution import Omission
 
 #: beginnings of log messages on standard error
 LOG_LEVELS = ("DEBUG ", "INFO ", "WARNING ")
@@ -22,10 +28,20 @@ LOG_LEVELS = ("DEBUG ", "INFO ", "WARNING ")
 
 @dataclass(frozen=True)
 class ControllerTrial:
-    """Scenario with the candidate, the original scenario, the output directories of both, and the function that runs commands."""
+    """Scenario with the candidate and the original scenario.
+
+    Attributes:
+        file: the scenario with the candidate.
+        original: the original scenario.
+        own_name: name of the controller of the original scenario.
+        candidate_folder: output directory of the scenario with the candidate.
+        shipped_folder: output directory of the original scenario.
+        run_command: function that runs commands.
+    """
 
     file: Path
     original: Path
+    own_name: str
     candidate_folder: Path
     shipped_folder: Path
     run_command: CommandRunner
@@ -81,7 +97,8 @@ class TrialResult:
 
         candidate = RunKpis.read(self.trial.candidate_folder) if self.outcome.code in (0, 3) else None
         checks = json.loads(self.trial.file.read_text(encoding="utf-8-sig"))["checks"]
-        return ScenarioKpis(candidate, RunKpis.read(self.trial.shipped_folder), checks, self.is_applicable)
+        shipped = RunKpis.read(self.trial.shipped_folder)
+        return ScenarioKpis(candidate, shipped, checks, self.is_applicable, self.trial.own_name)
 
     def as_json(self) -> dict[str, Any]:
         """Return the result as JSON."""
@@ -111,3 +128,51 @@ def run_trials(trials: Sequence[ControllerTrial], jobs: int) -> Iterator[TrialRe
     """Run all trials, `jobs` at a time; yield the results in order, as soon as both controllers have run."""
     work: list[Callable[[], TrialResult | None]] = [each for trial in trials for each in (trial.run_shipped, trial.run)]
     return (result for result in run_in_parallel(work, jobs) if result)
+
+
+@dataclass(frozen=True)
+class ControllerTrials:
+    """Results of a controller in all scenarios, what its preparation returned, and its ranking against the shipped controller."""
+
+    source: str
+    name: str
+    prepared: Mapping[str, Any]
+    results: Sequence[TrialResult]
+    ranking: Ranking
+
+    @property
+    def exit_code(self) -> int:
+        """The most severe exit code of the applicable scenarios; 2 if there is none."""
+        codes = [result.outcome.code for result in self.results if result.is_applicable]
+        return min(codes, key=EXIT_CODE_SEVERITY.index, default=2)
+
+    @property
+    def omissions(self) -> list[tuple[str, Omission]]:
+        """Names of scenarios, and what is left out of each."""
+        from ..studies.controller_bench.substitution import Omission
+
+        found = self.prepared["omissions"]
+        return [(each["scenario"], Omission(each["entry"], each["variable"])) for each in found]
+
+    def first_applicable(self) -> Mapping[str, str]:
+        """Return the first scenario that feeds all inputs of the controller."""
+        scenarios = zip(self.prepared["scenarios"], self.results, strict=True)
+        found: Mapping[str, str] | None = next((each for each, result in scenarios if result.is_applicable), None)
+        if found:
+            return found
+        raise InputError(f"no scenario feeds all inputs of {self.name}, so that its cost cannot be measured")
+
+    def as_json(self) -> dict[str, Any]:
+        """Return ranking, scenarios and notes as JSON."""
+        scenarios = [result.as_json() for result in self.results]
+        notes = [f"{scenario}: {each}" for scenario, each in self.omissions]
+        summary = {**asdict(self.ranking), "verdict": self.ranking.verdict}
+        return {"candidate": self.name, "ranking": summary, "scenarios": scenarios, "notes": notes}
+
+    def as_benched(self, cost: float = math.nan, reference_cost: float = math.nan) -> BenchedController:
+        """Return the controller as the page shows it; costs in s per step."""
+        from ..studies.controller_bench.page import BenchedController
+
+        kpis = {result.name: result.kpis for result in self.results}
+        notes, goals = summarize_omissions(self.omissions), tuple(self.prepared["goals"])
+        return BenchedController(self.name, self.ranking, kpis, goals, notes, cost, cost / reference_cost)

@@ -12,6 +12,8 @@ from ..core.json_values import parse_object
 
 #: modules of the KPIs of any signal and of control loops, with their files in the package
 _KPI_MODULES = {"cosim.kpis": "kpis.py", "cosim.analysis.kpis": "analysis/kpis.py"}
+#: types of the values that KPI functions return
+_KPI_TYPES = ("dict[str, Number]", "dict[str, float]")
 
 
 @dataclass(frozen=True)
@@ -68,10 +70,12 @@ def _list_controllers() -> Iterator[Entry]:
 
 
 def _list_kpis() -> Iterator[Entry]:
-    """Yield the public functions of the files from which shipped scenarios name KPIs, and the first lines of their docstrings."""
+    """Yield the KPI functions in the files from which shipped scenarios name KPIs, with the first lines of their docstrings."""
+    from ..scenario.function_definitions import function_definitions
+
     for name, path in sorted(_kpi_files().items()):
-        for node in ast.parse(path.read_text(encoding="utf-8")).body:
-            if isinstance(node, ast.FunctionDef) and not node.name.startswith("_"):
+        for node in function_definitions(path).values():
+            if node.returns and ast.unparse(node.returns) in _KPI_TYPES and not node.name.startswith("_"):
                 text = (ast.get_docstring(node) or "").partition("\n")[0]
                 arguments = ast.unparse(node.args).partition(", ")[2]  # without the result
                 yield Entry(f"{name}:{node.name}", text, str(path), arguments.replace("'", '"'))

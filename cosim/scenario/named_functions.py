@@ -5,17 +5,17 @@ from __future__ import annotations
 import ast
 import re
 from collections.abc import Callable, Collection, Iterator, Sequence
-from functools import lru_cache
 from importlib import import_module
-from importlib.util import find_spec
 from pathlib import Path
 from typing import Any
 
 from ..components.python_import import load_object
 from ..core.errors import Problem, did_you_mean, nearest_file
 from ..core.paths import is_file
+from ..results.checks import kpi_hint
 from .argument_types import argument_problem
 from .evaluation_schema import CallSpec, FunctionSpec
+from .function_definitions import function_definition, function_definitions, kpi_value_names, source_path
 from .nested_systems import Node
 from .schema import ScenarioSpec
 from .schema_types import accepted
@@ -59,7 +59,7 @@ def function_problem(spec: CallSpec, folder: Path) -> str:
     """Return why a function cannot be called with the arguments in the scenario, or "" if it can; see `definition_problem`."""
     if text := definition_problem(spec, folder):
         return text
-    return _argument_problem(spec.python.rpartition(":")[2], _function_definition(spec, folder).args, spec.arguments)
+    return _argument_problem(spec.python.rpartition(":")[2], function_definition(spec, folder).args, spec.arguments)
 
 
 def definition_problem(spec: CallSpec, folder: Path) -> str:
@@ -74,11 +74,11 @@ def definition_problem(spec: CallSpec, folder: Path) -> str:
     file, _, name = spec.python.rpartition(":")
     if not name.isidentifier() or not (file.endswith(".py") or all(part.isidentifier() for part in file.split("."))):
         return f'expected "file.py:function" or "package.module:function", found "{spec.python}"'
-    path = _source_path(file, folder)
+    path = source_path(file, folder)
     if path is None or not is_file(path):
         return f'{"file" if file.endswith(".py") else "module"} "{file}" does not exist{nearest_file(path) if path else ""}'
     try:
-        functions = _function_definitions(path.read_bytes())
+        functions = function_definitions(path)
     except SyntaxError as error:
         return f'"{file}" is not valid Python: {error.msg} (line {error.lineno})'
     if name not in functions:
@@ -88,7 +88,7 @@ def definition_problem(spec: CallSpec, folder: Path) -> str:
 
 def declared_arguments(spec: CallSpec, folder: Path) -> dict[str, bool]:
     """Return the keyword arguments that a function declares, without the first one, and whether each is required."""
-    return _declared_arguments(_function_definition(spec, folder).args)
+    return _declared_arguments(function_definition(spec, folder).args)
 
 
 def signal_problems(root: Node, kind: str, signals: Collection[str]) -> Iterator[Problem]:
@@ -110,7 +110,7 @@ def signal_problems(root: Node, kind: str, signals: Collection[str]) -> Iterator
 
 def unknown_signals(spec: CallSpec, root: Node, signals: Collection[str]) -> Iterator[tuple[str, str]]:
     """Yield (parameter, message) of every argument that names no recorded signal."""
-    declared = _function_definition(spec, root.folder).args
+    declared = function_definition(spec, root.folder).args
     for parameter in (*declared.posonlyargs, *declared.args, *declared.kwonlyargs):
         value, kinds = spec.arguments.get(parameter.arg), _annotation_names(parameter.annotation)
         if not isinstance(value, str):
@@ -123,7 +123,7 @@ def unknown_signals(spec: CallSpec, root: Node, signals: Collection[str]) -> Ite
 
 def wrong_types(spec: CallSpec, folder: Path) -> Iterator[tuple[str, str]]:
     """Yield (parameter, message) of every argument whose value does not have the annotated type."""
-    declared = _function_definition(spec, folder).args
+    declared = function_definition(spec, folder).args
     for parameter in (*declared.posonlyargs, *declared.args, *declared.kwonlyargs):
         if parameter.arg in spec.arguments and (text := argument_problem(parameter.annotation, spec.arguments[parameter.arg])):
             yield parameter.arg, text
@@ -145,32 +145,16 @@ def _kpi_name_problem(kpi: str, kpis: Sequence[FunctionSpec], folder: Path) -> s
     The names of a function's values are known only if its `return` statements write them as literals.
     """
     name, _, key = kpi.partition(".")
-    spec = next((spec for spec in kpis if spec.name == name), None)
-    if spec is None:
-        return f'no KPI "{kpi}"{did_you_mean(name, [spec.name for spec in kpis])}'
-    keys = [] if definition_problem(spec, folder) else _kpi_value_names(_function_definition(spec, folder))
-    if not keys or key.partition("[")[0] in keys:
+    values = {spec.name: _value_names(spec, folder) for spec in kpis}
+    if name in values and (not values[name] or key.partition("[")[0] in values[name]):
         return ""
-    return f'no KPI "{kpi}"{did_you_mean(kpi, [f"{name}.{known}" for known in keys])}'
+    own = {name: values[name]} if name in values else values
+    known = (f"{each}.{value}" if value else each for each, names in own.items() for value in names or [""])
+    return f'no KPI "{kpi}"{kpi_hint(kpi.partition("[")[0], known)}'
 
 
-def _source_path(file: str, folder: Path) -> Path | None:
-    """Return the source file of a Python file or an importable module."""
-    return folder / file if file.endswith(".py") else _module_file(file)
-
-
-def _function_definition(spec: CallSpec, folder: Path) -> ast.FunctionDef:
-    """Return the definition of a function for which `definition_problem` finds nothing."""
-    file, _, name = spec.python.rpartition(":")
-    path = _source_path(file, folder)
-    assert path is not None
-    return _function_definitions(path.read_bytes())[name]
-
-
-@lru_cache(16)  # a file often has several functions, and sweeps load the same scenario many times
-def _function_definitions(source: bytes) -> dict[str, ast.FunctionDef]:
-    """Return the functions that a source file defines at its top level, by name."""
-    return {node.name: node for node in ast.parse(source).body if isinstance(node, ast.FunctionDef)}
+def _value_names(spec: FunctionSpec, folder: Path) -> list[str]:
+    return [] if definition_problem(spec, folder) else kpi_value_names(function_definition(spec, folder))
 
 
 def _annotation_names(annotation: ast.expr | None) -> set[str]:
@@ -182,57 +166,6 @@ def _annotation_names(annotation: ast.expr | None) -> set[str]:
 def _signal_prefixes(signals: Collection[str]) -> list[str]:
     """Return all names that are prefixes of signals."""
     return list(dict.fromkeys(name[: match.start()] for name in signals for match in re.finditer(r"[.\[]", name)))
-
-
-@lru_cache(64)  # definitions are cached, so that equal ones are identical
-def _kpi_value_names(function: ast.FunctionDef) -> list[str]:
-    """Return the names of a KPI's values without indices, or nothing if its last `return` does not write them as literals.
-
-    Names in earlier `return` statements, such as those for runs without a landing, are included.
-    """
-    returned = [list(_dict_keys(value)) for value in _returned_expressions(function)]
-    known = returned and "" not in returned[-1]
-    return list(dict.fromkeys(key for keys in returned for key in keys if key)) if known else []
-
-
-def _returned_expressions(node: ast.AST) -> Iterator[ast.expr | None]:
-    """Yield the expressions of all `return` statements of a function, except those of functions inside it."""
-    for child in ast.iter_child_nodes(node):
-        if isinstance(child, ast.Return):
-            yield child.value
-        elif not isinstance(child, ast.FunctionDef | ast.AsyncFunctionDef | ast.ClassDef):
-            yield from _returned_expressions(child)
-
-
-def _dict_keys(value: ast.expr | None) -> Iterator[str]:
-    """Yield the keys of a dictionary expression: "time" for f"time[{i}]", and "" for a key that is not a literal."""
-    match value:
-        case ast.Dict(keys, values):
-            for key, each in zip(keys, values, strict=True):
-                yield from [_literal_key(key)] if key else _dict_keys(each)
-        case ast.DictComp(key):
-            yield _literal_key(key)
-        case _:
-            yield ""
-
-
-def _literal_key(key: ast.expr) -> str:
-    """Return the literal beginning of a key without its index, or "" if there is none."""
-    match key:
-        case ast.Constant(str(text)):
-            return text.partition("[")[0]
-        case ast.JoinedStr([ast.Constant(str(text)), *_]) if "[" in text:
-            return text.partition("[")[0]
-    return ""
-
-
-def _module_file(module: str) -> Path | None:
-    """Return the source file of an installed module; its parent packages are imported."""
-    try:
-        spec = find_spec(module)
-    except ImportError:
-        return None
-    return Path(spec.origin) if spec and spec.origin else None
 
 
 def load_function(reference: str, folder: Path) -> Callable[..., Any]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import re
 import shutil
 
 import pytest
@@ -133,14 +134,14 @@ def test_worse_and_better_controllers_are_marked(folder):
 def test_a_controller_that_fails_checks_ranks_below_however_many_kpis_are_better(folder):
     path = lazy(folder)
     worse = bench(folder, path)
-    assert worse.stdout.splitlines()[-3:-1] == [
-        "1. shipped  1 of 1 scenario passed, 2 of 2 checks passed",
-        "2. lazy     0 of 1 scenario passed, 0 of 2 checks passed",
+    *lines, page = worse.stdout.splitlines()
+    assert lines[-3:-1] == [
+        "1. scenario's own  1 of 1 scenario passed, 2 of 2 checks passed",
+        "2. lazy            0 of 1 scenario passed, 0 of 2 checks passed",
     ]
-    assert worse.stdout.splitlines()[-1].startswith(
-        "lazy is worse than the shipped controller (waypoints.reached 0 better, 1 worse;"
-    )
-    assert len(worse.stdout.splitlines()) < 10  # the tables of all KPIs are left out
+    assert lines[-1].startswith("lazy is worse than the scenarios' own controllers (waypoints.reached 0 better, 1 worse;")
+    assert len(lines) < 10  # the tables of all KPIs are left out
+    assert page == "page: runs/bench/vessel_autopilot/bench.html"
     ranking = json.loads(bench(folder, path, "--json").stdout)["ranking"]
     assert (ranking["verdict"], ranking["candidate"]["met"]) == ("below", 0)
 
@@ -191,12 +192,24 @@ def test_entries_about_missing_variables_are_removed_and_noted(folder):
 def test_notes_of_several_scenarios_stand_once_after_the_ranking(folder):
     (folder / "scenarios/row.json").write_text(json.dumps({**SAIL, "name": "row"}))
     ranking, notes = bench(folder, keeper(folder)).stdout.split("\n\n")[-2:]
-    assert ranking.splitlines()[-1].startswith("Keeper is worse than the shipped controller")
-    assert notes.splitlines() == [
-        "note: variables that the controller lacks (number of scenarios): "
+    assert ranking.splitlines()[-1].startswith("Keeper is worse than the scenarios' own controllers")
+    assert notes.splitlines()[:-1] == [
+        "note: ignored settings, for which the controller has no variable (number of scenarios): "
         "speed_command (2), acceptance_radius (2), waypoint_count (2), waypoint_x (2), waypoint_y (2), heading_P (2)",
         'note: left out (number of scenarios): kpi "away" without "distance" (2)',
     ]
+
+
+def test_the_page_of_a_single_controller_shows_it_beside_the_controller_of_the_scenario(folder):
+    """The KPI that the candidate has no signal for has a value of the scenario's own controller only."""
+    page = (folder / bench(folder, keeper(folder)).stdout.splitlines()[-1].removeprefix("page: ")).read_text()
+    assert "The scenario's own controller is strider_autopilot." in page
+    assert "cost" not in page.split("<body>")[1]
+    assert "lanes*.reached" in page
+    assert "* stands for any text" in page
+    row = page.partition(">waypoints.reached</td>")[2].partition("</tr>")[0]
+    assert re.findall(r'data-label="([^"]*)" class="number[ a-z]*">(\d)<', row) == [("scenario&#39;s own", "2"), ("Keeper", "1")]
+    assert "<li>Keeper: left out (number of scenarios): kpi &#34;away&#34; without &#34;distance&#34; (1)</li>" in page
 
 
 def test_a_scenario_that_does_not_feed_an_input_is_not_applicable(folder):
@@ -211,7 +224,7 @@ def test_a_scenario_that_does_not_feed_an_input_is_not_applicable(folder):
         "n/a     measured                     not applicable: input usv.vehicle.rates.r has no matching output "
         "vessel.position.rates.r; connect vessel.rates.r to it (and 1 more input)"
     )
-    assert "2. Keeper   0 of 1 scenario passed" in done.stdout
+    assert "2. Keeper          0 of 1 scenario passed" in done.stdout
 
 
 @pytest.fixture(scope="module")
@@ -266,13 +279,14 @@ def test_several_controllers_are_shown_side_by_side_with_their_costs(folder):
     assert 0.05 < ratios["strider_autopilot"] < 3
     assert costs["lazy"] / ratios["lazy"] == pytest.approx(costs["Keeper"] / ratios["Keeper"], rel=0.02)
     assert [line.partition(" (number")[0] for line in lines[cost_line + 1 : -1]] == [
-        "note: Keeper: variables that the controller lacks",
+        "note: Keeper: ignored settings, for which the controller has no variable",
         "note: Keeper: left out",
     ]
     page = (folder / lines[-1].removeprefix("page: ")).read_text()
     assert page.index("strider_autopilot</td>") < page.index("lazy</td>")
-    _, first, *others = page.split("<h2>")[1:3][-1].partition("<thead>")[2].partition("</thead>")[0].split('<th class="number">')
-    assert [each.partition("<")[0] for each in (first, *others)] == ["lazy", "Keeper", "strider_autopilot"]
+    _, *headings = page.split("<h2>")[2].partition("<thead>")[2].partition("</thead>")[0].split('<th class="number">')
+    assert [each.partition("<")[0] for each in headings] == ["scenario's own", "lazy", "Keeper", "strider_autopilot"]
+    assert "Its reference is ar_drone_geometric" in page
     assert 'class="number missed" title="check: equals true">no' in page
     assert "http" not in page.split("<body>")[1]
 

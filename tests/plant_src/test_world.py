@@ -188,3 +188,23 @@ def test_unknown_variables_are_refused_with_the_nearest_name() -> None:
         trial["uav.rotor_sped"] = [0.0] * 4
     with pytest.raises(ComponentError, match=r"uav.position.x is an output"):
         trial["uav.position.x"] = 0.0
+
+
+def test_limits_of_commands_are_those_of_the_data_of_each_vehicle():
+    names = ("ar_drone", "bluerov2_heavy", "blueboat", "cybership2", "otter", "strider", "wamv16")
+    vehicles = {
+        name: {"model": name, "position": [20.0 * i, 0.0, 2.0][: 3 if name in ("ar_drone", "bluerov2_heavy") else 2]}
+        for i, name in enumerate(names)
+    }
+    vehicles["ar_drone"]["parameters"] = {"max_rotor_speed": 600.0}
+    world = World("plant", vehicles)
+    limits = world.input_limits
+    world.free()
+    assert limits["ar_drone.rotor_speed[4]"] == (0.0, 600.0)
+    assert limits["bluerov2_heavy.thruster_speed[8]"] == (-283.0, 283.0)
+    assert limits["cybership2.propeller_speed[3]"] == (-209.44, 209.44)
+    assert limits["cybership2.rudder_angle[2]"] == (-0.6109, 0.6109)
+    assert limits["wamv16.azimuth[1]"] == pytest.approx((-math.pi / 2, math.pi / 2))
+    assert limits["otter.propeller_speed[1]"] == pytest.approx((-101.7, 103.9), abs=0.05)
+    assert limits["strider.rudder_angle"] == (-math.pi / 2, math.pi / 2)
+    assert not [name for name in limits if name.startswith("blueboat.rudder_angle") or "external" in name]

@@ -8,7 +8,7 @@ import pytest
 import cosim
 from cosim.kpis import time_to_reach
 from cosim.results.kpi import NoValue, evaluate_kpis, kpi_notes
-from plant_src.kpis import descent, landing, waypoints
+from plant_src.kpis import descent, landing, touchdown, waypoints
 
 
 @pytest.fixture(scope="module")
@@ -29,13 +29,31 @@ def test_values_with_the_same_reason_share_a_line(flight):
     assert notes(flight, "waypoints", waypoints, **path) == ["waypoints.time[1]: plant.usv did not reach this waypoint"]
 
 
+def test_a_vehicle_that_never_took_off_is_no_vehicle_that_missed_the_vessel():
+    """The motors stay off: the quadcopter falls 2 mm onto its platform and stays there."""
+    result = cosim.run("demo1_box", {"/kpis": [], "/checks": [], "/figures": [], "/connections/2/gain": 0.0}, stop_time=1)
+    deck = {"vehicle": "plant.uav", "deck": "plant.usv.deck"}
+    values = evaluate_kpis(
+        result,
+        [
+            ("landing", landing, deck),
+            ("touchdown", touchdown, {**deck, "mass": 0.4}),
+            ("descent", descent, {"vehicle": "plant.uav", "mode": "uav.mode", "descending": 5}),
+        ],
+    )
+    assert kpi_notes(values) == [
+        "landing.time, landing.lateral_error, landing.touchdown_speed and 15 more: "
+        "plant.uav never took off, it is in contact during the whole run"
+    ]
+
+
 def test_a_reason_contains_the_values_of_arguments(flight):
     reach = notes(flight, "high", time_to_reach, signal="plant.uav.position.z", level=50.0)
     assert reach == ["high.value: plant.uav.position.z does not reach 50.0"]
 
 
 def test_a_landing_without_the_mode_of_the_descent_has_another_reason(flight, monkeypatch):
-    monkeypatch.setattr("plant_src.kpis.touchdown_row", lambda *_: 10)
+    monkeypatch.setattr("plant_src.landing_kpis.touchdown_row", lambda *_: 10)
     (note,) = notes(flight, "descent", descent, vehicle="plant.uav", mode="uav.mode", descending=9)
     assert note == "descent.time_to_land: uav.mode is never 9, the mode of the descent"
 

@@ -1,4 +1,4 @@
-"""`cosim bench-controller`: benchmark of a controller against the shipped one."""
+"""`cosim bench-controller`: benchmark of controllers against those that the scenarios contain."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from ...studies.regression_runs import check_unique_names, default_folder, find_
 from .. import supervision
 from ..bench_notes import BenchProgress, print_omissions, print_trial
 from ..bench_table import print_ranking, print_side_by_side
-from ..bench_trial import ControllerTrial, TrialResult, run_trials
+from ..bench_trial import ControllerTrial, ControllerTrials, run_trials
 from ..completion import complete_role, complete_scenario
 from ..forked_commands import forked_commands
 from ..messages import print_json
@@ -25,9 +25,6 @@ from ..output_options import json_option
 from .regress import EXIT_CODE_SEVERITY
 
 if TYPE_CHECKING:
-    from ...studies.controller_bench.page import BenchedController
-    from ...studies.controller_bench.ranking import Ranking
-    from ...studies.controller_bench.substitution import Omission
     from ...studies.regression import CommandRunner
 
 #: file in which the child process that examines the candidate returns its results
@@ -74,14 +71,15 @@ def command(
 ) -> int:
     """Benchmark each CONTROLLER in every scenario with its role.
 
-    CONTROLLER is an FMU, my.py:Class, my.mo:Model or the JSON file of a nested system. It replaces the shipped controller. The
-    summary ranks both by passed checks, then by the goals of the role. --verbose prints tables that compare all KPIs with those
-    of the shipped controller and of the candidate's last run.
+    CONTROLLER is an FMU, my.py:Class, my.mo:Model or the JSON file of a nested system. It replaces the scenario's own controller,
+    which is the one that the scenario file contains. The summary ranks both by passed checks, then by the goals of the role. The
+    page bench.html in the output directory shows the checked KPIs and goals. --verbose prints tables that compare all KPIs with
+    those of the scenario's own controller and of the candidate's last run.
 
-    Several controllers, or those of --all, are shown side by side: a table here and the page bench.html in the output directory,
-    with the processor time per step of each. A scenario that does not feed an input of the controller is not applicable ("n/a")
-    and does not count. Exit code 0: all checks passed; 1: a component failed; 2: the controller's variables do not fit the role,
-    or no scenario is applicable; 3: a check failed. The controllers that --all adds to a named CONTROLLER do not affect it.
+    Several controllers, or those of --all, are shown side by side, with the processor time per step of each. A scenario that
+    does not feed an input of the controller is not applicable ("n/a") and does not count. Exit code 0: all checks passed; 1: a
+    component failed; 2: the controller's variables do not fit the role, or no scenario is applicable; 3: a check failed. The
+    controllers that --all adds to a named CONTROLLER do not affect it.
     """
     from ...scenario.settings import parse_settings
     from ...studies.controller_bench.role import read_role
@@ -109,44 +107,6 @@ def _check_sources(sources: Sequence[str], settings: Sequence[str]) -> None:
         raise InputError(f'2 controllers are called "{repeated}": their results would go to one folder')
 
 
-@dataclass(frozen=True)
-class _Trials:
-    """Results of a controller in all scenarios, what its preparation returned, and its ranking against the shipped controller."""
-
-    source: str
-    name: str
-    prepared: Mapping[str, Any]
-    results: Sequence[TrialResult]
-    ranking: Ranking
-
-    @property
-    def exit_code(self) -> int:
-        codes = [result.outcome.code for result in self.results if result.is_applicable]
-        return min(codes, key=EXIT_CODE_SEVERITY.index, default=2)
-
-    @property
-    def omissions(self) -> list[tuple[str, Omission]]:
-        """Names of scenarios, and what is left out of each."""
-        from ...studies.controller_bench.substitution import Omission
-
-        found = self.prepared["omissions"]
-        return [(each["scenario"], Omission(each["entry"], each["variable"])) for each in found]
-
-    def first_applicable(self) -> Mapping[str, str]:
-        """Return the first scenario that feeds all inputs of the controller."""
-        scenarios = zip(self.prepared["scenarios"], self.results, strict=True)
-        found: Mapping[str, str] | None = next((each for each, result in scenarios if result.is_applicable), None)
-        if found:
-            return found
-        raise InputError(f"no scenario feeds all inputs of {self.name}, so that its cost cannot be measured")
-
-    def as_json(self) -> dict[str, Any]:
-        scenarios = [result.as_json() for result in self.results]
-        notes = [f"{scenario}: {each}" for scenario, each in self.omissions]
-        summary = {**asdict(self.ranking), "verdict": self.ranking.verdict}
-        return {"candidate": self.name, "ranking": summary, "scenarios": scenarios, "notes": notes}
-
-
 class _RefusedError(Exception):
     """A controller was refused or crashed while it was examined; the child process has printed why."""
 
@@ -165,18 +125,26 @@ class _Bench:
     jobs: int
     as_json: bool
 
+    @property
+    def _page(self) -> Path:
+        return self.output_dir / Path(self.role).stem / "bench.html"
+
     def run_one(self, source: str, settings: Mapping[str, Any]) -> int:
-        """Benchmark a controller against the shipped one."""
+        """Benchmark a controller against those that the scenarios contain."""
+        from ...studies.controller_bench.page import write_bench_page
+
         try:
             trials = self._run_trials(source, settings)
         except _RefusedError as refused:
             return refused.code
+        write_bench_page(self.role, [trials.as_benched()], self._page)
         if self.as_json:
             print_json({"role": self.role, **trials.as_json()})
         else:
             print_ranking(trials.ranking, trials.name)
             click.echo("\n" if trials.omissions else "", nl=False)
             print_omissions(trials.omissions)
+            click.echo(f"page: {self._page}")
         return trials.exit_code
 
     def run_all(self, sources: Sequence[str], number_of_own: int) -> int:
@@ -184,7 +152,7 @@ class _Bench:
         from ...studies.controller_bench.candidate import parse_source
         from ...studies.controller_bench.page import order, write_bench_page
 
-        everything: list[_Trials] = []
+        everything: list[ControllerTrials] = []
         progress = BenchProgress(len(sources), quiet=self.as_json)
         try:
             for source in sources:
@@ -194,9 +162,8 @@ class _Bench:
             reference, costs = self._measure_costs(everything)
         except _RefusedError as refused:
             return refused.code
-        benched = [_side(trials, cost, costs[0]) for trials, cost in zip(everything, costs[1:], strict=True)]
-        page = self.output_dir / Path(self.role).stem / "bench.html"
-        write_bench_page(self.role, reference, costs[0], benched, page)
+        benched = [trials.as_benched(cost, costs[0]) for trials, cost in zip(everything, costs[1:], strict=True)]
+        write_bench_page(self.role, benched, self._page, reference, costs[0])
         if self.as_json:
             shown = [
                 {**trials.as_json(), "cost": each.cost, "cost_ratio": each.cost_ratio}
@@ -207,10 +174,10 @@ class _Bench:
             print_side_by_side(order(benched), reference)
             for trials in everything:
                 print_omissions(trials.omissions, trials.name)
-            click.echo(f"page: {page}")
+            click.echo(f"page: {self._page}")
         return min((trials.exit_code for trials in everything[:number_of_own]), key=EXIT_CODE_SEVERITY.index)
 
-    def _run_trials(self, source: str, settings: Mapping[str, Any]) -> _Trials:
+    def _run_trials(self, source: str, settings: Mapping[str, Any]) -> ControllerTrials:
         from ...studies.controller_bench.candidate import parse_source
         from ...studies.controller_bench.ranking import rank
 
@@ -225,9 +192,9 @@ class _Bench:
                 if not self.as_json:
                     print_trial(result, name)
         ranking = rank([result.kpis for result in results if result.is_applicable], prepared["goals"])
-        return _Trials(source, name, prepared, results, ranking)
+        return ControllerTrials(source, name, prepared, results, ranking)
 
-    def _measure_costs(self, everything: Sequence[_Trials]) -> tuple[str, list[float]]:
+    def _measure_costs(self, everything: Sequence[ControllerTrials]) -> tuple[str, list[float]]:
         """Return the name of the reference, its processor time per step (s) and that of each controller, in a child process."""
         file = self.output_dir / Path(self.role).stem / _COSTS_FILE
         measured = [(trials.source, trials.first_applicable()) for trials in everything]
@@ -253,13 +220,6 @@ def _write_costs(role_name: str, measured: Sequence[tuple[str, Mapping[str, str]
     return 0
 
 
-def _side(trials: _Trials, cost: float, reference_cost: float) -> BenchedController:
-    from ...studies.controller_bench.page import BenchedController
-
-    kpis = {result.name: result.kpis for result in trials.results}
-    return BenchedController(trials.name, trials.ranking, kpis, tuple(trials.prepared["goals"]), cost, cost / reference_cost)
-
-
 def _write_scenarios(controller: str, role_name: str, files: Sequence[Path], folder: Path, settings: Mapping[str, Any]) -> int:
     """Examine the candidate and write the scenarios that use it; runs in a child process, since it executes foreign code."""
     from ...results.files import write_json
@@ -276,7 +236,9 @@ def _write_scenarios(controller: str, role_name: str, files: Sequence[Path], fol
     for file in files:
         substitution = ControllerSubstitution(role, candidate, variables, file, settings)
         if path := substitution.write((folder / "scenarios").absolute()):
-            written.append({"file": path, "original": file, "component": substitution.replaced_components[0]})
+            places, own_names = zip(*substitution.replaced_components.items(), strict=True)
+            own_name = ", ".join(dict.fromkeys(own_names))
+            written.append({"file": path, "original": file, "component": places[0], "own_name": own_name})
             omissions += [{"scenario": file.stem, **asdict(each)} for each in dict.fromkeys(substitution.omissions)]
     if not written:
         raise InputError(f'no scenario has a component with the role "{role.name}": {role.description}')
@@ -288,5 +250,8 @@ def _make_trials(
     written: Sequence[Mapping[str, str]], folder: Path, shipped: Path, run_command: CommandRunner
 ) -> list[ControllerTrial]:
     """Return the trials of the written scenarios."""
-    files = [(Path(each["file"]), Path(each["original"])) for each in written]
-    return [ControllerTrial(file, original, folder / file.stem, shipped / file.stem, run_command) for file, original in files]
+    found = [(Path(each["file"]), Path(each["original"]), each["own_name"]) for each in written]
+    return [
+        ControllerTrial(file, original, own_name, folder / file.stem, shipped / file.stem, run_command)
+        for file, original, own_name in found
+    ]

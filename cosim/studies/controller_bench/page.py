@@ -1,7 +1,8 @@
-"""Controllers of a role side by side: their order, and the page `bench.html`."""
+"""Controllers of a role beside those that the scenarios contain: their order, and the page `bench.html`."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
@@ -15,18 +16,22 @@ from ...report.tables import format_number
 from ...results.checks import evaluate_all_checks
 from ...results.files import writing_atomically
 from .ranking import Ranking, ScenarioKpis
+from .score import RunKpis
+
+_NOT_APPLICABLE = {"text": "n/a", "failed": False, "limits": ""}
 
 
 @dataclass(frozen=True)
 class BenchedController:
-    """Controller, its ranking against the shipped one, and its costs.
+    """Controller, its ranking against those that the scenarios contain, and its costs.
 
     Attributes:
         name: name of the controller.
         ranking: its ranking.
         scenarios: its KPIs by the name of the scenario.
         goals: patterns of the KPI values that its role is for, the most important first.
-        cost: processor time per step (s).
+        notes: lines about what the scenarios contain and the controller lacks.
+        cost: processor time per step (s); NaN: not measured.
         cost_ratio: ratio of `cost` to that of the reference.
     """
 
@@ -34,8 +39,9 @@ class BenchedController:
     ranking: Ranking
     scenarios: Mapping[str, ScenarioKpis]
     goals: Sequence[str]
-    cost: float
-    cost_ratio: float
+    notes: Sequence[str]
+    cost: float = math.nan
+    cost_ratio: float = math.nan
 
 
 def order(controllers: Sequence[BenchedController]) -> list[BenchedController]:
@@ -49,16 +55,16 @@ def order(controllers: Sequence[BenchedController]) -> list[BenchedController]:
 
 
 def write_bench_page(
-    role: str, reference: str, reference_cost: float, controllers: Sequence[BenchedController], path: Path
+    role: str, controllers: Sequence[BenchedController], path: Path, reference: str = "", reference_cost: float = math.nan
 ) -> None:
     """Write a page with ranks, costs per step, and the checked KPIs and goals in every scenario.
 
     Args:
         role: the role, or its file.
-        reference: name of the controller whose cost is 1.
-        reference_cost: its processor time per step (s).
         controllers: the controllers in the order of their columns; a table ranks them.
         path: file to write.
+        reference: name of the controller whose cost is 1; "": the costs were not measured.
+        reference_cost: its processor time per step (s).
     """
     text = render_page(
         "bench.html",
@@ -68,7 +74,7 @@ def write_bench_page(
         reference_cost=1e6 * reference_cost,
         controllers=order(controllers),
         columns=[each.name for each in controllers],
-        scenarios=[(name, list(_kpi_rows(name, controllers))) for name in controllers[0].scenarios],
+        scenarios=[(name, run.own_name, list(_kpi_rows(name, controllers))) for name, run in controllers[0].scenarios.items()],
         version=__version__,
     )
     with writing_atomically(path) as temporary:
@@ -79,19 +85,19 @@ def _kpi_rows(scenario: str, controllers: Sequence[BenchedController]) -> Iterat
     """Yield the name, the unit and the cells of each KPI that is checked or a goal."""
     runs = [each.scenarios[scenario] for each in controllers]
     checked = {check["kpi"] for run in runs for check in run.checks}
-    found = [run.candidate for run in runs if run.candidate]
+    found = [kpis for kpis in (runs[0].shipped, *(run.candidate for run in runs)) if kpis]
     names = dict.fromkeys(name for run in found for name in run.kpis)
     for name in names:
         if name in checked or any(fnmatchcase(name, goal) for goal in controllers[0].goals):
             unit = next((run.units[name] for run in found if name in run.units), "")
-            yield name, unit, [_cell(name, run) for run in runs]
+            cells = [_cell(name, run.candidate, run.checks) if run.is_applicable else _NOT_APPLICABLE for run in runs]
+            yield name, unit, [_cell(name, runs[0].shipped, runs[0].checks), *cells]
 
 
-def _cell(name: str, run: ScenarioKpis) -> dict[str, Any]:
-    if not run.is_applicable:
-        return {"text": "n/a", "failed": False, "limits": ""}
-    if run.candidate is None or name not in run.candidate.kpis:
-        return {"text": "", "failed": run.candidate is None, "limits": ""}
-    outcomes = evaluate_all_checks(run.candidate.kpis, [check for check in run.checks if check["kpi"] == name])
+def _cell(name: str, run: RunKpis | None, checks: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
+    """Return the text of a KPI in a run (None: it failed), and the limits of the checks that failed."""
+    if run is None or name not in run.kpis:
+        return {"text": "", "failed": run is None, "limits": ""}
+    outcomes = evaluate_all_checks(run.kpis, [check for check in checks if check["kpi"] == name])
     failed = [outcome.limits for outcome in outcomes if not outcome.passed]
-    return {"text": format_number(run.candidate.kpis[name]), "failed": bool(failed), "limits": ", ".join(failed)}
+    return {"text": format_number(run.kpis[name]), "failed": bool(failed), "limits": ", ".join(failed)}

@@ -1,4 +1,4 @@
-"""Ranking of a candidate and the shipped controller by what their role is for."""
+"""Ranking of a candidate and of the scenarios' own controllers by what their role is for."""
 
 from __future__ import annotations
 
@@ -15,13 +15,15 @@ from .score import RunKpis, compare_values, merge_senses
 class ScenarioKpis:
     """KPIs of both controllers in a scenario (None: the run did not reach its end), and the checks of the scenario.
 
-    `is_applicable` is False if the scenario does not feed an input of the candidate.
+    `is_applicable` is False if the scenario does not feed an input of the candidate. `own_name` is the name of the controller
+    that the scenario contains, such as "ar_drone_cascaded".
     """
 
     candidate: RunKpis | None
     shipped: RunKpis | None
     checks: Sequence[Mapping[str, Any]]
     is_applicable: bool = True
+    own_name: str = ""
 
 
 @dataclass

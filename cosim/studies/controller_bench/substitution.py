@@ -56,7 +56,7 @@ class ControllerSubstitution:
         interface: the candidate's variables.
         file: the scenario's file.
         parameters: parameters of the candidate in addition to those of the scenario.
-        replaced_components: full names of the replaced components.
+        replaced_components: names of the replaced controllers, such as "ar_drone_cascaded", by the full names of the components.
         omissions: removed entries.
     """
 
@@ -65,7 +65,7 @@ class ControllerSubstitution:
     interface: CandidateInterface
     file: Path
     parameters: Mapping[str, Any] = field(default_factory=dict)
-    replaced_components: list[str] = field(default_factory=list)
+    replaced_components: dict[str, str] = field(default_factory=dict)
     omissions: list[Omission] = field(default_factory=list)
     _folder: Path = field(init=False)
 
@@ -118,7 +118,7 @@ class ControllerSubstitution:
         kind = next(source for source in SOURCES if source in spec)
         path = (folder / _reference_file(spec[kind])).resolve()
         if path in self.role.controllers:
-            self.replaced_components.append(full_name)
+            self.replaced_components[full_name] = path.stem
             filters[name] = self.interface.has_variables
             period = {key: value for key, value in spec.items() if key == "period"}
             return {**self.candidate.entry, **period, "parameters": {**spec.get("parameters", {}), **self.parameters}}

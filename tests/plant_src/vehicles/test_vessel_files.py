@@ -78,7 +78,11 @@ FAULTS: list[tuple[Callable[[dict[str, Any]], Any], str]] = [
         lambda d: d.update(mass=900),
         r"model\.hull\.depth: found 0\.345: the vessel sinks, because its draught at rest is 1\.171 m",
     ),
-    (lambda d: d.update(centre_of_mass=[0.15, 0, 9]), r"model\.hull: the vessel is not stable: its metacentric heights"),
+    (
+        lambda d: d.update(centre_of_mass=[0.15, 0, 9]),
+        r"model\.centre_of_mass: found z = 9 m: the vessel is not stable: its metacentric heights .* m, expected > 0: "
+        r"z must be below 1\.\d+ m, or hull\.transverse_moment \(beam, offset\) larger",
+    ),
     (lambda d: d.update(centre_of_mass=[4, 0, 0]), r"model\.centre_of_mass: found 3\.8469 m ahead of .*: the vessel capsizes"),
     (lambda d: d.update(added_mass=[-1] * 6), r"model\.added_mass: found the eigenvalue -1"),
     (lambda d: d.update(linear_damping=[-1] + [0] * 5), r"model\.linear_damping: found the diagonal"),

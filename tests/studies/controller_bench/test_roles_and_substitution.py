@@ -52,7 +52,7 @@ def test_a_shipped_controller_can_replace_itself_in_a_scenario(name, tmp_path):
     assert len(substitution.replaced_components) == 1
     prepared = load(path)
     try:
-        place = substitution.replaced_components[0]
+        place = next(iter(substitution.replaced_components))
         assert any(component == place or component.startswith(f"{place}.") for component in prepared.system.components)
         assert str(min(role.controllers)) in {str(file) for file in prepared.files().values()}
     finally:
