@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -19,7 +18,7 @@ from cosim.core.errors import ComponentError, InputError, Problem, did_you_mean
 from . import world_settings
 from .catalogue import MODELS
 from .environment.environment_model import EnvironmentModel
-from .physics.body import ContactBody, InvalidStateError
+from .physics.body import InvalidStateError
 from .physics.client import connect, preconnect, pybullet
 from .physics.compiled_equations import library_path
 from .physics.contacts import overlap_depths
@@ -28,8 +27,9 @@ from .physics.fixed_bodies import create_fixed_bodies
 from .physics.fleet import Fleet, FleetState
 from .scene import replay
 from .variable_views import recorded_others, variable_views, views_in_parts
+from .vehicle_constants import input_limits, vehicle_constants
 from .vehicle_files.plausibility import vehicle_warnings
-from .world_settings import INITIAL_PREFIX, WAVE_PREFIX, WorldSettings
+from .world_settings import WorldSettings
 
 if TYPE_CHECKING:
     from cosim.results import Result
@@ -128,6 +128,7 @@ class World(Component):
         self._fleet = Fleet(self._client, settings.vehicles, fixed.boxes, self._bullet_step, self._flags, fixed.names)
         self._advance, self._contacts, self._failures = self._fleet.advance, self._fleet.contacts, self._fleet.failures
         self._check_overlaps(fixed.paths | {body.body_id: f"vehicles.{body.name}" for body in self._fleet.bodies})
+        self.input_limits = {name: limits for body in self._fleet.bodies for name, limits in input_limits(body)}
         self._environment = EnvironmentModel(
             settings.environment,
             settings.sea,
@@ -161,7 +162,7 @@ class World(Component):
             prefixed = body.model.variables_of(body.name)
             yield from views_in_parts([v for v in prefixed if v.causality == "input"], body.inputs)
             yield from variable_views([v for v in prefixed if v.causality == "output"], {_FLOAT: body.outputs, _FLAG: flags})
-            yield from _constants(body, f"/components/{self._name}/arguments/vehicles/{body.name}/parameters")
+            yield from vehicle_constants(body, f"/components/{self._name}/arguments/vehicles/{body.name}/parameters")
         environment = self._environment
         yield from variable_views(environment.input_variables, {_FLOAT: environment.inputs})
         yield from variable_views(environment.output_variables, {_FLOAT: environment.outputs})
@@ -295,14 +296,3 @@ class World(Component):
         """Release the memory of a state in Bullet."""
         if self._release.alive:
             self._fleet.free_state(state.fleet)
-
-
-def _constants(body: ContactBody, pointer: str) -> Iterator[tuple[Variable, np.ndarray]]:
-    """Yield the parameters of a vehicle, except those of initial state and waves, as constants that `pointer` sets."""
-    for variable, values in variable_views(body.model.real_variables("parameter"), {_FLOAT: body.parameters}):
-        if not variable.name.startswith((INITIAL_PREFIX, WAVE_PREFIX)):
-            value = values.tolist() if variable.shape else values.item()
-            name = f"{body.name}.{variable.name}"
-            text = f"{variable.description}; set by {pointer}/{variable.name}"
-            constant = replace(variable, name=name, causality="local", variability="constant", start=value, description=text)
-            yield constant, values

@@ -53,6 +53,7 @@ PLANT_LAYERS = (
     "scene",
     "figures",
     "sensors",
+    "vehicle_constants",
     "world",
     "world_fmu",
     "replica",

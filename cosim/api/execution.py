@@ -17,6 +17,7 @@ from ..results.checks import CheckOutcome, Number, evaluate_all_checks, evaluate
 from ..results.kpi import NoValue, evaluate_kpis, kpi_notes, kpi_senses, kpi_units
 from ..results.non_finite import warn_non_finite
 from ..scenario import PreparedRun
+from .input_limits import warn_exceeded_limits
 
 
 @dataclass(frozen=True)
@@ -44,6 +45,8 @@ def evaluate_outcome(prepared: PreparedRun, outcome: SimulationOutcome, complete
     timing = _add_timings(prepared.timing, outcome.timing)
     timing["simulate_seconds"] = sum(outcome.timing.values())
     metadata = {**prepared.metadata, **_outcome_metadata(prepared, outcome)}
+    if complete or outcome.failure:
+        warn_exceeded_limits(prepared, outcome.recording)
     result = Result(outcome.recording, timing=timing, metadata=metadata)
     return _evaluate_run(result, prepared) if complete and not outcome.failure else Execution(result, outcome.failure)
 

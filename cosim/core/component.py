@@ -205,6 +205,7 @@ class Component(Protocol):
             with the time derivatives of those that do, see `Variable.derivative_of`.
         gives_output_slopes: First time derivatives of outputs are available (FMI: maxOutputDerivativeOrder). The outputs of
             `bind` end with those that are used.
+        input_limits: Lower and upper limit to which the component limits an input, by the name of the scalar.
     """
 
     variables: Sequence[Variable]
@@ -218,6 +219,7 @@ class Component(Protocol):
     initial_dependencies: Mapping[str, frozenset[str]] = MappingProxyType({})
     interpolates_inputs: bool = False
     gives_output_slopes: bool = False
+    input_limits: Mapping[str, tuple[float, float]] = MappingProxyType({})
 
     def set(self, name: str, value: Any) -> None:
         """Set a variable to a Python value, an array to nested lists; not called while stepping through a macro step."""

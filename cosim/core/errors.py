@@ -199,6 +199,17 @@ def did_you_mean(name: str, valid: Iterable[str]) -> str:
     return _did_you_mean(name, tuple(valid))
 
 
+def near_or_valid_names(name: str, valid: Iterable[str]) -> str:
+    """Return a hint like `did_you_mean`, but if there are many names and none is similar, their parts before the first dot.
+
+    >>> near_or_valid_names("speed.value", [f"{name}.{i}" for name in ("landing", "path") for i in range(8)])
+    '; valid: landing.*, path.*'
+    """
+    names = tuple(valid)
+    parts = (first + dot.replace(".", ".*") for first, dot, _ in (each.partition(".") for each in names))
+    return did_you_mean(name, names) or (f"; valid: {abbreviate_names(parts, 12)}" if names else "")
+
+
 def nearest_file(path: Path) -> str:
     """Return a hint for the end of a message about a missing file: the most similar name in its folder, else its files, else "".
 

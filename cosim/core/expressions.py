@@ -15,7 +15,7 @@ from dataclasses import dataclass
 from keyword import iskeyword
 from typing import Any, NamedTuple
 
-from .errors import did_you_mean
+from .errors import near_or_valid_names
 
 #: function without arguments that returns the present value of a part of an expression
 Reader = Callable[[], float]
@@ -75,7 +75,7 @@ class Expression:
     def unknown_name_problem(self, known: Mapping[str, Any], kind: str = "KPI or parameter") -> str:
         """Return a message about the first name that is not `known`; "" if all are."""
         missing = [name for name in self.names if name not in known]
-        return f'no {kind} "{missing[0]}"{did_you_mean(missing[0], known)}' if missing else ""
+        return f'no {kind} "{missing[0]}"{near_or_valid_names(missing[0], known)}' if missing else ""
 
     def bind(self, reader: Callable[[str], Reader]) -> Reader:
         """Return a function that returns the present value.
@@ -168,7 +168,7 @@ def check_node(node: ast.AST, conditions: bool = False) -> None:
 
 def _check_call(name: str, arguments: Sequence[ast.AST], conditions: bool) -> None:
     if name not in FUNCTIONS:
-        raise ValueError(f'unknown function "{name}"{did_you_mean(name, FUNCTIONS)}')
+        raise ValueError(f'unknown function "{name}"{near_or_valid_names(name, FUNCTIONS)}')
     for argument in arguments:
         check_node(argument, conditions)
     if len(arguments) not in FUNCTIONS[name].counts:

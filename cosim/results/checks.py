@@ -7,7 +7,7 @@ import operator
 from collections.abc import Callable, Iterable, Mapping
 from typing import Any, NamedTuple
 
-from ..core.errors import InputError, Problem, did_you_mean
+from ..core.errors import InputError, Problem, did_you_mean, near_or_valid_names
 
 Number = float | int | bool
 
@@ -66,6 +66,11 @@ def evaluate_all_checks(kpis: Mapping[str, Number], checks: Iterable[Mapping[str
     return evaluate_checks({**{check["kpi"]: math.nan for check in checks}, **kpis}, checks)
 
 
+def kpi_hint(name: str, kpis: Iterable[str]) -> str:
+    """Return a hint for the end of a message about an unknown KPI: the most similar name, else the valid names."""
+    return near_or_valid_names(name, kpis) or "; there are no KPIs"
+
+
 def _find_check_problems(kpis: Mapping[str, Number], check: Mapping[str, Any]) -> list[Problem]:
     name, limits = check["kpi"], [key for key in check if key != "kpi"]
     where = f'check of "{name}"'
@@ -75,7 +80,7 @@ def _find_check_problems(kpis: Mapping[str, Number], check: Mapping[str, Any]) -
         if key not in LIMIT_OPERATORS
     ]
     if name not in kpis:
-        problems.append(Problem(f"no such KPI{did_you_mean(name, kpis)}", where))
+        problems.append(Problem(f"no such KPI{kpi_hint(name, kpis)}", where))
     if not limits:
         problems.append(Problem(f"no limit given, expected one of {', '.join(LIMIT_OPERATORS)}", where))
     return problems

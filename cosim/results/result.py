@@ -13,6 +13,7 @@ import numpy as np
 from ..core.errors import InputError, did_you_mean
 from ..core.recording import Recording
 from ..core.text import count_noun
+from .checks import kpi_hint
 from .csv_files import read_csv, write_csv
 from .files import write_json
 
@@ -37,11 +38,11 @@ class KpiError(InputError, KeyError):
 class Kpis(dict[str, float | int | bool]):
     """Values of KPIs by name, such as `result.kpis["landing.lateral_error"]`.
 
-    An unknown name raises KpiError (an InputError and a KeyError). Its message contains the most similar name.
+    An unknown name raises KpiError (an InputError and a KeyError). Its message contains the most similar name, or the KPIs.
     """
 
     def __missing__(self, name: str) -> float | int | bool:
-        raise KpiError(f'no KPI "{name}" was computed{did_you_mean(name, self)}')
+        raise KpiError(f'no KPI "{name}" was computed{kpi_hint(name, self)}')
 
 
 class Presentation:

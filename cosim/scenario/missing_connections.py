@@ -23,7 +23,8 @@ def find_missing_connections(system: System, unconnected: VariablesByEndpoint) -
 
     An input probably lacks a connection if an output has its name, if outputs feed other elements of its vector, or if it is a
     single number and half of the component's inputs or more (vectors count once) are fed or set. Vectors of which no element is
-    fed are often disturbances, and Booleans requests that nothing makes.
+    fed are often disturbances, a vertical component ("force.z") beside horizontal ones that are fed is often 0 on purpose, and
+    Booleans are requests that nothing makes.
 
     Args:
         system: The system.
@@ -69,7 +70,7 @@ def _suspects(
     others = [
         end
         for end, variable in unfed.items()
-        if Endpoint(end.component, vector := _vector(end.scalar)) in fed_vectors
+        if (Endpoint(end.component, vector := _vector(end.scalar)) in fed_vectors and not end.scalar.endswith(".z"))
         or (is_mostly_fed and not vector and variable.type != "Boolean")
     ]
     return {end: unfed[end] for end in (*sources, *others)}

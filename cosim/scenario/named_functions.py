@@ -12,6 +12,7 @@ from typing import Any
 from ..components.python_import import load_object
 from ..core.errors import Problem, did_you_mean, nearest_file
 from ..core.paths import is_file
+from ..results.checks import kpi_hint
 from .argument_types import argument_problem
 from .evaluation_schema import CallSpec, FunctionSpec
 from .function_definitions import function_definition, function_definitions, kpi_value_names, source_path
@@ -144,13 +145,16 @@ def _kpi_name_problem(kpi: str, kpis: Sequence[FunctionSpec], folder: Path) -> s
     The names of a function's values are known only if its `return` statements write them as literals.
     """
     name, _, key = kpi.partition(".")
-    spec = next((spec for spec in kpis if spec.name == name), None)
-    if spec is None:
-        return f'no KPI "{kpi}"{did_you_mean(name, [spec.name for spec in kpis])}'
-    keys = [] if definition_problem(spec, folder) else kpi_value_names(function_definition(spec, folder))
-    if not keys or key.partition("[")[0] in keys:
+    values = {spec.name: _value_names(spec, folder) for spec in kpis}
+    if name in values and (not values[name] or key.partition("[")[0] in values[name]):
         return ""
-    return f'no KPI "{kpi}"{did_you_mean(kpi, [f"{name}.{known}" for known in keys])}'
+    own = {name: values[name]} if name in values else values
+    known = (f"{each}.{value}" if value else each for each, names in own.items() for value in names or [""])
+    return f'no KPI "{kpi}"{kpi_hint(kpi.partition("[")[0], known)}'
+
+
+def _value_names(spec: FunctionSpec, folder: Path) -> list[str]:
+    return [] if definition_problem(spec, folder) else kpi_value_names(function_definition(spec, folder))
 
 
 def _annotation_names(annotation: ast.expr | None) -> set[str]:

@@ -25,6 +25,9 @@ class ContactMemory:
         bodies: Contact body of each vehicle.
         vehicles: Settings of each vehicle.
         fixed: Bounding boxes of platforms and obstacles.
+
+    Attributes:
+        watched_pairs: Pairs that `is_unsafe` examines.
     """
 
     def __init__(
@@ -36,7 +39,7 @@ class ContactMemory:
     ):
         self._client, self._numbers, self._fixed = client, [body.body_id for body in bodies], fixed
         self._has_several_shapes = [len(vehicle.body.boxes) > 1 for vehicle in vehicles]
-        self._watched: Sequence[tuple[int, int]] = ()
+        self.watched_pairs: Sequence[tuple[int, int]] = ()
 
     def watch(self, near_pairs: Sequence[tuple[int, int]]) -> None:
         """Set the pairs that `is_unsafe` examines.
@@ -46,11 +49,11 @@ class ContactMemory:
         """
         several = self._has_several_shapes
         count = len(several)
-        self._watched = [(a, b) for a, b in near_pairs if several[a] and (b >= count or several[b])]
+        self.watched_pairs = [(a, b) for a, b in near_pairs if several[a] and (b >= count or several[b])]
 
     def is_unsafe(self) -> bool:
         """Return whether several shapes of a vehicle can touch one other body at the start of the step."""
-        return any(self._is_near(*pair) for pair in self._watched)
+        return any(self._is_near(*pair) for pair in self.watched_pairs)
 
     def _is_near(self, one: int, other: int) -> bool:
         (low, high), (other_low, other_high) = self._box(one), self._box(other)

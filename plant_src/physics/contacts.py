@@ -79,7 +79,7 @@ class Contacts:
         self._outputs: Any = outputs.data
         self._flags: Any = flags.reshape(-1).data
         self._permanent_flags, self._touching = failures.permanent_flags.reshape(-1).data, flags[:, TOUCHING].data
-        self._force_ends = list(accumulate(len(body.outputs) for body in bodies))
+        self._force_indices = [end - 1 for end in accumulate(len(body.outputs) for body in bodies)]
         self._bodies = {body.body_id: body for body in bodies}
         self._vehicle_indices = {body.body_id: k for k, body in enumerate(bodies)}
         self._vessels = {body.body_id for body in bodies if body.model.is_vessel}
@@ -89,8 +89,8 @@ class Contacts:
         """Set all contact forces to 0 and all flags but those of failures to false."""
         self.has_contacts = False
         self._flags[:] = self._permanent_flags
-        for end in self._force_ends:
-            self._outputs[end - 1] = 0.0
+        for index in self._force_indices:
+            self._outputs[index] = 0.0
 
     def add(self, step_fraction: float) -> int:
         """Add the contacts of Bullet's last step to the outputs.
@@ -131,7 +131,7 @@ class Contacts:
         flags += [FLAG_COUNT * vehicle + ON_VESSEL for vehicle in on_vessels]
         a, b = (self._bodies.get(number) for number in pair)
         self._pairs[pair] = _Pair(
-            [self._force_ends[vehicle] - 1 for vehicle in vehicles],
+            [self._force_indices[vehicle] for vehicle in vehicles],
             flags,
             a.commanded_twist if a else _NO_MOTION,
             b.commanded_twist if b else _NO_MOTION,

@@ -121,7 +121,7 @@ class Fleet:
         if self._near_vehicles_outdated or any(self._step_status):
             self._handle_step_status()
         if self._active_bodies:
-            if self._contact_memory.is_unsafe():
+            if self._contact_memory.watched_pairs and self._contact_memory.is_unsafe():
                 self._forget_contact_points()
             self._solve_contacts()
         for correct in self._correct:
@@ -165,8 +165,10 @@ class Fleet:
             vessel.reset_height()
         self._step_bullet()
         for repeats in range(MAX_REPEATS):
-            converged = [vessel.height_converged(repeats) for vessel in self._active_planar_bodies]
-            if all(converged):
+            converged = True
+            for vessel in self._active_planar_bodies:
+                converged &= vessel.height_converged(repeats)
+            if converged:
                 return
             for body in self._active_bodies:
                 body.reset_pose()

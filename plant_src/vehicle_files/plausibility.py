@@ -8,6 +8,8 @@ from typing import Any
 
 import numpy as np
 
+from cosim.core.units import KNOWN_UNITS
+
 from ..catalogue import model_from_data
 from ..vehicles.model import Model
 from ..vehicles.multirotor.airframe import Airframe, Rotor
@@ -21,6 +23,8 @@ MAX_ROTOR_DISTANCE = 5.0
 MAX_THRUST_RATIO = 30.0
 #: largest extent of a vessel and of other vehicles (m); the longest ships have 460 m
 MAX_EXTENT = {True: 500.0, False: 100.0}
+#: largest ratio of mass and displaced mass, in either direction; 1 kg is 2.2 lb
+MAX_MASS_RATIO = 1.5
 #: z component of the axis of a rotor that pushes downwards
 _DOWNWARDS = -0.5
 
@@ -44,6 +48,10 @@ def vehicle_warnings(model: Model) -> Iterator[str]:
         yield from _rotor_warnings(model.airframe, _reach(model))
     if isinstance(model.boat, SurfaceVessel):
         yield from _hull_warnings(model.boat)
+        yield from _draught_warnings(model.boat)
+    if model.craft:
+        displaced = model.craft.water_density * model.craft.displaced_volume
+        yield from _mass_warnings(model.craft.mass, displaced, f"displaced_volume of {model.craft.displaced_volume:.4g} m3")
 
 
 def _reach(model: Model) -> float:
@@ -106,3 +114,20 @@ def _hull_warnings(vessel: SurfaceVessel) -> Iterator[str]:
         if propeller.radius and propeller.position[2] - propeller.radius > surface:
             height = propeller.position[2] - surface
             yield f"propellers[{i}].position: {height:.3g} m above the water at rest, the propeller gives no thrust"
+
+
+def _draught_warnings(vessel: SurfaceVessel) -> Iterator[str]:
+    if vessel.hull.bottom < 0:
+        displaced = vessel.water_density * vessel.hull.area * -vessel.hull.bottom
+        yield from _mass_warnings(
+            vessel.mass, displaced, f"draught of {-vessel.hull.bottom:.4g} m (hull.bottom with a minus sign)"
+        )
+
+
+def _mass_warnings(mass: float, displaced: float, source: str) -> Iterator[str]:
+    """Yield a warning if the mass (kg) and the displaced mass that a quantity of the file gives (kg) differ too much."""
+    ratio = max(mass, displaced) / min(mass, displaced)
+    if ratio > MAX_MASS_RATIO:
+        is_pound = math.isclose(mass / displaced, 1 / KNOWN_UNITS["lb"].factor, rel_tol=0.05)
+        hint = ": is the mass in lb?" if is_pound else ""
+        yield f"mass: found {mass:.4g} kg, but the {source} displaces {displaced:.4g} kg of water{hint}"

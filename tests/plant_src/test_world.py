@@ -29,6 +29,10 @@ def refused(**arguments: Any) -> InputError:
         ({**UAV, "model": 7}, "vehicles.uav.model: found 7, expected the name of a vehicle model, or its data: ar_drone, "),
         ({"position": [0.0, 0.0, 2.0]}, 'vehicles.uav: "model" is missing'),
         ({"model": "ar_drone"}, 'vehicles.uav: "position" is missing'),
+        (
+            {"model": "ar_drone", "positon": [0.0, 0.0, 2.0]},
+            'vehicles.uav.positon: unknown key "positon"; did you mean "position"',
+        ),
         ({**UAV, "yow": 1.0}, r'vehicles.uav.yow: unknown key "yow"; did you mean "yaw"\?'),
         (quadcopter_settings([0.0, 0.0]), r"vehicles.uav.position: found \[0.0, 0.0\], expected a list of 3 numbers \[x, y, z\]"),
         (vessel_settings([0.0, 0.0, 0.1]), r"vehicles.uav.position: found .* expected a list of 2 numbers \[x, y\]"),
@@ -200,3 +204,23 @@ def test_a_vessel_starts_with_the_velocity_of_the_waves_unless_it_starts_on_stil
     assert abs(start()[0]) > 0.05
     assert start(velocity_body=[1.0, 0.0, 0.0]) - start() == pytest.approx([1.0, 0.0, 0.0])
     assert start(parameters={"initial.on_waves": 0.0}) == pytest.approx([0.0, 0.0, 0.0])
+
+
+def test_limits_of_commands_are_those_of_the_data_of_each_vehicle():
+    names = ("ar_drone", "bluerov2_heavy", "blueboat", "cybership2", "otter", "strider", "wamv16")
+    vehicles = {
+        name: {"model": name, "position": [20.0 * i, 0.0, 2.0][: 3 if name in ("ar_drone", "bluerov2_heavy") else 2]}
+        for i, name in enumerate(names)
+    }
+    vehicles["ar_drone"]["parameters"] = {"max_rotor_speed": 600.0}
+    world = World("plant", vehicles)
+    limits = world.input_limits
+    world.free()
+    assert limits["ar_drone.rotor_speed[4]"] == (0.0, 600.0)
+    assert limits["bluerov2_heavy.thruster_speed[8]"] == (-283.0, 283.0)
+    assert limits["cybership2.propeller_speed[3]"] == (-209.44, 209.44)
+    assert limits["cybership2.rudder_angle[2]"] == (-0.6109, 0.6109)
+    assert limits["wamv16.azimuth[1]"] == pytest.approx((-math.pi / 2, math.pi / 2))
+    assert limits["otter.propeller_speed[1]"] == pytest.approx((-101.7, 103.9), abs=0.05)
+    assert limits["strider.rudder_angle"] == (-math.pi / 2, math.pi / 2)
+    assert not [name for name in limits if name.startswith("blueboat.rudder_angle") or "external" in name]

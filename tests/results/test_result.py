@@ -49,9 +49,12 @@ def test_the_time_as_signal_is_refused_with_a_hint(result):
         result["time"]
 
 
-def test_an_unknown_kpi_names_the_nearest():
+def test_an_unknown_kpi_names_the_nearest_or_all():
     with pytest.raises(KeyError, match=r'^no KPI "landing.tme" was computed; did you mean "landing.time"\?$'):
         Kpis({"landing.time": 14.5})["landing.tme"]
+    many = Kpis({f"{name}.{i}": 1.0 for name in ("landing", "waypoints") for i in range(8)})
+    with pytest.raises(KeyError, match=r'^no KPI "speed.value" was computed; valid: landing\.\*, waypoints\.\*$'):
+        many["speed.value"]
 
 
 @pytest.mark.parametrize(

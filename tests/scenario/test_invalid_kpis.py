@@ -118,7 +118,8 @@ def test_missing_signals_of_an_invalid_component_are_not_reported(folder):
     [
         ("error.final_eror", 'no KPI "error.final_eror"; did you mean "error.final_error"?'),
         ("error", 'no KPI "error"; did you mean "error.time"?'),
-        ("eror.time[1]", 'no KPI "eror.time[1]"; did you mean "error"?'),
+        ("eror.time[1]", 'no KPI "eror.time[1]"; did you mean "error.time"?'),
+        ("speed.value", 'no KPI "speed.value"; valid: error.largest, error.final_error, error.time, unsaid'),
     ],
 )
 def test_checks_must_name_a_value_of_a_kpi(folder, number, message):
@@ -128,6 +129,11 @@ def test_checks_must_name_a_value_of_a_kpi(folder, number, message):
     checks = [{"kpi": each, "max": 1} for each in (number, "error.largest", "error.time[2]", "unsaid.anything")]
     (found,) = folder.problems({"a": folder.block("Gain")}, kpis=[known, unknown], checks=checks)
     assert found.endswith(f"$.checks[0].kpi: {message}")
+
+
+def test_a_check_without_kpis_says_that_there_are_none(folder):
+    (found,) = folder.problems({"a": folder.block("Gain")}, checks=[{"kpi": "speed.value", "max": 1}])
+    assert found.endswith('$.checks[0].kpi: no KPI "speed.value"; there are no KPIs')
 
 
 def test_two_kpis_cannot_have_the_same_name(folder):

@@ -41,7 +41,7 @@ def test_all_problems_are_reported_at_once(folder):
         '10:16: $.algorithm.stages: unknown component "e"; valid: b',
         "12:13: $.events[0]: event time 0.5 s lies between two communication points (1.0 s apart)",
         '11:11: $.kpis[0]: file "none.py" does not exist',
-        '11:62: $.checks[0].kpi: no KPI "kk.x"; did you mean "k"?',
+        '11:62: $.checks[0].kpi: no KPI "kk.x"; valid: k',
     ]
 
 

@@ -33,6 +33,29 @@ def still_air_loads(table: ca.SX, slots: int) -> ca.SX:
     return ca.horzcat(*loads)
 
 
+def create_still_air_load(slots: int) -> Callee:
+    """Create the function of all rotors' load in still air far from a surface.
+
+    Args:
+        slots: Number of elements of the arrays of rotors.
+
+    Returns:
+        Function of the matrix of `still_air_loads`, the number of rotors and the speeds (rad/s). Its result has the shape (6,).
+    """
+    arguments = matrix, _, speed = ca.SX.sym("matrix", 6, slots), ca.SX.sym("count"), ca.SX.sym("speed", slots)
+    return Callee(ca.Function("still_air_load", arguments, [matrix @ speed**2]), _STILL_AIR_LOAD_C)
+
+
+_STILL_AIR_LOAD_C = """{
+    for (int j = 0; j < 6; ++j) out[0][j] = 0;
+    for (int i = 0; i < in[1][0]; ++i) {
+        const double *const column = in[0] + 6 * i, squared = in[2][i] * in[2][i];
+        for (int j = 0; j < 6; ++j) out[0][j] += column[j] * squared;
+    }
+}
+"""
+
+
 #: largest ratio of the air speed in the plane of a rotor to the speed of its tips for which the translational lift grows
 MAX_ADVANCE_RATIO = 0.5
 
@@ -67,10 +90,20 @@ class RotorFunctions:
 
     slots: int
 
+    @property
+    def callees(self) -> tuple[Callee, ...]:
+        """All functions."""
+        return self.inflow_reductions, self.still_air_load, self.load_sum
+
     @cached_property
     def inflow_reductions(self) -> Callee:
         """Reductions of the inflow by the ground effect."""
         return create_reductions(self.slots)
+
+    @cached_property
+    def still_air_load(self) -> Callee:
+        """Sum of the loads of all rotors in still air."""
+        return create_still_air_load(self.slots)
 
     @cached_property
     def load_sum(self) -> Callee:

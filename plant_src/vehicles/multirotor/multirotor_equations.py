@@ -153,7 +153,7 @@ class MultirotorEquations:
         """Return the state after a step (s) with all effects off."""
         given, known = self._inputs(inputs), self.constants.by_name(constants)
         body, speed = rigid_body(known), self._commanded_speeds(given, known)
-        load = known["still_air_loads"] @ speed**2
+        load = self.rotor_functions.still_air_load(known["still_air_loads"], known["rotor_count"], speed)
         end = runge_kutta_4(
             lambda x: rigid_body_rate(body, known["gravity"], x, given, load[0:3], load[3:6]),
             state[:RIGID_BODY_STATE_COUNT],
@@ -286,7 +286,7 @@ def multirotor_block(airframe: Airframe, description: str, rotor_slots: int | No
         equations.rate,
         lambda state, _inputs, _constants: ca.vertcat(motion_of_state(state), ca.SX.zeros(len(WORLD_OUTPUTS))),
         derived_parameters=equations.constants.vector,
-        callees=[step, functions.inflow_reductions, functions.load_sum, surroundings_callee, SURFACE_SUM],
+        callees=[step, *functions.callees, surroundings_callee, SURFACE_SUM],
         free_step=step.function,
     )
     maps = contact_maps.FreeContactMaps(model, lambda c: rigid_body(equations.constants.by_name(c)), motion_of_state)

@@ -101,11 +101,18 @@ class SurfaceVessel(Boat):
             text = f"found {self.hull.depth:g}: the vessel sinks, because its draught at rest is {self.draught:.4g} m"
             yield self.problem(text, "hull", "depth")
         elif not min(self.metacentric_heights) > 0:
-            heights = ", ".join(f"{height:.4g}" for height in self.metacentric_heights)
-            text = f"the vessel is not stable: its metacentric heights (transverse, longitudinal) are {heights} m, expected > 0"
-            yield self.problem(text, "hull")
+            yield self.problem(self._instability(), "centre_of_mass")
         elif text := self._imbalance():
             yield self.problem(text, "centre_of_mass")
+
+    def _instability(self) -> str:
+        """Return the height of the centre of mass, or else the moment of the waterplane, that would make the vessel stable."""
+        heights, z = self.metacentric_heights, self.centre_of_mass[2]
+        key = "transverse_moment (beam, offset)" if heights[0] == min(heights) else "longitudinal_moment (length)"
+        return (
+            f"found z = {z:g} m: the vessel is not stable: its metacentric heights (transverse, longitudinal) are "
+            f"{heights[0]:.4g}, {heights[1]:.4g} m, expected > 0: z must be below {z + min(heights):.4g} m, or hull.{key} larger"
+        )
 
     def _imbalance(self) -> str:
         """Return why the vessel does not rest with its deck above the water; "" if it does."""

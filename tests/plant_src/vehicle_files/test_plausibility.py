@@ -47,6 +47,18 @@ MISTAKES: list[tuple[str, Callable[[dict[str, Any]], Any], str]] = [
     ("blueboat", lambda d: d["hull"].update(length=1200), "hull.length: found 1200 m, expected less than 500 m"),
     ("blueboat", lambda d: d.update(inertia=[1200, 3000, 4000]), "inertia: the radius of gyration"),
     ("cybership2", lambda d: d.update(yaw_inertia=1760), "yaw_inertia: the radius of gyration"),
+    (
+        "blueboat",
+        lambda d: d.update(mass=39.68),
+        "mass: found 39.68 kg, but the draught of 0.09745 m (hull.bottom with a minus sign) displaces 18 kg of water: "
+        "is the mass in lb?",
+    ),
+    ("blueboat", lambda d: d.update(mass=9), "mass: found 9 kg, but the draught of 0.09745 m"),
+    (
+        "bluerov2_heavy",
+        lambda d: d.update(mass=29.8),
+        "mass: found 29.8 kg, but the displaced_volume of 0.0134 m3 displaces",
+    ),
     ("bluerov2_heavy", lambda d: d.update(inertia=[210, 245, 245]), "inertia: the radius of gyration"),
 ]
 

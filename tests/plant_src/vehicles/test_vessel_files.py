@@ -78,7 +78,11 @@ FAULTS: list[tuple[Callable[[dict[str, Any]], Any], str]] = [
         lambda d: d.update(mass=900),
         r"model\.hull\.depth: found 0\.345: the vessel sinks, because its draught at rest is 1\.171 m",
     ),
-    (lambda d: d.update(centre_of_mass=[0.15, 0, 9]), r"model\.hull: the vessel is not stable: its metacentric heights"),
+    (
+        lambda d: d.update(centre_of_mass=[0.15, 0, 9]),
+        r"model\.centre_of_mass: found z = 9 m: the vessel is not stable: its metacentric heights .* m, expected > 0: "
+        r"z must be below 1\.\d+ m, or hull\.transverse_moment \(beam, offset\) larger",
+    ),
     (lambda d: d.update(centre_of_mass=[4, 0, 0]), r"model\.centre_of_mass: found 3\.8469 m ahead of .*: the vessel capsizes"),
     (lambda d: d.update(added_mass=[-1] * 6), r"model\.added_mass: found the eigenvalue -1"),
     (lambda d: d.update(linear_damping=[-1] + [0] * 5), r"model\.linear_damping: found the diagonal"),
@@ -108,6 +112,22 @@ def test_an_impossible_vessel_is_refused_with_its_path(change: Callable[[dict[st
     with pytest.raises(InputError, match=text) as caught:
         World("plant", {"usv": {"model": changed(change), "position": [0, 0]}})
     assert all(str(problem).startswith("vehicles.usv.model") for problem in caught.value.problems)
+
+
+@pytest.mark.parametrize(
+    ("path", "key"),
+    [((), "mass"), ((), "hull"), (("hull",), "length"), (("propellers", 0), "position"), (("propeller",), "max_speed")],
+)
+def test_a_misspelt_key_is_one_problem(path: tuple[str | int, ...], key: str) -> None:
+    def misspell(data: Any) -> None:
+        for each in path:
+            data = data[each]
+        data[key[:-1]] = data.pop(key)
+
+    with pytest.raises(InputError) as caught:
+        model_from_data(changed(misspell))
+    place = ".".join(map(str, (*path, key[:-1])))
+    assert list(map(str, caught.value.problems)) == [f'{place}: unknown key "{key[:-1]}"; did you mean "{key}"?']
 
 
 def test_a_parameter_of_a_scenario_replaces_a_value_of_the_file() -> None:

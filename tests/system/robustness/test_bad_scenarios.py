@@ -125,7 +125,7 @@ CHANGES: dict[str, tuple[Change, str]] = {
     "unknown column": (put("inputs/0/to", {"xx": ["a.u"]}), '"xx"'),
     "missing function": (put("kpis/0/python", "kpis.py:lost"), 'defines no function "lost"; did you mean "last"?'),
     "missing argument": (put("kpis/0/arguments", {}), '"last" needs the argument signal'),
-    "check of no KPI": (put("checks/0/kpi", "ende.value"), 'no KPI "ende.value"; did you mean "end"?'),
+    "check of no KPI": (put("checks/0/kpi", "ende.value"), 'no KPI "ende.value"; did you mean "end.value"?'),
     "check that cannot be met": (put("checks/0/min", 11), 'expected "min" to be at most "max"'),
     "a nested system in itself": (put("components/inner/system", "scenario.json"), "contains itself"),
     "a device as nested system": (put("components/inner/system", "/dev/zero"), 'cannot read "/dev/zero": Not a regular file'),
