@@ -201,6 +201,18 @@ def test_unknown_variables_are_refused_with_the_nearest_name() -> None:
         trial["uav.position.x"] = 0.0
 
 
+def test_a_vessel_starts_with_the_velocity_of_the_waves_unless_it_starts_on_still_water() -> None:
+    """The start velocity of the scenario is relative to the water."""
+
+    def start(**settings: Any) -> Any:
+        boat = {"model": "otter", "position": [0.0, 0.0], **settings}
+        return WorldHarness({"usv": boat}, environment={"seed": 1, "sea_state": 2}).vector("usv.velocity_body", "uvw")
+
+    assert abs(start()[0]) > 0.05
+    assert start(velocity_body=[1.0, 0.0, 0.0]) - start() == pytest.approx([1.0, 0.0, 0.0])
+    assert start(parameters={"initial.on_waves": 0.0}) == pytest.approx([0.0, 0.0, 0.0])
+
+
 def test_limits_of_commands_are_those_of_the_data_of_each_vehicle():
     names = ("ar_drone", "bluerov2_heavy", "blueboat", "cybership2", "otter", "strider", "wamv16")
     vehicles = {
