@@ -83,12 +83,13 @@ def unconnected_inputs(prepared: PreparedRun) -> VariablesByEndpoint:
 
 def _large_step(prepared: PreparedRun) -> Iterator[Problem]:
     """Yield a warning if the step size is much longer than the shortest one that an FMU recommends (FMI: DefaultExperiment)."""
-    step, files = prepared.settings.step_size, prepared.component_factory.fmus.values()
-    recommended = [(size, file.path.name) for file in files if (size := file.description.default_experiment.step_size)]
-    if recommended and (shortest := min(recommended))[0] * _MAX_STEP_RATIO <= step:
-        size, name = float(shortest[0]), shortest[1]
-        ratio = f"{float(step) / size:.3g} times the {size:g} s that {name} recommends"
-        text = f"a step of {float(step):g} s is {ratio}: the results are probably wrong, use about {size:g} s"
+    step = float(prepared.settings.step_size)
+    files = prepared.component_factory.fmus.values()
+    recommended = [(float(size), file.path.name) for file in files if (size := file.description.default_experiment.step_size)]
+    size, name = min(recommended, default=(math.inf, ""))
+    if step >= _MAX_STEP_RATIO * size:
+        ratio = f"{step / size:.3g} times the {size:g} s that {name} recommends"
+        text = f"a step of {step:g} s is {ratio}: the results are probably wrong, use about {size:g} s"
         yield Problem(text, prepared.root.where("step_size"))
 
 
