@@ -85,7 +85,8 @@ def _large_step(prepared: PreparedRun) -> Iterator[Problem]:
     """Yield a warning if the step size is much longer than the shortest one that an FMU recommends (FMI: DefaultExperiment)."""
     step = float(prepared.settings.step_size)
     files = prepared.component_factory.fmus.values()
-    recommended = [(float(size), file.path.name) for file in files if (size := file.description.default_experiment.step_size)]
+    experiments = ((file.description.default_experiment, file.path.name) for file in files)
+    recommended = [(float(each.step_size), name) for each, name in experiments if each.step_size]
     size, name = min(recommended, default=(math.inf, ""))
     if step >= _MAX_STEP_RATIO * size:
         ratio = f"{step / size:.3g} times the {size:g} s that {name} recommends"
