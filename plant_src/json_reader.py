@@ -25,12 +25,20 @@ class JsonReader:
 
     def __init__(self) -> None:
         self.problems: list[Problem] = []
+        self._missing: set[JsonPath] = set()
 
     def add_problem(self, path: JsonPath, text: str) -> None:
         """Record a problem of the value at `path`, once."""
         problem = Problem(text, ".".join(path), ("arguments", *path))
         if problem not in self.problems:
             self.problems.append(problem)
+
+    def add_missing(self, path: JsonPath, key: str, common: str) -> None:
+        """Record that a key is missing at `path` and at `common`, whose values count for all, unless it is misspelt there."""
+        places = (("arguments", *path), ("arguments", common))
+        misspelt = (each for each in self.problems if each.message.endswith(f'; did you mean "{key}"?'))
+        if not any(each.subject[:-1] in places for each in misspelt):
+            self.add_problem(path, f'"{key}" is missing, here and in "{common}"')
 
     def read_named_objects(self, value: Any, path: JsonPath) -> Mapping[str, Any]:
         """Read an object whose keys become parts of variable names."""
@@ -42,27 +50,24 @@ class JsonReader:
     def read_object(self, value: Any, path: JsonPath, required: Sequence[str], optional: Sequence[str]) -> Mapping[str, Any]:
         """Read an object with these keys and no others."""
         found = self.mapping(value, path)
-        for key in found:
-            if key not in (*required, *optional):
-                self.add_problem((*path, key), f'unknown key "{key}"{did_you_mean(key, (*required, *optional))}')
-        if isinstance(value, Mapping):
-            for key in required:
-                if key not in found:
-                    self.add_problem(path, f'"{key}" is missing')
+        valid = (*required, *optional)
+        hints = {key: did_you_mean(key, valid) for key in found if key not in valid}
+        for key, hint in hints.items():
+            self.add_problem((*path, key), f'unknown key "{key}"{hint}')
+        missing = [key for key in required if key not in found] if isinstance(value, Mapping) else []
+        self._missing.update((*path, key) for key in missing)
+        for key in missing:
+            if f'; did you mean "{key}"?' not in hints.values():
+                self.add_problem(path, f'"{key}" is missing')
         return found
 
     def mapping(self, value: Any, path: JsonPath) -> Mapping[str, Any]:
         """Read an object with any keys."""
         if isinstance(value, Mapping):
             return value
-        if not self._is_reported(path):
+        if tuple(path) not in self._missing:
             self.add_problem(path, f"found {value!r}, expected an object {{...}}")
         return {}
-
-    def _is_reported(self, path: JsonPath) -> bool:
-        """Return whether the value at `path` is already reported as missing."""
-        *parent, key = path or ("",)
-        return Problem(f'"{key}" is missing', ".".join(parent), ("arguments", *parent)) in self.problems
 
     def vector(self, value: Any, path: JsonPath, axes: Sequence[str]) -> Numbers:
         """Read a list of finite numbers, one for each of `axes`."""

@@ -57,6 +57,7 @@ class RegressionOutcome:
         summary: what was checked or written.
         details: problems, one line each.
         seconds: wall time (s).
+        accept: the scenario file if `--update` would accept the run as new reference; else "".
     """
 
     name: str
@@ -64,6 +65,7 @@ class RegressionOutcome:
     summary: str = ""
     details: tuple[str, ...] = ()
     seconds: float = 0.0
+    accept: str = ""
 
 
 #: runs a `cosim` command, given by its words, in a separate process and returns the exit code and standard error
@@ -121,22 +123,24 @@ class Regression:
         counts = [(len(run.failed_checks(checks_only=True)), len(run.checks), "check")]
         tubes = self.directory / "tubes.png"
         tubes.unlink(missing_ok=True)
-        margin = ""
+        margin, accept = "", ""
         if run.scenario.get("reference"):
             comparison = run.compare()
             margin = run.margin if comparison.passed else ""
             counts.append((len(comparison.failures), len(comparison.verdicts), "signal"))
             if not comparison.passed:
                 reason = run.scenario["reference"].get("reason")
+                accept = "" if failed else str(self.file)
                 failed += [
                     *str(comparison).splitlines(),
+                    'tube: the reference plus and minus its tolerances (key "reference" of the scenario)',
                     *([f"reason of the tolerances: {reason}"] if reason else []),
                     *run.reference_changes(),
                     f"see {run.draw_tubes(comparison, tubes)}",
                 ]
         if failed:
             failed += self._write_report(*(["--reference", str(self.file)] if run.scenario.get("reference") else []))
-        return RegressionOutcome(self.file.stem, 3 if failed else 0, _summarize(counts, margin), tuple(failed))
+        return RegressionOutcome(self.file.stem, 3 if failed else 0, _summarize(counts, margin), tuple(failed), accept=accept)
 
     def _write_report(self, *options: str) -> list[str]:
         """Write the report of the run by `cosim report` in a separate process, and return a line that names it."""

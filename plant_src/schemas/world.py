@@ -63,7 +63,7 @@ def _vehicle() -> Schema:
             ),
             "yaw": documented_value(NUMBER, "start heading, counter-clockwise from x", "rad", 1.57, 0.0),
             "velocity_body": documented_vector(
-                "start velocity along the body axes forward, left, up; default: at rest",
+                "start velocity along the body axes forward, left, up, to which that of the waves is added; default: at rest",
                 "m/s",
                 [1, 0, 0],
             ),

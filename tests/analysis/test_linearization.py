@@ -2,6 +2,7 @@
 
 import csv
 import json
+from pathlib import Path
 from zipfile import ZipFile
 
 import numpy as np
@@ -14,7 +15,7 @@ import cosim
 from cosim.analysis.linearization import linearize
 from cosim.core import resources
 
-HOVER = resources.root() / "docs/examples/hover.json"
+HOVER = Path(__file__).with_name("hover.json")
 QUADCOPTER_STATES = ["position", "velocity", "attitude", "rates"]
 
 

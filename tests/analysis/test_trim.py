@@ -1,6 +1,7 @@
 """Operating points."""
 
 import json
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -8,9 +9,8 @@ from cosim_command import run_cosim
 from linear_blocks import block, loop
 
 import cosim
-from cosim.core import resources
 
-HOVER = resources.root() / "docs/examples/hover.json"
+HOVER = Path(__file__).with_name("hover.json")
 
 
 def plant(**more):

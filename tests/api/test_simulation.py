@@ -283,13 +283,5 @@ def test_a_fork_leaves_the_simulation_to_its_parent(tmp_path):
     assert (done.stdout.strip(), done.returncode) == ("101", 0), done.stderr
 
 
-def test_the_example_of_an_own_loop_has_at_most_20_lines(tmp_path):
-    file = ROOT / "docs/examples/own_loop.py"
-    lines = [line for line in file.read_text().splitlines() if line.strip() and not line.startswith('"""')]
-    assert len(lines) <= 20
-    done = subprocess.run([sys.executable, file], cwd=tmp_path, capture_output=True, text=True, check=False)
-    assert done.stdout == "course after 20 s: 0.50 rad\n", done.stderr
-
-
 def test_a_prefix_is_named_as_such(demo):
     assert '"plant.uav" is a prefix, expected a variable such as "plant.uav.' in refusal(demo.get, "plant.uav")

@@ -1,4 +1,4 @@
-"""Tutorials and how-to guides: every block of a page is executed, in the order of the page, in one empty folder."""
+"""Tutorials and guides: every block of a page is executed, in the order of the page, in one empty folder."""
 
 import io
 import os
@@ -17,11 +17,12 @@ from cosim_command import run_cosim
 
 DOCS = Path(__file__).parents[2] / "docs"
 PAGES = [*sorted((DOCS / "tutorials").glob("*.md")), *sorted((DOCS / "how_to").glob("*.md"))]
+PAGES += [DOCS / "python.md", DOCS / "analysis.md"]
 BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)"| (\w+))?\n(.*?)^```$', re.MULTILINE | re.DOTALL)
 
 #: pages that take more than two seconds
 SLOW = {"cluster", "compare_runs", "controller_modelica", "controller_other_tools", "landing", "rank_controllers", "regression"}
-SLOW |= {"run_foreign_fmus", "sweep"}
+SLOW |= {"analysis", "python", "run_foreign_fmus", "sweep"}
 #: shown, but of programs that are not installed here
 NOT_EXECUTED = {"matlab"}
 

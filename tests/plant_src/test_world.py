@@ -29,6 +29,10 @@ def refused(**arguments: Any) -> InputError:
         ({**UAV, "model": 7}, "vehicles.uav.model: found 7, expected the name of a vehicle model, or its data: ar_drone, "),
         ({"position": [0.0, 0.0, 2.0]}, 'vehicles.uav: "model" is missing'),
         ({"model": "ar_drone"}, 'vehicles.uav: "position" is missing'),
+        (
+            {"model": "ar_drone", "positon": [0.0, 0.0, 2.0]},
+            'vehicles.uav.positon: unknown key "positon"; did you mean "position"',
+        ),
         ({**UAV, "yow": 1.0}, r'vehicles.uav.yow: unknown key "yow"; did you mean "yaw"\?'),
         (quadcopter_settings([0.0, 0.0]), r"vehicles.uav.position: found \[0.0, 0.0\], expected a list of 3 numbers \[x, y, z\]"),
         (vessel_settings([0.0, 0.0, 0.1]), r"vehicles.uav.position: found .* expected a list of 2 numbers \[x, y\]"),
@@ -188,6 +192,18 @@ def test_unknown_variables_are_refused_with_the_nearest_name() -> None:
         trial["uav.rotor_sped"] = [0.0] * 4
     with pytest.raises(ComponentError, match=r"uav.position.x is an output"):
         trial["uav.position.x"] = 0.0
+
+
+def test_a_vessel_starts_with_the_velocity_of_the_waves_unless_it_starts_on_still_water() -> None:
+    """The start velocity of the scenario is relative to the water."""
+
+    def start(**settings: Any) -> Any:
+        boat = {"model": "otter", "position": [0.0, 0.0], **settings}
+        return WorldHarness({"usv": boat}, environment={"seed": 1, "sea_state": 2}).vector("usv.velocity_body", "uvw")
+
+    assert abs(start()[0]) > 0.05
+    assert start(velocity_body=[1.0, 0.0, 0.0]) - start() == pytest.approx([1.0, 0.0, 0.0])
+    assert start(parameters={"initial.on_waves": 0.0}) == pytest.approx([0.0, 0.0, 0.0])
 
 
 def test_limits_of_commands_are_those_of_the_data_of_each_vehicle():

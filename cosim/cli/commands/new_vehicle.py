@@ -53,7 +53,9 @@ def command(name: str, base: str, directory: Path, urdf: Path | None, mesh: Path
     for warning in vehicle.warnings:
         click.echo(f"WARNING {warning}", err=True)
     build = shlex.join(["cosim", "build", str(file), "--output", str(file.with_suffix(".fmu"))])
-    click.echo(f"{file}: {vehicle.balance}\n\n{_use(file, base, vehicle.data['family'])}As an FMU:\n  {build}")
+    click.echo(
+        f"{file}: {vehicle.balance}\n\n{_use(file, base, vehicle.data['family'], bool(urdf or mesh))}As an FMU:\n  {build}"
+    )
 
 
 class _Vehicle(NamedTuple):
@@ -98,7 +100,7 @@ def _located(problem: Problem, source: Document, imported: Mapping[str, Path | N
     return Problem(problem.message, source.where(path))
 
 
-def _use(file: Path, base: str, family: Any) -> str:
+def _use(file: Path, base: str, family: Any, has_imported_shape: bool) -> str:
     """Return how to use the vehicle in a scenario; the controllers of Demo 1 fly multirotors like the AR.Drone only."""
     if base == "ar_drone":
         setting = f"/components/plant/arguments/vehicles/uav/model={file}"
@@ -106,6 +108,8 @@ def _use(file: Path, base: str, family: Any) -> str:
     text = f'Name it in a scenario, as a vehicle of the plant:\n  {{"model": "{file}", ...}}\n'
     if family == "multirotor":
         text += "multirotor_controller.fmu flies it; its parameters are mass, inertia and rotors (see crazyflie_square).\n"
+    if family == "surface_vessel" and has_imported_shape:
+        text += 'The imported shape is drawn and collides. Buoyancy, waves and drag act on the dimensions in "hull".\n'
     return text
 
 

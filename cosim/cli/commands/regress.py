@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import os
+import shlex
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -35,7 +37,7 @@ EXIT_CODE_SEVERITY = (130, 70, 2, 1, 3, 0)
     "--output-dir", type=click.Path(path_type=Path), default=Path("runs"), show_default=True, help="Folder for the results."
 )
 @click.option("--jobs", type=click.IntRange(min=1), help="Number of scenarios at a time; default: one per processor.")
-@json_option("an object with failed, their number, and scenarios, a list of name, code, summary, details and seconds")
+@json_option("an object with failed, their number, and scenarios, a list of name, code, summary, details, seconds and accept")
 def command(
     scenarios: tuple[Path, ...], update: bool, junit: Path | None, output_dir: Path, jobs: int | None, as_json: bool
 ) -> int:
@@ -62,6 +64,11 @@ def command(
         print_json({"failed": failed, "scenarios": [asdict(outcome) for outcome in outcomes]})
     else:
         click.echo(f"{count_noun(len(outcomes), 'scenario')}, {f'{failed} failed' if failed else 'all passed'}")
+        if accept := [shlex.quote(os.path.relpath(outcome.accept)) for outcome in outcomes if outcome.accept]:
+            click.echo(
+                f"if the change is meant, make {'this run' if len(accept) == 1 else 'these runs'} the reference: "
+                f"cosim regress --update {' '.join(accept)}"
+            )
     return min((outcome.code for outcome in outcomes), key=EXIT_CODE_SEVERITY.index)
 
 

@@ -114,7 +114,7 @@ class _MultirotorReader(VehicleReader):
         for key, unit in _COEFFICIENTS.items():
             place, source = ((*path, key), data) if key in data else (("rotor", key), common)
             if key not in source:
-                self.add_problem(path, f'"{key}" is missing, here and in "rotor"')
+                self.add_missing(path, key, "rotor")
             coefficients[key] = self.quantity(source.get(key, 1.0), place, unit, low=0.0)
         x, y, z = self.vector_quantity(data.get("position", [0.0] * 3), (*path, "position"), "m", "xyz")
         turns = self.choice(data.get("turns", "clockwise"), (*path, "turns"), tuple(TORQUE_SIGNS))

@@ -134,7 +134,7 @@ class _SubmergedReader(VehicleReader):
         """Read one thruster; its coefficients replace those of all thrusters."""
         data = self.read_data(value, path, ("position", "axis"), ("label", "turns", *_COEFFICIENTS))
         if "thrust_coefficient" not in {*data, *common}:
-            self.add_problem(path, '"thrust_coefficient" is missing, here and in "thruster"')
+            self.add_missing(path, "thrust_coefficient", "thruster")
         coefficients: dict[str, float] = {}
         for key, unit in _COEFFICIENTS.items():
             place, source = ((*path, key), data) if key in data else (("thruster", key), common)

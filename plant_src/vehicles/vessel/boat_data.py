@@ -90,7 +90,7 @@ class BoatReader(VehicleReader):
         numbers: dict[str, float] = {}
         for key, unit in _PROPELLER_QUANTITIES.items():
             if key in _REQUIRED_OF_PROPELLERS and key not in {*data, *common}:
-                self.add_problem(path, f'"{key}" is missing, here and in "propeller"')
+                self.add_missing(path, key, "propeller")
             place, source = ((*path, key), data) if key in data else (("propeller", key), common)
             default = numbers[_PROPELLER_DEFAULTS[key]] if key in _PROPELLER_DEFAULTS else 0.0
             limit = {"above": 0.0} if key in _REQUIRED_OF_PROPELLERS and key in source else {"low": 0.0}

@@ -135,3 +135,13 @@ def test_the_command_writes_the_vehicle_file(tmp_path: Path) -> None:
     assert outcome.exit_code == 0, outcome.output
     written = json.loads((tmp_path / "shape.json").read_text())
     assert model_from_data(written, "shape").body.mass == pytest.approx(2.0643)
+
+
+def test_the_command_says_that_the_mesh_of_a_vessel_does_not_float(tmp_path: Path) -> None:
+    boat = json.loads((resources.root() / "plant_src/vehicles/data/blueboat.json").read_text())
+    (tmp_path / "parts.json").write_text(json.dumps(without(boat, "boxes")))
+    arguments = ["boat", "--from", str(tmp_path / "parts.json"), "--directory", str(tmp_path), "--mesh"]
+    outcome = CliRunner().invoke(command, [*arguments, str(catamaran(tmp_path, "stl"))])
+    assert outcome.exit_code == 0, outcome.output
+    assert 'Buoyancy, waves and drag act on the dimensions in "hull".' in outcome.output
+    assert "hull" not in CliRunner().invoke(command, ["copy", "--from", "blueboat", "--directory", str(tmp_path)]).output

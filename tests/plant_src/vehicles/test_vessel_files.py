@@ -114,6 +114,22 @@ def test_an_impossible_vessel_is_refused_with_its_path(change: Callable[[dict[st
     assert all(str(problem).startswith("vehicles.usv.model") for problem in caught.value.problems)
 
 
+@pytest.mark.parametrize(
+    ("path", "key"),
+    [((), "mass"), ((), "hull"), (("hull",), "length"), (("propellers", 0), "position"), (("propeller",), "max_speed")],
+)
+def test_a_misspelt_key_is_one_problem(path: tuple[str | int, ...], key: str) -> None:
+    def misspell(data: Any) -> None:
+        for each in path:
+            data = data[each]
+        data[key[:-1]] = data.pop(key)
+
+    with pytest.raises(InputError) as caught:
+        model_from_data(changed(misspell))
+    place = ".".join(map(str, (*path, key[:-1])))
+    assert list(map(str, caught.value.problems)) == [f'{place}: unknown key "{key[:-1]}"; did you mean "{key}"?']
+
+
 def test_a_parameter_of_a_scenario_replaces_a_value_of_the_file() -> None:
     settings = {"model": OTTER, "position": [0, 0], "parameters": {"mass": 70.0, "propeller_time_constant": [0.2, 0.2]}}
     trial = WorldHarness({"usv": settings})
