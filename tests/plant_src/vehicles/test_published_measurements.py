@@ -13,7 +13,9 @@ from plant_src.catalogue import MODELS
 AR_DRONE, BLUEBOAT, BLUEROV, CRAZYFLIE = "AR.Drone 2.0 in flight", "BlueBoat", "BlueROV2 Heavy", "Crazyflie 2.1"
 CYBERSHIP, HERON, OTTER = "CyberShip II", "Heron", "Otter at sea"
 RUNS, LAKE, BENDERS = "runs of a BlueBoat, 2024", "runs of a Kingfisher, 2018", "flight data, Benders 2020"
+OSLO, MEASURED = "runs of an Otter, 2024", "otter_measured"
 GRAVITY = 9.81
+RPM = np.pi / 30
 
 
 def vessel(model: str, **settings: object) -> WorldHarness:
@@ -30,6 +32,11 @@ def run(
     """Return a value of every step (10 ms) while the propellers have these commands (rad/s)."""
     trial["usv.propeller_speed"] = commands
     return np.array([value(trial.step()) for _ in range(round(100 * duration))])
+
+
+def turns_per_minute(trial: WorldHarness, port: float, starboard: float, duration: float) -> np.ndarray:
+    """Return the speed (m/s) of every step while the shafts turn so fast (1/min)."""
+    return run(trial, [RPM * port, RPM * starboard], duration)
 
 
 def time_between(speeds: np.ndarray, first: float, second: float) -> float:
@@ -162,6 +169,58 @@ def test_heron_turns(measured) -> None:
 
 
 def test_otter_top_speed(measured) -> None:
-    trial = vessel("otter")
-    trial["usv.propeller_speed"] = [103.93, 103.93]
-    measured(OTTER, "speed at full power (identified)", speed(trial.step(3000)), 6 * 0.5144, "m/s", "maker", relative=0.01)
+    otter, recorded = (run(vessel(model), [120.0, 120.0], 20)[-1] for model in ("otter", MEASURED))
+    measured(OTTER, "speed at full power (identified)", otter, 6 * 0.5144, "m/s", "maker", relative=0.01, case="otter")
+    measured(OTTER, "speed at full power", recorded, 6 * 0.5144, "m/s", "maker", relative=0.15, case=MEASURED)
+
+
+def otter_figures(model: str) -> dict[str, float]:
+    """Return what the recorded runs of an Otter show, of a model: times (s), speeds (m/s) and yaw rates to starboard (rad/s)."""
+    coasting = turns_per_minute(vessel(model, velocity_body=[1.6, 0, 0]), 0, 0, 5)
+    start = turns_per_minute(vessel(model), 930, 930, 5)
+    found = {
+        "coasting": time_between(coasting, 1.4, 0.62),
+        "fast coasting": time_between(coasting, 1.51, 0.82),
+        "acceleration": time_between(start, 0.5, 1.5),
+        "astern": turns_per_minute(vessel(model), -912, -912, 15)[-1],
+    }
+    found |= {f"at {n}": turns_per_minute(vessel(model), n, n, 15)[-1] for n in (447, 650, 930)}
+    for name, port, starboard in (("circle", 1098, 766), ("turn", 1112, 749), ("one thruster", 1109, 16)):
+        trial = vessel(model, velocity_body=[1.9, 0, 0])
+        found[f"speed, {name}"] = turns_per_minute(trial, port, starboard, 15)[-1]
+        found[f"rate, {name}"] = -trial["usv.rates.r"]
+    return found
+
+
+def test_otter_of_mss_beside_recorded_runs(measured) -> None:
+    """The limits are the differences found, rounded up."""
+    found, case = otter_figures("otter"), "otter"
+    measured(OTTER, "coasting from 1.40 to 0.62 m/s", found["coasting"], 3.5, "s", OSLO, relative=0.75, case=case)
+    measured(OTTER, "coasting from 1.51 to 0.82 m/s", found["fast coasting"], 2.3, "s", OSLO, relative=0.75, case=case)
+    measured(OTTER, "acceleration from 0.5 to 1.5 m/s", found["acceleration"], 0.93, "s", OSLO, relative=0.3, case=case)
+    measured(OTTER, "speed at 447 1/min", found["at 447"], 1.21, "m/s", OSLO, relative=0.5, case=case)
+    measured(OTTER, "speed at 650 1/min", found["at 650"], 1.63, "m/s", OSLO, relative=0.2, case=case)
+    measured(OTTER, "speed at 930 1/min", found["at 930"], 2.0, "m/s", OSLO, relative=0.4, case=case)
+    measured(OTTER, "speed astern at 912 1/min", found["astern"], 1.92, "m/s", OSLO, relative=0.25, case=case)
+    measured(OTTER, "yaw rate at 1098/766 1/min", found["rate, circle"], 0.0410, "rad/s", OSLO, relative=6, case=case)
+    measured(OTTER, "yaw rate at 1109/16 1/min", found["rate, one thruster"], 0.119, "rad/s", OSLO, relative=1.7, case=case)
+
+
+def test_otter_measured_follows_recorded_runs(measured) -> None:
+    found, case = otter_figures(MEASURED), MEASURED
+    measured(OTTER, "coasting from 1.40 to 0.62 m/s (identified)", found["coasting"], 3.5, "s", OSLO, relative=0.02, case=case)
+    measured(OTTER, "coasting from 1.51 to 0.82 m/s", found["fast coasting"], 2.3, "s", OSLO, relative=0.1, case=case)
+    acceleration = found["acceleration"]
+    measured(OTTER, "acceleration from 0.5 to 1.5 m/s (identified)", acceleration, 0.93, "s", OSLO, relative=0.05, case=case)
+    one_thruster = time_between(turns_per_minute(vessel(MEASURED), 1115, 0, 5), 0.5, 1.5)
+    measured(OTTER, "acceleration by one thruster", one_thruster, 1.55, "s", OSLO, relative=0.1, case=case)
+    measured(OTTER, "speed at 447 1/min", found["at 447"], 1.21, "m/s", OSLO, relative=0.15, case=case)
+    measured(OTTER, "speed at 650 1/min", found["at 650"], 1.63, "m/s", OSLO, relative=0.15, case=case)
+    measured(OTTER, "speed at 930 1/min", found["at 930"], 2.0, "m/s", OSLO, relative=0.15, case=case)
+    measured(OTTER, "speed astern at 912 1/min (identified)", found["astern"], 1.92, "m/s", OSLO, relative=0.02, case=case)
+    rate = found["rate, circle"]
+    measured(OTTER, "yaw rate at 1098/766 1/min (identified)", rate, 0.0410, "rad/s", OSLO, relative=0.02, case=case)
+    measured(OTTER, "speed at 1098/766 1/min", found["speed, circle"], 2.01, "m/s", OSLO, relative=0.2, case=case)
+    measured(OTTER, "yaw rate at 1112/749 1/min", found["rate, turn"], 0.0380, "rad/s", OSLO, relative=0.3, case=case)
+    measured(OTTER, "yaw rate at 1109/16 1/min", found["rate, one thruster"], 0.119, "rad/s", OSLO, relative=0.3, case=case)
+    measured(OTTER, "speed at 1109/16 1/min", found["speed, one thruster"], 1.83, "m/s", OSLO, relative=0.15, case=case)

@@ -23,7 +23,13 @@ MULTIROTORS = ["crazyflie", "x500", "survey_hexacopter"]
 VESSELS = [name for name, model in MODELS.items() if model.boat]
 
 #: steady speed at full thrust (m/s): figure of the maker or of the source, and its tolerance
-PUBLISHED_SPEEDS = {"blueboat": (3.0, 0.1), "heron": (1.5, 0.05), "wamv16": (2.3, 0.1), "cybership2": (1.0, 0.05)}
+PUBLISHED_SPEEDS = {
+    "blueboat": (3.0, 0.1),
+    "heron": (1.5, 0.05),
+    "otter_measured": (3.1, 0.4),
+    "wamv16": (2.3, 0.1),
+    "cybership2": (1.0, 0.05),
+}
 
 
 def main_propellers(vessel: Boat) -> np.ndarray:
@@ -97,9 +103,7 @@ def quantities(data: Any) -> Any:
         yield from quantities(value)
 
 
-@pytest.mark.parametrize(
-    "name", ["blueboat", "wamv16", "cybership2", "heron", "crazyflie", "x500", "survey_hexacopter", "bluerov2_heavy"]
-)
+@pytest.mark.parametrize("name", [*VESSELS, *MULTIROTORS, "bluerov2_heavy"])
 def test_every_quantity_of_the_library_states_its_source(name: str) -> None:
     data = json.loads((DATA / f"{name}.json").read_text())
     assert {"sources", "validity"} <= data.keys()
