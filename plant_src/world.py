@@ -249,7 +249,8 @@ class World(Component):
                 for fraction in self._step_fractions:
                     self._advance(fraction)
         except InvalidStateError as error:
-            raise ComponentError(self._name, "do_step", str(error), time) from None
+            hint = f"; probable cause: the step of {step_size:g} s, {MAX_BULLET_STEP:g} s is usual" if step_size > 0.05 else ""
+            raise ComponentError(self._name, "do_step", f"{error}{hint}", time) from None
         if self._failures.alarm:
             self._report_failures(time + step_size)
 

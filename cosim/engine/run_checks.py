@@ -9,7 +9,7 @@ from fractions import Fraction
 from math import inf, lcm, ulp
 
 from ..core.component import Variable
-from ..core.errors import InputError, Problem
+from ..core.errors import InputError, Problem, abbreviate_names
 from ..core.size_limits import MAX_DELAYED_VALUES, format_count
 from ..core.system import Endpoint, System
 from ..core.time_grid import TimeGrid
@@ -41,9 +41,8 @@ def check_run(system: System, settings: Settings) -> TimeGrid:
             raise InputError(problems) from None
         grid = TimeGrid.from_times(settings.start_time, settings.start_time, settings.step_size)
     problems += _find_resolution_problems(settings)
-    problems += _find_period_problems(system, grid)
+    problems += _find_period_problems(system, settings, grid)
     problems += _find_delay_problems(system)
-    problems += _find_recording_problems(settings, grid)
     problems += _find_event_time_problems(settings.events, grid)
     if problems:
         raise InputError(problems)
@@ -122,12 +121,19 @@ def _find_event_time_problems(events: Iterable[Event], grid: TimeGrid) -> Iterat
             yield Problem(f"event time {error}", event.where, subject=("events", "time"))
 
 
-def _find_period_problems(system: System, grid: TimeGrid) -> Iterator[Problem]:
+def _find_period_problems(system: System, settings: Settings, grid: TimeGrid) -> Iterator[Problem]:
+    """Yield the problems of the periods and of the recording interval; a too large step size is one problem."""
     step, duration = float(grid.step), float(grid.step * grid.count)
+    periods = {name: period for name, period in system.periods.items() if period < grid.step}
+    if periods:
+        text = f"step size {step!r} s is longer than the period of {abbreviate_names(periods, 3)}"
+        yield Problem(f"{text}: expected at most {float(min(periods.values()))!r} s", subject=("step_size",))
+    else:
+        yield from _find_recording_problems(settings, grid)
     for name, period in system.periods.items():
         subject = ("components", name, "period")
         ratio = period / grid.step
-        if ratio < 1 or ratio.denominator != 1:
+        if ratio > 1 and ratio.denominator != 1:
             yield Problem(f"period {float(period)!r} s is no multiple of the step size {step!r} s", subject=subject)
         elif 0 < grid.count < ratio:
             yield Problem(f"the duration {duration!r} s is shorter than the period {float(period)!r} s", subject=subject)

@@ -16,6 +16,9 @@ from .missing_connections import VariablesByEndpoint, find_missing_connections
 if TYPE_CHECKING:
     from .prepared_run import PreparedRun
 
+#: ratio of a step size to the one that an FMU recommends from which on results are probably wrong
+_MAX_STEP_RATIO = 50
+
 
 def find_warnings(prepared: PreparedRun) -> list[Problem]:
     """Return all warnings about a prepared run, each with its location in the scenario file."""
@@ -23,7 +26,7 @@ def find_warnings(prepared: PreparedRun) -> list[Problem]:
 
 
 def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
-    """Yield the warnings that concern the results: functions left out, end of the run, late times, connections, FMU files."""
+    """Yield the warnings that concern the results: functions left out, end of the run, late times, connections, steps, FMUs."""
     if left_out := prepared.left_out:
         yield replace(left_out[0], message="; ".join(problem.message for problem in left_out))
     yield from _late_events(prepared)
@@ -32,6 +35,7 @@ def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
         yield Problem(prepared.plan.end_warning, prepared.root.where("stop_time"))
     yield from _missing_connections(prepared)
     yield from _double_conversions(prepared)
+    yield from _large_step(prepared)
     for file in prepared.component_factory.fmus.values():
         if file.run_warning:
             yield Problem(file.run_warning)
@@ -75,6 +79,19 @@ def unconnected_inputs(prepared: PreparedRun) -> VariablesByEndpoint:
         for slot in variable.scalar_names
         if (end := Endpoint(name, slot)) not in connected
     }
+
+
+def _large_step(prepared: PreparedRun) -> Iterator[Problem]:
+    """Yield a warning if the step size is much longer than the shortest one that an FMU recommends (FMI: DefaultExperiment)."""
+    step = float(prepared.settings.step_size)
+    files = prepared.component_factory.fmus.values()
+    experiments = ((file.description.default_experiment, file.path.name) for file in files)
+    recommended = [(float(each.step_size), name) for each, name in experiments if each.step_size]
+    size, name = min(recommended, default=(math.inf, ""))
+    if step >= _MAX_STEP_RATIO * size:
+        ratio = f"{step / size:.3g} times the {size:g} s that {name} recommends"
+        text = f"a step of {step:g} s is {ratio}: the results are probably wrong, use about {size:g} s"
+        yield Problem(text, prepared.root.where("step_size"))
 
 
 def _missing_reference(prepared: PreparedRun) -> Iterator[Problem]:

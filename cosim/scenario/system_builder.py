@@ -289,7 +289,7 @@ class SystemBuilder:
     def _is_consequence(self, problem: Problem) -> bool:
         """Return True if a problem with times only follows from an invalid start time, stop time or step size."""
         times = {"stop_time", "step_size", "start_time"} & self.root.invalid_keys
-        return bool(times) and (problem.subject[:1] in _TIMED_SETTINGS or problem.subject[-1:] == ("period",))
+        return bool(times) and (problem.subject[:1] in _TIMED_SETTINGS or problem.subject[-1:] in (("period",), ("step_size",)))
 
     def _with_location(self, problem: Problem) -> Problem:
         """Return a problem of the system with the location of its subject in the scenario file."""

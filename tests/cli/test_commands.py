@@ -318,6 +318,15 @@ def test_info_prints_which_capabilities_are_used(tmp_path):
     assert next(line for line in lines if line.startswith("not used")).split() == ["not", "used", "canRunAsynchronuously"]
 
 
+def test_info_names_the_source_of_an_fmu():
+    """The FMU of a Modelica model has a name in lower case."""
+    names = {"fmus/ar_drone_lqr.fmu": ("ar_drone_lqr", "ArDroneLqr.mo"), "fmus/python/mixer.fmu": ("Mixer", "mixer.py")}
+    for fmu, (model, source) in names.items():
+        lines = cosim("info", resources.root() / fmu).stdout.splitlines()
+        assert [line.split() for line in lines[:2]] == [["model", model], ["source", source]]
+    assert "source " not in cosim("info", resources.root() / "fmus/strider.fmu").stdout
+
+
 def test_info_names_the_program_that_an_fmu_needs():
     lines = cosim("info", resources.root() / "fmus/python/mixer.fmu").stdout.splitlines()
     assert "needs         Python on the host, with the packages that its class imports" in lines

@@ -6,6 +6,7 @@ import shutil
 import struct
 import sys
 from contextlib import contextmanager
+from dataclasses import replace
 from fractions import Fraction
 
 import pytest
@@ -88,6 +89,16 @@ def test_periods_must_fit_the_step_and_the_duration():
         "period 1.5 s is no multiple of the step size 1.0 s",
         "the duration 3.0 s is shorter than the period 4.0 s",
     ]
+
+
+def test_a_step_longer_than_periods_is_one_problem():
+    periods = dict.fromkeys("abcd", exact_fraction(0.01))
+    built = make_system({name: counter() for name in "abcd"}, periods=periods)
+    with pytest.raises(InputError) as refusal:
+        simulate(built, replace(settings(), record_interval=exact_fraction(0.01)))
+    (problem,) = refusal.value.problems
+    assert problem.message == "step size 1.0 s is longer than the period of a, b, c and 1 more: expected at most 0.01 s"
+    assert problem.subject == ("step_size",)
 
 
 def test_a_refused_system_is_freed():

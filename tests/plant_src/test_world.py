@@ -180,6 +180,13 @@ def test_a_vehicle_with_an_invalid_state_is_named(name: str, value: Any, message
         trial.step()
 
 
+def test_a_divergence_with_long_steps_names_them_as_the_cause() -> None:
+    trial = WorldHarness({"uav": UAV})
+    trial["uav.external_force.z"] = 1e200
+    with pytest.raises(ComponentError, match=r"the motion has diverged; probable cause: the step of 1 s, 0\.01 s is usual"):
+        trial.step(1, 1.0)
+
+
 def test_a_step_size_is_positive() -> None:
     trial = WorldHarness({"uav": UAV})
     with pytest.raises(ComponentError, match=r"found step size 0.0, expected a positive number"):

@@ -127,3 +127,11 @@ def test_run_and_check_warn_of_times_after_the_end(folder):
 @pytest.mark.parametrize("file", SHIPPED, ids=lambda file: file.stem)
 def test_shipped_scenarios_cause_no_warnings(file):
     assert warnings_of(file) == []
+
+
+@pytest.mark.parametrize(("step", "lines"), [(0.4, 0), (0.5, 1)])
+def test_a_step_much_longer_than_an_fmu_recommends(folder, step, lines):
+    boat = {"fmu": str(resources.root() / "fmus/strider.fmu")}
+    found = warnings_of(folder.scenario({"boat": boat}, step_size=step, stop_time=2))
+    text = "a step of 0.5 s is 50 times the 0.01 s that strider.fmu recommends: the results are probably wrong, use about 0.01 s"
+    assert [line for line in found if "recommends" in line] == [f"step_size: {text}"] * lines

@@ -137,6 +137,7 @@ def _properties(file: FmuFile) -> dict[str, str]:
     unused = [name for name in about.capabilities if name.lower() not in _USED_CAPABILITIES]
     return {
         "model": about.model_name,
+        "source": _source_name(file),
         "description": about.description,
         "FMI version": f"{about.fmi_version} {' and '.join(_INTERFACE_NAMES[name] for name in about.interfaces)}",
         "made by": about.generation_tool,
@@ -150,6 +151,14 @@ def _properties(file: FmuFile) -> dict[str, str]:
         "not used": ", ".join(unused),
         "sha256": file.sha256,
     }
+
+
+def _source_name(file: FmuFile) -> str:
+    """Return the name of the Modelica or Python file from which `cosim build` made the FMU; "" if it is not in the FMU."""
+    name = file.description.model_name.replace("_", "").lower()
+    sources = (Path(member) for member in file.examination.members if member.startswith("resources/") and member.count("/") == 1)
+    own = (each.name for each in sources if each.suffix in (".mo", ".py") and each.stem.replace("_", "").lower() == name)
+    return next(own, "")
 
 
 def _needed_tool(about: FmuDescription) -> str:

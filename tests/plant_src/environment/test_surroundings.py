@@ -16,7 +16,7 @@ from plant_src.environment.sea import CALM, Sea
 from plant_src.environment.surfaces import SurfaceTable
 from plant_src.physics.compiled_equations import bind_arrays, load_library
 from plant_src.placement import Platform
-from plant_src.vehicles.multirotor.surroundings import MAX_WAVE_EFFECT_HEIGHT
+from plant_src.vehicles.multirotor.surroundings import MAX_WAVE_EFFECT_HEIGHT, create_surroundings_function
 
 STRIDER = MODELS["strider"]
 PLATE = np.array([0.701, 0.602]) / 2  # m, half edges of the deck
@@ -50,8 +50,8 @@ class Surroundings:
         self.sea = np.array([0.0, 1.0, len(sea.phase), sea.highest_elevation])
         table = SurfaceTable(vessels, platforms)
         table.update()
-        arguments = [self.pose, self.disc, self.sea, sea.component_table(), table.count, table.rows]
-        self.call = bind_arrays(load_library("multirotor").surroundings, arguments, [self.result])
+        self.arguments = [self.pose, self.disc, self.sea, sea.component_table(), table.count, table.rows]
+        self.call = bind_arrays(load_library("multirotor").surroundings, self.arguments, [self.result])
 
     def at(self, x: float, y: float, z: float, time: float = 0.0, gain: float = 1.0) -> tuple[float, float, float]:
         """Return distance (m), share (1) and water level (m) at a place (m)."""
@@ -139,3 +139,18 @@ def test_the_water_level_is_that_at_the_centre_of_mass_near_the_crests() -> None
     highest, below = waves.highest_elevation, Surroundings([], [], waves, reach=0.5)
     assert below.at(3.0, 4.0, highest + 0.4, 5.0, 0.5)[2] == pytest.approx(0.5 * waves.elevation(3.0, 4.0, 5.0), rel=1e-9)
     assert below.at(3.0, 4.0, highest + 0.6, 5.0, 0.5)[2] == -highest
+
+
+@pytest.mark.parametrize("platforms", [[], [PLATFORM]], ids=["water", "platform"])
+def test_the_c_code_and_its_casadi_function_agree(platforms: list[Platform]) -> None:
+    """Both forms at random attitudes above, beside and below a platform, in waves and above them."""
+    function, _ = create_surroundings_function()
+    random, below = np.random.default_rng(5), Surroundings([], platforms, sea({"sea_state": 3}), radius=0.2, reach=0.5)
+    below.disc[:3] = 0.05, -0.02, 0.1
+    below.sea[:2] = 7.0, 0.8
+    for _ in range(300):
+        below.pose[:3] = random.uniform([3.5, -1.0, -0.5], [6.5, 1.0, 7.0])
+        below.pose[3:] = Rotation.random(rng=random).as_quat(scalar_first=True)
+        below.call()
+        expected = function(*(argument.ravel() for argument in below.arguments)).full().ravel()
+        np.testing.assert_allclose(below.result, expected, rtol=1e-12, atol=1e-12)
