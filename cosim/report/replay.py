@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from itertools import islice
 from pathlib import Path
 from typing import Any
@@ -28,17 +28,33 @@ def replay_data(runs: Sequence[Result]) -> dict[str, Any]:
         if not len(result.time):
             raise InputError(f"the result {result.metadata.get('name', '')} has no rows, so there is nothing to replay")
     scene = build_scene(runs[0].metadata)
-    plots = scene["plots"] or ([] if scene["bodies"] else _default_plots(runs[0]))
+    checked = list(_group_by_unit(runs[0], _checked_signals(runs[0])))
+    others = scene["plots"] or ([] if scene["bodies"] else _default_plots(runs[0]))
+    plots = [*checked, *(plot for plot in others if plot not in checked)]
     return {"scene": {**scene, "plots": plots}, "runs": [pack_run(result) for result in runs]}
 
 
 def _default_plots(result: Result) -> list[list[str]]:
     """Return the first numeric signals, grouped by unit; constant ones only if all are constant."""
     numeric = [name for name in result if result[name].dtype != object]
+    return list(_group_by_unit(result, [name for name in numeric if not is_constant(result[name])] or numeric))
+
+
+def _group_by_unit(result: Result, names: Iterable[str]) -> Iterator[list[str]]:
+    """Return the signals of each plot; all signals of a plot have the same unit."""
     plots: dict[str, list[str]] = {}
-    for name in [name for name in numeric if not is_constant(result[name])] or numeric:
+    for name in names:
         plots.setdefault(result.units.get(name, ""), []).append(name)
-    return [names[:MAX_SIGNALS_PER_PLOT] for names in islice(plots.values(), MAX_PLOTS)]
+    return (found[:MAX_SIGNALS_PER_PLOT] for found in islice(plots.values(), MAX_PLOTS))
+
+
+def _checked_signals(result: Result) -> Iterable[str]:
+    """Return the numeric signals in the arguments of those KPIs that are checked, each once."""
+    scenario = result.metadata.get("scenario", {})
+    checked = {check["kpi"].partition(".")[0] for check in scenario.get("checks", [])}
+    arguments = [kpi.get("arguments", {}) for kpi in scenario.get("kpis", []) if kpi["name"] in checked]
+    texts = [value for each in arguments for value in each.values() if isinstance(value, str)]
+    return dict.fromkeys(name for name in texts if name in result and result[name].dtype != object)
 
 
 def write_replay(runs: Sequence[Result], path: Path) -> None:

@@ -114,7 +114,7 @@ def _facts(result: Result) -> Iterator[tuple[str, str]]:
     simulated = float(result.time[-1] - result.time[0])
     yield "simulated", f"{simulated:g} s"
     if loop := result.timing.get("loop_seconds"):
-        yield "speed", f"{simulated / loop:.0f} × real time"
+        yield "computing speed", f"{simulated / loop:.0f} × real time"
     yield "signals", str(len(result))
     yield "rows", str(len(result.time))
     if events := result.metadata.get("live_events"):

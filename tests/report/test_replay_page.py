@@ -62,6 +62,29 @@ def test_scrubber_keys_and_plots_change_the_time(opened, flight_result):
     assert opened.page.locator(".plot b").first.inner_text() == f"{altitude:.4g} m"
 
 
+def test_the_view_from_above_shows_paths_waypoints_and_present_positions(opened, flight_result):
+    """The dots move with the time, east to the right and north upwards, by the same scale."""
+    dots = "cosimReplay.above.dots.map((dot) => dot.transform.baseVal[0].matrix).map(({e, f}) => [e, f])"
+    before = opened(dots)
+    opened.seek(9.5)
+    scale, moved = opened("cosimReplay.above.scale"), np.array(opened(dots)) - before
+    assert len(moved) == len(BODIES)
+    for body, (right, down) in zip(BODIES, moved, strict=True):
+        east, north = (
+            column(flight_result, f"{body}.position.{axis}", 9.5) - flight_result[f"{body}.position.{axis}"][0] for axis in "xy"
+        )
+        assert (right / scale, -down / scale) == pytest.approx((east, north), abs=0.02)
+        assert abs(east) > 1
+    assert opened.page.locator(".above .path").count() == 2
+    assert opened.page.locator(".above .waypoint").count() == 5
+    assert opened.page.locator(".above figcaption span").all_inner_texts() == ["uav", "usv", "waypoints"]
+
+
+def test_a_legend_names_the_lines_on_the_slider_and_the_speed_is_that_of_the_replay(opened):
+    assert opened.page.locator(".bar .legend").inner_text().split() == ["On", "the", "slider:", "uav", "touches"]
+    assert opened.page.get_by_label("Replay speed", exact=True).input_value() == "1"
+
+
 def test_the_space_bar_plays_at_once_whatever_was_clicked(open_page, shared):
     fresh = open_page(Path(shared.url.removeprefix("file://")))
     fresh.page.keyboard.press("Space")

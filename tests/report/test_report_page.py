@@ -18,6 +18,7 @@ from cosim.core.errors import InputError
 from cosim.core.recording import Recording
 from cosim.report import pages
 from cosim.report.failure import find_failure
+from cosim.report.replay import replay_data
 from cosim.report.run_page import write_report
 from cosim.results import Result, write_run
 from cosim.results.checks import CheckOutcome
@@ -180,6 +181,21 @@ def test_a_run_without_a_scene_shows_its_changing_signals(tmp_path):
     assert "the page shows only signals and no 3-D view" in done.stderr
     data = re.search(r'id="replay-data">(.*?)</script>', (tmp_path / "replay.html").read_text(), re.S).group(1)
     assert json.loads(data)["scene"]["plots"] == [["a.x", "b.x"], ["a.v"]]
+
+
+def test_plots_of_checked_signals_come_first(flight_result):
+    """The KPI of the yaw angle is checked, that of the rotor speed is not. The scene has a plot of the yaw angle, too."""
+    yaw, speed = "plant.usv.attitude.yaw", "plant.uav.rotor_speed[1]"
+    kpis = [
+        {"name": name, "python": "cosim.kpis:final", "arguments": {"signal": signal}}
+        for name, signal in (("turn", yaw), ("rotor", speed))
+    ]
+    scenario = {**flight_result.metadata["scenario"], "kpis": kpis, "checks": [{"kpi": "turn.value", "max": 1}]}
+    result = replace(flight_result, metadata={**flight_result.metadata, "scenario": scenario})
+    plots = replay_data([result])["scene"]["plots"]
+    assert plots[0] == [yaw]
+    assert plots.count([yaw]) == 1
+    assert len(plots) == len(replay_data([flight_result])["scene"]["plots"])
 
 
 LOUD = """

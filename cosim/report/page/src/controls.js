@@ -12,11 +12,12 @@ const PAGE = `
   <button type="button" class="play"></button>
   <output class="clock"></output>
   <div class="track"><div class="spans"></div><input type="range" class="scrubber" aria-label="Time" min="0" max="1" step="any"></div>
-  <select class="speed" aria-label="Speed"></select>
+  <label class="pace"><span>Replay speed</span> <select class="speed" aria-label="Replay speed"></select></label>
   <div class="layers segmented" role="group" aria-label="Layers">
     <button type="button" data-layer="trails" aria-pressed="true">Trails</button>
     <button type="button" data-layer="ghosts" aria-pressed="false">Ghosts</button></div>
-  <button type="button" class="full icon" title="Full screen (F)" aria-label="Full screen (F)">${FULL}</button></div>
+  <button type="button" class="full icon" title="Full screen (F)" aria-label="Full screen (F)">${FULL}</button>
+  <p class="legend"></p></div>
 <div class="signals">
   <div class="tools"><form class="add"><input list="signal-names" placeholder="Add a signal, * matches any text" aria-label="Add a signal" spellcheck="false">
   <datalist id="signal-names"></datalist></form>
@@ -30,7 +31,7 @@ export function build(root) {
   const find = (selector) => root.querySelector(selector);
   return {
     root, stage: find(".stage"), canvas: find("canvas"), chips: find(".chips"), cameras: find(".cameras"), bar: find(".bar"),
-    play: find(".play"), clock: find(".clock"), spans: find(".spans"), scrubber: find(".scrubber"), speed: find(".speed"),
+    play: find(".play"), clock: find(".clock"), spans: find(".spans"), legend: find(".legend"), scrubber: find(".scrubber"), speed: find(".speed"),
     layers: find(".layers"), full: find(".full"), window: find(".window"), add: find(".add"), names: find("datalist"), plots: find(".plots"),
   };
 }

@@ -11,6 +11,7 @@ import { showSpans } from "./spans.js";
 import { commander, steer } from "./steering.js";
 import { onThemeChange } from "./theme.js";
 import { themeButtons } from "./theme_button.js";
+import { TopView } from "./top_view.js";
 import { View } from "./view.js";
 
 const REDRAW = 500; // ms between two updates of a growing run
@@ -32,15 +33,16 @@ async function start(root, data) {
   showSpans(page, runs[0], data.scene);
   const plots = new Plots(page.plots, runs, player, data.scene.marks);
   for (const patterns of data.scene.plots) plots.add(patterns);
+  const above = new TopView(page.plots, data.scene, runs, player);
   connectSignals(page, runs[0], plots);
   onThemeChange(() => (view?.recolour(), plots.recolour()));
   player.seek(data.failure ? data.failure.opens : player.time);
   animate(player, view, page.stage);
   if (live) {
     player.seek(player.last);
-    watch(live, page, command, { player, view, plots, scene: data.scene });
+    watch(live, page, command, { player, view, plots, above, scene: data.scene });
   }
-  return { player, view, plots, runs, live };
+  return { player, view, plots, above, runs, live };
 }
 
 /** Add a mark for the failure of a run, unless the scene marks it already. */
@@ -49,7 +51,7 @@ function markFailure(marks, { time, label }, run) {
 }
 
 /** Show new rows until the run has ended; then the page is an ordinary replay. */
-function watch(live, page, command, { player, view, plots, scene }) {
+function watch(live, page, command, { player, view, plots, above, scene }) {
   const show = steer(page, live, player, command);
   let drawn = 0;
   live.follow(() => {
@@ -58,6 +60,7 @@ function watch(live, page, command, { player, view, plots, scene }) {
     if (performance.now() - drawn < REDRAW && !live.state.complete) return;
     drawn = performance.now();
     plots.grow();
+    above.grow();
     view?.grow();
     if (view) showSpans(page, live.run, scene);
   });
