@@ -34,6 +34,11 @@ def exact_fraction(value: float | int | str | Fraction) -> Fraction:
     return number
 
 
+def fraction_text(value: Fraction) -> str:
+    """Return a time as a scenario file has it: a fraction as text, "2/1" for 2."""
+    return f"{value.numerator}/{value.denominator}"
+
+
 def exact_divisor(duration: Fraction, step: Fraction) -> Fraction:
     """Return the exact divisor of a duration that a rounded decimal number stands for: 1/30 s of 10 s for 0.0333333333333333 s.
 

@@ -240,7 +240,9 @@ class _JsonParser:
 
     def expect(self, offset: int, *symbols: str) -> int:
         if self.text[offset : offset + 1] != symbols[0]:
-            raise self.error(offset, f"expected {' or '.join(map(repr, symbols))}")
+            end = len(self.text[:offset].rstrip())  # of the value before, after which a comma is probably missing
+            place = end if symbols[0] == "," and "\n" in self.text[end:offset] else offset
+            raise self.error(place, f"expected {' or '.join(map(repr, symbols))}")
         return _skip_whitespace(self.text, offset + 1)
 
     def string(self, offset: int) -> tuple[str, int]:

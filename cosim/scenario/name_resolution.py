@@ -7,6 +7,7 @@ import re
 import sys
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Mapping, Sequence
+from functools import partial
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -17,6 +18,7 @@ from ..core.errors import abbreviate_names, did_you_mean
 from ..core.text import shorten, text_problem
 from .nested_systems import Node
 from .schema import ScenarioSpec
+from .schema_types import hint_at_quotes
 
 _REALS = ("Float64", "Float32")
 
@@ -273,21 +275,13 @@ def _scalar_value(variable: Variable, value: Any) -> Any:
         except ValueError as error:
             raise ValueError(f'"{variable.name}" is of type Binary: {error}') from None
     if not _type_accepts(variable.type, value):
-        raise ValueError(f'"{variable.name}" is of type {variable.type}, found {_quote(value)}{_hint_at_quotes(variable, value)}')
+        hint = hint_at_quotes(value, partial(_type_accepts, variable.type))
+        raise ValueError(f'"{variable.name}" is of type {variable.type}, found {_quote(value)}{hint}')
     low, high = _limits(variable)
     if (low is not None and value < low) or (high is not None and value > high):
         span = f"{'-inf' if low is None else low} ... {'inf' if high is None else high}"
         raise ValueError(f'"{variable.name}" must lie in {span}, found {_quote(value)}')
     return float(value) if variable.type in _REALS else value
-
-
-def _hint_at_quotes(variable: Variable, value: Any) -> str:
-    """Return a hint at a text that is a value of the variable in quotes, else ""."""
-    try:
-        content = json.loads(value) if isinstance(value, str) else None
-    except ValueError:
-        return ""
-    return f"; write {value.strip()} without quotes" if content is not None and _type_accepts(variable.type, content) else ""
 
 
 def _quote(value: Any) -> str:

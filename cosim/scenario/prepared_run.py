@@ -22,6 +22,7 @@ from ..core.errors import InputError, Problem
 from ..core.stopwatch import Stopwatch
 from ..core.system import System
 from ..core.text import count_noun
+from ..core.time_grid import exact_fraction, fraction_text
 from ..engine.pacer import LatePolicy
 from ..engine.plan import Plan
 from ..engine.plan_run import free_components
@@ -246,11 +247,16 @@ def _check_choices(**options: tuple[object, Any]) -> None:
 
 
 def _json_time(value: TimeValue) -> float | str:
-    """Return a time as JSON has it: a fraction or a decimal number as text, a number of NumPy as a number."""
-    if isinstance(value, Fraction | Decimal):
-        return str(value)
-    plain: float | str = value.item() if isinstance(value, np.generic) else value
-    return plain
+    """Return a time as JSON has it: a number, or a fraction as text if no number is exact; what is no time stays as it is."""
+    plain = value.item() if isinstance(value, np.generic) else value
+    if not isinstance(plain, str | Fraction | Decimal) or (isinstance(plain, str) and "/" in plain):
+        return plain
+    try:
+        exact = exact_fraction(str(plain))
+        number = float(exact)
+        return number if exact_fraction(number) == exact else fraction_text(exact)
+    except (ValueError, ArithmeticError):
+        return str(plain)
 
 
 def import_figures(scenario: str | Path, parameters: Mapping[str, Any] | None = None) -> list[NamedCall]:

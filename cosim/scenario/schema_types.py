@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import json
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from fractions import Fraction
 from typing import Annotated, Any, Literal, TypeVar
 
@@ -22,10 +23,11 @@ from ..core.time_grid import MAX_TIME, exact_fraction
 
 S = TypeVar("S")
 
-_UNSIGNED_TIME = r"([0-9]{1,400}/0{0,399}[1-9][0-9]{0,399}|([0-9]{1,400}\.?[0-9]{0,400}|\.[0-9]{1,400})([eE][-+]?[0-9]{1,3})?)$"
-#: text of a time: a decimal number or a fraction; as regular expression of Python and of JSON Schema
+_UNSIGNED_TIME = r"[0-9]{1,400}/0{0,399}[1-9][0-9]{0,399}$"
+#: text of a time: a fraction; as regular expression of Python and of JSON Schema
 _TIME_PATTERN = rf"^[-+]?{_UNSIGNED_TIME}"
-_POSITIVE_TIME_PATTERN = rf"^\+?(?=[0-9.]*[1-9]){_UNSIGNED_TIME}"
+_POSITIVE_TIME_PATTERN = rf"^\+?(?=0*[1-9]){_UNSIGNED_TIME}"
+_EXPECTED_TIME = 'expected seconds as a number or as a fraction in text such as "1/60"'
 
 
 class PlacedError(ValueError):
@@ -43,11 +45,20 @@ class PlacedError(ValueError):
 def _parse_time(value: Any) -> Fraction:
     is_time = re.fullmatch(_TIME_PATTERN, value) if isinstance(value, str) else isinstance(value, int | float)
     if isinstance(value, bool) or not is_time:
-        raise ValueError('expected seconds as a number or as a fraction in text such as "1/60"')
+        raise ValueError(_EXPECTED_TIME)
     try:
         return exact_fraction(value)
     except (ValueError, ZeroDivisionError):
-        raise ValueError('expected seconds as a number or as a fraction in text such as "1/60"') from None
+        raise ValueError(_EXPECTED_TIME) from None
+
+
+def hint_at_quotes(value: Any, accepts: Callable[[Any], bool]) -> str:
+    """Return a hint at a text that is a value in quotes which `accepts` accepts without them, else ""."""
+    try:
+        content = json.loads(value) if isinstance(value, str) else None
+    except ValueError:
+        return ""
+    return f"; write {value.strip()} without quotes" if content is not None and accepts(content) else ""
 
 
 def _check_positive(value: Fraction) -> Fraction:

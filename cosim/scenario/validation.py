@@ -19,7 +19,7 @@ from ..core.json_values import copy_json
 from ..core.text import REPLACEMENT, count_noun
 from .json_document import Document
 from .schema import SystemSpec
-from .schema_types import INVALID, PlacedError
+from .schema_types import INVALID, PlacedError, hint_at_quotes
 
 S = TypeVar("S", bound=SystemSpec)
 
@@ -163,7 +163,8 @@ def _error_message(kind: type[BaseModel], path: Sequence[str | int], detail: Any
             return f'the key "{path[-1]}" is missing'
         case "value_error":
             error = detail["ctx"]["error"]
-            return str(error) if not path or isinstance(error, PlacedError) else f"{error}; found {found}"
+            hint = hint_at_quotes(detail["input"], _is_number) if "number" in str(error) else ""
+            return str(error) if not path or isinstance(error, PlacedError) else f"{error}; found {found}{hint}"
         case "dict_type" | "model_type":
             is_removal = detail["input"] is None and len(path) == 2 and path[0] == "components"
             hint = '; a scenario that "extends" this one removes a component by null' if is_removal else ""
@@ -173,7 +174,12 @@ def _error_message(kind: type[BaseModel], path: Sequence[str | int], detail: Any
                 'letters, digits, "_", ".", "-" and spaces' if tuple(path) == ("name",) else "letters, digits and underscores"
             )
             return f"expected a name of {characters}; found {found}"
-    return f"{detail['msg'].replace('Input should be', 'expected')}; found {found}"
+    hint = hint_at_quotes(detail["input"], _is_number) if detail["type"] in ("float_type", "int_type") else ""
+    return f"{detail['msg'].replace('Input should be', 'expected')}; found {found}{hint}"
+
+
+def _is_number(value: Any) -> bool:
+    return isinstance(value, int | float) and not isinstance(value, bool)
 
 
 def _shorten_json(value: Any) -> str:

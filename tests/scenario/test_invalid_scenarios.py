@@ -51,6 +51,8 @@ def test_all_problems_are_reported_at_once(folder):
         ({"stop_tme": 1}, '$.stop_tme: unknown key; did you mean "stop_time"?'),
         ({"step_size": 0}, "$.step_size: expected a positive number of seconds; found 0"),
         ({"step_size": "fast"}, 'expected seconds as a number or as a fraction in text such as "1/60"; found "fast"'),
+        ({"step_size": "0.01"}, 'such as "1/60"; found "0.01"; write 0.01 without quotes'),
+        ({"checks": [{"kpi": "k.value", "max": "2"}]}, '; found "2"; write 2 without quotes'),
         (
             {"start_time": 1e15, "stop_time": 1e15 + 3, "step_size": 0.01},
             "$.step_size: a step of 0.01 s is not resolved at t = 1000000000000003.0 s, where the times of components are 0.125",
@@ -174,11 +176,24 @@ def test_settings_of_the_caller_may_be_arrays_and_must_be_finite(folder):
     [
         {"start_time": 1_700_000_000, "stop_time": 1_700_000_001, "step_size": 0.0001},
         {"start_time": -1e13, "stop_time": -1e13, "step_size": 0.25},
-        {"stop_time": "1e-300", "step_size": "1e-300"},
+        {"stop_time": 1e-300, "step_size": 1e-300},
     ],
 )
 def test_steps_that_the_times_resolve_are_accepted(folder, times):
     load(folder.scenario({"a": folder.block("Gain")}, **times)).free()
+
+
+@pytest.mark.parametrize(
+    ("text", "place"),
+    [
+        ('{"name": "a"\n "stop_time": 3}', "1:13"),
+        ('{"name": "a",\n "stop_time": [1\n\n  2]}', "2:17"),
+        ('{"name": "a" "stop_time": 3}', "1:14"),
+    ],
+)
+def test_a_missing_comma_is_located_at_the_end_of_the_line(folder, text, place):
+    (found,) = folder.problems_of(folder.write(text))
+    assert found.startswith(f"scenario.json:{place}: expected ',' or ")
 
 
 def test_a_python_file_is_not_read_as_json(folder):
@@ -191,6 +206,6 @@ def test_a_python_file_is_not_read_as_json(folder):
 def test_a_gain_of_the_wrong_type_and_a_wrong_name_are_reported_in_one_line_each(folder):
     blocks = {"a": folder.block("Gain"), "b": folder.block("Gain")}
     (found,) = folder.problems(blocks, [{"from": "a.y", "to": "b.u", "gain": "2"}])
-    assert found.endswith('$.connections[0].gain: expected a number or a list of numbers; found "2"')
+    assert found.endswith('$.connections[0].gain: expected a number or a list of numbers; found "2"; write 2 without quotes')
     (found,) = folder.problems(blocks, name="my run/1")
     assert found.endswith('$.name: expected a name of letters, digits, "_", ".", "-" and spaces; found "my run/1"')

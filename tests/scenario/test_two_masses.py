@@ -13,7 +13,7 @@ from systems import connection
 import cosim
 from cosim.engine import EXECUTORS
 
-STEPS = ["0.02", "0.01", "0.005", "0.0025", "0.00125"]
+STEPS = [0.02, 0.01, 0.005, 0.0025, 0.00125]
 #: largest difference of a displacement (m) to the exact solution within 10 s, for each of the steps, and the order
 ERRORS = {
     "Jacobi, hold": ([3.89e-1, 2.05e-1, 1.11e-1, 5.83e-2, 3.00e-2], 1),
@@ -58,7 +58,7 @@ def exact(step, count):
 
 def error(folder, mass, coupling, step):
     found = displacements(folder, mass, coupling, step)
-    return np.abs(found - exact(float(step), len(found) - 1))[:, ::2].max()
+    return np.abs(found - exact(step, len(found) - 1))[:, ::2].max()
 
 
 @pytest.mark.parametrize("count", [2, pytest.param(len(STEPS), marks=pytest.mark.long)])
@@ -75,7 +75,7 @@ def test_both_executors_couple_alike(folder, mass, sloped_mass, coupling, monkey
     found = []
     for kind in EXECUTORS.values():
         monkeypatch.setattr("cosim.engine.plan_run.executor_class", lambda _, kind=kind: kind)
-        found.append([displacements(folder, fmu, coupling, "0.02", stop_time=1).tolist() for fmu in (mass, sloped_mass)])
+        found.append([displacements(folder, fmu, coupling, 0.02, stop_time=1).tolist() for fmu in (mass, sloped_mass)])
     assert found[0] == found[1]
 
 
@@ -103,7 +103,7 @@ def along_tangents(step, count):
 @pytest.mark.parametrize("step", STEPS[:2])
 def test_outputs_with_derivatives_are_extrapolated_along_their_tangents(folder, mass, sloped_mass, step):
     found = displacements(folder, sloped_mass, "Jacobi, linear", step)
-    np.testing.assert_allclose(found, along_tangents(float(step), len(found) - 1), rtol=0, atol=1e-12)
+    np.testing.assert_allclose(found, along_tangents(step, len(found) - 1), rtol=0, atol=1e-12)
     tangents, secants = (error(folder, fmu, "Jacobi, linear", step) for fmu in (sloped_mass, mass))
     assert tangents / secants == pytest.approx(0.4, abs=0.1)  # of the cubic terms 1/6 and 5/12
 
@@ -111,7 +111,7 @@ def test_outputs_with_derivatives_are_extrapolated_along_their_tangents(folder, 
 @pytest.mark.parametrize("coupling", ["Gauss-Seidel, linear", "iterated, linear"])
 def test_known_values_at_both_ends_are_better_than_tangents(folder, mass, sloped_mass, coupling):
     """Inputs whose source has stepped before pass through both values."""
-    second = [displacements(folder, fmu, coupling, "0.02", stop_time=1) for fmu in (sloped_mass, mass)]
+    second = [displacements(folder, fmu, coupling, 0.02, stop_time=1) for fmu in (sloped_mass, mass)]
     if coupling.startswith("iterated"):
         assert second[0].tolist() == second[1].tolist()
     else:
@@ -120,7 +120,7 @@ def test_known_values_at_both_ends_are_better_than_tangents(folder, mass, sloped
 
 def test_gauss_seidel_with_hold_conserves_the_energy(folder, mass):
     """Without dampers, each half step conserves the energy with the other mass at rest."""
-    x1, v1, x2, v2 = displacements(folder, mass, "Gauss-Seidel, hold", "0.01", d=0.0, dk=0.0).T
+    x1, v1, x2, v2 = displacements(folder, mass, "Gauss-Seidel, hold", 0.01, d=0.0, dk=0.0).T
     energy = (v1**2 + v2**2 + 10 * x1**2 + 10 * x2**2 + 30 * (x1 - x2) ** 2) / 2
     assert energy[0] == pytest.approx(20.0)
     assert energy[-1] / energy[0] - 1 == pytest.approx(0.0, abs=2e-12)

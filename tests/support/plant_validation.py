@@ -53,6 +53,7 @@ MEASURED_VEHICLES = (
     "CyberShip II",
     "Heron",
     "Otter at sea",
+    "WAM-V 16",
 )
 
 INTRODUCTION = """# Validation

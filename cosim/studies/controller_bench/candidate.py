@@ -13,6 +13,7 @@ from typing import cast
 
 from ...core.component import Component, Variable
 from ...core.errors import InputError, Problem, did_you_mean, nearest_file
+from ...core.time_grid import fraction_text
 from ...scenario import load
 from ...scenario.name_resolution import SlotIndex, Target, UnknownNameError, resolve_name
 from ...scenario.nested_systems import Node, load_scenario
@@ -117,7 +118,7 @@ def _common_step(file: Path) -> str:
     specs = (spec for node in load_scenario(file).root.walk() for spec in node.spec.components.values())
     periods = [Fraction(1), *(spec.period for spec in specs if spec.period)]
     denominator = math.lcm(*(period.denominator for period in periods))
-    return str(Fraction(math.gcd(*(int(period * denominator) for period in periods)), denominator))
+    return fraction_text(Fraction(math.gcd(*(int(period * denominator) for period in periods)), denominator))
 
 
 def _component_interface(component: Component) -> CandidateInterface:

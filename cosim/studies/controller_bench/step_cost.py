@@ -11,6 +11,7 @@ from pathlib import Path
 
 from ...api import Simulation, load
 from ...core.errors import InputError
+from ...core.time_grid import fraction_text
 from .candidate import parse_source
 
 #: number of turns, and of steps in each of them
@@ -50,7 +51,7 @@ def measure_step_costs(controllers: Sequence[MeasuredController], reference: str
 
 
 def _load_alone(source: str, step: Fraction) -> Simulation:
-    times = {"stop_time": str((ROUNDS * STEPS + 1) * step), "step_size": str(step)}
+    times = {"stop_time": fraction_text((ROUNDS * STEPS + 1) * step), "step_size": fraction_text(step)}
     components = {_NAME: dict(parse_source(source).entry)}
     return load({"name": _NAME, **times, "components": components, "record": {"signals": []}})
 

@@ -11,9 +11,10 @@ from world_harness import WorldHarness
 from plant_src.catalogue import MODELS
 
 AR_DRONE, BLUEBOAT, BLUEROV, CRAZYFLIE = "AR.Drone 2.0 in flight", "BlueBoat", "BlueROV2 Heavy", "Crazyflie 2.1"
-CYBERSHIP, HERON, OTTER = "CyberShip II", "Heron", "Otter at sea"
+CYBERSHIP, HERON, OTTER, WAMV = "CyberShip II", "Heron", "Otter at sea", "WAM-V 16"
 RUNS, LAKE, BENDERS = "runs of a BlueBoat, 2024", "runs of a Kingfisher, 2018", "flight data, Benders 2020"
 OSLO, MEASURED = "runs of an Otter, 2024", "otter_measured"
+SARDA, TRIALS = "bollard pull, Sarda et al. 2016", "trials, second hand"
 GRAVITY = 9.81
 RPM = np.pi / 30
 
@@ -224,3 +225,56 @@ def test_otter_measured_follows_recorded_runs(measured) -> None:
     measured(OTTER, "yaw rate at 1112/749 1/min", found["rate, turn"], 0.0380, "rad/s", OSLO, relative=0.3, case=case)
     measured(OTTER, "yaw rate at 1109/16 1/min", found["rate, one thruster"], 0.119, "rad/s", OSLO, relative=0.3, case=case)
     measured(OTTER, "speed at 1109/16 1/min", found["speed, one thruster"], 1.83, "m/s", OSLO, relative=0.15, case=case)
+
+
+def wamv_bollard_thrust(command: float) -> float:
+    """Return the thrust (N) of one thruster at a command (1 is full speed), from the surge acceleration in the first step."""
+    trial = vessel("wamv16", parameters={"propeller_time_constant": [0.0, 0.0]})
+    trial["usv.propeller_speed"] = [188.0 * command] * 2
+    return float(trial.step()["usv.velocity_body.u"]) / 0.01 * (180 + 27) / 2
+
+
+def test_wamv_bollard_thrust(measured) -> None:
+    measured(WAMV, "largest thrust (identified)", wamv_bollard_thrust(1.0), 240, "N", SARDA, relative=0.01)
+    measured(WAMV, "thrust at 80 % of the command", wamv_bollard_thrust(0.8), 182, "N", SARDA, relative=0.3)
+    measured(WAMV, "thrust at 60 % of the command", wamv_bollard_thrust(0.6), 120, "N", SARDA, relative=0.3)
+    measured(WAMV, "thrust at -95 % of the command (identified)", wamv_bollard_thrust(-0.95), -94, "N", SARDA, relative=0.01)
+    measured(WAMV, "thrust at -80 % of the command", wamv_bollard_thrust(-0.8), -67, "N", SARDA, relative=0.3)
+    measured(WAMV, "thrust at -60 % of the command", wamv_bollard_thrust(-0.6), -32, "N", SARDA, relative=0.3)
+
+
+def wamv_speeds(port: float, starboard: float, trial: WorldHarness | None = None, duration: float = 20) -> np.ndarray:
+    """Return the speed (m/s) of every step with these thrusts (N)."""
+    largest = [240.0 if thrust > 0 else 104.2 for thrust in (port, starboard)]
+    commands = [float(np.sign(n) * 188 * (abs(n) / n0) ** 0.5) for n, n0 in zip((port, starboard), largest, strict=True)]
+    return run(trial or vessel("wamv16"), commands, duration)
+
+
+def wamv_turn(port: float, starboard: float) -> tuple[float, float]:
+    """Return speed (m/s) and yaw rate to starboard (rad/s) of the steady turn with these thrusts (N)."""
+    trial = vessel("wamv16")
+    return wamv_speeds(port, starboard, trial)[-1], -trial["usv.rates.r"]
+
+
+def test_wamv_runs_straight(measured) -> None:
+    """The expected values are closed forms of 207 kg du/dt = T - 112.4 kg/m u^2."""
+    for thrust, expected in ((85, 1.23), (120, 1.46), (240, 2.07)):
+        speeds = wamv_speeds(thrust, thrust)
+        case = f"{thrust}/{thrust} N"
+        measured(WAMV, "speed (identified)", speeds[-1], expected, "m/s", TRIALS, relative=0.01, case=case)
+    speeds = wamv_speeds(120, 120)
+    measured(WAMV, "acceleration from 0.3 to 1.0 m/s at 120/120 N", time_between(speeds, 0.3, 1), 0.79, "s", TRIALS, relative=0.1)
+    rise = 0.01 * float(np.argmax(speeds > 0.632 * speeds[-1]))
+    measured(WAMV, "time to 63 % of the speed at 120/120 N", rise, 0.92, "s", TRIALS, relative=0.4)
+    speeds = wamv_speeds(0, 0, vessel("wamv16", velocity_body=[1.6, 0, 0]), 5)
+    measured(WAMV, "coasting from 1.4 to 0.7 m/s (identified)", time_between(speeds, 1.4, 0.7), 1.31, "s", TRIALS, relative=0.02)
+
+
+def test_wamv_turns(measured) -> None:
+    for port, starboard, u, r in ((120, 60, 1.26, 0.067), (240, 120, 1.78, 0.102), (120, 0, 1.01, 0.159)):
+        speed_found, rate_found = wamv_turn(port, starboard)
+        case = f"{port}/{starboard} N"
+        measured(WAMV, "speed in a turn", speed_found, u, "m/s", TRIALS, relative=0.05, case=case)
+        measured(WAMV, "yaw rate in a turn", rate_found, r, "rad/s", TRIALS, relative=0.15, case=case)
+    _, spin = wamv_turn(60, -60)
+    measured(WAMV, "yaw rate of a spin at 60/-60 N", spin, 0.311, "rad/s", TRIALS, relative=0.05)

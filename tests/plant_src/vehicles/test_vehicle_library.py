@@ -27,7 +27,7 @@ PUBLISHED_SPEEDS = {
     "blueboat": (3.0, 0.1),
     "heron": (1.5, 0.05),
     "otter_measured": (3.1, 0.4),
-    "wamv16": (2.3, 0.1),
+    "wamv16": (2.07, 0.05),
     "cybership2": (1.0, 0.05),
 }
 
