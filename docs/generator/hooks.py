@@ -35,6 +35,8 @@ REFERENCE = {
 
 _LINK = re.compile(r"\]\(([^)#:\s]+)(?:#[^)]*)?\)")
 _CODE = re.compile(r"`[^`\n]*`")
+#: a server shows the page "404" in place of pages of all folders; a file has no root of the site
+_BASE = "location.protocol === 'file:' || document.write('<base href=\"/\">')"
 #: first line of a block of code with a word for the tests, such as "fails"
 _MANNER = re.compile(r"^(```\w+) \w+$", re.MULTILINE)
 
@@ -53,6 +55,14 @@ def on_files(files: Files, config: MkDocsConfig) -> Files:
 def on_page_markdown(markdown: str, **_: object) -> str:
     """Remove the backslashes before bars in code, which only GitHub's tables need, and the words for the tests."""
     return _MANNER.sub(r"\1", _CODE.sub(lambda code: code[0].replace(r"\|", "|"), markdown))
+
+
+def on_post_template(output_content: str, template_name: str, **_: object) -> str:
+    """Make the links of the page "404" relative, so that it is readable as a file; a server shows it at any address."""
+    if template_name != "404.html":
+        return output_content
+    relative = re.sub(r'((?:href|src)=")/', r"\1", output_content)
+    return relative.replace("<head>", f"<head><script>{_BASE}</script>", 1)
 
 
 def repository_files(generated: Mapping[str, str]) -> list[str]:

@@ -52,6 +52,15 @@ def test_no_page_shows_the_markdown_of_a_block(site):
     assert [page for page in site.rglob("*.html") if "```" in page.read_text()] == []
 
 
+def test_the_page_of_a_wrong_address_has_its_style_as_a_file(site, chromium):
+    page = chromium.new_page()
+    page.goto((site / "404.html").as_uri())
+    assert page.evaluate("getComputedStyle(document.querySelector('.md-header')).position") == "sticky"
+    page.get_by_role("link", name="Tutorials").click()
+    assert page.url == (site / "docs/tutorials/landing.html").as_uri()
+    page.close()
+
+
 def test_pages_are_read_and_searched_as_files_without_a_network(site, chromium):
     """The browser has no network and opens no other address than files."""
     for page in site.rglob("*.html"):
