@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import math
 
+import numpy as np
 import pytest
+from cosim_command import run_cosim
 from fault_fmu import lag_output
 from lag_project import SEGV_ORDER
 
@@ -213,3 +216,44 @@ def test_a_component_class_prepares_all_runs_with_its_arguments(make_lag):
     levels = {"prepared": {}, "changed": {"/components/prepared/arguments/rate": 3}}
     assert lag.run_command("sweep", lag.write(factors=[{"name": "level", "levels": levels}])).code == 0, lag.last_result
     assert [row["status"] for row in lag.table()] == ["ok", "ok"]
+
+
+NOISE = """
+import numpy as np
+from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Integer, Real
+
+
+class Noise(Fmi2Slave):
+    def __init__(self, **arguments):
+        super().__init__(**arguments)
+        self.seed, self.seeded, self.unseeded = 0, 0.0, 0.0
+        self.register_variable(Integer("seed", causality=Fmi2Causality.parameter, variability=Fmi2Variability.fixed))
+        for name in ("seeded", "unseeded"):
+            self.register_variable(Real(name, causality=Fmi2Causality.output))
+
+    def enter_initialization_mode(self):
+        self.random = np.random.default_rng(self.seed)
+
+    def do_step(self, current_time, step_size):
+        self.seeded, self.unseeded = self.random.normal(), np.random.normal()
+        return True
+"""
+
+
+def test_noise_of_a_python_class_is_that_of_its_seed_or_differs_in_each_run(tmp_path):
+    """The runs are forked from one process, whose random state they would share."""
+    (tmp_path / "noise.py").write_text(NOISE)
+    kpis = [
+        {"name": name, "python": "cosim.kpis:final", "arguments": {"signal": f"noise.{name}"}} for name in ("seeded", "unseeded")
+    ]
+    scenario = {"name": "noise", "stop_time": 0.02, "step_size": 0.01, "components": {"noise": {"python": "noise.py:Noise"}}}
+    scenario |= {"kpis": kpis, "seeds": ["/components/noise/parameters/seed"]}
+    (tmp_path / "noise.json").write_text(json.dumps(scenario))
+    (tmp_path / "s.json").write_text(json.dumps({"name": "s", "scenario": "noise.json", "seeds": {"first": 1, "count": 3}}))
+    done = run_cosim("sweep", "s.json", "--workers", "1", cwd=tmp_path)
+    assert done.returncode == 0, done.stderr
+    with (tmp_path / "runs/s/table.csv").open() as file:
+        rows = list(csv.DictReader(file))
+    assert len({row["unseeded.value"] for row in rows}) == 3
+    expected = {str(seed): np.random.default_rng(seed).normal(size=2)[1] for seed in (1, 2, 3)}
+    assert all(float(row["seeded.value"]) == expected[row["seed"]] for row in rows)

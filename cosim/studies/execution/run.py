@@ -13,6 +13,8 @@ from functools import partial
 from pathlib import Path
 from typing import IO, Any, NamedTuple
 
+import numpy as np
+
 from ...components.fmi import FmuFile
 from ...core.errors import ComponentError, CosimError, InputError, Problem
 from ...core.json_values import parse_object
@@ -81,7 +83,11 @@ def supervised_check(context: StudyContext, job: Job, fmu_files: FmuFiles) -> li
 
 
 def _run_reporting_failure(reply: IO[str], work: Callable[[], None]) -> int:
-    """Call `work` and return an exit code; write the text of an exception to `reply`."""
+    """Call `work` and return an exit code; write the text of an exception to `reply`.
+
+    The forked process first gets a random state of its own: otherwise unseeded noise would be the same in all runs.
+    """
+    np.random.seed()  # noqa: NPY002  # the global state, which components may use
     try:
         work()
         return 0
