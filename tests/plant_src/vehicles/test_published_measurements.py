@@ -250,10 +250,11 @@ def wamv_speeds(port: float, starboard: float, trial: WorldHarness | None = None
     return run(trial or vessel("wamv16"), commands, duration)
 
 
-def wamv_turn(port: float, starboard: float) -> tuple[float, float]:
-    """Return speed (m/s) and yaw rate to starboard (rad/s) of the steady turn with these thrusts (N)."""
+def wamv_turn(port: float, starboard: float) -> tuple[float, float, float]:
+    """Return surge and sway velocity (m/s) and yaw rate to starboard (rad/s) of the steady turn with these thrusts (N)."""
     trial = vessel("wamv16")
-    return wamv_speeds(port, starboard, trial)[-1], -trial["usv.rates.r"]
+    wamv_speeds(port, starboard, trial)
+    return trial["usv.velocity_body.u"], trial["usv.velocity_body.v"], -trial["usv.rates.r"]
 
 
 def test_wamv_runs_straight(measured) -> None:
@@ -271,10 +272,10 @@ def test_wamv_runs_straight(measured) -> None:
 
 
 def test_wamv_turns(measured) -> None:
-    for port, starboard, u, r in ((120, 60, 1.26, 0.067), (240, 120, 1.78, 0.102), (120, 0, 1.01, 0.159)):
-        speed_found, rate_found = wamv_turn(port, starboard)
-        case = f"{port}/{starboard} N"
-        measured(WAMV, "speed in a turn", speed_found, u, "m/s", TRIALS, relative=0.05, case=case)
-        measured(WAMV, "yaw rate in a turn", rate_found, r, "rad/s", TRIALS, relative=0.15, case=case)
-    _, spin = wamv_turn(60, -60)
-    measured(WAMV, "yaw rate of a spin at 60/-60 N", spin, 0.311, "rad/s", TRIALS, relative=0.05)
+    turns = ((120, 60, 1.26, 0.05, 0.067), (240, 120, 1.78, 0.11, 0.102), (120, 0, 1.01, 0.09, 0.159))
+    for port, starboard, u, v, r in turns:
+        found, case = wamv_turn(port, starboard), f"{port}/{starboard} N"
+        measured(WAMV, "speed in a turn", found[0], u, "m/s", TRIALS, relative=0.05, case=case)
+        measured(WAMV, "drift in a turn", found[1], v, "m/s", TRIALS, within=0.05, case=case)
+        measured(WAMV, "yaw rate in a turn", found[2], r, "rad/s", TRIALS, relative=0.15, case=case)
+    measured(WAMV, "yaw rate of a spin at 60/-60 N", wamv_turn(60, -60)[2], 0.311, "rad/s", TRIALS, relative=0.05)
