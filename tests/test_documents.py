@@ -12,17 +12,19 @@ from cosim_command import run_cosim
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
+#: documents whose blocks are executed one by one; `docs/test_tutorials.py` executes the others in order
+WITH_SINGLE_BLOCKS = [document for document in DOCUMENTS if document.name not in ("analysis.md", "python.md")]
 
 
 def blocks(language):
-    for document in DOCUMENTS:
+    for document in WITH_SINGLE_BLOCKS:
         for text in re.findall(rf"```{language}\n(.*?)```", document.read_text(), re.DOTALL):
             yield pytest.param(text, id=f"{document.name}: {text.splitlines()[0][:40]}")
 
 
 def commands():
     """Every command line of the documents that runs cosim or Python, and what the document shows of its output."""
-    for document in DOCUMENTS:
+    for document in WITH_SINGLE_BLOCKS:
         for block, shown in re.findall(r"```sh\n(.*?)```\n(?:\n```text\n(.*?)```)?", document.read_text(), re.DOTALL):
             for line in re.split(r"\n|&&", block):
                 if line.strip().startswith(("cosim ", "python docs/")) and "build" not in line:
