@@ -39,7 +39,7 @@ def draw_tubes(
     panels = figure.subplots(len(worst), 2, sharex=True, squeeze=False)
     for row, verdict in zip(panels, worst, strict=True):
         name = verdict.signal
-        _draw_row(row, comparer, verdict, chosen[name], result[name], reference[name])
+        _draw_row(row, comparer, verdict, chosen[name])
         row[0].set_title(name, loc="left")
         row[1].set_title("result - reference", loc="left")
         row[0].set_ylabel(reference.units.get(name) or result.units.get(name) or "")
@@ -50,12 +50,11 @@ def draw_tubes(
     return figure
 
 
-def _draw_row(
-    row: Sequence[Axes], comparer: Comparer, verdict: Verdict, tolerance: Tolerance, result: np.ndarray, reference: np.ndarray
-) -> None:
+def _draw_row(row: Sequence[Axes], comparer: Comparer, verdict: Verdict, tolerance: Tolerance) -> None:
     """Draw a signal and its tube in the first of two panels, and both minus the reference in the second."""
     tube, points = comparer.tube(verdict.signal, tolerance), comparer.points
-    values, base = points.interpolate_result(result.astype(float)), points.interpolate_reference(reference.astype(float))
+    values, reference = comparer.series(verdict.signal)
+    base = points.interpolate_reference(reference)
     for axes, shift in zip(row, (np.zeros(len(base)), base), strict=True):
         axes.fill_between(
             tube.time, tube.lower - shift, tube.upper - shift, color=TUBE_COLOUR, alpha=0.2, linewidth=0, label="tube"

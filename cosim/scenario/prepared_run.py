@@ -18,6 +18,7 @@ import numpy as np
 
 from ..components.fmi import FmuFile
 from ..components.python_import import package_files
+from ..core import resources
 from ..core.errors import InputError, Problem
 from ..core.stopwatch import Stopwatch
 from ..core.system import System
@@ -31,6 +32,7 @@ from ..process.float_mode import default_float_mode
 from ..process.process_state import exclusive_process_state
 from .component_factory import ComponentFactory
 from .evaluation_schema import FunctionSpec
+from .file_paths import SHIPPED
 from .json_document import Document
 from .named_functions import load_function, signal_problems
 from .nested_systems import Node, load_scenario
@@ -146,6 +148,8 @@ class PreparedRun:
     def files(self) -> dict[str, Path]:
         """Return all files that the run depends on, by their path relative to the scenario's folder.
 
+        Files that cosim ships have names such as "cosim:fmus/mixer.fmu", except for those of shipped scenarios.
+
         These are the scenario and its nested systems, FMUs, Python and Modelica sources, and input profiles.
         """
         own = [file for node in self.root.walk() for file in node.document.files]
@@ -156,7 +160,8 @@ class PreparedRun:
         factory, folder = self.component_factory, self.root.folder.resolve()
         data = {file.resolve() for file in (*own, *(path for path, _ in factory.fmus), *factory.modelica_files)}
         files = data | package_files((*functions, *factory.python_files))
-        return {_relative_name(str(file), str(folder)): file for file in sorted(files, key=str)}
+        shipped = str(resources.root().resolve())
+        return {_name_of_file(str(file), str(folder), shipped): file for file in sorted(files, key=str)}
 
     @property
     def sources(self) -> dict[str, str]:
@@ -171,8 +176,10 @@ class PreparedRun:
 
 
 @lru_cache(1024)  # a run names over a hundred files, and runs in one process name the same ones
-def _relative_name(file: str, folder: str) -> str:
-    return relpath(file, folder).replace(os.sep, "/")
+def _name_of_file(file: str, folder: str, shipped: str) -> str:
+    is_shipped = Path(file).is_relative_to(shipped) and not Path(folder).is_relative_to(shipped)
+    name = relpath(file, shipped if is_shipped else folder).replace(os.sep, "/")
+    return f"{SHIPPED}{name}" if is_shipped else name
 
 
 @default_float_mode()

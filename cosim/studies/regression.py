@@ -17,6 +17,7 @@ from ..core.errors import CosimError, InputError
 from ..core.json_values import parse_object
 from ..core.paths import open_text
 from ..core.text import count_noun
+from ..scenario.file_paths import SHIPPED
 
 if TYPE_CHECKING:
     from ..results import Result
@@ -234,7 +235,8 @@ class _FinishedRun:
             made_by = parse_object(self.reference_path.with_suffix(".json").read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return
-        if changes := describe_provenance_changes(made_by, self.result.metadata):
+        changes = describe_provenance_changes(made_by, self.result.metadata)
+        if changes := sorted(changes, key=lambda change: change.startswith(SHIPPED)):
             more = f" and {len(changes) - MAX_LISTED_CHANGES} more" if len(changes) > MAX_LISTED_CHANGES else ""
             yield f"changed since the reference was made: {', '.join(changes[:MAX_LISTED_CHANGES])}{more}"
 

@@ -21,6 +21,10 @@ from .tube import ComparisonPoints, TimeWindows, Tolerance, Tube, UniformTimeWin
 DENSE_FRACTION = 0.1
 #: resolution of `needed_share`
 SHARE_STEPS = 16
+#: a full turn in the units of angles
+TURNS = {"rad": 2 * math.pi, "deg": 360.0}
+#: largest range in turns of an angle that is kept within one turn; a little more than 1, because references are rounded
+MAX_WRAPPED_RANGE = 1.01
 
 
 class Verdict(NamedTuple):
@@ -83,7 +87,8 @@ def compare(result: Result, reference: Result, tolerances: Mapping[str, Toleranc
     """Compare the signals of a reference that match a pattern with those of a result.
 
     A signal fails if it leaves its tube (see `tube`), is missing, does not cover the time of the reference, or is NaN or infinite
-    in either. Strings fail if they differ. A pattern that matches no signal fails as well.
+    in either. Strings fail if they differ. A pattern that matches no signal fails as well. Angles (rad, deg) that are kept within
+    one turn, such as -pi ... pi, differ by at most half a turn.
 
     Args:
         result: The result.
@@ -152,15 +157,30 @@ class Comparer:
         """Points at which the result is compared."""
         return ComparisonPoints(self._result.time, self._reference.time)
 
+    def series(self, name: str) -> tuple[np.ndarray, np.ndarray]:
+        """Return a signal of the result at all `points` and that of the reference at its rows.
+
+        An angle that is kept within one turn is continued without jumps, and the reference is the nearest of its equal angles.
+        """
+        result, reference = _to_floats(self._result, name), _to_floats(self._reference, name)
+        turn = TURNS.get(self._unit(name), math.inf)
+        values = np.concatenate([result, reference]) if math.isfinite(turn) else np.zeros(1)
+        if turn / 2 < np.ptp(values) <= MAX_WRAPPED_RANGE * turn:
+            result = np.unwrap(result, period=turn)
+            distance = np.interp(self._reference.time, self._result.time, result) - reference
+            reference = reference + turn * np.round(distance / turn)
+        return self.points.interpolate_result(result), reference
+
     def tube(self, name: str, tolerance: Tolerance, rows: slice | np.ndarray = slice(None)) -> Tube:
         """Return the tube around a signal of the reference, at all `points` or at those selected by `rows`."""
+        return self._tube(self.series(name)[1], self._half_width(name, tolerance), tolerance.time, rows)
+
+    def _tube(self, reference: np.ndarray, half_width: float, reach: float, rows: slice | np.ndarray = slice(None)) -> Tube:
         time = self.points.time[rows]
-        reference = _to_floats(self._reference, name)
         if self._spacing and isinstance(rows, slice):
-            lower, upper = UniformTimeWindows(self._spacing, tolerance.time).extremes(reference)
+            lower, upper = UniformTimeWindows(self._spacing, reach).extremes(reference)
         else:
-            lower, upper = TimeWindows(self._reference.time, time, tolerance.time).extremes(reference)
-        half_width = tolerance.half_width(reference)
+            lower, upper = TimeWindows(self._reference.time, time, reach).extremes(reference)
         return Tube(time, lower - half_width, upper + half_width)
 
     @cached_property
@@ -168,9 +188,13 @@ class Comparer:
         """Distance between points (s) if they are the evenly spaced rows of the reference, else 0."""
         return uniform_spacing(self.points.time) if np.array_equal(self.points.time, self._reference.time) else 0.0
 
+    def _half_width(self, name: str, tolerance: Tolerance) -> float:
+        return tolerance.half_width(_to_floats(self._reference, name))
+
     def is_outside(self, name: str, tolerance: Tolerance) -> np.ndarray:
         """Return at each of `points` whether the result is outside the tube around a signal, shape (points,)."""
-        tube, values = self.tube(name, tolerance), self.points.interpolate_result(_to_floats(self._result, name))
+        values, reference = self.series(name)
+        tube = self._tube(reference, self._half_width(name, tolerance), tolerance.time)
         return (values < tube.lower) | (values > tube.upper)
 
     def compare_signal(self, name: str, tolerance: Tolerance) -> Verdict:
@@ -229,12 +253,12 @@ class Comparer:
 
     def _compare_numbers(self, name: str, tolerance: Tolerance) -> Verdict:
         """Compare numbers; the tube is computed only at points where the deviation exceeds the half height of the tube."""
-        values, reference = self.points.interpolate_result(_to_floats(self._result, name)), _to_floats(self._reference, name)
-        half_width = tolerance.half_width(reference)
+        values, reference = self.series(name)
+        half_width = self._half_width(name, tolerance)
         deviation = np.abs(values - self.points.interpolate_reference(reference))
         distant = np.flatnonzero(deviation > half_width)
         rows = distant if distant.size < DENSE_FRACTION * deviation.size else slice(None)
-        tube = self.tube(name, tolerance, rows)
+        tube = self._tube(reference, half_width, tolerance.time, rows)
         distance = np.maximum(tube.lower - values[rows], values[rows] - tube.upper)
         if distance.max(initial=0) > 0:
             return self._tube_violation(name, tube, values[rows], distance, half_width)
@@ -253,8 +277,11 @@ class Comparer:
         return Verdict(name, text, float(tube.time[row]), _relative_excess(distance[worst], half_width))
 
     def _unit_suffix(self, name: str) -> str:
-        unit = self._result.units.get(name) or self._reference.units.get(name)
+        unit = self._unit(name)
         return f" {unit}" if unit and unit != "1" else ""
+
+    def _unit(self, name: str) -> str:
+        return self._result.units.get(name) or self._reference.units.get(name) or ""
 
 
 def _to_floats(run: Result, name: str) -> np.ndarray:

@@ -109,7 +109,7 @@ def write_reference(result: Result, path: Path, tolerances: Mapping[str, Toleran
 def _provenance(metadata: Mapping[str, Any]) -> dict[str, Any]:
     """Return the versions, machine and hashes of `run.json`, with one hash for the Python files of a folder with many of them."""
     hashes = metadata.get("sha256") or {}
-    counts = Counter(map(_modules_of, hashes))
+    counts = Counter(filter(None, map(_modules_of, hashes)))
     return {
         **{key: metadata.get(key) for key in _PROVENANCE_KEYS},
         "sha256": _join_modules(hashes, {name for name, count in counts.items() if count > MAX_SINGLE_MODULES}),

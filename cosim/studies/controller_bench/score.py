@@ -12,6 +12,7 @@ from typing import Any
 from ...core.json_values import is_number, parse_object
 from ...core.version import __version__
 from ...results.checks import CheckOutcome, Number, evaluate_checks
+from ...scenario.file_paths import path_in
 
 #: relative difference up to which two values are equal
 EQUALITY_TOLERANCE = 0.01
@@ -41,7 +42,7 @@ def is_current(directory: Path, scenario: Path) -> bool:
     """Return whether the run in `directory` is up to date: the files of `scenario` and the version of cosim are unchanged."""
     try:
         about = parse_object((directory / "run.json").read_text(encoding="utf-8"))
-        files = {scenario.parent.resolve() / name: digest for name, digest in about["sha256"].items()}
+        files = {path_in(scenario.parent.resolve(), name): digest for name, digest in about["sha256"].items()}
         same_files = all(sha256(file.read_bytes()).hexdigest() == digest for file, digest in files.items())
         return same_files and scenario.resolve() in files and about["versions"]["cosim"] == __version__
     except (OSError, ValueError, KeyError, TypeError, AttributeError):

@@ -152,3 +152,41 @@ def test_worst_signals_are_sorted_by_relative_excess():
     comparison = compare(result, REFERENCE, {"a.x": Tolerance(0.1), "a.y": Tolerance(0.4), "b.x": Tolerance(1)})
     assert [verdict.signal for verdict in comparison.worst] == ["a.x", "a.y", "b.x"]
     assert [verdict.excess for verdict in comparison.worst] == pytest.approx([2, 0.25, -1])
+
+
+def principal(angles):
+    return np.angle(np.exp(1j * angles))
+
+
+WEST = np.pi + 0.1 * np.sin(3 * TIME)
+
+
+@pytest.mark.parametrize(("unit", "scale"), [("rad", 1.0), ("deg", 180 / np.pi)])
+def test_an_angle_may_cross_half_a_turn_at_another_time_than_its_reference(unit, scale):
+    reference = recorded(yaw=scale * principal(WEST))
+    result = recorded(units={"yaw": unit}, yaw=scale * principal(WEST + 0.04))
+    assert compare(result, reference, {"yaw": Tolerance(0.05 * scale)}).passed
+    assert not compare(result, reference, {"yaw": Tolerance(0.03 * scale)}).passed
+
+
+def test_the_deviation_of_an_angle_is_at_most_half_a_turn():
+    result, reference = recorded(units={"yaw": "rad"}, yaw=principal(WEST + 0.2)), recorded(yaw=principal(WEST))
+    (text,) = failures(result, {"yaw": Tolerance(0.05)}, reference)
+    assert "at most 0.15 rad outside" in text
+    assert "101 of 101 points outside" in text
+
+
+def test_an_angle_without_a_jump_on_the_other_side_of_half_a_turn_is_near():
+    result, reference = recorded(units={"yaw": "rad"}, yaw=np.full(101, 3.14)), recorded(yaw=np.full(101, -3.14))
+    assert compare(result, reference, {"yaw": Tolerance(0.01)}).passed
+
+
+def test_a_whole_turn_is_a_deviation_of_an_angle_that_counts_turns():
+    turns = 2 * TIME
+    result, reference = recorded(units={"yaw": "rad"}, yaw=turns + 2 * np.pi), recorded(yaw=turns)
+    assert len(failures(result, {"yaw": Tolerance(0.1)}, reference)) == 1
+
+
+def test_a_whole_turn_is_a_deviation_of_a_number_without_the_unit_of_an_angle():
+    result, reference = recorded(units={"x": "m"}, x=np.full(101, 3.14)), recorded(x=np.full(101, -3.14))
+    assert len(failures(result, {"x": Tolerance(0.1)}, reference)) == 1

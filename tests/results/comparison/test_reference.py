@@ -93,12 +93,22 @@ def test_changes_name_what_is_different():
 def test_a_changed_module_is_named_unless_its_folder_has_many(tmp_path):
     few = {f"controllers/{name}.py": "1" for name in ("a", "b")}
     many = {f"plant/m{i}.py": "1" for i in range(9)}
-    run = Result(swing().recording, metadata={**METADATA, "sha256": few | many})
+    data = {f"vehicles/{i}.json": "1" for i in range(9)}
+    run = Result(swing().recording, metadata={**METADATA, "sha256": few | many | data})
     write_reference(run, tmp_path / "r.csv", TOLERANCES)
     made_by = json.loads((tmp_path / "r.json").read_text())
-    assert sorted(made_by["sha256"]) == ["controllers/a.py", "controllers/b.py", "plant/*.py"]
+    assert sorted(made_by["sha256"]) == ["controllers/a.py", "controllers/b.py", "plant/*.py", *data]
     assert describe_provenance_changes(made_by, run.metadata) == []
-    changed = {"sha256": few | many | {"controllers/b.py": "2", "plant/m3.py": "2"}}
+    changed = {"sha256": few | many | data | {"controllers/b.py": "2", "plant/m3.py": "2"}}
     assert describe_provenance_changes(made_by, {**run.metadata, **changed}) == ["controllers/b.py", "plant/*.py"]
     older = {**made_by, "sha256": {"controllers/*.py": "one hash of all"}}  # references of older versions
     assert describe_provenance_changes(older, {**run.metadata, "sha256": few}) == ["controllers/*.py"]
+
+
+def test_an_angle_that_jumps_by_a_turn_needs_few_rows():
+    angle = np.angle(np.exp(1j * (np.pi + 0.3 * np.sin(TIME))))
+    run = Result(Recording(TIME, {"yaw": angle}, {"yaw": "rad"}))
+    reference = decimate(run, {"yaw": Tolerance(absolute=0.01)})
+    assert len(reference.time) < 100
+    later = Result(Recording(TIME, {"yaw": np.angle(np.exp(1j * (np.pi + 0.3 * np.sin(TIME - 0.02))))}, {"yaw": "rad"}))
+    assert compare(later, reference, {"yaw": Tolerance(absolute=0.01)}).passed
