@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Sequence
 from typing import TYPE_CHECKING
 
@@ -50,7 +51,7 @@ def print_side_by_side(controllers: Sequence[BenchedController], reference: str)
 
     Args:
         controllers: the controllers, the best first.
-        reference: name of the controller whose costs are 1.
+        reference: name of the controller whose costs are 1; "": the costs were not measured.
     """
     from rich import box
     from rich.table import Table
@@ -62,10 +63,11 @@ def print_side_by_side(controllers: Sequence[BenchedController], reference: str)
     for each in controllers:
         found = each.ranking.candidate
         counts = (f"{found.passed} of {found.scenarios}", f"{found.met} of {found.checks}")
-        table.add_row(cell_text(each.name), *counts, f"{1e6 * each.cost:.3g}", f"{each.cost_ratio:.3g}")
+        costs = ("-" if math.isnan(value) else f"{value:.3g}" for value in (1e6 * each.cost, each.cost_ratio))
+        table.add_row(cell_text(each.name), *counts, *costs)
     click.echo()
     table_console().print(table)
-    click.echo(f"cost: smallest processor time per step; ratio: to {reference}")
+    click.echo(f"cost: smallest processor time per step; ratio: to {reference}" if reference else "the costs were not measured")
 
 
 def print_comparison(rows: Sequence[KpiComparison], candidate: str) -> None:

@@ -10,7 +10,6 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..core.errors import InputError
 from ..studies.regression import CommandRunner, Regression, RegressionOutcome
 from ..studies.regression_runs import run_in_parallel
 from .bench_notes import summarize_omissions
@@ -154,13 +153,10 @@ class ControllerTrials:
         found = self.prepared["omissions"]
         return [(each["scenario"], Omission(each["entry"], each["variable"])) for each in found]
 
-    def first_applicable(self) -> Mapping[str, str]:
-        """Return the first scenario that feeds all inputs of the controller."""
+    def first_finished(self) -> Mapping[str, str] | None:
+        """Return the first scenario that the controller ran to its end, with all its inputs fed; None if there is none."""
         scenarios = zip(self.prepared["scenarios"], self.results, strict=True)
-        found: Mapping[str, str] | None = next((each for each, result in scenarios if result.is_applicable), None)
-        if found:
-            return found
-        raise InputError(f"no scenario feeds all inputs of {self.name}, so that its cost cannot be measured")
+        return next((each for each, result in scenarios if result.is_applicable and result.outcome.code in (0, 3)), None)
 
     def as_json(self) -> dict[str, Any]:
         """Return ranking, scenarios and notes as JSON."""

@@ -2,25 +2,16 @@
 
 from __future__ import annotations
 
-import json
 import re
-import sys
 from bisect import bisect_left
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from functools import partial
 from typing import Any, NamedTuple
 
-import numpy as np
-
-from ..core.binary_text import parse_binary
 from ..core.component import Component, Variable
 from ..core.errors import abbreviate_names, did_you_mean
-from ..core.text import shorten, text_problem
 from .nested_systems import Node
 from .schema import ScenarioSpec
-from .schema_types import hint_at_quotes
-
-_REALS = ("Float64", "Float32")
+from .variable_values import check_value, quote_value, start_values
 
 
 class UnknownNameError(Exception):
@@ -156,19 +147,19 @@ def check_assignment(
     if array in variables and text not in variables and text in variables[array].scalar_names:
         return {array: _with_element(variables[array], text, value, current)}
     if text in variables:
-        return {text: _check_value(variables[text], value, all_elements)}
+        return {text: check_value(variables[text], value, all_elements)}
     if f"{text}[1]" in variables:
         if not isinstance(value, list) or not value:
-            raise ValueError(f'"{text}" is a list of values, found {_quote(value)}')
+            raise ValueError(f'"{text}" is a list of values, found {quote_value(value)}')
         names = [f"{text}[{i}]" for i in range(1, len(value) + 1)]
         if names[-1] not in variables:
             size = sum(other.startswith(f"{text}[") for other in variables)
             raise ValueError(f'"{text}" takes at most {size} values, found {len(value)}')
-        return {each: _check_value(variables[each], element) for each, element in zip(names, value, strict=True)}
+        return {each: check_value(variables[each], element) for each, element in zip(names, value, strict=True)}
     if isinstance(value, list) and (names := vector_names(variables, text)):
         if len(value) != len(names):
             raise ValueError(f'"{text}" takes {len(names)} values, found {len(value)}')
-        return {each: _check_value(variables[each], element) for each, element in zip(names, value, strict=True)}
+        return {each: check_value(variables[each], element) for each, element in zip(names, value, strict=True)}
     settable = [v.name for causality in ("parameter", "input") for v in variables.values() if v.causality == causality]
     valid = abbreviate_names(re.sub(r"\[\d+\]$", "", each) for each in settable)
     hint = did_you_mean(text, settable) or (valid and f"; valid: {valid}")
@@ -182,9 +173,9 @@ def _with_element(
     if current is None:
         raise ValueError(f'"{element}" is an element, an event sets the whole array: expected a list for "{variable.name}"')
     elements = current(variable.name)
-    elements = list(_start_values(variable) if elements is None else elements)
+    elements = list(start_values(variable) if elements is None else elements)
     elements[variable.scalar_names.index(element)] = value
-    return list(_check_value(variable, elements, all_elements=True))
+    return list(check_value(variable, elements, all_elements=True))
 
 
 def vector_names(variables: Mapping[str, Variable], prefix: str) -> list[str]:
@@ -196,116 +187,3 @@ def vector_names(variables: Mapping[str, Variable], prefix: str) -> list[str]:
     found = [each for name, each in variables.items() if name.startswith(begin) and not re.search(r"[.\[]", name[len(begin) :])]
     kinds = {(each.type, each.unit, each.causality, each.shape) for each in found}
     return [each.name for each in found] if len(found) > 1 and len(kinds) == 1 and not found[0].shape else []
-
-
-def _check_value(variable: Variable, value: Any, all_elements: bool = False) -> Any:
-    if variable.causality not in ("parameter", "structuralParameter", "input") and variable.start is None:
-        raise ValueError(f'"{variable.name}" is of causality {variable.causality} and cannot be set')
-    if variable.variability == "constant":
-        description = variable.description and f": {variable.description}"
-        raise ValueError(f'"{variable.name}" is a constant and cannot be set{description}')
-    if variable.causality == "structuralParameter" and value != variable.start:
-        raise ValueError(
-            f'"{variable.name}" is a structural parameter, which is set before the start to a positive integer: it stays '
-            f"{json.dumps(variable.start)}, found {_quote(value)}"
-        )
-    if not variable.shape:
-        return _scalar_value(variable, value)
-    size = len(variable.scalar_names)
-    if not isinstance(value, list):
-        raise ValueError(f'"{variable.name}" is an array of {size} values, expected a list, found {_quote(value)}')
-    elements = _flatten(variable, value)
-    if len(elements) > size or (all_elements and len(elements) < size):
-        raise ValueError(f'"{variable.name}" takes {"" if all_elements else "at most "}{size} values, found {len(elements)}')
-    return [*(_scalar_value(variable, element) for element in elements), *_start_values(variable)[len(elements) :]]
-
-
-def _flatten(variable: Variable, value: list[Any]) -> list[Any]:
-    """Return the elements of a list in row-major order; nested lists must have the shape of the array."""
-    if not any(isinstance(row, list) for row in value):
-        return value
-    if _nested_shape(value) != variable.shape:
-        text = " x ".join(map(str, variable.shape))
-        raise ValueError(f'"{variable.name}" is an array of {text} values, found {_quote(value)}')
-    rows = value
-    for _ in variable.shape[1:]:
-        rows = [element for row in rows for element in row]
-    return rows
-
-
-def _nested_shape(value: Any) -> tuple[int, ...]:
-    """Return the shape of nested lists; () if they are not rectangular."""
-    if not isinstance(value, list):
-        return ()
-    shapes = {_nested_shape(row) for row in value}
-    return (len(value), *shapes.pop()) if len(shapes) == 1 else ()
-
-
-def _start_values(variable: Variable) -> Sequence[Any]:
-    """Return the start values of all elements of an array."""
-    start, size = variable.start, len(variable.scalar_names)
-    if variable.type == "Binary":
-        start = tuple(map(parse_binary, start)) if isinstance(start, tuple) else parse_binary(start or "")
-    if start is None:
-        start = {"String": "", "Binary": b""}.get(variable.type, 0)
-    return start if isinstance(start, tuple) else (start,) * size
-
-
-def _enumeration_value(variable: Variable, value: Any) -> Any:
-    """Return the number of an enumeration item that is given by its name or its number."""
-    items = dict(variable.items)
-    if value in items:
-        return items[value]
-    if value in items.values() and not isinstance(value, bool):
-        return value
-    valid = ", ".join(f"{name} ({number})" for name, number in items.items())
-    hint = did_you_mean(value, items) if isinstance(value, str) else ""
-    raise ValueError(f'"{variable.name}" is one of {valid}, found {_quote(value)}{hint}')
-
-
-def _scalar_value(variable: Variable, value: Any) -> Any:
-    """Return a scalar in the type of the variable; raise ValueError if its type does not fit or it is out of range."""
-    if isinstance(value, str) and (problem := text_problem(value)):
-        raise ValueError(f'"{variable.name}": {problem}')
-    if variable.items:
-        return _enumeration_value(variable, value)
-    if variable.type == "Binary" and isinstance(value, str):
-        try:
-            return parse_binary(value)
-        except ValueError as error:
-            raise ValueError(f'"{variable.name}" is of type Binary: {error}') from None
-    if not _type_accepts(variable.type, value):
-        hint = hint_at_quotes(value, partial(_type_accepts, variable.type))
-        raise ValueError(f'"{variable.name}" is of type {variable.type}, found {_quote(value)}{hint}')
-    low, high = _limits(variable)
-    if (low is not None and value < low) or (high is not None and value > high):
-        span = f"{'-inf' if low is None else low} ... {'inf' if high is None else high}"
-        raise ValueError(f'"{variable.name}" must lie in {span}, found {_quote(value)}')
-    return float(value) if variable.type in _REALS else value
-
-
-def _quote(value: Any) -> str:
-    """Return a value as JSON where that is possible, shortened."""
-    return shorten(json.dumps(value, default=repr))
-
-
-def _limits(variable: Variable) -> tuple[float | None, float | None]:
-    """Return the variable's minimum and maximum, narrowed to the range of its data type."""
-    low, high = variable.minimum, variable.maximum
-    smallest: float
-    largest: float
-    if variable.dtype.kind in "iu":
-        smallest, largest = np.iinfo(variable.dtype).min, np.iinfo(variable.dtype).max
-    elif variable.type == "Float32":
-        smallest, largest = float(np.finfo(np.float32).min), float(np.finfo(np.float32).max)
-    else:
-        return low, high
-    return smallest if low is None else max(low, smallest), largest if high is None else min(high, largest)
-
-
-def _type_accepts(kind: str, value: Any) -> bool:
-    if kind == "Boolean" or isinstance(value, bool):
-        return kind == "Boolean" and isinstance(value, bool)
-    if kind in ("String", "Binary"):
-        return isinstance(value, str if kind == "String" else bytes)
-    return isinstance(value, int | float) and abs(value) <= sys.float_info.max if kind in _REALS else isinstance(value, int)

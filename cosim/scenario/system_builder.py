@@ -27,6 +27,7 @@ from .function_arguments import FunctionResolver, without_placeholders
 from .name_resolution import SlotIndex, UnknownNameError, check_assignment, resolve_name
 from .named_functions import find_function_problems
 from .nested_systems import Node, Scenario
+from .problem_locations import located_problems
 from .recorded_signals import SignalSelector
 from .schema_types import accepted
 from .stages import StagePlanner, parallel_mode
@@ -35,9 +36,6 @@ from .wiring import Wiring
 
 #: prefix of the components made from input profiles: inputs.0, inputs.1, ...
 PROFILE_PREFIX = "inputs"
-
-#: settings whose times must fit the communication points
-_TIMED_SETTINGS = (("stop_time",), ("record",), ("events",))
 
 
 class SystemBuilder:
@@ -89,8 +87,7 @@ class SystemBuilder:
         try:
             plan = compile_plan(system, settings)
         except InputError as error:
-            found = (problem for problem in error.problems if not self._is_consequence(problem))
-            self.problems += map(self._with_location, found)
+            self.problems += located_problems(self.root, error.problems)
         signals = None if self._has_missing_signals else settings.columns
         resolver = FunctionResolver(self.root, self.components, self.start_values, signals)
         resolved = resolver.resolve(self.spec)
@@ -285,18 +282,3 @@ class SystemBuilder:
         where = node.where(*path) if path in node.document.settings else ""
         problems = [each if each.subject else replace(each, where=each.where or where) for each in error.problems]
         self._add_problems(InputError(problems), node, "components", name)
-
-    def _is_consequence(self, problem: Problem) -> bool:
-        """Return True if a problem with times only follows from an invalid start time, stop time or step size."""
-        times = {"stop_time", "step_size", "start_time"} & self.root.invalid_keys
-        return bool(times) and (problem.subject[:1] in _TIMED_SETTINGS or problem.subject[-1:] in (("period",), ("step_size",)))
-
-    def _with_location(self, problem: Problem) -> Problem:
-        """Return a problem of the system with the location of its subject in the scenario file."""
-        if problem.where or not problem.subject:
-            return problem
-        key, *rest = problem.subject
-        if key == "components" and rest and (found := self.root.find_component(rest[0])):
-            node, name = found
-            return replace(problem, where=node.where("components", name, *rest[1:]), subject=())
-        return replace(problem, where=self.root.where(*problem.subject), subject=())

@@ -25,6 +25,8 @@ MAX_THRUST_RATIO = 30.0
 MAX_EXTENT = {True: 500.0, False: 100.0}
 #: largest ratio of mass and displaced mass, in either direction; 1 kg is 2.2 lb
 MAX_MASS_RATIO = 1.5
+#: largest ratio of the lengths of the hull that floats and of a shape that collides or is drawn, in either direction
+MAX_LENGTH_RATIO = 3.0
 #: z component of the axis of a rotor that pushes downwards
 _DOWNWARDS = -0.5
 
@@ -49,6 +51,7 @@ def vehicle_warnings(model: Model) -> Iterator[str]:
     if isinstance(model.boat, SurfaceVessel):
         yield from _hull_warnings(model.boat)
         yield from _draught_warnings(model.boat)
+        yield from _shape_warnings(model, model.boat.hull.length)
     if model.craft:
         displaced = model.craft.water_density * model.craft.displaced_volume
         yield from _mass_warnings(model.craft.mass, displaced, f"displaced_volume of {model.craft.displaced_volume:.4g} m3")
@@ -114,6 +117,17 @@ def _hull_warnings(vessel: SurfaceVessel) -> Iterator[str]:
         if propeller.radius and propeller.position[2] - propeller.radius > surface:
             height = propeller.position[2] - surface
             yield f"propellers[{i}].position: {height:.3g} m above the water at rest, the propeller gives no thrust"
+
+
+def _shape_warnings(model: Model, length: float) -> Iterator[str]:
+    """Yield a warning for each shape that is not that of the hull, whose length (m) is given."""
+    shapes = {"boxes": np.concatenate([box.corners() for box in model.body.boxes])}
+    if model.visual is not None:
+        shapes["visual"] = model.visual.reshape(-1, 3)
+    for key, points in shapes.items():
+        extent = float(np.ptp(points[:, 0]))
+        if max(extent, length) > MAX_LENGTH_RATIO * min(extent, length):
+            yield f"{key}: {extent:.4g} m long, but the vessel floats by hull.length = {length:.4g} m, whatever is drawn"
 
 
 def _draught_warnings(vessel: SurfaceVessel) -> Iterator[str]:

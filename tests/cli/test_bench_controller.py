@@ -252,6 +252,62 @@ def test_an_fmu_that_crashes_fails_only_its_scenario(tmp_path, fault_libraries):
     assert "SIGSEGV" in done.stdout
 
 
+RAISING = """
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+
+
+class Raising(Fmi2Slave):
+    def __init__(self, **arguments):
+        super().__init__(**arguments)
+        self.u = self.y = 0.0
+        self.register_variable(Real("u", causality=Fmi2Causality.input))
+        self.register_variable(Real("y", causality=Fmi2Causality.output))
+
+    def do_step(self, current_time, step_size):
+        if current_time > 0.5:
+            raise ValueError("it is late")
+        return True
+"""
+
+
+@pytest.mark.parametrize(
+    ("last", "cells", "message"),
+    [
+        ("late.py:Raising", ["-", "-"], "the cost of late.py:Raising is not measured: controller: do_step failed at t = "),
+        ("crashing.fmu", None, "WARNING no cost is measured: "),
+    ],
+)
+def test_a_controller_that_fails_while_costs_are_measured_keeps_the_table_and_the_page(
+    tmp_path, fault_libraries, last, cells, message
+):
+    """The scenario has 3 steps, the measurement hundreds. A crash ends the measurement of all costs, an exception that of one."""
+    shipped = FaultFmus(fault_libraries, tmp_path)(2, name="shipped")
+    FaultFmus(fault_libraries, tmp_path)(2, "DoStep 6 segv", name="crashing")
+    (tmp_path / "late.py").write_text(RAISING)
+    role = {"description": "A lag.", "controllers": ["shipped.fmu"], "inputs": {"u": ""}, "outputs": {"y": ""}}
+    (tmp_path / "lag.json").write_text(json.dumps(role))
+    (tmp_path / "scenarios").mkdir()
+    content = {"name": "short", "stop_time": 0.03, "step_size": 0.01, "components": {"lag": {"fmu": str(shipped)}}}
+    content["kpis"] = [{"name": "end", "python": "cosim.kpis:final", "arguments": {"signal": "lag.y"}}]
+    (tmp_path / "scenarios/short.json").write_text(json.dumps(content))
+    done = bench(tmp_path, shipped, last, role="lag.json")
+    assert message in done.stderr, done.stdout + done.stderr
+    rows = {
+        line.split()[0]: line.split()[-2:]
+        for line in done.stdout.splitlines()
+        if re.match(r"(shipped|Raising|crashing) +\d+ of", line)
+    }
+    assert len(rows) == 2, done.stdout + done.stderr
+    assert "nan" not in done.stdout
+    if cells:
+        assert rows["Raising"] == cells
+        assert float(rows["shipped"][0]) > 0
+    else:
+        assert set(map(tuple, rows.values())) == {("-", "-")}
+        assert "the costs were not measured\n" in done.stdout
+    assert done.stdout.splitlines()[-1].startswith("page: ")
+
+
 def test_a_part_of_a_shipped_controller_is_replaced(folder):
     """The scenario contains the autopilot as one FMU; it is replaced by the nested system with the new heading controller."""
     shutil.copy(ROOT / "fmus/fmi3/heading_controller.fmu", folder / "heading.fmu")

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
@@ -11,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 import click
 
-from ...core.errors import InputError, Problem
+from ...core.errors import ComponentError, InputError, Problem
 from ...core.processors import available_processors
 from ...studies.regression_runs import check_unique_names, default_folder, find_scenario_files
 from .. import supervision
@@ -195,11 +196,23 @@ class _Bench:
         return ControllerTrials(source, name, prepared, results, ranking)
 
     def _measure_costs(self, everything: Sequence[ControllerTrials]) -> tuple[str, list[float]]:
-        """Return the name of the reference, its processor time per step (s) and that of each controller, in a child process."""
+        """Return the name of the reference, its processor time per step (s) and that of each controller, in a child process.
+
+        The cost of a controller that does not run to its end in any scenario is NaN, and so are all if the process crashes.
+        """
         file = self.output_dir / Path(self.role).stem / _COSTS_FILE
-        measured = [(trials.source, trials.first_applicable()) for trials in everything]
-        found = _in_child(lambda: _write_costs(self.role, measured, file), file)
-        return found["reference"], found["costs"]
+        measured = {i: (trials.source, scenario) for i, trials in enumerate(everything) if (scenario := trials.first_finished())}
+        found: Mapping[str, Any] = {"reference": "", "costs": [None] * (1 + len(measured))}
+        try:
+            if measured:
+                found = _in_child(lambda: _write_costs(self.role, [*measured.values()], file), file)
+        except _RefusedError:  # the child process has printed why
+            pass
+        except ComponentError as error:
+            click.echo(f"WARNING no cost is measured: {error}", err=True)
+        reference_cost, *costs = (math.nan if cost is None else float(cost) for cost in found["costs"])
+        cost_of = dict(zip(measured, costs, strict=True))
+        return found["reference"], [reference_cost, *(cost_of.get(i, math.nan) for i in range(len(everything)))]
 
 
 def _in_child(work: Callable[[], int], file: Path) -> Any:

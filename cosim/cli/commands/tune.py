@@ -123,7 +123,7 @@ def _print_best(tuning: Tuning, best: Trial, folder: Path, failure: str | None) 
 
     first = tuning.trials[0]
     rows = [[name, f"{first.parameters[name]:.6g}", f"{value:.6g}"] for name, value in best.parameters.items()]
-    rows.append([tuning.objective.text, f"{first.value:.6g}", f"{best.value:.6g}"])
+    rows.append([tuning.objective.text, *("-" if math.isnan(each.value) else f"{each.value:.6g}" for each in (first, best))])
     study_options.print_table(["", "start", "best"], rows)
     if failure:
         click.echo(failure, err=True)
@@ -137,5 +137,5 @@ def _failure_text(tuning: Tuning, best: Trial) -> str:
     if best.failure:
         return f"a run failed at every point; at the first one: {best.failure}"
     if not best.value < math.inf:
-        return f"the value of {tuning.objective.text} is {best.value:g} at every point"
+        return f"{tuning.objective.text} has no {'finite ' if best.value == math.inf else ''}value at any point"
     return f"no point meets the constraints: the best one violates them by {best.violation:.3g}"

@@ -2,15 +2,20 @@
 
 from __future__ import annotations
 
+import logging
+import math
 import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 from dataclasses import dataclass
 from fractions import Fraction
+from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from ...api import Simulation, load
-from ...core.errors import InputError
+from ...core.errors import ComponentError, CosimError, InputError
 from ...core.time_grid import fraction_text
 from .candidate import parse_source
 
@@ -38,16 +43,32 @@ def measure_step_costs(controllers: Sequence[MeasuredController], reference: str
     """Return the smallest processor time per step (s) of the reference, an FMU, and of each controller.
 
     Each controller steps alone, with the inputs that it has in its scenario at a quarter of the time. A reference that is one of
-    the controllers is measured once, so that its ratio is 1; any other one keeps the start values of its inputs.
+    the controllers is measured once, so that its ratio is 1; any other one keeps the start values of its inputs. The cost of a
+    controller that fails is NaN, with a warning.
     """
     entry = parse_source(reference).entry
     same = next((i for i, each in enumerate(controllers) if parse_source(each.source).entry == entry), None)
     with ExitStack() as stack:
-        alone = [stack.enter_context(_load_with_inputs(each)) for each in controllers]
-        alone += [stack.enter_context(_load_alone(reference, Fraction(1, 100)))] if same is None else []
-        rounds = [[_step_seconds(each) for each in alone] for _ in range(ROUNDS)]
-    costs = [min(column) for column in zip(*rounds, strict=True)]
+        alone = [_enter(stack, each.source, partial(_load_with_inputs, each)) for each in controllers]
+        if same is None:
+            alone.append(_enter(stack, reference, lambda: _load_alone(reference, Fraction(1, 100))))
+        sources = [*(each.source for each in controllers), reference]
+        rounds = [[_step_seconds(*each) for each in zip(sources, alone, strict=False)] for _ in range(ROUNDS)]
+    costs = [float(np.min(column)) for column in zip(*rounds, strict=True)]  # NaN if a round has failed
     return [costs[-1 if same is None else same], *costs[: len(controllers)]]
+
+
+def _enter(stack: ExitStack, source: str, prepare: Callable[[], Simulation]) -> Simulation | None:
+    """Return a prepared simulation that the stack closes; None, with a warning, if it fails."""
+    try:
+        return stack.enter_context(prepare())
+    except CosimError as error:
+        _warn(source, error)
+        return None
+
+
+def _warn(source: str, error: CosimError) -> None:
+    logging.getLogger("cosim").warning("the cost of %s is not measured: %s", source, error)
 
 
 def _load_alone(source: str, step: Fraction) -> Simulation:
@@ -68,7 +89,16 @@ def _load_with_inputs(controller: MeasuredController) -> Simulation:
     return alone
 
 
-def _step_seconds(simulation: Simulation) -> float:
+def _step_seconds(source: str, simulation: Simulation | None) -> float:
+    """Return the processor time per step (s); NaN if the simulation has failed."""
     began = time.process_time()
-    simulation.step(STEPS)
+    try:
+        if simulation is None:
+            return math.nan
+        simulation.step(STEPS)
+    except ComponentError as error:
+        _warn(source, error)
+        return math.nan
+    except InputError:  # it failed in an earlier round
+        return math.nan
     return (time.process_time() - began) / STEPS

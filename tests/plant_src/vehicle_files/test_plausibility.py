@@ -45,6 +45,12 @@ MISTAKES: list[tuple[str, Callable[[dict[str, Any]], Any], str]] = [
     ("x500", lambda d: d["boxes"][0].update(size=[400, 400, 200]), "boxes: a corner is"),
     ("x500", rotors(turns="clockwise"), "rotors: all turn the vehicle about z in the same direction"),
     ("blueboat", lambda d: d["hull"].update(length=1200), "hull.length: found 1200 m, expected less than 500 m"),
+    (
+        "blueboat",
+        lambda d: d.update(visual={"vertices": [[0, 0, 0], [4800, 0, 0], [0, 300, 0]], "faces": [[0, 1, 2]]}),
+        "visual: 4800 m long, but the vessel floats by hull.length = 1.04 m",
+    ),
+    ("blueboat", lambda d: d.update(boxes=[{"size": [5, 1, 0.4], "position": [0, 0, 0]}]), "boxes: 5 m long"),
     ("blueboat", lambda d: d.update(inertia=[1200, 3000, 4000]), "inertia: the radius of gyration"),
     ("cybership2", lambda d: d.update(yaw_inertia=1760), "yaw_inertia: the radius of gyration"),
     (
