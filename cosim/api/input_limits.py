@@ -13,16 +13,12 @@ from ..core.component import Variable
 from ..core.recording import Recording
 from ..core.system import Connection, Endpoint
 from ..core.text import count_noun
-from ..core.units import KNOWN_UNITS
 from ..engine.transfer_plan import connection_conversion
 from ..scenario import PreparedRun
+from ..scenario.input_limits import outside, probable_cause, set_excesses
 
 #: share of the rows from which on an input outside its limits causes a warning
 MIN_SHARE = 0.25
-#: part of a limit by which a value may exceed it
-_MARGIN = 0.01
-#: unit of an input -> units in which its value is often given by mistake
-_CONFUSED_UNITS = {"rad/s": "rpm", "rad": "deg"}
 
 
 class _Excess(NamedTuple):
@@ -47,6 +43,7 @@ def warn_exceeded_limits(prepared: PreparedRun, recording: Recording) -> None:
     """Log a warning for every input that was outside its limits in at least a quarter of the rows.
 
     The limits are those of `Component.input_limits`. An input is known if it is recorded, or all outputs that feed it are.
+    Inputs that the scenario or its caller has set beyond the limits are left out, because `set_excesses` names them.
     """
     if not len(recording.time):
         return
@@ -64,17 +61,19 @@ def _find_excesses(prepared: PreparedRun, recording: Recording) -> Iterator[_Exc
     }
     if not limits:
         return
+    known = set_excesses(prepared)
     recorded = {end: recording.columns[name] for name, end in prepared.settings.columns.items() if name in recording.columns}
     feeding: dict[Endpoint, list[Connection]] = {}
     for connection in system.connections:
         feeding.setdefault(connection.target, []).append(connection)
-    for end, (low, high) in limits.items():
+    for end, each in limits.items():
         values = recorded[end] if end in recorded else _fed_values(prepared, feeding.get(end, ()), recorded)
-        if values is not None:
-            outside = (values < low - _MARGIN * abs(low)) | (values > high + _MARGIN * abs(high))
-            if (share := float(np.mean(outside))) >= MIN_SHARE:
-                extreme = values[outside][np.argmax(np.abs(values[outside]))]
-                yield _Excess(end, system.find_element(end).variable, share, float(extreme), (low, high))
+        variable = system.find_element(end).variable
+        if values is not None and not ((end.component, variable.name) in known and end not in feeding):
+            exceeding = outside(values, each)
+            if (share := float(np.mean(exceeding))) >= MIN_SHARE:
+                extreme = values[exceeding][np.argmax(np.abs(values[exceeding]))]
+                yield _Excess(end, variable, share, float(extreme), each)
 
 
 def _fed_values(
@@ -97,18 +96,8 @@ def _describe(elements: list[_Excess]) -> str:
     unit = worst.variable.unit.name if worst.variable.unit else ""
     low, high = worst.limits
     others = f" (and {count_noun(len(elements) - 1, 'more element')})" if len(elements) > 1 else ""
+    cause = probable_cause(worst.extreme, worst.limits, unit, "the controller saturates, or a value of the vehicle is wrong")
     return (
         f"{worst.end}{others} is outside its limits {low:.4g} ... {high:.4g} {unit} in {100 * worst.share:.0f} % of the run, "
-        f"up to {worst.extreme:.4g} {unit}; {_probable_cause(worst, unit)}"
+        f"up to {worst.extreme:.4g} {unit}; {cause}"
     )
-
-
-def _probable_cause(excess: _Excess, unit: str) -> str:
-    low, high = excess.limits
-    if confused := _CONFUSED_UNITS.get(unit):
-        value = excess.extreme * KNOWN_UNITS[confused].factor
-        if low <= value <= high:
-            return f"probable cause: {confused} in place of {unit} ({excess.extreme:.4g} {confused} = {value:.4g} {unit})"
-    if excess.extreme < low == 0:
-        return "probable cause: the sign"
-    return f"probable causes: another unit than {unit}, or gains of the controller that are too large"

@@ -11,6 +11,7 @@ from ..core.errors import Problem
 from ..core.paths import is_file
 from ..core.system import Endpoint
 from ..engine.transfer_plan import unit_conversion
+from .input_limits import set_excesses
 from .missing_connections import VariablesByEndpoint, find_missing_connections
 
 if TYPE_CHECKING:
@@ -26,7 +27,7 @@ def find_warnings(prepared: PreparedRun) -> list[Problem]:
 
 
 def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
-    """Yield the warnings that concern the results: functions left out, end of the run, late times, connections, steps, FMUs."""
+    """Yield the warnings that concern the results: functions left out, late times, connections, steps, values, FMUs."""
     if left_out := prepared.left_out:
         yield replace(left_out[0], message="; ".join(problem.message for problem in left_out))
     yield from _late_events(prepared)
@@ -36,6 +37,7 @@ def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
     yield from _missing_connections(prepared)
     yield from _double_conversions(prepared)
     yield from _large_step(prepared)
+    yield from set_excesses(prepared).values()
     for file in prepared.component_factory.fmus.values():
         if file.run_warning:
             yield Problem(file.run_warning)

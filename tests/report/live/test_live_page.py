@@ -55,7 +55,7 @@ def test_a_live_run_is_shown_steered_and_replayed(run, page):
     speed.press("Enter")
     waiting(page, "document.querySelector('.answer').textContent === ''")
 
-    page.locator(".speed").select_option(label="fastest")
+    page.get_by_label("Run speed", exact=True).select_option(label="fastest")
     page.locator(".play").click()
     assert run.wait() in (0, 3)
     waiting(page, "document.querySelector('.state').textContent === 'Finished'")
@@ -67,6 +67,7 @@ def test_a_live_run_is_shown_steered_and_replayed(run, page):
     assert (x, y, z) == pytest.approx([result[f"vessel.position.{axis}"][-1] for axis in "xyz"], abs=1e-5)
 
     page.evaluate("cosimReplay.player.seek(2)")  # a replay as any
+    assert page.get_by_label("Replay speed", exact=True).input_value() == "1"
     page.locator(".play").click()
     waiting(page, "cosimReplay.player.time > 2 && cosimReplay.player.playing")
     assert {url for url in page.requests if not url.startswith((run.url, "data:"))} == set()

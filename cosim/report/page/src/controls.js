@@ -31,7 +31,7 @@ export function build(root) {
   const find = (selector) => root.querySelector(selector);
   return {
     root, stage: find(".stage"), canvas: find("canvas"), chips: find(".chips"), cameras: find(".cameras"), bar: find(".bar"),
-    play: find(".play"), clock: find(".clock"), spans: find(".spans"), legend: find(".legend"), scrubber: find(".scrubber"), speed: find(".speed"),
+    play: find(".play"), clock: find(".clock"), spans: find(".spans"), legend: find(".legend"), scrubber: find(".scrubber"), pace: find(".pace span"), speed: find(".speed"),
     layers: find(".layers"), full: find(".full"), window: find(".window"), add: find(".add"), names: find("datalist"), plots: find(".plots"),
   };
 }

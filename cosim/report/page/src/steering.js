@@ -28,6 +28,7 @@ export function steer(page, live, player, command) {
     const { paused, ended, speed } = live.state;
     state.textContent = ended ? "Finished" : paused ? "Paused" : "Live";
     state.dataset.state = state.textContent;
+    page.pace.textContent = page.speed.ariaLabel = ended ? "Replay speed" : "Run speed";
     offerSpeeds(page.speed, ended ? player.speed : speed, !ended);
     if (ended) for (const control of [step, ...page.root.querySelectorAll(".fields input")]) control.disabled = true;
   };
