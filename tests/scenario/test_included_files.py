@@ -107,3 +107,13 @@ def test_the_scene_includes_files(tmp_path: Path) -> None:
     assert loaded.spec.scene.arguments == {"vehicles": {"usv": {"mass": 1}}}
     scene["arguments"] = {"vehicles": {"usv": "ship.json"}}
     assert 'ship.json"' in str(load_scenario(scenario(tmp_path, {}, scene=scene)).problems[0])
+
+
+def test_files_that_cosim_ships_have_the_same_name_in_every_installation(tmp_path: Path) -> None:
+    own = tmp_path / "own.json"
+    own.write_text('{"extends": "cosim:scenarios/demo1_box.json", "name": "own"}')
+    run = load(own)
+    run.free()
+    names = set(run.files())
+    assert {"own.json", "cosim:scenarios/demo1_box.json", "cosim:fmus/mixer.fmu"} <= names
+    assert not [name for name in names if ".." in name]
