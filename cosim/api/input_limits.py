@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from itertools import groupby
 from typing import NamedTuple
 
@@ -40,19 +40,21 @@ class _Excess(NamedTuple):
 
 
 def warn_exceeded_limits(prepared: PreparedRun, recording: Recording) -> None:
-    """Log a warning for every input that was outside its limits in at least a quarter of the rows.
+    """Log a warning for every input that was set beyond its limits, or was outside them in at least a quarter of the rows.
 
-    The limits are those of `Component.input_limits`. An input is known if it is recorded, or all outputs that feed it are.
-    Inputs that the scenario or its caller has set beyond the limits are left out, because `set_excesses` names them.
+    The limits are those of `Component.input_limits`. Without having been set, an input is known if it is recorded, or all outputs
+    that feed it are.
     """
     if not len(recording.time):
         return
-    excesses = _find_excesses(prepared, recording)
-    for _, elements in groupby(excesses, lambda excess: (excess.end.component, excess.variable.name)):
-        logging.getLogger("cosim").warning("%s", _describe(list(elements)))
+    known = set_excesses(prepared)
+    excesses = groupby(_find_excesses(prepared, recording, known), lambda excess: (excess.end.component, excess.variable.name))
+    for text in (*map(str, known.values()), *(_describe(list(elements)) for _, elements in excesses)):
+        logging.getLogger("cosim").warning("%s", text)
 
 
-def _find_excesses(prepared: PreparedRun, recording: Recording) -> Iterator[_Excess]:
+def _find_excesses(prepared: PreparedRun, recording: Recording, known: Collection[tuple[str, str]]) -> Iterator[_Excess]:
+    """Yield the elements outside their limits, without unconnected inputs that are `known` by component and variable."""
     system = prepared.system
     limits = {
         Endpoint(name, scalar): each
@@ -61,7 +63,6 @@ def _find_excesses(prepared: PreparedRun, recording: Recording) -> Iterator[_Exc
     }
     if not limits:
         return
-    known = set_excesses(prepared)
     recorded = {end: recording.columns[name] for name, end in prepared.settings.columns.items() if name in recording.columns}
     feeding: dict[Endpoint, list[Connection]] = {}
     for connection in system.connections:

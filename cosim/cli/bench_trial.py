@@ -131,7 +131,7 @@ def run_trials(trials: Sequence[ControllerTrial], jobs: int) -> Iterator[TrialRe
 
 @dataclass(frozen=True)
 class ControllerTrials:
-    """Results of a controller in all scenarios, what its preparation returned, and its ranking against the shipped controller."""
+    """Results of a controller in all scenarios, what its preparation returned, and its ranking."""
 
     source: str
     name: str

@@ -23,11 +23,11 @@ _MAX_STEP_RATIO = 50
 
 def find_warnings(prepared: PreparedRun) -> list[Problem]:
     """Return all warnings about a prepared run, each with its location in the scenario file."""
-    return [*find_run_warnings(prepared), *_missing_reference(prepared)]
+    return [*find_run_warnings(prepared), *set_excesses(prepared).values(), *_missing_reference(prepared)]
 
 
 def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
-    """Yield the warnings that concern the results: functions left out, late times, connections, steps, values, FMUs."""
+    """Yield the warnings that concern the results: functions left out, late times, connections, steps, FMUs."""
     if left_out := prepared.left_out:
         yield replace(left_out[0], message="; ".join(problem.message for problem in left_out))
     yield from _late_events(prepared)
@@ -37,7 +37,6 @@ def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
     yield from _missing_connections(prepared)
     yield from _double_conversions(prepared)
     yield from _large_step(prepared)
-    yield from set_excesses(prepared).values()
     for file in prepared.component_factory.fmus.values():
         if file.run_warning:
             yield Problem(file.run_warning)

@@ -163,9 +163,8 @@ class Comparer:
         An angle that is kept within one turn is continued without jumps, and the reference is the nearest of its equal angles.
         """
         result, reference = _to_floats(self._result, name), _to_floats(self._reference, name)
-        turn = TURNS.get(self._unit(name), math.inf)
-        values = np.concatenate([result, reference]) if math.isfinite(turn) else np.zeros(1)
-        if turn / 2 < np.ptp(values) <= MAX_WRAPPED_RANGE * turn:
+        turn = TURNS.get(self._unit(name))
+        if turn and turn / 2 < np.ptp(np.concatenate([result, reference])) <= MAX_WRAPPED_RANGE * turn:
             result = np.unwrap(result, period=turn)
             distance = np.interp(self._reference.time, self._result.time, result) - reference
             reference = reference + turn * np.round(distance / turn)
