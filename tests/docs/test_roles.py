@@ -1,4 +1,4 @@
-"""Reference of the roles: each variable has a unit and a meaning, each setting of a shipped scenario is a variable of the role."""
+"""Reference of the roles: variables with units and meanings, and the settings of the shipped scenarios."""
 
 import importlib
 import json
@@ -45,5 +45,6 @@ def test_the_table_counts_the_scenarios_that_set_a_parameter(roles):
     for parameter, start in {"vtol.take_off_time": "0", "vtol.ramp_time": "0.3", "vtol.clearance": "0.4"}.items():
         count = sum(f'"{parameter}"' in text for text in texts)
         cells = next(line for line in lines if line.startswith(f"| `{parameter}` |")).split(" | ")
-        assert count and cells[1:5] == ["Real", "m" if parameter == "vtol.clearance" else "s", start, str(count)]
+        assert count
+        assert cells[1:5] == ["Real", "m" if parameter == "vtol.clearance" else "s", start, str(count)]
     assert any(line.startswith("| `vtol.landing_enabled` | Boolean |  | true |") for line in lines)
