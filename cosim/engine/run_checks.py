@@ -135,7 +135,8 @@ def _fitting_step(system: System, settings: Settings) -> Fraction:
     common = _common_divisor(intervals)
     ratio = ceil(common / step)
     decade = 10 ** (len(str(ratio)) - 1)
-    return common / next(k * decade for k in (1, 2, 4, 5, 8, 10) if k * decade >= ratio)
+    divisor = next(k * decade for k in (1, 2, 4, 5, 8, 10) if k * decade >= ratio)
+    return Fraction(common, divisor)
 
 
 def _intervals(system: System, settings: Settings) -> list[Fraction]:

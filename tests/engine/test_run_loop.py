@@ -106,7 +106,7 @@ def test_a_step_that_divides_no_period_is_one_problem_with_a_valid_step():
     """Events are compared with the valid step, which 1.5 s fits."""
     built = make_system({name: counter() for name in "ab"}, periods={"a": exact_fraction(3), "b": exact_fraction(4.5)})
     changed = settings(stop=9, step=2, record_interval=exact_fraction(1.5), events=[Event(exact_fraction(1.5), {})])
-    for step, example in ((0.8, ", such as 0.75 s"), ("4/3", ", such as 0.75 s"), (0.02, ", such as 0.015 s")):
+    for step, example in ((0.8, ", such as 0.75 s"), ("4/3", ", such as 0.75 s"), (0.7, ", such as 0.375 s")):
         with pytest.raises(InputError) as refusal:
             simulate(built, replace(changed, step_size=exact_fraction(step)))
         (problem,) = refusal.value.problems

@@ -129,9 +129,23 @@ def test_shipped_scenarios_cause_no_warnings(file):
     assert warnings_of(file) == []
 
 
-@pytest.mark.parametrize(("step", "lines"), [(0.4, 0), (0.5, 1)])
-def test_a_step_much_longer_than_an_fmu_recommends(folder, step, lines):
-    boat = {"fmu": str(resources.root() / "fmus/strider.fmu")}
-    found = warnings_of(folder.scenario({"boat": boat}, step_size=step, stop_time=2))
-    text = "a step of 0.5 s is 50 times the 0.01 s that strider.fmu recommends: the results are probably wrong, use about 0.01 s"
-    assert [line for line in found if "recommends" in line] == [f"step_size: {text}"] * lines
+def step_warnings(folder, step, **more):
+    boats = {name: {"fmu": str(resources.root() / "fmus/strider.fmu"), **more} for name in ("one", "other")}
+    found = warnings_of(folder.scenario(boats, step_size=step, stop_time=2))
+    return [line for line in found if "recommends" in line]
+
+
+def test_components_that_step_much_more_rarely_than_their_fmu_recommends_are_named(folder):
+    text = (
+        "one, other step every 0.05 s, 5 times the 0.01 s that strider.fmu recommends: the results may be wrong, use about 0.01 s"
+    )
+    assert step_warnings(folder, 0.04) == []
+    assert step_warnings(folder, 0.05) == [f"step_size: {text}"]
+    assert step_warnings(folder, 0.01, period=0.05) == [f"components.one.period: {text}"]
+
+
+def test_the_solver_of_an_fmu_for_model_exchange_keeps_its_own_step(folder):
+    fmu = {"fmu": str(resources.root() / "fmus/continuous_pid.fmu")}
+    assert [
+        len(warnings_of(folder.scenario({"pid": fmu | each}, step_size=0.05))) for each in ({}, {"solver": {"method": "euler"}})
+    ] == [1, 0]
