@@ -14,8 +14,9 @@ from ..core.errors import Problem, abbreviate_names
 from ..core.paths import is_file
 from ..core.system import Endpoint
 from ..engine.transfer_plan import unit_conversion
+from .fitting_outputs import VariablesByEndpoint
 from .input_limits import set_excesses
-from .missing_connections import VariablesByEndpoint, find_missing_connections
+from .missing_connections import find_missing_connections
 
 if TYPE_CHECKING:
     from .prepared_run import PreparedRun
@@ -48,8 +49,8 @@ def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
 
 
 def _missing_connections(prepared: PreparedRun) -> Iterator[Problem]:
-    """Yield a warning for each component with inputs that probably lack a connection, and one for components without any."""
-    for name, text in find_missing_connections(prepared.system, unconnected_inputs(prepared)):
+    """Yield a warning for each connection that is probably missing, and for components with other inputs that lack one."""
+    for name, text in find_missing_connections(prepared.root, prepared.system, unconnected_inputs(prepared)):
         found = prepared.root.find_component(name)
         yield Problem(text, found[0].where("components", found[1]) if found else prepared.root.where("connections"))
 

@@ -29,14 +29,45 @@ def ship(folder, connections, parameters=(), **more):
 
 
 @pytest.mark.parametrize(
-    ("left", "line"),
+    ("left", "inputs", "connection"),
     [
-        (0, "plant: nothing feeds or sets plant.ship.motor[1], plant.ship.motor[2], but there is an output pilot.motor[1]"),
-        (1, "pilot: nothing feeds or sets pilot.vehicle.position.x, but there is an output plant.ship.position.x"),
+        (0, "plant: nothing feeds or sets plant.ship.motor[1], plant.ship.motor[2]: ", "pilot.motor to plant.ship.motor"),
+        (1, "pilot: nothing feeds or sets pilot.vehicle.position.x: ", "plant.ship.position.x to pilot.vehicle.position.x"),
     ],
 )
-def test_a_missing_connection_is_recognized_by_matching_names(folder, left, line):
-    assert ship(folder, [BOTH[left]]) == [f"components.{line}: is a connection missing?"]
+def test_a_missing_connection_is_recognized_by_matching_names(folder, left, inputs, connection):
+    assert ship(folder, [BOTH[left]]) == [f"components.{inputs}is a connection from {connection} missing?"]
+
+
+def test_a_missing_connection_to_a_nested_system_is_one_warning_with_all_outputs_that_fit(folder):
+    """The inner components share the port; a prefix fits if it has all of the names, whatever else it has."""
+    text = (resources.root() / "scenarios/demo1_box.json").read_text()
+    text = text.replace('"../', '"cosim:').replace('"systems/', '"cosim:scenarios/systems/').replace('"references/', '"cosim:')
+    lines = {"plant.uav": [], "plant.usv.deck": []}
+    for source, target in (("plant.uav", "uav.vehicle"), ("plant.usv.deck", "uav.target")):
+        link = f'  {{"from": "{source}", "to": "{target}"}},\n'
+        assert link in text
+        lines[source] = [line for line in warnings_of(folder.write(text.replace(link, ""))) if "connection" in line]
+    assert [line.partition(" more: ")[2] for line in lines["plant.uav"]] == [
+        "is a connection from plant.uav or plant.usv to uav.vehicle missing?"
+    ]
+    (line,) = lines["plant.usv.deck"]
+    inputs = "position.x, uav.target.position.y, uav.target.position.z, uav.target.velocity.x and 1 more"
+    missing = "is a connection from plant.uav, plant.usv or plant.usv.deck to uav.target missing?"
+    assert line == f"components.uav: nothing feeds or sets uav.target.{inputs}: {missing}"
+
+
+def test_a_connection_that_a_nested_system_lacks_inside_names_its_own_components(folder):
+    components = {"plant": folder.block("Plant"), "pilot": folder.block("Controller", parameters={"offset": 0.0})}
+    ports = {"inputs": {"push": "plant.ship.motor"}, "outputs": {"position": "plant.ship.position"}}
+    folder.write({"components": components, "connections": [], "ports": ports}, "n.json")
+    nested = {"inner": {"system": "n.json"}, "pilot": folder.block("Controller", parameters={"offset": 0.0})}
+    fed = [connection("inner.position.x", "pilot.vehicle.position.x")]
+    assert warnings_of(folder.scenario(nested, fed)) == [
+        "components.pilot: nothing feeds or sets inner.pilot.vehicle.position.x: "
+        "is a connection from inner.plant.ship.position.x to inner.pilot.vehicle.position.x missing?",
+        "connections: nothing feeds or sets an input of inner.plant: are connections missing?",  # its port has another name
+    ]
 
 
 KEEPS = 'it keeps its start value until a connection feeds or "parameters" set it'
