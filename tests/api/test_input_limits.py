@@ -99,7 +99,9 @@ def test_a_command_beyond_the_limits_is_named_when_the_scenario_is_read(tmp_path
 
 def test_a_set_command_is_not_named_again_after_the_run(tmp_path, caplog):
     event = {"time": 0, "set": {"plant.boat.propeller_speed": RPM}}
-    (file := tmp_path / "trial.json").write_text(json.dumps({**BOAT, "events": [event], "record": {"signals": ["plant.*"]}}))
+    (file := tmp_path / "trial.json").write_text(
+        json.dumps({**BOAT, "events": [event], "record": {"signals": ["plant.boat.propeller_speed*"]}})
+    )
     cosim.run(file)
     assert not [message for message in caplog.messages if "limits" in message]
 
