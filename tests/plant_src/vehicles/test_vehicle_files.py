@@ -91,7 +91,7 @@ FAULTS: list[tuple[Callable[[dict[str, Any]], Any], str]] = [
         lambda d: d["rotors"][1].update(turns="left"),
         r"model\.rotors\.1\.turns: found 'left'; valid: clockwise, counter-clockwise",
     ),
-    (lambda d: d["rotor"].update(max_speed=100), r"model\.rotor\.max_speed: it cannot fly: the thrust of all rotors at full"),
+    (lambda d: d["rotor"].update(max_speed=100), r"model\.mass: it cannot fly: the thrust of all rotors at full"),
     (lambda d: d["rotor"].update(drag=[-1, 0, 0]), r"model\.rotor\.drag: found \[-1\.0, 0\.0, 0\.0\], expected numbers of at"),
     (lambda d: d["rotors"][2].update(axis=[0, 0, 0]), r"model\.rotors\.2\.axis: found the zero vector, expected a direction"),
     (lambda d: d["rotor"].pop("thrust_coefficient"), r'model\.rotors\.0: "thrust_coefficient" is missing, here and in "rotor"'),
