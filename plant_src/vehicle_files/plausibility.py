@@ -56,7 +56,7 @@ def vehicle_warnings(model: Model) -> Iterator[Problem]:
         yield from _thrust_warnings(model.airframe)
         yield from _rotor_warnings(model.airframe, _reach(model))
     if model.boat:
-        yield from boat_warnings(model.boat, np.concatenate([box.corners() for box in model.body.boxes]), model.motion)
+        yield from boat_warnings(model.boat, _corners(model))
     if isinstance(model.boat, SurfaceVessel):
         yield from _hull_warnings(model.boat)
         yield from _draught_warnings(model.boat)
@@ -67,10 +67,16 @@ def vehicle_warnings(model: Model) -> Iterator[Problem]:
         yield from _mass_warnings(model.craft.mass, displaced, f"displaced_volume of {model.craft.displaced_volume:.4g} m3")
 
 
-def _reach(model: Model) -> float:
-    """Return the distance of the farthest corner of the collision shape from the centre of mass (m)."""
+def _corners(model: Model) -> np.ndarray:
+    """Return the corners of all boxes (m), shape (n, 3): of a vessel from O, else from the centre of mass."""
     corners = np.concatenate([box.corners() for box in model.body.boxes])
-    return float(np.linalg.norm(corners - (model.boat.centre_of_mass if model.boat else 0.0), axis=1).max())
+    return corners + model.boat.centre_of_mass if model.boat and model.motion == "planar" else corners
+
+
+def _reach(model: Model) -> float:
+    """Return the distance of the farthest corner of the boxes from the centre of mass (m)."""
+    centre = model.boat.centre_of_mass if model.boat else 0.0
+    return float(np.linalg.norm(_corners(model) - centre, axis=1).max())
 
 
 def _actuators(model: Model) -> Sequence[Rotor | Thruster | Propeller]:
@@ -155,7 +161,7 @@ def _hull_warnings(vessel: SurfaceVessel) -> Iterator[Problem]:
 
 def _shape_warnings(model: Model, length: float) -> Iterator[Problem]:
     """Yield a warning for each shape that is not that of the hull, whose length (m) is given."""
-    shapes = {"boxes": np.concatenate([box.corners() for box in model.body.boxes])}
+    shapes = {"boxes": _corners(model)}
     if model.visual is not None:
         shapes["visual"] = model.visual.reshape(-1, 3)
     for key, points in shapes.items():

@@ -1,4 +1,4 @@
-"""Probable mistakes in the data of vessels and submerged vehicles: thrust, speed, and places of propellers and rudders."""
+"""Probable mistakes in the data of vessels and submerged vehicles: thrust, resistance, places and angles of propellers."""
 
 from __future__ import annotations
 
@@ -9,15 +9,16 @@ import numpy as np
 
 from cosim.core.errors import Problem
 
+from ..vehicles.common.quantities import RADIANS_EXPECTED
 from ..vehicles.planar_vessel.planar_vessel import PlanarVessel
 from ..vehicles.submerged.craft import Craft
 from ..vehicles.surface_vessel.surface_vessel import SurfaceVessel
+from ..vehicles.vessel.actuators import Propeller
 from ..vehicles.vessel.boat import Boat
 
-#: largest ratio of the thrust of all propellers to the weight: shipped vessels have at most 0.42, the shipped ROV has 1.8
+#: largest ratio of the thrust of all propellers to the weight: shipped vessels have at most 0.42, planing boats about 0.5, the
+#: shipped ROV 1.8
 MAX_VESSEL_THRUST, MAX_SUBMERGED_THRUST = 1.0, 5.0
-#: largest Froude number, speed over the square root of gravity times length: vessels of the shipped files have at most 0.92
-MAX_FROUDE_NUMBER = 2.0
 #: largest speed of the tips of propellers (m/s)
 MAX_TIP_SPEED = 100.0
 #: distance outside of the box around hull and boxes at which a propeller or rudder is implausible, over the length
@@ -32,41 +33,27 @@ def warning(text: str, *path: str) -> Problem:
     return Problem(text, subject=("arguments", *path))
 
 
-def boat_warnings(boat: Boat, corners: np.ndarray, motion: str) -> Iterator[Problem]:
-    """Yield warnings about a vessel.
-
-    Args:
-        boat: The vessel.
-        corners: Corners of its boxes (m), shape (n, 3): of a planar vessel from the centre of mass, else from O.
-        motion: "planar" or "6dof".
-    """
-    if motion == "planar":
-        corners = corners + boat.centre_of_mass
-    low, high = _bounds(boat, corners)
+def boat_warnings(boat: Boat, corners: np.ndarray) -> Iterator[Problem]:
+    """Yield warnings about a vessel, the corners of whose boxes from O are given (m), shape (n, 3)."""
     thrusts = [each.thrust_coefficient * each.max_speed**2 for each in boat.propellers]
     largest = int(np.argmax(thrusts))
     propeller, path = boat.propellers[largest], ("propellers", str(largest))
     cause = _cause(propeller.max_speed, propeller.radius, (*path, "thrust_coefficient"), (*path, "max_speed"))
-    forward = sum(thrust * each.axis[0] for thrust, each in zip(thrusts, boat.propellers, strict=True))
-    speed = _balance(forward, *_surge_damping(boat))
-    yield from _thrust_warnings(sum(thrusts), boat.mass * _GRAVITY, MAX_VESSEL_THRUST, (speed, high[0] - low[0]), cause)
+    yield from _thrust_warnings(sum(thrusts), boat.mass * _GRAVITY, MAX_VESSEL_THRUST, cause)
+    yield from _resistance_warnings(*_surge_damping(boat), *(each.advance_coefficient for each in boat.propellers))
+    yield from _azimuth_warnings(boat.propellers)
+    low, high = _bounds(boat, corners)
     yield from _position_warnings(boat, low, high)
     yield from _height_warnings(boat, high[2])
 
 
 def craft_warnings(craft: Craft, reach: float) -> Iterator[Problem]:
     """Yield warnings about a submerged vehicle whose farthest corner is `reach` (m) from the centre of mass."""
-    squared = craft.max_thruster_speed**2
-    thrusts = [each.thrust_coefficient * squared for each in craft.thrusters]
+    thrusts = [each.thrust_coefficient * craft.max_thruster_speed**2 for each in craft.thrusters]
     path = ("thrusters", str(int(np.argmax(thrusts))), "thrust_coefficient")
     cause = _cause(craft.max_thruster_speed, craft.thruster_radius, path, ("thruster", "max_speed"))
-    forward = sum(
-        max(each.axis[0] * each.thrust_coefficient, -each.axis[0] * each.reverse_thrust_coefficient) * squared
-        for each in craft.thrusters
-    )
-    speed = _balance(forward, craft.linear_damping[0, 0], craft.quadratic_damping[0, 0], 0.0)
-    weight = craft.mass * craft.gravity
-    yield from _thrust_warnings(sum(thrusts), weight, MAX_SUBMERGED_THRUST, (speed, max(craft.size)), cause)
+    yield from _thrust_warnings(sum(thrusts), craft.mass * craft.gravity, MAX_SUBMERGED_THRUST, cause)
+    yield from _resistance_warnings(craft.linear_damping[0, 0], craft.quadratic_damping[0, 0], craft.advance_coefficient)
     for i, thruster in enumerate(craft.thrusters):
         distance, limit = math.hypot(*thruster.position), MAX_THRUSTER_DISTANCE * reach
         if distance > limit:
@@ -82,6 +69,17 @@ def _cause(speed: float, radius: float, coefficient: tuple[str, ...], max_speed:
     return "", coefficient
 
 
+def _thrust_warnings(thrust: float, weight: float, limit: float, cause: tuple[str, Sequence[str]]) -> Iterator[Problem]:
+    """Yield a warning if the thrust (N) is more than `limit` times the weight (N)."""
+    hint, path = cause
+    if thrust > limit * weight:
+        text = (
+            f"the thrust of all propellers at full speed is {thrust:.4g} N, {thrust / weight:.3g} times the weight of "
+            f"{weight:.4g} N, expected less than {limit:g} times"
+        )
+        yield warning(text + hint, *path)
+
+
 def _surge_damping(boat: Boat) -> tuple[float, float, float]:
     """Return the linear, quadratic and cubic coefficient of the resistance in surge."""
     linear = float(boat.linear_damping[0, 0])
@@ -91,32 +89,19 @@ def _surge_damping(boat: Boat) -> tuple[float, float, float]:
     return linear, float(boat.quadratic_damping[0][0, 0]), boat.cubic_damping[0]
 
 
-def _balance(thrust: float, linear: float, quadratic: float, cubic: float) -> float:
-    """Return the speed (m/s) at which the resistance is as large as the thrust (N); infinite without resistance."""
-    if thrust <= 0:
-        return 0.0
-    roots = np.roots([cubic, quadratic, linear, -thrust])
-    return min((float(root.real) for root in roots if abs(root.imag) < 1e-9 and root.real > 0), default=math.inf)
+def _resistance_warnings(*coefficients: float) -> Iterator[Problem]:
+    """Yield a warning if all coefficients of forces of the water that limit the speed ahead are 0."""
+    if not any(coefficients):
+        text = "the water has no resistance ahead: the elements for u are 0, here and in quadratic_damping"
+        yield warning(text, "linear_damping")
 
 
-def _thrust_warnings(
-    thrust: float, weight: float, limit: float, speed_and_length: tuple[float, float], cause: tuple[str, Sequence[str]]
-) -> Iterator[Problem]:
-    """Yield a warning if the thrust, or else the speed to which it leads, is too large."""
-    hint, path = cause
-    speed, length = speed_and_length
-    if thrust > limit * weight:
-        text = (
-            f"the thrust of all propellers at full speed is {thrust:.4g} N, {thrust / weight:.3g} times the weight of "
-            f"{weight:.4g} N, expected less than {limit:g} times"
-        )
-        yield warning(text + hint, *path)
-    elif (froude := speed / math.sqrt(_GRAVITY * length)) > MAX_FROUDE_NUMBER:
-        text = (
-            f"the thrust of all propellers at full speed and the resistance in surge balance at {speed:.3g} m/s, the Froude "
-            f"number {froude:.3g} for a length of {length:.3g} m, expected less than {MAX_FROUDE_NUMBER:g}"
-        )
-        yield warning(text + hint, *path)
+def _azimuth_warnings(propellers: Sequence[Propeller]) -> Iterator[Problem]:
+    """Yield a warning for each largest azimuth angle of more than a turn and at most 360 rad; larger ones mean "no limit"."""
+    for i, propeller in enumerate(propellers):
+        if 2 * math.pi < propeller.max_azimuth <= 360:
+            text = f"found {propeller.max_azimuth:g}, {RADIANS_EXPECTED}"
+            yield warning(text, "propellers", str(i), "max_azimuth")
 
 
 def _bounds(boat: Boat, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

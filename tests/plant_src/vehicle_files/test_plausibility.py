@@ -87,7 +87,8 @@ MISTAKES: list[tuple[str, Callable[[dict[str, Any]], Any], str]] = [
     ("blueboat", every_propeller(thrust_coefficient=91), "propellers.0.thrust_coefficient: the thrust of all propellers"),
     ("blueboat", every_propeller(thrust_coefficient=9.81), "propellers.0.thrust_coefficient: the thrust of all propellers"),
     ("blueboat", every_propeller(max_speed=9.5492966), "propellers.0.m"),
-    ("blueboat", lambda d: d.update(linear_damping=[0] * 6, quadratic_damping=[0] * 6), "propellers.0.thrust_coefficient: the"),
+    ("blueboat", lambda d: d.update(linear_damping=[0] * 6, quadratic_damping=[0] * 6), "linear_damping: the water has no resistance"),
+    ("blueboat", lambda d: d["propellers"][1].update(max_azimuth=45), "propellers.1.max_azimuth: found 45, radians expected"),
     ("bluerov2_heavy", lambda d: d["thruster"].update(max_speed=4000), "thruster.max_speed: the thrust of all propellers"),
     ("bluerov2_heavy", lambda d: d["thrusters"][2].update(position=[15, 0, 0]), "thrusters.2.position: 15 m from the centre"),
     ("blueboat", lambda d: d["propellers"][0].update(position=[0, 7.5, 0]), "propellers.0.position: y = 7.5 m is far outside"),
@@ -108,6 +109,20 @@ def test_one_rotor_upside_down() -> None:
         data["rotor"]["max_speed"] = 2000
 
     assert "rotors.0.axis: the rotor pushes downwards, its thrust points along [0, 0, -1]" in warnings_of("x500", overturn)
+
+
+def test_a_planing_boat_has_no_warning() -> None:
+    """A boat of 2 m and 40 kg that planes at 15 m/s with a resistance of a quarter of its weight; its propeller pulls twice that."""
+
+    def planing(data: dict[str, Any]) -> None:
+        hull = {"count": 1, "length": 2, "beam": 0.5, "depth": 0.3, "bottom": -0.05, "waterplane_coefficient": 0.78}
+        data.update(hull=hull, mass=40, centre_of_mass=[0, 0, 0.05], inertia=[1.2, 10, 10], rudders=[])
+        data.update(added_mass=[2, 10, 80, 0.5, 30, 4], quadratic_damping=[0.44, 0, 0, 0, 0, 0])
+        data.update(boxes=[{"size": [2, 0.5, 0.3], "position": [0, 0, 0.1]}])
+        propeller = {"position": [-1.05, 0, -0.1], "thrust_coefficient": 2e-4, "max_speed": 1000, "advance_coefficient": 0.0065}
+        data.update(propeller={"radius": 0.035}, propellers=[propeller])
+
+    assert warnings_of("blueboat", planing) == []
 
 
 def test_propellers_and_origin_above_the_water() -> None:

@@ -85,7 +85,10 @@ FAULTS: list[tuple[Callable[[dict[str, Any]], Any], str]] = [
     ),
     (lambda d: d.update(mass={"value": 1, "unit": 3}), r"model\.mass\.unit: found 3, expected a unit such as 'kg'"),
     (lambda d: d.pop("inertia"), r'model: "inertia" is missing'),
-    (lambda d: d.update(inertia=[1, 1, 3]), r"model\.inertia: .* expected none greater than the sum of the other two"),
+    (
+        lambda d: d.update(inertia=[1, 3, 1.5]),
+        r"model\.inertia: found the principal moments 1 about x, 3 about y, 1.5 about z, expected none greater than the sum",
+    ),
     (lambda d: d["rotor"].update(radus=1), r'model\.rotor\.radus: unknown key "radus"; did you mean "radius"\?'),
     (
         lambda d: d["rotors"][1].update(turns="left"),
@@ -98,6 +101,11 @@ FAULTS: list[tuple[Callable[[dict[str, Any]], Any], str]] = [
     (lambda d: d.update(rotors=d["rotors"] * 5), r"model\.rotors: found 20, expected 1 to 16"),
     (lambda d: d.update(rotors=[]), r"model\.rotors: found \[\], expected a list with at least one element"),
     (lambda d: d["boxes"][0].update(size=[1, 0, 1]), r"model\.boxes\.0\.size: .* expected edges greater than 0"),
+    (
+        lambda d: d["boxes"][0].update(yaw=-90),
+        r"model\.boxes\.0\.yaw: found -90, expected a number from -6\.28319 to 6\.28319: radians expected; in degrees\? Write {",
+    ),
+    (lambda d: d["boxes"][0].update(yaw={"value": 400, "unit": "deg"}), r"yaw: found 6\.98\d*, expected .* to 6\.28319$"),
     (lambda d: d.update(family="multirotr"), r'model\.family: found \'multirotr\'; did you mean "multirotor"\?'),
     (lambda d: d.update(crash_speed="fast"), r"model\.crash_speed: found 'fast', expected a finite number"),
 ]
