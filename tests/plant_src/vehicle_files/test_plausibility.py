@@ -84,10 +84,14 @@ MISTAKES: list[tuple[str, Callable[[dict[str, Any]], Any], str]] = [
     ("x500", lambda d: d.update(mass=2.9), "mass: thrust over weight is 1.2, expected more than 1.3"),
     ("x500", lambda d: d["rotor"].update(max_speed=9549), "rotor.max_speed: thrust over weight is 154"),
     ("x500", lambda d: d["rotor"].update(thrust_coefficient=8.55e-4), "rotor.thrust_coefficient: thrust over weight is 169"),
-    ("blueboat", every_propeller(thrust_coefficient=91), "propellers.0.thrust_coefficient: the thrust of all propellers"),
+    ("blueboat", every_propeller(thrust_coefficient=4.448), "propellers.0.thrust_coefficient: the thrust of all propellers"),
     ("blueboat", every_propeller(thrust_coefficient=9.81), "propellers.0.thrust_coefficient: the thrust of all propellers"),
     ("blueboat", every_propeller(max_speed=9.5492966), "propellers.0.m"),
-    ("blueboat", lambda d: d.update(linear_damping=[0] * 6, quadratic_damping=[0] * 6), "linear_damping: the water has no resistance"),
+    (
+        "blueboat",
+        lambda d: d.update(linear_damping=[0] * 6, quadratic_damping=[0] * 6),
+        "linear_damping: the water has no resistance",
+    ),
     ("blueboat", lambda d: d["propellers"][1].update(max_azimuth=45), "propellers.1.max_azimuth: found 45, radians expected"),
     ("bluerov2_heavy", lambda d: d["thruster"].update(max_speed=4000), "thruster.max_speed: the thrust of all propellers"),
     ("bluerov2_heavy", lambda d: d["thrusters"][2].update(position=[15, 0, 0]), "thrusters.2.position: 15 m from the centre"),
@@ -109,6 +113,18 @@ def test_one_rotor_upside_down() -> None:
         data["rotor"]["max_speed"] = 2000
 
     assert "rotors.0.axis: the rotor pushes downwards, its thrust points along [0, 0, -1]" in warnings_of("x500", overturn)
+
+
+def test_the_origin_of_a_planar_vessel_does_not_matter() -> None:
+    """A vessel of 1.3 m whose data start from a point 5 m behind it has no warning."""
+
+    def moved(data: dict[str, Any]) -> None:
+        data["centre_of_mass"] = [5, 0, 0]
+        for part in (*data["propellers"], *data["rudders"], *data["boxes"]):
+            x, y, z = part.get("position", [0, 0, 0])
+            part["position"] = [x + 5, y, z]
+
+    assert warnings_of("cybership2", moved) == []
 
 
 def test_a_planing_boat_has_no_warning() -> None:

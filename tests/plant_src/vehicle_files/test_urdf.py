@@ -139,9 +139,9 @@ def test_a_link_without_mass_is_a_warning(tmp_path: Path) -> None:
 
 def test_angles_in_degrees_are_a_warning(tmp_path: Path) -> None:
     """The joints of three motors have yaw angles of more than a turn if they are written in degrees."""
-    text = robot().replace(f"rpy=\"0.1 0 {np.pi / 4}\"", 'rpy="0 0 6.2"')
+    text = robot().replace(f'rpy="0.1 0 {np.pi / 4}"', 'rpy="0 0 6.2"')
     for angle in (135, 225, 315):
-        text = text.replace(f"rpy=\"0.1 0 {np.deg2rad(angle)}\"", f'rpy="0 0 {angle}"')
+        text = text.replace(f'rpy="0.1 0 {np.deg2rad(angle)}"', f'rpy="0 0 {angle}"')
     (file := tmp_path / "quad.urdf").write_text(text)
     expected = 'joint "to_rear_left", origin: rpy: found 0 0 135, radians expected; in degrees? A right angle is 1.5708'
     assert vehicle_from_urdf(file, DATA).warnings == [f"{file}:3: {expected} (2 more such origins)"]
