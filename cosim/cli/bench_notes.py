@@ -48,11 +48,13 @@ class BenchProgress:
 
 
 def print_trial(result: TrialResult, candidate: str) -> None:
-    """Print a line about a scenario and its problems; with --verbose also all KPIs."""
+    """Print a line about a scenario, its problems and what the candidate ignored in it; with --verbose also all KPIs."""
     if not result.is_applicable:
         _print_not_applicable(result)
         return
     print_outcome(result.outcome)
+    if result.outcome.code and result.trial.ignored_settings:
+        click.echo(f"        ignored settings: {', '.join(result.trial.ignored_settings)}")
     if current_command_line().verbosity > 0:
         print_comparison(result.rows(), candidate)
 
@@ -79,9 +81,8 @@ def print_omissions(omissions: Sequence[tuple[str, Omission]], controller: str =
 
 def summarize_omissions(omissions: Sequence[tuple[str, Omission]]) -> list[str]:
     """Return a line of ignored settings and one of KPIs and figures that are left out, each with its number of scenarios."""
-    names = [(scenario, each.entry, each.variable.partition(".")[2]) for scenario, each in omissions]
-    settings = [(scenario, name) for scenario, entry, name in names if not entry]
-    entries = [(scenario, f'{entry} without "{name}"') for scenario, entry, name in names if entry]
+    settings = [(scenario, each.lacking) for scenario, each in omissions if not each.entry]
+    entries = [(scenario, f'{each.entry} without "{each.lacking}"') for scenario, each in omissions if each.entry]
     headings = {"ignored settings, for which the controller has no variable": settings, "left out": entries}
     return [f"{heading} (number of scenarios): {_count_scenarios(items)}" for heading, items in headings.items() if items]
 

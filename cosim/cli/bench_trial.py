@@ -33,6 +33,7 @@ class ControllerTrial:
         file: the scenario with the candidate.
         original: the original scenario.
         own_name: name of the controller of the original scenario.
+        ignored_settings: variables that the scenario sets and the candidate lacks, such as "vtol.landing_time".
         candidate_folder: output directory of the scenario with the candidate.
         shipped_folder: output directory of the original scenario.
         run_command: function that runs commands.
@@ -41,6 +42,7 @@ class ControllerTrial:
     file: Path
     original: Path
     own_name: str
+    ignored_settings: Sequence[str]
     candidate_folder: Path
     shipped_folder: Path
     run_command: CommandRunner
@@ -107,6 +109,7 @@ class TrialResult:
             "code": self.outcome.code,
             "seconds": self.outcome.seconds,
             "problems": self.outcome.details,
+            "ignored_settings": list(self.trial.ignored_settings),
             "kpis": [_row_as_json(row) for row in self.rows()],
         }
 
@@ -151,7 +154,7 @@ class ControllerTrials:
         from ..studies.controller_bench.substitution import Omission
 
         found = self.prepared["omissions"]
-        return [(each["scenario"], Omission(each["entry"], each["variable"])) for each in found]
+        return [(each["scenario"], Omission(each["entry"], each["variable"], each["lacking"])) for each in found]
 
     def first_finished(self) -> Mapping[str, str] | None:
         """Return the first scenario that the controller ran to its end, with all its inputs fed; None if there is none."""

@@ -226,15 +226,22 @@ def nearest_file(path: Path) -> str:
 
 @lru_cache(16)  # the same wrong name often occurs several times
 def _did_you_mean(name: str, names: tuple[str, ...]) -> str:
-    if len(name) > MAX_QUOTATION_LENGTH:  # no slip of the pen, and the search takes quadratic time
-        return ""
-    swapped = {name[:i] + name[i + 1] + name[i] + name[i + 2 :] for i in range(len(name) - 1)}
-    same = [other for other in names if other.lower() == name.lower()]
-    if near := same or [other for other in names if other in swapped] or _close_matches(name, names):
-        return f'; did you mean "{near[0]}"?'
-    if 0 < len(names) <= 12:
+    if near := nearest_name(name, names):
+        return f'; did you mean "{near}"?'
+    if len(name) <= MAX_QUOTATION_LENGTH and 0 < len(names) <= 12:
         return f"; valid: {', '.join(names)}"
     return ""
+
+
+def nearest_name(name: str, valid: Iterable[str]) -> str:
+    """Return the valid name that a wrong one probably means, as in `did_you_mean`; "" if none is similar."""
+    if len(name) > MAX_QUOTATION_LENGTH:  # no slip of the pen, and the search takes quadratic time
+        return ""
+    names = tuple(valid)
+    swapped = {name[:i] + name[i + 1] + name[i] + name[i + 2 :] for i in range(len(name) - 1)}
+    same = [other for other in names if other.lower() == name.lower()]
+    near = same or [other for other in names if other in swapped] or _close_matches(name, names)
+    return near[0] if near else ""
 
 
 def _close_matches(name: str, names: tuple[str, ...]) -> list[str]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
@@ -182,10 +182,11 @@ class System:
         for group in iterate_groups(self.stages):
             if group.iteration:
                 yield from self._find_iteration_problems(group)
-        missing = [name for name in self.components if name not in seen]
+        missing = dict.fromkeys(_unlisted_member(name, seen) for name in self.components if name not in seen)
         if len(missing) > unknown:  # otherwise the unknown names probably stand for them
             for name in missing:
-                yield Problem(f'component "{name}" is in no stage, so it would never step', subject=subject)
+                text = f'component "{name}" is in no stage of "algorithm", so it would never step'
+                yield Problem(text, subject=("components", name))
 
     def _find_iteration_problems(self, group: Group) -> Iterator[Problem]:
         repeated = f"the stages of {group.name} are iterated"
@@ -240,6 +241,13 @@ class System:
         if (actual := slots[end.scalar].variable.causality) != causality:
             return f"{end} is of causality {actual}, expected an {causality}"
         return ""
+
+
+def _unlisted_member(name: str, listed: Collection[str]) -> str:
+    """Return the outermost system around a component, or itself, of which the stages contain no component."""
+    parts = name.split(".")
+    systems = (".".join(parts[:n]) for n in range(1, len(parts)))
+    return next((system for system in systems if not any(each.startswith(f"{system}.") for each in listed)), name)
 
 
 def incompatibility(source: Variable, target: Variable, convert: bool = False) -> str:

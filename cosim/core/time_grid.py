@@ -39,6 +39,16 @@ def fraction_text(value: Fraction) -> str:
     return f"{value.numerator}/{value.denominator}"
 
 
+def time_text(value: Fraction) -> str:
+    """Return a time with its unit as a message has it, a fraction in quotes if no number is exact.
+
+    >>> time_text(Fraction(1, 100)), time_text(Fraction(1, 60))
+    ('0.01 s', '"1/60" s')
+    """
+    number = repr(float(value))
+    return f"{number} s" if exact_fraction(number) == value else f'"{fraction_text(value)}" s'
+
+
 def exact_divisor(duration: Fraction, step: Fraction) -> Fraction:
     """Return the exact divisor of a duration that a rounded decimal number stands for: 1/30 s of 10 s for 0.0333333333333333 s.
 

@@ -3,16 +3,16 @@
 from __future__ import annotations
 
 from collections import Counter
-from collections.abc import Iterable, Iterator, Set
+from collections.abc import Iterable, Iterator, Sequence, Set
 from dataclasses import replace
 from fractions import Fraction
-from math import inf, lcm, ulp
+from math import ceil, gcd, inf, lcm, ulp
 
 from ..core.component import Variable
 from ..core.errors import InputError, Problem, abbreviate_names
 from ..core.size_limits import MAX_DELAYED_VALUES, format_count
 from ..core.system import Endpoint, System
-from ..core.time_grid import TimeGrid
+from ..core.time_grid import TimeGrid, time_text
 from .settings import Event, Settings
 
 #: longest wall time of a step of a run in real time (s)
@@ -33,13 +33,16 @@ def check_run(system: System, settings: Settings) -> TimeGrid:
     """
     problems = [*system.problems(), *_find_event_problems(system, settings.events)]
     problems += _find_real_time_problems(settings)
+    step = _fitting_step(system, settings)
+    if step != settings.step_size:
+        problems.append(_step_problem(system, settings, step))
     try:
-        grid = TimeGrid.from_times(settings.start_time, settings.stop_time, settings.step_size)
+        grid = TimeGrid.from_times(settings.start_time, settings.stop_time, step)
     except ValueError as error:
         problems.append(Problem(str(error), subject=("stop_time",)))
-        if settings.step_size <= 0:
+        if step <= 0:
             raise InputError(problems) from None
-        grid = TimeGrid.from_times(settings.start_time, settings.start_time, settings.step_size)
+        grid = TimeGrid.from_times(settings.start_time, settings.start_time, step)
     problems += _find_resolution_problems(settings)
     problems += _find_period_problems(system, settings, grid)
     problems += _find_delay_problems(system)
@@ -121,19 +124,55 @@ def _find_event_time_problems(events: Iterable[Event], grid: TimeGrid) -> Iterat
             yield Problem(f"event time {error}", event.where, subject=("events", "time"))
 
 
+def _fitting_step(system: System, settings: Settings) -> Fraction:
+    """Return the step size, or one that divides all intervals if it is longer than a period or divides none of several."""
+    step, intervals = settings.step_size, _intervals(system, settings)
+    if step <= 0:
+        return step
+    divides_none = len(intervals) > 1 and all((each / step).denominator != 1 for each in intervals)
+    if not divides_none and all(period >= step for period in system.periods.values()):
+        return step
+    common = _common_divisor(intervals)
+    ratio = ceil(common / step)
+    decade = 10 ** (len(str(ratio)) - 1)
+    divisor = next(k * decade for k in (1, 2, 4, 5, 8, 10) if k * decade >= ratio)
+    return Fraction(common, divisor)
+
+
+def _intervals(system: System, settings: Settings) -> list[Fraction]:
+    """Return the periods and the recording interval (s), which the step size must divide."""
+    return [*system.periods.values(), *filter(None, [settings.record_interval])]
+
+
+def _common_divisor(intervals: Sequence[Fraction]) -> Fraction:
+    """Return the largest number that divides all intervals."""
+    denominator = lcm(*(each.denominator for each in intervals))
+    return Fraction(gcd(*(int(each * denominator) for each in intervals)), denominator)
+
+
+def _step_problem(system: System, settings: Settings, fitting: Fraction) -> Problem:
+    """Return the problem of a step size that does not fit, with the valid ones."""
+    step, common = settings.step_size, _common_divisor(_intervals(system, settings))
+    longer = [name for name, period in system.periods.items() if period < step]
+    unfit = longer or [name for name, period in system.periods.items() if (period / step).denominator != 1]
+    fault = (
+        f"is longer than the period of {abbreviate_names(longer, 3)}"
+        if longer
+        else f"divides no period of {abbreviate_names(unfit, 3)}"
+    )
+    example = "" if fitting == common else f", such as {time_text(fitting)}"
+    text = f"step size {float(step)!r} s {fault}: expected {time_text(common)} or a whole fraction of it{example}"
+    return Problem(text, subject=("step_size",))
+
+
 def _find_period_problems(system: System, settings: Settings, grid: TimeGrid) -> Iterator[Problem]:
-    """Yield the problems of the periods and of the recording interval; a too large step size is one problem."""
+    """Yield the problems of single periods and of the recording interval."""
     step, duration = float(grid.step), float(grid.step * grid.count)
-    periods = {name: period for name, period in system.periods.items() if period < grid.step}
-    if periods:
-        text = f"step size {step!r} s is longer than the period of {abbreviate_names(periods, 3)}"
-        yield Problem(f"{text}: expected at most {float(min(periods.values()))!r} s", subject=("step_size",))
-    else:
-        yield from _find_recording_problems(settings, grid)
+    yield from _find_recording_problems(settings, grid)
     for name, period in system.periods.items():
         subject = ("components", name, "period")
         ratio = period / grid.step
-        if ratio > 1 and ratio.denominator != 1:
+        if ratio.denominator != 1:
             yield Problem(f"period {float(period)!r} s is no multiple of the step size {step!r} s", subject=subject)
         elif 0 < grid.count < ratio:
             yield Problem(f"the duration {duration!r} s is shorter than the period {float(period)!r} s", subject=subject)

@@ -11,19 +11,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence, Set
+from collections.abc import Collection, Mapping, Sequence, Set
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
 from ..core import paths
-from ..core.errors import InputError, Problem, did_you_mean
+from ..core.errors import InputError, Problem, did_you_mean, nearest_name
 from ..core.size_limits import MAX_LEVELS
 from .component_schema import SOURCES
 from .file_paths import change_paths, find_scenario, path_in, relocating, resolve_shipped_paths
 from .included_files import include_files
 from .json_document import Document, JsonPath, Origin, read_document
 from .schema import KEYED_LISTS, NOT_INHERITED
+
+#: entries with names -> their noun, and the keys of which an entry needs one to be new; without them it changes one of the base
+_NEW_ENTRIES: Mapping[str, tuple[str, tuple[str, ...]]] = {
+    "components": ("component", SOURCES),
+    "connections": ("connection to", ("from",)),
+    "kpis": ("KPI", ("python",)),
+    "figures": ("figure", ("python",)),
+    "stop_when": ("stop condition", ("when",)),
+}
 
 
 def read_system_document(file: Path) -> Document:
@@ -140,9 +149,10 @@ def _component_of(name: Any) -> str:
     return name.partition(".")[0] if isinstance(name, str) else ""
 
 
-def _is_change_of_nothing(components: Mapping[str, Any], name: str, new: Any) -> bool:
-    """Return whether an entry without a source is none of the base's components, so that it can neither change nor add one."""
-    return name not in components and isinstance(new, dict) and bool(new) and not any(source in new for source in SOURCES)
+def _is_change_of_nothing(kind: str, new: Any) -> bool:
+    """Return True if an entry that the base lacks adds nothing, because it has no key that makes it new, misspelt or not."""
+    _, keys = _NEW_ENTRIES.get(kind, ("", ()))
+    return isinstance(new, dict) and bool(keys) and not any(key in keys or nearest_name(key, keys) for key in new)
 
 
 class _Merger:
@@ -163,8 +173,8 @@ class _Merger:
             places = ((*path, key), (*old_path, key), (*new_path, key))
             if key not in new:
                 result[key] = self._copy(self._base, places[0], old[key], places[1])
-            elif path == ("components",) and _is_change_of_nothing(old, key, new[key]):
-                self._report(places[2], f"the base has no such component{did_you_mean(key, old)}")
+            elif path == ("components",) and key not in old and _is_change_of_nothing("components", new[key]):
+                self._report_unknown(places[2], old)
             elif new[key] is not None:
                 result[key] = self._merge(*places, old.get(key), new[key])
             elif key in old:
@@ -203,6 +213,8 @@ class _Merger:
                 )
             elif name not in names and change is None:
                 self._report((kind, name), f"nothing to remove{did_you_mean(name, names)}")
+            elif name not in names and _is_change_of_nothing(kind, change):
+                self._report_unknown((kind, name), names)
             elif name not in names:
                 path = (kind, len(result))
                 result.append({key: name, **self._merge_element(path, (), (kind, name), {}, change)})
@@ -224,6 +236,14 @@ class _Merger:
         if isinstance(value, list):
             return [self._copy(document, (*path, i), each, (*old_path, i)) for i, each in enumerate(value)]
         return value
+
+    def _report_unknown(self, path: JsonPath, names: Collection[str]) -> None:
+        """Report a change of an entry that the base lacks; `names` are those of its entries."""
+        noun, keys = _NEW_ENTRIES[str(path[0])]
+        name = str(path[1])
+        near = nearest_name(name, names)
+        hint = f'; did you mean "{near}"?' if near else f"; a new one needs {' or '.join(keys)}{did_you_mean(name, names)}"
+        self._report(path, f'the base "{self._document.value["extends"]}" has no {noun} "{name}"{hint}')
 
     def _report(self, path: JsonPath, text: str) -> None:
         self.problems.append(Problem(text, self._document.where(path)))

@@ -37,11 +37,13 @@ def find_scenario(scenario: str | Path) -> Path:
     if path.suffix == ".json" or paths.is_file(path):
         return path
     names = resources.shipped_names("scenarios/*.json")
-    if str(scenario) not in names and paths.is_file(completed := path.with_name(f"{path.name}.json")):
+    if str(scenario) in names:
+        return resources.root() / "scenarios" / f"{scenario}.json"
+    if path.name and paths.is_file(completed := path.with_name(f"{path.name}.json")):
         return completed
-    if str(scenario) not in names:
-        raise InputError(f'no scenario file and no shipped scenario "{scenario}"{did_you_mean(str(scenario), names)}')
-    return resources.root() / "scenarios" / f"{scenario}.json"
+    if str(scenario) and paths.is_folder(path):
+        raise InputError(f"{scenario} is a folder, expected a scenario file")
+    raise InputError(f'no scenario file and no shipped scenario "{scenario}"{did_you_mean(str(scenario), names)}')
 
 
 def path_in(folder: Path, text: str) -> Path:

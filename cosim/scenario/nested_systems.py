@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -165,7 +165,7 @@ def load_scenario(
     reader = _SystemReader()
     file = reader.read(document, ScenarioSpec, ())
     check_expanded_size(file)
-    seeds = _find_seed_problems(document, file.spec)
+    seeds = _find_seed_problems(document, file.spec, file.invalid_keys)
     return Scenario(_make_node(file), [*problems, *reader.problems, *seeds], variables)
 
 
@@ -178,13 +178,15 @@ def _refuse_study(document: Document) -> None:
             raise InputError([Problem(text, document.where(("scenario",)))])
 
 
-def _find_seed_problems(document: Document, spec: SystemSpec) -> Iterator[Problem]:
-    """Yield a problem for each JSON pointer of "seeds" that no value can be set at."""
+def _find_seed_problems(document: Document, spec: SystemSpec, invalid_keys: Set[str]) -> Iterator[Problem]:
+    """Yield a problem for each JSON pointer of "seeds" that no value can be set at, except those below invalid keys."""
     for i, pointer in enumerate(spec.seeds if isinstance(spec, ScenarioSpec) else ()):
         if not pointer.startswith("/"):
             yield Problem(
                 f'expected a JSON pointer, which begins with "/"; found "{shorten(pointer)}"', document.where(("seeds", i))
             )
+        elif pointer.split("/")[1] in invalid_keys:
+            continue
         elif problem := json_pointer.set_value(copy_json(document.value), pointer, 0):
             yield Problem(problem, document.where(("seeds", i)))
 

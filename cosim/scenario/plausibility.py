@@ -3,22 +3,26 @@
 from __future__ import annotations
 
 import math
+from collections import defaultdict
 from collections.abc import Iterator
 from dataclasses import replace
+from fractions import Fraction
 from typing import TYPE_CHECKING
 
-from ..core.errors import Problem
+from ..components.fmi import FmuDescription
+from ..core.errors import Problem, abbreviate_names
 from ..core.paths import is_file
 from ..core.system import Endpoint
 from ..engine.transfer_plan import unit_conversion
+from .fitting_outputs import VariablesByEndpoint
 from .input_limits import set_excesses
-from .missing_connections import VariablesByEndpoint, find_missing_connections
+from .missing_connections import find_missing_connections
 
 if TYPE_CHECKING:
     from .prepared_run import PreparedRun
 
-#: ratio of a step size to the one that an FMU recommends from which on results are probably wrong
-_MAX_STEP_RATIO = 50
+#: ratio of the step of a component to the one that its FMU recommends, from which on results may be wrong
+_MAX_STEP_RATIO = 5
 
 
 def find_warnings(prepared: PreparedRun) -> list[Problem]:
@@ -36,7 +40,7 @@ def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
         yield Problem(prepared.plan.end_warning, prepared.root.where("stop_time"))
     yield from _missing_connections(prepared)
     yield from _double_conversions(prepared)
-    yield from _large_step(prepared)
+    yield from _large_steps(prepared)
     for file in prepared.component_factory.fmus.values():
         if file.run_warning:
             yield Problem(file.run_warning)
@@ -45,8 +49,8 @@ def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
 
 
 def _missing_connections(prepared: PreparedRun) -> Iterator[Problem]:
-    """Yield a warning for each component with inputs that probably lack a connection, and one for components without any."""
-    for name, text in find_missing_connections(prepared.system, unconnected_inputs(prepared)):
+    """Yield a warning for each connection that is probably missing, and for components with other inputs that lack one."""
+    for name, text in find_missing_connections(prepared.root, prepared.system, unconnected_inputs(prepared)):
         found = prepared.root.find_component(name)
         yield Problem(text, found[0].where("components", found[1]) if found else prepared.root.where("connections"))
 
@@ -82,17 +86,36 @@ def unconnected_inputs(prepared: PreparedRun) -> VariablesByEndpoint:
     }
 
 
-def _large_step(prepared: PreparedRun) -> Iterator[Problem]:
-    """Yield a warning if the step size is much longer than the shortest one that an FMU recommends (FMI: DefaultExperiment)."""
-    step = float(prepared.settings.step_size)
-    files = prepared.component_factory.fmus.values()
-    experiments = ((file.description.default_experiment, file.path.name) for file in files)
-    recommended = [(float(each.step_size), name) for each, name in experiments if each.step_size]
-    size, name = min(recommended, default=(math.inf, ""))
-    if step >= _MAX_STEP_RATIO * size:
-        ratio = f"{step / size:.3g} times the {size:g} s that {name} recommends"
-        text = f"a step of {step:g} s is {ratio}: the results are probably wrong, use about {size:g} s"
-        yield Problem(text, prepared.root.where("step_size"))
+def _large_steps(prepared: PreparedRun) -> Iterator[Problem]:
+    """Yield a warning for each step that is much longer than FMUs recommend (FMI: DefaultExperiment), with their components.
+
+    FMUs for Model Exchange are left out, because their solver has a step of its own.
+    """
+    system, macro_step = prepared.system, prepared.settings.step_size
+    groups: dict[Fraction, dict[str, Fraction]] = defaultdict(dict)
+    for name, component in system.components.items():
+        description = getattr(component, "description", None)
+        if isinstance(description, FmuDescription) and description.interface != "model-exchange":
+            step, recommended = system.periods.get(name, macro_step), description.default_experiment.step_size
+            if recommended and step >= _MAX_STEP_RATIO * recommended:
+                groups[step][name] = recommended
+    for step, sizes in groups.items():
+        names = sorted(sizes, key=sizes.__getitem__)
+        size, source = sizes[names[0]], prepared.sources[names[0]].rpartition("/")[2]
+        verb = "step" if len(names) > 1 else "steps"
+        fault = (
+            f"{abbreviate_names(names, 3)} {verb} every {float(step):g} s, {float(step / size):.3g} times the {float(size):g} s"
+        )
+        text = f"{fault} that {source} recommends: the results may be wrong, use about {float(size):g} s"
+        yield Problem(text, _where_step(prepared, names[0]))
+
+
+def _where_step(prepared: PreparedRun, component: str) -> str:
+    """Return the location of the period of a component, or else of the step size."""
+    found = prepared.root.find_component(component)
+    if component in prepared.system.periods and found:
+        return found[0].where("components", found[1], "period")
+    return prepared.root.where("step_size")
 
 
 def _missing_reference(prepared: PreparedRun) -> Iterator[Problem]:

@@ -14,7 +14,7 @@ from typing import Any, Generic, NamedTuple, TypeVar
 
 from pydantic import BaseModel, ValidationError
 
-from ..core.errors import Problem, did_you_mean
+from ..core.errors import Problem, did_you_mean, nearest_name
 from ..core.json_values import copy_json
 from ..core.text import REPLACEMENT, count_noun
 from .json_document import Document
@@ -61,7 +61,7 @@ def validate_document(document: Document, kind: type[S]) -> Validated[S]:
             path = _error_path(detail)
             if detail["type"] == "extra_forbidden":
                 _remove_key(value, path)
-                invalid_keys |= {key for key in kind.model_fields if len(path) == 1 and _may_mean(str(path[0]), key)}
+                invalid_keys |= {key for key in _meant_keys(kind, path) if len(path) == 1}
             else:
                 part = path[:-1] if detail["type"] == "missing" and len(path) > 1 else path
                 invalid_keys |= _remove_invalid(kind, value, [part if attempt < _MAX_ATTEMPTS else part[:1]])
@@ -113,8 +113,8 @@ def schema_problems(kind: type[BaseModel], document: Document, error: Validation
             case "value_error":
                 return path in above_invalid
             case "missing":
-                misspelt = (key for *parent, key in (*unknown_keys, *invalid) if tuple(parent) == path[:-1])
-                return any(_may_mean(str(key), str(path[-1])) for key in misspelt)
+                misspelt = (other for other in (*unknown_keys, *invalid) if other[:-1] == path[:-1])
+                return any(path[-1] in _meant_keys(kind, other) for other in misspelt)
             case "string_pattern_mismatch":
                 return path[0] == "algorithm" and detail["input"] in illegal_names
         return False
@@ -144,9 +144,10 @@ def _group_problem(kind: type[BaseModel], document: Document, group: Sequence[tu
     return Problem(f"{_error_message(kind, path, detail)}, and {count} likewise", document.where(path))
 
 
-def _may_mean(key: str, required: str) -> bool:
-    """Return True if an unknown or unreadable key is probably a misspelt required key."""
-    return REPLACEMENT in key or f'"{required}"' in did_you_mean(key, (required,))
+def _meant_keys(kind: type[BaseModel], path: Sequence[str | int]) -> list[str]:
+    """Return the keys that the unknown key at `path` may mean: the most similar one, or all if it is unreadable."""
+    key, known = str(path[-1]), _known_keys(kind, path[:-1])
+    return known if REPLACEMENT in key else list(filter(None, [nearest_name(key, known)]))
 
 
 def _error_path(detail: Any) -> tuple[str | int, ...]:

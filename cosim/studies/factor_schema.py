@@ -27,7 +27,7 @@ _LEVEL_SOURCES = ("values", "range", "distribution", "levels")
 #: quantiles in aggregates.csv
 QUANTILES = {"min": 0.0, "q05": 0.05, "q25": 0.25, "median": 0.5, "q75": 0.75, "q95": 0.95, "max": 1.0}
 #: columns of the output files beside those of factors or parameters
-TABLE_COLUMNS = ("run", "seed", "status", "passed", "failure", "output", "command")
+TABLE_COLUMNS = ("run", "seed", "status", "passed", "missed", "failure", "output", "command")
 AGGREGATE_COLUMNS = ("kpi", "count", "mean", "std", *QUANTILES)
 SUCCESS_COLUMNS = ("runs", "distinct", "failed", "passed", "rate", "low", "high")
 TRIAL_COLUMNS = ("value", "violation", "failure")

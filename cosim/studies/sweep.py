@@ -12,7 +12,7 @@ from typing import Any
 
 from ..core.errors import InputError, Problem
 from ..core.size_limits import MAX_RUNS
-from ..results.checks import Number, evaluate_checks
+from ..results.checks import CheckOutcome, Number, evaluate_all_checks, evaluate_checks
 from .design import Design, Point, build_design
 from .document import StudyFile, read_study
 from .execution.job import Job, Record, RunKey
@@ -92,10 +92,9 @@ class Sweep:
         success = self.study_file.spec.success
         return self.study.checks if success is None else [check.model_dump(exclude_none=True) for check in success]
 
-    def passed(self, kpis: Mapping[str, Number]) -> bool:
-        """Return whether these KPIs meet all criteria; a missing KPI does not."""
-        known = all(check["kpi"] in kpis for check in self.criteria)
-        return known and all(outcome.passed for outcome in evaluate_checks(kpis, self.criteria))
+    def missed(self, kpis: Mapping[str, Number]) -> list[CheckOutcome]:
+        """Return the criteria that these KPIs do not meet; a missing KPI has the value NaN and meets none."""
+        return [outcome for outcome in evaluate_all_checks(kpis, self.criteria) if not outcome.passed]
 
     def check(self, runner: CheckingRunner) -> None:
         """Raise InputError with all problems of the levels of the factors."""
@@ -165,7 +164,7 @@ class Sweep:
         for run, key in enumerate(self.keys):
             if key in run_store:
                 record = run_store[key]
-                passed = not record.failure and self.passed(record.kpis)
+                passed = not record.failure and not self.missed(record.kpis)
                 yield SweepRow(run, self.design[run], record, passed, key in self.shared_keys)
 
 

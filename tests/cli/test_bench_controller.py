@@ -181,8 +181,13 @@ def test_a_problem_inside_a_nested_system_keeps_its_position(folder):
 def test_entries_about_missing_variables_are_removed_and_noted(folder):
     done = bench(folder, keeper(folder), "--verbose")
     assert done.returncode == 3
-    assert 'note: sail: kpi "away" is left out: the candidate has no "usv.distance"' in done.stdout
-    assert 'note: sail: "usv.waypoint_count" is left out: the candidate has no such variable' in done.stdout
+    assert 'note: sail: kpi "away" is left out: the candidate has no "distance"' in done.stdout
+    assert 'note: sail: "usv.waypoint_count" is left out: the candidate has no "waypoint_count"' in done.stdout
+    below = done.stdout.partition("FAILED  sail")[2]
+    assert (
+        "\n        ignored settings: speed_command, acceptance_radius, waypoint_count, waypoint_x, waypoint_y, heading_P\n"
+        in below
+    )
     written = json.loads((folder / "runs/bench/vessel_autopilot/Keeper/scenarios/sail.json").read_text())
     assert written["components"]["usv"] == {"parameters": {}, "python": f"{folder / 'keeper.py'}:Keeper"}
     assert [kpi["name"] for kpi in written["kpis"]] == ["waypoints"]

@@ -246,7 +246,7 @@ def test_check_and_run_warn_about_a_forgotten_connection(tmp_path):
         assert done.returncode == 0
         (warning,) = done.stderr.splitlines()
         assert warning.startswith(f"WARNING {file}:1:")
-        assert "nothing feeds or sets plant.ship.motor[1], plant.ship.motor[2], but there is an output pilot.motor[1]" in warning
+        assert "plant.ship.motor[2]: is a connection from pilot.motor to plant.ship.motor missing?" in warning
     assert "1 warning." in checked.stdout
     assert "No warnings" not in checked.stdout
     assert warning in json.loads((tmp_path / "runs/small/run.json").read_text())["warnings"]

@@ -22,8 +22,8 @@ def test_all_problems_are_found_at_once():
     built = make_system(components, "a.y > b.u, c.y > b.u, a.z > c.u, a.u > c.u, a.y > d.u", stages=[("a", "e"), ("b",)])
     assert texts(built) == [
         'unknown component "e"; valid: c, f',
-        'component "c" is in no stage, so it would never step',
-        'component "f" is in no stage, so it would never step',
+        'component "c" is in no stage of "algorithm", so it would never step',
+        'component "f" is in no stage of "algorithm", so it would never step',
         "input b.u is connected twice: it is already fed by a.y",
         'component "a" has no variable "z"; valid: y',
         "a.u is of causality input, expected an output",

@@ -97,8 +97,22 @@ def test_a_step_longer_than_periods_is_one_problem():
     with pytest.raises(InputError) as refusal:
         simulate(built, replace(settings(), record_interval=exact_fraction(0.01)))
     (problem,) = refusal.value.problems
-    assert problem.message == "step size 1.0 s is longer than the period of a, b, c and 1 more: expected at most 0.01 s"
+    fault = "step size 1.0 s is longer than the period of a, b, c and 1 more"
+    assert problem.message == f"{fault}: expected 0.01 s or a whole fraction of it"
     assert problem.subject == ("step_size",)
+
+
+def test_a_step_that_divides_no_period_is_one_problem_with_a_valid_step():
+    """Events are compared with the valid step, which 1.5 s fits."""
+    built = make_system({name: counter() for name in "ab"}, periods={"a": exact_fraction(3), "b": exact_fraction(4.5)})
+    changed = settings(stop=9, step=2, record_interval=exact_fraction(1.5), events=[Event(exact_fraction(1.5), {})])
+    for step, example in ((0.8, ", such as 0.75 s"), ("4/3", ", such as 0.75 s"), (0.7, ", such as 0.375 s")):
+        with pytest.raises(InputError) as refusal:
+            simulate(built, replace(changed, step_size=exact_fraction(step)))
+        (problem,) = refusal.value.problems
+        assert problem.message.endswith(f" s divides no period of a, b: expected 1.5 s or a whole fraction of it{example}")
+        assert problem.subject == ("step_size",)
+    simulate(built, replace(changed, step_size=exact_fraction(0.75)))
 
 
 def test_a_refused_system_is_freed():

@@ -127,6 +127,8 @@ def test_paths_stay_relative_to_the_file_that_contains_them(folder):
     [
         ("other.json", 'cannot read "'),
         ("demo1_bax", 'no scenario file and no shipped scenario "demo1_bax"; did you mean "demo1_box"?'),
+        (".", ". is a folder, expected a scenario file"),
+        ("a" * 5000, 'no scenario file and no shipped scenario "aaa'),
         ("scenario.json", '"scenario.json" extends itself'),
         ("loop.json", '"scenario.json" extends itself'),
         (3, "expected the path of a file or the name of a shipped scenario"),
@@ -250,6 +252,40 @@ def test_paths_in_settings_start_from_the_working_directory(folder, extend, monk
     assert done.returncode == 0, done.stderr
 
 
-def test_a_misspelt_component_is_recognized(folder, extend):
-    (found,) = folder.problems_of(extend(components={"pllant": {"period": 0.2}}))
-    assert "components.pllant: the base has no such component" in found
+CHANGES_OF_NOTHING = {
+    "component": ({"components": {"B": {"period": 1}}}, '.components.B: the base "base.json" has no component "B"', "b"),
+    "empty": ({"components": {"B": {}}}, '.components.B: the base "base.json" has no component "B"', "b"),
+    "connection": (
+        {"connections": {"b.uu": {"delay": 1}}},
+        '.connections["b.uu"]: the base "base.json" has no connection to "b.uu"',
+        "b.u",
+    ),
+    "KPI": ({"kpis": {"ned": {"arguments": {}}}}, '.kpis.ned: the base "base.json" has no KPI "ned"', "end"),
+    "figure": (
+        {"figures": {"pahts": {"optional": True}}},
+        '.figures.pahts: the base "base.json" has no figure "pahts"; a new one needs python',
+        "",
+    ),
+}
+
+
+@pytest.mark.parametrize("case", CHANGES_OF_NOTHING)
+def test_a_misspelt_name_is_reported_at_its_place_in_the_extending_file(folder, extend, case):
+    changes, text, near = CHANGES_OF_NOTHING[case]
+    (found,) = folder.problems_of(extend(**changes))
+    assert found.startswith("scenario.json:1:")
+    assert found.endswith(f"${text}" + (f'; did you mean "{near}"?' if near else ""))
+
+
+def test_a_new_component_needs_a_source_and_a_place_in_the_stages(folder, base, extend):
+    stages = {"algorithm": {"kind": "staged", "stages": [["a"], ["b"]]}}
+    folder.write({**json.loads(base.read_text()), **stages}, "base.json")
+    (found,) = folder.problems_of(extend(components={"pilot": {"parameters": {"k": 1.0}}}))
+    assert (
+        'the base "base.json" has no component "pilot"; a new one needs fmu or python or modelica or system; valid: a, b' in found
+    )
+    (found,) = folder.problems_of(extend(components={"pilot": {"pyhton": "own.py:Own"}}))
+    assert '$.components.pilot.pyhton: unknown key; did you mean "python"?' in found
+    (found,) = folder.problems_of(extend(components={"pilot": folder.block("Gain")}))
+    assert found.startswith("scenario.json:1:")
+    assert '$.components.pilot: component "pilot" is in no stage of "algorithm", so it would never step' in found

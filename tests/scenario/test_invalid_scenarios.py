@@ -69,7 +69,7 @@ def test_all_problems_are_reported_at_once(folder):
         ({"events": [{"time": 0.5, "set": {"a.u": 1}}]}, "$.events[0]: event time 0.5 s lies between two"),
         ({"events": [{"time": 1, "set": {"a.q": 1}}]}, '$.events[0].set["a.q"]: component "a" has no variable "q"'),
         ({"algorithm": {"stages": [["a"], ["b"]]}}, '$.algorithm.stages: unknown component "b"'),
-        ({"algorithm": {"stages": []}}, '$.algorithm.stages: component "a" is in no stage'),
+        ({"algorithm": {"stages": []}}, '$.components.a: component "a" is in no stage of "algorithm", so it would never step'),
         ({"algorithm": {"kind": "magic", "stages": [["a"]]}}, "$.algorithm.kind: expected 'staged'"),
         ({"connections": [connection("a.y", "a.u", delay=-1)]}, "$.connections[0].delay: expected greater than or equal to 0"),
         ({"connections": [connection("a.y", "a.u", delay=1.5)]}, "$.connections[0].delay: expected a valid integer"),

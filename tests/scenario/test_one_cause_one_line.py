@@ -78,6 +78,11 @@ NAMES = {
     "a misspelt stop time": (renamed("stop_time", "stop_tme"), 'unknown key; did you mean "stop_time"?'),
     "misspelt components": (renamed("components", "component"), 'unknown key; did you mean "components"?'),
     "a misspelt source": (renamed("python", "pyhton", 1), 'unknown key; did you mean "python"?'),
+    "misspelt connections": (renamed("connections", "conections"), 'unknown key; did you mean "connections"?'),
+    "misspelt components with seeds": (
+        json.dumps(SCENARIO | {"seeds": ["/components/a/parameters/k"]}).replace('"components"', '"compnents"'),
+        'unknown key; did you mean "components"?',
+    ),
     "a misspelt list of signals": (TEXT.replace('"record": {"signals"', '"recrod": {"signals"'), 'did you mean "record"?'),
     "misspelt KPIs": (renamed("kpis", "kpsi"), 'unknown key; did you mean "kpis"?'),
     "a misspelt end of a connection": (renamed("from", "form", 1), 'unknown key; did you mean "from"?'),
@@ -187,6 +192,13 @@ def test_one_mistake_gives_one_line(folder, case):
 
 
 NESTED = {"components": {"x": GAIN}, "ports": {"inputs": {"u": "x.u"}, "outputs": {"y": "x.y"}}}
+
+
+def test_a_nested_system_in_no_stage_is_one_line(folder):
+    folder.write(NESTED | {"components": {"x": GAIN, "z": GAIN}}, "n.json")
+    stages = {"components": {"a": GAIN, "b": GAIN, "n": {"system": "n.json"}}, "seeds": []}
+    (line,) = refusal(folder, json.dumps(SCENARIO | stages))
+    assert line.endswith('$.components.n: component "n" is in no stage of "algorithm", so it would never step')
 
 
 @pytest.mark.parametrize(

@@ -29,14 +29,45 @@ def ship(folder, connections, parameters=(), **more):
 
 
 @pytest.mark.parametrize(
-    ("left", "line"),
+    ("left", "inputs", "connection"),
     [
-        (0, "plant: nothing feeds or sets plant.ship.motor[1], plant.ship.motor[2], but there is an output pilot.motor[1]"),
-        (1, "pilot: nothing feeds or sets pilot.vehicle.position.x, but there is an output plant.ship.position.x"),
+        (0, "plant: nothing feeds or sets plant.ship.motor[1], plant.ship.motor[2]: ", "pilot.motor to plant.ship.motor"),
+        (1, "pilot: nothing feeds or sets pilot.vehicle.position.x: ", "plant.ship.position.x to pilot.vehicle.position.x"),
     ],
 )
-def test_a_missing_connection_is_recognized_by_matching_names(folder, left, line):
-    assert ship(folder, [BOTH[left]]) == [f"components.{line}: is a connection missing?"]
+def test_a_missing_connection_is_recognized_by_matching_names(folder, left, inputs, connection):
+    assert ship(folder, [BOTH[left]]) == [f"components.{inputs}is a connection from {connection} missing?"]
+
+
+def test_a_missing_connection_to_a_nested_system_is_one_warning_with_all_outputs_that_fit(folder):
+    """The inner components share the port; a prefix fits if it has all of the names, whatever else it has."""
+    text = (resources.root() / "scenarios/demo1_box.json").read_text()
+    text = text.replace('"../', '"cosim:').replace('"systems/', '"cosim:scenarios/systems/').replace('"references/', '"cosim:')
+    lines = {"plant.uav": [], "plant.usv.deck": []}
+    for source, target in (("plant.uav", "uav.vehicle"), ("plant.usv.deck", "uav.target")):
+        link = f'  {{"from": "{source}", "to": "{target}"}},\n'
+        assert link in text
+        lines[source] = [line for line in warnings_of(folder.write(text.replace(link, ""))) if "connection" in line]
+    assert [line.partition(" more: ")[2] for line in lines["plant.uav"]] == [
+        "is a connection from plant.uav or plant.usv to uav.vehicle missing?"
+    ]
+    (line,) = lines["plant.usv.deck"]
+    inputs = "position.x, uav.target.position.y, uav.target.position.z, uav.target.velocity.x and 1 more"
+    missing = "is a connection from plant.uav, plant.usv or plant.usv.deck to uav.target missing?"
+    assert line == f"components.uav: nothing feeds or sets uav.target.{inputs}: {missing}"
+
+
+def test_a_connection_that_a_nested_system_lacks_inside_names_its_own_components(folder):
+    components = {"plant": folder.block("Plant"), "pilot": folder.block("Controller", parameters={"offset": 0.0})}
+    ports = {"inputs": {"push": "plant.ship.motor"}, "outputs": {"position": "plant.ship.position"}}
+    folder.write({"components": components, "connections": [], "ports": ports}, "n.json")
+    nested = {"inner": {"system": "n.json"}, "pilot": folder.block("Controller", parameters={"offset": 0.0})}
+    fed = [connection("inner.position.x", "pilot.vehicle.position.x")]
+    assert warnings_of(folder.scenario(nested, fed)) == [
+        "components.pilot: nothing feeds or sets inner.pilot.vehicle.position.x: "
+        "is a connection from inner.plant.ship.position.x to inner.pilot.vehicle.position.x missing?",
+        "connections: nothing feeds or sets an input of inner.plant: are connections missing?",  # its port has another name
+    ]
 
 
 KEEPS = 'it keeps its start value until a connection feeds or "parameters" set it'
@@ -129,9 +160,23 @@ def test_shipped_scenarios_cause_no_warnings(file):
     assert warnings_of(file) == []
 
 
-@pytest.mark.parametrize(("step", "lines"), [(0.4, 0), (0.5, 1)])
-def test_a_step_much_longer_than_an_fmu_recommends(folder, step, lines):
-    boat = {"fmu": str(resources.root() / "fmus/strider.fmu")}
-    found = warnings_of(folder.scenario({"boat": boat}, step_size=step, stop_time=2))
-    text = "a step of 0.5 s is 50 times the 0.01 s that strider.fmu recommends: the results are probably wrong, use about 0.01 s"
-    assert [line for line in found if "recommends" in line] == [f"step_size: {text}"] * lines
+def step_warnings(folder, step, **more):
+    boats = {name: {"fmu": str(resources.root() / "fmus/strider.fmu"), **more} for name in ("one", "other")}
+    found = warnings_of(folder.scenario(boats, step_size=step, stop_time=2))
+    return [line for line in found if "recommends" in line]
+
+
+def test_components_that_step_much_more_rarely_than_their_fmu_recommends_are_named(folder):
+    text = (
+        "one, other step every 0.05 s, 5 times the 0.01 s that strider.fmu recommends: the results may be wrong, use about 0.01 s"
+    )
+    assert step_warnings(folder, 0.04) == []
+    assert step_warnings(folder, 0.05) == [f"step_size: {text}"]
+    assert step_warnings(folder, 0.01, period=0.05) == [f"components.one.period: {text}"]
+
+
+def test_the_solver_of_an_fmu_for_model_exchange_keeps_its_own_step(folder):
+    fmu = {"fmu": str(resources.root() / "fmus/continuous_pid.fmu")}
+    assert [
+        len(warnings_of(folder.scenario({"pid": fmu | each}, step_size=0.05))) for each in ({}, {"solver": {"method": "euler"}})
+    ] == [1, 0]

@@ -57,8 +57,8 @@ _COSTS_FILE = "costs.json"
 )
 @click.option("--jobs", type=click.IntRange(min=1), help="Number of scenarios at a time; default: one per processor.")
 @json_option(
-    "an object with candidate, role, ranking, scenarios (name, applicable, code, seconds, problems, kpis) and notes; of several "
-    "controllers: role, reference and controllers, objects with the same keys, cost (s per step) and cost_ratio"
+    "an object with candidate, role, ranking, scenarios (name, applicable, code, seconds, problems, ignored_settings, kpis) and "
+    "notes; of several controllers: role, reference and controllers, objects with the same keys, cost (s per step) and cost_ratio"
 )
 def command(
     controllers: tuple[str, ...],
@@ -251,7 +251,9 @@ def _write_scenarios(controller: str, role_name: str, files: Sequence[Path], fol
         if path := substitution.write((folder / "scenarios").absolute()):
             places, own_names = zip(*substitution.replaced_components.items(), strict=True)
             own_name = ", ".join(dict.fromkeys(own_names))
-            written.append({"file": path, "original": file, "component": places[0], "own_name": own_name})
+            ignored = list(dict.fromkeys(each.lacking for each in substitution.omissions if not each.entry))
+            about = {"own_name": own_name, "ignored_settings": ignored}
+            written.append({"file": path, "original": file, "component": places[0], **about})
             omissions += [{"scenario": file.stem, **asdict(each)} for each in dict.fromkeys(substitution.omissions)]
     if not written:
         raise InputError(f'no scenario has a component with the role "{role.name}": {role.description}')
@@ -260,11 +262,11 @@ def _write_scenarios(controller: str, role_name: str, files: Sequence[Path], fol
 
 
 def _make_trials(
-    written: Sequence[Mapping[str, str]], folder: Path, shipped: Path, run_command: CommandRunner
+    written: Sequence[Mapping[str, Any]], folder: Path, shipped: Path, run_command: CommandRunner
 ) -> list[ControllerTrial]:
     """Return the trials of the written scenarios."""
-    found = [(Path(each["file"]), Path(each["original"]), each["own_name"]) for each in written]
+    found = [(Path(each["file"]), Path(each["original"]), each["own_name"], each["ignored_settings"]) for each in written]
     return [
-        ControllerTrial(file, original, own_name, folder / file.stem, shipped / file.stem, run_command)
-        for file, original, own_name in found
+        ControllerTrial(file, original, own_name, ignored, folder / file.stem, shipped / file.stem, run_command)
+        for file, original, own_name, ignored in found
     ]

@@ -35,18 +35,19 @@ _MAX_PRINTED = 20
 @click.option("--parquet", is_flag=True, help="Also write table.parquet (extra `parquet`).")
 @click.option("--replays", is_flag=True, help="Also write the 3-D replay of one run of each cell of the maps.")
 @json_option(
-    "an object with name, folder, runs, finished, failed, units (by KPI), failure_causes (cause, runs, first_run) and groups, "
-    "whose entries have labels, runs, distinct, passed, success_rate, interval (95 %) and kpis; the first group is all runs and "
-    "has the kpis"
+    "an object with name, folder, runs, finished, failed, units (by KPI), failure_causes (cause, runs, first_run), "
+    "missed_criteria (kpi, limits, runs, first_run, command) and groups, whose entries have labels, runs, distinct, passed, "
+    "success_rate, interval (95 %) and kpis; the first group is all runs and has the kpis"
 )
 @study_options.study_options
 def command(sweep: str, output_dir: Path | None, parquet: bool, replays: bool, as_json: bool, **study: Any) -> int:
     """Run a scenario at many points: parameter studies and Monte Carlo.
 
     SWEEP is a JSON file or the name of a shipped sweep. Each run has its own child process. Writes table.csv (one row per
-    run), aggregates.csv, success.csv, failures.csv, sweep.json, sweep.html and success maps to the output directory. Called
-    again, the command continues an interrupted sweep. Exit code 0: all runs reached their end; 1: some failed; 2: the sweep
-    was refused; 130: interrupted, the finished runs are written.
+    run), aggregates.csv, success.csv, unsuccessful.csv (criteria that a run misses, and the command that repeats it),
+    failures.csv, sweep.json, sweep.html and success maps to the output directory. Called again, the command continues an
+    interrupted sweep. Exit code 0: all runs reached their end; 1: some failed; 2: the sweep was refused; 130: interrupted, the
+    finished runs are written.
     """
     from ...results.parquet_files import require_parquet
     from ...studies.sweep import Sweep
@@ -118,7 +119,7 @@ def _write_maps_and_page(
         runs = [cell.representative_run.number for each in maps for cell in each.cells.values() if cell.representative_run]
         for run, cause in write_replays(sweep, runs, folder, workers or available_processors()).items():
             click.echo(f"no replay of run {run}: {cause}", err=True)
-    write_sweep_page(sweep, summary, maps, folder)
+    write_sweep_page(sweep, sweep.rows(run_store), summary, maps, folder)
 
 
 def _print_summary(sweep: Sweep, summary: SweepSummary) -> None:
@@ -136,6 +137,9 @@ def _print_summary(sweep: Sweep, summary: SweepSummary) -> None:
         if summary.groups[0].distinct < summary.groups[0].runs:
             runs = count_noun(summary.groups[0].runs, "run")
             click.echo(f"{summary.groups[0].distinct} of {runs} are distinct; only these count in the intervals")
+    for each in _first(summary.missed_criteria, "sweep.html"):
+        runs = f"{each.runs} of {count_noun(summary.finished, 'run')}"
+        click.echo(f"{each.kpi} {each.limits}: missed by {runs}; the first is run {each.first_run}:\n  {each.command}")
     for cause, count, first in _first(summary.failure_causes, "failures.csv"):
         click.echo(f"{count} failed, first run {first}: {cause}", err=True)
 
@@ -169,6 +173,7 @@ def _summary_as_json(sweep: Sweep, summary: SweepSummary, folder: Path) -> dict[
         "failed": summary.failed,
         "units": dict(summary.units),
         "failure_causes": [{"cause": cause, "runs": count, "first_run": first} for cause, count, first in summary.failure_causes],
+        "missed_criteria": [each._asdict() for each in summary.missed_criteria],
         "groups": groups,
     }
 

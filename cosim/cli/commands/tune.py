@@ -119,7 +119,7 @@ def _print_worst(search: WorstCase, files: list[Path]) -> None:
 
 
 def _print_best(tuning: Tuning, best: Trial, folder: Path, failure: str | None) -> None:
-    from ...studies.summary.sweep_files import format_run_command
+    from ...studies.summary.run_commands import format_run_command
 
     first = tuning.trials[0]
     rows = [[name, f"{first.parameters[name]:.6g}", f"{value:.6g}"] for name, value in best.parameters.items()]

@@ -167,7 +167,8 @@ def interface_problems(role: Role, interface: CandidateInterface, settings: Iter
         interface: the controller's interface.
         settings: names of the variables that are set.
     """
-    expected = {**role.inputs, **role.outputs, **role.parameters}
+    short = {short: role.parameters[name] for name, short in role.short_names.items()}
+    expected = {**short, **role.inputs, **role.outputs, **role.parameters}
     return [
         *(_missing_output(name, role, interface) for name in role.outputs if name not in interface.outputs),
         *(_unexpected_input(name, role, interface) for name in interface.inputs if name not in role.inputs),

@@ -8,19 +8,22 @@ Each role is a JSON file; the shipped ones are in scenarios/roles/. Paths in it 
                 "target": {"outputs_of": "../../fmus/strider.fmu", "below": "deck"},
                 "altitude_command": "m"},                                       a single variable and its unit
      "outputs": {"thrust": {"unit": "N", "description": "Positive: forward"}, "rotor_speed[1]": "rad/s"},
-     "parameters": {"speed_command": "m/s"},
+     "parameters": {"speed_command": "m/s",                                     optional: scenarios set them
+                    "vtol.landing_time": {"unit": "s", "start": 5, "description": "Earliest start of the approach"}},
      "goals": ["waypoints.reached", "waypoints.time*"],                         KPIs that rank controllers, the first one first
      "cost_reference": "../../fmus/ar_drone_geometric.fmu",                     costs per step are ratios to that of this FMU
      "stand_ins": {"../../fmus/strider_autopilot.fmu": "../systems/strider_autopilot.json"}}
 
 A controller declares the inputs and parameters that it uses; it must have all outputs. A parameter without an index stands for
-an array. `stand_ins` maps a file to an equivalent nested system, so that a part of it can be replaced.
+an array. A parameter with a prefix may also be declared without it: `landing_time` in place of `vtol.landing_time`.
+`stand_ins` maps a file to an equivalent nested system, so that a part of it can be replaced.
 """
 
 from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
+from typing import Literal
 
 from pydantic import TypeAdapter, ValidationError
 
@@ -46,6 +49,13 @@ class VariableSpec(Spec):
     description: str
 
 
+class ParameterSpec(VariableSpec):
+    """Parameter that scenarios set; `start` is the value where no scenario sets it (None: each scenario sets it)."""
+
+    type: Literal["Real", "Integer", "Boolean"] = "Real"
+    start: bool | float | None = None
+
+
 class RoleSpec(Spec):
     """Schema of a role's file."""
 
@@ -55,7 +65,7 @@ class RoleSpec(Spec):
     outputs: dict[str, str | VariableSpec]
     goals: list[str] = []
     cost_reference: str | None = None
-    parameters: dict[str, str | VariableSpec] = {}
+    parameters: dict[str, str | ParameterSpec] = {}
     stand_ins: dict[str, str] = {}
 
 
@@ -75,6 +85,11 @@ class Role:
     stand_ins: dict[Path, Path]
     #: costs per step are ratios to that of this FMU; None: to that of the first controller
     cost_reference: Path | None
+
+    @property
+    def short_names(self) -> dict[str, str]:
+        """Names of the parameters without their prefixes, such as "landing_time", by those with prefixes."""
+        return {name: name.rpartition(".")[2] for name in self.parameters if "." in name}
 
     @property
     def different_controllers(self) -> list[Path]:

@@ -1,7 +1,8 @@
 """Scenarios in which a candidate replaces the shipped controller.
 
 Entries of a scenario that refer to variables which the candidate lacks (parameters, connections to inputs, KPIs of its signals)
-are removed and noted. References are removed, since another controller gives other trajectories.
+are removed and noted. A parameter of the role that the candidate declares without its prefix is renamed.
+References are removed, since another controller gives other trajectories.
 """
 
 from __future__ import annotations
@@ -10,7 +11,7 @@ import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ...core.errors import InputError
 from ...results.files import write_json
@@ -22,8 +23,21 @@ from ...scenario.nested_systems import load_scenario
 from .candidate import CandidateInterface, CandidateSource
 from .role import Role
 
-#: returns whether a name of a system still exists
-NameFilter = Callable[[str], bool]
+
+class NewName(NamedTuple):
+    """Name of a variable in a changed system.
+
+    Attributes:
+        name: the name.
+        lacking: variable of the candidate that does not exist, such as "vtol.landing_time"; "": the name is valid.
+    """
+
+    name: str
+    lacking: str = ""
+
+
+#: returns the new name for a name of the unchanged system
+NameMap = Callable[[str], NewName]
 #: end of the first part of a name
 _SEPARATOR = re.compile(r"[.\[]")
 
@@ -34,16 +48,17 @@ class Omission:
 
     Attributes:
         entry: 'kpi "descent"' or 'figure "landing"'; "" for a value of the variable or a connection to it.
-        variable: full name of the variable.
+        variable: full name of the variable in the scenario, such as "demo1.landing_time".
+        lacking: name of the variable that the candidate would need for it, such as "vtol.landing_time".
     """
 
     entry: str
     variable: str
+    lacking: str
 
     def __str__(self) -> str:
-        if self.entry:
-            return f'{self.entry} is left out: the candidate has no "{self.variable}"'
-        return f'"{self.variable}" is left out: the candidate has no such variable'
+        entry = self.entry or f'"{self.variable}"'
+        return f'{entry} is left out: the candidate has no "{self.lacking}"'
 
 
 @dataclass
@@ -84,95 +99,107 @@ class ControllerSubstitution:
         if loaded.problems:
             raise InputError(loaded.problems)
         self._folder, origin = folder, self.file.parent.resolve()
-        changed, known = self._substitute_system(loaded.root.document.value, origin, "")
+        changed, renamed = self._substitute_system(loaded.root.document.value, origin, "")
         if not self.replaced_components:
             return None
         path = folder / self.file.name
-        write_json(self._prune_scenario(changed, known, origin), path)
+        write_json(self._prune_scenario(changed, renamed, origin), path)
         return path
 
     # -- systems -------------------------------------------------------------------------------------------------------
 
-    def _substitute_system(self, value: Mapping[str, Any], folder: Path, prefix: str) -> tuple[dict[str, Any], NameFilter]:
-        """Return a system that contains the candidate, and a filter of the names that exist in it."""
-        filters: dict[str, NameFilter] = {}
+    def _substitute_system(self, value: Mapping[str, Any], folder: Path, prefix: str) -> tuple[dict[str, Any], NameMap]:
+        """Return a system that contains the candidate, and a map of the names that exist in it."""
+        maps: dict[str, NameMap] = {}
         components = {
-            name: self._substitute_component(spec, folder, f"{prefix}{name}", name, filters)
+            name: self._substitute_component(spec, folder, f"{prefix}{name}", name, maps)
             for name, spec in value["components"].items()
         }
 
-        def known(name: str) -> bool:
+        def renamed(name: str) -> NewName:
             component, _, rest = name.partition(".")
-            return component not in filters or filters[component](rest)
+            new = maps[component](rest) if component in maps and rest else NewName(rest)
+            return NewName(f"{component}.{new.name}" if rest else name, new.lacking)
 
-        for name in filters:
-            spec = components[name]
-            parameters = {key: v for key, v in spec.get("parameters", {}).items() if self._is_kept(known, f"{name}.{key}")}
-            components[name] = {**spec, "parameters": parameters}
-        connections = [each for each in value.get("connections", []) if self._is_kept(known, each["to"])]
-        return {**value, "components": components, "connections": connections}, known
+        for name in maps:
+            parameters = self._known_settings(maps[name], components[name].get("parameters", {}), f"{name}.")
+            own = self.parameters if f"{prefix}{name}" in self.replaced_components else {}
+            components[name] = {**components[name], "parameters": {**parameters, **own}}
+        connections = [
+            {**each, "to": new} for each in value.get("connections", []) if (new := self._kept_name(renamed, each["to"]))
+        ]
+        return {**value, "components": components, "connections": connections}, renamed
 
     def _substitute_component(
-        self, spec: Mapping[str, Any], folder: Path, full_name: str, name: str, filters: dict[str, NameFilter]
+        self, spec: Mapping[str, Any], folder: Path, full_name: str, name: str, maps: dict[str, NameMap]
     ) -> dict[str, Any]:
         kind = next(source for source in SOURCES if source in spec)
         path = (folder / _reference_file(spec[kind])).resolve()
         if path in self.role.controllers:
             self.replaced_components[full_name] = path.stem
-            filters[name] = self.interface.has_variables
-            period = {key: value for key, value in spec.items() if key == "period"}
-            return {**self.candidate.entry, **period, "parameters": {**spec.get("parameters", {}), **self.parameters}}
+            maps[name] = self._candidate_name
+            return {**self.candidate.entry, **{key: spec[key] for key in ("period", "parameters") if key in spec}}
         system = self.role.stand_ins.get(path, path if kind == "system" else None)
         nested = self._substitute_nested(system, full_name) if system else None
         if nested is None:
             return {**spec, kind: absolute_reference(spec[kind], folder)}
-        changed, filters[name] = nested
+        changed, maps[name] = nested
         return {key: value for key, value in spec.items() if key not in (kind, "isolation")} | {"system": str(changed)}
 
-    def _substitute_nested(self, file: Path, full_name: str) -> tuple[Path, NameFilter] | None:
-        """Write a nested system with the candidate; return its path and name filter, or None if no component has the role."""
+    def _candidate_name(self, name: str) -> NewName:
+        """Return the candidate's name of a variable: a parameter of the role may lack its prefix."""
+        if self.interface.has_variables(name):
+            return NewName(name)
+        short = self.role.short_names.get(name, "")
+        return NewName(short) if short in self.interface.parameters else NewName(name, name)
+
+    def _substitute_nested(self, file: Path, full_name: str) -> tuple[Path, NameMap] | None:
+        """Write a nested system with the candidate; return its path and name map, or None if no component has the role."""
         before = len(self.replaced_components)
-        value, known = self._substitute_system(read_system_document(file).value, file.parent, f"{full_name}.")
+        value, renamed = self._substitute_system(read_system_document(file).value, file.parent, f"{full_name}.")
         if len(self.replaced_components) == before:
             return None
-        ports, lost = self._prune_ports(value.get("ports", {}), known)
+        ports, lost = self._prune_ports(value.get("ports", {}), renamed)
         path = self._folder / "systems" / f"{self.file.stem}.{full_name}.json"
         write_json({**value, "ports": ports}, path)
         shown = {port for kind in ports.values() for port in kind}
 
-        def known_outside(name: str) -> bool:
+        def renamed_outside(name: str) -> NewName:
             port = _SEPARATOR.split(name, 1)[0]
-            return port in shown or (port not in lost and known(name))
+            if port in shown:
+                return NewName(name)
+            return NewName(name, lost[port]) if port in lost else renamed(name)
 
-        return path, known_outside
+        return path, renamed_outside
 
-    def _prune_ports(self, ports: Mapping[str, Any], known: NameFilter) -> tuple[dict[str, Any], set[str]]:
-        """Return the ports that lead to a `known` variable of the changed system, and the names of the removed ports."""
+    def _prune_ports(self, ports: Mapping[str, Any], renamed: NameMap) -> tuple[dict[str, Any], dict[str, str]]:
+        """Return the ports that lead to a variable of the changed system, and what is lacking for the removed ports."""
         remaining: dict[str, dict[str, Any]] = {kind: {} for kind in ports}
-        lost = set()
+        lost = {}
         for kind, named in ports.items():
             for port, inner in named.items():
-                targets = [name for name in ([inner] if isinstance(inner, str) else inner) if known(name)]
+                found = [renamed(name) for name in ([inner] if isinstance(inner, str) else inner)]
+                targets = [new.name for new in found if not new.lacking]
                 if targets:
                     remaining[kind][port] = targets[0] if isinstance(inner, str) else targets
                 else:
-                    lost.add(port)
+                    lost[port] = found[0].lacking
         return remaining, lost
 
     # -- the scenario's own keys ---------------------------------------------------------------------------------------
 
-    def _prune_scenario(self, value: dict[str, Any], known: NameFilter, folder: Path) -> dict[str, Any]:
-        signals = [name for name in value.get("record", {}).get("signals", ["*"]) if "*" in name or known(name)]
+    def _prune_scenario(self, value: dict[str, Any], renamed: NameMap, folder: Path) -> dict[str, Any]:
+        signals = [name for name in value.get("record", {}).get("signals", ["*"]) if "*" in name or not renamed(name).lacking]
         functions = {
             key: [
                 {**each, "python": absolute_reference(each["python"], folder)}
                 for each in value.get(key, [])
-                if self._all_known(known, each, folder, f'{key[:-1]} "{each["name"]}"')
+                if self._all_known(renamed, each, folder, f'{key[:-1]} "{each["name"]}"')
             ]
             for key in ("kpis", "figures")
         }
         kpis = {each["name"] for each in functions["kpis"]}
-        events = [{**each, "set": self._known_settings(known, each["set"])} for each in value.get("events", [])]
+        events = [{**each, "set": self._known_settings(renamed, each["set"])} for each in value.get("events", [])]
         inputs = [{**each, "file": absolute_reference(each["file"], folder)} for each in value.get("inputs", [])]
         scene = value.get("scene")
         return {
@@ -185,25 +212,27 @@ class ControllerSubstitution:
             **({"scene": {**scene, "python": absolute_reference(scene["python"], folder)}} if scene else {}),
         }
 
-    def _known_settings(self, known: NameFilter, settings: Mapping[str, Any]) -> dict[str, Any]:
-        return {name: value for name, value in settings.items() if self._is_kept(known, name)}
+    def _known_settings(self, renamed: NameMap, settings: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
+        return {new: value for name, value in settings.items() if (new := self._kept_name(renamed, name, prefix))}
 
-    def _all_known(self, known: NameFilter, function: Mapping[str, Any], folder: Path, what: str) -> bool:
+    def _all_known(self, renamed: NameMap, function: Mapping[str, Any], folder: Path, what: str) -> bool:
         spec = FunctionSpec.model_validate(function)
-        missing = [text for text in _strings(spec.arguments) if not known(text)]
+        groups = [[text] for text in _strings(spec.arguments)]
         if sources := [source for source in spec.sources if not source.startswith("/")]:
             needed = [name for name, is_required in declared_arguments(spec, folder).items() if is_required]
-            absent = (name for name in needed if name not in spec.arguments)
-            missing += [f"{sources[0]}.{name}" for name in absent if not any(known(f"{source}.{name}") for source in sources)]
+            groups += [[f"{source}.{name}" for source in sources] for name in needed if name not in spec.arguments]
+        missing = [(names[0], lacking[0]) for names in groups if all(lacking := [renamed(name).lacking for name in names])]
         if missing:
-            self.omissions.append(Omission(what, missing[0]))
+            self.omissions.append(Omission(what, *missing[0]))
         return not missing
 
-    def _is_kept(self, known: NameFilter, name: str) -> bool:
-        if known(name):
-            return True
-        self.omissions.append(Omission("", name))
-        return False
+    def _kept_name(self, renamed: NameMap, name: str, prefix: str = "") -> str | None:
+        """Return the new name of a variable that is set or fed; note it and return None if the candidate lacks it."""
+        new = renamed(name)
+        if not new.lacking:
+            return new.name
+        self.omissions.append(Omission("", f"{prefix}{name}", new.lacking))
+        return None
 
 
 def absolute_reference(reference: str, folder: Path) -> str:

@@ -13,11 +13,13 @@ from ...report.pages import render_page, safe_markup
 from ...results.checks import evaluate_checks
 from ...results.files import remove_files, writing_atomically
 from ..design import Design
-from ..sweep import Sweep
-from .replays import replay_path, replay_settings
+from ..sweep import Sweep, SweepRow
+from .missed_criteria import criterion_limits
+from .replays import replay_path
+from .run_commands import run_command
 from .success_map import MAP_NAME, MapCell, SuccessMap
 from .success_map_figure import draw_map
-from .sweep_files import SweepSummary, format_run_command
+from .sweep_files import SweepSummary
 
 PAGE_FILE = "sweep.html"
 _MAP_FILE = re.compile(rf"{MAP_NAME}(_\d+)?\.(png|svg)")
@@ -25,7 +27,9 @@ _MAP_FILE = re.compile(rf"{MAP_NAME}(_\d+)?\.(png|svg)")
 _MAX_LISTED_LEVELS = 12
 
 
-def write_sweep_page(sweep: Sweep, summary: SweepSummary, maps: Sequence[SuccessMap], folder: Path) -> None:
+def write_sweep_page(
+    sweep: Sweep, rows: Iterable[SweepRow], summary: SweepSummary, maps: Sequence[SuccessMap], folder: Path
+) -> None:
     """Write every map as NAME.png and NAME.svg, and sweep.html with maps, success rates, KPIs, failures and the design.
 
     Each cell of a map is a link to the replay of one of its runs if there is one, else to the command that repeats that run.
@@ -33,6 +37,7 @@ def write_sweep_page(sweep: Sweep, summary: SweepSummary, maps: Sequence[Success
 
     Args:
         sweep: the sweep.
+        rows: its finished runs.
         summary: its statistics.
         maps: its success maps.
         folder: the output directory.
@@ -43,7 +48,7 @@ def write_sweep_page(sweep: Sweep, summary: SweepSummary, maps: Sequence[Success
         folder, *(path.name for path in folder.glob(f"{MAP_NAME}*") if _MAP_FILE.fullmatch(path.name) and path.name not in drawn)
     )
     statistics = overall.shown_statistics() if overall else ()
-    cells = list(_shown_cells(sweep, maps, folder))
+    cells = list(_shown_cells(sweep, rows, maps, folder))
     text = render_page(
         "sweep.html",
         spec=sweep.study_file.spec,
@@ -66,7 +71,7 @@ def write_sweep_page(sweep: Sweep, summary: SweepSummary, maps: Sequence[Success
 def _criterion(check: Mapping[str, Any], units: Mapping[str, str]) -> tuple[str, str]:
     """Return a criterion as (KPI, limits with their unit)."""
     (outcome,) = evaluate_checks({check["kpi"]: 0.0}, [check])
-    return check["kpi"], f"{outcome.limits} {units.get(check['kpi'], '')}".rstrip()
+    return check["kpi"], criterion_limits(outcome, units)
 
 
 def _design_rows(sweep: Sweep) -> Iterator[tuple[str, str]]:
@@ -108,14 +113,20 @@ def _cell_link(sweep: Sweep, cell: MapCell, folder: Path) -> str:
     return page if (folder / page).exists() else f"{PAGE_FILE}#run-{cell.representative_run.number}"
 
 
-def _shown_cells(sweep: Sweep, maps: Iterable[SuccessMap], folder: Path) -> Iterator[dict[str, Any]]:
-    """Yield each run that represents a cell, once, with its command."""
+def _shown_cells(sweep: Sweep, rows: Iterable[SweepRow], maps: Iterable[SuccessMap], folder: Path) -> Iterator[dict[str, Any]]:
+    """Yield each run that represents a cell, once, with the reasons why it is no success and with its command."""
     shown = {
         cell.representative_run.number: cell
         for map_ in maps
         for cell in map_.cells.values()
         if cell.representative_run is not None
     }
+    reasons = {row.run: _reasons(sweep, row) for row in rows if row.run in shown}
     for number, cell in sorted(shown.items()):
-        command = format_run_command(sweep.study_file.scenario, replay_settings(sweep, number))
-        yield {"run": number, "cell": cell, "link": _cell_link(sweep, cell, folder), "command": command}
+        texts = {"reasons": reasons[number], "command": run_command(sweep, number)}
+        yield {"run": number, "cell": cell, "link": _cell_link(sweep, cell, folder), **texts}
+
+
+def _reasons(sweep: Sweep, row: SweepRow) -> list[str]:
+    """Return why a run is no success: the failure, or the criteria that it misses."""
+    return [row.record.failure] if row.record.failure else [str(outcome) for outcome in sweep.missed(row.record.kpis)]

@@ -6,12 +6,12 @@ from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 from ..execution.job import Job, Record
 from ..execution.local import LocalRunner
 from ..execution.worker_pool import WorkerPool
 from ..sweep import Sweep
+from .run_commands import run_settings
 
 REPLAY_FOLDER = "replays"
 
@@ -19,12 +19,6 @@ REPLAY_FOLDER = "replays"
 def replay_path(sweep: Sweep, run: int) -> str:
     """Return the path of a run's replay, relative to the folder of the sweep."""
     return f"{REPLAY_FOLDER}/{sweep.keys[run]}.html"
-
-
-def replay_settings(sweep: Sweep, run: int) -> dict[str, Any]:
-    """Return the settings that repeat a run with all signals that the scenario records, not only those that the sweep needs."""
-    settings = sweep.study.job(sweep.design[run].settings).settings
-    return {name: value for name, value in settings.items() if not name.startswith("/record")}
 
 
 def write_replays(sweep: Sweep, runs: Iterable[int], folder: Path, workers: int) -> dict[int, str]:
@@ -40,5 +34,5 @@ def write_replays(sweep: Sweep, runs: Iterable[int], folder: Path, workers: int)
 
 def _write_replay(sweep: Sweep, pool: WorkerPool, run: int, page: Path) -> Record:
     labels = ", ".join(f"{name} {label}" for name, label in sweep.design[run].labels.items())
-    job = Job(sweep.keys[run], replay_settings(sweep, run))
+    job = Job(sweep.keys[run], run_settings(sweep, run))
     return pool.replay(job, f"{sweep.study_file.spec.name} run {run}: {labels}", page)

@@ -1,12 +1,10 @@
-"""Files of a sweep: table, aggregates, success rates, failures, and metadata."""
+"""Files of a sweep: table, aggregates, success rates, runs without success, failures, and metadata."""
 
 from __future__ import annotations
 
-import json
-import shlex
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
-from os.path import normpath
+from itertools import islice
 from pathlib import Path
 from typing import Any
 
@@ -15,8 +13,13 @@ from ..execution.bundle import cosim_fingerprint
 from ..execution.run_store import RunStore
 from ..factor_schema import AGGREGATE_COLUMNS, SUCCESS_COLUMNS
 from ..sweep import Sweep, SweepRow, kpi_names
+from .missed_criteria import MissedCriterion, UnsuccessfulRun, missed_criteria, unsuccessful_runs
+from .run_commands import format_run_command
 from .statistics import RunGroup, failure_causes, group_rows, groupings
 from .table import write_csv, write_csv_rows, write_parquet
+
+#: largest number of runs without success in a summary
+_MAX_LISTED_RUNS = 50
 
 
 @dataclass(frozen=True)
@@ -28,12 +31,21 @@ class SweepSummary:
         groups: groups of runs; the first one holds all of them.
         failure_causes: cause, number of runs and first run.
         units: units of the KPIs that have one.
+        missed_criteria: criteria of success that runs miss.
+        unsuccessful_runs: the first runs that reached their end without success.
     """
 
     finished: int
     groups: list[RunGroup]
     failure_causes: list[tuple[str, int, int]]
     units: Mapping[str, str]
+    missed_criteria: list[MissedCriterion]
+    unsuccessful_runs: list[UnsuccessfulRun]
+
+    @property
+    def unsuccessful(self) -> int:
+        """Number of runs that reached their end without success."""
+        return self.groups[0].runs - self.groups[0].failed - self.groups[0].passed if self.groups else 0
 
     @property
     def failed(self) -> int:
@@ -42,7 +54,7 @@ class SweepSummary:
 
 
 def write_sweep_files(sweep: Sweep, run_store: RunStore, folder: Path, parquet: bool) -> SweepSummary:
-    """Write table.csv, aggregates.csv, success.csv, failures.csv and sweep.json, and return the summary.
+    """Write table.csv, aggregates.csv, success.csv, unsuccessful.csv, failures.csv and sweep.json, and return the summary.
 
     With `parquet`, table.parquet is written, too; else an older one is removed.
     """
@@ -64,8 +76,19 @@ def write_sweep_files(sweep: Sweep, run_store: RunStore, folder: Path, parquet: 
             groups.append(group)
     write_csv_rows([*factors, *AGGREGATE_COLUMNS], statistics, folder / "aggregates.csv")
     write_csv_rows([*factors, *SUCCESS_COLUMNS], (_success_row(group, factors) for group in groups), folder / "success.csv")
+    unsuccessful = (
+        [each.run, *each.labels.values(), "; ".join(each.missed), each.command] for each in unsuccessful_runs(sweep, rows())
+    )
+    write_csv_rows(["run", *factors, "missed", "command"], unsuccessful, folder / "unsuccessful.csv")
     write_csv_rows(["run", *factors, "failure", "output", "command"], _failure_rows(sweep, rows()), folder / "failures.csv")
-    summary = SweepSummary(groups[0].runs if groups else 0, groups, failure_causes(rows()), run_store.units)
+    summary = SweepSummary(
+        groups[0].runs if groups else 0,
+        groups,
+        failure_causes(rows()),
+        run_store.units,
+        missed_criteria(sweep, rows(), run_store.units),
+        list(islice(unsuccessful_runs(sweep, rows()), _MAX_LISTED_RUNS)),
+    )
     write_json(_sweep_metadata(sweep, summary), folder / "sweep.json")
     return summary
 
@@ -84,21 +107,6 @@ def _failure_rows(sweep: Sweep, rows: Iterator[SweepRow]) -> Iterator[list[Any]]
         if row.record.failure:
             command = format_run_command(sweep.study_file.scenario, sweep.study.job(row.point.settings).settings)
             yield [row.run, *row.point.labels.values(), row.record.failure, row.record.output, command]
-
-
-def format_run_command(scenario: Path, settings: Any) -> str:
-    """Return the command line that makes this run alone."""
-    words = [word for name, value in settings.items() for word in ("--set", f"{name}={_setting_text(value)}")]
-    return shlex.join(["cosim", "run", normpath(scenario), *words])
-
-
-def _setting_text(value: Any) -> str:
-    """Return a value as `--set` reads it: JSON, or a string that is not JSON."""
-    try:
-        json.loads(value)
-    except (TypeError, ValueError, RecursionError):
-        return value if isinstance(value, str) else json.dumps(value)
-    return json.dumps(value)
 
 
 def _sweep_metadata(sweep: Sweep, summary: SweepSummary) -> dict[str, Any]:

@@ -11,7 +11,7 @@ from cosim.core.component import Variable
 from cosim.core.errors import InputError
 from cosim.scenario import load
 from cosim.studies.controller_bench.candidate import CandidateInterface, interface_problems, parse_source, read_interface
-from cosim.studies.controller_bench.role import read_role, role_names
+from cosim.studies.controller_bench.role import read_role, read_role_file, role_names
 from cosim.studies.controller_bench.score import RunKpis, compare_kpis, compare_values, is_current, merge_senses
 from cosim.studies.controller_bench.substitution import ControllerSubstitution
 
@@ -94,10 +94,10 @@ def test_ports_without_a_target_are_removed_with_their_settings(tmp_path):
     keeper.write_text(BARE)
     candidate = parse_source(f"{keeper}:Bare")
     scenario = ROOT / "scenarios/performance_5.json"
-    path = ControllerSubstitution(read_role("uav_controller"), candidate, read_interface(candidate), scenario).write(
-        tmp_path / "out"
-    )
+    substitution = ControllerSubstitution(read_role("uav_controller"), candidate, read_interface(candidate), scenario)
+    path = substitution.write(tmp_path / "out")
     assert path is not None
+    assert ("demo1.landing_time", "vtol.landing_time") in {(each.variable, each.lacking) for each in substitution.omissions}
     written = json.loads(path.read_text())
     assert written["components"]["demo1"]["parameters"] == {}
     nested = json.loads((tmp_path / "out/systems/performance_5.demo1.json").read_text())
@@ -105,6 +105,30 @@ def test_ports_without_a_target_are_removed_with_their_settings(tmp_path):
     assert nested["components"]["uav"]["python"] == f"{keeper}:Bare"
     assert {each["to"].split(".")[0] for each in nested["connections"]} == {"plant", "usv"}
     load(path).free()
+
+
+def test_a_parameter_of_the_role_may_be_declared_without_its_prefix(tmp_path):
+    """A scenario sets it in the controller, through a port of the system around it, or not at all."""
+    role, candidate = read_role("uav_controller"), parse_source(str(min(read_role("uav_controller").controllers)))
+    shape = candidate_of(outputs=role.outputs, parameters=["landing_time"])
+    demo1, performance_5 = (
+        ControllerSubstitution(role, candidate, shape, ROOT / f"scenarios/{name}.json").write(tmp_path / name)
+        for name in ("demo1_box", "performance_5")
+    )
+    assert json.loads(demo1.read_text())["components"]["uav"]["parameters"] == {"landing_time": 5.0}
+    assert json.loads(performance_5.read_text())["components"]["demo1"]["parameters"] == {"landing_time": 5.0}
+    nested = json.loads((tmp_path / "performance_5/systems/performance_5.demo1.json").read_text())
+    assert nested["ports"] == {"parameters": {"landing_time": "uav.landing_time"}}
+
+
+@pytest.mark.parametrize("name", ["uav_controller", "uav_path_command", "usv_guidance", "vessel_autopilot"])
+def test_start_values_units_and_types_of_a_roles_parameters_are_those_of_a_shipped_controller(name):
+    role = read_role_file(name)[1]
+    shipped = [read_interface(parse_source(str(path))).parameters for path in read_role(name).different_controllers]
+    types = {"Float64": "Real", "Int32": "Integer", "Boolean": "Boolean"}
+    for parameter, spec in role.parameters.items():
+        found = next(each[key] for each in shipped for key in (parameter, f"{parameter}[1]") if key in each)
+        assert (types[found.type], found.start, found.unit.name if found.unit else "") == (spec.type, spec.start, spec.unit)
 
 
 def test_changed_systems_of_different_scenarios_are_separate_files(tmp_path):

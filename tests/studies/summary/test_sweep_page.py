@@ -1,13 +1,20 @@
 """`sweep.html`, its maps and their replays, as `cosim sweep` writes them."""
 
+import csv
+import io
+import json
 import re
+import shlex
 from html.parser import HTMLParser
 
 import pytest
+from cosim_command import run_cosim
 from lag_project import SEGV_ORDER
 from page_probes import LOW_CONTRAST
 
+from cosim.core import resources
 from cosim.studies.summary.page import _design_rows
+from cosim.studies.summary.run_commands import format_run_command
 from cosim.studies.sweep import Sweep
 
 #: a run that ends above 0.2 is unsuccessful; the last one crashes
@@ -40,9 +47,9 @@ class Reader(HTMLParser):
 
 @pytest.fixture(scope="module")
 def lag(make_lag):
-    """Project after a sweep."""
+    """Project after a sweep; `swept` is what the command printed."""
     found = make_lag()
-    found.run_command("sweep", found.write(**STUDY), "--workers", 1)
+    found.swept = found.run_command("sweep", found.write(**STUDY), "--workers", 1)
     return found
 
 
@@ -99,6 +106,30 @@ def test_cells_link_to_the_command_that_repeats_a_run(page):
     assert "cosim run lag.json --set" in page.words  # in the folder of the sweep command
     assert "/record" not in page.words
     assert re.search(r"Run 2, the first unsuccessful run in\s+start = high,\s+T = quick", page.words)
+
+
+def test_page_terminal_and_table_name_the_criterion_that_a_run_misses(lag, page, results):
+    (row,) = csv.DictReader((results / "unsuccessful.csv").open())
+    assert (row["run"], row["start"], row["T"]) == ("2", "high", "quick")
+    value = float(next(csv.DictReader(io.StringIO("".join(table_lines(results, 2)))))["end.value"])
+    assert row["missed"] == f"end.value is {value:.6g}, expected at most 0.2"
+    assert f"T = quick. {row['missed']}. This command makes it again" in " ".join(page.words.split())  # the cell of the map
+    assert f"Run 2, start = high, T = quick: {row['missed']}" in page.words  # the list
+    assert f"end.value max 0.2: missed by 1 of 4 runs; the first is run 2:\n  {row['command']}\n" in lag.swept.out
+    again = run_cosim(*shlex.split(row["command"])[1:], cwd=lag.folder)
+    assert json.loads((lag.folder / "runs/lag/kpis.json").read_text())["end.value"] == value, again.stderr
+
+
+def table_lines(results, run):
+    """Return the header of table.csv and the line of a run."""
+    header, *lines = (results / "table.csv").read_text().splitlines(keepends=True)
+    return [header, lines[run]]
+
+
+def test_commands_name_shipped_scenarios_in_place_of_their_paths(tmp_path):
+    shipped, own = resources.root() / "scenarios/demo1_box.json", tmp_path / "demo1_box.json"
+    assert format_run_command(shipped, {"uav.altitude_command": 3.0}) == "cosim run demo1_box --set uav.altitude_command=3.0"
+    assert format_run_command(own, {}) == f"cosim run {own}"
 
 
 def test_the_page_shows_success_rates_failures_and_the_design(page):

@@ -114,7 +114,10 @@ CHANGES: dict[str, tuple[Change, str]] = {
     "prefix without an output": (put("connections/1/from", "b.shop"), 'no output "shop"; valid: ship.position.x'),
     "a delay without end": (put("connections/1/delay", 10**12), "delay: expected less than or equal to 1000000"),
     "negative delay": (put("connections/1/delay", -1), "$.connections[1].delay: expected greater than or equal to 0"),
-    "a component in no stage": (drop("algorithm/stages/2"), 'component "f" is in no stage, so it would never step'),
+    "a component in no stage": (
+        drop("algorithm/stages/2"),
+        'component "f" is in no stage of "algorithm", so it would never step',
+    ),
     "a component in two stages": (add("algorithm/stages", ["a"]), '"a"'),
     "unknown algorithm": (put("algorithm/kind", "jacoby"), "$.algorithm.kind: expected 'staged'"),
     # what is done with the result

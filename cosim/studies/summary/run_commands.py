@@ -1,0 +1,43 @@
+"""Command lines that repeat single runs of a study."""
+
+from __future__ import annotations
+
+import json
+import shlex
+from os.path import normpath
+from pathlib import Path
+from typing import Any
+
+from ...core import resources
+from ..sweep import Sweep
+
+
+def run_command(sweep: Sweep, run: int) -> str:
+    """Return the command line that repeats a run with all signals that the scenario records."""
+    return format_run_command(sweep.study_file.scenario, run_settings(sweep, run))
+
+
+def run_settings(sweep: Sweep, run: int) -> dict[str, Any]:
+    """Return the settings that repeat a run with all signals that the scenario records, not only those that the sweep needs."""
+    settings = sweep.study.job(sweep.design[run].settings).settings
+    return {name: value for name, value in settings.items() if not name.startswith("/record")}
+
+
+def format_run_command(scenario: Path, settings: Any) -> str:
+    """Return the command line that makes this run alone; it refers to a shipped scenario by its name."""
+    words = [word for name, value in settings.items() for word in ("--set", f"{name}={_setting_text(value)}")]
+    return shlex.join(["cosim", "run", _scenario_text(scenario), *words])
+
+
+def _scenario_text(scenario: Path) -> str:
+    is_shipped = scenario.resolve().parent == (resources.root() / "scenarios").resolve()
+    return scenario.stem if is_shipped else normpath(scenario)
+
+
+def _setting_text(value: Any) -> str:
+    """Return a value as `--set` reads it: JSON, or a string that is not JSON."""
+    try:
+        json.loads(value)
+    except (TypeError, ValueError, RecursionError):
+        return value if isinstance(value, str) else json.dumps(value)
+    return json.dumps(value)
