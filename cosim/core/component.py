@@ -229,6 +229,10 @@ class Component(Protocol):
     def get(self, name: str) -> Any:
         """Return the present value of a variable, an array as flat list; not called while stepping through a macro step."""
 
+    def unit_source(self, name: str) -> str:  # noqa: ARG002
+        """Return the declaration of a variable's unit for messages, such as "Pilot.units (pilot.py:7)"; "" if it is unknown."""
+        return ""
+
     def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
         """Enter the initialization mode of FMI; times in s."""
 
