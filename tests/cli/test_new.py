@@ -279,7 +279,7 @@ def test_the_output_of_a_build_is_an_fmu(tmp_path):
     ("text", "line"),
     [
         ('{\n "family": "multirotor",\n "mass": 1.0\n "inertia": 1\n}', "boat.json:3:13: expected ',' or '}'"),
-        ('{"family": "submerged", "mass": NaN}', "boat.json:1:25: $.mass: NaN is not allowed, expected a finite number"),
+        ('{"family": "submerged", "mass": NaN}', "boat.json:1:33: $.mass: NaN is not allowed, expected a finite number"),
         ('{\n "family": "multirotr"}', """boat.json:2:2: $.family: found 'multirotr'; did you mean "multirotor"?"""),
         ("[1]", "boat.json:1:1: $: expected an object, the data of a vehicle"),
     ],
