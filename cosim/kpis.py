@@ -29,6 +29,7 @@ from .results.signal_analysis import (
     row_slice,
     step_response,
     time_average,
+    values_in_si,
 )
 
 FOREVER = math.inf
@@ -136,13 +137,13 @@ def energy(
 
     Args:
         result: The recorded run.
-        effort: Name of a force (N), a torque (N.m) or a power (W).
-        flow: Name of a speed (m/s) for a force, of an angular rate (rad/s) for a torque; 1 for a power.
+        effort: Name of a force, a torque or a power; its values are converted to N, N.m or W.
+        flow: Name of a speed for a force, of an angular rate for a torque, converted to m/s or rad/s; 1 for a power.
         start: Time (s) of the first row that counts.
         stop: Time (s) of the last row that counts.
     """
     rows = row_slice(result, start, stop)
-    power = result[effort].astype(np.float64) * (result[flow] if isinstance(flow, str) else flow)
+    power = values_in_si(result, effort) * (values_in_si(result, flow) if isinstance(flow, str) else flow)
     return {"value": integrate(result.time[rows], power[rows])}
 
 

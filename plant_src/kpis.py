@@ -15,7 +15,7 @@ import numpy as np
 from cosim.results import Result
 from cosim.results.checks import Number
 from cosim.results.kpi import Prefix, Signal, better, no_value, units
-from cosim.results.signal_analysis import require, row_slice
+from cosim.results.signal_analysis import require, row_slice, values_in_unit
 
 from .landing_kpis import descent, landing, touchdown
 from .recorded_motion import distance_from_line, horizontal_distance, used_waypoints
@@ -154,7 +154,8 @@ def motors(result: Result, rotor_speed: Prefix, threshold: float = 1.0) -> dict[
 
     Args:
         result: Recorded mission.
-        rotor_speed: Prefix of the commands `rotor_speed[1]`, `rotor_speed[2]`, ... ("uav.mixer.rotor_speed").
+        rotor_speed: Prefix of the commands `rotor_speed[1]`, `rotor_speed[2]`, ... ("uav.mixer.rotor_speed"), in any unit of a
+            speed of rotation.
         threshold: Speed below which a rotor counts as stopped (rad/s).
 
     Returns:
@@ -167,7 +168,7 @@ def motors(result: Result, rotor_speed: Prefix, threshold: float = 1.0) -> dict[
     """
     require(threshold > 0, f"expected a positive threshold (rad/s); found {threshold:g}")
     names = result.signals(f"{rotor_speed}[*]") or [f"{rotor_speed}[1]"]
-    fastest = np.max([np.abs(result[name]) for name in names], axis=0)
+    fastest = np.max([np.abs(values_in_unit(result, name, "rad/s")) for name in names], axis=0)
     running = np.flatnonzero(fastest >= threshold)
     first_stopped = int(running[-1]) + 1 if running.size else 0
     stopped = first_stopped < len(fastest)

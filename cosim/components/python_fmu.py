@@ -17,7 +17,7 @@ from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, InputError, d
 from ..core.text import shorten, text_problem
 from ..core.units import named_unit
 from .object_state import snapshot
-from .python_units import checked_units
+from .python_units import checked_units, units_place
 from .slave_protection import PYTHONFMU_ATTRIBUTES
 
 _TYPES = {Real: "Float64", Integer: "Int32", Boolean: "Boolean", String: "String"}
@@ -70,8 +70,9 @@ class PythonFmuComponent(Component):
     def __init__(self, slave: Fmi2Slave, instance_name: str):
         self._slave, self._name, self._time = slave, instance_name, 0.0
         self._pythonfmu_variables: dict[str, ScalarVariable] = {v.name: v for v in slave.vars.values()}
-        units = checked_units(getattr(type(slave), "units", {}), {v.name: _fmi_type(v) for v in slave.vars.values()})
-        self.variables = [_to_variable(v, units.get(v.name)) for v in slave.vars.values()]
+        types = {v.name: _fmi_type(v) for v in slave.vars.values()}
+        self._units = checked_units(getattr(type(slave), "units", {}), types, type(slave))
+        self.variables = [_to_variable(v, self._units.get(v.name)) for v in slave.vars.values()]
         self._setters: list[tuple[Callable[[Any], None], np.ndarray, int]] = []
         self._getters: list[tuple[str, Callable[[], Any], type, Callable[[Any], Any], np.ndarray, int]] = []
         self._types = {variable.name: variable.type for variable in self.variables}
@@ -86,6 +87,10 @@ class PythonFmuComponent(Component):
         """Return the value of one variable by its PythonFMU getter."""
         registered = self._pythonfmu_variables[name]
         return _CASTS[_fmi_type(registered)](self._call_user_code("get", registered.getter))
+
+    def unit_source(self, name: str) -> str:
+        """Return class, file and line of the class attribute `units` if it names the variable."""
+        return units_place(type(self._slave)) if name in self._units else ""
 
     def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
         """Call the slave's `setup_experiment` and `enter_initialization_mode`."""

@@ -26,7 +26,7 @@ from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
-from .errors import ComponentError, did_you_mean
+from .errors import ComponentError, Problem, did_you_mean
 from .units import Unit
 
 Causality = Literal["parameter", "calculatedParameter", "structuralParameter", "input", "output", "local", "independent"]
@@ -206,6 +206,7 @@ class Component(Protocol):
         gives_output_slopes: First time derivatives of outputs are available (FMI: maxOutputDerivativeOrder). The outputs of
             `bind` end with those that are used.
         input_limits: Lower and upper limit to which the component limits an input, by the name of the scalar.
+        warnings: Probable mistakes in the arguments; the subject of each begins with "arguments".
     """
 
     variables: Sequence[Variable]
@@ -220,12 +221,17 @@ class Component(Protocol):
     interpolates_inputs: bool = False
     gives_output_slopes: bool = False
     input_limits: Mapping[str, tuple[float, float]] = MappingProxyType({})
+    warnings: Sequence[Problem] = ()
 
     def set(self, name: str, value: Any) -> None:
         """Set a variable to a Python value, an array to nested lists; not called while stepping through a macro step."""
 
     def get(self, name: str) -> Any:
         """Return the present value of a variable, an array as flat list; not called while stepping through a macro step."""
+
+    def unit_source(self, name: str) -> str:  # noqa: ARG002
+        """Return the declaration of a variable's unit for messages, such as "Pilot.units (pilot.py:7)"; "" if it is unknown."""
+        return ""
 
     def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
         """Enter the initialization mode of FMI; times in s."""

@@ -14,6 +14,11 @@ def is_file(path: Path) -> bool:
     return os.path.isfile(path)  # noqa: PTH113
 
 
+def is_folder(path: Path) -> bool:
+    """Return whether the folder exists; False for names that no folder can have, for which `Path.is_dir` raises."""
+    return os.path.isdir(path)  # noqa: PTH112
+
+
 def resolve_path(path: Path) -> Path:
     """Return the path with symbolic links resolved; a loop of links is left unresolved instead of raising."""
     return Path(os.path.realpath(path))

@@ -2,19 +2,17 @@
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Collection, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from fractions import Fraction
 from functools import cached_property
 from typing import Any, Literal, NamedTuple
 
-import numpy as np
-
+from .compatibility import FLOAT_TYPES, incompatibility, unit_conflict
 from .component import Component, Variable
 from .errors import Problem, did_you_mean
-
-INTEGER_TYPES = frozenset({"Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64"})
-FLOAT_TYPES = frozenset({"Float64", "Float32"})
+from .text import count_noun
 
 
 class Endpoint(NamedTuple):
@@ -199,6 +197,7 @@ class System:
 
     def _find_connection_problems(self) -> Iterator[Problem]:
         by_target: dict[Endpoint, Connection] = {}
+        refused: dict[tuple[str, str, str, str], list[Connection]] = defaultdict(list)
         for connection in self.connections:
             source = self._find_endpoint_problem(connection.source, "output")
             target = self._find_endpoint_problem(connection.target, "input")
@@ -211,12 +210,26 @@ class System:
                 yield Problem(text, connection.where)
             source_variable, target_variable = (self.find_element(end).variable for end in (connection.source, connection.target))
             text = incompatibility(source_variable, target_variable, connection.convert)
+            if text and text == unit_conflict(source_variable, target_variable):
+                text += self._unit_sources(connection)
             if connection.is_mapped and not text and target_variable.type not in FLOAT_TYPES:
                 text = f"gains, offsets and sums are for inputs of floating-point numbers, found {target_variable.type}"
             if connection.interpolation == "linear" and not text:
                 text = self._linear_problem(connection)
             if text:
-                yield Problem(f"{connection.source} cannot feed {connection.target}: {text}", connection.where)
+                refused[connection.where, connection.source.component, connection.target.component, text].append(connection)
+        for (where, _, _, text), (first, *others) in refused.items():
+            more = f", and {count_noun(len(others), 'more element')} likewise" if others else ""
+            yield Problem(f"{first.source} cannot feed {first.target}{more}: {text}", where)
+
+    def _unit_sources(self, connection: Connection) -> str:
+        """Return the declarations of the units of both ends, as far as the components know them."""
+        found = ""
+        for end in (connection.source, connection.target):
+            variable = self.find_element(end).variable
+            if variable.unit and (place := self.components[end.component].unit_source(variable.name)):
+                found += f'; "{variable.unit.name}" is declared by {place}'
+        return found
 
     def _linear_problem(self, connection: Connection) -> str:
         """Return the reason why an input cannot change linearly within a step; "" if it can."""
@@ -248,33 +261,3 @@ def _unlisted_member(name: str, listed: Collection[str]) -> str:
     parts = name.split(".")
     systems = (".".join(parts[:n]) for n in range(1, len(parts)))
     return next((system for system in systems if not any(each.startswith(f"{system}.") for each in listed)), name)
-
-
-def incompatibility(source: Variable, target: Variable, convert: bool = False) -> str:
-    """Return the reason why values of `source` cannot be converted to `target`; "" if they can.
-
-    Args:
-        source: The output.
-        target: The input.
-        convert: Booleans and all integers are converted to floating-point numbers.
-    """
-    on_request = target.type in FLOAT_TYPES and source.type in INTEGER_TYPES | {"Boolean"}
-    if not (_is_convertible(source, target) or (convert and on_request)):
-        hint = ' unless the connection has "convert": true' if on_request else ""
-        return f"type {source.type} cannot be converted to {target.type}{hint}"
-    if source.unit and target.unit and not source.unit.converts_to(target.unit):
-        return f'units "{source.unit.name}" and "{target.unit.name}" measure different quantities'
-    return ""
-
-
-def _is_convertible(source: Variable, target: Variable) -> bool:
-    if source.type == target.type:
-        return source.type != "Clock"
-    if target.type in FLOAT_TYPES:
-        exact = source.type in INTEGER_TYPES and source.dtype.itemsize < target.dtype.itemsize
-        return source.type in FLOAT_TYPES or source.type == "Enumeration" or exact
-    if source.type == "Enumeration":  # its values are small, whatever their type
-        return target.type in ("Int32", "Int64")
-    if target.type == "Enumeration":
-        return source.type in INTEGER_TYPES - {"UInt64"}
-    return {source.type, target.type} <= INTEGER_TYPES and bool(np.can_cast(source.dtype, target.dtype, "safe"))

@@ -120,3 +120,11 @@ UNPREFIXED: _UnitTable = {
     "degF": (5 / 9, _power(*_KELVIN)),
     "degRk": (5 / 9, _power(*_KELVIN)),
 }
+
+#: abbreviations and words that are no units, in lower case and singular -> the unit
+WORDS = {
+    **{"meter": "m", "metre": "m", "foot": "ft", "feet": "ft", "mps": "m/s", "kmh": "km/h", "kph": "km/h", "knot": "kn"},
+    **{"mps2": "m/s2", "second": "s", "sec": "s", "minute": "min", "hour": "h", "hertz": "Hz", "radian": "rad", "degree": "deg"},
+    **{"gram": "g", "kilogram": "kg", "newton": "N", "newtonmeter": "N.m", "pascal": "Pa", "joule": "J", "watt": "W"},
+    **{"volt": "V", "ampere": "A", "amp": "A", "ohm": "Ohm", "kelvin": "K", "celsius": "degC", "percent": "%"},
+}

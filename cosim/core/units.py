@@ -14,8 +14,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from functools import lru_cache
 
-from .errors import did_you_mean
-from .unit_table import BASE_UNITS, OFFSETS, PREFIXED, PREFIXES, UNPREFIXED
+from .errors import nearest_name
+from .unit_table import BASE_UNITS, OFFSETS, PREFIXED, PREFIXES, UNPREFIXED, WORDS
 
 
 @dataclass(frozen=True, slots=True)
@@ -50,8 +50,6 @@ KNOWN_UNITS = {
     name: Unit(name, exponents, factor, OFFSETS.get(name, 0.0))
     for name, (factor, exponents) in {**PREFIXED, **UNPREFIXED}.items()
 }
-#: abbreviations that are no units, in lower case -> the unit
-_ABBREVIATIONS = {"mps": "m/s", "kmh": "km/h", "kph": "km/h", "mps2": "m/s2"}
 #: common spellings -> Modelica syntax, after Unicode compatibility normalization, which converts superscripts
 _SPELLINGS = {
     "**": "",
@@ -105,11 +103,18 @@ def parse_unit(text: str) -> Unit:
 
 
 def _hint_at_unit(symbol: str) -> str:
-    """Return a hint at the unit that a symbol probably means; short symbols resemble too many units by chance."""
-    if meaning := _ABBREVIATIONS.get(symbol.lower()):
+    """Return a hint at the unit that a symbol probably means.
+
+    A short symbol resembles many units by chance; only one of the same letters counts.
+    """
+    word = symbol.lower()
+    if meaning := WORDS.get(word) or WORDS.get(word.removesuffix("s")):
         return f'; did you mean "{meaning}"?'
-    names = KNOWN_UNITS if len(symbol) > 3 else [name for name in KNOWN_UNITS if name.lower() == symbol.lower()]
-    return did_you_mean(symbol, names)
+    letters = sorted(word)
+    near = nearest_name(
+        symbol, KNOWN_UNITS if len(symbol) > 3 else [name for name in KNOWN_UNITS if sorted(name.lower()) == letters]
+    )
+    return f'; did you mean "{near}"?' if near else ""
 
 
 @lru_cache(4096)

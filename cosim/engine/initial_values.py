@@ -6,10 +6,11 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from ..core.compatibility import FLOAT_TYPES
 from ..core.component import Ports
 from ..core.errors import ComponentError, abbreviate_names
 from ..core.graph import strong_components
-from ..core.system import FLOAT_TYPES, Endpoint, System
+from ..core.system import Endpoint, System
 from ..process.journal import calling_component
 from . import newton
 from .convergence import exceeds_tolerance

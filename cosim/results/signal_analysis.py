@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.errors import InputError
-from ..core.units import parse_unit
+from ..core.units import named_unit
 from .result import Result
 
 
@@ -78,16 +78,41 @@ def control_error(result: Result, signal: str, target: str | float, start: float
     return result.time[rows], (result[signal].astype(np.float64) - reference)[rows]
 
 
+def values_in_unit(result: Result, signal: str, unit: str) -> np.ndarray:
+    """Return the values of a signal in a unit, for KPIs that expect a unit; a signal without unit is not converted.
+
+    Args:
+        result: The run.
+        signal: Name of the signal.
+        unit: The unit, such as "rad/s".
+
+    Raises:
+        InputError: The unit of the signal measures another quantity.
+    """
+    found = result.units.get(signal, "")
+    return _convert(result[signal], found, unit, f'"{signal}" has the unit {found}, which does not convert to {unit}')
+
+
+def values_in_si(result: Result, signal: str) -> np.ndarray:
+    """Return the values of a signal in the SI unit of its quantity; a signal without known unit is not converted."""
+    unit = named_unit(result.units.get(signal, ""))
+    return unit.factor * result[signal].astype(np.float64) + unit.offset
+
+
 def _converted(result: Result, name: str, to_unit_of: str) -> np.ndarray:
     """Return the values of a signal in the unit of another one; a signal without unit is not converted."""
     found, expected = (result.units.get(each, "") for each in (name, to_unit_of))
+    return _convert(result[name], found, expected, f'"{name}" ({found}) cannot be compared with "{to_unit_of}" ({expected})')
+
+
+def _convert(values: np.ndarray, found: str, expected: str, problem: str) -> np.ndarray:
+    """Return values in another unit; raise InputError with the text `problem` if the quantity is another one."""
     if not (found and expected) or found == expected:
-        return result[name]
-    unit, target_unit = parse_unit(found), parse_unit(expected)
-    if not unit.converts_to(target_unit):
-        raise InputError(f'"{name}" ({found}) cannot be compared with "{to_unit_of}" ({expected})')
-    factor, offset = unit.conversion(target_unit)
-    return factor * result[name] + offset
+        return values
+    unit, target = named_unit(found), named_unit(expected)
+    require(unit.converts_to(target), problem)
+    factor, offset = unit.conversion(target)
+    return factor * values + offset
 
 
 def integrate(time: np.ndarray, values: np.ndarray) -> float:

@@ -8,8 +8,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from functools import cached_property
 from typing import NamedTuple
 
+from ..core.compatibility import incompatibility
 from ..core.component import Variable
-from ..core.system import Endpoint, System, incompatibility
+from ..core.system import Endpoint, System
 from .nested_systems import Node
 
 VariablesByEndpoint = dict[Endpoint, Variable]

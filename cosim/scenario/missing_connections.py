@@ -5,9 +5,10 @@ from __future__ import annotations
 import difflib
 from collections.abc import Iterator
 
+from ..core.compatibility import incompatibility
 from ..core.component import Component, Variable
 from ..core.errors import abbreviate_names
-from ..core.system import Endpoint, System, incompatibility
+from ..core.system import Endpoint, System
 from .fitting_outputs import MissingConnection, OutputFinder, Place, VariablesByEndpoint
 from .nested_systems import Node
 from .system_builder import PROFILE_PREFIX

@@ -122,8 +122,6 @@ class Regression:
     def _compare(self, run: _FinishedRun) -> RegressionOutcome:
         failed = run.failed_checks()
         counts = [(len(run.failed_checks(checks_only=True)), len(run.checks), "check")]
-        tubes = self.directory / "tubes.png"
-        tubes.unlink(missing_ok=True)
         margin, accept = "", ""
         if run.scenario.get("reference"):
             comparison = run.compare()
@@ -137,7 +135,7 @@ class Regression:
                     'tube: the reference plus and minus its tolerances (key "reference" of the scenario)',
                     *([f"reason of the tolerances: {reason}"] if reason else []),
                     *run.reference_changes(),
-                    f"see {run.draw_tubes(comparison, tubes)}",
+                    f"see {run.draw_tubes(comparison, self.directory / 'tubes.png')}",
                 ]
         if failed:
             failed += self._write_report(*(["--reference", str(self.file)] if run.scenario.get("reference") else []))

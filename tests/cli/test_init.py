@@ -15,6 +15,8 @@ import pytest
 from cosim import __version__
 from cosim.cli.commands.init import pip_origin, pip_requirement
 
+pytestmark = pytest.mark.slow
+
 
 def run(*command, cwd):
     """Run a command of this environment as from a user's shell."""

@@ -24,6 +24,8 @@ from cosim.core import resources
 from cosim.report.scene import build_scene
 from cosim.results import Result
 
+pytestmark = pytest.mark.slow
+
 MADE = {
     "python": ["my_pilot.py"],
     "modelica": ["MyPilot.mo"],

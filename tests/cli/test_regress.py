@@ -88,6 +88,9 @@ def test_a_changed_result_fails_with_signal_time_and_changes(folder):
     suite = etree.parse(folder / "out/junit.xml").getroot().find("testsuite")
     assert (suite.get("tests"), suite.get("failures"), suite.get("errors")) == ("1", "1", "0")
     assert "leaves its tube" in suite.find("testcase[@name='cooling']/failure").text
+    scenario(folder, reference=REFERENCE)
+    assert regress(folder).returncode == 0
+    assert not (folder / "runs/cooling/tubes.png").exists()
 
 
 def test_every_scenario_of_a_folder_is_reported(folder):

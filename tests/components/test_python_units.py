@@ -57,16 +57,55 @@ def test_degrees_cannot_become_newtons(tmp_path, exported):
         cosim.run(scenario(tmp_path, exported, {"y": "deg"}, {"x": "N"}))
 
 
+VECTOR = """
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+
+
+class Base(Fmi2Slave):
+    author = "someone"
+    units: dict[str, str] = {f"{name}[{i}]": unit for name, unit in (("x", "rad"), ("y", "m")) for i in (1, 2, 3)}
+
+
+class Both(Base):
+    def __init__(self, **arguments):
+        super().__init__(**arguments)
+        for name, causality in (("x", Fmi2Causality.input), ("y", Fmi2Causality.output)):
+            for i in (1, 2, 3):
+                self.register_variable(Real(f"{name}[{i}]", causality=causality, getter=lambda: 0.0, setter=lambda _: None))
+
+    def do_step(self, time, step_size):
+        return True
+"""
+
+
+def test_wrong_units_of_a_vector_are_one_line_with_the_place_of_their_declaration(tmp_path):
+    (tmp_path / "both.py").write_text(VECTOR)
+    components = {name: {"python": "both.py:Both"} for name in "ab"}
+    wires = [{"from": "a.y", "to": "b.x"}]
+    (tmp_path / "s.json").write_text(
+        json.dumps({"name": "s", "stop_time": 2, "step_size": 1, "components": components, "connections": wires})
+    )
+    with pytest.raises(InputError) as refusal:
+        cosim.run(tmp_path / "s.json")
+    (problem,) = refusal.value.problems
+    place = "is declared by Base.units (both.py:7)"
+    assert problem.message == (
+        'a.y[1] cannot feed b.x[1], and 2 more elements likewise: units "m" and "rad" measure different quantities'
+        f'; "m" {place}; "rad" {place}'
+    )
+
+
 @pytest.mark.parametrize(
     ("units", "message"),
     [
         ({"xx": "rad"}, 'names "xx", but no register_variable of type Real does; registered: x, y$'),
         ({"y": "radd"}, r'contains "radd" for "y": unknown unit'),
+        ({"x": "metre", "y": "metre"}, r'contains "metre" for "x", "y": unknown unit "metre"; did you mean "m"\?$'),
         (["y"], "is not a dict of names of variables and units"),
     ],
 )
 def test_wrong_units_are_refused(tmp_path, units, message):
-    with pytest.raises(InputError, match=f'the class attribute "units" {message}'):
+    with pytest.raises(InputError, match=rf"the class attribute Sender\.units \(sender\.py:6\) {message}"):
         cosim.run(scenario(tmp_path, False, units, {}))
     with pytest.raises(InputError, match=rf'sender\.py: the class attribute "units" {message}'):
         scenario(tmp_path, True, units, {})

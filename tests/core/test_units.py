@@ -3,7 +3,7 @@ import re
 
 import pytest
 
-from cosim.core.unit_table import BASE_UNITS, PREFIXED, PREFIXES, UNPREFIXED
+from cosim.core.unit_table import BASE_UNITS, PREFIXED, PREFIXES, UNPREFIXED, WORDS
 from cosim.core.units import Unit, multiply_units, named_unit, parse_unit
 
 
@@ -145,7 +145,9 @@ def test_an_unknown_unit_is_refused_with_the_nearest_one():
         parse_unit("ohm.m")
 
 
-@pytest.mark.parametrize(("text", "hint"), [("mps", '; did you mean "m/s"?'), ("psj", "")])
+@pytest.mark.parametrize(
+    ("text", "hint"), [("mps", '; did you mean "m/s"?'), ("rmp", '; did you mean "rpm"?'), ("psj", ""), ("sm", "")]
+)
 def test_a_short_unknown_unit_has_no_hint_at_a_unit_that_resembles_it_by_chance(text, hint):
     with pytest.raises(ValueError, match=f'^unknown unit "{text}"{re.escape(hint)}$'):
         parse_unit(text)
@@ -214,3 +216,25 @@ def test_products_of_units_of_any_spelling(factors, expected):
 @pytest.mark.parametrize("text", HOSTILE)
 def test_products_with_any_text_are_texts(text):
     assert isinstance(multiply_units([(text, 2), ("s", 1)]), str)
+
+
+@pytest.mark.parametrize(
+    ("text", "unit"),
+    [
+        ("metre", "m"),
+        ("Meters", "m"),
+        ("newton", "N"),
+        ("N*metre", "m"),
+        ("degrees/s", "deg"),
+        ("celsius", "degC"),
+        ("knots", "kn"),
+    ],
+)
+def test_a_written_out_unit_has_its_symbol_as_hint(text, unit):
+    with pytest.raises(ValueError, match=f'; did you mean "{unit}"'):
+        parse_unit(text)
+
+
+def test_the_hints_at_units_are_units():
+    for unit in WORDS.values():
+        parse_unit(unit)

@@ -18,6 +18,8 @@ from cosim.export.build import build, build_to, cached_fmu, read_manifest
 from cosim.export.build_check import check_fmus
 from cosim.export.sources import classify_source, find_sources, snake_case, tool_version
 
+pytestmark = pytest.mark.slow
+
 EQUATIONS = """
 from pathlib import Path
 

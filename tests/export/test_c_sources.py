@@ -18,6 +18,8 @@ from cosim.export.build import build, build_to, read_manifest
 from cosim.export.build_check import check_fmus
 from cosim.export.sources import find_sources
 
+pytestmark = pytest.mark.slow
+
 KEEPER = root() / "controllers/c/speed_keeper"
 
 

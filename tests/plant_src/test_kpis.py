@@ -7,6 +7,7 @@ import pytest
 from mission_recording import DESCENT_RATE, STOP, TAKE_OFF, TOUCHDOWN, mission_result, with_signals
 
 from cosim.core.errors import InputError
+from cosim.core.recording import Recording
 from cosim.results import Result
 from cosim.results.kpi import evaluate_kpis
 from plant_src.kpis import final, landing, motors, tracking, waypoints
@@ -163,6 +164,18 @@ def test_motors_that_start_again_have_not_stopped():
 def test_motors_that_never_ran_stopped_at_the_start():
     idle = mission_result(**{f"uav__rotor_speed[{i}]": np.zeros_like(TIME) for i in range(1, 5)})
     assert motors(idle, "uav.rotor_speed")["stop_time"] == 0.0
+
+
+def test_motor_commands_are_converted_from_their_unit():
+    names = [f"uav.rotor_speed[{i}]" for i in (1, 2)]
+    commands = {names[0]: np.array([6000.0, 3000.0, 5.0]), names[1]: np.array([0.0, 628.0, 0.9])}
+    recorded = Recording(np.array([0.0, 1.0, 2.0]), commands, {names[0]: "rpm", names[1]: "rad/s"})
+    kpis = motors(Result(recorded), "uav.rotor_speed")
+    assert kpis["max_speed"] == pytest.approx(200 * np.pi, rel=1e-12)  # 6000 revolutions per minute
+    assert (kpis["stopped_at_end"], kpis["stop_time"], kpis["final_speed"]) == (True, 2.0, 0.9)
+    in_newtons = Recording(recorded.time, commands, dict.fromkeys(names, "N"))
+    with pytest.raises(InputError, match=r'"uav.rotor_speed\[1\]" has the unit N, which does not convert to rad/s'):
+        motors(Result(in_newtons), "uav.rotor_speed")
 
 
 def test_unknown_signal_names_are_rejected():

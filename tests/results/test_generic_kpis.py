@@ -149,6 +149,13 @@ def test_nan_makes_settling_and_saturation_nan():
         assert math.isnan(value(kpis.saturation_share, "x", upper=2.0, result=lost))
 
 
+def test_energy_is_in_joules_whatever_the_units_of_the_signals():
+    values = {"torque": np.array([2.0, 2.0]), "rate": np.array([30.0, 30.0]), "power": np.array([3.0, 3.0])}
+    result = Result(Recording(np.array([0.0, 2.0]), values, {"torque": "N.m", "rate": "rpm", "power": "kW"}))
+    assert value(kpis.energy, "torque", "rate", result=result) == pytest.approx(4 * np.pi, rel=1e-12)
+    assert value(kpis.energy, "power", result=result) == pytest.approx(6000.0, rel=1e-12)
+
+
 def test_energy_of_integers_does_not_overflow():
     small = run([0, 3], force=np.array([100_000, 100_000], np.int32), speed=np.array([50_000, 50_000], np.int32))
     assert value(kpis.energy, "force", "speed", result=small) == 1.5e10

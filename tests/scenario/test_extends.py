@@ -127,6 +127,8 @@ def test_paths_stay_relative_to_the_file_that_contains_them(folder):
     [
         ("other.json", 'cannot read "'),
         ("demo1_bax", 'no scenario file and no shipped scenario "demo1_bax"; did you mean "demo1_box"?'),
+        (".", ". is a folder, expected a scenario file"),
+        ("a" * 5000, 'no scenario file and no shipped scenario "aaa'),
         ("scenario.json", '"scenario.json" extends itself'),
         ("loop.json", '"scenario.json" extends itself'),
         (3, "expected the path of a file or the name of a shipped scenario"),

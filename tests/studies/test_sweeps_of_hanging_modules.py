@@ -7,6 +7,8 @@ import json
 import pytest
 from cosim_command import run_cosim
 
+pytestmark = pytest.mark.slow
+
 HANGS = "import time\ntime.sleep(3600)\n"
 #: the process ends, but another one keeps its connections for some seconds
 LEAVES_A_PROCESS = "import os, time\nif os.fork():\n    os._exit(0)\ntime.sleep(8)\nos._exit(0)\n"

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from ...report.drawing_process import DrawingProcess
     from ...scenario import PreparedRun
 
-RESULT_FILES = ("result.csv", "result.parquet", "result.mcap", "kpis.json", "run.json", "report.html", "replay.html")
+RESULT_FILES = ("result.csv", "result.parquet", "result.mcap", "kpis.json", "run.json", "report.html", "replay.html", "tubes.png")
 
 
 @click.command(cls=strict_sandbox.SandboxCommand)

@@ -9,9 +9,9 @@ from typing import Any
 
 import numpy as np
 
+from ...core.compatibility import FLOAT_TYPES
 from ...core.component import Variable
 from ...core.errors import ComponentError
-from ...core.system import FLOAT_TYPES
 from .accessor_calls import AccessorCallFactory
 from .file import FmuFile
 from .function_calls import OK

@@ -13,6 +13,8 @@ from cosim.core.errors import InputError
 from cosim.export.modelica import load_block
 from cosim.export.modelica.frontend import rumoca_client, rumoca_frontend
 
+pytestmark = pytest.mark.slow
+
 pytest.importorskip("rumoca")
 
 

@@ -26,6 +26,8 @@ from cosim.process.sandbox import (
     system_call_filter,
 )
 
+pytestmark = pytest.mark.slow
+
 AVAILABLE = find_available_sandboxes()
 needs_sandbox = pytest.mark.skipif(not AVAILABLE.confines_fmus, reason="this system cannot confine FMUs")
 needs_bubblewrap = pytest.mark.skipif(not AVAILABLE.bubblewrap, reason="no bubblewrap that works")

@@ -19,6 +19,7 @@ from cosim_command import run_cosim
 from cosim.process.sandbox import find_available_sandboxes
 
 pytestmark = [
+    pytest.mark.slow,
     pytest.mark.skipif(not find_available_sandboxes().bubblewrap, reason="no bubblewrap that works"),
     pytest.mark.skipif(not find_available_sandboxes().confines_fmus, reason="this system cannot confine FMUs"),
 ]
