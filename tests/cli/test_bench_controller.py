@@ -352,7 +352,8 @@ def test_several_controllers_are_shown_side_by_side_with_their_costs(folder):
     page = (folder / lines[-1].removeprefix("page: ")).read_text()
     assert page.index("strider_autopilot</td>") < page.index("lazy</td>")
     _, *headings = page.split("<h2>")[2].partition("<thead>")[2].partition("</thead>")[0].split('<th class="number">')
-    assert [each.replace("<wbr>", "").partition("<")[0] for each in headings] == ["scenario's own", "lazy", "Keeper", "strider_autopilot"]
+    names = [each.replace("<wbr>", "").partition("<")[0] for each in headings]
+    assert names == ["scenario's own", "lazy", "Keeper", "strider_autopilot"]
     assert "Its reference is ar_drone_geometric" in page
     assert 'class="number missed" title="check: equals true">no' in page
     assert 'title="true if all waypoints were reached in order">waypoints.all_reached</td>' in page
