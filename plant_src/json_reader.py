@@ -76,12 +76,12 @@ class JsonReader:
             return (1.0,) * len(axes)
         return tuple(self.number(number, path) for number in value)
 
-    def number(self, value: Any, path: JsonPath, low: float = -math.inf, high: float = math.inf) -> float:
-        """Read a finite number from `low` to `high`."""
+    def number(self, value: Any, path: JsonPath, low: float = -math.inf, high: float = math.inf, hint: str = "") -> float:
+        """Read a finite number from `low` to `high`; `hint` follows the message about another one."""
         if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
             self.add_problem(path, f"found {value!r}, expected a finite number")
         elif not low <= value <= high:
-            self.add_problem(path, f"found {value!r}, expected {_range_text(low, high)}")
+            self.add_problem(path, f"found {value!r}, expected {_range_text(low, high)}{hint}")
         else:
             return float(value)
         return min(max(1.0, low), high)

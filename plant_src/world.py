@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -137,9 +138,11 @@ class World(Component):
             self._fleet.bodies,
         )
         self._has_environment = bool(self._environment.update_functions)
-        for vehicle in settings.vehicles:
-            for warning in vehicle_warnings(vehicle.model):
-                component_log.log_message(self._name, component_log.WARNING, f"{vehicle.name}: {warning}")
+        self.warnings = [
+            replace(warning, subject=("arguments", "vehicles", vehicle.name, "model", *warning.subject[1:]))
+            for vehicle in settings.vehicles
+            for warning in vehicle_warnings(vehicle.model)
+        ]
         for name in self._environment.vessels_without_wave_motion:
             component_log.log_message(self._name, component_log.WARNING, f"the planar vessel {name} does not move with the waves")
         if self._environment.wind_is_without_effect:

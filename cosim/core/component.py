@@ -26,7 +26,7 @@ from typing import Any, Literal, NamedTuple, Protocol
 
 import numpy as np
 
-from .errors import ComponentError, did_you_mean
+from .errors import ComponentError, Problem, did_you_mean
 from .units import Unit
 
 Causality = Literal["parameter", "calculatedParameter", "structuralParameter", "input", "output", "local", "independent"]
@@ -206,6 +206,7 @@ class Component(Protocol):
         gives_output_slopes: First time derivatives of outputs are available (FMI: maxOutputDerivativeOrder). The outputs of
             `bind` end with those that are used.
         input_limits: Lower and upper limit to which the component limits an input, by the name of the scalar.
+        warnings: Probable mistakes in the arguments; the subject of each begins with "arguments".
     """
 
     variables: Sequence[Variable]
@@ -220,6 +221,7 @@ class Component(Protocol):
     interpolates_inputs: bool = False
     gives_output_slopes: bool = False
     input_limits: Mapping[str, tuple[float, float]] = MappingProxyType({})
+    warnings: Sequence[Problem] = ()
 
     def set(self, name: str, value: Any) -> None:
         """Set a variable to a Python value, an array to nested lists; not called while stepping through a macro step."""

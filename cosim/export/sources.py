@@ -159,7 +159,7 @@ def vehicle_from_mesh(mesh: Path, data: Mapping[str, Any], scale: float) -> Impo
     return read(mesh, data, scale)
 
 
-def examine_vehicle(data: Mapping[str, Any], name: str) -> tuple[float, list[str]]:
+def examine_vehicle(data: Mapping[str, Any], name: str) -> tuple[float, list[Problem]]:
     """Read the data of a vehicle as a scenario does.
 
     Returns:
@@ -170,7 +170,7 @@ def examine_vehicle(data: Mapping[str, Any], name: str) -> tuple[float, list[str
     """
     from ..components.python_import import load_object
 
-    examine: Callable[[Mapping[str, Any], str], tuple[float, list[str]]] = load_object(_VEHICLE_CHECK, resources.root())
+    examine: Callable[[Mapping[str, Any], str], tuple[float, list[Problem]]] = load_object(_VEHICLE_CHECK, resources.root())
     return examine(data, name)
 
 

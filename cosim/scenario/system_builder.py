@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections import defaultdict
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import suppress
@@ -12,6 +13,7 @@ from typing import Any
 
 from ..components.fmi import FmuFile, Isolation
 from ..components.input_table import read_input_table
+from ..core import component_log
 from ..core.component import Component, Variable, count_scalars
 from ..core.errors import InputError, Problem, merge_problems
 from ..core.size_limits import MAX_SCALARS, require_at_most
@@ -126,6 +128,9 @@ class SystemBuilder:
             try:
                 component = self.component_factory.create(node, name, values.get(full_name, {}))
                 self.components[full_name] = component
+                for warning in component.warnings:
+                    place = node.where("components", name, *warning.subject)
+                    logging.getLogger(component_log.LOGGER_NAME).warning("%s", Problem(warning.message, place))
                 scalars += count_scalars(component.variables)
             except InputError as error:
                 node.invalid_components.add(name)

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from cosim.core.errors import Problem
 from cosim.core.units import KNOWN_UNITS
 
 from ..catalogue import model_from_data
@@ -16,11 +17,17 @@ from ..vehicles.multirotor.airframe import Airframe, Rotor
 from ..vehicles.submerged.craft import Thruster
 from ..vehicles.surface_vessel.surface_vessel import SurfaceVessel
 from ..vehicles.vessel.actuators import Propeller
+from .vessel_plausibility import boat_warnings, craft_warnings, warning
 
 #: largest distance of a rotor from the centre of mass over the median of all rotors, and over the farthest corner of the boxes
 MAX_ROTOR_DISTANCE = 5.0
-#: largest ratio of thrust to weight; racing drones reach about 15
-MAX_THRUST_RATIO = 30.0
+#: smallest and largest ratio of thrust to weight; the shipped multirotors have 1.7 to 3.2, racing drones reach about 15
+MIN_THRUST_RATIO, MAX_THRUST_RATIO = 1.3, 30.0
+#: largest speed of the tips of rotors (m/s), the speed of sound
+MAX_TIP_SPEED = 340.0
+#: largest thrust coefficient, thrust over air density, disc area and squared tip speed; the shipped rotors have about 0.01
+MAX_THRUST_COEFFICIENT = 0.1
+_AIR_DENSITY = 1.225
 #: largest extent of a vessel and of other vehicles (m); the longest ships have 460 m
 MAX_EXTENT = {True: 500.0, False: 100.0}
 #: largest ratio of mass and displaced mass, in either direction; 1 kg is 2.2 lb
@@ -28,10 +35,10 @@ MAX_MASS_RATIO = 1.5
 #: largest ratio of the lengths of the hull that floats and of a shape that collides or is drawn, in either direction
 MAX_LENGTH_RATIO = 3.0
 #: z component of the axis of a rotor that pushes downwards
-_DOWNWARDS = -0.5
+_DOWNWARDS = -0.1
 
 
-def examine_vehicle(data: Mapping[str, Any], name: str) -> tuple[float, list[str]]:
+def examine_vehicle(data: Mapping[str, Any], name: str) -> tuple[float, list[Problem]]:
     """Return mass (kg) and warnings of a vehicle that is given by its data.
 
     Raises:
@@ -41,26 +48,35 @@ def examine_vehicle(data: Mapping[str, Any], name: str) -> tuple[float, list[str
     return model.body.mass, list(vehicle_warnings(model))
 
 
-def vehicle_warnings(model: Model) -> Iterator[str]:
-    """Yield a warning for each quantity of a vehicle file that is probably wrong, with its path in the file."""
+def vehicle_warnings(model: Model) -> Iterator[Problem]:
+    """Yield a warning for each quantity that is probably wrong; its subject is "arguments" and the path in the vehicle file."""
     if model.airframe or model.craft or model.boat:
         yield from _size_warnings(model)
     if model.airframe:
         yield from _thrust_warnings(model.airframe)
         yield from _rotor_warnings(model.airframe, _reach(model))
+    if model.boat:
+        yield from boat_warnings(model.boat, _corners(model))
     if isinstance(model.boat, SurfaceVessel):
         yield from _hull_warnings(model.boat)
         yield from _draught_warnings(model.boat)
         yield from _shape_warnings(model, model.boat.hull.length)
     if model.craft:
+        yield from craft_warnings(model.craft, _reach(model))
         displaced = model.craft.water_density * model.craft.displaced_volume
         yield from _mass_warnings(model.craft.mass, displaced, f"displaced_volume of {model.craft.displaced_volume:.4g} m3")
 
 
-def _reach(model: Model) -> float:
-    """Return the distance of the farthest corner of the collision shape from the centre of mass (m)."""
+def _corners(model: Model) -> np.ndarray:
+    """Return the corners of all boxes (m), shape (n, 3): of a vessel from O, else from the centre of mass."""
     corners = np.concatenate([box.corners() for box in model.body.boxes])
-    return float(np.linalg.norm(corners - (model.boat.centre_of_mass if model.boat else 0.0), axis=1).max())
+    return corners + model.boat.centre_of_mass if model.boat and model.motion == "planar" else corners
+
+
+def _reach(model: Model) -> float:
+    """Return the distance of the farthest corner of the boxes from the centre of mass (m)."""
+    centre = model.boat.centre_of_mass if model.boat else 0.0
+    return float(np.linalg.norm(_corners(model) - centre, axis=1).max())
 
 
 def _actuators(model: Model) -> Sequence[Rotor | Thruster | Propeller]:
@@ -69,68 +85,92 @@ def _actuators(model: Model) -> Sequence[Rotor | Thruster | Propeller]:
     return model.craft.thrusters if model.craft else model.boat.propellers if model.boat else ()
 
 
-def _size_warnings(model: Model) -> Iterator[str]:
+def _size_warnings(model: Model) -> Iterator[Problem]:
     reach = _reach(model)
     if reach > (limit := MAX_EXTENT[model.is_vessel]) / 2:
-        yield f"boxes: a corner is {reach:.4g} m from the centre of mass, expected less than {limit / 2:g} m"
+        yield warning(f"a corner is {reach:.4g} m from the centre of mass, expected less than {limit / 2:g} m", "boxes")
     farthest = max(reach, *(float(np.linalg.norm(part.position)) for part in _actuators(model)))
     radius = math.sqrt(max(model.body.inertia) / model.body.mass)
     if radius > farthest:
         key = "yaw_inertia" if model.motion == "planar" else "inertia"
-        yield (
-            f"{key}: the radius of gyration, the square root of inertia over mass, is {radius:.3g} m, but the farthest point of "
+        text = (
+            f"the radius of gyration, the square root of inertia over mass, is {radius:.3g} m, but the farthest point of "
             f"the vehicle is {farthest:.3g} m from the centre of mass"
         )
+        yield warning(text, key)
 
 
-def _thrust_warnings(airframe: Airframe) -> Iterator[str]:
+def _thrust_warnings(airframe: Airframe) -> Iterator[Problem]:
     ratio = airframe.lift / (airframe.mass * airframe.gravity)
     if ratio > MAX_THRUST_RATIO:
-        yield f"mass: thrust over weight is {ratio:.3g}, expected less than {MAX_THRUST_RATIO:g}"
+        text, *path = _cause_of_thrust(airframe)
+        yield warning(f"thrust over weight is {ratio:.3g}, expected less than {MAX_THRUST_RATIO:g}{text}", *path)
+    elif ratio < MIN_THRUST_RATIO:
+        text = f"thrust over weight is {ratio:.3g}, expected more than {MIN_THRUST_RATIO:g}: it can hardly climb"
+        yield warning(text, "mass")
 
 
-def _rotor_warnings(airframe: Airframe, reach: float) -> Iterator[str]:
+def _cause_of_thrust(airframe: Airframe) -> tuple[str, ...]:
+    """Return the probable cause of a thrust that is too large, and the path of its key."""
+    tip_speed = airframe.max_rotor_speed * airframe.rotor_radius
+    if tip_speed > MAX_TIP_SPEED:
+        found = f"{airframe.max_rotor_speed:.4g} rad/s make {tip_speed:.4g} m/s at the tips of the rotors"
+        return f"; {found}: is max_speed in rpm?", "rotor", "max_speed"
+    area, thrust = math.pi * airframe.rotor_radius**2, max(rotor.thrust_coefficient for rotor in airframe.rotors)
+    coefficient = thrust / (_AIR_DENSITY * area * airframe.rotor_radius**2)
+    if coefficient > MAX_THRUST_COEFFICIENT:
+        text = f"; the thrust is {coefficient:.3g} times air density, disc area and squared tip speed, about 0.01 is usual"
+        return text, "rotor", "thrust_coefficient"
+    return "", "mass"
+
+
+def _rotor_warnings(airframe: Airframe, reach: float) -> Iterator[Problem]:
     distances = [float(np.linalg.norm(rotor.position)) for rotor in airframe.rotors]
     limit = MAX_ROTOR_DISTANCE * max(airframe.rotor_radius, min(float(np.median(distances)), 2 * reach))
     for i, (rotor, distance) in enumerate(zip(airframe.rotors, distances, strict=True)):
         if distance > limit:
-            yield f"rotors[{i}].position: {distance:.4g} m from the centre of mass, expected less than {limit:.3g} m"
+            text = f"{distance:.4g} m from the centre of mass, expected less than {limit:.3g} m"
+            yield warning(text, "rotors", str(i), "position")
         if rotor.axis[2] < _DOWNWARDS:
-            yield f"rotors[{i}].axis: the rotor pushes downwards"
+            axis = ", ".join(f"{round(each, 3):g}" for each in rotor.axis)
+            yield warning(f"the rotor pushes downwards, its thrust points along [{axis}]", "rotors", str(i), "axis")
     torques = [
         rotor.thrust_coefficient * np.cross(rotor.position, rotor.axis)[2]
         + rotor.torque_sign * rotor.torque_coefficient * rotor.axis[2]
         for rotor in airframe.rotors
     ]
     if min(torques) > 0 or max(torques) < 0:
-        yield "rotors: all turn the vehicle about z in the same direction, it cannot hold its yaw angle: change turns of some"
+        text = "all turn the vehicle about z in the same direction, it cannot hold its yaw angle: change turns of some"
+        yield warning(text, "rotors")
 
 
-def _hull_warnings(vessel: SurfaceVessel) -> Iterator[str]:
+def _hull_warnings(vessel: SurfaceVessel) -> Iterator[Problem]:
     hull, draught = vessel.hull, vessel.draught
     if hull.length > MAX_EXTENT[True]:
-        yield f"hull.length: found {hull.length:g} m, expected less than {MAX_EXTENT[True]:g} m"
+        yield warning(f"found {hull.length:g} m, expected less than {MAX_EXTENT[True]:g} m", "hull", "length")
     if hull.bottom > 0:
-        yield f"hull.bottom: found {hull.bottom:g}: the origin is below the hull, minus the draught ({-draught:.3g}) is usual"
+        text = f"found {hull.bottom:g}: the origin is below the hull, minus the draught ({-draught:.3g}) is usual"
+        yield warning(text, "hull", "bottom")
     surface = hull.bottom + draught
     for i, propeller in enumerate(vessel.propellers):
         if propeller.radius and propeller.position[2] - propeller.radius > surface:
             height = propeller.position[2] - surface
-            yield f"propellers[{i}].position: {height:.3g} m above the water at rest, the propeller gives no thrust"
+            text = f"{height:.3g} m above the water at rest, the propeller gives no thrust"
+            yield warning(text, "propellers", str(i), "position")
 
 
-def _shape_warnings(model: Model, length: float) -> Iterator[str]:
+def _shape_warnings(model: Model, length: float) -> Iterator[Problem]:
     """Yield a warning for each shape that is not that of the hull, whose length (m) is given."""
-    shapes = {"boxes": np.concatenate([box.corners() for box in model.body.boxes])}
+    shapes = {"boxes": _corners(model)}
     if model.visual is not None:
         shapes["visual"] = model.visual.reshape(-1, 3)
     for key, points in shapes.items():
         extent = float(np.ptp(points[:, 0]))
         if max(extent, length) > MAX_LENGTH_RATIO * min(extent, length):
-            yield f"{key}: {extent:.4g} m long, but the vessel floats by hull.length = {length:.4g} m, whatever is drawn"
+            yield warning(f"{extent:.4g} m long, but the vessel floats by hull.length = {length:.4g} m, whatever is drawn", key)
 
 
-def _draught_warnings(vessel: SurfaceVessel) -> Iterator[str]:
+def _draught_warnings(vessel: SurfaceVessel) -> Iterator[Problem]:
     if vessel.hull.bottom < 0:
         displaced = vessel.water_density * vessel.hull.area * -vessel.hull.bottom
         yield from _mass_warnings(
@@ -138,10 +178,10 @@ def _draught_warnings(vessel: SurfaceVessel) -> Iterator[str]:
         )
 
 
-def _mass_warnings(mass: float, displaced: float, source: str) -> Iterator[str]:
+def _mass_warnings(mass: float, displaced: float, source: str) -> Iterator[Problem]:
     """Yield a warning if the mass (kg) and the displaced mass that a quantity of the file gives (kg) differ too much."""
     ratio = max(mass, displaced) / min(mass, displaced)
     if ratio > MAX_MASS_RATIO:
         is_pound = math.isclose(mass / displaced, 1 / KNOWN_UNITS["lb"].factor, rel_tol=0.05)
         hint = ": is the mass in lb?" if is_pound else ""
-        yield f"mass: found {mass:.4g} kg, but the {source} displaces {displaced:.4g} kg of water{hint}"
+        yield warning(f"found {mass:.4g} kg, but the {source} displaces {displaced:.4g} kg of water{hint}", "mass")

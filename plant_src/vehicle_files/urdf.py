@@ -84,13 +84,13 @@ def vehicle_from_urdf(path: Path, data: Mapping[str, Any]) -> ImportedVehicle:
         result.setdefault("inertia", {"value": body.inertia.tolist(), "unit": "kg.m2", "source": source})
     if is_vessel:
         result.setdefault("centre_of_mass", {"value": body.centre.tolist(), "unit": "m", "source": source})
-    triangles = [mesh for link, pose in frames for mesh in _visual_meshes(urdf, link, pose)]
-    if triangles and "visual" not in data:
+    if "visual" not in data and any(link.find("visual") is not None for link in urdf.links.values()):
+        triangles = [mesh for link, pose in frames for mesh in _drawn_shapes(urdf, link, pose)]
         result["visual"] = mesh_import.visual_data(np.concatenate(triangles), source)
     for key in NAMED_LISTS:
         if isinstance(elements := data.get(key), list):
             result[key] = _placed_elements(elements, poses, origin, key)
-    return ImportedVehicle(result, body.centre.tolist(), list(_link_warnings(urdf)))
+    return ImportedVehicle(result, body.centre.tolist(), [*_link_warnings(urdf), *_angle_warnings(urdf)])
 
 
 def link_poses(urdf: UrdfFile) -> dict[str, Pose]:
@@ -167,6 +167,19 @@ def _link_warnings(urdf: UrdfFile) -> Iterator[str]:
             yield f'{urdf.where(inertial)}: link "{name}" has a mass but the inertia 0: it is a point'
 
 
+def _angle_warnings(urdf: UrdfFile) -> Iterator[str]:
+    """Yield a warning about the first angles of more than a turn, with the number of the others."""
+    origins = [origin for part in urdf.root if part.tag in ("link", "joint") for origin in part.iter("origin")]
+    angles = [(origin, urdf.numbers(origin, "rpy", 3, "0 0 0")) for origin in origins]
+    large = [(origin, numbers) for origin, numbers in angles if max(abs(numbers)) > 2 * np.pi]
+    if large:
+        origin, numbers = large[0]
+        found = " ".join(f"{number:g}" for number in numbers)
+        more = f" ({len(large) - 1} more such origins)" if len(large) > 1 else ""
+        text = f"rpy: found {found}, radians expected; in degrees? A right angle is 1.5708{more}"
+        yield str(urdf.error(origin, text))
+
+
 def _collision_shape(urdf: UrdfFile, link: ET.Element, pose: Pose) -> Iterator[dict[str, Any]]:
     """Yield the collision shapes of a link; what is not an upright box or a mesh becomes the level box around it."""
     for collision in link.findall("collision"):
@@ -195,10 +208,10 @@ def _edges(urdf: UrdfFile, shape: ET.Element) -> np.ndarray:
     raise urdf.error(shape, f"found the geometry {shape.tag}, expected box, cylinder, sphere or mesh")
 
 
-def _visual_meshes(urdf: UrdfFile, link: ET.Element, pose: Pose) -> Iterator[np.ndarray]:
-    """Yield the triangles of the visual shapes of a link, each of shape (n, 3, 3)."""
-    for visual in link.findall("visual"):
-        yield (pose @ _origin(urdf, visual)).transformed(_triangles(urdf, urdf.child(visual, "geometry/*")))
+def _drawn_shapes(urdf: UrdfFile, link: ET.Element, pose: Pose) -> Iterator[np.ndarray]:
+    """Yield the triangles of the visual shapes of a link, or else of its collision shapes, each of shape (n, 3, 3)."""
+    for element in link.findall("visual") or link.findall("collision"):
+        yield (pose @ _origin(urdf, element)).transformed(_triangles(urdf, urdf.child(element, "geometry/*")))
 
 
 def _triangles(urdf: UrdfFile, shape: ET.Element) -> np.ndarray:

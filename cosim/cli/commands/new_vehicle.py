@@ -85,9 +85,16 @@ def _vehicle(source: Document, name: str, urdf: Path | None, mesh: Path | None, 
             balance += f", centre of mass [{centre}] m in {file.name}"
         mass, found = examine_vehicle(data, name)
     except InputError as error:
-        imported = {} if data is source.value else dict.fromkeys(data.keys() - source.value.keys(), urdf or mesh)
-        raise InputError([_located(problem, source, imported) for problem in error.problems]) from None
-    return _Vehicle(data, f"mass {mass:.4g} kg{balance}", [*warnings, *found])
+        raise InputError(
+            [_located(problem, source, _imported(data, source, urdf or mesh)) for problem in error.problems]
+        ) from None
+    located = (_located(problem, source, _imported(data, source, urdf or mesh)) for problem in found)
+    return _Vehicle(data, f"mass {mass:.4g} kg{balance}", [*warnings, *map(str, located)])
+
+
+def _imported(data: Mapping[str, Any], source: Document, file: Path | None) -> Mapping[str, Path | None]:
+    """Return the keys of the data that the vehicle file does not have, each with the file from which it was imported."""
+    return dict.fromkeys(data.keys() - source.value.keys(), file)
 
 
 def _located(problem: Problem, source: Document, imported: Mapping[str, Path | None]) -> Problem:

@@ -43,11 +43,24 @@ def inertia_problems(inertia: np.ndarray) -> Iterator[str]:
     elif not np.allclose(tensor, tensor.T, rtol=1e-12, atol=0):
         yield f"found {tensor.tolist()}, expected a symmetric tensor"
     else:
-        small, middle, large = moments = np.linalg.eigvalsh(tensor).tolist()  # in ascending order
+        moments, axes = np.linalg.eigh(tensor)  # in ascending order
+        small, middle, large = moments.tolist()
         if small <= 0:
-            yield f"found the principal moments {moments}, expected all greater than 0"
+            yield f"found the principal moments {_moments_text(moments, axes)}, expected all greater than 0"
         elif large > (small + middle) * (1 + 1e-9):
-            yield f"found the principal moments {moments}, expected none greater than the sum of the other two"
+            text = _moments_text(moments, axes)
+            yield f"found the principal moments {text}, expected none greater than the sum of the other two"
+
+
+def _moments_text(moments: np.ndarray, axes: np.ndarray) -> str:
+    """Return principal moments with their axes in words, in the order of the nearest body axes."""
+    texts = []
+    for moment, axis in sorted(zip(moments, axes.T, strict=True), key=lambda pair: int(np.argmax(np.abs(pair[1])))):
+        largest = int(np.argmax(np.abs(axis)))
+        components = ", ".join(f"{round(component / np.sign(axis[largest]), 2) + 0.0:g}" for component in axis)
+        name = "xyz"[largest] if abs(axis[largest]) > 1 - 1e-9 else f"[{components}]"
+        texts.append(f"{moment:.4g} about {name}")
+    return ", ".join(texts)
 
 
 def principal_axes(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

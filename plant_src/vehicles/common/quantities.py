@@ -21,6 +21,9 @@ from ...json_reader import JsonPath, JsonReader, Numbers
 #: keys that every object of vehicle data may have; they are texts for the reader of the file
 TEXT_KEYS = ("source", "note")
 
+#: hint for an angle of more than a turn
+RADIANS_EXPECTED = 'radians expected; in degrees? Write {"value": 90, "unit": "deg"}'
+
 
 class QuantityReader(JsonReader):
     """Reader of vehicle data, which collects all problems."""
@@ -70,7 +73,7 @@ class QuantityReader(JsonReader):
     ) -> float:
         """Read a quantity from `low` to `high` (in SI units), and greater than `above`."""
         number = self.si_value(value, path, unit)
-        found = self.number(number, path, low, high)
+        found = self.number(number, path, low, high, _angle_hint(value, unit))
         if above is not None and not found > above:
             self.add_problem(path, f"found {number!r}, expected a number greater than {above:g}")
         return found
@@ -78,6 +81,13 @@ class QuantityReader(JsonReader):
     def vector_quantity(self, value: Any, path: JsonPath, unit: str, axes: Sequence[str]) -> Numbers:
         """Read a list of one quantity for each of `axes` (in SI units)."""
         return self.vector(self.si_value(value, path, unit), path, axes)
+
+
+def _angle_hint(value: Any, unit: str) -> str:
+    """Return a hint for an angle without a unit that is more than a turn; "" for anything else."""
+    number = value.get("value") if isinstance(value, Mapping) and "unit" not in value else value
+    is_large = unit == "rad" and isinstance(number, int | float) and abs(number) > 2 * math.pi
+    return f": {RADIANS_EXPECTED}" if is_large else ""
 
 
 def _offered(unit: Unit) -> str:

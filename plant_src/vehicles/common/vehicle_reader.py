@@ -130,7 +130,8 @@ class VehicleReader(QuantityReader):
         if not min(length, width, height) > 0:
             self.add_problem((*path, "size"), f"found {[length, width, height]}, expected edges greater than 0")
         x, y, z = self.vector_quantity(data.get("position", [0.0] * 3), (*path, "position"), "m", "xyz")
-        return CollisionBox((length, width, height), (x, y, z), self.quantity(data.get("yaw", 0.0), (*path, "yaw"), "rad"))
+        yaw = self.quantity(data.get("yaw", 0.0), (*path, "yaw"), "rad", -2 * math.pi, 2 * math.pi)
+        return CollisionBox((length, width, height), (x, y, z), yaw)
 
     def read_piece(self, value: Any, path: JsonPath) -> CollisionPiece:
         """Read the points of a convex piece."""

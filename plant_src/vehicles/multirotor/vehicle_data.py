@@ -96,9 +96,10 @@ class _MultirotorReader(VehicleReader):
         """Report a multirotor that cannot fly: the thrust of all rotors at full speed along z is less than its weight."""
         weight = airframe.mass * airframe.gravity
         if airframe.lift < weight:
-            path = ("rotors", "0", "axis") if airframe.lift < 0 else ("rotor", "max_speed")
+            path = ("rotors", "0", "axis") if airframe.lift < 0 else ("mass",)
+            hint = ": is the mass in g?" if 0 < airframe.lift < weight / 100 else ""
             thrust = f"the thrust of all rotors at full speed is {airframe.lift:.4g} N along z"
-            self.add_problem(path, f"it cannot fly: {thrust}, its weight {weight:.4g} N")
+            self.add_problem(path, f"it cannot fly: {thrust}, its weight {weight:.4g} N{hint}")
 
     def read_hull(self, data: Mapping[str, Any], boxes: Sequence[Collision], mass: float) -> Hull:
         """Read what water acts on: the box around all boxes, the displaced volume and the drag coefficient."""

@@ -107,7 +107,7 @@ FAULTS = [
     (robot(BODY.replace('value="0.8"', 'value="${m}"')), r"mass: found '\${m}', expected a number; expand it with xacro first"),
     (robot(BODY.replace('value="0.8"', 'value="-0.8"')), ':1: link "base", mass: found -0.8, expected at least 0'),
     (robot(BODY.replace('iyy="0.005"', "")), ':2: link "base", inertia: "iyy" is missing'),
-    (robot(BODY.replace('izz="0.008"', 'izz="0.08"')), r':2: link "base", inertia: found the principal moments \['),
+    (robot(BODY.replace('izz="0.008"', 'izz="0.08"')), r'"base", inertia: found .* about \[0.98, -0.19, 0\], .* 0.08 about z'),
     (
         robot().replace('<link name="rear_left">', '<link name="front_left">'),
         '"front_left": the name is used twice, first in line 3',
@@ -137,13 +137,33 @@ def test_a_link_without_mass_is_a_warning(tmp_path: Path) -> None:
     assert vehicle_from_urdf(file, DATA).warnings == [f'{file}:1: link "base" has a shape but no <inertial>: its mass is 0']
 
 
+def test_angles_in_degrees_are_a_warning(tmp_path: Path) -> None:
+    """The joints of three motors have yaw angles of more than a turn if they are written in degrees."""
+    text = robot().replace(f'rpy="0.1 0 {np.pi / 4}"', 'rpy="0 0 6.2"')
+    for angle in (135, 225, 315):
+        text = text.replace(f'rpy="0.1 0 {np.deg2rad(angle)}"', f'rpy="0 0 {angle}"')
+    (file := tmp_path / "quad.urdf").write_text(text)
+    expected = 'joint "to_rear_left", origin: rpy: found 0 0 135, radians expected; in degrees? A right angle is 1.5708'
+    assert vehicle_from_urdf(file, DATA).warnings == [f"{file}:3: {expected} (2 more such origins)"]
+
+
+def test_a_link_without_visual_is_drawn_as_it_collides(tmp_path: Path) -> None:
+    """The base has a visual shape, the motors have only cylinders that collide; without any visual shape the boxes are drawn."""
+    assert "visual" not in imported(tmp_path, robot())
+    visual = "<visual><geometry><box size='0.1 0.1 0.02'/></geometry></visual><collision>"
+    mesh = imported(tmp_path, robot(BODY.replace("<collision>", visual)))["visual"]
+    x, y, _ = np.array(mesh["vertices"]).T
+    assert np.hypot(x, y).max() == pytest.approx(ARM + 0.01, abs=1e-3)
+
+
 def test_primitive_visual_shapes_are_drawn(tmp_path: Path) -> None:
     """The volume inside the triangles (divergence theorem) is that of the shape: its faces point outwards."""
     shapes = '<box size="1 2 3"/>', '<cylinder radius="0.5" length="2"/>', '<sphere radius="0.5"/>'
     exact = 6.0, np.pi / 2, np.pi / 6
     for shape, volume in zip(shapes, exact, strict=True):
-        visual = f"<visual><origin xyz='0 0 7'/><geometry>{shape}</geometry></visual><collision>"
-        mesh = imported(tmp_path, robot(BODY.replace("<collision>", visual)))["visual"]
+        visual = f"<visual><origin xyz='0 0 7'/><geometry>{shape}</geometry></visual>"
+        shapeless = re.sub("<collision>.*?</collision>", "", robot(BODY.replace("<collision>", f"{visual}<collision>")))
+        mesh = imported(tmp_path, shapeless, {**DATA, "boxes": [{"size": [0.1, 0.1, 0.1]}]})["visual"]
         a, b, c = np.moveaxis(np.array(mesh["vertices"])[np.array(mesh["faces"])], 1, 0)
         assert np.einsum("ij,ij", a, np.cross(b, c)) / 6 == pytest.approx(volume, rel=0.04)
         assert np.mean(mesh["vertices"], axis=0) == pytest.approx([0, 0, 7 - 0.022], abs=1e-6)

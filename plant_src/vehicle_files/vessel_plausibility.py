@@ -1,0 +1,140 @@
+"""Probable mistakes in the data of vessels and submerged vehicles: thrust, resistance, places and angles of propellers."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Iterator, Sequence
+
+import numpy as np
+
+from cosim.core.errors import Problem
+
+from ..vehicles.common.quantities import RADIANS_EXPECTED
+from ..vehicles.planar_vessel.planar_vessel import PlanarVessel
+from ..vehicles.submerged.craft import Craft
+from ..vehicles.surface_vessel.surface_vessel import SurfaceVessel
+from ..vehicles.vessel.actuators import Propeller
+from ..vehicles.vessel.boat import Boat
+
+#: largest ratio of the thrust of all propellers to the weight: shipped vessels have at most 0.42, planing boats about 0.5, the
+#: shipped ROV 1.8
+MAX_VESSEL_THRUST, MAX_SUBMERGED_THRUST = 1.0, 5.0
+#: largest speed of the tips of propellers (m/s)
+MAX_TIP_SPEED = 100.0
+#: distance outside of the box around hull and boxes at which a propeller or rudder is implausible, over the length
+POSITION_MARGIN = 0.25
+#: largest distance of a thruster from the centre of mass over that of the farthest corner
+MAX_THRUSTER_DISTANCE = 2.0
+_GRAVITY = 9.81
+
+
+def warning(text: str, *path: str) -> Problem:
+    """Return a warning about the value with this path in the vehicle file."""
+    return Problem(text, subject=("arguments", *path))
+
+
+def boat_warnings(boat: Boat, corners: np.ndarray) -> Iterator[Problem]:
+    """Yield warnings about a vessel, the corners of whose boxes from O are given (m), shape (n, 3)."""
+    thrusts = [each.thrust_coefficient * each.max_speed**2 for each in boat.propellers]
+    largest = int(np.argmax(thrusts))
+    propeller, path = boat.propellers[largest], ("propellers", str(largest))
+    cause = _cause(propeller.max_speed, propeller.radius, (*path, "thrust_coefficient"), (*path, "max_speed"))
+    yield from _thrust_warnings(sum(thrusts), boat.mass * _GRAVITY, MAX_VESSEL_THRUST, cause)
+    yield from _resistance_warnings(*_surge_damping(boat), *(each.advance_coefficient for each in boat.propellers))
+    yield from _azimuth_warnings(boat.propellers)
+    low, high = _bounds(boat, corners)
+    yield from _position_warnings(boat, low, high)
+    yield from _height_warnings(boat, high[2])
+
+
+def craft_warnings(craft: Craft, reach: float) -> Iterator[Problem]:
+    """Yield warnings about a submerged vehicle whose farthest corner is `reach` (m) from the centre of mass."""
+    thrusts = [each.thrust_coefficient * craft.max_thruster_speed**2 for each in craft.thrusters]
+    path = ("thrusters", str(int(np.argmax(thrusts))), "thrust_coefficient")
+    cause = _cause(craft.max_thruster_speed, craft.thruster_radius, path, ("thruster", "max_speed"))
+    yield from _thrust_warnings(sum(thrusts), craft.mass * craft.gravity, MAX_SUBMERGED_THRUST, cause)
+    yield from _resistance_warnings(craft.linear_damping[0, 0], craft.quadratic_damping[0, 0], craft.advance_coefficient)
+    for i, thruster in enumerate(craft.thrusters):
+        distance, limit = math.hypot(*thruster.position), MAX_THRUSTER_DISTANCE * reach
+        if distance > limit:
+            text = f"{distance:.4g} m from the centre of mass, expected less than {limit:.3g} m"
+            yield warning(text, "thrusters", str(i), "position")
+
+
+def _cause(speed: float, radius: float, coefficient: tuple[str, ...], max_speed: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
+    """Return a hint and the path of the key that is probably wrong: the largest speed, or else the thrust coefficient."""
+    if speed * radius > MAX_TIP_SPEED:
+        hint = f"; {speed:.4g} rad/s make {speed * radius:.4g} m/s at the tips of the propellers: is max_speed in rpm?"
+        return hint, max_speed
+    return "", coefficient
+
+
+def _thrust_warnings(thrust: float, weight: float, limit: float, cause: tuple[str, Sequence[str]]) -> Iterator[Problem]:
+    """Yield a warning if the thrust (N) is more than `limit` times the weight (N)."""
+    hint, path = cause
+    if thrust > limit * weight:
+        text = (
+            f"the thrust of all propellers at full speed is {thrust:.4g} N, {thrust / weight:.3g} times the weight of "
+            f"{weight:.4g} N, expected less than {limit:g} times"
+        )
+        yield warning(text + hint, *path)
+
+
+def _surge_damping(boat: Boat) -> tuple[float, float, float]:
+    """Return the linear, quadratic and cubic coefficient of the resistance in surge."""
+    linear = float(boat.linear_damping[0, 0])
+    if isinstance(boat, SurfaceVessel):
+        return linear, float(boat.quadratic_damping[0, 0]), 0.0
+    assert isinstance(boat, PlanarVessel)
+    return linear, float(boat.quadratic_damping[0][0, 0]), boat.cubic_damping[0]
+
+
+def _resistance_warnings(*coefficients: float) -> Iterator[Problem]:
+    """Yield a warning if all coefficients of forces of the water that limit the speed ahead are 0."""
+    if not any(coefficients):
+        text = "the water has no resistance ahead: the elements for u are 0, here and in quadratic_damping"
+        yield warning(text, "linear_damping")
+
+
+def _azimuth_warnings(propellers: Sequence[Propeller]) -> Iterator[Problem]:
+    """Yield a warning for each largest azimuth angle of more than a turn and at most 360 rad; larger ones mean "no limit"."""
+    for i, propeller in enumerate(propellers):
+        if 2 * math.pi < propeller.max_azimuth <= 360:
+            text = f"found {propeller.max_azimuth:g}, {RADIANS_EXPECTED}"
+            yield warning(text, "propellers", str(i), "max_azimuth")
+
+
+def _bounds(boat: Boat, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Return the lowest and highest coordinates (m, from O) of boxes and hull, each of shape (3,)."""
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    if isinstance(boat, SurfaceVessel):
+        hull = boat.hull
+        x, y = hull.length / 2, hull.offset + hull.beam / 2
+        low = np.minimum(low, [hull.waterplane_centre - x, -y, hull.bottom])
+        high = np.maximum(high, [hull.waterplane_centre + x, y, hull.bottom + hull.depth])
+    return low, high
+
+
+def _position_warnings(boat: Boat, low: np.ndarray, high: np.ndarray) -> Iterator[Problem]:
+    """Yield a warning for each propeller and rudder far outside of hull and boxes."""
+    margin = POSITION_MARGIN * (high[0] - low[0])
+    positions = {"propellers": [each.position for each in boat.propellers], "rudders": [each.position for each in boat.rudders]}
+    for key, places in positions.items():
+        for i, position in enumerate(places):
+            for axis, place in enumerate(position):
+                if not low[axis] - margin <= place <= high[axis] + margin:
+                    text = (
+                        f"{'xyz'[axis]} = {place:.4g} m is far outside of hull and boxes, expected "
+                        f"{low[axis] - margin:.3g} to {high[axis] + margin:.3g} m"
+                    )
+                    yield warning(text, key, str(i), "position")
+
+
+def _height_warnings(boat: Boat, top: float) -> Iterator[Problem]:
+    """Yield a warning if the centre of mass is above hull and boxes by more than the depth of the hull."""
+    if isinstance(boat, SurfaceVessel) and (height := boat.centre_of_mass[2] - top) > boat.hull.depth:
+        text = (
+            f"z = {boat.centre_of_mass[2]:.4g} m is {height:.3g} m above hull and boxes, expected at most the depth of the hull, "
+            f"{boat.hull.depth:.3g} m"
+        )
+        yield warning(text, "centre_of_mass")
