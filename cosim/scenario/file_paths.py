@@ -24,12 +24,12 @@ _PATH_KEYS, _PATH_LIST_KEYS, _REFERENCE_KEYS = ("fmu", "system", "file"), ("libr
 
 
 def find_scenario(scenario: str | Path) -> Path:
-    """Return the path of a scenario file, given by its path with or without ".json", or by the name of a shipped scenario.
+    """Return the path of a scenario file, given by its path (also "cosim:...") with or without ".json", or by a shipped name.
 
     Raises:
         InputError: There is neither such a file nor a shipped scenario of this name, or it is an FMU or a Python file.
     """
-    path = Path(scenario)
+    path = path_in(Path(), str(scenario))
     if path.suffix == ".fmu":
         raise InputError(f"{scenario} is an FMU, expected a scenario; `cosim simulate {scenario}` simulates a single FMU")
     if path.suffix == ".py":
@@ -43,7 +43,7 @@ def find_scenario(scenario: str | Path) -> Path:
         return completed
     if str(scenario) and paths.is_folder(path):
         raise InputError(f"{scenario} is a folder, expected a scenario file")
-    raise InputError(f'no scenario file and no shipped scenario "{scenario}"{did_you_mean(str(scenario), names)}')
+    raise InputError(f'no scenario file and no shipped scenario "{scenario}"{did_you_mean(path.name, names)}')
 
 
 def path_in(folder: Path, text: str) -> Path:

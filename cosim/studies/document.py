@@ -11,7 +11,7 @@ from typing import Any, Generic, TypeVar
 from pydantic import ValidationError
 
 from ..core import paths, resources
-from ..core.errors import InputError, Problem, did_you_mean
+from ..core.errors import InputError, Problem, did_you_mean, nearest_file
 from ..core.size_limits import MAX_RUNS, require_at_most
 from ..scenario import load_scenario
 from ..scenario.dict_document import document_of_dict
@@ -114,7 +114,9 @@ def read_study(file: str | Path | Mapping[str, Any], kind: type[S], max_runs: in
     _check_counts(spec, document, max_runs)
     study_file = StudyFile(spec, document)
     try:
-        study_file.scenario  # noqa: B018  (raises InputError if there is no such scenario)
+        if not paths.is_file(study_file.scenario):
+            hint = nearest_file(study_file.scenario)
+            raise InputError(f'scenario "{study_file.spec.scenario}" does not exist{hint}')
     except InputError as error:
         raise InputError([replace(problem, where=document.where(("scenario",))) for problem in error.problems]) from None
     if (seeds := document.value.get("seeds")) and "set" not in seeds:

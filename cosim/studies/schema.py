@@ -88,7 +88,10 @@ class StudySpec(Spec):
         "name of the study and of its results folder", "landing_speeds"
     )
     description: str = key("text for reports and people", "Landings at three speeds.", default="")
-    scenario: str = key("path relative to this file, or the name of a shipped scenario", "demo1_box")
+    scenario: str = key(
+        'path relative to this file or of a file that cosim ships ("cosim:scenarios/..."), or the name of a shipped scenario',
+        "demo1_box",
+    )
     settings: dict[str, Any] = key("settings of all runs, as of `--set`", {"uav.vtol.landing_time": 8.0}, default={})
     deadline: float | None = key("wall time that a run may take", 60.0, unit="s", default=None, gt=0)
 

@@ -9,6 +9,7 @@ from click.testing import CliRunner
 from cosim_command import run_cosim
 
 from cosim.cli import cli
+from cosim.core import resources
 from cosim.core.errors import InputError
 from cosim.studies.document import read_study
 from cosim.studies.schema import SweepSpec, TuneSpec
@@ -223,3 +224,13 @@ def test_a_scenario_is_not_read_as_a_sweep(tmp_path):
     assert done.returncode == 2
     assert "is a scenario, expected a study; `cosim run base.json` runs it" in done.stderr
     assert len(done.stderr.splitlines()) == 1
+
+
+@pytest.mark.parametrize("name", ["cosim:scenarios/demo1_box.json", "cosim:scenarios/demo1_box", "demo1_box"])
+def test_a_sweep_names_a_shipped_scenario_as_other_files_do(tmp_path, name):
+    file = tmp_path / "s.json"
+    file.write_text(json.dumps({"scenario": name, "name": "s", "factors": [FACTOR]}))
+    assert read_study(file, SweepSpec).scenario == resources.root() / "scenarios/demo1_box.json"
+    file.write_text(file.read_text().replace("box", "bx"))
+    with pytest.raises(InputError, match=r's\.json:1:2: \$\.scenario: .*; did you mean "demo1_box(\.json)?"\?$'):
+        read_study(file, SweepSpec)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -83,6 +84,9 @@ def command(
             raise CheckError("\n".join(map(str, problems)))
         click.echo("every FMU is up to date with its source")
         return 0
+    for source in sources:
+        if source.suffix == ".json" and source.is_file():
+            _check_vehicle_file(source)
     if output is not None:
         _build_one(sources, output, int(fmi_version), modelica_compiler, include, library, values)
     elif fmi_version != "2":
@@ -96,6 +100,22 @@ def command(
     else:
         build(list(sources) or None, root, _print_built)
     return 0
+
+
+def _check_vehicle_file(file: Path) -> None:
+    """Raise InputError with file, line and column of each problem if a file is no vehicle file."""
+    from ...export.sources import examine_vehicle
+    from ...scenario.json_document import read_document
+
+    document = read_document(file)
+    if document.problems:
+        raise InputError(document.problems)
+    if not isinstance(document.value, dict):
+        raise InputError(Problem("expected an object, the data of a vehicle", document.where(())))
+    try:
+        examine_vehicle(document.value, file.stem)
+    except InputError as error:
+        raise InputError([replace(each, where=document.where(each.subject[1:])) for each in error.problems]) from None
 
 
 def _build_one(
