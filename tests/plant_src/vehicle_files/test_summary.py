@@ -33,6 +33,6 @@ def test_rotors_that_the_controller_cannot_fly_have_no_parameters() -> None:
     assert examine_vehicle(data, "x500").parameters == {}
 
 
-@pytest.mark.parametrize(("name", "inertia"), [("x500", [0.0238, 0.0238, 0.0439]), ("cybership2", 1.70964)])
+@pytest.mark.parametrize(("name", "inertia"), [("x500", [0.023845, 0.023845, 0.043919]), ("cybership2", 1.70964)])
 def test_the_inertia_is_that_of_the_file(name: str, inertia: Any) -> None:
     assert examine_vehicle(shipped(f"plant_src/vehicles/data/{name}.json"), name).inertia == pytest.approx(inertia, rel=1e-3)
