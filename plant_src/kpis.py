@@ -51,7 +51,7 @@ def waypoints(
         Values by name:
 
         - `reached`: number of waypoints reached in order, counted from the first
-        - `all_reached`: true if that is the number of waypoints
+        - `all_reached`: true if all waypoints were reached in order
         - `time[1]`, `time[2]`, ...: time at which each waypoint was reached (s); NaN if it was not
     """
     require(acceptance_radius > 0, f"expected a positive acceptance_radius (m); found {acceptance_radius:g}")
@@ -135,7 +135,10 @@ def tracking(result: Result, vehicle: Prefix, target: Prefix, start: float, stop
         stop: Last time that is evaluated (s).
 
     Returns:
-        `rms`, the root mean square over the rows, and `max`, the largest distance (m); NaN without rows.
+        Values by name, NaN without rows:
+
+        - `rms`: root mean square of the horizontal distance over the rows (m)
+        - `max`: largest horizontal distance (m)
     """
     distance = horizontal_distance(result, vehicle, target)[row_slice(result, start, stop)]
     if not distance.size:

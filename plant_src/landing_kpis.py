@@ -44,7 +44,7 @@ def landing(result: Result, vehicle: Prefix, deck: Prefix) -> dict[str, Number]:
 
         - `time`: time of the touchdown (s)
         - `lateral_error`: horizontal distance of the vehicle's centre of mass from the deck centre at touchdown (m)
-        - `touchdown_speed`: vertical speed relative to the deck centre, positive when approaching, one row before (m/s)
+        - `touchdown_speed`: vertical speed relative to the deck centre one row before touchdown, positive when approaching (m/s)
         - `tangential_speed`: horizontal speed relative to the deck centre, one row before touchdown (m/s)
         - `slide`: largest distance from the touchdown point in the plane of the deck, over rows in contact (m)
         - `bounces`: number of times that contact with the vessel was lost and regained after touchdown

@@ -47,7 +47,7 @@ def print_ranking(ranking: Ranking, candidate: str) -> None:
 
 
 def print_side_by_side(controllers: Sequence[BenchedController], reference: str) -> None:
-    """Print a line per controller: scenarios passed, checks passed and costs per step.
+    """Print a line per controller: scenarios passed, checks passed and costs per step; below the table what orders them.
 
     Args:
         controllers: the controllers, the best first.
@@ -55,6 +55,8 @@ def print_side_by_side(controllers: Sequence[BenchedController], reference: str)
     """
     from rich import box
     from rich.table import Table
+
+    from ..studies.controller_bench.page import have_different_totals
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
     table.add_column("controller", overflow="fold")
@@ -67,6 +69,9 @@ def print_side_by_side(controllers: Sequence[BenchedController], reference: str)
         table.add_row(cell_text(each.name), *counts, *costs)
     click.echo()
     table_console().print(table)
+    click.echo("order: passed checks, then passed scenarios, then the goals of the role")
+    if have_different_totals(controllers):
+        click.echo("the totals differ: scenarios that are not applicable (n/a) and checks of KPIs that are left out do not count")
     click.echo(f"cost: smallest processor time per step; ratio: to {reference}" if reference else "the costs were not measured")
 
 

@@ -34,6 +34,7 @@ class ControllerTrial:
         original: the original scenario.
         own_name: name of the controller of the original scenario.
         ignored_settings: variables that the scenario sets and the candidate lacks, such as "vtol.landing_time".
+        kpi_descriptions: meanings of the KPI values (see `describe_kpis`).
         candidate_folder: output directory of the scenario with the candidate.
         shipped_folder: output directory of the original scenario.
         run_command: function that runs commands.
@@ -43,6 +44,7 @@ class ControllerTrial:
     original: Path
     own_name: str
     ignored_settings: Sequence[str]
+    kpi_descriptions: Mapping[str, str]
     candidate_folder: Path
     shipped_folder: Path
     run_command: CommandRunner
@@ -99,7 +101,7 @@ class TrialResult:
         candidate = RunKpis.read(self.trial.candidate_folder) if self.outcome.code in (0, 3) else None
         checks = json.loads(self.trial.file.read_text(encoding="utf-8-sig"))["checks"]
         shipped = RunKpis.read(self.trial.shipped_folder)
-        return ScenarioKpis(candidate, shipped, checks, self.is_applicable, self.trial.own_name)
+        return ScenarioKpis(candidate, shipped, checks, self.is_applicable, self.trial.own_name, self.trial.kpi_descriptions)
 
     def as_json(self) -> dict[str, Any]:
         """Return the result as JSON."""

@@ -9,6 +9,7 @@ from pathlib import Path
 from markdown_parts import code, page, plain, table
 
 import cosim
+from cosim.cli.scenario_groups import group_scenarios
 from cosim.cli.shipped import CATALOGUE, Entry
 from cosim.components.fmi import FmuFile
 from cosim.components.python_import import load_object
@@ -109,13 +110,15 @@ def _kpi_parts(entry: Entry) -> Iterator[str]:
 
 def scenarios_page() -> str:
     """Return the page with the shipped scenarios, sweeps and tunings."""
-    scenarios, studies = CATALOGUE["scenarios"](), CATALOGUE["sweeps"]()
+    groups, studies = group_scenarios(CATALOGUE["scenarios"]()), CATALOGUE["sweeps"]()
     return page(
         "Shipped scenarios",
         "`cosim run NAME` runs a scenario, `cosim sweep NAME`, `cosim tune NAME` and `cosim tune --worst NAME` a study. "
         "`cosim list` prints these lists.",
-        *(
-            table((kind, "content"), ((code(each.name), plain(each.description)) for each in entries))
-            for kind, entries in (("scenario", scenarios), ("study", studies))
-        ),
+        *(f"## {heading.capitalize()}\n\n{_entry_table('scenario', entries)}" for heading, entries in groups.items()),
+        f"## Sweeps and tunings\n\n{_entry_table('study', studies)}",
     )
+
+
+def _entry_table(kind: str, entries: Iterable[Entry]) -> str:
+    return table((kind, "content"), ((code(each.name), plain(each.description)) for each in entries))

@@ -10,7 +10,11 @@ import pytest
 from cosim_command import run_cosim
 from fault_fmu import FaultFmus, build_library
 
+from cosim.cli.bench_table import print_side_by_side
 from cosim.core import resources
+from cosim.studies.controller_bench.page import BenchedController
+from cosim.studies.controller_bench.ranking import ScenarioKpis, rank
+from cosim.studies.controller_bench.score import RunKpis
 
 ROOT = resources.root()
 MISSION = {
@@ -331,7 +335,9 @@ def test_several_controllers_are_shown_side_by_side_with_their_costs(folder):
     assert done.returncode == 3, done.stdout + done.stderr
     lines = done.stdout.splitlines()
     cost_line = lines.index("cost: smallest processor time per step; ratio: to ar_drone_geometric")
-    rows = [line.split() for line in lines[lines.index("") + 3 : cost_line]]
+    differ = "the totals differ: scenarios that are not applicable (n/a) and checks of KPIs that are left out do not count"
+    assert lines[cost_line - 2 : cost_line] == ["order: passed checks, then passed scenarios, then the goals of the role", differ]
+    rows = [line.split() for line in lines[lines.index("") + 3 : cost_line - 2]]
     assert rows[0][:7] == ["strider_autopilot", "1", "of", "1", "2", "of", "2"]
     costs = {row[0]: float(row[-2]) for row in rows}
     ratios = {row[0]: float(row[-1]) for row in rows}
@@ -346,10 +352,25 @@ def test_several_controllers_are_shown_side_by_side_with_their_costs(folder):
     page = (folder / lines[-1].removeprefix("page: ")).read_text()
     assert page.index("strider_autopilot</td>") < page.index("lazy</td>")
     _, *headings = page.split("<h2>")[2].partition("<thead>")[2].partition("</thead>")[0].split('<th class="number">')
-    assert [each.partition("<")[0] for each in headings] == ["scenario's own", "lazy", "Keeper", "strider_autopilot"]
+    names = [each.replace("<wbr>", "").partition("<")[0] for each in headings]
+    assert names == ["scenario's own", "lazy", "Keeper", "strider_autopilot"]
     assert "Its reference is ar_drone_geometric" in page
     assert 'class="number missed" title="check: equals true">no' in page
+    assert 'title="true if all waypoints were reached in order">waypoints.all_reached</td>' in page
+    assert "<dd>value, the last value of a signal in its own unit" not in page  # not of `cosim.kpis:final`
+    assert "<dt>away.<wbr>value</dt><dd>the error in the last row (signal usv.distance)</dd>" in page
     assert "http" not in page.split("<body>")[1]
+
+
+def test_the_table_says_that_scenarios_which_are_not_applicable_make_totals_differ(capsys):
+    def benched(name, applicable):
+        runs = [ScenarioKpis(RunKpis({"a": 0.0}, {}, {}), None, [{"kpi": "a", "max": 1}]) for _ in range(applicable)]
+        return BenchedController(name, rank(runs, []), {}, [], [])
+
+    print_side_by_side([benched("first", 2), benched("second", 2)], "")
+    assert "totals differ" not in capsys.readouterr().out
+    print_side_by_side([benched("first", 2), benched("second", 1)], "")
+    assert "totals differ" in capsys.readouterr().out
 
 
 def test_failures_of_shipped_controllers_do_not_affect_the_exit_code_of_an_own_one(folder):

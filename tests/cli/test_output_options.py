@@ -1,6 +1,7 @@
 """Options that choose what commands print: --json, --quiet, --verbose; and `cosim list`."""
 
 import json
+import re
 from pathlib import Path
 
 import pytest
@@ -139,6 +140,24 @@ def test_list_names_what_is_shipped():
     listed = json.loads(run_cosim("list", "--json", "scenarios", "kpis").stdout)
     assert [entry["name"] for entry in listed["scenarios"]] == sorted(path.stem for path in (ROOT / "scenarios").glob("*.json"))
     assert all(Path(entry["file"]).is_file() and entry["description"] for found in listed.values() for entry in found)
+
+
+def test_scenarios_are_listed_in_the_groups_of_their_document():
+    """Each scenario is in one group; the document has a heading for each group and a table of its scenarios."""
+    text = run_cosim("list", "scenarios").stdout
+    listed = {
+        head.lower(): sorted(re.findall(r"^  (\w+)", rows, re.M))
+        for head, rows in re.findall(r"^(\w.*):\n((?:  .*\n)+)", text, re.M)
+    }
+    document = (ROOT / "docs/shipped_scenarios.md").read_text()
+    documented = {}
+    for head, rows in re.findall(r"^## (.*)\n\n((?:\|.*\n)+)", document, re.M):
+        names = "".join(row.split("|")[1] for row in rows.splitlines())
+        documented[head.lower()] = sorted(re.findall(r"`(\w+)`", names))
+    assert listed == documented
+    assert sorted(name for names in listed.values() for name in names) == sorted(
+        path.stem for path in (ROOT / "scenarios").glob("*.json")
+    )
 
 
 def test_an_fmu_in_place_of_a_scenario_is_explained():

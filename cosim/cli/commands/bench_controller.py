@@ -237,6 +237,7 @@ def _write_scenarios(controller: str, role_name: str, files: Sequence[Path], fol
     """Examine the candidate and write the scenarios that use it; runs in a child process, since it executes foreign code."""
     from ...results.files import write_json
     from ...studies.controller_bench.candidate import interface_problems, parse_source, read_interface
+    from ...studies.controller_bench.kpi_descriptions import describe_kpis
     from ...studies.controller_bench.role import read_role
     from ...studies.controller_bench.substitution import ControllerSubstitution
 
@@ -252,7 +253,8 @@ def _write_scenarios(controller: str, role_name: str, files: Sequence[Path], fol
             places, own_names = zip(*substitution.replaced_components.items(), strict=True)
             own_name = ", ".join(dict.fromkeys(own_names))
             ignored = list(dict.fromkeys(each.lacking for each in substitution.omissions if not each.entry))
-            about = {"own_name": own_name, "ignored_settings": ignored}
+            meanings = describe_kpis(json.loads(path.read_text(encoding="utf-8"))["kpis"], path.parent)
+            about = {"own_name": own_name, "ignored_settings": ignored, "kpi_descriptions": meanings}
             written.append({"file": path, "original": file, "component": places[0], **about})
             omissions += [{"scenario": file.stem, **asdict(each)} for each in dict.fromkeys(substitution.omissions)]
     if not written:
@@ -265,8 +267,16 @@ def _make_trials(
     written: Sequence[Mapping[str, Any]], folder: Path, shipped: Path, run_command: CommandRunner
 ) -> list[ControllerTrial]:
     """Return the trials of the written scenarios."""
-    found = [(Path(each["file"]), Path(each["original"]), each["own_name"], each["ignored_settings"]) for each in written]
     return [
-        ControllerTrial(file, original, own_name, ignored, folder / file.stem, shipped / file.stem, run_command)
-        for file, original, own_name, ignored in found
+        ControllerTrial(
+            file := Path(each["file"]),
+            Path(each["original"]),
+            each["own_name"],
+            each["ignored_settings"],
+            each["kpi_descriptions"],
+            folder / file.stem,
+            shipped / file.stem,
+            run_command,
+        )
+        for each in written
     ]

@@ -3,18 +3,19 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
 from pathlib import Path
-from typing import Any
+from typing import Any, NamedTuple
 
 from ...core.text import count_noun
 from ...core.version import __version__
 from ...report.pages import render_page
 from ...report.tables import format_number
-from ...results.checks import evaluate_all_checks
+from ...results.checks import CheckOutcome, Number, evaluate_all_checks
 from ...results.files import writing_atomically
+from .kpi_descriptions import kpi_description
 from .ranking import Ranking, ScenarioKpis
 from .score import RunKpis
 
@@ -54,6 +55,11 @@ def order(controllers: Sequence[BenchedController]) -> list[BenchedController]:
     return sorted(controllers, key=key, reverse=True)
 
 
+def have_different_totals(controllers: Iterable[BenchedController]) -> bool:
+    """Return whether scenarios or checks count for some controllers only: some are not applicable, or their KPI is left out."""
+    return len({(each.ranking.candidate.scenarios, each.ranking.candidate.checks) for each in controllers}) > 1
+
+
 def write_bench_page(
     role: str, controllers: Sequence[BenchedController], path: Path, reference: str = "", reference_cost: float = math.nan
 ) -> None:
@@ -66,6 +72,7 @@ def write_bench_page(
         reference: name of the controller whose cost is 1; "": the costs were not measured.
         reference_cost: its processor time per step (s).
     """
+    scenarios = [(name, run.own_name, list(_kpi_rows(name, controllers))) for name, run in controllers[0].scenarios.items()]
     text = render_page(
         "bench.html",
         role=Path(role).stem,
@@ -73,31 +80,65 @@ def write_bench_page(
         reference=reference,
         reference_cost=1e6 * reference_cost,
         controllers=order(controllers),
+        different_totals=have_different_totals(controllers),
         columns=[each.name for each in controllers],
-        scenarios=[(name, run.own_name, list(_kpi_rows(name, controllers))) for name, run in controllers[0].scenarios.items()],
+        scenarios=scenarios,
+        meanings=_meanings(row for _, _, rows in scenarios for row in rows),
         version=__version__,
     )
     with writing_atomically(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
-def _kpi_rows(scenario: str, controllers: Sequence[BenchedController]) -> Iterator[tuple[str, str, list[dict[str, Any]]]]:
-    """Yield the name, the unit and the cells of each KPI that is checked or a goal."""
+class KpiRow(NamedTuple):
+    """Row of a scenario's table.
+
+    Attributes:
+        name: name of the KPI value.
+        unit: its unit.
+        meaning: its description; "": unknown.
+        limits: limits of its checks, such as "max 0.1"; "": it is not checked.
+        cells: text, `failed` and `limits` of the failed checks, of the scenario's own controller and of each controller.
+    """
+
+    name: str
+    unit: str
+    meaning: str
+    limits: str
+    cells: Sequence[Mapping[str, Any]]
+
+
+def _kpi_rows(scenario: str, controllers: Sequence[BenchedController]) -> Iterator[KpiRow]:
+    """Yield a row for each KPI that is checked or a goal."""
     runs = [each.scenarios[scenario] for each in controllers]
-    checked = {check["kpi"] for run in runs for check in run.checks}
+    checks = [check for run in runs for check in run.checks]
     found = [kpis for kpis in (runs[0].shipped, *(run.candidate for run in runs)) if kpis]
-    names = dict.fromkeys(name for run in found for name in run.kpis)
-    for name in names:
-        if name in checked or any(fnmatchcase(name, goal) for goal in controllers[0].goals):
+    for name in dict.fromkeys(name for run in found for name in run.kpis):
+        limits = ", ".join(dict.fromkeys(outcome.limits for outcome in _outcomes(name, {}, checks)))
+        if limits or any(fnmatchcase(name, goal) for goal in controllers[0].goals):
             unit = next((run.units[name] for run in found if name in run.units), "")
+            meaning = next(filter(None, (kpi_description(name, run.descriptions) for run in runs)), "")
             cells = [_cell(name, run.candidate, run.checks) if run.is_applicable else _NOT_APPLICABLE for run in runs]
-            yield name, unit, [_cell(name, runs[0].shipped, runs[0].checks), *cells]
+            yield KpiRow(name, unit, meaning, limits, [_cell(name, runs[0].shipped, runs[0].checks), *cells])
+
+
+def _meanings(rows: Iterable[KpiRow]) -> dict[str, list[str]]:
+    """Return the different meanings of each KPI, by its name without an index."""
+    found: dict[str, dict[str, None]] = {}
+    for row in rows:
+        if row.meaning:
+            found.setdefault(row.name.partition("[")[0], {})[row.meaning] = None
+    return {name: list(meanings) for name, meanings in found.items()}
 
 
 def _cell(name: str, run: RunKpis | None, checks: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
     """Return the text of a KPI in a run (None: it failed), and the limits of the checks that failed."""
     if run is None or name not in run.kpis:
         return {"text": "", "failed": run is None, "limits": ""}
-    outcomes = evaluate_all_checks(run.kpis, [check for check in checks if check["kpi"] == name])
-    failed = [outcome.limits for outcome in outcomes if not outcome.passed]
+    failed = [outcome.limits for outcome in _outcomes(name, run.kpis, checks) if not outcome.passed]
     return {"text": format_number(run.kpis[name]), "failed": bool(failed), "limits": ", ".join(failed)}
+
+
+def _outcomes(name: str, kpis: Mapping[str, Number], checks: Sequence[Mapping[str, Any]]) -> list[CheckOutcome]:
+    """Return the outcomes of the checks of a KPI."""
+    return evaluate_all_checks(kpis, [check for check in checks if check["kpi"] == name])

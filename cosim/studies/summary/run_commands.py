@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from ...core import resources
+from ...scenario.file_paths import SHIPPED, PathChange, change_pointed, relocating
 from ..sweep import Sweep
 
 
@@ -24,9 +25,25 @@ def run_settings(sweep: Sweep, run: int) -> dict[str, Any]:
 
 
 def format_run_command(scenario: Path, settings: Any) -> str:
-    """Return the command line that makes this run alone; it refers to a shipped scenario by its name."""
-    words = [word for name, value in settings.items() for word in ("--set", f"{name}={_setting_text(value)}")]
+    """Return the command line that makes this run alone in the working directory; it refers to a shipped scenario by its name.
+
+    Paths in settings of a study start from the folder of the scenario, those of the option `--set` from the working directory.
+    """
+    change = _path_changes(scenario.parent)
+    moved = {name: change_pointed(name, value, change) if name.startswith("/") else value for name, value in settings.items()}
+    words = [word for name, value in moved.items() for word in ("--set", f"{name}={_setting_text(value)}")]
     return shlex.join(["cosim", "run", _scenario_text(scenario), *words])
+
+
+def _path_changes(folder: Path) -> PathChange:
+    """Return a function that makes paths relative to the folder shipped ones, or relative to the working directory."""
+    to_shipped, to_working = relocating(folder, resources.root()), relocating(folder, Path.cwd())
+
+    def change(text: str) -> str:
+        shipped = to_shipped(text)
+        return to_working(text) if Path(shipped).is_absolute() or shipped.startswith("..") else f"{SHIPPED}{shipped}"
+
+    return change
 
 
 def _scenario_text(scenario: Path) -> str:

@@ -132,6 +132,18 @@ def test_commands_name_shipped_scenarios_in_place_of_their_paths(tmp_path):
     assert format_run_command(own, {}) == f"cosim run {own}"
 
 
+def test_paths_in_commands_start_from_the_working_directory_or_name_shipped_files(tmp_path, monkeypatch):
+    (tmp_path / "work").mkdir()
+    monkeypatch.chdir(tmp_path / "work")
+    shipped, own = resources.root() / "scenarios/demo1_box.json", tmp_path / "scenarios/own.json"
+    level = {"/components/uav": {"system": "systems/uav.json", "parameters": {"file": "systems/uav.json"}}}
+    moved = '{"system": "%s", "parameters": {"file": "systems/uav.json"}}'
+    assert shlex.split(format_run_command(shipped, level))[-1] == "/components/uav=" + moved % "cosim:scenarios/systems/uav.json"
+    assert shlex.split(format_run_command(own, level))[-1] == "/components/uav=" + moved % "../scenarios/systems/uav.json"
+    one = shlex.split(format_run_command(shipped, {"/components/uav/fmu": "../fmus/ar_drone_indi.fmu"}))
+    assert one[-1] == "/components/uav/fmu=cosim:fmus/ar_drone_indi.fmu"
+
+
 def test_the_page_shows_success_rates_failures_and_the_design(page):
     assert "✗ 2 of 4 runs failed" in page.words
     assert "SIGSEGV" in page.words
