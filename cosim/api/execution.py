@@ -68,12 +68,14 @@ def _evaluate_run(result: Result, prepared: PreparedRun) -> Execution:
         except (CosimError, KeyboardInterrupt) as error:
             failures.append(error)
     kpis = Kpis({name: math.nan if isinstance(value, NoValue) else value for name, value in values.items()})
+    checks = evaluate_all_checks(kpis, prepared.checks)
+    failed = [check.check["kpi"] for check in checks if not check.passed]
     about = {
         "kpi_units": kpi_units(functions, kpis, result.units),
         "kpi_senses": kpi_senses(functions, kpis),
         "kpi_notes": kpi_notes(values, _signals_of_optional_kpis(prepared, functions, result)),
+        "check_notes": kpi_notes({name: values[name] for name in failed if name in values}),
     }
-    checks = evaluate_all_checks(kpis, prepared.checks)
     evaluated = replace(result, kpis=kpis, metadata={**result.metadata, **about}, checks=checks)
     return Execution(evaluated, failures[0] if failures else None)
 

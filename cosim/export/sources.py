@@ -86,7 +86,7 @@ def _load_equations(path: Path, _model: str | None, _options: ModelicaOptions | 
 _VEHICLE_PROGRAM = "plant_src/vehicle_files/block.py"
 _URDF_READER = "plant_src/vehicle_files/urdf.py:vehicle_from_urdf"
 _MESH_READER = "plant_src/vehicle_files/mesh_import.py:vehicle_from_mesh"
-_VEHICLE_CHECK = "plant_src/vehicle_files/plausibility.py:examine_vehicle"
+_VEHICLE_CHECK = "plant_src/vehicle_files/summary.py:examine_vehicle"
 #: file and class of the shipped plant
 WORLD = "plant_src/world.py:World"
 _WORLD_SCHEMA = "plant_src/schemas/world.py:world_schema"
@@ -95,6 +95,8 @@ _VEHICLE_SCHEMA = "plant_src/schemas/vehicle.py:vehicle_schema"
 
 #: data of a vehicle, its centre of mass in the frame of the imported file (m), and warnings
 ImportedVehicle = tuple[dict[str, Any], list[float], list[str]]
+#: mass (kg), inertia (kg m2), parameters of the controller that flies a multirotor (or none), and probable mistakes
+VehicleSummary = tuple[float, Any, Mapping[str, Any], Sequence[Problem]]
 
 
 def _load_vehicle(path: Path, _model: str | None, _options: ModelicaOptions | None) -> Block:
@@ -159,18 +161,18 @@ def vehicle_from_mesh(mesh: Path, data: Mapping[str, Any], scale: float) -> Impo
     return read(mesh, data, scale)
 
 
-def examine_vehicle(data: Mapping[str, Any], name: str) -> tuple[float, list[Problem]]:
+def examine_vehicle(data: Mapping[str, Any], name: str) -> VehicleSummary:
     """Read the data of a vehicle as a scenario does.
 
     Returns:
-        Mass (kg), and warnings about probable mistakes.
+        Mass, inertia, parameters of the controller that flies it, and warnings about probable mistakes.
 
     Raises:
         InputError: With all problems of the data; the subject of each begins with "arguments" and continues with the path.
     """
     from ..components.python_import import load_object
 
-    examine: Callable[[Mapping[str, Any], str], tuple[float, list[Problem]]] = load_object(_VEHICLE_CHECK, resources.root())
+    examine: Callable[[Mapping[str, Any], str], VehicleSummary] = load_object(_VEHICLE_CHECK, resources.root())
     return examine(data, name)
 
 

@@ -78,6 +78,7 @@ def render_report(result: Result, outcomes: Sequence[CheckOutcome], figures: Ite
         failure=failure,
         checks=len(outcomes),
         failed=sum(not outcome.passed for outcome in outcomes),
+        reasons=result.metadata.get("check_notes", []),
         facts=list(_facts(result)),
         cards=[_check_row(outcome, units) for outcome in outcomes],
         kpis=_group_kpis(result.kpis, units),

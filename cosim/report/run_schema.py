@@ -107,6 +107,7 @@ class RunFile(_Part):
     units: dict[str, str] = {}
     kpi_units: dict[str, str] = {}
     kpi_notes: list[str] = []
+    check_notes: list[str] = []
     warnings: list[str] = []
     live_events: list[Any] = []
     terminated_by: _Termination | None = None

@@ -273,7 +273,9 @@ def kpi_notes(kpis: Mapping[str, Number], taken: Iterable[tuple[str, Mapping[str
             names_of.setdefault(value.reason, []).append(name)
     reasons = [f"{abbreviate_names(names, 3)}: {reason}" for reason, names in names_of.items()]
     return reasons + [
-        f"{name}: {argument} is the signal {signal}" for name, signals in taken for argument, signal in signals.items()
+        f'{name} is computed from the signal {signal} (argument "{argument}")'
+        for name, signals in taken
+        for argument, signal in signals.items()
     ]
 
 

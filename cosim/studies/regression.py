@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import os
 import subprocess
 import sys
 import time
@@ -233,10 +234,14 @@ class _FinishedRun:
             made_by = parse_object(self.reference_path.with_suffix(".json").read_text(encoding="utf-8"))
         except (OSError, ValueError):
             return
-        changes = describe_provenance_changes(made_by, self.result.metadata)
+        changes = describe_provenance_changes(made_by, self.result.metadata, self._shown_file)
         if changes := sorted(changes, key=lambda change: change.startswith(SHIPPED)):
             more = f" and {len(changes) - MAX_LISTED_CHANGES} more" if len(changes) > MAX_LISTED_CHANGES else ""
             yield f"changed since the reference was made: {', '.join(changes[:MAX_LISTED_CHANGES])}{more}"
+
+    def _shown_file(self, name: str) -> str:
+        """Return a file of the run, which metadata name from the scenario's folder, relative to the working directory."""
+        return name if name.startswith(SHIPPED) else os.path.relpath(self.folder / name).replace(os.sep, "/")
 
     def draw_tubes(self, comparison: Comparison, path: Path) -> Path:
         """Draw the worst signals in their tubes to a file and return its path."""

@@ -3,15 +3,13 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Mapping, Sequence
-from typing import Any
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
 from cosim.core.errors import Problem
 from cosim.core.units import KNOWN_UNITS
 
-from ..catalogue import model_from_data
 from ..vehicles.model import Model
 from ..vehicles.multirotor.airframe import Airframe, Rotor
 from ..vehicles.submerged.craft import Thruster
@@ -36,16 +34,6 @@ MAX_MASS_RATIO = 1.5
 MAX_LENGTH_RATIO = 3.0
 #: z component of the axis of a rotor that pushes downwards
 _DOWNWARDS = -0.1
-
-
-def examine_vehicle(data: Mapping[str, Any], name: str) -> tuple[float, list[Problem]]:
-    """Return mass (kg) and warnings of a vehicle that is given by its data.
-
-    Raises:
-        InputError: With all problems; the subject of each begins with "arguments" and continues with the path in the data.
-    """
-    model = model_from_data(data, name)
-    return model.body.mass, list(vehicle_warnings(model))
 
 
 def vehicle_warnings(model: Model) -> Iterator[Problem]:

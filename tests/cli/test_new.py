@@ -276,6 +276,21 @@ def test_the_output_of_a_build_is_an_fmu(tmp_path):
 
 
 @pytest.mark.parametrize(
+    ("text", "line"),
+    [
+        ('{\n "family": "multirotor",\n "mass": 1.0\n "inertia": 1\n}', "boat.json:3:13: expected ',' or '}'"),
+        ('{"family": "submerged", "mass": NaN}', "boat.json:1:33: $.mass: NaN is not allowed, expected a finite number"),
+        ('{\n "family": "multirotr"}', """boat.json:2:2: $.family: found 'multirotr'; did you mean "multirotor"?"""),
+        ("[1]", "boat.json:1:1: $: expected an object, the data of a vehicle"),
+    ],
+)
+def test_the_export_of_a_vehicle_file_names_the_place_of_a_fault(tmp_path, text, line):
+    (tmp_path / "boat.json").write_text(text)
+    done = run_cosim("build", "boat.json", "--output", "boat.fmu", cwd=tmp_path)
+    assert (done.returncode, done.stderr) == (2, f"{line}\n")
+
+
+@pytest.mark.parametrize(
     ("base", "hint"), [("ar_drone", "cosim run demo1_box --set"), ("x500", "multirotor_controller.fmu flies it")]
 )
 def test_a_new_multirotor_comes_with_a_way_to_fly_it(tmp_path: Path, base: str, hint: str) -> None:

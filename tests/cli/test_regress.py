@@ -76,7 +76,7 @@ def test_a_changed_result_fails_with_signal_time_and_changes(folder):
     done = regress(folder, "--junit", "out/junit.xml")
     assert done.returncode == 3
     assert "body.temperature leaves its tube at t = 0.0" in done.stdout
-    assert "changed since the reference was made: cooling.json\n" in done.stdout
+    assert "changed since the reference was made: scenarios/cooling.json\n" in done.stdout
     assert "        tube: the reference plus and minus its tolerances" in done.stdout
     command = "cosim regress --update scenarios/cooling.json"
     assert done.stdout.splitlines()[-1] == f"if the change is meant, make this run the reference: {command}"

@@ -69,6 +69,16 @@ def test_the_page_has_the_kpis_with_units_and_checks(page, directory):
     assert page.texts[card + 1 : card + 4] == [f"{kpis['landing.lateral_error']:.4g}", "m", "✓ max 0.1"]
 
 
+def test_the_reasons_of_failed_checks_are_at_the_top(tmp_path):
+    recording = Recording(np.array([0.0, 1.0]), {"a.y": np.zeros(2)}, {})
+    reason = "landing.lateral_error: plant.uav never took off"
+    outcome = CheckOutcome({"kpi": "landing.lateral_error", "max": 0.1}, float("nan"), False)
+    write_report(Result(recording, metadata={"check_notes": [reason], "kpi_notes": [reason]}), [outcome], [], tmp_path / "r.html")
+    texts = Reader((tmp_path / "r.html").read_text()).texts
+    verdict = texts.index("✗ 0 of 1 check passed")
+    assert texts[verdict + 1 : verdict + 3] == [reason, "run"]
+
+
 def test_the_page_has_system_versions_timings_and_scenario(page):
     assert {"plant.uav.position.x", "uav.vtol.vehicle.position.x", "rad/s", "stepping loop"} <= set(page.texts)
     assert {"pybullet", "pybullet-arm64"} & set(page.texts)  # the second one has wheels for Python 3.12 and later

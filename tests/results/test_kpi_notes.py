@@ -71,4 +71,7 @@ def test_a_copy_as_for_another_process_has_the_reason():
 
 def test_a_run_names_the_signals_of_optional_kpis():
     result = cosim.run("demo1_box", {"/figures": []}, stop_time=0.1)
-    assert "descent: mode is the signal uav.mode" in result.metadata["kpi_notes"]
+    assert result.metadata["check_notes"] == [
+        "landing.lateral_error, landing.touchdown_speed: plant.uav never took off, it is in contact during the whole run"
+    ]
+    assert 'descent is computed from the signal uav.mode (argument "mode")' in result.metadata["kpi_notes"]

@@ -53,16 +53,15 @@ def command(name: str, base: str, directory: Path, urdf: Path | None, mesh: Path
     for warning in vehicle.warnings:
         click.echo(f"WARNING {warning}", err=True)
     build = shlex.join(["cosim", "build", str(file), "--output", str(file.with_suffix(".fmu"))])
-    click.echo(
-        f"{file}: {vehicle.balance}\n\n{_use(file, base, vehicle.data['family'], bool(urdf or mesh))}As an FMU:\n  {build}"
-    )
+    click.echo(f"{file}: {vehicle.balance}\n\n{_use(file, base, vehicle, bool(urdf or mesh))}As an FMU:\n  {build}")
 
 
 class _Vehicle(NamedTuple):
-    """Data of a vehicle; mass and centre of mass in words; warnings about probable mistakes."""
+    """Data of a vehicle; mass, inertia and centre of mass in words; parameters of its controller; probable mistakes."""
 
     data: Mapping[str, Any]
     balance: str
+    parameters: Mapping[str, Any]
     warnings: Sequence[str]
 
 
@@ -83,13 +82,14 @@ def _vehicle(source: Document, name: str, urdf: Path | None, mesh: Path | None, 
             data, warnings = read[0], [*warnings, *read[2]]
             centre = ", ".join(f"{round(coordinate, 9) + 0.0:.4g}" for coordinate in read[1])
             balance += f", centre of mass [{centre}] m in {file.name}"
-        mass, found = examine_vehicle(data, name)
+        mass, inertia, parameters, found = examine_vehicle(data, name)
     except InputError as error:
         raise InputError(
             [_located(problem, source, _imported(data, source, urdf or mesh)) for problem in error.problems]
         ) from None
     located = (_located(problem, source, _imported(data, source, urdf or mesh)) for problem in found)
-    return _Vehicle(data, f"mass {mass:.4g} kg{balance}", [*warnings, *map(str, located)])
+    balance = f"mass {mass:.4g} kg, inertia {inertia} kg.m2{balance}"
+    return _Vehicle(data, balance, parameters, [*warnings, *map(str, located)])
 
 
 def _imported(data: Mapping[str, Any], source: Document, file: Path | None) -> Mapping[str, Path | None]:
@@ -107,14 +107,17 @@ def _located(problem: Problem, source: Document, imported: Mapping[str, Path | N
     return Problem(problem.message, source.where(path))
 
 
-def _use(file: Path, base: str, family: Any, has_imported_shape: bool) -> str:
+def _use(file: Path, base: str, vehicle: _Vehicle, has_imported_shape: bool) -> str:
     """Return how to use the vehicle in a scenario; the controllers of Demo 1 fly multirotors like the AR.Drone only."""
+    family = vehicle.data["family"]
     if base == "ar_drone":
         setting = f"/components/plant/arguments/vehicles/uav/model={file}"
         return f"Fly Demo 1 with it:\n  cosim run demo1_box --set {shlex.quote(setting)}\n"
     text = f'Name it in a scenario, as a vehicle of the plant:\n  {{"model": "{file}", ...}}\n'
-    if family == "multirotor":
-        text += "multirotor_controller.fmu flies it; its parameters are mass, inertia and rotors (see crazyflie_square).\n"
+    if vehicle.parameters:
+        lines = ",\n".join(f'    "{key}": {json.dumps(value)}' for key, value in vehicle.parameters.items())
+        text += "multirotor_controller.fmu flies it with these parameters (see crazyflie_square):\n"
+        text += f'  "parameters": {{\n{lines}}}\n'
     if family == "surface_vessel" and has_imported_shape:
         text += 'The imported shape is drawn and collides. Buoyancy, waves and drag act on the dimensions in "hull".\n'
     return text

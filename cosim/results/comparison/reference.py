@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter, defaultdict
-from collections.abc import Collection, Mapping
+from collections.abc import Callable, Collection, Mapping
 from hashlib import sha256
 from pathlib import Path
 from typing import Any
@@ -131,12 +131,15 @@ def _join_modules(hashes: Mapping[str, str], joined: Collection[str]) -> dict[st
     }
 
 
-def describe_provenance_changes(before: Mapping[str, Any], after: Mapping[str, Any]) -> list[str]:
+def describe_provenance_changes(
+    before: Mapping[str, Any], after: Mapping[str, Any], shown: Callable[[str], str] = str
+) -> list[str]:
     """Return the differences between the provenance of a reference and of a run, such as "numpy 2.1 -> 2.2".
 
     Args:
         before: Provenance of the reference, as in its JSON file.
         after: Metadata of the run.
+        shown: Function that returns how a file is named, from its path relative to the scenario's folder or "cosim:...".
     """
     changes = []
     for key in _PROVENANCE_KEYS:
@@ -145,5 +148,5 @@ def describe_provenance_changes(before: Mapping[str, Any], after: Mapping[str, A
         if key == "sha256":
             new = _join_modules(new, old.keys())
         names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
-        changes += [name if key == "sha256" else f"{name} {old.get(name)} -> {new.get(name)}" for name in names]
+        changes += [shown(name) if key == "sha256" else f"{name} {old.get(name)} -> {new.get(name)}" for name in names]
     return changes

@@ -209,6 +209,8 @@ def new_vehicle(folder: Path, text: str, data: dict[str, Any]) -> Result:
 def test_the_command_writes_the_vehicle_file(tmp_path: Path) -> None:
     outcome = new_vehicle(tmp_path, robot(), DATA)
     assert outcome.exit_code == 0, outcome.output
-    assert "my_quad.json: mass 1 kg, centre of mass [0, 0, 0.022] m in quad.urdf" in outcome.output
+    assert "my_quad.json: mass 1 kg, inertia [[0.0" in outcome.output
+    assert "] kg.m2, centre of mass [0, 0, 0.022] m in quad.urdf" in outcome.output
+    assert '    "rotor_x": [0.141421, -0.141421, -0.141421, 0.141421, 0, 0, 0, 0],\n' in outcome.output
     written = json.loads((tmp_path / "my_quad.json").read_text())
     assert model_from_data(written, "my_quad").body.mass == pytest.approx(1.0)
