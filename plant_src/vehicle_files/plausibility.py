@@ -44,7 +44,7 @@ def vehicle_warnings(model: Model) -> Iterator[Problem]:
         yield from _thrust_warnings(model.airframe)
         yield from _rotor_warnings(model.airframe, _reach(model))
     if model.boat:
-        yield from boat_warnings(model.boat, _corners(model))
+        yield from boat_warnings(model.boat, box_corners(model))
     if isinstance(model.boat, SurfaceVessel):
         yield from _hull_warnings(model.boat)
         yield from _draught_warnings(model.boat)
@@ -55,16 +55,18 @@ def vehicle_warnings(model: Model) -> Iterator[Problem]:
         yield from _mass_warnings(model.craft.mass, displaced, f"displaced_volume of {model.craft.displaced_volume:.4g} m3")
 
 
-def _corners(model: Model) -> np.ndarray:
-    """Return the corners of all boxes (m), shape (n, 3): of a vessel from O, else from the centre of mass."""
-    corners = np.concatenate([box.corners() for box in model.body.boxes])
+def box_corners(model: Model) -> np.ndarray:
+    """Return the corners of all boxes (m, body frame), shape (n, 3): of a vessel from O, else from the centre of mass."""
+    corners: np.ndarray = np.concatenate([box.corners() for box in model.body.boxes])
+    axis, w = np.array(model.body.axes[:3]), model.body.axes[3]
+    corners = corners + 2 * np.cross(axis, w * corners + np.cross(axis, corners))
     return corners + model.boat.centre_of_mass if model.boat and model.motion == "planar" else corners
 
 
 def _reach(model: Model) -> float:
     """Return the distance of the farthest corner of the boxes from the centre of mass (m)."""
     centre = model.boat.centre_of_mass if model.boat else 0.0
-    return float(np.linalg.norm(_corners(model) - centre, axis=1).max())
+    return float(np.linalg.norm(box_corners(model) - centre, axis=1).max())
 
 
 def _actuators(model: Model) -> Sequence[Rotor | Thruster | Propeller]:
@@ -149,7 +151,7 @@ def _hull_warnings(vessel: SurfaceVessel) -> Iterator[Problem]:
 
 def _shape_warnings(model: Model, length: float) -> Iterator[Problem]:
     """Yield a warning for each shape that is not that of the hull, whose length (m) is given."""
-    shapes = {"boxes": _corners(model)}
+    shapes = {"boxes": box_corners(model)}
     if model.visual is not None:
         shapes["visual"] = model.visual.reshape(-1, 3)
     for key, points in shapes.items():
