@@ -104,7 +104,8 @@ class WorstCase:
             InputError: A parameter cannot be set, or a check names no KPI of any run.
         """
         start = start_coordinates(self.spec.parameters)
-        self.study.check_jobs(runner, [self._job(parameter_values(self.spec.parameters, start))])
+        jobs = [self._job(parameter_values(self.spec.parameters, start))]
+        self.study.check_jobs(runner, jobs, self.study.unknown_criteria(check.kpi for check in self.spec.success or ()))
 
         def evaluate(points: Sequence[Sequence[float]]) -> list[float]:
             values = [parameter_values(self.spec.parameters, point) for point in points]
