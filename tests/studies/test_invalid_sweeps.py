@@ -179,8 +179,10 @@ def test_criteria_with_unknown_kpis_are_refused_together_with_wrong_factors(lag)
     assert (done.code, len(done.err.splitlines())) == (2, 3), done.err
     for i in (1, 2):
         text = f'$.success[{i}].kpi: no KPI "{criteria[i]["kpi"]}"; did you mean "end.value"?'
-        assert f"{lag.folder / 'sweep.json'}:1:" in done.err and text in done.err
-    assert "$.factors[0].set" in done.err and lag.records() == []
+        assert f"{lag.folder / 'sweep.json'}:1:" in done.err
+        assert text in done.err
+    assert "$.factors[0].set" in done.err
+    assert lag.records() == []
 
 
 def test_criteria_with_kpis_that_only_runs_reveal_end_the_sweep_after_the_first_runs(lag):
