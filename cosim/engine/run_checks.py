@@ -166,16 +166,23 @@ def _step_problem(system: System, settings: Settings, fitting: Fraction) -> Prob
 
 
 def _find_period_problems(system: System, settings: Settings, grid: TimeGrid) -> Iterator[Problem]:
-    """Yield the problems of single periods and of the recording interval."""
-    step, duration = float(grid.step), float(grid.step * grid.count)
+    """Yield the problems of single periods and of the recording interval; a too short duration is one problem."""
     yield from _find_recording_problems(settings, grid)
+    late: dict[str, Fraction] = {}
     for name, period in system.periods.items():
-        subject = ("components", name, "period")
         ratio = period / grid.step
         if ratio.denominator != 1:
-            yield Problem(f"period {float(period)!r} s is no multiple of the step size {step!r} s", subject=subject)
+            text = f"period {float(period)!r} s is no multiple of the step size {float(grid.step)!r} s"
+            yield Problem(text, subject=("components", name, "period"))
         elif 0 < grid.count < ratio:
-            yield Problem(f"the duration {duration!r} s is shorter than the period {float(period)!r} s", subject=subject)
+            late[name] = period
+    if late:
+        duration, longest = float(grid.step * grid.count), float(max(late.values()))
+        text = f"the duration {duration!r} s is shorter than the period of {abbreviate_names(late, 3)}"
+        yield Problem(
+            f"{text}: expected at least {longest!r} s",
+            subject=("stop_time",) if len(late) > 1 else ("components", *late, "period"),
+        )
 
 
 def _find_delay_problems(system: System) -> Iterator[Problem]:

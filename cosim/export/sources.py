@@ -84,19 +84,10 @@ def _load_equations(path: Path, _model: str | None, _options: ModelicaOptions | 
 
 #: program whose function `vehicle_block` makes the block of a vehicle file
 _VEHICLE_PROGRAM = "plant_src/vehicle_files/block.py"
-_URDF_READER = "plant_src/vehicle_files/urdf.py:vehicle_from_urdf"
-_MESH_READER = "plant_src/vehicle_files/mesh_import.py:vehicle_from_mesh"
-_VEHICLE_CHECK = "plant_src/vehicle_files/summary.py:examine_vehicle"
 #: file and class of the shipped plant
 WORLD = "plant_src/world.py:World"
 _WORLD_SCHEMA = "plant_src/schemas/world.py:world_schema"
 _VEHICLE_SCHEMA = "plant_src/schemas/vehicle.py:vehicle_schema"
-
-
-#: data of a vehicle, its centre of mass in the frame of the imported file (m), and warnings
-ImportedVehicle = tuple[dict[str, Any], list[float], list[str]]
-#: mass (kg), inertia (kg m2), parameters of the controller that flies a multirotor (or none), and probable mistakes
-VehicleSummary = tuple[float, Any, Mapping[str, Any], Sequence[Problem]]
 
 
 def _load_vehicle(path: Path, _model: str | None, _options: ModelicaOptions | None) -> Block:
@@ -120,60 +111,6 @@ def vehicle_file_schema() -> dict[str, Any]:
 
     create_schema: Callable[[], dict[str, Any]] = load_object(_VEHICLE_SCHEMA, resources.root())
     return create_schema()
-
-
-def vehicle_from_urdf(urdf: Path, data: Mapping[str, Any]) -> ImportedVehicle:
-    """Return the data of a vehicle with mass, inertia and collision shape of a URDF file.
-
-    Args:
-        urdf: URDF file.
-        data: Further data of the vehicle; its rotors and thrusters may name links of the URDF file.
-
-    Returns:
-        Data, centre of mass in the root frame (m), and warnings.
-
-    Raises:
-        InputError: The URDF file cannot be read, or does not describe one rigid body.
-    """
-    from ..components.python_import import load_object
-
-    read: Callable[[Path, Mapping[str, Any]], ImportedVehicle] = load_object(_URDF_READER, resources.root())
-    return read(urdf, data)
-
-
-def vehicle_from_mesh(mesh: Path, data: Mapping[str, Any], scale: float) -> ImportedVehicle:
-    """Return the data of a vehicle with inertia, collision shape and appearance of a mesh.
-
-    Args:
-        mesh: STL, OBJ or GLB file.
-        data: Further data of the vehicle, with its mass.
-        scale: Factor on all coordinates.
-
-    Returns:
-        Data, centre of mass in the frame of the mesh (m), and warnings.
-
-    Raises:
-        InputError: The mesh cannot be read or encloses no volume, or the data have no mass.
-    """
-    from ..components.python_import import load_object
-
-    read: Callable[[Path, Mapping[str, Any], float], ImportedVehicle] = load_object(_MESH_READER, resources.root())
-    return read(mesh, data, scale)
-
-
-def examine_vehicle(data: Mapping[str, Any], name: str) -> VehicleSummary:
-    """Read the data of a vehicle as a scenario does.
-
-    Returns:
-        Mass, inertia, parameters of the controller that flies it, and warnings about probable mistakes.
-
-    Raises:
-        InputError: With all problems of the data; the subject of each begins with "arguments" and continues with the path.
-    """
-    from ..components.python_import import load_object
-
-    examine: Callable[[Mapping[str, Any], str], VehicleSummary] = load_object(_VEHICLE_CHECK, resources.root())
-    return examine(data, name)
 
 
 SOURCE_KINDS = (

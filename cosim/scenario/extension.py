@@ -4,6 +4,7 @@
 - Objects are merged key by key. Every other value replaces that of the base. `null` removes a key.
 - The lists `connections`, `kpis`, `figures` and `checks` of the base are changed by an object whose keys are the names of
   elements: `to`, `name`, `name` and `kpi`. New names are appended.
+- An entry that the base lacks needs a source, or `from`, `python` or `when`. Without one it is a misspelt entry of the base.
 - A component that gets a source of another kind inherits only `period`, and `isolation` where it is valid.
 - With a component that `null` removes go its connections, its place in the stages and its recorded signals.
 - `name`, `description`, `reference` and `$schema` describe the base alone and are not inherited.

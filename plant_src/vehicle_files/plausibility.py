@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from cosim.core.errors import Problem
 from cosim.core.units import KNOWN_UNITS
 
+from ..placement import VehiclePlacement
 from ..vehicles.model import Model
 from ..vehicles.multirotor.airframe import Airframe, Rotor
 from ..vehicles.submerged.craft import Thruster
@@ -36,6 +38,15 @@ MAX_LENGTH_RATIO = 3.0
 _DOWNWARDS = -0.1
 
 
+def placement_warnings(vehicle: VehiclePlacement) -> Iterator[Problem]:
+    """Yield a warning for each value of a vehicle in a world that is probably wrong, with its path in the component."""
+    path = ("arguments", "vehicles", vehicle.name)
+    for each in vehicle_warnings(vehicle.model):
+        yield replace(each, subject=(*path, "model", *each.subject[1:]))
+    if abs(yaw := vehicle.parameter("initial.yaw")) > 2 * math.pi:
+        yield Problem(f"found {yaw:g}, radians expected; in degrees? A right angle is 1.5708", subject=(*path, "yaw"))
+
+
 def vehicle_warnings(model: Model) -> Iterator[Problem]:
     """Yield a warning for each quantity that is probably wrong; its subject is "arguments" and the path in the vehicle file."""
     if model.airframe or model.craft or model.boat:
@@ -44,7 +55,7 @@ def vehicle_warnings(model: Model) -> Iterator[Problem]:
         yield from _thrust_warnings(model.airframe)
         yield from _rotor_warnings(model.airframe, _reach(model))
     if model.boat:
-        yield from boat_warnings(model.boat, _corners(model))
+        yield from boat_warnings(model.boat, box_corners(model))
     if isinstance(model.boat, SurfaceVessel):
         yield from _hull_warnings(model.boat)
         yield from _draught_warnings(model.boat)
@@ -55,16 +66,18 @@ def vehicle_warnings(model: Model) -> Iterator[Problem]:
         yield from _mass_warnings(model.craft.mass, displaced, f"displaced_volume of {model.craft.displaced_volume:.4g} m3")
 
 
-def _corners(model: Model) -> np.ndarray:
-    """Return the corners of all boxes (m), shape (n, 3): of a vessel from O, else from the centre of mass."""
-    corners = np.concatenate([box.corners() for box in model.body.boxes])
+def box_corners(model: Model) -> np.ndarray:
+    """Return the corners of all boxes (m, body frame), shape (n, 3): of a vessel from O, else from the centre of mass."""
+    corners: np.ndarray = np.concatenate([box.corners() for box in model.body.boxes])
+    axis, w = np.array(model.body.axes[:3]), model.body.axes[3]
+    corners = corners + 2 * np.cross(axis, w * corners + np.cross(axis, corners))
     return corners + model.boat.centre_of_mass if model.boat and model.motion == "planar" else corners
 
 
 def _reach(model: Model) -> float:
     """Return the distance of the farthest corner of the boxes from the centre of mass (m)."""
     centre = model.boat.centre_of_mass if model.boat else 0.0
-    return float(np.linalg.norm(_corners(model) - centre, axis=1).max())
+    return float(np.linalg.norm(box_corners(model) - centre, axis=1).max())
 
 
 def _actuators(model: Model) -> Sequence[Rotor | Thruster | Propeller]:
@@ -149,7 +162,7 @@ def _hull_warnings(vessel: SurfaceVessel) -> Iterator[Problem]:
 
 def _shape_warnings(model: Model, length: float) -> Iterator[Problem]:
     """Yield a warning for each shape that is not that of the hull, whose length (m) is given."""
-    shapes = {"boxes": _corners(model)}
+    shapes = {"boxes": box_corners(model)}
     if model.visual is not None:
         shapes["visual"] = model.visual.reshape(-1, 3)
     for key, points in shapes.items():

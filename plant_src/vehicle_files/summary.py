@@ -1,4 +1,4 @@
-"""Summary of a vehicle file: mass, inertia, parameters of the controller that flies it, and probable mistakes."""
+"""Summary and description of a vehicle file: mass, inertia, dimensions, actuators, parameters of a controller, mistakes."""
 
 from __future__ import annotations
 
@@ -7,12 +7,14 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from cosim.core.component import Variable
 from cosim.core.errors import Problem
 
 from ..catalogue import model_from_data
 from ..vehicles.model import Model
 from ..vehicles.multirotor.airframe import Airframe
-from .plausibility import vehicle_warnings
+from ..vehicles.surface_vessel.surface_vessel import SurfaceVessel
+from .plausibility import box_corners, vehicle_warnings
 
 #: length of the arrays of `multirotor_controller`, and smallest z component of the axes of rotors that it controls
 _CONTROLLED_ROTORS, _UPWARDS = 8, 0.95
@@ -43,6 +45,37 @@ def examine_vehicle(data: Mapping[str, Any], name: str) -> VehicleSummary:
     model = model_from_data(data, name)
     parameters = controller_parameters(model.airframe) if model.airframe else {}
     return VehicleSummary(model.body.mass, _inertia(model), parameters, list(vehicle_warnings(model)))
+
+
+def describe_vehicle(data: Mapping[str, Any], name: str) -> tuple[Mapping[str, str], Sequence[Variable]]:
+    """Return the properties of a vehicle that is given by its data, and its variables in a world.
+
+    Raises:
+        InputError: As of `examine_vehicle`.
+    """
+    model = model_from_data(data, name)
+    corners = box_corners(model)
+    properties = {
+        "vehicle": model.name,
+        "family": str(data["family"]),
+        "description": str(data.get("description", "")),
+        "mass": f"{model.body.mass:.6g} kg",
+        "inertia": f"{_inertia(model)} kg.m2",
+        "boxes": f"{_edges(np.ptp(corners, axis=0))} (length, width, height of all)",
+    }
+    if isinstance(model.boat, SurfaceVessel):
+        hull = model.boat.hull
+        hulls = f"{hull.count} of {_edges((hull.length, hull.beam, hull.depth))}"
+        properties["hulls"] = f"{hulls} (length, beam, depth), draught {model.boat.draught:.4g} m"
+    vehicle: Any = model.airframe or model.craft or model.boat
+    for kind in ("rotors", "thrusters", "propellers", "rudders"):
+        if parts := getattr(vehicle, kind, ()):
+            properties[kind] = f"{len(parts)}: {', '.join(part.label for part in parts)}"
+    return properties, model.variables
+
+
+def _edges(lengths: Sequence[float]) -> str:
+    return f"{' x '.join(f'{length:.4g}' for length in lengths)} m"
 
 
 def controller_parameters(airframe: Airframe) -> Mapping[str, Any]:

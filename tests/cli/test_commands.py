@@ -344,6 +344,19 @@ def test_info_describes_python_classes_and_modelica_models(tmp_path):
     assert 'did you mean "Gain"?' in cosim("info", f"{BLOCKS}:Gian").stderr
 
 
+def test_info_describes_a_vehicle_file(tmp_path):
+    done = cosim("info", "cosim:plant_src/vehicles/data/blueboat.json")
+    assert done.stderr == ""
+    for line in ("family        surface_vessel", "mass          18 kg", "propellers    2: port, starboard"):
+        assert f"{line}\n" in done.stdout
+    assert "hulls         2 of 1.04 x 0.12 x 0.29 m (length, beam, depth), draught 0.09745 m\n" in done.stdout
+    assert "boxes         1.19 x 0.912 x 0.42 m" in done.stdout
+    assert "\n  propeller_speed   Float64[2]   rad/s" in done.stdout
+    (tmp_path / "boat.json").write_text('{"family": "surface_vessl"}')
+    refused = cosim("info", tmp_path / "boat.json").stderr
+    assert "boat.json:1:2: $.family: found 'surface_vessl'; did you mean \"surface_vessel\"" in refused
+
+
 def test_an_unknown_variable_of_a_component_with_many_is_refused_with_some_valid_names():
     done = cosim("run", "free_flight", "--set", "usv.kp=3")
     assert done.stderr.startswith(

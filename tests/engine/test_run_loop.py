@@ -87,7 +87,7 @@ def test_periods_must_fit_the_step_and_the_duration():
         simulate(built, settings())
     assert [problem.message for problem in refusal.value.problems] == [
         "period 1.5 s is no multiple of the step size 1.0 s",
-        "the duration 3.0 s is shorter than the period 4.0 s",
+        "the duration 3.0 s is shorter than the period of b: expected at least 4.0 s",
     ]
 
 
@@ -113,6 +113,15 @@ def test_a_step_that_divides_no_period_is_one_problem_with_a_valid_step():
         assert problem.message.endswith(f" s divides no period of a, b: expected 1.5 s or a whole fraction of it{example}")
         assert problem.subject == ("step_size",)
     simulate(built, replace(changed, step_size=exact_fraction(0.75)))
+
+
+def test_a_duration_shorter_than_periods_is_one_problem():
+    built = make_system({name: counter() for name in "ab"}, periods={"a": exact_fraction(4), "b": exact_fraction(5)})
+    with pytest.raises(InputError) as refusal:
+        simulate(built, settings())
+    (problem,) = refusal.value.problems
+    assert problem.message == "the duration 3.0 s is shorter than the period of a, b: expected at least 5.0 s"
+    assert problem.subject == ("stop_time",)
 
 
 def test_a_refused_system_is_freed():

@@ -98,7 +98,7 @@ def test_periods_must_fit_step_size_and_duration(folder):
     found = folder.problems({"a": folder.block("Gain", period=1.5), "b": folder.block("Gain", period=4)})
     assert [line.split(": $.")[1] for line in found] == [
         "components.a.period: period 1.5 s is no multiple of the step size 1.0 s",
-        "components.b.period: the duration 3.0 s is shorter than the period 4.0 s",
+        "components.b.period: the duration 3.0 s is shorter than the period of b: expected at least 4.0 s",
     ]
 
 

@@ -111,6 +111,15 @@ def test_a_forgotten_number_of_a_component_with_mostly_fed_inputs_is_named_with_
     assert own_pair(folder, ["altitude"]) == []  # few inputs of the component are in use
 
 
+def test_an_output_outside_of_a_nested_system_is_not_proposed_for_its_inner_input(folder):
+    (folder.path / "own.py").write_text(OWN_BLOCK)
+    known = {"position": [0.0, 0.0], "altitude": 0.0, "speed": 0.0}
+    folder.write({"components": {"pilot": {"python": "own.py:Own", "parameters": known}}, "ports": {}}, "n.json")
+    plant = {"python": "own.py:Own", "parameters": known | {"rotor_speeed": 0.0}}
+    found = warnings_of(folder.scenario({"inner": {"system": "n.json"}, "plant": plant}))
+    assert found == [f"components.pilot: nothing feeds or sets inner.pilot.rotor_speeed: {KEEPS}"]
+
+
 def test_the_other_elements_of_a_vector_that_outputs_feed_in_part_are_named(folder):
     """A vertical component is 0 on purpose."""
     assert own_pair(folder, ["gust.x", "gust.y"]) == []

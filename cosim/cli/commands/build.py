@@ -2,13 +2,13 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import click
 
 from ...core.errors import CheckError, InputError, Problem, nearest_file
+from ..vehicle_files import read_vehicle_file
 
 if TYPE_CHECKING:
     from ...export.build import BuildResult
@@ -86,7 +86,9 @@ def command(
         return 0
     for source in sources:
         if source.suffix == ".json" and source.is_file():
-            _check_vehicle_file(source)
+            from ...export.vehicle_files import examine_vehicle
+
+            read_vehicle_file(source, examine_vehicle)
     if output is not None:
         _build_one(sources, output, int(fmi_version), modelica_compiler, include, library, values)
     elif fmi_version != "2":
@@ -100,22 +102,6 @@ def command(
     else:
         build(list(sources) or None, root, _print_built)
     return 0
-
-
-def _check_vehicle_file(file: Path) -> None:
-    """Raise InputError with file, line and column of each problem if a file is no vehicle file."""
-    from ...export.sources import examine_vehicle
-    from ...scenario.json_document import read_document
-
-    document = read_document(file)
-    if document.problems:
-        raise InputError(document.problems)
-    if not isinstance(document.value, dict):
-        raise InputError(Problem("expected an object, the data of a vehicle", document.where(())))
-    try:
-        examine_vehicle(document.value, file.stem)
-    except InputError as error:
-        raise InputError([replace(each, where=document.where(each.subject[1:])) for each in error.problems]) from None
 
 
 def _build_one(

@@ -17,6 +17,7 @@ from .. import current_command_line
 from ..messages import print_json, print_line
 from ..output_options import json_option
 from ..shipped import shipped_fmus
+from ..vehicle_files import read_vehicle_file
 
 if TYPE_CHECKING:
     from ...components.fmi import FmuFile
@@ -77,8 +78,8 @@ def command(fmu: str, with_locals: bool, as_json: bool) -> None:
         _print_variables(causality, group)
 
 
-def _describe(source: str) -> tuple[dict[str, str], Sequence[Variable]]:
-    """Return properties and variables of an FMU, of file.py:Class, or of file.mo:Model."""
+def _describe(source: str) -> tuple[Mapping[str, str], Sequence[Variable]]:
+    """Return properties and variables of an FMU, of file.py:Class, of file.mo:Model, or of a vehicle file."""
     from ...components.fmi import FmuFile
 
     file, _, name = source.rpartition(":")
@@ -87,6 +88,10 @@ def _describe(source: str) -> tuple[dict[str, str], Sequence[Variable]]:
         raise InputError(f"{source}: expected the name of a {kind.lower()}, as in {source}:{kind}")
     if file.endswith(".py"):
         return _describe_class(source)
+    if source.endswith(".json"):
+        from ...export.vehicle_files import describe_vehicle
+
+        return read_vehicle_file(_find_fmu(source), describe_vehicle)
     if file.endswith(".mo"):
         from ...export.build import cached_fmu
 

@@ -71,7 +71,7 @@ def _vehicle(source: Document, name: str, urdf: Path | None, mesh: Path | None, 
     Raises:
         InputError: A scenario would refuse the data; each problem names the file and the place in it.
     """
-    from ...export.sources import examine_vehicle, vehicle_from_mesh, vehicle_from_urdf
+    from ...export.vehicle_files import examine_vehicle, vehicle_from_mesh, vehicle_from_urdf
 
     if source.problems or not isinstance(source.value, dict):
         raise InputError(source.problems or [Problem("expected a JSON object with the data of a vehicle", str(source.file))])

@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from cosim.core import resources
-from plant_src.vehicle_files.summary import examine_vehicle
+from plant_src.vehicle_files.summary import describe_vehicle, examine_vehicle
 
 
 def shipped(path: str) -> Any:
@@ -36,3 +36,12 @@ def test_rotors_that_the_controller_cannot_fly_have_no_parameters() -> None:
 @pytest.mark.parametrize(("name", "inertia"), [("x500", [0.023845, 0.023845, 0.043919]), ("cybership2", 1.70964)])
 def test_the_inertia_is_that_of_the_file(name: str, inertia: Any) -> None:
     assert examine_vehicle(shipped(f"plant_src/vehicles/data/{name}.json"), name).inertia == pytest.approx(inertia, rel=1e-3)
+
+
+def test_the_edges_of_the_boxes_are_those_of_the_file() -> None:
+    """Products of inertia turn the principal axes of the Crazyflie, in which Bullet has its boxes, but not its edges."""
+    data = shipped("plant_src/vehicles/data/crazyflie.json")
+    (box,) = data["boxes"]
+    properties, variables = describe_vehicle(data, "crazyflie")
+    assert properties["boxes"].startswith(" x ".join(f"{edge:.4g}" for edge in box["size"]) + " m ")
+    assert "rotor_speed" in [variable.name for variable in variables if variable.causality == "input"]

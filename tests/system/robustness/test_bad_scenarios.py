@@ -75,7 +75,7 @@ CHANGES: dict[str, tuple[Change, str]] = {
     "step of zero": (put("step_size", 0), "$.step_size: expected a positive number of seconds; found 0"),
     "negative step": (put("step_size", -0.01), "$.step_size: expected a positive number of seconds; found -0.01"),
     "stop before start": (put("stop_time", -1), "$.stop_time: the stop time -1.0 lies before the start time 0.0"),
-    "step longer than the run": (put("step_size", 100), "is shorter than the step size 100.0 s"),
+    "step longer than the run": (put("step_size", 100), "step size 100.0 s is longer than the period of a, inner.g"),
     "division by zero": (put("stop_time", "1/0"), "$.stop_time: expected seconds"),
     "more steps than can be counted": (put("step_size", 1e-18), "are more than 9007199254740992 steps"),
     "a number to hang on": (put("stop_time", "1e999999999"), "$.stop_time: expected seconds"),

@@ -1,0 +1,31 @@
+"""Vehicle files as arguments of commands."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import replace
+from pathlib import Path
+from typing import Any, TypeVar
+
+from ..core.errors import InputError, Problem
+
+_Result = TypeVar("_Result")
+
+
+def read_vehicle_file(file: Path, read: Callable[[Mapping[str, Any], str], _Result]) -> _Result:
+    """Return the result of `read` for the data in a vehicle file and the name of the file.
+
+    Raises:
+        InputError: The file is no vehicle file; each problem names file, line and column.
+    """
+    from ..scenario.json_document import read_document
+
+    document = read_document(file)
+    if document.problems:
+        raise InputError(document.problems)
+    if not isinstance(document.value, dict):
+        raise InputError(Problem("expected an object, the data of a vehicle", document.where(())))
+    try:
+        return read(document.value, file.stem)
+    except InputError as error:
+        raise InputError([replace(each, where=document.where(each.subject[1:])) for each in error.problems]) from None
