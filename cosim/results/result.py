@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from ..core.errors import InputError, did_you_mean
+from ..core.errors import InputError, pattern_hint
 from ..core.recording import Recording
 from ..core.text import count_noun
 from .checks import kpi_hint
@@ -101,7 +101,7 @@ class Result:
         try:
             return self.recording.columns[name]
         except KeyError:
-            hint = "; the time of each row is in `result.time`" if name == "time" else did_you_mean(name, self)
+            hint = "; the time of each row is in `result.time`" if name == "time" else pattern_hint(name, self)
             raise SignalError(f'no signal "{name}" was recorded{hint}') from None
 
     def __contains__(self, name: object) -> bool:
