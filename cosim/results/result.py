@@ -132,17 +132,17 @@ class Result:
         failure, units = self.metadata.get("failure"), self.metadata.get("kpi_units", {})
         lines = [f"{self.metadata.get('name', 'Result')}: {rows}{span}", *([f"ended early: {failure}"] if failure else [])]
         lines += [self.termination] if self.termination else []
-        lines += self._summarize_checks()
+        lines += self._summarize_checks(units)
         width = max(map(len, self.kpis), default=0)
         for name, value in self.kpis.items():
             text = str(value) if isinstance(value, bool) else f"{value:.6g}"
             lines.append(f"  {name:{width}}  {text} {units.get(name, '')}".rstrip())
         return "\n".join(lines)
 
-    def _summarize_checks(self) -> list[str]:
+    def _summarize_checks(self, units: Mapping[str, str]) -> list[str]:
         if not self.checks:
             return []
-        failed = [f"  {outcome}" for outcome in self.checks if not outcome.passed]
+        failed = [f"  {outcome.text(units)}" for outcome in self.checks if not outcome.passed]
         return [
             f"{len(self.checks) - len(failed)} of {count_noun(len(self.checks), 'check')} passed{':' * bool(failed)}",
             *failed,
