@@ -115,6 +115,19 @@ def test_units_of_kpis_are_shown_also_when_a_sweep_is_continued(lag):
     assert [sorted(record) for record in lag.records()] == [["key", "kpis", "seconds", "units"], ["key", "kpis", "seconds"]]
 
 
+def test_a_second_sweep_of_the_same_name_warns_and_removes_the_replays_of_the_first(lag):
+    """A replay shows the number of its run and the criteria, so another sweep cannot show it, even of an equal run."""
+    factors = [{"name": name, "set": f"lag.{name}", "values": [1]} for name in ("T", "y_start")]
+    first = lag.write(factors=factors, maps=[{"x": "T", "y": "y_start"}])
+    assert lag.run_command("sweep", first, "--replays").err == ""
+    assert len(list((lag.folder / "runs/sweep/replays").iterdir())) == 1
+    other = lag.folder / "other.json"
+    other.write_text(json.dumps(json.loads(first.read_text()) | {"success": [{"kpi": "end.value", "max": 0.0}]}))
+    text = f'replaces the results of {first} in runs/sweep; another "name" in the sweep or --output-dir keeps both\n'
+    assert [lag.run_command("sweep", other).err for _ in range(2)] == [text, ""]
+    assert list((lag.folder / "runs/sweep/replays").iterdir()) == []
+
+
 def test_a_run_without_a_kpi_of_the_criteria_is_unsuccessful(lag):
     """Runs that end above 1, as does the first one, have another KPI."""
     (lag.folder / "own.py").write_text(

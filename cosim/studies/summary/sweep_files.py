@@ -116,6 +116,7 @@ def _sweep_metadata(sweep: Sweep, summary: SweepSummary) -> dict[str, Any]:
     return {
         "name": spec.name,
         "sweep": sweep.study_file.document.value,
+        "sweep_file": str(sweep.study_file.document.file.resolve()),
         "scenario_file": str(sweep.study_file.scenario.resolve()),
         "cosim": cosim_fingerprint(),
         "sha256": dict(sweep.study.bundle.files),
