@@ -5,7 +5,6 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import replace
 from functools import partial
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -29,7 +28,7 @@ from .physics.fleet import Fleet, FleetState
 from .scene import replay
 from .variable_views import recorded_others, variable_views, views_in_parts
 from .vehicle_constants import input_limits, vehicle_constants
-from .vehicle_files.plausibility import vehicle_warnings
+from .vehicle_files.plausibility import placement_warnings
 from .world_settings import WorldSettings
 
 if TYPE_CHECKING:
@@ -138,11 +137,7 @@ class World(Component):
             self._fleet.bodies,
         )
         self._has_environment = bool(self._environment.update_functions)
-        self.warnings = [
-            replace(warning, subject=("arguments", "vehicles", vehicle.name, "model", *warning.subject[1:]))
-            for vehicle in settings.vehicles
-            for warning in vehicle_warnings(vehicle.model)
-        ]
+        self.warnings = [warning for vehicle in settings.vehicles for warning in placement_warnings(vehicle)]
         for name in self._environment.vessels_without_wave_motion:
             component_log.log_message(self._name, component_log.WARNING, f"the planar vessel {name} does not move with the waves")
         if self._environment.wind_is_without_effect:

@@ -6,11 +6,13 @@ import json
 import logging
 import sys
 from collections.abc import Iterable
+from pathlib import Path
 from typing import Any
 
 import click
 
 from ..core.errors import Problem
+from ..core.json_values import parse_object
 from ..core.text import SPACES, escape_control_characters
 from ..process.standard_streams import unescaped
 from . import current_command_line
@@ -79,3 +81,21 @@ def log_problems(problems: Iterable[Problem]) -> None:
     """Log problems that do not prevent a run as warnings."""
     for problem in problems:
         logging.getLogger("cosim").warning("%s", problem)
+
+
+def warn_overwriting(folder: Path, about: str, kind: str, file: Path) -> None:
+    """Warn if results of another file with the same name are replaced in a folder.
+
+    Args:
+        folder: The output directory.
+        about: Name of the JSON file that describes the earlier results.
+        kind: "scenario" or "sweep"; the JSON file names its file as "scenario_file" or "sweep_file".
+        file: The file whose results are written now.
+    """
+    try:
+        former = parse_object((folder / about).read_text(encoding="utf-8"))[f"{kind}_file"]
+    except (OSError, ValueError, LookupError):  # no earlier results, or an unreadable file
+        return
+    if former != str(file):
+        text = f'replaces the results of {former} in {folder}; another "name" in the {kind} or --output-dir keeps both'
+        click.echo(text, err=True)

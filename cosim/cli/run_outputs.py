@@ -88,6 +88,11 @@ class RunOutcome:
         """The output directory as an absolute path."""
         return self.shown_folder.absolute()
 
+    @property
+    def kpi_units(self) -> Mapping[str, str]:
+        """Units of the KPIs by name."""
+        return self.result.metadata.get("kpi_units") or {}
+
     @cached_property
     def checks(self) -> Sequence[CheckOutcome]:
         """Outcomes of the scenario's checks."""
@@ -151,11 +156,11 @@ def _print_kpis(outcome: RunOutcome) -> None:
     if current_command_line().verbosity < 0:
         for check in outcome.checks:
             if not check.passed:
-                click.echo(f"check failed: {check}", err=True)
+                click.echo(f"check failed: {check.text(outcome.kpi_units)}", err=True)
     from ..report.tables import print_kpis
 
-    result, about = outcome.result, outcome.result.metadata
-    print_kpis(result.kpis, outcome.checks, about.get("kpi_units"), notes=about.get("kpi_notes", ()))
+    result, notes = outcome.result, outcome.result.metadata.get("kpi_notes", ())
+    print_kpis(result.kpis, outcome.checks, outcome.kpi_units, notes=notes)
 
 
 def _write_report(outcome: RunOutcome) -> None:
@@ -193,9 +198,8 @@ def _print_summary(outcome: RunOutcome) -> None:
     result = outcome.result
     loop, simulated = result.timing["loop_seconds"], float(result.time[-1] - result.time[0])
     seconds = time.perf_counter() - outcome.began
-    click.echo(
-        f"\n{_summarize_checks(outcome.checks)}{simulated:g} s simulated in {loop:.2f} s: {simulated / loop:.0f} times real time"
-    )
+    checks = _summarize_checks(outcome.checks, outcome.kpi_units)
+    click.echo(f"\n{checks}{simulated:g} s simulated in {loop:.2f} s: {simulated / loop:.0f} times real time")
     click.echo(f"{', '.join(outcome.files)} in {outcome.shown_folder} ({seconds:.1f} s in all)")
     if pacing := result.metadata["real_time"]:
         click.echo(_format_pacing(pacing))
@@ -209,11 +213,11 @@ def _print_summary(outcome: RunOutcome) -> None:
             click.echo(f"{name:24} {value:.3f}")
 
 
-def _summarize_checks(checks: Sequence[CheckOutcome]) -> str:
+def _summarize_checks(checks: Sequence[CheckOutcome], units: Mapping[str, str]) -> str:
     """Return a line that says how many checks passed, and which ones failed; "" if there are none."""
     if not checks:
         return ""
-    failed = "".join(f"\n  {check}" for check in checks if not check.passed)
+    failed = "".join(f"\n  {check.text(units)}" for check in checks if not check.passed)
     passed = sum(check.passed for check in checks)
     return f"{passed} of {count_noun(len(checks), 'check')} passed{failed and ', failed:'}{failed}\n"
 

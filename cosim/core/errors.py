@@ -12,6 +12,7 @@ from __future__ import annotations
 
 import difflib
 import errno
+import re
 import traceback
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
@@ -28,6 +29,8 @@ PASS_THROUGH_EXCEPTIONS = (KeyboardInterrupt, GeneratorExit)
 _DISK_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
 #: maximum number of characters shown of an exception's text
 _MAX_EXCEPTION_LENGTH = 2000
+#: parts of regular expressions and of patterns of a shell; indices such as [1] and [1,2] belong to names
+_FOREIGN_WILDCARD = re.compile(r"[?(|{^$\\]|\[(?!\d+(,\d+)*\])")
 #: maximum number of characters of the line of an error
 _MAX_LINE_LENGTH = 8000
 
@@ -197,6 +200,17 @@ def did_you_mean(name: str, valid: Iterable[str]) -> str:
     '; did you mean "uav.altitude"?'
     """
     return _did_you_mean(name, tuple(valid))
+
+
+def pattern_hint(pattern: str, valid: Iterable[str]) -> str:
+    """Return a hint for the end of a message about a pattern that matches no name; see `did_you_mean`.
+
+    >>> pattern_hint("usv.position.[xy]", ["usv.position.x"])
+    '; only "*" is a wildcard'
+    >>> pattern_hint("usv.positoin[1]", ["usv.position[1]"])
+    '; did you mean "usv.position[1]"?'
+    """
+    return '; only "*" is a wildcard' if _FOREIGN_WILDCARD.search(pattern) else did_you_mean(pattern, valid)
 
 
 def near_or_valid_names(name: str, valid: Iterable[str]) -> str:

@@ -9,7 +9,9 @@ from typing import Any
 
 from ..core.errors import InputError
 from ..results import Result
+from ..results.checks import CheckOutcome
 from ..results.files import writing_atomically
+from .failure import find_failure
 from .pages import embed_json, render_page
 from .samples import is_constant, pack_run
 from .scene import build_scene
@@ -61,7 +63,27 @@ def write_replay(runs: Sequence[Result], path: Path) -> None:
     """Write the replay of one run, or of two runs for comparison, as a self-contained page."""
     names = dict.fromkeys(str(result.metadata.get("name", "run")) for result in runs)
     description = "Two runs; the second is tinted and dashed" if len(runs) > 1 else _description(runs[0])
-    text = render_page("replay.html", title=" and ".join(names), description=description, data=embed_json(replay_data(runs)))
+    _write_page(path, " and ".join(names), description, replay_data(runs))
+
+
+def write_judged_replay(result: Result, outcomes: Sequence[CheckOutcome], path: Path) -> None:
+    """Write the replay of a run that names the failed checks, marks the failure and opens before it; see `find_failure`.
+
+    Args:
+        result: The run.
+        outcomes: Outcomes of the checks.
+        path: The HTML file.
+    """
+    failure, units = find_failure(result, outcomes), result.metadata.get("kpi_units") or {}
+    reasons = [outcome.text(units) for outcome in outcomes if not outcome.passed]
+    cause = result.metadata.get("failure") or (result.termination if result.crashed else "") or "; ".join(reasons)
+    sentences = [f"Not successful: {cause.rstrip('.')}.", str(failure)] if failure else ["Successful."] if outcomes else []
+    data = {**replay_data([result]), "failure": failure and failure._asdict()}
+    _write_page(path, str(result.metadata.get("name", "run")), " ".join([*sentences, _description(result)]), data)
+
+
+def _write_page(path: Path, title: str, description: str, data: dict[str, Any]) -> None:
+    text = render_page("replay.html", title=title, description=description.strip(), data=embed_json(data))
     with writing_atomically(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 

@@ -35,9 +35,19 @@ class CheckOutcome(NamedTuple):
         return ", ".join(f"{key} {str(limit).lower()}" for key, limit in self.check.items() if key != "kpi")
 
     def __str__(self) -> str:
-        value = str(self.value).lower() if isinstance(self.value, bool) else f"{self.value:.6g}"
+        return self.text({})
+
+    def text(self, units: Mapping[str, str]) -> str:
+        """Return value and limits in words, such as "roll.value is 0.46 rad, expected at most 0.35 rad".
+
+        Args:
+            units: Units of KPIs by name; "", "1" and missing ones are not written.
+        """
+        unit = units.get(self.check["kpi"]) or "1"
+        suffix = "" if unit == "1" else f" {unit}"
+        value = str(self.value).lower() if isinstance(self.value, bool) else f"{self.value:.6g}{suffix}"
         found = "has no value" if math.isnan(self.value) else f"is {value}"
-        limits = (f"{_LIMIT_WORDS[key]}{str(limit).lower()}" for key, limit in self.check.items() if key != "kpi")
+        limits = (f"{_LIMIT_WORDS[key]}{str(limit).lower()}{suffix}" for key, limit in self.check.items() if key != "kpi")
         return f"{self.check['kpi']} {found}, expected {' and '.join(limits)}"
 
 

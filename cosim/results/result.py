@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any, ClassVar
 
 import numpy as np
 
-from ..core.errors import InputError, did_you_mean
+from ..core.errors import InputError, pattern_hint
 from ..core.recording import Recording
 from ..core.text import count_noun
 from .checks import kpi_hint
@@ -101,7 +101,7 @@ class Result:
         try:
             return self.recording.columns[name]
         except KeyError:
-            hint = "; the time of each row is in `result.time`" if name == "time" else did_you_mean(name, self)
+            hint = "; the time of each row is in `result.time`" if name == "time" else pattern_hint(name, self)
             raise SignalError(f'no signal "{name}" was recorded{hint}') from None
 
     def __contains__(self, name: object) -> bool:
@@ -132,17 +132,17 @@ class Result:
         failure, units = self.metadata.get("failure"), self.metadata.get("kpi_units", {})
         lines = [f"{self.metadata.get('name', 'Result')}: {rows}{span}", *([f"ended early: {failure}"] if failure else [])]
         lines += [self.termination] if self.termination else []
-        lines += self._summarize_checks()
+        lines += self._summarize_checks(units)
         width = max(map(len, self.kpis), default=0)
         for name, value in self.kpis.items():
             text = str(value) if isinstance(value, bool) else f"{value:.6g}"
             lines.append(f"  {name:{width}}  {text} {units.get(name, '')}".rstrip())
         return "\n".join(lines)
 
-    def _summarize_checks(self) -> list[str]:
+    def _summarize_checks(self, units: Mapping[str, str]) -> list[str]:
         if not self.checks:
             return []
-        failed = [f"  {outcome}" for outcome in self.checks if not outcome.passed]
+        failed = [f"  {outcome.text(units)}" for outcome in self.checks if not outcome.passed]
         return [
             f"{len(self.checks) - len(failed)} of {count_noun(len(self.checks), 'check')} passed{':' * bool(failed)}",
             *failed,

@@ -51,7 +51,7 @@ def find_function_problems(
         yield from signal_problems(root, "kpis", signals)
     kpis = [kpi for _, kpi in accepted(declared.kpis)]
     for i, check in accepted(spec.checks) if "kpis" not in root.invalid_keys else ():
-        if text := _kpi_name_problem(check.kpi, kpis, root.folder):
+        if text := kpi_name_problem(check.kpi, kpis, root.folder):
             yield Problem(text, root.where("checks", i, "kpi"))
 
 
@@ -139,7 +139,7 @@ def _reason(value: str, root: Node, names: Collection[str]) -> str:
     return f"{did_you_mean(value, names)}{RECORDED_INPUTS}"
 
 
-def _kpi_name_problem(kpi: str, kpis: Sequence[FunctionSpec], folder: Path) -> str:
+def kpi_name_problem(kpi: str, kpis: Sequence[FunctionSpec], folder: Path) -> str:
     """Return why a KPI value such as "landing.lateral_error" cannot result from `kpis`, or "" if it may.
 
     The names of a function's values are known only if its `return` statements write them as literals.

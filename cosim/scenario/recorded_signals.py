@@ -6,7 +6,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 
 from ..core.component import Component
-from ..core.errors import Problem, did_you_mean
+from ..core.errors import Problem, pattern_hint
 from ..core.system import Endpoint
 from .name_resolution import PrefixIndex
 
@@ -38,7 +38,7 @@ class SignalSelector:
             matches = _matching_names(pattern, self._output_index) or _matching_names(pattern, self._other_index)
             if not matches and not self._may_match_invalid(pattern):
                 names = {**self._outputs, **self._others}
-                self.problems.append(Problem(f'no variable matches "{pattern}"{did_you_mean(pattern, names)}', where))
+                self.problems.append(Problem(f'no variable matches "{pattern}"{pattern_hint(pattern, names)}', where))
             selected.update(matches)
         return {name: end for name, end in {**self._outputs, **self._others}.items() if name in selected}
 

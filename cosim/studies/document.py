@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, replace
+from functools import cached_property
 from operator import itemgetter
 from pathlib import Path
 from typing import Any, Generic, TypeVar
@@ -33,7 +34,7 @@ class StudyFile(Generic[S]):
     spec: S
     document: Document
 
-    @property
+    @cached_property
     def scenario(self) -> Path:
         """Path of the scenario's file."""
         near = self.document.file.parent / self.spec.scenario

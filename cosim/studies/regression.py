@@ -194,7 +194,8 @@ class _FinishedRun:
 
         kpis = {name: math.nan if value is None else value for name, value in self.result.kpis.items()}
         crash = [self.result.termination] if self.result.crashed and not checks_only else []
-        return crash + [str(outcome) for outcome in evaluate_all_checks(kpis, self.checks) if not outcome.passed]
+        units = self.result.metadata.get("kpi_units") or {}
+        return crash + [outcome.text(units) for outcome in evaluate_all_checks(kpis, self.checks) if not outcome.passed]
 
     @property
     def reference_path(self) -> Path:

@@ -11,6 +11,9 @@ from typing import Any, Protocol
 from ..core.errors import InputError, Problem
 from ..results.checks import Number
 from ..scenario import load_scenario
+from ..scenario.named_functions import kpi_name_problem
+from ..scenario.nested_systems import Scenario
+from ..scenario.schema_types import accepted
 from .document import StudyFile
 from .execution.bundle import Bundle, collect_bundle, fmu_paths
 from .execution.job import Job, Record, Runner, StudyContext, run_key
@@ -60,14 +63,32 @@ class Study:
     @cached_property
     def checks(self) -> list[dict[str, Any]]:
         """Checks of the scenario with the common settings."""
-        file = self.study_file.scenario
-        spec = load_scenario(file, {k: v for k, v in self.spec.settings.items() if k.startswith("/")}, file.parent).spec
-        return [check.model_dump(exclude_none=True) for check in spec.checks]
+        return [check.model_dump(exclude_none=True) for check in self._scenario.spec.checks]
 
-    def check_jobs(self, runner: CheckingRunner, jobs: Iterable[Job]) -> None:
-        """Raise InputError with positions in the study's file if one of these jobs cannot be run."""
-        if problems := [problem for job in jobs for problem in self.study_file.locate_problems(runner.check(job), job.settings)]:
-            raise InputError(dict.fromkeys(problems))
+    @cached_property
+    def _scenario(self) -> Scenario:
+        """Scenario with the common settings of its file."""
+        file = self.study_file.scenario
+        return load_scenario(file, {k: v for k, v in self.spec.settings.items() if k.startswith("/")}, file.parent)
+
+    def unknown_criteria(self, names: Iterable[str]) -> list[Problem]:
+        """Return the problems of criteria of success whose KPIs cannot result from the functions of the scenario.
+
+        Args:
+            names: names of the KPIs, in the order of "success".
+        """
+        kpis, folder = [kpi for _, kpi in accepted(self._scenario.spec.kpis)], self._scenario.root.folder
+        return [
+            Problem(text, self.study_file.document.where(("success", i, "kpi")))
+            for i, name in enumerate(names)
+            if (text := kpi_name_problem(name, kpis, folder))
+        ]
+
+    def check_jobs(self, runner: CheckingRunner, jobs: Iterable[Job], problems: Iterable[Problem] = ()) -> None:
+        """Raise InputError with `problems` and, with positions in the study's file, those for which these jobs cannot be run."""
+        found = [problem for job in jobs for problem in self.study_file.locate_problems(runner.check(job), job.settings)]
+        if found := [*found, *problems]:
+            raise InputError(dict.fromkeys(found))
 
 
 @dataclass

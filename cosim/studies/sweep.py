@@ -12,7 +12,7 @@ from typing import Any
 
 from ..core.errors import InputError, Problem
 from ..core.size_limits import MAX_RUNS
-from ..results.checks import CheckOutcome, Number, evaluate_all_checks, evaluate_checks
+from ..results.checks import CheckOutcome, Number, evaluate_all_checks, evaluate_checks, kpi_hint
 from .design import Design, Point, build_design
 from .document import StudyFile, read_study
 from .execution.job import Job, Record, RunKey
@@ -97,9 +97,21 @@ class Sweep:
         return [outcome for outcome in evaluate_all_checks(kpis, self.criteria) if not outcome.passed]
 
     def check(self, runner: CheckingRunner) -> None:
-        """Raise InputError with all problems of the levels of the factors."""
+        """Raise InputError with all problems of the levels of the factors and of the names of the criteria."""
         points = islice(self._representatives(), _MAX_CHECKED_POINTS)
-        self.study.check_jobs(runner, (self.study.job(point.settings) for point in points))
+        jobs = (self.study.job(point.settings) for point in points)
+        self.study.check_jobs(runner, jobs, () if self._varies_kpis else self.study.unknown_criteria(self._own_criteria))
+
+    @property
+    def _own_criteria(self) -> list[str]:
+        """Names of the KPIs in the sweep's own criteria."""
+        return [check.kpi for check in self.study_file.spec.success or ()]
+
+    @property
+    def _varies_kpis(self) -> bool:
+        """True if levels change the KPI functions of the scenario, so that their names are unknown before the runs."""
+        settings = (self.design[0].settings, *self.design.level_settings())
+        return any(name.startswith("/kpis") for each in settings for name in each)
 
     def _representatives(self) -> Iterator[Point]:
         """Yield the first point, and the first point with each further listed level of a factor."""
@@ -123,7 +135,8 @@ class Sweep:
             observe: called after every run.
 
         Raises:
-            InputError: before the first run for a level that cannot be set; after the first runs for unknown KPIs in criteria.
+            InputError: before the first run for a level that cannot be set and for unknown KPIs in criteria; after the first runs
+                for KPIs in criteria whose function gives names that its source does not show.
         """
         observed_kpis = ObservedKpis()
 
@@ -156,8 +169,16 @@ class Sweep:
             raise InputError(problems)
 
     def _check_criteria(self, observed_kpis: ObservedKpis) -> None:
-        if observed_kpis.runs:
-            evaluate_checks(observed_kpis.kpis, self.criteria)
+        if not observed_kpis.runs:
+            return
+        kpis, where = observed_kpis.kpis, self.study_file.document.where
+        if problems := [
+            Problem(f'no KPI "{name}"{kpi_hint(name, kpis)}', where(("success", i, "kpi")))
+            for i, name in enumerate(self._own_criteria)
+            if name not in kpis
+        ]:
+            raise InputError(problems)
+        evaluate_checks(kpis, self.criteria)
 
     def rows(self, run_store: RunStore) -> Iterator[SweepRow]:
         """Yield the finished runs in the order of the design."""

@@ -104,12 +104,13 @@ class WorstCase:
             InputError: A parameter cannot be set, or a check names no KPI of any run.
         """
         start = start_coordinates(self.spec.parameters)
-        self.study.check_jobs(runner, [self._job(parameter_values(self.spec.parameters, start))])
+        jobs = [self._job(parameter_values(self.spec.parameters, start))]
+        self.study.check_jobs(runner, jobs, self.study.unknown_criteria(check.kpi for check in self.spec.success or ()))
 
         def evaluate(points: Sequence[Sequence[float]]) -> list[float]:
             values = [parameter_values(self.spec.parameters, point) for point in points]
             run_pending(map(self._job, values), run_store, runner, observe)
-            attempts = [self._attempt(each, run_store[self._job(each).key]) for each in values]
+            attempts = [self._attempt(each, run_store[self._job(each).key], run_store.units) for each in values]
             self.attempts += attempts
             return [-each.severity for each in attempts]
 
@@ -125,13 +126,13 @@ class WorstCase:
     def _job(self, values: Mapping[str, float]) -> Job:
         return self.study.job(parameter_settings(self.spec.parameters, values))
 
-    def _attempt(self, values: Mapping[str, float], record: Record) -> Attempt:
+    def _attempt(self, values: Mapping[str, float], record: Record, units: Mapping[str, str]) -> Attempt:
         self.observed_kpis.add(record)
         if record.failure:
             return Attempt(values, _FAILED, record.failure, False)
         outcomes = evaluate_all_checks(record.kpis, self.criteria)
         closest = max(outcomes, key=severity)
-        return Attempt(values, severity(closest), str(closest), all(outcome.passed for outcome in outcomes))
+        return Attempt(values, severity(closest), closest.text(units), all(outcome.passed for outcome in outcomes))
 
 
 def severity(outcome: CheckOutcome) -> float:

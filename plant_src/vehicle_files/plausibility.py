@@ -4,12 +4,14 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from cosim.core.errors import Problem
 from cosim.core.units import KNOWN_UNITS
 
+from ..placement import VehiclePlacement
 from ..vehicles.model import Model
 from ..vehicles.multirotor.airframe import Airframe, Rotor
 from ..vehicles.submerged.craft import Thruster
@@ -34,6 +36,15 @@ MAX_MASS_RATIO = 1.5
 MAX_LENGTH_RATIO = 3.0
 #: z component of the axis of a rotor that pushes downwards
 _DOWNWARDS = -0.1
+
+
+def placement_warnings(vehicle: VehiclePlacement) -> Iterator[Problem]:
+    """Yield a warning for each value of a vehicle in a world that is probably wrong, with its path in the component."""
+    path = ("arguments", "vehicles", vehicle.name)
+    for each in vehicle_warnings(vehicle.model):
+        yield replace(each, subject=(*path, "model", *each.subject[1:]))
+    if abs(yaw := vehicle.parameter("initial.yaw")) > 2 * math.pi:
+        yield Problem(f"found {yaw:g}, radians expected; in degrees? A right angle is 1.5708", subject=(*path, "yaw"))
 
 
 def vehicle_warnings(model: Model) -> Iterator[Problem]:

@@ -8,6 +8,9 @@ from cosim_command import run_cosim
 from matplotlib.image import imread
 
 from cosim.core import resources
+from cosim.core.recording import Recording
+from cosim.results import Result
+from cosim.results.result import write_run
 
 
 def cosim(*arguments):
@@ -37,6 +40,18 @@ def test_a_signal_outside_its_tube_gives_exit_code_3_and_the_time(tmp_path):
     assert done.returncode == 3
     assert done.stderr.splitlines()[0] == "1 of 1 signal failed"
     assert done.stderr.splitlines()[1].startswith("plant.x leaves its tube at t = 0 s: 0.2 is 0.1 above its limit 0.1;")
+
+
+@pytest.mark.parametrize("name", ["", "result.csv"])
+def test_units_of_the_run_are_known_so_that_an_angle_may_jump_by_a_turn(tmp_path, name):
+    time = np.arange(0, 10, 0.01)
+    yaw = {"plant.yaw": np.angle(np.exp(1j * (time + 1e-3))), "plant.x": time}
+    write_run(Result(Recording(time, yaw, {"plant.yaw": "rad", "plant.x": "m"})), tmp_path / "run")
+    reference = {"plant.yaw": np.angle(np.exp(1j * time)), "plant.x": time + 1}
+    Result(Recording(time, reference, dict.fromkeys(reference, ""))).to_csv(tmp_path / "reference.csv")
+    done = cosim("compare", tmp_path / "run" / name, tmp_path / "reference.csv", "--absolute", "0.002")
+    assert done.stderr.splitlines()[0] == "1 of 2 signals failed"
+    assert done.stderr.splitlines()[1].startswith("plant.x leaves its tube at t = 0 s: 0 m is 0.998 m below its limit 0.998 m;")
 
 
 @pytest.mark.parametrize(("time", "code"), [("0.2", 0), ("0.05", 3)])

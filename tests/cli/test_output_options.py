@@ -27,7 +27,9 @@ class Talker(Fmi2Slave):
             raise ValueError("too late")
         return True
 """
-KPIS = "def last(result, signal):\n    return {'value': float(result[signal][-1])}\n"
+KPIS = (
+    "from cosim import units\n\n\n@units(value='m')\ndef last(result, signal):\n    return {'value': float(result[signal][-1])}\n"
+)
 FIGURES = """
 from matplotlib.figure import Figure
 
@@ -75,12 +77,12 @@ def test_quiet_prints_only_what_is_wrong(tmp_path):
     good = run_cosim("run", talker(tmp_path), "--quiet", cwd=tmp_path)
     assert (good.returncode, good.stdout, good.stderr) == (0, "", "")
     bad = run_cosim("run", talker(tmp_path, largest=1.0), "--quiet", cwd=tmp_path)
-    assert (bad.returncode, bad.stdout, bad.stderr) == (3, "", "check failed: end.value is 2, expected at most 1.0\n")
+    assert (bad.returncode, bad.stdout, bad.stderr) == (3, "", "check failed: end.value is 2 m, expected at most 1.0 m\n")
     both = run_cosim("run", tmp_path / "talk.json", "--quiet", "--json", cwd=tmp_path)
     assert json.loads(both.stdout)["exit_code"] == 3
     regressed = run_cosim("regress", tmp_path / "talk.json", "-q", cwd=tmp_path)
     assert (regressed.returncode, regressed.stdout) == (3, "")
-    assert regressed.stderr == "talk: end.value is 2, expected at most 1.0\ntalk: see runs/talk/report.html\n"
+    assert regressed.stderr == "talk: end.value is 2 m, expected at most 1.0 m\ntalk: see runs/talk/report.html\n"
 
 
 def test_verbose_prints_timings(tmp_path):

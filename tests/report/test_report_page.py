@@ -116,7 +116,7 @@ def test_failed_checks_are_at_the_top(flight_result, tmp_path):
     texts = Reader((tmp_path / "report.html").read_text()).texts
     assert texts[1] == "✗ 4 of 5 checks passed"
     assert "✗ failed: equals true" in texts
-    assert "The replay opens at t = 14 s. Mark × at t = 16 s: check of waypoints.all_reached failed." in texts
+    assert "The replay opens at t = 14 s. Mark × at t = 16 s: end of the run, check of waypoints.all_reached failed." in texts
 
 
 @pytest.mark.parametrize(
@@ -133,6 +133,26 @@ def test_the_moment_of_a_failure_depends_on_its_kind(flight_result, metadata, fa
     outcomes = [CheckOutcome({"kpi": "landing.lateral_error", "max": 0.1}, 0.2, passed=False)]
     assert find_failure(result, outcomes) == failure
     assert find_failure(replace(result, metadata={}), []) is None
+
+
+@pytest.mark.parametrize(
+    ("function", "arguments", "time"),
+    [
+        ("peak", {"signal": "x", "target": 1.0}, 3.0),
+        ("minimum", {"signal": "x"}, 3.0),
+        ("maximum", {"signal": "x"}, 1.0),
+        ("peak", {"signal": "x", "start": 2.0, "stop": 2.0}, 2.0),
+        ("rms", {"signal": "x"}, 4.0),
+    ],
+)
+def test_a_failed_check_of_an_extreme_marks_the_row_of_the_extreme(function, arguments, time):
+    """Values without a time are marked at the end of the run."""
+    recording = Recording(np.arange(5.0), {"x": np.array([0.0, 5.0, 1.0, -4.0, 2.0])}, {"x": "m"})
+    kpi = {"name": "k", "python": f"cosim.kpis:{function}", "arguments": arguments}
+    result = Result(recording, {"k.value": 9.0}, metadata={"scenario": {"kpis": [kpi]}})
+    failure = find_failure(result, [CheckOutcome({"kpi": "k.value", "max": 1.0}, 9.0, passed=False)])
+    end = "end of the run, " if function == "rms" else ""
+    assert (failure.time, failure.label) == (time, f"{end}check of k.value failed")
 
 
 def short_run(folder):

@@ -86,9 +86,10 @@ def test_repr_shows_name_size_failure_and_kpis(result):
         "  landing.bounces        2",
     ]
     checks = evaluate_all_checks(kpis, [{"kpi": "landing.bounces", "max": 1}, {"kpi": "landing.landed_at_end", "equals": True}])
-    assert repr(Result(result.recording, checks=checks)).splitlines()[1:] == [
+    units = {"landing.bounces": "m", "landing.landed_at_end": "1"}
+    assert repr(Result(result.recording, checks=checks, metadata={"kpi_units": units})).splitlines()[1:] == [
         "1 of 2 checks passed:",
-        "  landing.bounces is 2, expected at most 1",
+        "  landing.bounces is 2 m, expected at most 1 m",
     ]
     assert repr(Result(Recording.empty())) == "Result: 0 rows of 0 signals"
 

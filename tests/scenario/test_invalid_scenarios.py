@@ -65,6 +65,7 @@ def test_all_problems_are_reported_at_once(folder):
         ({"start_time": 1e10, "stop_time": 1e10 + 1, "step_size": 0.0001}, "a step of 0.0001 s is not resolved at t = 1000"),
         ({"stop_time": 0.5}, "$.stop_time: the duration 0.5 s is shorter than the step size 1.0 s"),
         ({"record": {"signals": ["a.z"]}}, '$.record.signals[0]: no variable matches "a.z"; did you mean "a.y"?'),
+        ({"record": {"signals": ["a.[yz]"]}}, '$.record.signals[0]: no variable matches "a.[yz]"; only "*" is a wildcard'),
         ({"record": {"interval": 1.5}}, "$.record.interval: recording interval 1.5 s is no multiple of the step size 1.0 s"),
         ({"events": [{"time": 0.5, "set": {"a.u": 1}}]}, "$.events[0]: event time 0.5 s lies between two"),
         ({"events": [{"time": 1, "set": {"a.q": 1}}]}, '$.events[0].set["a.q"]: component "a" has no variable "q"'),

@@ -171,12 +171,30 @@ def test_an_invalid_value_of_a_pointer_is_located_in_the_sweep_file(lag):
     }
 
 
-def test_criteria_with_unknown_kpis_end_the_sweep_after_the_first_runs(lag):
+def test_criteria_with_unknown_kpis_are_refused_together_with_wrong_factors(lag):
+    """Every problem has its place in the sweep file; nothing runs."""
+    factors = [{"name": "T", "set": "lag.Tau", "values": [1.0]}]
+    criteria = [{"kpi": "end.value", "max": 1.0}, {"kpi": "end.valeu", "max": 1.0}, {"kpi": "edn.value", "max": 1.0}]
+    done = lag.run_command("sweep", lag.write(factors=factors, success=criteria))
+    assert (done.code, len(done.err.splitlines())) == (2, 3), done.err
+    for i in (1, 2):
+        text = f'$.success[{i}].kpi: no KPI "{criteria[i]["kpi"]}"; did you mean "end.value"?'
+        assert f"{lag.folder / 'sweep.json'}:1:" in done.err
+        assert text in done.err
+    assert "$.factors[0].set" in done.err
+    assert lag.records() == []
+
+
+def test_criteria_with_kpis_that_only_runs_reveal_end_the_sweep_after_the_first_runs(lag):
+    """The function computes the names of its values."""
+    (lag.folder / "named.py").write_text("def f(result):\n    return dict([('height', 1.0)])\n")
+    content = json.loads((lag.folder / "lag.json").read_text())
+    (lag.folder / "lag.json").write_text(json.dumps(content | {"kpis": [{"name": "k", "python": "named.py:f"}]}))
     factors = [{"name": "y", "set": "lag.y_start", "values": list(range(50))}]
-    done = lag.run_command("sweep", lag.write(factors=factors, success=[{"kpi": "end.valeu", "max": 1.0}]))
+    done = lag.run_command("sweep", lag.write(factors=factors, success=[{"kpi": "k.heigth", "max": 1.0}]))
     assert done.code == 2
-    assert 'no such KPI; did you mean "end.value"?' in done.err
-    assert len(lag.records()) < 50
+    assert '$.success[0].kpi: no KPI "k.heigth"; did you mean "k.height"?' in done.err
+    assert 0 < len(lag.records()) < 50
 
 
 def test_a_factor_with_the_name_of_a_kpi_is_refused(lag):
@@ -188,9 +206,10 @@ def test_a_factor_with_the_name_of_a_kpi_is_refused(lag):
 
 def test_criteria_with_unknown_kpis_are_refused_when_all_runs_are_finished(lag):
     factors = [{"name": "y", "set": "lag.y_start", "values": [1, 2]}]
-    for _ in range(2):
-        assert lag.run_command("sweep", lag.write(factors=factors, success=[{"kpi": "end.valeu", "max": 1.0}])).code == 2
-    assert len(lag.records()) == 2
+    assert lag.run_command("sweep", lag.write(factors=factors)).code == 0
+    done = lag.run_command("sweep", lag.write(factors=factors, success=[{"kpi": "end.valeu", "max": 1.0}]))
+    assert (done.code, len(lag.records())) == (2, 2)
+    assert '$.success[0].kpi: no KPI "end.valeu"; did you mean "end.value"?' in done.err
 
 
 def test_a_file_that_cannot_be_imported_is_named(lag):

@@ -48,4 +48,4 @@ def test_100_000_runs_take_less_than_300_megabytes(lag):
     assert f"{RUNS} of {RUNS} runs, {LAST} made now" in out
     print(f"\n{peak / 1000:.0f} MB at most")
     assert 0 < peak < 300_000
-    assert len(list(folder.iterdir())) == 6
+    assert len(list(folder.iterdir())) == 8

@@ -99,18 +99,33 @@ def test_units_of_kpis_are_shown_also_when_a_sweep_is_continued(lag):
     (lag.folder / "own.py").write_text(
         "from cosim import units\n\n\n@units(end='m/s')\ndef own(result):\n    return {'end': result['lag.y'][-1], 'count': 2}\n"
     )
-    content = {"settings": {"/kpis": [{"name": "own", "python": "own.py:own"}]}, "success": [{"kpi": "own.end", "max": 10.0}]}
+    content = {"settings": {"/kpis": [{"name": "own", "python": "own.py:own"}]}, "success": [{"kpi": "own.end", "min": 9.0}]}
     sweep = lag.write(factors=[{"name": "T", "set": "lag.T", "values": [0.5, 1.0]}], **content)
     for _ in range(2):
         lines = [line.split() for line in lag.run_command("sweep", sweep).out.splitlines()]
         assert ["KPI", "unit", "mean", "std", "min", "median", "max"] in lines
-        assert [line[1] for line in lines if line[:1] == ["own.end"]] == ["m/s"]
+        assert [line[1] for line in lines if line[:1] == ["own.end"]] == ["m/s", "min"]
         assert [line[1] for line in lines if line[:1] == ["own.count"]] == ["2"]
         page = (lag.folder / "runs/sweep/sweep.html").read_text()
         assert '<td class="name">own.end</td><td class="soft" data-label="unit">m/s</td>' in page
-        assert "<code>own.end</code> max 10.0 m/s" in page
+        assert "<code>own.end</code> min 9.0 m/s" in page
+        assert "m/s, expected at least 9.0 m/s" in page
+        assert "m/s, expected at least 9.0 m/s" in lag.table(file="unsuccessful.csv")[0]["missed"]
         assert json.loads((lag.folder / "runs/sweep/sweep.json").read_text())["units"] == {"own.end": "m/s"}
     assert [sorted(record) for record in lag.records()] == [["key", "kpis", "seconds", "units"], ["key", "kpis", "seconds"]]
+
+
+def test_a_second_sweep_of_the_same_name_warns_and_removes_the_replays_of_the_first(lag):
+    """A replay shows the number of its run and the criteria, so another sweep cannot show it, even of an equal run."""
+    factors = [{"name": name, "set": f"lag.{name}", "values": [1]} for name in ("T", "y_start")]
+    first = lag.write(factors=factors, maps=[{"x": "T", "y": "y_start"}])
+    assert lag.run_command("sweep", first, "--replays").err == ""
+    assert len(list((lag.folder / "runs/sweep/replays").iterdir())) == 1
+    other = lag.folder / "other.json"
+    other.write_text(json.dumps(json.loads(first.read_text()) | {"success": [{"kpi": "end.value", "max": 0.0}]}))
+    text = f'replaces the results of {first} in runs/sweep; another "name" in the sweep or --output-dir keeps both\n'
+    assert [lag.run_command("sweep", other).err for _ in range(2)] == [text, ""]
+    assert list((lag.folder / "runs/sweep/replays").iterdir()) == []
 
 
 def test_a_run_without_a_kpi_of_the_criteria_is_unsuccessful(lag):

@@ -39,7 +39,7 @@ def command(
     Each is a CSV file or a folder written by `cosim run`. Every signal of the reference must stay within the larger of the
     absolute and the relative tolerance, and within the tolerance of time; without tolerances it must be equal. If REFERENCE is
     a scenario file or the name of a shipped scenario, its reference and its tolerances are used. Exit code 0: all signals
-    agree; 3: a signal leaves its tube, is missing, ends early, or is not finite.
+    agree; 3: a signal leaves its tube, is missing, ends early, or is not finite. The text lists the 10 earliest failures.
     """
     from ...api.comparison import ComparisonTask
     from ...results.comparison import Tolerance
@@ -58,5 +58,5 @@ def command(
     else:
         share = task.needed_share() if comparison.passed else 0
         margin = f"; {share:.0%} of the tolerances would suffice" if share else ""
-        click.echo(f"{comparison}{margin}", err=not comparison.passed)
+        click.echo(f"{comparison.shortened()}{margin}", err=not comparison.passed)
     return 0 if comparison.passed else 3

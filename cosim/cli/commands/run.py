@@ -12,7 +12,6 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ...core.errors import InputError, Problem
-from ...core.json_values import parse_object
 from ...process.output_lock import LockKeeper
 from .. import live, strict_sandbox, supervision
 from ..completion import complete_scenario
@@ -188,6 +187,7 @@ def _prepare_folder(prepared: PreparedRun, options: RunOptions, locks: LockKeepe
     """Check the figures and that results can be written, lock the output directory, and remove results of an earlier run."""
     from ...engine.disk_space import find_space_problems
     from ...results.files import check_writable, remove_files
+    from ..messages import warn_overwriting
 
     if not options.no_report and (problems := prepared.figure_problems()):
         raise InputError(problems)
@@ -195,23 +195,12 @@ def _prepare_folder(prepared: PreparedRun, options: RunOptions, locks: LockKeepe
     folder = shown.absolute()
     check_writable(folder)
     locks.lock(OutputFiles.of_folder(folder).lock, shown)
-    _warn_overwriting(shown, prepared.document.file.resolve())
+    warn_overwriting(shown, "run.json", "scenario", prepared.document.file.resolve())
     replaced = sum((folder / name).stat().st_size for name in RESULT_FILES if (folder / name).is_file())
     if problems := find_space_problems(prepared.plan, folder, csv=True, replaced=replaced):
         raise InputError([Problem(problem.message, prepared.root.where(*problem.subject)) for problem in problems])
     figures = (f"{figure.name}{suffix}" for figure in prepared.spec.figures for suffix in (".png", ".svg", ".csv"))
     remove_files(folder, *RESULT_FILES, *figures)
-
-
-def _warn_overwriting(folder: Path, scenario: Path) -> None:
-    """Warn if results of another scenario file with the same name are replaced in this folder."""
-    try:
-        former = parse_object((folder / "run.json").read_text(encoding="utf-8"))["scenario_file"]
-    except (OSError, ValueError, LookupError):  # no earlier run, or an unreadable run.json
-        return
-    if former != str(scenario):
-        text = f'replaces the results of {former} in {folder}; another "name" in the scenario or --output-dir keeps both'
-        click.echo(text, err=True)
 
 
 @contextmanager

@@ -14,7 +14,7 @@ from ...core.processors import available_processors
 from ...core.text import count_noun
 from .. import current_command_line, study_options
 from ..completion import complete_study
-from ..messages import print_json
+from ..messages import print_json, warn_overwriting
 from ..output_options import json_option
 
 if TYPE_CHECKING:
@@ -57,6 +57,7 @@ def command(sweep: str, output_dir: Path | None, parquet: bool, replays: bool, a
     loaded = Sweep.from_file(sweep, study.pop("max_runs"))
     folder = output_dir or Path("runs") / loaded.study_file.spec.name
     with study_options.open_run_store(folder, study.pop("retry_failed")) as run_store:
+        warn_overwriting(folder, "sweep.json", "sweep", loaded.study_file.document.file.resolve())
         return _run_sweep(loaded, run_store, folder, parquet, replays, as_json, **study)
 
 
@@ -111,10 +112,11 @@ def _write_maps_and_page(
 ) -> None:
     """Write the maps, the replays of their cells if required, and the page."""
     from ...studies.summary.page import write_sweep_page
-    from ...studies.summary.replays import write_replays
+    from ...studies.summary.replays import remove_foreign_replays, write_replays
     from ...studies.summary.success_map import success_maps
 
     maps = success_maps(sweep, sweep.rows(run_store))
+    remove_foreign_replays(sweep, folder)
     if replays:
         runs = [cell.representative_run.number for each in maps for cell in each.cells.values() if cell.representative_run]
         for run, cause in write_replays(sweep, runs, folder, workers or available_processors()).items():

@@ -1,6 +1,7 @@
 """Comparison of a result with a reference: every signal has to stay in a tube around the reference."""
 
-from .comparison import Comparison, Verdict, compare, needed_share
+from .comparison import compare, needed_share
 from .tube import Tolerance, Tube
+from .verdict import Comparison, Verdict
 
 __all__ = ["Comparison", "Tolerance", "Tube", "Verdict", "compare", "needed_share"]

@@ -6,16 +6,14 @@ import math
 import re
 from bisect import bisect_left
 from collections.abc import Iterator, Mapping
-from dataclasses import dataclass
 from functools import cached_property
-from typing import NamedTuple
 
 import numpy as np
 
-from ...core.errors import InputError, did_you_mean
-from ...core.text import count_noun
+from ...core.errors import InputError, did_you_mean, pattern_hint
 from .. import Result
 from .tube import ComparisonPoints, TimeWindows, Tolerance, Tube, UniformTimeWindows, time_tolerance, uniform_spacing
+from .verdict import Comparison, Verdict
 
 #: share of all points up to which it is faster to compute the tube only at these points
 DENSE_FRACTION = 0.1
@@ -25,62 +23,6 @@ SHARE_STEPS = 16
 TURNS = {"rad": 2 * math.pi, "deg": 360.0}
 #: largest range in turns of an angle that is kept within one turn; a little more than 1, because references are rounded
 MAX_WRAPPED_RANGE = 1.01
-
-
-class Verdict(NamedTuple):
-    """Verdict on one signal.
-
-    Attributes:
-        signal: Name of the signal.
-        problem: Description of the first deviation; "" if the signal passes.
-        time: Time of the first deviation (s): -inf if it has no time, inf if there is none.
-        excess: Largest distance outside the tube in half heights of the tube; inf if nothing can be compared or the height is 0.
-            If no point is outside, a number from -1 (on the reference) to 0 (half a height from it).
-    """
-
-    signal: str
-    problem: str = ""
-    time: float = -math.inf
-    excess: float = math.inf
-
-    @property
-    def passed(self) -> bool:
-        """True if the signal has no problem."""
-        return not self.problem
-
-    def __str__(self) -> str:
-        return f"{self.signal} {self.problem or 'stays in its tube'}"
-
-
-@dataclass(frozen=True)
-class Comparison:
-    """Verdicts on the whole comparison and on patterns, followed by those on all signals in the order of the reference."""
-
-    verdicts: tuple[Verdict, ...]
-
-    @property
-    def passed(self) -> bool:
-        """True if at least one signal was compared and all passed."""
-        return bool(self.verdicts) and all(verdict.passed for verdict in self.verdicts)
-
-    @property
-    def failures(self) -> list[Verdict]:
-        """Verdicts that failed, the earliest first."""
-        return sorted((verdict for verdict in self.verdicts if not verdict.passed), key=lambda verdict: verdict.time)
-
-    @property
-    def worst(self) -> list[Verdict]:
-        """Verdicts on all signals that were compared with a tube, the largest excess first."""
-        return sorted((verdict for verdict in self.verdicts if verdict.time > -math.inf), key=lambda verdict: -verdict.excess)
-
-    def __str__(self) -> str:
-        """Return a summary in one line, and one line per failure."""
-        failures = self.failures
-        if not self.verdicts:
-            return "nothing was compared"
-        if not failures:
-            return f"{count_noun(len(self.verdicts), 'signal')} compared, none leaves its tube"
-        return "\n".join([f"{len(failures)} of {count_noun(len(self.verdicts), 'signal')} failed", *map(str, failures)])
 
 
 def compare(result: Result, reference: Result, tolerances: Mapping[str, Tolerance]) -> Comparison:
@@ -103,7 +45,7 @@ def compare(result: Result, reference: Result, tolerances: Mapping[str, Toleranc
     selected = match_tolerances(tolerances, list(reference))
     unmatched = [pattern for pattern in tolerances if not reference.signals(pattern)]
     general = [
-        Verdict(f'"{pattern}"', f"matches no signal of the reference{did_you_mean(pattern, reference)}") for pattern in unmatched
+        Verdict(f'"{pattern}"', f"matches no signal of the reference{pattern_hint(pattern, reference)}") for pattern in unmatched
     ]
     if not len(reference.time) or not len(result.time):
         return Comparison((*general, Verdict("the reference" if not len(reference.time) else "the result", "has no rows")))
@@ -267,13 +209,23 @@ class Comparer:
         """Return the verdict on a signal whose `distance` outside the tube is positive at some points."""
         outside = np.flatnonzero(distance > 0)
         row, worst, unit = outside[0], int(distance.argmax()), self._unit_suffix(name)
+        time, excess = float(tube.time[row]), _relative_excess(distance[worst], half_width)
+        share = f"{outside.size} of {self.points.time.size} points outside"
+        expected = float(np.interp(time, self._reference.time, _to_floats(self._reference, name)))
+        if half_width < 1 and self._is_discrete(name) and expected.is_integer() and float(values[row]).is_integer():
+            return Verdict(name, f"is {values[row]:g} at t = {time:g} s, expected {expected:g}; {share}", time, excess)
         side, bound = ("above", tube.upper) if values[row] > tube.upper[row] else ("below", tube.lower)
         text = (
-            f"leaves its tube at t = {tube.time[row]:g} s: {values[row]:.6g}{unit} is {distance[row]:.3g}{unit} {side} "
+            f"leaves its tube at t = {time:g} s: {values[row]:.6g}{unit} is {distance[row]:.3g}{unit} {side} "
             f"its limit {bound[row]:.6g}{unit}; at most {distance[worst]:.3g}{unit} outside, at t = {tube.time[worst]:g} s; "
-            f"{outside.size} of {self.points.time.size} points outside"
+            f"{share}"
         )
-        return Verdict(name, text, float(tube.time[row]), _relative_excess(distance[worst], half_width))
+        return Verdict(name, text, time, excess)
+
+    def _is_discrete(self, name: str) -> bool:
+        """Return whether all values of both runs are integers without a unit, Booleans for example."""
+        runs = (_to_floats(self._result, name), _to_floats(self._reference, name))
+        return not self._unit_suffix(name) and all(np.array_equal(values, np.round(values)) for values in runs)
 
     def _unit_suffix(self, name: str) -> str:
         unit = self._unit(name)

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from ...core.errors import CheckError
+from ...core.errors import CheckError, pattern_hint
 from ...core.recording import Recording
 from .. import Result
 from ..files import write_json
@@ -43,6 +43,9 @@ def decimate(result: Result, tolerances: Mapping[str, Tolerance]) -> Result:
     Raises:
         CheckError: The run cannot be a reference: a pattern matches no signal, or a value is not finite.
     """
+    if unmatched := [pattern for pattern in tolerances if not result.signals(pattern)]:
+        texts = (f'"{pattern}" matches no recorded signal{pattern_hint(pattern, result)}' for pattern in unmatched)
+        raise CheckError(f"this run is no reference: {'; '.join(texts)}")
     selected = match_tolerances(tolerances, list(result))
     rounded = {name: _round(result[name], tolerance) for name, tolerance in selected.items()}
     source = Result(Recording(result.time, rounded, {name: result.units[name] for name in selected}))

@@ -24,6 +24,7 @@ from ...process.journal import EXIT_CODE, Phase, current_journal
 from ...process.run_files.folder import keeping_run_files
 from ...process.supervisor import SupervisedOutcome, run_supervised
 from ...results import Result
+from ...results.checks import evaluate_all_checks
 from ...results.kpi import evaluate_kpis, kpi_units
 from ...scenario import PreparedRun, load
 from .job import Job, Record, StudyContext
@@ -38,10 +39,11 @@ FmuFiles = Mapping[Path, FmuFile]
 
 
 class ReplayRequest(NamedTuple):
-    """Title and path of the page to which the replay of a run is written."""
+    """Title and path of the page to which the replay of a run is written, and the checks that the run should pass."""
 
     title: str
     page: str
+    checks: list[dict[str, Any]]
 
 
 def supervised_run(context: StudyContext, job: Job, fmu_files: FmuFiles, replay: ReplayRequest | None = None) -> Record:
@@ -120,14 +122,15 @@ def _run_job(context: StudyContext, job: Job, fmu_files: FmuFiles, reply: IO[str
 
 def _run_with_replay(replay: ReplayRequest, context: StudyContext, job: Job, fmu_files: FmuFiles, reply: IO[str]) -> None:
     from ...api import Simulation
-    from ...report.replay import write_replay
+    from ...report.replay import write_judged_replay
 
     _set_deadline(context)
     simulation = Simulation(lambda _: _prepare_job(context, job, fmu_files))
     with keeping_run_files(Path(tempfile.gettempdir()) / "run"), default_float_mode(), simulation:
         execution = simulation.execute()
         result = execution.result
-        write_replay([replace(result, metadata={**result.metadata, "name": replay.title})], Path(replay.page))
+        named = replace(result, metadata={**result.metadata, "name": replay.title})
+        write_judged_replay(named, evaluate_all_checks(result.kpis, replay.checks), Path(replay.page))
         if execution.failure:
             raise execution.failure
         _write_reply(reply, {"kpis": result.kpis, "units": _known_units(result.metadata["kpi_units"])})

@@ -13,12 +13,14 @@ import sys
 import threading
 import time
 from contextlib import suppress
-from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 from ...core.errors import ComponentError, CosimError, Problem
 from ...process.supervisor import STOP_TIMEOUT, has_ended, is_stopped
 from .job import FORK_REQUEST, READY, Job, Record, StudyContext
+
+if TYPE_CHECKING:
+    from .run import ReplayRequest
 
 #: attempts at a run whose worker process is killed
 MAX_ATTEMPTS = 3
@@ -190,9 +192,9 @@ class WorkerPool:
         """Return the problems for which a job cannot be run."""
         return [Problem(message, where) for message, where in json.loads(self._request(job, check=True))]
 
-    def replay(self, job: Job, title: str, page: Path) -> Record:
-        """Run a job again and write its 3-D replay to `page`; after a failure, the replay ends there."""
-        return Record.from_json(self._request(job, check=False, replay={"title": title, "page": str(page.resolve())}))
+    def replay(self, job: Job, request: ReplayRequest) -> Record:
+        """Run a job again and write its 3-D replay; after a failure, the replay ends there."""
+        return Record.from_json(self._request(job, check=False, replay=request._asdict()))
 
     def _request(self, job: Job, check: bool, **more: Any) -> bytes:
         request = {"key": job.key, "settings": job.settings, "check": check, **more}

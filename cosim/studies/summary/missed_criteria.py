@@ -34,7 +34,7 @@ class UnsuccessfulRun(NamedTuple):
     Attributes:
         run: number of the point.
         labels: labels of the factors.
-        missed: found values and limits, such as "landing.touchdown_speed is 0.61, expected at most 0.5".
+        missed: found values and limits, such as "landing.touchdown_speed is 0.61 m/s, expected at most 0.5 m/s".
         command: command line that makes this run alone.
     """
 
@@ -65,9 +65,9 @@ def missed_criteria(sweep: Sweep, rows: Iterable[SweepRow], units: Mapping[str, 
     return [MissedCriterion(*criterion, runs, first, run_command(sweep, first)) for criterion, (runs, first) in found]
 
 
-def unsuccessful_runs(sweep: Sweep, rows: Iterable[SweepRow]) -> Iterator[UnsuccessfulRun]:
-    """Yield the runs that reached their end without success, in the order of the design."""
+def unsuccessful_runs(sweep: Sweep, rows: Iterable[SweepRow], units: Mapping[str, str]) -> Iterator[UnsuccessfulRun]:
+    """Yield the runs that reached their end without success, in the order of the design; `units` are those of the KPIs."""
     for row in rows:
         if not row.passed and not row.record.failure:
-            missed = [str(outcome) for outcome in sweep.missed(row.record.kpis)]
+            missed = [outcome.text(units) for outcome in sweep.missed(row.record.kpis)]
             yield UnsuccessfulRun(row.run, row.point.labels, missed, run_command(sweep, row.run))

@@ -48,7 +48,7 @@ def write_sweep_page(
         folder, *(path.name for path in folder.glob(f"{MAP_NAME}*") if _MAP_FILE.fullmatch(path.name) and path.name not in drawn)
     )
     statistics = overall.shown_statistics() if overall else ()
-    cells = list(_shown_cells(sweep, rows, maps, folder))
+    cells = list(_shown_cells(sweep, rows, summary.units, maps, folder))
     text = render_page(
         "sweep.html",
         spec=sweep.study_file.spec,
@@ -113,7 +113,9 @@ def _cell_link(sweep: Sweep, cell: MapCell, folder: Path) -> str:
     return page if (folder / page).exists() else f"{PAGE_FILE}#run-{cell.representative_run.number}"
 
 
-def _shown_cells(sweep: Sweep, rows: Iterable[SweepRow], maps: Iterable[SuccessMap], folder: Path) -> Iterator[dict[str, Any]]:
+def _shown_cells(
+    sweep: Sweep, rows: Iterable[SweepRow], units: Mapping[str, str], maps: Iterable[SuccessMap], folder: Path
+) -> Iterator[dict[str, Any]]:
     """Yield each run that represents a cell, once, with the reasons why it is no success and with its command."""
     shown = {
         cell.representative_run.number: cell
@@ -121,12 +123,12 @@ def _shown_cells(sweep: Sweep, rows: Iterable[SweepRow], maps: Iterable[SuccessM
         for cell in map_.cells.values()
         if cell.representative_run is not None
     }
-    reasons = {row.run: _reasons(sweep, row) for row in rows if row.run in shown}
+    reasons = {row.run: _reasons(sweep, row, units) for row in rows if row.run in shown}
     for number, cell in sorted(shown.items()):
         texts = {"reasons": reasons[number], "command": run_command(sweep, number)}
         yield {"run": number, "cell": cell, "link": _cell_link(sweep, cell, folder), **texts}
 
 
-def _reasons(sweep: Sweep, row: SweepRow) -> list[str]:
+def _reasons(sweep: Sweep, row: SweepRow, units: Mapping[str, str]) -> list[str]:
     """Return why a run is no success: the failure, or the criteria that it misses."""
-    return [row.record.failure] if row.record.failure else [str(outcome) for outcome in sweep.missed(row.record.kpis)]
+    return [row.record.failure] if row.record.failure else [outcome.text(units) for outcome in sweep.missed(row.record.kpis)]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import shlex
+from functools import lru_cache
 from os.path import normpath
 from pathlib import Path
 from typing import Any
@@ -29,15 +30,16 @@ def format_run_command(scenario: Path, settings: Any) -> str:
 
     Paths in settings of a study start from the folder of the scenario, those of the option `--set` from the working directory.
     """
-    change = _path_changes(scenario.parent)
+    change = _path_changes(scenario.parent, Path.cwd())
     moved = {name: change_pointed(name, value, change) if name.startswith("/") else value for name, value in settings.items()}
     words = [word for name, value in moved.items() for word in ("--set", f"{name}={_setting_text(value)}")]
     return shlex.join(["cosim", "run", _scenario_text(scenario), *words])
 
 
-def _path_changes(folder: Path) -> PathChange:
+@lru_cache(1)  # a sweep writes a command for each run without success
+def _path_changes(folder: Path, working: Path) -> PathChange:
     """Return a function that makes paths relative to the folder shipped ones, or relative to the working directory."""
-    to_shipped, to_working = relocating(folder, resources.root()), relocating(folder, Path.cwd())
+    to_shipped, to_working = relocating(folder, resources.root()), relocating(folder, working)
 
     def change(text: str) -> str:
         shipped = to_shipped(text)
@@ -46,6 +48,7 @@ def _path_changes(folder: Path) -> PathChange:
     return change
 
 
+@lru_cache(1)
 def _scenario_text(scenario: Path) -> str:
     is_shipped = scenario.resolve().parent == (resources.root() / "scenarios").resolve()
     return scenario.stem if is_shipped else normpath(scenario)

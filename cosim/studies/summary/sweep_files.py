@@ -76,8 +76,10 @@ def write_sweep_files(sweep: Sweep, run_store: RunStore, folder: Path, parquet: 
             groups.append(group)
     write_csv_rows([*factors, *AGGREGATE_COLUMNS], statistics, folder / "aggregates.csv")
     write_csv_rows([*factors, *SUCCESS_COLUMNS], (_success_row(group, factors) for group in groups), folder / "success.csv")
+    units = run_store.units
     unsuccessful = (
-        [each.run, *each.labels.values(), "; ".join(each.missed), each.command] for each in unsuccessful_runs(sweep, rows())
+        [each.run, *each.labels.values(), "; ".join(each.missed), each.command]
+        for each in unsuccessful_runs(sweep, rows(), units)
     )
     write_csv_rows(["run", *factors, "missed", "command"], unsuccessful, folder / "unsuccessful.csv")
     write_csv_rows(["run", *factors, "failure", "output", "command"], _failure_rows(sweep, rows()), folder / "failures.csv")
@@ -85,9 +87,9 @@ def write_sweep_files(sweep: Sweep, run_store: RunStore, folder: Path, parquet: 
         groups[0].runs if groups else 0,
         groups,
         failure_causes(rows()),
-        run_store.units,
-        missed_criteria(sweep, rows(), run_store.units),
-        list(islice(unsuccessful_runs(sweep, rows()), _MAX_LISTED_RUNS)),
+        units,
+        missed_criteria(sweep, rows(), units),
+        list(islice(unsuccessful_runs(sweep, rows(), units), _MAX_LISTED_RUNS)),
     )
     write_json(_sweep_metadata(sweep, summary), folder / "sweep.json")
     return summary
@@ -114,6 +116,7 @@ def _sweep_metadata(sweep: Sweep, summary: SweepSummary) -> dict[str, Any]:
     return {
         "name": spec.name,
         "sweep": sweep.study_file.document.value,
+        "sweep_file": str(sweep.study_file.document.file.resolve()),
         "scenario_file": str(sweep.study_file.scenario.resolve()),
         "cosim": cosim_fingerprint(),
         "sha256": dict(sweep.study.bundle.files),

@@ -160,11 +160,13 @@ def test_a_warning_names_file_and_line_of_the_key(tmp_path: Path, caplog: pytest
     (tmp_path / "boat.json").write_text(text := json.dumps(data, indent=1))
     plant = {
         "python": "cosim:plant_src/world.py:World",
-        "arguments": {"vehicles": {"boat": {"model": "boat.json", "position": [0, 0]}}},
+        "arguments": {"vehicles": {"boat": {"model": "boat.json", "position": [0, 0], "yaw": 90}}},
     }
     scenario = {"name": "trial", "stop_time": 1, "step_size": 0.01, "components": {"plant": plant}, "connections": []}
     (tmp_path / "trial.json").write_text(json.dumps(scenario))
     load(tmp_path / "trial.json").free()
     line = text[: text.index("-22")].count("\n")
-    (message,) = caplog.messages
+    message, yaw = caplog.messages
     assert re.search(rf"boat.json:{line}:\d+: \$.propellers\[1\].position: x = -22 m is far outside of hull and boxes", message)
+    assert yaw.endswith("vehicles.boat.yaw: found 90, radians expected; in degrees? A right angle is 1.5708")
+    assert "trial.json:1:" in yaw

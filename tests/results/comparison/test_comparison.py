@@ -101,12 +101,13 @@ def test_a_pattern_without_a_signal_fails():
     assert failures(REFERENCE, {"a.x": Tolerance(), "a.z": Tolerance()}) == [
         '"a.z" matches no signal of the reference; did you mean "a.y"?'
     ]
+    assert failures(REFERENCE, {"a.[xy]": Tolerance()}) == ['"a.[xy]" matches no signal of the reference; only "*" is a wildcard']
 
 
 def test_time_tolerance_permits_a_late_switch():
     late = changed(b__x=TIME > 5.3)
     assert compare(late, REFERENCE, {"*": Tolerance(time=0.3)}).passed
-    assert failures(late, {"*": Tolerance(time=0.1)})[0].startswith("b.x leaves its tube at t = 5.2 s: 0 is 1 below its limit 1;")
+    assert failures(late, {"*": Tolerance(time=0.1)})[0].startswith("b.x is 0 at t = 5.2 s, expected 1; ")
 
 
 @pytest.mark.parametrize(("offset", "share"), [(0.0, 0.0), (0.01, 1 / 16), (0.052, 3 / 8), (0.2, 1.0)])
@@ -118,7 +119,23 @@ def test_a_coarse_result_is_compared_at_rows_of_the_reference():
     peak = recorded(x=np.where(TIME == 5.5, 1.0, 0.0))
     coarse = recorded(TIME[::10], x=np.zeros(11))
     (failure,) = failures(coarse, {"x": Tolerance(0.5)}, peak)
-    assert failure.startswith("x leaves its tube at t = 5.5 s: 0 is 0.5 below its limit 0.5")
+    assert failure == "x is 0 at t = 5.5 s, expected 1; 1 of 101 points outside"
+
+
+def test_integers_with_a_unit_or_a_wide_tolerance_have_a_tube():
+    """A count that differs by 3 is outside a tolerance of 2; metres that happen to be integers are no discrete values."""
+    for unit, tolerance in (("m", 0.0), ("", 2.0)):
+        units = {"x": unit}
+        verdicts = failures(recorded(units=units, x=np.full(101, 3)), {"x": Tolerance(tolerance)}, recorded(x=np.zeros(101)))
+        assert verdicts[0].startswith("x leaves its tube at t = 0 s: 3")
+
+
+def test_a_short_summary_lists_the_ten_earliest_failures():
+    signals = {f"s{i}": i / 10 <= TIME for i in range(12)}
+    comparison = compare(recorded(**{name: ~values for name, values in signals.items()}), recorded(**signals), EXACT)
+    first, *lines, last = comparison.shortened().splitlines()
+    assert (first, len(lines), last) == ("12 of 12 signals failed", 10, "... and 2 more")
+    assert len(str(comparison).splitlines()) == 13
 
 
 def test_strings_must_be_equal():

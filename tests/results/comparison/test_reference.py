@@ -75,7 +75,8 @@ def test_written_rows_are_recorded_ones_rounded_to_a_hundredth_of_the_tolerance(
     ("run", "tolerances", "reason"),
     [
         (swing(c=np.where(TIME == 3, np.nan, 0)), {"c": Tolerance(1)}, "c is nan at t = 3 s"),
-        (swing(), {"a.x": Tolerance(1), "a.z": Tolerance(1)}, '"a.z" matches no signal'),
+        (swing(), {"a.x": Tolerance(1), "a.z": Tolerance(1)}, '^this run is no reference: "a.z" matches no recorded signal'),
+        (swing(), {"a.[xy]": Tolerance(1)}, r'"a.\[xy\]" matches no recorded signal; only "\*" is a wildcard$'),
     ],
 )
 def test_a_run_that_fails_its_own_comparison_is_refused(run, tolerances, reason, tmp_path):

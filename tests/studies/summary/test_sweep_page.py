@@ -165,6 +165,23 @@ def test_a_replay_shows_all_signals_that_the_scenario_records(replayed, results)
     assert "sweep run 0: start low, T quick" in text
 
 
+@pytest.mark.usefixtures("replayed")
+def test_a_replay_names_the_criterion_that_the_run_misses_and_opens_before_the_failure(results):
+    (row,) = csv.DictReader((results / "unsuccessful.csv").open())
+    good, bad = (next((results / "replays").glob(f"{key}-*")).read_text() for key in run_keys(results))
+    assert "<p>Successful.</p>" in good
+    sentence = "The replay opens at t = 0 s. Mark × at t = 0.1 s: end of the run, check of end.value failed."
+    assert f"<p>Not successful: {row['missed']}. {sentence}</p>" in bad
+    assert '"failure":{"time":0.1,' in bad.replace(" ", "")
+
+
+def run_keys(results):
+    """Return the keys of the runs 0 and 2, which have replays."""
+    lines = [json.loads(line) for line in (results / "journal.jsonl").read_text().splitlines()]
+    good, bad = sorted((line for line in lines if "failure" not in line), key=lambda line: line["kpis"]["end.value"])
+    return good["key"], bad["key"]
+
+
 def test_a_crashing_run_is_reported_and_keeps_its_command(replayed):
     page, done = replayed
     assert {link for link in page.links if link.startswith("sweep.html#run-")} == {"sweep.html#run-1", "sweep.html#run-3"}

@@ -1,4 +1,4 @@
-/* made from sources c1358ab60af09152a6d6af17f20ea4b1c62dac27df74e77b871c1a01c213691a
+/* made from sources 9d553298f9bfb25b89224cec1e82ba3f55229f060766837e14ccb76b00cc25c9
 
 three
 
