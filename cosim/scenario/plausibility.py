@@ -10,6 +10,7 @@ from fractions import Fraction
 from typing import TYPE_CHECKING
 
 from ..components.fmi import FmuDescription
+from ..components.fmi.changed_sources import changed_sources_warning
 from ..core.errors import Problem, abbreviate_names
 from ..core.paths import is_file
 from ..core.system import Endpoint
@@ -44,8 +45,8 @@ def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
     for file in prepared.component_factory.fmus.values():
         if file.run_warning:
             yield Problem(file.run_warning)
-        if changed := file.changed_sources():
-            yield Problem(f'"{file.path}" was built from another version of {", ".join(changed)}: `cosim build` builds it again')
+        if changed := changed_sources_warning(file):
+            yield Problem(changed)
 
 
 def _missing_connections(prepared: PreparedRun) -> Iterator[Problem]:

@@ -14,6 +14,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..components.fmi.changed_sources import OTHER_VERSION
 from ..core.errors import CosimError, InputError
 from ..core.json_values import parse_object
 from ..core.paths import open_text
@@ -118,7 +119,9 @@ class Regression:
         except CosimError as error:
             return RegressionOutcome(self.file.stem, error.exit_code, "cannot be compared", tuple(str(error).splitlines()))
         ending = "" if run.result.crashed else run.result.termination  # a crash is one of the details
-        return replace(outcome, summary="; ".join(filter(None, (outcome.summary, ending))))
+        outdated = [line for line in done.stderr.splitlines() if OTHER_VERSION in line]
+        summary = "; ".join(filter(None, (outcome.summary, ending)))
+        return replace(outcome, summary=summary, details=(*outdated, *outcome.details))
 
     def _compare(self, run: _FinishedRun) -> RegressionOutcome:
         failed = run.failed_checks()

@@ -20,6 +20,7 @@ from cosim_command import run_cosim
 
 from cosim.cli import main
 from cosim.components.fmi import FmuFile
+from cosim.components.fmi.changed_sources import find_changed_sources
 from cosim.core import resources
 from cosim.report.scene import build_scene
 from cosim.results import Result
@@ -183,21 +184,21 @@ def test_a_run_writes_a_figure_and_a_replay(moved, role, figure, bodies):
 @pytest.mark.parametrize("language", MADE)
 def test_an_fmu_older_than_its_source_is_recognized(moved, language, tmp_path):
     folder = shutil.copytree(moved("vessel_autopilot", language) / "my_pilot", tmp_path / "my_pilot")
-    assert FmuFile(folder / "my_pilot.fmu").changed_sources() == []
+    assert find_changed_sources(FmuFile(folder / "my_pilot.fmu")) == []
     source = folder / MADE[language][-1]
     source.write_text(source.read_text() + "\n")
-    assert FmuFile(folder / "my_pilot.fmu").changed_sources() == [source.name]
+    assert find_changed_sources(FmuFile(folder / "my_pilot.fmu")) == [source]
 
 
 def test_an_fmu_of_a_class_that_imports_another_file_is_not_older_than_its_source(moved, tmp_path):
     folder = shutil.copytree(moved("vessel_autopilot", "python") / "my_pilot", tmp_path / "my_pilot")
     (folder / "bold.py").write_text("from my_pilot import MyPilot\n\n\nclass Bold(MyPilot):\n    pass\n")
     assert cosim("build", "bold.py", "--output", "bold.fmu", cwd=folder).returncode == 0
-    assert FmuFile(folder / "bold.fmu").changed_sources() == []
+    assert find_changed_sources(FmuFile(folder / "bold.fmu")) == []
     (folder / "bold.py").write_text("from my_pilot import MyPilot\n\n\nclass Bold(MyPilot):\n    gain = 2\n")
-    assert FmuFile(folder / "bold.fmu").changed_sources() == ["bold.py"]
+    assert find_changed_sources(FmuFile(folder / "bold.fmu")) == [folder / "bold.py"]
     (folder / "bold.py").write_text("from my_pilot import\n")
-    assert FmuFile(folder / "bold.fmu").changed_sources() == ["bold.py"]
+    assert find_changed_sources(FmuFile(folder / "bold.fmu")) == [folder / "bold.py"]
 
 
 def test_a_run_of_an_fmu_older_than_its_source_warns(moved, tmp_path):
@@ -205,7 +206,9 @@ def test_a_run_of_an_fmu_older_than_its_source_warns(moved, tmp_path):
     with (folder / "my_pilot.c").open("a") as source:
         source.write("/* changed */\n")
     done = cosim("check", "my_pilot/my_pilot.json", cwd=tmp_path)
-    assert 'my_pilot.fmu" was built from another version of my_pilot.c: `cosim build` builds it again' in done.stderr
+    command = "cosim build my_pilot --output my_pilot/my_pilot.fmu"
+    warning = f'"my_pilot/my_pilot.fmu" was built from another version of my_pilot/my_pilot.c: `{command}` builds it again'
+    assert f"WARNING {warning}\n" in done.stderr
 
 
 def test_files_are_overwritten_only_with_force(tmp_path):

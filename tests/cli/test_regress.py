@@ -152,3 +152,17 @@ def test_missing_and_unreadable_scenarios_are_refused(folder):
     assert "aimless.json:1:2:" in regress(folder).stdout
     (folder / "scenarios/aimless.json").write_text("[" * 100_000)
     assert "nested more than 100 levels deep" in regress(folder).stdout
+
+
+def test_an_fmu_older_than_its_source_in_the_folder_of_controllers_is_named(folder):
+    (folder / "controllers").mkdir()
+    (folder / "scenarios/cooling.py").rename(folder / "controllers/body.py")
+    assert run_cosim("build", "controllers/body.py", "--output", "fmus/body.fmu", cwd=folder).returncode == 0
+    scenario(folder, components={"body": {"fmu": "../fmus/body.fmu"}}, reference=REFERENCE)
+    updated = regress(folder, "--update")
+    assert (updated.returncode, "WARNING" in updated.stdout) == (0, False)
+    (folder / "controllers/body.py").write_text(COOLING + "# changed")
+    done = regress(folder)
+    command = "cosim build controllers/body.py --output fmus/body.fmu"
+    warning = f'"fmus/body.fmu" was built from another version of controllers/body.py: `{command}` builds it again'
+    assert (done.returncode, done.stdout.splitlines()[1]) == (0, f"        WARNING {warning}")

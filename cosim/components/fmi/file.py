@@ -2,20 +2,17 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-from contextlib import suppress
+from collections.abc import Callable
 from copy import copy
 from dataclasses import dataclass
 from functools import cached_property
 from hashlib import file_digest
 from pathlib import Path
 from typing import Any
-from zlib import crc32
 
 from ...core.errors import InputError
 from ...process.journal import suspending_deadline
 from ...process.temporary_folders import FMU_PREFIX, LockedFolder
-from ..sibling_imports import read_with_relative_imports
 from . import file_cache
 from .description import FmuDescription, build_description
 from .file_cache import ExtractedFolder, FileKey
@@ -32,17 +29,6 @@ from .preflight import (
 )
 from .preflight.binary import can_be_compiled
 from .preflight.fmu_platform import current_platform
-
-#: files that `cosim build` copies into an FMU
-_SOURCE_SUFFIXES = (".py", ".mo", ".c", ".h")
-
-
-def _contents_in_fmu(source: Path) -> Iterator[bytes]:
-    """Yield what `cosim build` may have made of a source: the file, and a Python file with relative imports."""
-    yield source.read_bytes()
-    if source.suffix == ".py":
-        with suppress(SyntaxError, ValueError):  # such a file has not been exported
-            yield read_with_relative_imports(source, source.parent).encode()
 
 
 @dataclass(frozen=True)
@@ -135,17 +121,6 @@ class FmuFile:
             return ""
         more = f", and {len(found) - 1} more" if len(found) > 1 else ""
         return f'"{self.path}": {found[0]}{more}; `cosim validate` lists all findings'
-
-    def changed_sources(self) -> list[str]:
-        """Return the names of the sources beside the FMU that differ from the copies that `cosim build` put into it."""
-        beside = sorted(path for path in self.path.parent.glob("*.*") if path.suffix in _SOURCE_SUFFIXES and path.is_file())
-        return [path.name for path in beside if self._differs(path)]
-
-    def _differs(self, source: Path) -> bool:
-        """Return whether the FMU contains files with the name of a source, but none with its content."""
-        names = (f"resources/{source.name}", f"sources/{source.name}")
-        copies = [self.examination.members[name] for name in names if name in self.examination.members]
-        return bool(copies) and not any(crc32(content) in copies for content in _contents_in_fmu(source))
 
     @cached_property
     def sha256(self) -> str:
