@@ -81,7 +81,8 @@ def build_to(
 
     Args:
         source: The source file; it may be anywhere.
-        model: Name of the Modelica model. None selects the model with the name of the file.
+        model: Name of the Modelica model, or of the Python class. None selects the model with the name of the file, or the
+            only class.
         target: The FMU to write.
         fmi_version: 2 or 3.
         include: Further files of the FMU of a Python source, see `write_python_fmu`.
@@ -98,23 +99,23 @@ def build_to(
     classified = classify_source(source, model)
     if fmi_version not in classified.fmi_versions:
         raise InputError(Problem(f"a {classified.kind.name} cannot be exported as FMI {fmi_version}.0", str(source)))
-    if not include:
+    if classified.kind.package == "pythonfmu" and not values:
+        write_python_fmu(classified.path, target, include, model)
+    elif include:
+        raise InputError(Problem("only the FMU of a Python class can include files", str(source)))
+    else:
         from .modelica import ModelicaOptions
 
         if values and classified.kind.package != "rumoca":
             raise InputError(Problem("only parameters of Modelica models can be set when building", str(source)))
         export_source(classified, {fmi_version: target}, model, ModelicaOptions(library_path, values or {}))
-    elif classified.kind.package == "pythonfmu":
-        write_python_fmu(classified.path, target, include)
-    else:
-        raise InputError(Problem("only the FMU of a Python class can include files", str(source)))
     return target
 
 
 def cached_fmu(source: Path, model: str | None, library_path: Sequence[Path] = ()) -> Path:
     """Return the FMI 2.0 FMU of a Modelica model from the user's cache.
 
-    The FMU is built if the model, the Modelica files beside it, a library that it uses, the exporter or the tools have changed
+    The FMU is built if the model, the packages beside it, a library that it uses, the exporter or the tools have changed
     since the last build.
 
     Args:
@@ -127,9 +128,10 @@ def cached_fmu(source: Path, model: str | None, library_path: Sequence[Path] = (
         OutputError: The disk is full or defective.
     """
     from .modelica.frontend.libraries import find_libraries, library_folders
+    from .modelica.frontend.rumoca_frontend import readable_files
 
     classified = classify_source(source, model)
-    files = sorted(source.resolve().parent.rglob("*.mo"))
+    files = readable_files(source)
     exporter = sorted(path for path in Path(__file__).parent.rglob("*") if path.suffix in (".py", ".c", ".h"))
     contents = [(str(path), file_hash(path)) for path in [*files, *exporter]]
     contents += [(str(library.path), library.digest) for library in find_libraries([source], library_folders(library_path), ())]

@@ -24,6 +24,10 @@ if TYPE_CHECKING:
     from .modelica import ModelicaOptions
 
 
+#: suffix of a source file -> kind of the members that a reference names
+MEMBERS = {".py": "Class", ".mo": "Model"}
+
+
 @dataclass(frozen=True, slots=True)
 class SourceKind:
     """A kind of source with its exporter: either `load_block` or `write_fmi2`."""
@@ -152,18 +156,20 @@ def classify_source(path: Path, model: str | None = None) -> Source:
 
     Args:
         path: The source file, or the folder of a C controller.
-        model: Name of the Modelica model. None selects the model with the name of the file.
+        model: Name of the Modelica model, or of the Python class. None selects the model with the name of the file.
 
     Raises:
         InputError: The file cannot be exported.
     """
     path = resolve_source_path(path)
+    if model and path.suffix not in MEMBERS:
+        raise InputError(Problem(f'contains no models or classes to choose from; write it without ":{model}"', str(path)))
     if path.suffix == ".mo":
         return Source(path, SOURCE_KINDS[0], snake_case((model or path.stem).rpartition(".")[2]))
-    if path.name == "equations.py":
+    if path.name == "equations.py" and not model:
         return Source(path, SOURCE_KINDS[2], path.resolve().parent.name)
     if path.suffix == ".py":
-        return Source(path, SOURCE_KINDS[1], snake_case(path.stem))
+        return Source(path, SOURCE_KINDS[1], snake_case(model or path.stem))
     if path.name == DESCRIPTION_FILE:
         return Source(path, SOURCE_KINDS[-1], path.resolve().parent.name)
     if path.suffix == ".json":
@@ -174,6 +180,21 @@ def classify_source(path: Path, model: str | None = None) -> Source:
             str(path),
         )
     )
+
+
+def split_reference(reference: str) -> tuple[Path, str | None]:
+    """Return the file of a source, and the model or class that "file.mo:Model" or "file.py:Class" names in it.
+
+    Raises:
+        InputError: There is a colon without a name after it.
+    """
+    file, _, member = reference.rpartition(":")
+    kind = MEMBERS.get(Path(file).suffix)
+    if not kind:
+        return Path(reference), None
+    if not member:
+        raise InputError(f"{reference}: expected the name of a {kind.lower()} after the colon, as in {reference}{kind}")
+    return Path(file), member
 
 
 def resolve_source_path(path: Path) -> Path:

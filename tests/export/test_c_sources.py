@@ -8,7 +8,7 @@ from zipfile import ZipFile
 
 import pytest
 from cosim_command import run_cosim
-from fmpy import extract, simulate_fmu
+from fmpy import extract, read_model_description, simulate_fmu
 from fmpy.build import build_platform_binary
 from fmpy.validation import validate_fmu
 
@@ -145,11 +145,33 @@ def test_the_command_builds_a_source_in_any_folder(folder, tmp_path):
     assert validate_fmu(str(tmp_path / "there/keeper.fmu")) == []
 
 
+PACKAGE = """package Pilots
+  block DeckPilot
+    input Real u;
+    output Real y = 2*u;
+  end DeckPilot;
+  block Other
+    extends DeckPilot;
+  end Other;
+end Pilots;"""
+
+
+def test_the_command_builds_a_model_of_a_package_in_a_file(tmp_path):
+    (tmp_path / "Pilots.mo").write_text(PACKAGE)
+    done = cosim("build", "Pilots.mo:Pilots.DeckPilot", cwd=tmp_path)
+    assert (done.returncode, done.stdout) == (0, "Pilots.mo:Pilots.DeckPilot -> deck_pilot.fmu\n")
+    assert read_model_description(tmp_path / "deck_pilot.fmu").modelName == "deck_pilot"
+    done = cosim("build", "Pilots.mo", "--output", "x.fmu", cwd=tmp_path)
+    assert done.stderr.endswith(
+        "no model with the name Pilots, but Pilots.DeckPilot, Pilots.Other; write Pilots.mo:Pilots.DeckPilot\n"
+    )
+
+
 @pytest.mark.parametrize(
     ("sources", "message"),
     [
-        ((), "--output requires one source, found 0"),
-        (("nothing.mo",), "nothing.mo: does not exist"),
+        ((), "an FMU of your own requires one source, found 0"),
+        (("nothing.mo:Pilot",), "nothing.mo: does not exist"),
         ((".",), ".: cannot be exported"),
     ],
 )

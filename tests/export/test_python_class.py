@@ -228,3 +228,19 @@ def test_only_python_classes_include_files(tmp_path):
     (tmp_path / "modelDescription.xml").touch()
     with pytest.raises(InputError, match="only the FMU of a Python class can include files"):
         build_to(tmp_path / "modelDescription.xml", None, tmp_path / "x.fmu", include=[tmp_path])
+
+
+def test_a_class_of_several_in_a_file_is_exported_by_name(tmp_path):
+    path = tmp_path / "pilots.py"
+    step = "def do_step(self, time, step_size):\n        self.y = {}\n        return True\n"
+    further = f"\n\nclass Fast(LeakyIntegrator):\n    {step}"
+    path.write_text(SOURCE + further.format(5.0) + further.format(7.0).replace("Fast", "Faster"))
+    with pytest.raises(InputError, match=r"several PythonFMU classes \(Fast, Faster, LeakyIntegrator\).*write pilots.py:Fast$"):
+        build_to(path, None, tmp_path / "x.fmu")
+    with pytest.raises(InputError, match="no PythonFMU class is named Fist; found: Fast"):
+        build_to(path, "Fist", tmp_path / "x.fmu")
+    fmus = {name: build_to(path, name, tmp_path / f"{name}.fmu") for name in ("Fast", "Faster")}
+    outputs = {}
+    for name, fmu in fmus.items():  # in one process, with one `sys.modules`
+        outputs[name] = simulate_fmu(str(fmu), stop_time=0.1, output_interval=0.1)["y"][-1]
+    assert outputs == {"Fast": 5.0, "Faster": 7.0}

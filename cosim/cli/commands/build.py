@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -15,7 +16,7 @@ if TYPE_CHECKING:
 
 
 @click.command()
-@click.argument("sources", nargs=-1, type=click.Path(path_type=Path))
+@click.argument("sources", nargs=-1)
 @click.option("--check", is_flag=True, help="Build nothing; check that the fmus/ of cosim are up to date.")
 @click.option("--output", type=click.Path(path_type=Path), help="Export a single source, in any folder, to this FMU.")
 @click.option("--fmi", "fmi_version", type=click.Choice(["2", "3"]), default="2", help="FMI version of --output; default: 2.")
@@ -47,7 +48,7 @@ if TYPE_CHECKING:
     help="Parameter of a Modelica model for --output, also one that selects equations or array sizes; repeatable.",
 )
 def command(
-    sources: tuple[Path, ...],
+    sources: tuple[str, ...],
     check: bool,
     output: Path | None,
     fmi_version: str,
@@ -60,9 +61,11 @@ def command(
 
     SOURCES are .mo or .py files, vehicle files, or folders of controllers in C; default: all controllers and plants. The FMUs are
     written to fmus/ (FMI 2.0) and fmus/fmi3/, and their hashes to fmus/manifest.json. --output exports a single source of your
-    own. There, --fmi selects the FMI version, and --modelica-compiler omc exports models that need the Modelica Standard Library
-    or features that cosim's own compiler lacks; OpenModelica must be installed (this was written from its documentation and not
-    tried with it).
+    own. Of a Modelica file it exports the model with the name of the file, of a Python file the only PythonFMU class.
+    file.mo:Package.Model or file.py:Class exports another one, without --output to a file with its name in the working
+    directory (model.fmu). With --output, --fmi selects the FMI version, and --modelica-compiler omc exports models that need
+    the Modelica Standard Library or features that cosim's own compiler lacks; OpenModelica must be installed (this was written
+    from its documentation and not tried with it).
 
     Modelica models, equations and controllers in C require a C compiler, and Modelica models and equations the extra "build".
     --check is for changes of cosim itself: it compares the hashes of all sources with the manifest, and the behaviour of newly
@@ -71,9 +74,14 @@ def command(
     from ...core import resources
     from ...export.build import build
     from ...export.build_check import check_fmus
+    from ...export.sources import classify_source, split_reference
     from ..messages import print_log
 
     print_log()
+    named = [split_reference(source) for source in sources]
+    files = [file for file, _ in named]
+    if output is None and any(member for _, member in named):
+        output = Path(f"{classify_source(*named[0]).name}.fmu")
     root = resources.root()
     if check:
         if sources or output:
@@ -84,13 +92,13 @@ def command(
             raise CheckError("\n".join(map(str, problems)))
         click.echo("every FMU is up to date with its source")
         return 0
-    for source in sources:
+    for source in files:
         if source.suffix == ".json" and source.is_file():
             from ...export.vehicle_files import examine_vehicle
 
             read_vehicle_file(source, examine_vehicle)
     if output is not None:
-        _build_one(sources, output, int(fmi_version), modelica_compiler, include, library, values)
+        _build_one(named, output, int(fmi_version), modelica_compiler, include, library, values)
     elif fmi_version != "2":
         raise InputError("--fmi requires --output: fmus/ contains FMUs of both FMI versions")
     elif values:
@@ -100,12 +108,12 @@ def command(
     elif modelica_compiler != "cosim":
         raise InputError("--modelica-compiler omc requires --output: the FMUs in fmus/ are built by the compiler of cosim")
     else:
-        build(list(sources) or None, root, _print_built)
+        build(files or None, root, _print_built)
     return 0
 
 
 def _build_one(
-    sources: tuple[Path, ...],
+    sources: Sequence[tuple[Path, str | None]],
     output: Path,
     fmi_version: int,
     modelica_compiler: str,
@@ -118,26 +126,27 @@ def _build_one(
     from ...scenario.settings import parse_settings
 
     if len(sources) != 1:
-        raise InputError(f"--output requires one source, found {len(sources)}")
+        raise InputError(f"an FMU of your own requires one source, found {len(sources)}")
     if output.suffix != ".fmu":
         raise InputError(f'--output: expected the name of an FMU; found "{output}"; did you mean "{output}.fmu"?')
-    if not sources[0].exists():
-        raise InputError(Problem(f"does not exist{nearest_file(sources[0])}", str(sources[0])))
+    source, member = sources[0]
+    if not source.exists():
+        raise InputError(Problem(f"does not exist{nearest_file(source)}", str(source)))
     if modelica_compiler == "omc":
         if fmi_version != 2:
             raise InputError("--modelica-compiler omc exports FMI 2.0 only")
-        export_with_omc(sources[0], output)
+        export_with_omc(source, output, member)
     else:
         build_to(
-            sources[0],
-            None,
+            source,
+            member,
             output,
             fmi_version=fmi_version,
             include=include,
             library_path=library,
             values=parse_settings(values),
         )
-    click.echo(f"{sources[0]} -> {output}")
+    click.echo(f"{source}{f':{member}' if member else ''} -> {output}")
 
 
 def _print_built(built: BuildResult) -> None:

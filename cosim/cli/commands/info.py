@@ -27,9 +27,6 @@ if TYPE_CHECKING:
 #: length to which start values are shortened in the table (characters)
 _MAX_START_LENGTH = 40
 
-#: suffix of a source file -> kind of the members that a reference names
-_MEMBERS = {".py": "Class", ".mo": "Model"}
-
 _INTERFACE_NAMES: Mapping[str, str] = {"co-simulation": "Co-Simulation", "model-exchange": "Model Exchange"}
 
 
@@ -81,10 +78,11 @@ def command(fmu: str, with_locals: bool, as_json: bool) -> None:
 def _describe(source: str) -> tuple[Mapping[str, str], Sequence[Variable]]:
     """Return properties and variables of an FMU, of file.py:Class, of file.mo:Model, or of a vehicle file."""
     from ...components.fmi import FmuFile
+    from ...export.sources import MEMBERS
 
     file, _, name = source.rpartition(":")
-    if Path(source).suffix in _MEMBERS:
-        kind = _MEMBERS[Path(source).suffix]
+    if Path(source).suffix in MEMBERS:
+        kind = MEMBERS[Path(source).suffix]
         raise InputError(f"{source}: expected the name of a {kind.lower()}, as in {source}:{kind}")
     if file.endswith(".py"):
         return _describe_class(source)

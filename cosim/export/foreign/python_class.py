@@ -36,8 +36,8 @@ _PROTECTION = tuple(Path(__file__).parents[2] / "components" / name for name in 
 _TYPES = {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "String": "String"}
 
 
-def write_python_fmu(source: Path, target: Path, include: Sequence[Path] = ()) -> list[Path]:
-    """Write the FMI 2.0 FMU of the `Fmi2Slave` class in a Python file.
+def write_python_fmu(source: Path, target: Path, include: Sequence[Path] = (), class_name: str | None = None) -> list[Path]:
+    """Write the FMI 2.0 FMU of an `Fmi2Slave` class in a Python file.
 
     The FMU contains
 
@@ -52,10 +52,11 @@ def write_python_fmu(source: Path, target: Path, include: Sequence[Path] = ()) -
     file and line.
 
     Args:
-        source: The Python file; it defines exactly one subclass of `Fmi2Slave`.
+        source: The Python file.
         target: The FMU to write.
         include: Further files and folders. Those below the folder of the source keep their paths relative to it; the others are
             placed beside the source.
+        class_name: The class. None selects the only subclass of `Fmi2Slave`, or the one that derives from all others.
 
     Returns:
         The files that the FMU was made from.
@@ -64,7 +65,7 @@ def write_python_fmu(source: Path, target: Path, include: Sequence[Path] = ()) -
         InputError: The class cannot be exported, or its model description is invalid.
     """
     contents, files = _read_files(source, include)
-    members, units = _build_with_pythonfmu(source, contents)
+    members, units = _build_with_pythonfmu(source, contents, class_name)
     root = ElementTree.fromstring(members[DESCRIPTION_FILE])  # noqa: S314 - just written by PythonFMU
     _set_units(root, units, source)
     _complete_description(root)
@@ -107,17 +108,18 @@ def _included_files(folder: Path, include: Sequence[Path]) -> Iterator[tuple[Pat
         yield from ((file.relative_to(base), file) for file in files if "__pycache__" not in file.parts)
 
 
-def _build_with_pythonfmu(source: Path, contents: Mapping[Path, bytes]) -> tuple[dict[str, bytes], Any]:
+def _build_with_pythonfmu(source: Path, contents: Mapping[Path, bytes], class_name: str | None) -> tuple[dict[str, bytes], Any]:
     """Return the members of the FMU that PythonFMU builds (name -> contents), and the attribute `units` of the class."""
     if taken := [file.name for file in _PROTECTION if Path(file.name) in contents]:
         raise InputError(Problem(f"is the name of a file that cosim adds to the FMU; rename it: {source.parent}", taken[0]))
     contents = {**contents, **{Path(file.name): file.read_bytes() for file in _PROTECTION}}
-    package = f"{source.stem}_{sha256(repr(sorted(contents.items())).encode()).hexdigest()[:12]}"
+    named = [class_name] if class_name else []
+    package = f"{source.stem}_{sha256(repr([*sorted(contents.items()), *named]).encode()).hexdigest()[:12]}"
     with TemporaryDirectory(prefix="cosim-build-") as folder, TemporaryDirectory(prefix="cosim-build-") as target:
         for path, content in contents.items():
             (folder / path).parent.mkdir(parents=True, exist_ok=True)
             (folder / path).write_bytes(content)
-        command = [sys.executable, "-P", str(_PROGRAM), folder, package, source.stem, target]
+        command = [sys.executable, "-P", str(_PROGRAM), folder, package, source.stem, target, *named]
         process = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
         built = list(Path(target).glob("*.fmu"))
         if process.returncode or not built:

@@ -64,8 +64,8 @@ def load_block(path: Path, model: str | None = None, options: ModelicaOptions = 
 
 def _load_block(path: Path, model: str | None, options: ModelicaOptions) -> Block:
     defaults, sources = _flatten(path, model, options)
-    folder = _source_root(sources.files)
-    names = {str(file.relative_to(folder)): file for file in sources.files}
+    folder = _source_root(sources.used)
+    names = {str(file.relative_to(folder)): file for file in sources.used}
     return Block(
         identifier=re.sub(r"\W", "_", defaults.model.name.rpartition(".")[2]),
         description=defaults.model.description,

@@ -66,6 +66,35 @@ def test_a_file_with_within_is_loaded_as_a_member_of_its_package(folder):
     assert (block.identifier, sorted(block.resources)) == ("Double", ["Lib/Double.mo", "Lib/package.mo"])
 
 
+def test_an_fmu_contains_only_the_files_that_the_model_needs(folder):
+    (folder / "Other").mkdir()
+    (folder / "Other/package.mo").write_text("package Other end Other;")
+    (folder / "Lib/Unused.mo").write_text(MEMBER.replace("Double", "Unused").replace("Lib;", "Lib; // Double, Third", 1))
+    (folder / "Lib/Third.mo").write_text("within Lib; package Third end Third;")
+    (folder / "Lib/Double.mo").write_text(MEMBER.replace("2*u", "Half.half(4*u)"))
+    (folder / "Lib/Half").mkdir()
+    (folder / "Lib/Half/package.mo").write_text("within Lib; package Half end Half;")
+    (folder / "Lib/Half/Third.mo").write_text("within Lib.Half; package Third end Third;")
+    half = "within Lib.Half; function half input Real u; output Real y; algorithm y := u/2; end half;"
+    (folder / "Lib/Half/half.mo").write_text(half)
+    block = load_block(folder / "Top.mo")
+    needed = ["Lib/Double.mo", "Lib/Half/half.mo", "Lib/Half/package.mo", "Lib/package.mo", "Top.mo"]
+    assert sorted(block.resources) == needed
+    alone = folder / "alone"
+    for name, file in block.resources.items():
+        (alone / name).parent.mkdir(parents=True, exist_ok=True)
+        (alone / name).write_text(file.read_text())
+    assert load_block(alone / "Top.mo").files == block.files
+
+
+def test_a_model_in_a_package_file_uses_the_other_files_of_its_package(folder):
+    (folder / "Lib/package.mo").write_text(PACKAGE.replace("end Lib", "block Own extends Double; end Own;\nend Lib"))
+    block = load_block(folder / "Lib/package.mo", "Lib.Own")
+    assert sorted(block.resources) == ["Lib/Double.mo", "Lib/package.mo"]
+    with pytest.raises(InputError, match=r"no model with the name Lib; write .*Lib/package\.mo:Lib\.Own"):
+        load_block(folder / "Lib/package.mo")
+
+
 def test_a_model_of_a_file_is_selected_by_name(write_model):
     path = write_model(
         "model A\n  output Real y;\nequation\n  y = 1;\nend A;\nmodel B\n  output Real z;\nequation\n  z = 2;\nend B;"

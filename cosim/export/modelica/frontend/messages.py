@@ -9,6 +9,7 @@ from typing import Any
 
 from ....core.errors import Problem
 from ..model.syntax_tree import SourceLocation
+from .declared_models import models_hint
 from .sources import ModelicaSources
 
 _QUOTED = re.compile(r"['`]([\w.]+(?: = [\w.]+)?)['`]")
@@ -63,7 +64,7 @@ def to_problems(answer: Mapping[str, Any], name: str, path: Path, sources: Model
     if any(line.startswith("unresolved extends base class") for line in reasons):
         reasons = [line for line in reasons if not line.startswith("base class not found")]
     if [line for line in reasons if not line.endswith(_NOT_FOUND)] == []:
-        reasons = [f"the file contains no model with the name {name}"]
+        reasons = [f"the file contains no model with the name {name}{models_hint(name, path)}"]
     specific = [line for line in reasons if " could not be compiled: " not in line] or reasons
     if not specific or answer["panicked"]:
         specific = [f"the Modelica front end failed on the model {name}: {' '.join(lines)}"]

@@ -22,6 +22,7 @@ from .messages import to_problems, to_syntax_problem
 from .rumoca_client import run_rumoca
 from .sources import ModelicaSources, display_name
 from .termination import replace_terminate
+from .used_files import select_used_files
 
 RUMOCA_VERSION = "0.10.2"
 #: largest Modelica file (bytes)
@@ -30,6 +31,7 @@ MAX_SOURCE_SIZE = 1 << 24
 #: name of a model with values of parameters; it extends the model of the file
 MODIFIED_MODEL = "CosimModifiedModel"
 
+_PACKAGE_FILE = "package.mo"
 _REFERENCE = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
 _WITHIN = re.compile(r"^\s*within\s+([\w.]+)\s*;", re.MULTILINE)
 
@@ -70,12 +72,15 @@ def flatten_model(
     """
     path = path.resolve()
     text = read_source(path)
-    packages, name = find_packages(path, text), model_name(path, text, model)
-    files = [path, *(file for package in packages for file in sorted(package.rglob("*.mo")) if file != path)]
-    libraries = find_libraries(files, library_folders(options.library_path), [package.name for package in packages])
+    available, name = find_packages(path, text), model_name(path, text, model)
     declaration = modified_model(name, options.values, options.supplement)
+    used = select_used_files(path, available, declaration)
+    libraries = find_libraries(used, library_folders(options.library_path), [package.name for package in available])
+    of_libraries = {name for library in libraries for name in library.uses}
+    packages = [folder for folder in available if folder.name in of_libraries or any(f.is_relative_to(folder) for f in used)]
+    files = _with_package_files(path, packages)
     links = link_libraries(libraries) if libraries else None
-    sources = ModelicaSources(files, libraries, links, None if _WITHIN.search(text) else replace_terminate(text))
+    sources = ModelicaSources(files, libraries, links, None if _is_member(path, text) else replace_terminate(text), used)
     if not libraries:
         flat = json.loads(_flatten(sources, packages, name, declaration))
     else:
@@ -185,13 +190,30 @@ def model_name(path: Path, text: str, model: str | None) -> str:
         model: The name of the model, or None.
     """
     within = _WITHIN.search(text)
-    return model or (f"{within[1]}.{path.stem}" if within else path.stem)
+    own = path.parent.name if path.name == _PACKAGE_FILE else path.stem
+    return model or (f"{within[1]}.{own}" if within else own)
+
+
+def _is_member(path: Path, text: str) -> bool:
+    """Return whether a file belongs to a package that has further files."""
+    is_package = path.name == _PACKAGE_FILE and any(file != path for file in path.parent.rglob("*.mo"))
+    return is_package or _WITHIN.search(text) is not None
+
+
+def readable_files(path: Path) -> list[Path]:
+    """Return a Modelica file and the files of all packages that it may use."""
+    path = path.resolve()
+    return _with_package_files(path, find_packages(path, read_source(path)))
+
+
+def _with_package_files(path: Path, packages: Sequence[Path]) -> list[Path]:
+    return [path, *(file for package in packages for file in sorted(package.rglob("*.mo")) if file != path)]
 
 
 def find_packages(path: Path, text: str) -> list[Path]:
     """Return the folders of the packages that a file may use, for the file and its contents `text`."""
     folder = path.parent
-    if _WITHIN.search(text):
-        while (folder / "package.mo").is_file():
+    if _is_member(path, text):
+        while (folder / _PACKAGE_FILE).is_file():
             folder = folder.parent
-    return sorted(child for child in folder.iterdir() if (child / "package.mo").is_file())
+    return sorted(child for child in folder.iterdir() if (child / _PACKAGE_FILE).is_file())

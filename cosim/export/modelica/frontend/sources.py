@@ -24,12 +24,14 @@ class ModelicaSources:
         libraries: Libraries that the model uses.
         links: Folder with a link to each library, through which the front end reads them; None without libraries.
         text: Text of the model's file as the front end reads it; None if it reads the file itself.
+        used: Those of the files that the model needs, the file of the model first.
     """
 
     files: Sequence[Path]
     libraries: Sequence[Library] = ()
     links: Path | None = None
     text: str | None = None
+    used: Sequence[Path] = ()
 
     @cached_property
     def _by_hash(self) -> Mapping[int, Path]:
