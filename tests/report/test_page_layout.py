@@ -44,7 +44,7 @@ def test_texts_of_the_diagram_are_inside_their_boxes(report):
     assert 110 < max(widths) < 152 - 8, widths
     texts = report("[...document.querySelectorAll('.component text')].map((text) => text.textContent)")
     assert texts[0::2] == ["WaveMeasure…", "illinois", "uav.attitude"]
-    assert texts[1] == "DeckController.mo:…"
+    assert texts[1] == "DeckController.mo:D…"
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

@@ -52,8 +52,8 @@ def test_demo_1_has_its_waypoints_and_platforms():
 def test_a_boat_has_a_landing_mark_of_five_parts_only_beside_a_multirotor(boat, hull_parts):
     def part_counts(*models):
         vehicles = {model: {"model": model, "position": [0, 0]} for model in models}
-        plant = {"python": "cosim:plant_src/world.py:World", "arguments": {"vehicles": vehicles}}
-        found = build_scene({"scenario": {"components": {"plant": plant}}, "scenario_file": "boat.json"})
+        plant = {"python": "../plant_src/world.py:World", "arguments": {"vehicles": vehicles}}
+        found = build_scene({"scenario": {"components": {"plant": plant}}, "scenario_file": str(root() / "scenarios/boat.json")})
         return {body["title"]: len(body["parts"]) for body in found["bodies"]}
 
     assert part_counts(boat) == {boat: hull_parts}
