@@ -11,6 +11,9 @@ from ..core.errors import InputError, Problem
 
 _Result = TypeVar("_Result")
 
+#: keys that a scenario or a study has, and a vehicle file has not
+SCENARIO_KEYS = frozenset({"components", "extends", "scenario"})
+
 
 def read_vehicle_file(file: Path, read: Callable[[Mapping[str, Any], str], _Result]) -> _Result:
     """Return the result of `read` for the data in a vehicle file and the name of the file.
@@ -25,6 +28,8 @@ def read_vehicle_file(file: Path, read: Callable[[Mapping[str, Any], str], _Resu
         raise InputError(document.problems)
     if not isinstance(document.value, dict):
         raise InputError(Problem("expected an object, the data of a vehicle", document.where(())))
+    if "family" not in document.value and not SCENARIO_KEYS.isdisjoint(document.value):
+        raise InputError(f"{file} is a scenario or a study, expected a vehicle file; `cosim check {file}` describes a scenario")
     try:
         return read(document.value, file.stem)
     except InputError as error:

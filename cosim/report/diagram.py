@@ -5,6 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from itertools import accumulate
 from typing import Any, NamedTuple
 
 from ..core.text import count_noun
@@ -12,8 +13,10 @@ from ..core.text import count_noun
 WIDTH, HEIGHT, GAP_X, GAP_Y, MARGIN, LANE = 152.0, 52.0, 70.0, 34.0, 44.0, 14.0  # px
 FRAME_GAP = 12.0  # px between a frame and its components
 FRAME_ROWS = 0.2  # rows above and below a nested system, for its frame
-MAX_TITLE_LENGTH, MAX_ORIGIN_LENGTH = 20, 25  # characters
+TEXT_WIDTH = WIDTH - 16.0  # px, of the texts in a box
+TITLE_SIZE, ORIGIN_SIZE = 13.0 * 1.1, 11.0  # px; semi-bold letters are a tenth wider
 MAX_TOOLTIP_LINES = 40
+_NARROW_LETTERS, _WIDE_LETTERS = frozenset("fijlrtIJ.,:;'|!()[]/\\ -"), frozenset("mwMW@%&+=<>#~^")
 
 
 @dataclass(frozen=True)
@@ -120,11 +123,24 @@ def _build_box(component: Mapping[str, Any], column: float, row: float) -> Box:
     every = f", every {component['period']:g} s" if component["period"] else ""
     tooltip = f"{name}\n{origin}\n{count_noun(component['inputs'], 'input')}, {count_noun(component['outputs'], 'output')}{every}"
     file = origin.rpartition("/")[2]
-    return Box(name, *position, _truncate(name, MAX_TITLE_LENGTH), _truncate(file, MAX_ORIGIN_LENGTH), tooltip)
+    return Box(name, *position, _fit(name, TITLE_SIZE), _fit(file, ORIGIN_SIZE), tooltip)
 
 
-def _truncate(text: str, length: int) -> str:
-    return text if len(text) <= length else f"{text[: length - 1]}…"
+def _fit(text: str, size: float) -> str:
+    """Return a text that is not wider than a box in letters of `size` (px), shortened at its end if necessary."""
+    widths = list(accumulate(map(_letter_width, text), initial=1.0))  # with an ellipsis
+    if (widths[-1] - 1.0) * size <= TEXT_WIDTH:
+        return text
+    return f"{text[: sum(width * size <= TEXT_WIDTH for width in widths) - 1]}…"
+
+
+def _letter_width(letter: str) -> float:
+    """Return the width of a letter (em) in a wide sans-serif font, DejaVu Sans; the reader's font is at most as wide."""
+    if letter in _NARROW_LETTERS:
+        return 0.41
+    if letter in _WIDE_LETTERS or not letter.isascii():
+        return 1.0
+    return 0.78 if letter.isupper() else 0.64
 
 
 def _connections_by_pair(connections: Sequence[Sequence[str]], boxes: Mapping[str, Box]) -> dict[tuple[str, str], list[str]]:

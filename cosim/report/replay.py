@@ -77,13 +77,15 @@ def write_judged_replay(result: Result, outcomes: Sequence[CheckOutcome], path: 
     failure, units = find_failure(result, outcomes), result.metadata.get("kpi_units") or {}
     reasons = [outcome.text(units) for outcome in outcomes if not outcome.passed]
     cause = result.metadata.get("failure") or (result.termination if result.crashed else "") or "; ".join(reasons)
-    sentences = [f"Not successful: {cause.rstrip('.')}.", str(failure)] if failure else ["Successful."] if outcomes else []
     data = {**replay_data([result]), "failure": failure and failure._asdict()}
-    _write_page(path, str(result.metadata.get("name", "run")), " ".join([*sentences, _description(result)]), data)
+    verdict = (
+        f"Not successful: {cause.rstrip('.')}. {failure}" if failure else "Successful." if outcomes else _description(result)
+    )
+    _write_page(path, str(result.metadata.get("name", "run")), verdict, data, failed=failure is not None)
 
 
-def _write_page(path: Path, title: str, description: str, data: dict[str, Any]) -> None:
-    text = render_page("replay.html", title=title, description=description.strip(), data=embed_json(data))
+def _write_page(path: Path, title: str, description: str, data: dict[str, Any], failed: bool = False) -> None:
+    text = render_page("replay.html", title=title, description=description, data=embed_json(data), failed=failed)
     with writing_atomically(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 

@@ -87,7 +87,8 @@ def _waves(components: Sea) -> list[Scene]:
 
 def _scene(vehicles: Mapping[str, Any], scenario: Mapping[str, Any]) -> Scene:
     colours = {False: cycle(MULTIROTOR_COLOURS), True: cycle(VESSEL_COLOURS)}
-    bodies = [_body_scene(name, vehicle, next(colours[_is_vessel(vehicle)])) for name, vehicle in vehicles.items()]
+    has_landings = any(next(iter(models_of(vehicle).values())).airframe for vehicle in vehicles.values())
+    bodies = [_body_scene(name, vehicle, next(colours[_is_vessel(vehicle)]), has_landings) for name, vehicle in vehicles.items()]
     vessels = [name for name, vehicle in vehicles.items() if _is_vessel(vehicle)]
     flying = [name for name in vehicles if name not in vessels]
     colour_of = {body["name"]: body["colour"] for body in bodies}
@@ -121,14 +122,14 @@ def _view_name(vessel: str, vessels: Sequence[str]) -> str:
     return "Deck" if len(vessels) == 1 else f"Deck {_short_name(vessel)}"
 
 
-def _body_scene(name: str, vehicle: Any, colour: str) -> Scene:
+def _body_scene(name: str, vehicle: Any, colour: str, has_landings: bool) -> Scene:
     return {
         "name": name,
         "title": _short_name(name),
         "colour": colour,
         "position": [f"{name}.position.{axis}" for axis in "xyz"],
         "orientation": [f"{name}.orientation.{axis}" for axis in "wxyz"],
-        "parts": [part._asdict() for part in vehicle_parts(vehicle)],
+        "parts": [part._asdict() for part in vehicle_parts(vehicle, has_landings)],
     }
 
 

@@ -20,11 +20,12 @@ from .parts import ALONG_X, BLACK, BLUE, GREY, ORANGE, RED, SILVER, YELLOW, Part
 DETAILED_MODELS: Mapping[str, Callable[[Model], list[Part]]] = {"ar_drone": ar_drone_parts, "strider": strider_parts}
 
 
-def vehicle_parts(vehicle: Any) -> list[Part]:
+def vehicle_parts(vehicle: Any, has_landings: bool = True) -> list[Part]:
     """Return the parts of a vehicle in its body frame, relative to its centre of mass.
 
     Args:
         vehicle: Name of a vehicle of the catalogue ("crazyflie"), or its data.
+        has_landings: Draw a landing mark on a vessel that is drawn from its collision boxes.
     """
     model = next(iter(models_of(vehicle).values()))
     if model.name in DETAILED_MODELS and isinstance(vehicle, str):
@@ -35,7 +36,7 @@ def vehicle_parts(vehicle: Any) -> list[Part]:
         return list(multirotor_parts(model.airframe, model.body))
     if model.craft:
         return list(submerged_parts(model.craft, model.body))
-    parts = list(catamaran_parts(model.body) if model.is_vessel else box_parts(model.body))
+    parts = list(catamaran_parts(model.body, has_landings) if model.is_vessel else box_parts(model.body))
     return [part._replace(position=_difference(part.position, _origin_of_boxes(model))) for part in parts]
 
 
@@ -61,13 +62,13 @@ def box_parts(body: Body) -> Iterator[Part]:
         yield Part("box", (2 * x, 2 * y, 2 * z), box.position, GREY, box.orientation)
 
 
-def catamaran_parts(body: Body) -> Iterator[Part]:
+def catamaran_parts(body: Body, has_landings: bool) -> Iterator[Part]:
     """Yield cylindrical hulls in place of the lower collision boxes, and struts to the landing deck, the highest box."""
     deck = max(body.boxes, key=lambda box: box.position[2])
     (length, width, thickness), (x, y, z) = deck.half_extents, deck.position
     aft = width if len(body.boxes) == 1 else 0.0
     yield Part("box", (2 * length - aft, 2 * width, 2 * thickness), (x - aft / 2, y, z), GREY)
-    yield from landing_mark(x, y, z + thickness)
+    yield from landing_mark(x, y, z + thickness) if has_landings else ()
     if len(body.boxes) == 1:  # a single hull: the turned box below the deck is its bow
         bow, turn = (x + length - width, y, z), (0.0, 0.0, math.sin(math.pi / 8), math.cos(math.pi / 8))
         yield Part("box", (math.sqrt(2) * width, math.sqrt(2) * width, 1.99 * thickness), bow, YELLOW, turn)

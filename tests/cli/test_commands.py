@@ -355,6 +355,7 @@ def test_info_describes_a_vehicle_file(tmp_path):
     (tmp_path / "boat.json").write_text('{"family": "surface_vessl"}')
     refused = cosim("info", tmp_path / "boat.json").stderr
     assert "boat.json:1:2: $.family: found 'surface_vessl'; did you mean \"surface_vessel\"" in refused
+    assert "is a scenario or a study, expected a vehicle file" in cosim("info", "cosim:scenarios/demo1_box.json").stderr
 
 
 def test_an_unknown_variable_of_a_component_with_many_is_refused_with_some_valid_names():

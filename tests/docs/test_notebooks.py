@@ -49,5 +49,5 @@ def test_own_controller(run_notebook):
 @pytest.mark.long
 def test_envelope(run_notebook):
     _, values = run_notebook("envelope")
-    assert len(values[-1]) == 6
-    assert all(passed for height, passed in values[-1] if height == "0.1")
+    assert [passed for height, passed in values[-1] if height == 0.3] == [True, True]
+    assert [sum(passed for height, passed in values[-1] if height == high) for high in (0.9, 1.2)] == [1, 1]

@@ -8,6 +8,19 @@ from page_probes import LOW_CONTRAST, OVERFLOWING, UNREACHABLE
 from cosim.report.run_page import write_report
 from cosim.results.checks import evaluate_checks
 
+LONG_NAMES = {
+    "components": [
+        {"name": name, "origin": origin, "inputs": 1, "outputs": 1, "period": None}
+        for name, origin in (
+            ("WaveMeasurementMMMM", "models/DeckController.mo:DeckController"),
+            ("illinois", "WWWWWWWWWWWWWWWWWWWWWWWW.fmu"),
+            ("uav.attitude", "attitude.fmu"),
+        )
+    ],
+    "stages": [["WaveMeasurementMMMM", "illinois", "uav.attitude"]],
+    "connections": [],
+}
+
 SIZES = ((1280, 800), (768, 1024), (360, 740))
 
 
@@ -20,9 +33,18 @@ def report(open_page, flight_result, tmp_path_factory):
         {"kpi": "waypoints.all_reached", "equals": True},
     ]
     ended = {"terminated_by": {"time": 16.0, "since": 13.0, "condition": "landed", "cause": "plant.uav.contact.vessel"}}
-    result = replace(flight_result, metadata={**flight_result.metadata, **ended})
+    result = replace(flight_result, metadata={**flight_result.metadata, **ended, "system": LONG_NAMES})
     write_report(result, evaluate_checks(flight_result.kpis, checks), [], file)
     return open_page(file)
+
+
+def test_texts_of_the_diagram_are_inside_their_boxes(report):
+    """In the widest font of the page; texts that fit are not shortened."""
+    widths = report("[...document.querySelectorAll('.component text')].map((text) => text.getBBox().width)")
+    assert 110 < max(widths) < 152 - 8, widths
+    texts = report("[...document.querySelectorAll('.component text')].map((text) => text.textContent)")
+    assert texts[0::2] == ["WaveMeasure…", "illinois", "uav.attitude"]
+    assert texts[1] == "DeckController.mo:D…"
 
 
 @pytest.mark.parametrize("scheme", ["light", "dark"])

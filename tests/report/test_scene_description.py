@@ -48,6 +48,18 @@ def test_demo_1_has_its_waypoints_and_platforms():
     assert {part["position"][2] for part in planks} == {0.45}
 
 
+@pytest.mark.parametrize(("boat", "hull_parts"), [("heron", 11), ("cybership2", 2)])
+def test_a_boat_has_a_landing_mark_of_five_parts_only_beside_a_multirotor(boat, hull_parts):
+    def part_counts(*models):
+        vehicles = {model: {"model": model, "position": [0, 0]} for model in models}
+        plant = {"python": "../plant_src/world.py:World", "arguments": {"vehicles": vehicles}}
+        found = build_scene({"scenario": {"components": {"plant": plant}}, "scenario_file": str(root() / "scenarios/boat.json")})
+        return {body["title"]: len(body["parts"]) for body in found["bodies"]}
+
+    assert part_counts(boat) == {boat: hull_parts}
+    assert part_counts(boat, "crazyflie")[boat] == hull_parts + 5
+
+
 def test_a_world_inside_a_nested_system_is_found_by_its_full_name():
     found = scene(root() / "scenarios/performance_1.json")
     assert [body["position"][0] for body in found["bodies"]] == ["demo1.plant.uav.position.x", "demo1.plant.usv.position.x"]

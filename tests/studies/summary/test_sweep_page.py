@@ -171,7 +171,7 @@ def test_a_replay_names_the_criterion_that_the_run_misses_and_opens_before_the_f
     good, bad = (next((results / "replays").glob(f"{key}-*")).read_text() for key in run_keys(results))
     assert "<p>Successful.</p>" in good
     sentence = "The replay opens at t = 0 s. Mark × at t = 0.1 s: end of the run, check of end.value failed."
-    assert f"<p>Not successful: {row['missed']}. {sentence}</p>" in bad
+    assert f'<p class="whole">Not successful: {row["missed"]}. {sentence}</p>' in bad
     assert '"failure":{"time":0.1,' in bad.replace(" ", "")
 
 
