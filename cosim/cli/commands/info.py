@@ -24,6 +24,9 @@ if TYPE_CHECKING:
     from ...components.fmi.description import FmuDescription
 
 
+#: width of the column of start values (characters)
+_START_WIDTH = 14
+
 #: length to which start values are shortened in the table (characters)
 _MAX_START_LENGTH = 40
 
@@ -187,11 +190,11 @@ def _print_variables(causality: str, variables: list[Variable]) -> None:
     for variable in variables:
         dimensions = f"[{','.join(map(str, variable.shape))}]" if variable.shape else ""
         unit = variable.unit.name if variable.unit else "-"
-        start = "" if variable.start is None else f"= {_start_text(variable.start)}"
+        start = "" if variable.start is None else f"start = {_start_text(variable.start)}"
         items = ", ".join(f"{number}: {name}" for name, number in variable.items)
-        value = "; ".join(filter(None, (start, items)))
-        columns = (f"{variable.name:{width}} {variable.type + dimensions:12} {unit:8}", variable.description, value)
-        print_line(f"  {' '.join(filter(None, columns))}".rstrip())
+        text = "; ".join(filter(None, (variable.description, items)))
+        columns = f"{variable.name:{width}} {variable.type + dimensions:12} {unit:8} {start:{_START_WIDTH}}"
+        print_line(f"  {columns} {text}".rstrip())
 
 
 def _start_text(start: object) -> str:

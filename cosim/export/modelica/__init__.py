@@ -6,9 +6,9 @@ The package rumoca parses, checks and flattens a model. The order of computation
 | ------------ | ---------------------------------------------------------------------------------------------------------- |
 | `frontend/`  | `rumoca_frontend`: flatten a model with rumoca; `libraries`: find the libraries that it uses; `sources`:   |
 |              | files and locations; `messages`: those of rumoca; `parts`, `library_search`: places of errors;             |
-|              | `declared_models`: models of a file; `used_files`: files that a model needs; `termination`: terminate() in |
-|              | algorithms; `flat_cache`: keep flat models; `rumoca_client`, `rumoca_process`: run rumoca in a child       |
-|              | process; `reader`                                                                                          |
+|              | `unsupported_operators`: their messages; `declared_models`: models of a file; `used_files`: files that a   |
+|              | model needs; `termination`: terminate() in algorithms; `flat_cache`: keep flat models; `rumoca_client`,    |
+|              | `rumoca_process`: run rumoca in a child process; `reader`                                                  |
 |              | (`expression_reader`, `statement_reader`, `unrolling`): convert its JSON to the flat model; `constants`:   |
 |              | structural parameters and constants become literals; `folded_branches`: find the parameters with which     |
 |              | rumoca has selected equations; `strings`: String arguments become literals; `openmodelica`: export with    |

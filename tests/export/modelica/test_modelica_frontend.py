@@ -185,3 +185,49 @@ end Typed;""")
         assert variables["m"].get("description") == "Load"
         (type_name,) = [element.get("name") for element in root.iter(enumeration)]
         assert attributes[2].get("declaredType") == type_name == "Mode"
+
+
+MACHINE = """within Lib;
+block Machine  // with initialState(idle)
+  block State
+    outer output Real v;
+  equation
+    v = 0;
+  end State;
+  inner output Real v;
+  State idle, run;
+  input Boolean go;
+equation
+  initialState(idle);
+  transition(idle, run, go);
+end Machine;"""
+RESET = """within Lib;
+block Reset
+  input Real u;
+  output Real y(start = 0, fixed = true);
+  discrete Real n(start = 0);
+equation
+  der(y) = u;
+algorithm
+  when u > 1 then
+    n := pre(n) + 1;
+    reinit(y, 0);
+  end when;
+end Reset;"""
+UNSUPPORTED = [
+    ("Machine", MACHINE, 12, "state machines (initialState, transition) are not supported; write the state as a variable of an "),
+    ("Reset", RESET, 11, "reinit() is not supported in algorithms; write it in a when-equation "),
+    ("Reset", RESET.replace("reinit(y, 0)", 'terminate("end")'), 11, "terminate() is not supported in algorithms of packages; "),
+]
+
+
+@pytest.mark.parametrize(("name", "text", "line", "message"), UNSUPPORTED)
+def test_an_unsupported_operator_is_one_problem_at_its_place(folder, name, text, line, message):
+    member = folder / f"Lib/{name}.mo"
+    member.write_text(text)
+    (folder / "Heir.mo").write_text(f"block Heir\n  extends Lib.{name};\nend Heir;")
+    for path in (folder / "Heir.mo", member):
+        with pytest.raises(InputError) as caught:
+            load_block(path)
+        assert [problem.where for problem in caught.value.problems] == [f"{member}:{line}"]
+        assert caught.value.problems[0].message.startswith(message)

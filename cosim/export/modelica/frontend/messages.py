@@ -11,6 +11,7 @@ from ....core.errors import Problem
 from ..model.syntax_tree import SourceLocation
 from .declared_models import models_hint
 from .sources import ModelicaSources
+from .unsupported_operators import explain_unsupported_operator
 
 _QUOTED = re.compile(r"['`]([\w.]+(?: = [\w.]+)?)['`]")
 _DIMENSION = re.compile(r"component dimension for ([\w.]+)")
@@ -26,8 +27,6 @@ _OPERATOR = re.compile(
 )
 #: messages that do not name their cause -> their meaning
 _MEANINGS = {
-    "function-call assignment must retain at least one output": "terminate() and functions without results are not supported in "
-    "algorithms of packages; write terminate() in a when-equation",
     "must name a coordinate classified as a continuous state": "der() needs a variable with a derivative: inputs, discrete "
     "variables and parameters have none; filter an input u first, T*der(x) = u - x, and use der(x)",
     "component binding type compatibility": "the type of the binding does not fit the declaration",
@@ -68,7 +67,15 @@ def to_problems(answer: Mapping[str, Any], name: str, path: Path, sources: Model
     specific = [line for line in reasons if " could not be compiled: " not in line] or reasons
     if not specific or answer["panicked"]:
         specific = [f"the Modelica front end failed on the model {name}: {' '.join(lines)}"]
-    return [_locate_problem(reason, name, path, sources, answer["lines"]) for reason in specific]
+    return list(dict.fromkeys(_to_problem(reason, name, path, sources, answer["lines"]) for reason in specific))
+
+
+def _to_problem(reason: str, name: str, path: Path, sources: ModelicaSources, part: Sequence[int] | None) -> Problem:
+    """Convert a reason: that of an operator that it does not name or place, else the reason with a place."""
+    explained = explain_unsupported_operator(reason, sources)
+    if explained and explained.where:
+        return explained
+    return _locate_problem(explained.message if explained else reason, name, path, sources, part)
 
 
 def _shorten(reason: str) -> str:
