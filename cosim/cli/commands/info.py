@@ -24,7 +24,7 @@ if TYPE_CHECKING:
     from ...components.fmi.description import FmuDescription
 
 
-#: width of the column of start values (characters)
+#: largest width of the column of start values (characters)
 _START_WIDTH = 14
 
 #: length to which start values are shortened in the table (characters)
@@ -187,14 +187,15 @@ def _print_variables(causality: str, variables: list[Variable]) -> None:
         return
     click.echo(f"\n{causality}s ({len(variables)})")
     width = min(40, max(len(variable.name) for variable in variables))
-    for variable in variables:
+    starts = ["" if variable.start is None else f"start = {_start_text(variable.start)}" for variable in variables]
+    start_width = min(_START_WIDTH, max(map(len, starts)))
+    for variable, start in zip(variables, starts, strict=True):
         dimensions = f"[{','.join(map(str, variable.shape))}]" if variable.shape else ""
         unit = variable.unit.name if variable.unit else "-"
-        start = "" if variable.start is None else f"start = {_start_text(variable.start)}"
-        items = ", ".join(f"{number}: {name}" for name, number in variable.items)
+        items = ", ".join(f"{number}: {name}" for number, name in variable.items)
         text = "; ".join(filter(None, (variable.description, items)))
-        columns = f"{variable.name:{width}} {variable.type + dimensions:12} {unit:8} {start:{_START_WIDTH}}"
-        print_line(f"  {columns} {text}".rstrip())
+        columns = (f"{variable.name:{width}} {variable.type + dimensions:12} {unit:8}", f"{start:{start_width}}", text)
+        print_line(f"  {' '.join(filter(None, columns))}".rstrip())
 
 
 def _start_text(start: object) -> str:
