@@ -171,8 +171,21 @@ def test_a_replay_names_the_criterion_that_the_run_misses_and_opens_before_the_f
     good, bad = (next((results / "replays").glob(f"{key}-*")).read_text() for key in run_keys(results))
     assert "<p>Successful.</p>" in good
     sentence = "The replay opens at t = 0 s. Mark × at t = 0.1 s: end of the run, check of end.value failed."
-    assert f'<p class="whole">Not successful: {row["missed"]}. {sentence}</p>' in bad
+    assert f"<p>Not successful: {row['missed']}. {sentence}</p>" in bad
     assert '"failure":{"time":0.1,' in bad.replace(" ", "")
+
+
+@pytest.mark.usefixtures("replayed")
+def test_a_phone_shows_the_whole_reason_above_the_replay(chromium, results):
+    (row,) = csv.DictReader((results / "unsuccessful.csv").open())
+    bad = next((results / "replays").glob(f"{run_keys(results)[1]}-*"))
+    context = chromium.new_context(viewport={"width": 360, "height": 740}, java_script_enabled=False)
+    opened = context.new_page()
+    opened.goto(bad.as_uri())
+    reason = opened.get_by_text(row["missed"]).bounding_box()
+    assert reason["width"] > 300
+    assert reason["height"] < 120
+    context.close()
 
 
 def run_keys(results):
