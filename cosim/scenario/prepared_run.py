@@ -20,6 +20,7 @@ from ..components.fmi import FmuFile
 from ..components.python_import import package_files
 from ..core import resources
 from ..core.errors import InputError, Problem
+from ..core.paths import resolve_path
 from ..core.stopwatch import Stopwatch
 from ..core.system import System
 from ..core.text import count_noun
@@ -160,19 +161,32 @@ class PreparedRun:
         factory, folder = self.component_factory, self.root.folder.resolve()
         data = {file.resolve() for file in (*own, *(path for path, _ in factory.fmus), *factory.modelica_files)}
         files = data | package_files((*functions, *factory.python_files))
-        shipped = str(resources.root().resolve())
-        return {_name_of_file(str(file), str(folder), shipped): file for file in sorted(files, key=str)}
+        return {_name_of_file(str(file), str(folder), _shipped()): file for file in sorted(files, key=str)}
 
     @property
     def sources(self) -> dict[str, str]:
-        """Source of each component as the scenario names it: an FMU, a Python class, a Modelica model or a CSV file."""
-        specs = {node.full_name(name): node.spec.components[name] for node, name in self.root.leaves()}
+        """Source of each component as the scenario names it: an FMU, a Python class, a Modelica model or a CSV file.
+
+        One that cosim ships has a name such as "cosim:fmus/mixer.fmu", except for those of shipped scenarios.
+        """
         profiles = {f"{PROFILE_PREFIX}.{i}": spec.file for i, spec in enumerate(self.spec.inputs)}
-        return {name: spec.fmu or spec.python or spec.modelica or "" for name, spec in specs.items()} | profiles
+        return {node.full_name(name): self._source_of(node, name) for node, name in self.root.leaves()} | profiles
+
+    def _source_of(self, node: Node, name: str) -> str:
+        spec = node.spec.components[name]
+        text = spec.fmu or spec.python or spec.modelica or ""
+        file, colon, member = ("", "", "") if spec.fmu else text.rpartition(":")
+        known = _name_of_file(str(resolve_path(node.folder / (file or text))), str(self.root.folder.resolve()), _shipped())
+        return f"{known}{colon}{member}" if text and known.startswith(SHIPPED) else text
 
     def free(self) -> None:
         """Free the components of a scenario that is not simulated."""
         free_components(self.system.components)
+
+
+def _shipped() -> str:
+    """Return the folder of the files that cosim ships."""
+    return str(resources.root().resolve())
 
 
 @lru_cache(1024)  # a run names over a hundred files, and runs in one process name the same ones

@@ -5,6 +5,7 @@ import json
 import pytest
 
 import cosim
+from cosim.scenario import load
 
 PLANT = {
     "python": "cosim:plant_src/world.py:World",
@@ -49,3 +50,19 @@ def test_a_shipped_nested_system_is_extended(tmp_path, monkeypatch):
     (tmp_path / "own.json").write_text(json.dumps(scenario))
     with cosim.load("own") as simulation:  # a file of the working directory, without ".json"
         assert simulation.get("uav.altitude.altitude_P") == 100.0
+
+
+def test_the_sources_of_components_have_the_names_of_the_user(tmp_path):
+    (tmp_path / "own.py").write_text(
+        "from pythonfmu import Fmi2Slave\n\n\nclass Own(Fmi2Slave):\n    def do_step(self, time, step):\n        return True\n"
+    )
+    components = {
+        "a": {"fmu": "cosim:fmus/mixer.fmu"},
+        "b": {"python": "cosim:controllers/python/mixer.py:Mixer"},
+        "c": {"python": "own.py:Own"},
+    }
+    file = tmp_path / "mixers.json"
+    file.write_text(json.dumps({"name": "mixers", "stop_time": 1, "step_size": 0.01, "components": components}))
+    prepared = load(file)
+    prepared.free()
+    assert prepared.sources == {name: component.get("fmu") or component["python"] for name, component in components.items()}
