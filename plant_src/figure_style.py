@@ -49,7 +49,7 @@ def _panel_height(height: float) -> float:
 def add_legend(figure: Figure, location: str) -> None:
     """Add a legend outside of the axes with as many columns as fit into the width of the figure."""
     for columns in range(5, 0, -1):
-        legend = figure.legend(loc=location, ncols=columns, **LEGEND_STYLE)
+        legend = figure.legend(ncols=columns, **{"loc": location, **LEGEND_STYLE})
         if legend.get_window_extent().width <= figure.bbox.width:
             return
         legend.remove()

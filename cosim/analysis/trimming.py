@@ -12,7 +12,7 @@ from ..api.scenario_runs import load
 from ..core.errors import InputError
 from ..core.system import Endpoint
 from ..scenario import PreparedRun
-from ..scenario.json_pointer import find_value, pointer_keys
+from ..scenario.json_pointer import find_value, missing_value, pointer_keys
 from ..scenario.name_resolution import SlotIndex, UnknownNameError, resolve_name
 from ..scenario.nested_systems import load_scenario
 from .experiment import Scenario
@@ -202,5 +202,5 @@ def _pointed(document: Any, pointer: str) -> Any:
     keys = pointer_keys(pointer)
     value, depth = find_value(document, keys)
     if depth < len(keys):
-        raise InputError(f'the scenario has no "{pointer}"')
+        raise InputError(missing_value(document, pointer))
     return value

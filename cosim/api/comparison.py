@@ -7,26 +7,40 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, NamedTuple
 
-from ..core.errors import InputError
+from ..core.errors import InputError, abbreviate_names
+from ..core.json_values import parse_object
 from ..results import Result
 from ..results.comparison import Comparison, Tolerance, needed_share
 from ..results.comparison import compare as compare_results
+from ..results.comparison.reference import describe_provenance_changes
 from ..scenario import find_scenario, load_scenario
+from ..scenario.file_paths import SHIPPED
 from .arguments import expect, is_number
 
 if TYPE_CHECKING:
     from ..report.runs import NamedCall
+
+#: number of names in the line that lists what has changed since a reference was made
+MAX_LISTED_CHANGES = 5
 
 #: a result, a CSV file, or a folder that `cosim run` has written
 ResultSource = Result | str | Path
 
 
 class ComparisonTask(NamedTuple):
-    """A result, its reference, and the tolerances by patterns of signals."""
+    """A result, its reference, and the tolerances by patterns of signals.
+
+    Attributes:
+        result: The result.
+        reference: The reference.
+        tolerances: Tolerances by patterns of signals.
+        changes: What has changed since the reference of a scenario was made, in one line; "" if nothing is known.
+    """
 
     result: Result
     reference: Result
     tolerances: Mapping[str, Tolerance]
+    changes: str = ""
 
     @classmethod
     def read(
@@ -43,14 +57,16 @@ class ComparisonTask(NamedTuple):
         Raises:
             InputError: A file cannot be read, or the scenario has no reference.
         """
-        if not isinstance(reference, Result) and _is_scenario(Path(reference)):
-            file, tolerances = _scenario_reference(Path(reference))
-            return cls(_read_result(result), _read_result(file), tolerances)
+        if not isinstance(reference, Result) and is_scenario(Path(reference)):
+            scenario = find_scenario(Path(reference))
+            file, tolerances = _scenario_reference(scenario)
+            run = _read_result(result)
+            return cls(run, _read_result(file), tolerances, reference_changes(run, file, scenario.parent))
         return cls(_read_result(result), _read_result(reference), dict.fromkeys(signals or ("*",), tolerance))
 
     def compare(self) -> Comparison:
         """Return the verdict on each signal of the reference."""
-        return compare_results(*self)
+        return compare_results(self.result, self.reference, self.tolerances)
 
     def figure(self, comparison: Comparison) -> NamedCall:
         """Return name, function and arguments of the figure with the largest deviations."""
@@ -61,7 +77,7 @@ class ComparisonTask(NamedTuple):
 
     def needed_share(self) -> float:
         """Return the share of all tolerances (1) with which a comparison that passes would still pass; 0 if all are equal."""
-        return needed_share(*self)
+        return needed_share(self.result, self.reference, self.tolerances)
 
 
 def compare(
@@ -101,6 +117,28 @@ def compare(
     return ComparisonTask.read(result, reference, Tolerance(absolute, relative, time), patterns).compare()
 
 
+def reference_changes(result: Result, reference: Path, folder: Path) -> str:
+    """Return one line that lists what has changed since the reference of a scenario was made; "" if nothing is known.
+
+    Args:
+        result: A run of the scenario.
+        reference: The reference, a CSV file with a JSON file of the same name that states its origin.
+        folder: Folder of the scenario.
+    """
+
+    def shown(name: str) -> str:
+        """Return a file of the run, which metadata name from the scenario's folder, relative to the working directory."""
+        return name if name.startswith(SHIPPED) else os.path.relpath(folder / name).replace(os.sep, "/")
+
+    try:
+        made_by = parse_object(reference.with_suffix(".json").read_text(encoding="utf-8"))
+    except (OSError, ValueError):
+        return ""
+    changes = describe_provenance_changes(made_by, result.metadata, shown)
+    own_first = sorted(changes, key=lambda change: change.startswith(SHIPPED))
+    return f"changed since the reference was made: {abbreviate_names(own_first, MAX_LISTED_CHANGES)}" if changes else ""
+
+
 def _read_result(source: ResultSource) -> Result:
     if isinstance(source, Result):
         return source
@@ -113,14 +151,13 @@ def _read_result(source: ResultSource) -> Result:
     return Result.from_csv(path / "result.csv" if path.is_dir() else path)
 
 
-def _is_scenario(path: Path) -> bool:
+def is_scenario(path: Path) -> bool:
     """Return whether a path is a JSON file, or a name without a folder that is no existing file (a shipped scenario)."""
     return path.suffix == ".json" or (path.name == str(path) and not path.suffix and not path.exists())
 
 
-def _scenario_reference(scenario: Path) -> tuple[Path, Mapping[str, Tolerance]]:
+def _scenario_reference(path: Path) -> tuple[Path, Mapping[str, Tolerance]]:
     """Return the path of a scenario's reference, and its tolerances."""
-    path = find_scenario(scenario)
     spec = load_scenario(path).spec.reference
     if spec is None:
         raise InputError(f'{path} has no "reference"')

@@ -98,7 +98,7 @@ def _metadata_with_defaults(result: Result) -> dict[str, Any]:
     missing: dict[str, Any] = {
         "name": "run",
         "failure": None,
-        "deviation": "",
+        "deviation": [],
         "scenario": {},
         "scenario_file": "",
         "system": None,

@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 from ..core.component import Component, Variable
 from ..core.errors import Problem, did_you_mean
 from .evaluation_schema import CallSpec, FunctionSpec
-from .json_pointer import find_value, pointer_keys
+from .json_pointer import find_value, missing_value, pointer_keys
 from .name_resolution import Target, UnknownNameError, resolve_name
 from .named_functions import RECORDED_INPUTS, declared_arguments, definition_problem, unknown_signals, wrong_types
 from .nested_systems import Node
@@ -135,7 +135,7 @@ class FunctionResolver:
         keys = pointer_keys(pointer)
         value, depth = find_value(self.root.document.value, keys)
         if depth < len(keys):
-            raise UnknownNameError(f'the scenario has no "{pointer}"')
+            raise UnknownNameError(missing_value(self.root.document.value, pointer))
         return value
 
     def _value_of(self, name: str) -> Any:

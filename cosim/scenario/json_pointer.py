@@ -5,6 +5,9 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Any
 
+from ..core.errors import abbreviate_names, nearest_name
+from ..core.text import count_noun, shorten
+
 #: keys of objects that are created when a value in them is set
 _OPTIONAL_OBJECTS = ("parameters", "arguments")
 
@@ -34,6 +37,28 @@ def find_value(value: Any, keys: Sequence[str]) -> tuple[Any, int]:
     return value, len(keys)
 
 
+def missing_value(document: Any, pointer: str) -> str:
+    """Return the message about a JSON pointer to no value, with the keys at the deepest place that exists.
+
+    >>> missing_value({"environment": {"sea_state": 2, "seed": 1}}, "/environment/waves/direction")
+    'the scenario has no "/environment/waves"; "environment" has: sea_state, seed'
+    """
+    keys = pointer_keys(pointer)
+    value, depth = find_value(document, keys)
+    return f'the scenario has no "/{"/".join(keys[: depth + 1])}"{_present_keys(keys[:depth], keys[depth], value)}'
+
+
+def _present_keys(place: Sequence[str], key: str, value: Any) -> str:
+    """Return a hint for the end of a message: the key at a place that another one probably means, else all keys there."""
+    owner = f'"{shorten(place[-1])}"' if place else "it"
+    if isinstance(value, list):
+        return f"; {owner} has {count_noun(len(value), 'element')}"
+    if not isinstance(value, dict) or not value:
+        return ""
+    near = nearest_name(key, (*value, *_OPTIONAL_OBJECTS))
+    return f'; did you mean "{near}"?' if near else f"; {owner} has: {abbreviate_names(map(shorten, value), 12)}"
+
+
 def set_value(document: Any, pointer: str, value: Any) -> str:
     """Set a value in a JSON document; only the last key, and "parameters" or "arguments" before it, may be new.
 
@@ -45,13 +70,13 @@ def set_value(document: Any, pointer: str, value: Any) -> str:
     if depth == len(keys) - 2 and keys[depth] in _OPTIONAL_OBJECTS and isinstance(target, dict):
         target, depth = target.setdefault(keys[depth], {}), depth + 1
     if depth < len(keys) - 1:
-        return f'the scenario has no "/{"/".join(keys[: depth + 1])}"'
+        return missing_value(document, pointer)
     if isinstance(target, dict):
         target[keys[-1]] = value
     elif isinstance(target, list) and keys[-1].isdigit() and int(keys[-1]) < len(target):
         target[int(keys[-1])] = value
     else:
-        return f'the scenario has no "{pointer}"'
+        return missing_value(document, pointer)
     return ""
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+import shlex
 import subprocess
 import sys
 import time
@@ -16,18 +17,13 @@ from typing import TYPE_CHECKING, Any
 
 from ..components.fmi.changed_sources import OTHER_VERSION
 from ..core.errors import CosimError, InputError
-from ..core.json_values import parse_object
 from ..core.paths import open_text
 from ..core.text import count_noun
-from ..scenario.file_paths import SHIPPED
 
 if TYPE_CHECKING:
     from ..results import Result
     from ..results.comparison import Comparison, Tolerance
 
-
-#: number of names in the line that lists what has changed since a reference was made
-MAX_LISTED_CHANGES = 5
 
 #: keys of a scenario that state expectations of its results
 EXPECTATION_KEYS = ("checks", "reference")
@@ -124,12 +120,15 @@ class Regression:
         return replace(outcome, summary=summary, details=(*outdated, *outcome.details))
 
     def _compare(self, run: _FinishedRun) -> RegressionOutcome:
+        from ..api.comparison import reference_changes
+
         failed = run.failed_checks()
         counts = [(len(run.failed_checks(checks_only=True)), len(run.checks), "check")]
-        margin, accept = "", ""
+        notes, accept = list[str](), ""
         if run.scenario.get("reference"):
             comparison = run.compare()
-            margin = run.margin if comparison.passed else ""
+            notes = [run.margin] if comparison.passed else []
+            notes += run.later_rows()
             counts.append((len(comparison.failures), len(comparison.verdicts), "signal"))
             if not comparison.passed:
                 reason = run.scenario["reference"].get("reason")
@@ -138,12 +137,12 @@ class Regression:
                     *str(comparison).splitlines(),
                     'tube: the reference plus and minus its tolerances (key "reference" of the scenario)',
                     *([f"reason of the tolerances: {reason}"] if reason else []),
-                    *run.reference_changes(),
+                    *filter(None, [reference_changes(run.result, run.reference_path, run.folder)]),
                     f"see {run.draw_tubes(comparison, self.directory / 'tubes.png')}",
                 ]
         if failed:
             failed += self._write_report(*(["--reference", str(self.file)] if run.scenario.get("reference") else []))
-        return RegressionOutcome(self.file.stem, 3 if failed else 0, _summarize(counts, margin), tuple(failed), accept=accept)
+        return RegressionOutcome(self.file.stem, 3 if failed else 0, _summarize(counts, notes), tuple(failed), accept=accept)
 
     def _write_report(self, *options: str) -> list[str]:
         """Write the report of the run by `cosim report` in a separate process, and return a line that names it."""
@@ -161,14 +160,23 @@ class Regression:
         return RegressionOutcome(self.file.stem, 0, f"{amount}, {size:.0f} kB in {run.reference_path}")
 
 
-def _summarize(counts: Collection[tuple[int, int, str]], margin: str) -> str:
-    """Return the numbers of checks and signals from (number of failures, number of all, noun), and the margin of the signals."""
+def _summarize(counts: Collection[tuple[int, int, str]], notes: Sequence[str]) -> str:
+    """Return the numbers of checks and signals from (number of failures, number of all, noun), and notes on the comparison."""
+    ending = f" ({'; '.join(notes)})" if notes else ""
     if not any(failed for failed, _, _ in counts):
-        return ", ".join(count_noun(number, noun) for _, number, noun in counts) + (f" ({margin})" if margin else "")
-    return ", ".join(
+        return ", ".join(count_noun(number, noun) for _, number, noun in counts) + ending
+    parts = (
         f"{failed} of {count_noun(number, noun)} failed" if failed else f"{count_noun(number, noun)} passed"
         for failed, number, noun in counts
     )
+    return ", ".join(parts) + ending
+
+
+def accept_command(scenarios: Sequence[str]) -> str:
+    """Return a line with the command that makes the runs of scenarios their references."""
+    files = " ".join(shlex.quote(os.path.relpath(each)) for each in scenarios)
+    runs = "this run" if len(scenarios) == 1 else "these runs"
+    return f"if the change is meant, make {runs} the reference: cosim regress --update {files}"
 
 
 @dataclass(frozen=True)
@@ -230,22 +238,13 @@ class _FinishedRun:
 
         return f"{needed_share(self.result, self.reference, self.tolerances):.0%} of the tolerances"
 
-    def reference_changes(self) -> Iterator[str]:
-        """Yield one line that lists what has changed since the reference was made."""
-        from ..results.comparison.reference import describe_provenance_changes
+    def later_rows(self) -> Iterator[str]:
+        """Yield a note if the run continues after the end of the reference."""
+        from ..results.comparison.tube import time_tolerance
 
-        try:
-            made_by = parse_object(self.reference_path.with_suffix(".json").read_text(encoding="utf-8"))
-        except (OSError, ValueError):
-            return
-        changes = describe_provenance_changes(made_by, self.result.metadata, self._shown_file)
-        if changes := sorted(changes, key=lambda change: change.startswith(SHIPPED)):
-            more = f" and {len(changes) - MAX_LISTED_CHANGES} more" if len(changes) > MAX_LISTED_CHANGES else ""
-            yield f"changed since the reference was made: {', '.join(changes[:MAX_LISTED_CHANGES])}{more}"
-
-    def _shown_file(self, name: str) -> str:
-        """Return a file of the run, which metadata name from the scenario's folder, relative to the working directory."""
-        return name if name.startswith(SHIPPED) else os.path.relpath(self.folder / name).replace(os.sep, "/")
+        own, expected = self.result.time, self.reference.time
+        if own.size and expected.size and own[-1] > expected[-1] + time_tolerance(expected):
+            yield f"the reference ends at {expected[-1]:g} s"
 
     def draw_tubes(self, comparison: Comparison, path: Path) -> Path:
         """Draw the worst signals in their tubes to a file and return its path."""

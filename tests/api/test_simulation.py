@@ -185,7 +185,7 @@ def test_a_reset_sets_the_seeds_of_the_scenario():
 
 def test_seeds_that_nothing_can_be_set_at_are_refused():
     line = refusal(cosim.load, scenario(seeds=["/components/h/arguments/k"]))
-    assert line == 'scenario: $.seeds[0]: the scenario has no "/components/h"'
+    assert line == 'scenario: $.seeds[0]: the scenario has no "/components/h"; "components" has: g'
 
 
 def test_the_process_stays_as_the_caller_left_it(simulation, caplog, tmp_path, monkeypatch):

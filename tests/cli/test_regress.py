@@ -85,12 +85,26 @@ def test_a_changed_result_fails_with_signal_time_and_changes(folder):
     page = (folder / "runs/cooling/report.html").read_text()
     assert "comparison" in re.findall(r"<figcaption>(.*?)</figcaption>", page)
     assert '<p class="verdict bad">✗ Comparison with the reference: 1 of 1 signal failed</p>' in page
+    assert "<li>Changed since the reference was made: scenarios/cooling.json</li>" in page
+    assert f"<li>If the change is meant, make this run the reference: {command}</li>" in page
     suite = etree.parse(folder / "out/junit.xml").getroot().find("testsuite")
     assert (suite.get("tests"), suite.get("failures"), suite.get("errors")) == ("1", "1", "0")
     assert "leaves its tube" in suite.find("testcase[@name='cooling']/failure").text
     scenario(folder, reference=REFERENCE)
     assert regress(folder).returncode == 0
     assert not (folder / "runs/cooling/tubes.png").exists()
+
+
+def test_a_run_that_is_longer_than_its_reference_says_so(folder):
+    scenario(folder, reference=REFERENCE)
+    assert regress(folder, "--update").returncode == 0
+    scenario(folder, reference=REFERENCE, stop_time=6)
+    done = regress(folder)
+    assert (done.returncode, "1 signal (25% of the tolerances; the reference ends at 5 s)" in done.stdout) == (0, True)
+    scenario(folder, reference=REFERENCE, stop_time=6, kpis=CHECK["kpis"], checks=[{"kpi": "end.value", "max": 1}], rate=0.6)
+    assert regress(folder).returncode == 3
+    page = (folder / "runs/cooling/report.html").read_text()
+    assert ("Changed since" in page, "If the change is meant" in page) == (True, False)
 
 
 def test_every_scenario_of_a_folder_is_reported(folder):

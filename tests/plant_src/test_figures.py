@@ -157,7 +157,7 @@ def test_all_texts_are_inside_of_the_figure():
     ):
         figure = draw_figure(recorded, function.__name__, function, arguments)
         box, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
-        assert box.min.min() >= 0 and box.x1 <= width and box.y1 <= height, function
+        assert max(-box.x0, -box.y0, box.x1 - width, box.y1 - height) <= 0, function
 
 
 TURNS = {"waypoint_x": [4.0, 9.0, 30.0], "waypoint_y": [0.0, 0.0, 0.0], "acceptance_radius": 0.5}

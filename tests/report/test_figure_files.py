@@ -88,7 +88,7 @@ def long_labels(_result, **figure_arguments):
 def test_labels_are_inside_of_a_figure_without_a_layout():
     figure = draw_figure(RESULT, "curve", long_labels, {})
     box, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
-    assert box.min.min() >= 0 and box.x1 <= width and box.y1 <= height
+    assert max(-box.x0, -box.y0, box.x1 - width, box.y1 - height) <= 0
 
 
 @pytest.mark.filterwarnings("error")

@@ -209,8 +209,9 @@ def test_a_problem_of_a_setting_is_located_at_the_setting(folder, extend):
 
 def test_a_setting_creates_missing_parameters(folder, extend):
     assert cosim.run(extend(), parameters={"/components/b/parameters/k": 5.0}).kpis["end.value"] == 10.0
-    (problem,) = folder.problems_of(extend(), parameters={"/components/b/parametres/k": 5.0})
-    assert problem == 'setting "/components/b/parametres/k": the scenario has no "/components/b/parametres"'
+    place = "/components/b/parametres"
+    (problem,) = folder.problems_of(extend(), parameters={f"{place}/k": 5.0})
+    assert problem == f'setting "{place}/k": the scenario has no "{place}"; did you mean "parameters"?'
 
 
 def test_inherited_checks_make_a_regression_test(extend):

@@ -159,7 +159,10 @@ def test_settings_of_the_caller_are_checked(folder):
         'setting "a.kk": component "a" has no variable "kk"; did you mean "k"?'
     ]
     assert folder.problems_of(file, parameters={"/components/b/period": 1}) == [
-        'setting "/components/b/period": the scenario has no "/components/b"'
+        'setting "/components/b/period": the scenario has no "/components/b"; "components" has: a'
+    ]
+    assert folder.problems_of(file, parameters={"/connections/0/from": "a.y"}) == [
+        'setting "/connections/0/from": the scenario has no "/connections/0"; "connections" has 0 elements'
     ]
 
 

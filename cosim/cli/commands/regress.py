@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import os
-import shlex
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -12,7 +10,7 @@ import click
 
 from ...core.processors import available_processors
 from ...core.text import count_noun
-from ...studies.regression import RegressionOutcome
+from ...studies.regression import RegressionOutcome, accept_command
 from ...studies.regression_runs import default_folder, run_regressions
 from .. import current_command_line
 from ..completion import complete_scenario
@@ -64,11 +62,8 @@ def command(
         print_json({"failed": failed, "scenarios": [asdict(outcome) for outcome in outcomes]})
     else:
         click.echo(f"{count_noun(len(outcomes), 'scenario')}, {f'{failed} failed' if failed else 'all passed'}")
-        if accept := [shlex.quote(os.path.relpath(outcome.accept)) for outcome in outcomes if outcome.accept]:
-            click.echo(
-                f"if the change is meant, make {'this run' if len(accept) == 1 else 'these runs'} the reference: "
-                f"cosim regress --update {' '.join(accept)}"
-            )
+        if accepted := [outcome.accept for outcome in outcomes if outcome.accept]:
+            click.echo(accept_command(accepted))
     return min((outcome.code for outcome in outcomes), key=EXIT_CODE_SEVERITY.index)
 
 

@@ -28,16 +28,19 @@ def command(result: Path, output_file: Path | None, reference: Path | None, open
 
     RESULT is a folder written by `cosim run`. The page is a single file and needs no network.
     """
-    from ...api.comparison import ComparisonTask
-    from ...report.finished_run import write_folder_report
+    from ...api.comparison import ComparisonTask, is_scenario
+    from ...report.finished_run import Deviation, write_folder_report
     from ...results.comparison import Tolerance
+    from ...studies.regression import accept_command
 
     print_log()
     target = output_file or result / "report.html"
     if reference:
         task = ComparisonTask.read(result, reference, Tolerance())
         comparison = task.compare()
-        write_folder_report(result, target, [task.figure(comparison)], "" if comparison.passed else str(comparison))
+        accept = accept_command([str(reference)]) if is_scenario(reference) else ""
+        deviation = None if comparison.passed else Deviation(str(comparison), task.changes, accept)
+        write_folder_report(result, target, [task.figure(comparison)], deviation)
     else:
         write_folder_report(result, target)
     click.echo(target)

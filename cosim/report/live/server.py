@@ -202,9 +202,8 @@ class _Handler(BaseHTTPRequestHandler):
         if about is None:
             raise RequestRefusedError(HTTPStatus.GONE)
         data = embed_json({"scene": about.pop("scene"), "live": about})
-        text = render_page(
-            "replay.html", title=about["name"], description=about["description"], data=data, policy=LIVE_CONTENT_SECURITY_POLICY
-        )
+        texts = {"title": about["name"], "description": about["description"], "failed": False}
+        text = render_page("replay.html", **texts, data=data, policy=LIVE_CONTENT_SECURITY_POLICY)
         self._send(HTTPStatus.OK, "text/html; charset=utf-8", text.encode())
 
     def _send_rows(self) -> None:

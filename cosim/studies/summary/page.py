@@ -103,7 +103,8 @@ def _write_map(sweep: Sweep, map_: SuccessMap, folder: Path) -> dict[str, Any]:
     text = figure_to_svg(figure).replace(' target="_blank"', "")
     with writing_atomically(folder / f"{map_.name}.svg") as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
-    return {"svg": safe_markup(text[text.index("<svg") :]), "width": figure.get_figwidth()}
+    in_page = text[text.index("<svg") :].replace(f'"{PAGE_FILE}#', '"#')  # a copy of the page may have another name
+    return {"svg": safe_markup(in_page), "width": figure.get_figwidth()}
 
 
 def _cell_link(sweep: Sweep, cell: MapCell, folder: Path) -> str:
