@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from typing import Any
+from typing import Any, cast
 
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
@@ -20,25 +20,39 @@ TOUCHDOWN_MARKER: Mapping[str, Any] = {
     "markeredgecolor": "white",
 }
 LEGEND_STYLE: Mapping[str, Any] = {
-    "ncols": 5,
     "columnspacing": 0.7,
     "handlelength": 1.4,
     "handletextpad": 0.4,
     "borderaxespad": 0.2,
 }
 COLUMN_WIDTH = 3.5  # in, column of a two-column paper
+MIN_PANEL_HEIGHT, MAX_PANEL_HEIGHT = 1.0, 6.0  # in, axes with equal scales
 
 
 def fit_height(figure: Figure, axes: Axes) -> None:
-    """Set the height of the figure so that axes with equal scales fill the column width."""
-    left, right, below, above, max_height = 0.45, 0.08, 0.4, 0.27, 6.0  # in
+    """Set equal scales, and the height of a figure with constrained layout at which the axes fill its width."""
     axes.margins(0.05)
     (x_first, x_last), (y_first, y_last) = axes.get_xlim(), axes.get_ylim()
-    width = COLUMN_WIDTH - left - right
-    height = min(max_height, max(1.0, width * (y_last - y_first) / (x_last - x_first)))
-    total = below + height + above
-    figure.set_size_inches(COLUMN_WIDTH, total)
-    axes.set_position((left / COLUMN_WIDTH, below / total, width / COLUMN_WIDTH, height / total))
+    ratio = (y_last - y_first) / (x_last - x_first)
+    figure.set_figheight(_panel_height(ratio * COLUMN_WIDTH) + 0.6)  # near the final one, for the number of ticks
+    cast(Any, figure.get_layout_engine()).execute(figure)
+    width, height = figure.get_size_inches()
+    box = axes.get_position()
+    figure.set_figheight(_panel_height(ratio * box.width * width) + (1 - box.height) * height)
+    axes.set_aspect("equal")
+
+
+def _panel_height(height: float) -> float:
+    return min(MAX_PANEL_HEIGHT, max(MIN_PANEL_HEIGHT, height))
+
+
+def add_legend(figure: Figure, location: str) -> None:
+    """Add a legend outside of the axes with as many columns as fit into the width of the figure."""
+    for columns in range(5, 0, -1):
+        legend = figure.legend(ncols=columns, **{"loc": location, **LEGEND_STYLE})
+        if legend.get_window_extent().width <= figure.bbox.width:
+            return
+        legend.remove()
 
 
 def annotate(axes: Axes, text: str, position: tuple[float, float], offset: tuple[float, float], color: str) -> Text:

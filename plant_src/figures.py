@@ -19,13 +19,13 @@ from cosim.results.kpi import Prefix, Signal
 
 from .figure_style import (
     COLUMN_WIDTH,
-    LEGEND_STYLE,
     MULTIROTOR_COLOUR,
     PHASE_COLOURS,
     REFERENCE_COLOUR,
     TOUCHDOWN_COLOUR,
     TOUCHDOWN_MARKER,
     VESSEL_COLOUR,
+    add_legend,
     annotate,
     fit_height,
 )
@@ -63,8 +63,8 @@ def paths(
     Returns:
         Figure of column width, one metre equally long along both axes.
     """
-    figure = Figure()
-    axes = figure.add_subplot(aspect="equal", xlabel="x / m", ylabel="y / m")
+    figure = Figure(figsize=(COLUMN_WIDTH, COLUMN_WIDTH), layout="constrained")
+    axes = figure.add_subplot(xlabel="x / m", ylabel="y / m")
     for name, platform in (platforms or {}).items():
         _draw_platform(axes, name, platform)
     _draw_waypoints(axes, used_waypoints(waypoint_x, waypoint_y, waypoint_count), acceptance_radius)
@@ -73,7 +73,7 @@ def paths(
     row = touchdown_row(result, vehicle)
     if row is not None:
         axes.plot(*(result[f"{vehicle}.position.{axis}"][row] for axis in "xy"), **TOUCHDOWN_MARKER, label="touchdown", zorder=6)
-    figure.legend(loc="upper center", **LEGEND_STYLE)
+    add_legend(figure, "outside upper center")
     fit_height(figure, axes)
     return figure
 
@@ -130,8 +130,7 @@ def landing(
     if stop is None:
         stop = result.time[-1] if row is None else min(result.time[-1], result.time[row] + TIME_AFTER_TOUCHDOWN)
     shown = slice(*np.searchsorted(result.time, (start, stop + 1e-9)))
-    figure = Figure(figsize=(COLUMN_WIDTH, 3.4))
-    figure.subplots_adjust(left=0.185, right=0.965, bottom=0.17, top=0.88, hspace=0.1)
+    figure = Figure(figsize=(COLUMN_WIDTH, 3.4), layout="constrained")
     above, below = figure.subplots(2, sharex=True, height_ratios=(3, 2))
     for name, line in _altitudes(vehicle, deck, altitude_reference):
         above.plot(result.time[shown], result[name][shown], **line)
@@ -142,7 +141,7 @@ def landing(
         _shade_phases(figure, result.time[shown], result[mode][shown], phases)
     if row is not None:
         _mark_touchdown(figure, result.time[row], result[f"{vehicle}.position.z"][row])
-    figure.legend(loc="lower center", **LEGEND_STYLE)
+    add_legend(figure, "outside lower center")
     figure.align_ylabels()
     return figure
 

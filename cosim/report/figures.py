@@ -31,6 +31,7 @@ STYLE: Mapping[Any, Any] = {
     "axes.spines.right": False,
     "axes.spines.top": False,
     "axes.titlesize": 8,
+    "figure.constrained_layout.use": True,
     "figure.dpi": 200,
     "figure.figsize": (3.5, 2.6),
     "font.family": "DejaVu Sans",
@@ -71,6 +72,9 @@ def draw_figure(result: Result, name: str, function: Callable[..., Figure], argu
         function: The figure function of the scenario.
         arguments: Its keyword arguments.
 
+    Returns:
+        The figure with its final layout, by matplotlib's constrained layout unless the function sets another one.
+
     Raises:
         InputError: The result lacks a signal that the function needs.
         ComponentError: The function fails or does not return a matplotlib figure.
@@ -80,9 +84,18 @@ def draw_figure(result: Result, name: str, function: Callable[..., Figure], argu
     evaluation = ResultFunction(name, function, arguments)
     with figure_style():
         figure = evaluation.evaluate("figure", result)
-    if not isinstance(figure, Figure):
-        raise evaluation.failure("figure", f"returned {type(figure).__name__}, expected a matplotlib.figure.Figure")
+        if not isinstance(figure, Figure):
+            raise evaluation.failure("figure", f"returned {type(figure).__name__}, expected a matplotlib.figure.Figure")
+        _fix_layout(figure)
     return figure
+
+
+def _fix_layout(figure: Figure) -> None:
+    """Lay a figure out once, for all of its files; axes that are not in a grid keep their positions."""
+    engine = figure.get_layout_engine()
+    if engine and any(axes.get_subplotspec() for axes in figure.axes):
+        engine.execute(figure)
+    figure.set_layout_engine("none")
 
 
 def save_figure(figure: Figure, path: Path) -> None:

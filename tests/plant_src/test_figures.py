@@ -4,8 +4,9 @@ import numpy as np
 import pytest
 from matplotlib.figure import Figure
 from matplotlib.patches import Circle, Rectangle
-from mission_recording import TOUCHDOWN, mission_result
+from mission_recording import TOUCHDOWN, mission_result, with_signals
 
+from cosim.report.figures import draw_figure
 from plant_src.figures import TIME_AFTER_TOUCHDOWN, landing, paths, tracking_error
 
 DECK = {"vehicle": "plant.uav", "deck": "plant.usv.deck"}
@@ -136,6 +137,27 @@ def test_axes_carry_units_and_the_figure_fits_a_column(figure):
     assert picture.get_size_inches()[0] == 3.5
     assert all(axes.get_ylabel().endswith("/ m") for axes in picture.axes)
     assert picture.axes[-1].get_xlabel() in ("x / m", "t / s")
+
+
+def short_phases(result):
+    """Modes of which two are too short for a horizontal name."""
+    return np.select([result.time < 8, result.time < 8.7, result.time < 9.4], [3, 4, 5], 4).astype(np.int32)
+
+
+def test_all_texts_are_inside_of_the_figure():
+    result = mission_result(offset=(6e-4, 8e-4))
+    result = with_signals(result, uav__vtol__mode=short_phases(result))
+    far = with_signals(result, **{f"plant__{name}__position__y": 1000 * result.time for name in ("uav", "usv")})
+    turns = {"vehicle": "plant.uav", "target": "plant.usv.deck", **TURNS, "limit": 0.1255}
+    for function, recorded, arguments in (
+        (landing, result, {**LANDING, "limit": 0.1255}),
+        (tracking_error, result, turns),
+        (paths, result, {**DECK, "waypoint_x": [5.0], "waypoint_y": [0.0], "acceptance_radius": 0.5}),
+        (paths, far, DECK),
+    ):
+        figure = draw_figure(recorded, function.__name__, function, arguments)
+        box, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
+        assert max(-box.x0, -box.y0, box.x1 - width, box.y1 - height) <= 0, function
 
 
 TURNS = {"waypoint_x": [4.0, 9.0, 30.0], "waypoint_y": [0.0, 0.0, 0.0], "acceptance_radius": 0.5}

@@ -75,6 +75,42 @@ def test_the_style_is_restored_after_drawing():
     assert dict(matplotlib.rcParams) == before
 
 
+def long_labels(_result, **figure_arguments):
+    """A figure whose labels need more space than matplotlib's fixed margins."""
+    figure = Figure(**figure_arguments)
+    axes = figure.add_subplot(xlabel="t / s", ylabel="horizontal\nerror / m")
+    axes.plot([0, 1], [1e-6, 1e-5])
+    axes.yaxis.set_major_formatter("{x:.7f}")
+    figure.colorbar(axes.imshow([[0, 1]], aspect="auto"), ax=axes, label="share")
+    return figure
+
+
+def test_labels_are_inside_of_a_figure_without_a_layout():
+    figure = draw_figure(RESULT, "curve", long_labels, {})
+    box, (width, height) = figure.get_tightbbox(), figure.get_size_inches()
+    assert max(-box.x0, -box.y0, box.x1 - width, box.y1 - height) <= 0
+
+
+@pytest.mark.filterwarnings("error")
+def test_margins_of_a_figure_without_layout_remain():
+    def wide(result):
+        figure = long_labels(result, layout="none")
+        figure.subplots_adjust(left=0.4)
+        return figure
+
+    assert draw_figure(RESULT, "wide", wide, {}).axes[0].get_position().x0 == pytest.approx(0.4)
+
+
+@pytest.mark.filterwarnings("error")
+def test_axes_at_a_position_of_their_own_keep_it():
+    def picture(_result):
+        figure = Figure()
+        figure.add_axes((0.0, 0.0, 1.0, 1.0)).set_axis_off()
+        return figure
+
+    assert draw_figure(RESULT, "picture", picture, {}).axes[0].get_position().bounds == (0.0, 0.0, 1.0, 1.0)
+
+
 def test_a_failing_figure_is_named():
     def broken(_result):
         raise ValueError("no such thing")
