@@ -20,6 +20,7 @@ from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
+from .paths import resolve_path
 from .text import MAX_QUOTATION_LENGTH, count_noun, escape_control_characters, shorten
 from .user_code import innermost_user_line
 
@@ -225,17 +226,23 @@ def near_or_valid_names(name: str, valid: Iterable[str]) -> str:
 
 
 def nearest_file(path: Path) -> str:
-    """Return a hint for the end of a message about a missing file: the most similar name in its folder, else its files, else "".
+    """Return a hint for the end of a message about a missing file: the most similar name in its folder, else its files.
 
-    Files are those with the same ending, up to 12.
+    Files are those with the same ending, up to 12; without one, the hint is the absolute path of the folder. A name without an
+    ending that is similar to none has no hint.
     """
     try:
-        names = tuple(sorted(each.name for each in path.parent.iterdir() if not path.suffix or each.suffix == path.suffix))
+        folder = resolve_path(path.parent) if ".." in path.parts else path.parent
+        names = tuple(sorted(each.name for each in folder.iterdir() if not path.suffix or each.suffix == path.suffix))
+    except FileNotFoundError:
+        return f'; there is no folder "{folder.absolute()}"'
     except (OSError, ValueError):
         return ""
     if near := [name for name in names if Path(name).stem == path.name] or _close_matches(path.name, names):
         return f'; did you mean "{near[0]}"?'
-    return f'; files in "{path.parent}": {abbreviate_names(names, 12)}' if names and path.suffix else ""
+    if not path.suffix:
+        return ""
+    return f'; files in "{folder}": {abbreviate_names(names, 12)}' if names else f'; no *{path.suffix} in "{folder.absolute()}"'
 
 
 @lru_cache(16)  # the same wrong name often occurs several times

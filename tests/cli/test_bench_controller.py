@@ -179,7 +179,8 @@ def test_a_problem_inside_a_nested_system_keeps_its_position(folder):
     path = folder / "lost.json"
     path.write_text('{"components": {"a": {"python": "lost.py:A"}}, "ports": {}}')
     done = bench(folder, path)
-    assert (done.returncode, done.stderr) == (2, f'{path}:1:17: $.components.a: file "lost.py" does not exist\n')
+    message = f'{path}:1:17: $.components.a: file "lost.py" does not exist; no *.py in "{path.parent}"\n'
+    assert (done.returncode, done.stderr) == (2, message)
 
 
 def test_entries_about_missing_variables_are_removed_and_noted(folder):

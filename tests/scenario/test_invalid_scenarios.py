@@ -30,7 +30,7 @@ def test_all_problems_are_reported_at_once(folder):
         "3:48: $.components.a.parameters.u: NaN is not allowed, expected a finite number",
         '9:19: $.connections[4].too: unknown key; did you mean "to"?',
         "1:89: $.colour: unknown key",
-        '5:3: $.components.c: FMU "missing.fmu" does not exist',
+        f'5:3: $.components.c: FMU "missing.fmu" does not exist; no *.fmu in "{folder.path}"',
         '3:24: $.components.a.parameters.kk: component "a" has no variable "kk"; did you mean "k"?',
         '3:33: $.components.a.parameters.k: "k" is of type Float64, found "x"',
         "7:33: $.connections[1]: input b.u is connected twice: it is already fed by a.y",
@@ -40,7 +40,7 @@ def test_all_problems_are_reported_at_once(folder):
         '12:35: $.events[0].set["a.q"]: component "a" has no variable "q"; valid: k, u',
         '10:16: $.algorithm.stages: unknown component "e"; valid: b',
         "12:13: $.events[0]: event time 0.5 s lies between two communication points (1.0 s apart)",
-        '11:11: $.kpis[0]: file "none.py" does not exist',
+        f'11:11: $.kpis[0]: file "none.py" does not exist; no *.py in "{folder.path}"',
         '11:62: $.checks[0].kpi: no KPI "kk.x"; valid: k',
     ]
 
