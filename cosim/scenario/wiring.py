@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import re
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
 from typing import NamedTuple
 
-from ..core.component import Component
-from ..core.errors import Problem, did_you_mean
+from ..core.compatibility import incompatibility
+from ..core.component import Component, Variable
+from ..core.errors import Problem, abbreviate_names, did_you_mean
 from ..core.size_limits import MAX_CONNECTIONS, require_at_most
 from ..core.system import Connection, Endpoint
 from .name_resolution import SlotIndex, Target, UnknownNameError, resolve_name
@@ -18,6 +20,8 @@ from .schema_types import INVALID, accepted
 
 #: words of the problem of an input that a prefix or a pattern does not feed
 NO_MATCHING_OUTPUT = "has no matching output"
+#: number of connections that a hint lists
+_MAX_PAIRS = 4
 
 
 class _Candidate(NamedTuple):
@@ -38,6 +42,17 @@ class _Source(NamedTuple):
         component, prefix = self.target
         name = prefix.replace("*", rest) if "*" in prefix else prefix + rest
         return f"{component}.{name}".replace("..", ".")
+
+
+def _unmatched(end: Endpoint, source: _Source, rest: str, hint: str, where: str) -> Problem:
+    return Problem(f"input {end} {NO_MATCHING_OUTPUT} {source.expected_name(rest)}{hint}", where)
+
+
+def _kind_of_names(names: Iterable[str]) -> str:
+    """Return "array" for the elements of an array ("[1]"), "vector" for components of a vector (".x"), else ""."""
+    kinds = {"array": re.compile(r"\[\d+\]"), "vector": re.compile(r"\.\w+")}
+    names = list(names)
+    return next((kind for kind, form in kinds.items() if names and all(map(form.fullmatch, names))), "")
 
 
 class Wiring:
@@ -88,7 +103,8 @@ class Wiring:
         """Return all connections, and add the inputs that have no output to the problems."""
         if not self._has_invalid_connections:
             explained = self._by_input.keys() | self._excused
-            self.problems += [problem for end, problem in self._unmatched_inputs.items() if end not in explained]
+            unmatched = (problem for end, problem in self._unmatched_inputs.items() if end not in explained)
+            self.problems += dict.fromkeys(unmatched)
         return (connection for candidate in self._by_input.values() for connection in candidate.connections)
 
     def _expand(self, node: Node, i: int, spec: ConnectionSpec) -> None:
@@ -100,9 +116,12 @@ class Wiring:
         if len(found) < len(sources):
             self.excuse(node, spec.target)
             return
+        where = node.where("connections", i)
         for target, slots in inputs:
-            for rest, slot in slots.items():
-                self._match(found, Endpoint(target.component, slot), rest, spec, node.where("connections", i))
+            ends = {rest: Endpoint(target.component, slot) for rest, slot in slots.items()}
+            for rest, end in ends.items():
+                self._match(found, end, rest, spec, where)
+            self._join_problems_of_elements(found[0], ends, where)
 
     def _find_source(self, node: Node, name: str, where: str) -> _Source | None:
         """Return the outputs that a name refers to; None if there are none."""
@@ -113,8 +132,7 @@ class Wiring:
         """Connect an input to the output of each source with the same name after the prefix, or at the "*" of a pattern."""
         unmatched = [source for source in sources if rest not in source.outputs]
         if unmatched and end not in self._inputs_with_values:
-            text = f"input {end} {NO_MATCHING_OUTPUT} {unmatched[0].expected_name(rest)}"
-            self._unmatched_inputs[end] = Problem(text + self._output_hint(unmatched[0], rest), where)
+            self._unmatched_inputs[end] = _unmatched(end, unmatched[0], rest, self._output_hint(unmatched[0], end, rest), where)
         if unmatched:
             return
         connections = [
@@ -133,20 +151,48 @@ class Wiring:
         ]
         self._add(_Candidate(connections, is_variable=rest == ""))
 
-    def _output_hint(self, source: _Source, rest: str) -> str:
-        """Return a hint at a similar name below the source's prefix, else at an output of any component with the same end."""
+    def _join_problems_of_elements(self, source: _Source, ends: Mapping[str, Endpoint], where: str) -> None:
+        """Report inputs once, with the connections to write, if they and the outputs are an array and components of a vector."""
+        outputs = [Endpoint(source.target.component, slot) for slot in source.outputs.values()]
+        kinds = {_kind_of_names(source.outputs), _kind_of_names(ends)}
+        unmatched = {rest: end for rest, end in ends.items() if end in self._unmatched_inputs}
+        if kinds != {"array", "vector"} or len(outputs) != len(ends) or not unmatched:
+            return
+        pairs = list(zip(outputs, ends.values(), strict=True))
+        if all(self._fits(*pair) for pair in pairs):
+            hint = abbreviate_names((f"{output} to {end}" for output, end in pairs), _MAX_PAIRS)
+            rest, first = next(iter(unmatched.items()))
+            problem = _unmatched(first, source, rest, f"; connect {hint}", where)
+            self._unmatched_inputs.update(dict.fromkeys(unmatched.values(), problem))
+
+    def _output_hint(self, source: _Source, end: Endpoint, rest: str) -> str:
+        """Return a hint at outputs that fit an input: of a similar name below the prefix, or of other components."""
+        outputs = {name: Endpoint(source.target.component, slot) for name, slot in source.outputs.items()}
+        outputs = {name: output for name, output in outputs.items() if self._fits(output, end)}
         if not rest.startswith("."):
-            return did_you_mean(
-                source.expected_name(rest), (f"{source.target.component}.{name}" for name in source.outputs.values())
-            )
-        hint = did_you_mean(rest[1:], (name[1:] for name in source.outputs))
-        same = (name for name in self._output_names if name.endswith(rest) and "did you mean" not in hint)
-        return next((f"; connect {name} to it" for name in same), hint)
+            return did_you_mean(source.expected_name(rest), map(str, outputs.values()))
+        if _kind_of_names(outputs) == "array":
+            return f"; valid: {abbreviate_names(map(str, outputs.values()), _MAX_PAIRS)}"
+        hint = did_you_mean(rest[1:], (name[1:] for name in outputs))
+        same = (
+            output
+            for output, variable in self._variables.items()
+            if str(output).endswith(rest)
+            and variable.causality == "output"
+            and output.component != end.component
+            and self._fits(output, end)
+            and "did you mean" not in hint
+        )
+        return next((f"; connect {output} to it" for output in same), hint)
+
+    def _fits(self, output: Endpoint, end: Endpoint) -> bool:
+        return not incompatibility(self._variables[output], self._variables[end])
 
     @cached_property
-    def _output_names(self) -> list[str]:
-        outputs = ((name, v) for name, c in self._components.items() for v in c.variables if v.causality == "output")
-        return [f"{name}.{slot}" for name, variable in outputs for slot in variable.scalar_names]
+    def _variables(self) -> Mapping[Endpoint, Variable]:
+        """Variables of all components by their scalars."""
+        variables = ((name, variable) for name, c in self._components.items() for variable in c.variables)
+        return {Endpoint(name, slot): variable for name, variable in variables for slot in variable.scalar_names}
 
     def _add(self, new: _Candidate) -> None:
         first = new.connections[0]

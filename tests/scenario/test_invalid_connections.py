@@ -1,7 +1,9 @@
 """Invalid connections: units, types and prefixes."""
 
+import pytest
 from systems import connection
 
+import cosim
 from cosim.core import resources
 
 
@@ -37,3 +39,58 @@ def test_a_prefix_without_a_matching_output_names_the_input(folder):
         {**components, "plant": folder.block("Plant")}, [connection("plant.ship.position", "pilot.vehicle")]
     )
     assert "input pilot.vehicle.position.x has no matching output plant.ship.position.position.x" in line
+
+
+GUST = """
+model Gust
+  output Real force[3](each unit = "N");
+  output Real moment[2](each unit = "N.m");
+equation
+  force = {1, 0, 0};
+  moment = {0, 0};
+end Gust;
+"""
+BODY = """
+model Body
+  connector Vector
+    input Real x(unit = "N");
+    input Real y(unit = "N");
+    input Real z(unit = "N");
+  end Vector;
+  connector Position
+    output Real x(unit = "m");
+    output Real y(unit = "m");
+    output Real z(unit = "m");
+  end Position;
+  Vector external_force;
+  Position position;
+equation
+  position.x = external_force.x;
+  position.y = external_force.y;
+  position.z = external_force.z;
+end Body;
+"""
+
+
+@pytest.fixture
+def gust_and_body(folder):
+    sources = {"gust": ("Gust", GUST), "body": ("Body", BODY)}
+    return {key: {"modelica": f"{folder.write(text, f'{name}.mo')}:{name}"} for key, (name, text) in sources.items()}
+
+
+def test_an_array_is_proposed_element_by_element_for_a_vector(folder, gust_and_body):
+    wires = [connection("gust.force", "body.external_force")]
+    (line,) = folder.problems(gust_and_body, wires)
+    assert line.partition(": input ")[2] == (
+        "body.external_force.x has no matching output gust.force.x; connect gust.force[1] to body.external_force.x, "
+        "gust.force[2] to body.external_force.y, gust.force[3] to body.external_force.z"
+    )
+    valid = [connection(f"gust.force[{i}]", f"body.external_force.{axis}") for i, axis in enumerate("xyz", start=1)]
+    assert cosim.run(folder.scenario(gust_and_body, valid))["body.position.x"][-1] == 1.0
+
+
+def test_outputs_of_another_quantity_are_not_proposed(folder, gust_and_body):
+    lines = folder.problems({**gust_and_body, "other": gust_and_body["body"]}, [connection("gust.moment", "body.external_force")])
+    assert [line.partition(": input ")[2] for line in lines] == [
+        f"body.external_force.{axis} has no matching output gust.moment.{axis}" for axis in "xyz"
+    ]
