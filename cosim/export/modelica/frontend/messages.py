@@ -46,11 +46,11 @@ _SYNTAX_ERROR = re.compile(r"×\s*(?P<what>.+?)\n[^\n]*╭─\[[^\]]*:(?P<line>\
 _LINE_BREAK = re.compile(r"\s*\n[\s│]*")
 _EXPECTED = re.compile(r"help: expected one of: (?P<tokens>.*)", re.DOTALL)
 #: words that are no names (Modelica Language Specification 3.6, section 2.3.3)
-_RESERVED = frozenset(
-    "algorithm and annotation block break class connect connector constant constrainedby der discrete each else elseif elsewhen "
-    "encapsulated end enumeration equation expandable extends external false final flow for function if import impure in initial "
-    "inner input loop model not operator or outer output package parameter partial protected public pure record redeclare "
-    "replaceable return stream then true type when while within".split()
+_RESERVED = re.compile(
+    "algorithm|and|annotation|block|break|class|connect|connector|constant|constrainedby|der|discrete|each|else|elseif|"
+    "elsewhen|encapsulated|end|enumeration|equation|expandable|extends|external|false|final|flow|for|function|if|import|"
+    "impure|in|initial|inner|input|loop|model|not|operator|or|outer|output|package|parameter|partial|protected|public|pure|"
+    "record|redeclare|replaceable|return|stream|then|true|type|when|while|within"
 )
 
 
@@ -61,7 +61,7 @@ def to_syntax_problem(file: str, line: int, message: str) -> Problem:
         return Problem(message, f"{file}:{line}")
     what = _LINE_BREAK.sub(" ", detail["what"])
     word = what.removeprefix("unexpected ").strip("`")
-    if word in _RESERVED and _is_in_place_of_name(word, message):
+    if _RESERVED.fullmatch(word) and _is_in_place_of_name(word, message):
         what = f"`{word}` is a reserved keyword in Modelica (MLS §2.3.3) and cannot be used as an identifier"
     return Problem(what, f"{file}:{detail['line']}")
 
