@@ -18,8 +18,9 @@ _DESCRIPTION = "plant_src/vehicle_files/summary.py:describe_vehicle"
 
 #: data of a vehicle, its centre of mass in the frame of the imported file (m), and warnings
 ImportedVehicle = tuple[dict[str, Any], list[float], list[str]]
-#: mass (kg), inertia (kg m2), parameters of the controller that flies a multirotor (or none), and probable mistakes
-VehicleSummary = tuple[float, Any, Mapping[str, Any], Sequence[Problem]]
+#: mass (kg), inertia (kg m2), parameters of the controller that flies a multirotor (or none), probable mistakes, and draught, top
+#: speed and sense of turning of a vessel in words
+VehicleSummary = tuple[float, Any, Mapping[str, Any], Sequence[Problem], Mapping[str, str]]
 #: properties by name, and variables of a vehicle in a scenario
 VehicleDescription = tuple[Mapping[str, str], Sequence[Variable]]
 
@@ -63,7 +64,7 @@ def examine_vehicle(data: Mapping[str, Any], name: str) -> VehicleSummary:
     """Read the data of a vehicle as a scenario does.
 
     Returns:
-        Mass, inertia, parameters of the controller that flies it, and warnings about probable mistakes.
+        Mass, inertia, parameters of the controller that flies it, warnings about probable mistakes, and properties of a vessel.
 
     Raises:
         InputError: With all problems of the data; the subject of each begins with "arguments" and continues with the path.

@@ -14,6 +14,7 @@ from ..catalogue import model_from_data
 from ..vehicles.model import Model
 from ..vehicles.multirotor.airframe import Airframe
 from ..vehicles.surface_vessel.surface_vessel import SurfaceVessel
+from .boat_performance import boat_properties
 from .plausibility import box_corners, vehicle_warnings
 
 #: length of the arrays of `multirotor_controller`, and smallest z component of the axes of rotors that it controls
@@ -28,12 +29,14 @@ class VehicleSummary(NamedTuple):
         inertia: Moments of inertia about x, y and z or the rows of the tensor; of a planar vessel the yaw inertia (kg m2).
         parameters: Parameters of `multirotor_controller` for a multirotor that it can fly; empty for other vehicles.
         warnings: Probable mistakes; the subject of each is "arguments" and the path in the vehicle file.
+        performance: Draught, top speed and sense of turning of a vessel in words, by name.
     """
 
     mass: float
     inertia: Any
     parameters: Mapping[str, Any]
     warnings: Sequence[Problem]
+    performance: Mapping[str, str]
 
 
 def examine_vehicle(data: Mapping[str, Any], name: str) -> VehicleSummary:
@@ -44,7 +47,8 @@ def examine_vehicle(data: Mapping[str, Any], name: str) -> VehicleSummary:
     """
     model = model_from_data(data, name)
     parameters = controller_parameters(model.airframe) if model.airframe else {}
-    return VehicleSummary(model.body.mass, _inertia(model), parameters, list(vehicle_warnings(model)))
+    performance = dict(boat_properties(model.boat)) if model.boat else {}
+    return VehicleSummary(model.body.mass, _inertia(model), parameters, list(vehicle_warnings(model)), performance)
 
 
 def describe_vehicle(data: Mapping[str, Any], name: str) -> tuple[Mapping[str, str], Sequence[Variable]]:
@@ -66,12 +70,12 @@ def describe_vehicle(data: Mapping[str, Any], name: str) -> tuple[Mapping[str, s
     if isinstance(model.boat, SurfaceVessel):
         hull = model.boat.hull
         hulls = f"{hull.count} of {_edges((hull.length, hull.beam, hull.depth))}"
-        properties["hulls"] = f"{hulls} (length, beam, depth), draught {model.boat.draught:.4g} m"
+        properties["hulls"] = f"{hulls} (length, beam, depth)"
     vehicle: Any = model.airframe or model.craft or model.boat
     for kind in ("rotors", "thrusters", "propellers", "rudders"):
         if parts := getattr(vehicle, kind, ()):
             properties[kind] = f"{len(parts)}: {', '.join(part.label for part in parts)}"
-    return properties, model.variables
+    return properties | (dict(boat_properties(model.boat)) if model.boat else {}), model.variables
 
 
 def _edges(lengths: Sequence[float]) -> str:

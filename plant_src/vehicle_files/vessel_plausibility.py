@@ -40,7 +40,7 @@ def boat_warnings(boat: Boat, corners: np.ndarray) -> Iterator[Problem]:
     propeller, path = boat.propellers[largest], ("propellers", str(largest))
     cause = _cause(propeller.max_speed, propeller.radius, (*path, "thrust_coefficient"), (*path, "max_speed"))
     yield from _thrust_warnings(sum(thrusts), boat.mass * _GRAVITY, MAX_VESSEL_THRUST, cause)
-    yield from _resistance_warnings(*_surge_damping(boat), *(each.advance_coefficient for each in boat.propellers))
+    yield from _resistance_warnings(*surge_damping(boat), *(each.advance_coefficient for each in boat.propellers))
     yield from _azimuth_warnings(boat.propellers)
     low, high = _bounds(boat, corners)
     yield from _position_warnings(boat, low, high)
@@ -80,7 +80,7 @@ def _thrust_warnings(thrust: float, weight: float, limit: float, cause: tuple[st
         yield warning(text + hint, *path)
 
 
-def _surge_damping(boat: Boat) -> tuple[float, float, float]:
+def surge_damping(boat: Boat) -> tuple[float, float, float]:
     """Return the linear, quadratic and cubic coefficient of the resistance in surge."""
     linear = float(boat.linear_damping[0, 0])
     if isinstance(boat, SurfaceVessel):

@@ -57,7 +57,7 @@ def command(name: str, base: str, directory: Path, urdf: Path | None, mesh: Path
 
 
 class _Vehicle(NamedTuple):
-    """Data of a vehicle; mass, inertia and centre of mass in words; parameters of its controller; probable mistakes."""
+    """Data of a vehicle; mass, inertia, centre of mass and performance in words; parameters of its controller; mistakes."""
 
     data: Mapping[str, Any]
     balance: str
@@ -82,13 +82,14 @@ def _vehicle(source: Document, name: str, urdf: Path | None, mesh: Path | None, 
             data, warnings = read[0], [*warnings, *read[2]]
             centre = ", ".join(f"{round(coordinate, 9) + 0.0:.4g}" for coordinate in read[1])
             balance += f", centre of mass [{centre}] m in {file.name}"
-        mass, inertia, parameters, found = examine_vehicle(data, name)
+        mass, inertia, parameters, found, performance = examine_vehicle(data, name)
     except InputError as error:
         raise InputError(
             [_located(problem, source, _imported(data, source, urdf or mesh)) for problem in error.problems]
         ) from None
     located = (_located(problem, source, _imported(data, source, urdf or mesh)) for problem in found)
     balance = f"mass {mass:.4g} kg, inertia {inertia} kg.m2{balance}"
+    balance += "".join(f"\n  {key:<12} {text}" for key, text in performance.items())
     return _Vehicle(data, balance, parameters, [*warnings, *map(str, located)])
 
 
