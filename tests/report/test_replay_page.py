@@ -288,7 +288,7 @@ NUMBERS = {
 }
 
 
-def test_tick_labels_are_complete(open_page, tmp_path):
+def test_tick_labels_are_complete_and_without_a_unit_there_is_no_label(open_page, tmp_path):
     time = np.linspace(0, 5, 101)
     columns = {name: low + (high - low) * np.sin(time) ** 2 for name, (low, high, _) in NUMBERS.items()}
     write_replay([Result(Recording(time, columns, {}), metadata={"name": "numbers"})], tmp_path / "numbers.html")
@@ -297,7 +297,7 @@ def test_tick_labels_are_complete(open_page, tmp_path):
         opened(f"cosimReplay.plots.add(['{name}'])")
         chart = "cosimReplay.plots.list.at(-1).chart"
         opened.until(f"{chart}.axes[1]._values?.length > 0")
-        assert opened(f"{chart}.axes[1]._values") == texts
+        assert opened(f"[{chart}.axes[1]._values, {chart}.axes[1].label]") == [texts, ""]
         widths = opened(f"{chart}.axes[1]._values.map((text) => {chart}.ctx.measureText(text).width)")
         assert opened(f"{chart}.axes[1]._size") > max(widths) + 5
 

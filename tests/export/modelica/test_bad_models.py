@@ -29,7 +29,18 @@ BAD = {
     "missing operand": (in_model("", "y = u + ;"), "M.mo:6: unexpected `;`"),
     "assignment in equation": (in_model("", "y := u;"), "M.mo:6: unexpected `y`"),
     "equation in algorithm": (in_model("", "algorithm\n  y = u;"), "M.mo:7: unexpected `=`"),
-    "keyword as name": (in_model("Real model;"), "M.mo:4: unexpected `model`"),
+    "keyword as name": (
+        in_model("Real model;"),
+        "M.mo:4: `model` is a reserved keyword in Modelica (MLS §2.3.3) and cannot be used as",
+    ),
+    "keyword as member": (
+        in_model("", "y = u.model;"),
+        "M.mo:6: `model` is a reserved keyword in Modelica (MLS §2.3.3) and cannot be used as an id",
+    ),
+    "missing semicolon before a class": (
+        in_model("partial model B\n  end B;\n  extends B\n  model A\n  end A;"),
+        "M.mo:7: unexpected `model`",
+    ),
     "unterminated string": (in_model('parameter String s = "abc;'), 'M.mo:4: unexpected `"`'),
     "unterminated comment": (in_model("/* comment"), "M.mo:4: unexpected `/`"),
     "bad number": (in_model("", "y = 1.2.3;"), "M.mo:6: unexpected `.3`"),

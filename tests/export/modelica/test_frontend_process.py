@@ -95,8 +95,8 @@ def test_a_file_that_is_too_large_or_no_text_is_refused(tmp_path, monkeypatch):
 
 def test_a_package_that_is_no_text_is_refused(tmp_path):
     (tmp_path / "P").mkdir()
-    (tmp_path / "P" / "package.mo").write_bytes(b"package P // \xe9\nend P;\n")
-    message = refusal(model(tmp_path, "  y = u;"))
+    (tmp_path / "P" / "package.mo").write_bytes(b"package P // \xe9\n constant Real k = 2;\nend P;\n")
+    message = refusal(model(tmp_path, "  y = P.k*u;"))
     assert message.startswith(f"{tmp_path}/P/package.mo:1: the file cannot be read: 'utf-8' codec")
 
 

@@ -42,13 +42,37 @@ _LOCATION_SUFFIX = re.compile(r"\[(?P<file>[^\[\]]+):(?P<line>\d+):\d+\]$")
 _PANIC = re.compile(
     r'detail: "(?P<what>[^"]+)", span: Span \{ source: SourceId\((?P<source>\d+)\), start: BytePos\((?P<start>\d+)\)'
 )
-_SYNTAX_ERROR = re.compile(r"×\s*(?P<what>.+?)\n.*?\[[^\]]*:(?P<line>\d+):\d+\]", re.DOTALL)
+_SYNTAX_ERROR = re.compile(r"×\s*(?P<what>.+?)\n[^\n]*╭─\[[^\]]*:(?P<line>\d+):\d+\]", re.DOTALL)
+_LINE_BREAK = re.compile(r"\s*\n[\s│]*")
+_EXPECTED = re.compile(r"help: expected one of: (?P<tokens>.*)", re.DOTALL)
+#: words that are no names (Modelica Language Specification 3.6, section 2.3.3)
+_RESERVED = re.compile(
+    "algorithm|and|annotation|block|break|class|connect|connector|constant|constrainedby|der|discrete|each|else|elseif|"
+    "elsewhen|encapsulated|end|enumeration|equation|expandable|extends|external|false|final|flow|for|function|if|import|"
+    "impure|in|initial|inner|input|loop|model|not|operator|or|outer|output|package|parameter|partial|protected|public|pure|"
+    "record|redeclare|replaceable|return|stream|then|true|type|when|while|within"
+)
 
 
 def to_syntax_problem(file: str, line: int, message: str) -> Problem:
     """Convert a syntax error."""
     detail = _SYNTAX_ERROR.search(message)
-    return Problem(detail["what"] if detail else message, f"{file}:{detail['line'] if detail else line}")
+    if not detail:
+        return Problem(message, f"{file}:{line}")
+    what = _LINE_BREAK.sub(" ", detail["what"])
+    word = what.removeprefix("unexpected ").strip("`")
+    if _RESERVED.fullmatch(word) and _is_in_place_of_name(word, message):
+        what = f"`{word}` is a reserved keyword in Modelica (MLS §2.3.3) and cannot be used as an identifier"
+    return Problem(what, f"{file}:{detail['line']}")
+
+
+def _is_in_place_of_name(word: str, message: str) -> bool:
+    """Return whether a word stands in a declaration after its type: a type may go on with "." or ".*", a term also with "+"."""
+    expected = _EXPECTED.search(message)
+    tokens = expected["tokens"].replace("\n", " ").split(", ") if expected else []
+    tokens = [token.strip() for token in tokens]
+    ends_declaration = re.search(rf"\b{word}\s*[;=(\[,\"]", message)
+    return "dotstar" in tokens and "+" not in tokens and ends_declaration is not None
 
 
 def to_problems(answer: Mapping[str, Any], name: str, path: Path, sources: ModelicaSources) -> list[Problem]:

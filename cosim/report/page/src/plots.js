@@ -25,9 +25,9 @@ const AXIS = {
   font: FONT, labelFont: FONT, labelSize: 14, labelGap: 0,
 };
 
-/** The axes of time and of values with a unit, which may be "". */
+/** The axes of time and of values with a unit, "" without a label. */
 function axes(unit) {
-  return [{ ...AXIS, size: 24, space: 70, label: "time (s)" }, { ...AXIS, size: room, space: 28, label: unit || "–" }];
+  return [{ ...AXIS, size: 24, space: 70, label: "time (s)" }, { ...AXIS, size: room, space: 28, label: unit }];
 }
 
 const JUMP = 5; // rad: larger differences of successive angles are turns
