@@ -32,7 +32,8 @@ def _turning_levers(boat: Boat) -> Iterator[tuple[str, float]]:
     for i, propeller in enumerate(boat.propellers, 1):
         yield f"propeller_speed[{i}] ({propeller.label})", turning_lever(boat, propeller)
     for i, rudder in enumerate(boat.rudders, 1):
-        yield f"rudder_angle[{i}] ({rudder.label})", rudder.position[0] - boat.centre_of_mass[0]
+        if rudder.max_angle > 0:  # no keel
+            yield f"rudder_angle[{i}] ({rudder.label})", rudder.position[0] - boat.centre_of_mass[0]
 
 
 def top_speed(boat: Boat) -> float:

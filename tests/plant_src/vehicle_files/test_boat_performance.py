@@ -55,3 +55,7 @@ def test_the_properties_name_the_inputs() -> None:
     properties = dict(boat_properties(shipped("cybership2")))
     assert properties["to port"] == "positive propeller_speed[2] (starboard), propeller_speed[3] (bow thruster)"
     assert properties["to starboard"] == "positive propeller_speed[1] (port), rudder_angle[1] (port), rudder_angle[2] (starboard)"
+
+
+def test_keels_turn_no_vessel() -> None:
+    assert dict(boat_properties(shipped("otter_measured")))["to port"] == "positive propeller_speed[2] (starboard)"
