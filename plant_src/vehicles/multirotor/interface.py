@@ -12,6 +12,7 @@ from dataclasses import replace
 from cosim.core.component import Variable
 from cosim.core.units import parse_unit
 
+from ..common.element_labels import element_labels
 from ..common.inertia import inertia_variables
 from ..common.interface import (
     CURRENT_INPUTS,
@@ -125,7 +126,7 @@ def _rotor_array(name: str, unit: str, description: str, values: Sequence[float]
 
 
 def _rotor_speed_variable(airframe: Airframe, slots: int) -> Variable:
-    labels = ", ".join(rotor.label for rotor in airframe.rotors)
+    labels = element_labels([rotor.label for rotor in airframe.rotors], slots, "rotor_count")
     text = f"commanded rotor speeds ({labels}), limited to 0 ... {airframe.max_rotor_speed:.4g} rad/s"
     unit, start = parse_unit("rad/s"), (0.0,) * slots
     return Variable("rotor_speed", "Float64", "input", start=start, unit=unit, shape=(slots,), description=text)

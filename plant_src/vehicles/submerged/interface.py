@@ -14,6 +14,7 @@ import numpy as np
 from cosim.core.component import Variable
 from cosim.core.units import parse_unit
 
+from ..common.element_labels import element_labels
 from ..common.inertia import inertia_variables
 from ..common.interface import (
     CURRENT_INPUTS,
@@ -112,7 +113,7 @@ def _thruster_array(name: str, unit: str, description: str, values: Sequence[flo
 
 
 def _thruster_speed_variable(craft: Craft, slots: int) -> Variable:
-    labels = ", ".join(thruster.label for thruster in craft.thrusters)
+    labels = element_labels([thruster.label for thruster in craft.thrusters], slots, str(slots))
     limit = f"{craft.max_thruster_speed:.4g}"
     text = f"commanded thruster speeds ({labels}), limited to -{limit} ... {limit} rad/s"
     unit, start = parse_unit("rad/s"), (0.0,) * slots

@@ -13,6 +13,7 @@ from dataclasses import dataclass
 from cosim.core.component import Variable
 from cosim.core.units import parse_unit
 
+from ..common.element_labels import element_labels
 from ..common.interface import parameter
 from ..common.shapes import Vector
 
@@ -130,10 +131,12 @@ def _array(name: str, unit: str, description: str, values: Sequence[float], slot
 
 def actuator_inputs(propellers: Sequence[Propeller], rudders: Sequence[Rudder], slots: tuple[int, int]) -> Iterator[Variable]:
     """Yield the commands; a vessel without azimuth thrusters or rudders, and without slots for more, has no such commands."""
-    labels, angles = (", ".join(element.label for element in kind) for kind in (propellers, rudders))
+    labels = element_labels([each.label for each in propellers], slots[0], "propeller_count")
+    angles = element_labels([each.label for each in rudders], slots[1], "rudder_count")
     yield _command("propeller_speed", "rad/s", f"commanded propeller speeds ({labels})", slots[0])
     if slots[0] > len(propellers) or any(propeller.max_azimuth for propeller in propellers):
-        yield _command("azimuth", "rad", f"azimuth angles ({labels}); positive: the thrust turns to port", slots[0])
+        text = f"azimuth angles ({labels}), without lag; positive: the thrust turns to port, at the stern the bow to starboard"
+        yield _command("azimuth", "rad", text, slots[0])
     if slots[1]:
         text = f"rudder angles ({angles}); positive: trailing edge to starboard, bow to starboard, yaw decreases"
         yield _command("rudder_angle", "rad", text, slots[1])
