@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 import time
-from collections.abc import Iterable, Sequence
-from typing import TYPE_CHECKING
+from collections.abc import Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -53,10 +53,23 @@ def print_trial(result: TrialResult, candidate: str) -> None:
         _print_not_applicable(result)
         return
     print_outcome(result.outcome)
+    is_verbose = current_command_line().verbosity > 0
     if result.outcome.code and result.trial.ignored_settings:
         click.echo(f"        ignored settings: {', '.join(result.trial.ignored_settings)}")
-    if current_command_line().verbosity > 0:
+    if (result.outcome.code or is_verbose) and (text := settings_text(result.trial.applied_settings)):
+        click.echo(f"        settings applied: {text}")
+    if is_verbose:
         print_comparison(result.rows(), candidate)
+
+
+def settings_text(settings: Mapping[str, Mapping[str, Any]]) -> str:
+    """Return the values of each variable of the candidate ("landing_time = 5.0"); several if its components differ."""
+    from ..scenario.variable_values import quote_value
+
+    values: dict[str, dict[str, None]] = {}
+    for name, value in (item for each in settings.values() for item in each.items()):
+        values.setdefault(name, {})[quote_value(value)] = None
+    return ", ".join(f"{name} = {' or '.join(texts)}" for name, texts in values.items())
 
 
 def _print_not_applicable(result: TrialResult) -> None:

@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..studies.regression import CommandRunner, Regression, RegressionOutcome
 from ..studies.regression_runs import run_in_parallel
-from .bench_notes import summarize_omissions
+from .bench_notes import settings_text, summarize_omissions
 from .commands.regress import EXIT_CODE_SEVERITY
 
 if TYPE_CHECKING:
@@ -34,6 +34,7 @@ class ControllerTrial:
         original: the original scenario.
         own_name: name of the controller of the original scenario.
         ignored_settings: variables that the scenario sets and the candidate lacks, such as "vtol.landing_time".
+        applied_settings: values that the scenario gives the candidate, by component and the candidate's own variable.
         kpi_descriptions: meanings of the KPI values (see `describe_kpis`).
         candidate_folder: output directory of the scenario with the candidate.
         shipped_folder: output directory of the original scenario.
@@ -44,6 +45,7 @@ class ControllerTrial:
     original: Path
     own_name: str
     ignored_settings: Sequence[str]
+    applied_settings: Mapping[str, Mapping[str, Any]]
     kpi_descriptions: Mapping[str, str]
     candidate_folder: Path
     shipped_folder: Path
@@ -101,7 +103,8 @@ class TrialResult:
         candidate = RunKpis.read(self.trial.candidate_folder) if self.outcome.code in (0, 3) else None
         checks = json.loads(self.trial.file.read_text(encoding="utf-8-sig"))["checks"]
         shipped = RunKpis.read(self.trial.shipped_folder)
-        return ScenarioKpis(candidate, shipped, checks, self.is_applicable, self.trial.own_name, self.trial.kpi_descriptions)
+        about = self.trial.own_name, self.trial.kpi_descriptions, settings_text(self.trial.applied_settings)
+        return ScenarioKpis(candidate, shipped, checks, self.is_applicable, *about)
 
     def as_json(self) -> dict[str, Any]:
         """Return the result as JSON."""
@@ -112,6 +115,7 @@ class TrialResult:
             "seconds": self.outcome.seconds,
             "problems": self.outcome.details,
             "ignored_settings": list(self.trial.ignored_settings),
+            "applied_settings": self.trial.applied_settings,
             "kpis": [_row_as_json(row) for row in self.rows()],
         }
 

@@ -109,7 +109,7 @@ def lazy(folder):
 
 def test_another_build_of_the_shipped_controller_is_neither_better_nor_worse(folder):
     done = bench(folder, ROOT / "fmus/python/strider_autopilot.fmu", "--json")
-    assert done.returncode == 0, done.stdout + done.stderr
+    assert done.returncode == 0
     (sail,) = json.loads(done.stdout)["scenarios"]
     assert len(sail["kpis"]) == 5
     assert all(kpi["against_shipped"] == "" for kpi in sail["kpis"])
@@ -197,6 +197,19 @@ def test_entries_about_missing_variables_are_removed_and_noted(folder):
     assert written["components"]["usv"] == {"parameters": {}, "python": f"{folder / 'keeper.py'}:Keeper"}
     assert [kpi["name"] for kpi in written["kpis"]] == ["waypoints"]
     assert "reference" not in written
+
+
+def test_settings_that_the_scenario_gives_the_controller_are_listed(folder):
+    variability = "__import__('pythonfmu').Fmi2Variability.tunable"
+    declared = f"Real('speed_command', causality=Fmi2Causality.parameter, variability={variability})"
+    candidate = keeper(folder, first=f"self.speed_command = 0.5; self.register_variable({declared})")
+    applied = "speed_command = 1.0"
+    done = bench(folder, candidate)
+    assert f"\n        settings applied: {applied}\n" in done.stdout.partition("FAILED  sail")[2], done.stdout + done.stderr
+    page = (folder / "runs/bench/vessel_autopilot/bench.html").read_text()
+    assert f"Settings applied to Keeper: {applied}." in page
+    (scenario,) = json.loads(bench(folder, candidate, "--json").stdout)["scenarios"]
+    assert scenario["applied_settings"] == {"usv": {"speed_command": 1.0}}
 
 
 def test_notes_of_several_scenarios_stand_once_after_the_ranking(folder):

@@ -57,8 +57,9 @@ _COSTS_FILE = "costs.json"
 )
 @click.option("--jobs", type=click.IntRange(min=1), help="Number of scenarios at a time; default: one per processor.")
 @json_option(
-    "an object with candidate, role, ranking, scenarios (name, applicable, code, seconds, problems, ignored_settings, kpis) and "
-    "notes; of several controllers: role, reference and controllers, objects with the same keys, cost (s per step) and cost_ratio"
+    "an object with candidate, role, ranking, scenarios (name, applicable, code, seconds, problems, ignored_settings, "
+    "applied_settings, kpis) and notes; of several controllers: role, reference and controllers, objects with the same keys, "
+    "cost (s per step) and cost_ratio"
 )
 def command(
     controllers: tuple[str, ...],
@@ -75,7 +76,8 @@ def command(
     CONTROLLER is an FMU, my.py:Class, my.mo:Model or the JSON file of a nested system. It replaces the scenario's own controller,
     which is the one that the scenario file contains. The summary ranks both by passed checks, then by the goals of the role. The
     page bench.html in the output directory shows the checked KPIs and goals. --verbose prints tables that compare all KPIs with
-    those of the scenario's own controller and of the candidate's last run.
+    those of the scenario's own controller and of the candidate's last run, and the settings that each scenario gives the
+    controller (without it, of failed scenarios only).
 
     Several controllers, or those of --all, are shown side by side, with the processor time per step of each. A scenario that
     does not feed an input of the controller is not applicable ("n/a") and does not count. Exit code 0: all checks passed; 1: a
@@ -255,6 +257,7 @@ def _write_scenarios(controller: str, role_name: str, files: Sequence[Path], fol
             ignored = list(dict.fromkeys(each.lacking for each in substitution.omissions if not each.entry))
             meanings = describe_kpis(json.loads(path.read_text(encoding="utf-8"))["kpis"], path.parent)
             about = {"own_name": own_name, "ignored_settings": ignored, "kpi_descriptions": meanings}
+            about["applied_settings"] = substitution.applied_settings
             written.append({"file": path, "original": file, "component": places[0], **about})
             omissions += [{"scenario": file.stem, **asdict(each)} for each in dict.fromkeys(substitution.omissions)]
     if not written:
@@ -273,6 +276,7 @@ def _make_trials(
             Path(each["original"]),
             each["own_name"],
             each["ignored_settings"],
+            each["applied_settings"],
             each["kpi_descriptions"],
             folder / file.stem,
             shipped / file.stem,

@@ -72,7 +72,10 @@ def write_bench_page(
         reference: name of the controller whose cost is 1; "": the costs were not measured.
         reference_cost: its processor time per step (s).
     """
-    scenarios = [(name, run.own_name, list(_kpi_rows(name, controllers))) for name, run in controllers[0].scenarios.items()]
+    scenarios = [
+        (name, run.own_name, _settings(name, controllers), list(_kpi_rows(name, controllers)))
+        for name, run in controllers[0].scenarios.items()
+    ]
     text = render_page(
         "bench.html",
         role=Path(role).stem,
@@ -83,11 +86,20 @@ def write_bench_page(
         different_totals=have_different_totals(controllers),
         columns=[each.name for each in controllers],
         scenarios=scenarios,
-        meanings=_meanings(row for _, _, rows in scenarios for row in rows),
+        meanings=_meanings(row for *_, rows in scenarios for row in rows),
         version=__version__,
     )
     with writing_atomically(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
+
+
+def _settings(scenario: str, controllers: Sequence[BenchedController]) -> dict[str, list[str]]:
+    """Return the names of the controllers by the settings that the scenario gives them."""
+    names: dict[str, list[str]] = {}
+    for each in controllers:
+        if text := each.scenarios[scenario].settings:
+            names.setdefault(text, []).append(each.name)
+    return names
 
 
 class KpiRow(NamedTuple):

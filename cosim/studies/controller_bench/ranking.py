@@ -16,7 +16,8 @@ class ScenarioKpis:
     """KPIs of both controllers in a scenario (None: the run did not reach its end), and the checks of the scenario.
 
     `is_applicable` is False if the scenario does not feed an input of the candidate. `own_name` is the name of the controller
-    that the scenario contains, such as "ar_drone_cascaded". `descriptions` are the meanings of KPI values (see `describe_kpis`).
+    that the scenario contains, such as "ar_drone_cascaded". `descriptions` are the meanings of KPI values (see `describe_kpis`),
+    `settings` the values that the scenario gives the candidate ("landing_time = 5.0").
     """
 
     candidate: RunKpis | None
@@ -25,6 +26,7 @@ class ScenarioKpis:
     is_applicable: bool = True
     own_name: str = ""
     descriptions: Mapping[str, str] = field(default_factory=dict)
+    settings: str = ""
 
 
 @dataclass

@@ -10,6 +10,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -30,10 +31,12 @@ class NewName(NamedTuple):
     Attributes:
         name: the name.
         lacking: variable of the candidate that does not exist, such as "vtol.landing_time"; "": the name is valid.
+        own: full name of the component that is the candidate, and its variable; None: the name is of something else.
     """
 
     name: str
     lacking: str = ""
+    own: tuple[str, str] | None = None
 
 
 #: returns the new name for a name of the unchanged system
@@ -73,6 +76,7 @@ class ControllerSubstitution:
         parameters: parameters of the candidate in addition to those of the scenario.
         replaced_components: names of the replaced controllers, such as "ar_drone_cascaded", by the full names of the components.
         omissions: removed entries.
+        applied_settings: values that the candidate gets, by the full names of its components and its own variables.
     """
 
     role: Role
@@ -82,6 +86,7 @@ class ControllerSubstitution:
     parameters: Mapping[str, Any] = field(default_factory=dict)
     replaced_components: dict[str, str] = field(default_factory=dict)
     omissions: list[Omission] = field(default_factory=list)
+    applied_settings: dict[str, dict[str, Any]] = field(default_factory=dict)
     _folder: Path = field(init=False)
 
     def write(self, folder: Path) -> Path | None:
@@ -119,12 +124,15 @@ class ControllerSubstitution:
         def renamed(name: str) -> NewName:
             component, _, rest = name.partition(".")
             new = maps[component](rest) if component in maps and rest else NewName(rest)
-            return NewName(f"{component}.{new.name}" if rest else name, new.lacking)
+            return NewName(f"{component}.{new.name}" if rest else name, new.lacking, new.own)
 
         for name in maps:
-            parameters = self._known_settings(maps[name], components[name].get("parameters", {}), f"{name}.")
+            given = components[name].get("parameters", {})
+            parameters = self._known_settings(maps[name], given, f"{name}.")
             own = self.parameters if f"{prefix}{name}" in self.replaced_components else {}
             components[name] = {**components[name], "parameters": {**parameters, **own}}
+            self._note_applied({maps[name](each).own: given[each] for each in given})
+            self._note_applied({(f"{prefix}{name}", each): own[each] for each in own})
         connections = [
             {**each, "to": new} for each in value.get("connections", []) if (new := self._kept_name(renamed, each["to"]))
         ]
@@ -137,7 +145,7 @@ class ControllerSubstitution:
         path = (folder / _reference_file(spec[kind])).resolve()
         if path in self.role.controllers:
             self.replaced_components[full_name] = path.stem
-            maps[name] = self._candidate_name
+            maps[name] = partial(self._candidate_name, full_name)
             return {**self.candidate.entry, **{key: spec[key] for key in ("period", "parameters") if key in spec}}
         system = self.role.stand_ins.get(path, path if kind == "system" else None)
         nested = self._substitute_nested(system, full_name) if system else None
@@ -146,12 +154,17 @@ class ControllerSubstitution:
         changed, maps[name] = nested
         return {key: value for key, value in spec.items() if key not in (kind, "isolation")} | {"system": str(changed)}
 
-    def _candidate_name(self, name: str) -> NewName:
+    def _note_applied(self, settings: Mapping[tuple[str, str] | None, Any]) -> None:
+        for own, value in settings.items():
+            if own:
+                self.applied_settings.setdefault(own[0], {})[own[1]] = value
+
+    def _candidate_name(self, component: str, name: str) -> NewName:
         """Return the candidate's name of a variable: a parameter of the role may lack its prefix."""
         if self.interface.has_variables(name):
-            return NewName(name)
+            return NewName(name, own=(component, name))
         short = self.role.short_names.get(name, "")
-        return NewName(short) if short in self.interface.parameters else NewName(name, name)
+        return NewName(short, own=(component, short)) if short in self.interface.parameters else NewName(name, name)
 
     def _substitute_nested(self, file: Path, full_name: str) -> tuple[Path, NameMap] | None:
         """Write a nested system with the candidate; return its path and name map, or None if no component has the role."""
@@ -162,12 +175,16 @@ class ControllerSubstitution:
         ports, lost = self._prune_ports(value.get("ports", {}), renamed)
         path = self._folder / "systems" / f"{self.file.stem}.{full_name}.json"
         write_json({**value, "ports": ports}, path)
-        shown = {port for kind in ports.values() for port in kind}
+        shown = {
+            port: inner for kind, named in value.get("ports", {}).items() for port, inner in named.items() if port in ports[kind]
+        }
 
         def renamed_outside(name: str) -> NewName:
             port = _SEPARATOR.split(name, 1)[0]
             if port in shown:
-                return NewName(name)
+                inner = [shown[port]] if isinstance(shown[port], str) else shown[port]
+                targets = [renamed(each + name[len(port) :]).own for each in inner]
+                return NewName(name, own=next(filter(None, targets), None))
             return NewName(name, lost[port]) if port in lost else renamed(name)
 
         return path, renamed_outside

@@ -88,6 +88,27 @@ def test_other_json_is_skipped_and_an_invalid_scenario_is_refused(tmp_path):
         ControllerSubstitution(role, candidate, shape, tmp_path / "bad.json").write(tmp_path / "out")
 
 
+def test_settings_are_listed_with_the_names_of_the_candidate(tmp_path):
+    """The scenario sets the port `landing_time` of a nested system; the candidate declares it without the prefix of the role."""
+    declared = 'Real("landing_time", causality=Fmi2Causality.parameter, variability="tunable", start=8.0)'
+    lander = BARE.replace(
+        "        for i in", f"        self.landing_time = 8.0\n        self.register_variable({declared})\n        for i in"
+    )
+    (tmp_path / "bare.py").write_text(
+        lander.replace('variability="tunable"', "variability=Fmi2Variability.tunable").replace(
+            "Slave,", "Slave, Fmi2Variability,"
+        )
+    )
+    candidate = parse_source(f"{tmp_path / 'bare.py'}:Bare")
+    scenario = ROOT / "scenarios/performance_5.json"
+    substitution = ControllerSubstitution(read_role("uav_controller"), candidate, read_interface(candidate), scenario)
+    path = substitution.write(tmp_path / "out")
+    assert path is not None
+    given = json.loads(scenario.read_text())["components"]["demo1"]["parameters"]["landing_time"]
+    (settings,) = substitution.applied_settings.values()
+    assert settings["landing_time"] == given
+
+
 def test_ports_without_a_target_are_removed_with_their_settings(tmp_path):
     """The candidate has no parameter `landing_time`, which is a port of the nested system around it."""
     keeper = tmp_path / "bare.py"
