@@ -88,7 +88,7 @@ class ComponentFactory:
 
     def _build_modelica(self, folder: Path, spec: ComponentSpec) -> Path:
         """Return the FMU of "file.mo:Model", from the user's cache if source and tools are unchanged."""
-        from ..export.build import cached_fmu
+        from ..export.build import cached_fmu, packed_modelica_files
 
         reference = spec.modelica or ""
         file, _, model = reference.rpartition(":")
@@ -97,4 +97,6 @@ class ComponentFactory:
         if not is_file(folder / file):
             raise InputError(f'file "{file}" does not exist{nearest_file(folder / file)}')
         self.modelica_files.append(folder / file)
-        return cached_fmu(folder / file, model, [folder / library for library in spec.libraries])
+        fmu = cached_fmu(folder / file, model, [folder / library for library in spec.libraries])
+        self.modelica_files += packed_modelica_files(folder / file, fmu)
+        return fmu

@@ -159,7 +159,9 @@ class PreparedRun:
         modules = (spec.python.rpartition(":")[0] for spec in calls)
         functions = (self.root.folder / module for module in modules if module.endswith(".py"))
         factory, folder = self.component_factory, self.root.folder.resolve()
-        data = {file.resolve() for file in (*own, *(path for path, _ in factory.fmus), *factory.modelica_files)}
+        cache = resources.cache_directory()  # FMUs of Modelica sources, whose files are named themselves
+        fmus = (path for path, _ in factory.fmus if not path.is_relative_to(cache))
+        data = {file.resolve() for file in (*own, *fmus, *factory.modelica_files)}
         files = data | package_files((*functions, *factory.python_files))
         return {_name_of_file(str(file), str(folder), _shipped()): file for file in sorted(files, key=str)}
 

@@ -349,7 +349,8 @@ def test_info_describes_a_vehicle_file(tmp_path):
     assert done.stderr == ""
     for line in ("family        surface_vessel", "mass          18 kg", "propellers    2: port, starboard"):
         assert f"{line}\n" in done.stdout
-    assert "hulls         2 of 1.04 x 0.12 x 0.29 m (length, beam, depth), draught 0.09745 m\n" in done.stdout
+    assert "hulls         2 of 1.04 x 0.12 x 0.29 m (length, beam, depth)\n" in done.stdout
+    assert "draught       0.09745 m\n" in done.stdout
     assert "boxes         1.19 x 0.912 x 0.42 m" in done.stdout
     assert "\n  propeller_speed   Float64[2]   rad/s" in done.stdout
     (tmp_path / "boat.json").write_text('{"family": "surface_vessl"}')

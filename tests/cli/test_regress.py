@@ -5,8 +5,12 @@ import re
 from pathlib import Path
 
 import pytest
+from click.testing import CliRunner
 from cosim_command import run_cosim
 from lxml import etree
+
+from cosim.cli.commands import regress as regress_command
+from cosim.studies.regression import RegressionOutcome
 
 COOLING = """
 import os
@@ -154,6 +158,14 @@ def test_a_missing_reference_is_reported_with_a_hint(folder):
     done = regress(folder, "scenarios/cooling.json")
     assert done.returncode == 2
     assert 'cooling.csv" does not exist: `cosim regress --update` writes it' in done.stdout
+
+
+def test_a_folder_without_scenarios_is_told_that_the_shipped_ones_are_run(folder, monkeypatch):
+    """With the outcome of one of them, because all of them take long."""
+    monkeypatch.chdir(folder / "scenarios")
+    outcome = RegressionOutcome("demo1_box", 0, "5 checks")
+    monkeypatch.setattr(regress_command, "run_regressions", lambda folders, *_: [outcome] if folders[0].is_absolute() else [])
+    assert "no folder scenarios/ here: the shipped scenarios are run\n" in CliRunner().invoke(regress_command.command).stderr
 
 
 def test_missing_and_unreadable_scenarios_are_refused(folder):

@@ -90,7 +90,7 @@ def command(
             )
         if problems := check_fmus(root):
             raise CheckError("\n".join(map(str, problems)))
-        click.echo("every FMU is up to date with its source")
+        click.echo("every FMU of cosim is up to date with its source")
         return 0
     for source in files:
         if source.suffix == ".json" and source.is_file():
