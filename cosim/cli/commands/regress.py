@@ -41,10 +41,10 @@ def command(
 ) -> int:
     """Run all scenarios that have checks or a reference, and compare their results with these.
 
-    SCENARIO is a file or the name of a shipped scenario; DIR stands for its files *.json; default: the folder scenarios/, or without
-    it the shipped ones. Each scenario runs as with `cosim run --no-report`. FMUs are taken as they are: export a changed controller
-    first. --update writes the references: the signals matched by the patterns of their tolerances, with as few rows as necessary,
-    and a JSON file with their origin. A run that fails its checks does not become a reference.
+    SCENARIO is a file or the name of a shipped scenario; DIR stands for its files *.json; default: the folder scenarios/, or
+    without it the shipped ones. Each scenario runs as with `cosim run --no-report`. FMUs are taken as they are: export a changed
+    controller first. --update writes the references: the signals matched by the patterns of their tolerances, with as few rows
+    as necessary, and a JSON file with their origin. A run that fails its checks does not become a reference.
 
     Exit code 0: all passed; 1: a component failed; 2: a scenario was refused; 3: a check or comparison failed.
     """
