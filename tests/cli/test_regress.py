@@ -94,6 +94,10 @@ def test_a_changed_result_fails_with_signal_time_and_changes(folder):
     suite = etree.parse(folder / "out/junit.xml").getroot().find("testsuite")
     assert (suite.get("tests"), suite.get("failures"), suite.get("errors")) == ("1", "1", "0")
     assert "leaves its tube" in suite.find("testcase[@name='cooling']/failure").text
+    scenario(folder, rate=0.1, reference=REFERENCE, **CHECK)
+    assert regress(folder).returncode == 3
+    page = (folder / "runs/cooling/report.html").read_text()
+    assert "✗ Comparison with the reference: 1 of 1 signal failed; 1 of 1 check failed</p>" in page
     scenario(folder, reference=REFERENCE)
     assert regress(folder).returncode == 0
     assert not (folder / "runs/cooling/tubes.png").exists()
