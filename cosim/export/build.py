@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import zipfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from hashlib import sha256
@@ -111,15 +110,6 @@ def build_to(
             raise InputError(Problem("only parameters of Modelica models can be set when building", str(source)))
         export_source(classified, {fmi_version: target}, model, ModelicaOptions(library_path, values or {}))
     return target
-
-
-def packed_modelica_files(source: Path, fmu: Path) -> list[Path]:
-    """Return a Modelica file and the files of packages from which its FMU was built, as far as the FMU contains them."""
-    from .modelica.frontend.rumoca_frontend import readable_files
-
-    with zipfile.ZipFile(fmu) as archive:
-        packed = tuple(name.removeprefix("resources") for name in archive.namelist() if name.startswith("resources/"))
-    return [file for file in readable_files(source) if file == source.resolve() or file.as_posix().endswith(packed)]
 
 
 def cached_fmu(source: Path, model: str | None, library_path: Sequence[Path] = ()) -> Path:

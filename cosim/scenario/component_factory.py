@@ -40,6 +40,8 @@ class ComponentFactory:
         #: source files of the components made so far
         self.python_files: list[Path] = []
         self.modelica_files: list[Path] = []
+        #: Modelica file of each FMU in the user's cache, by the resolved path of the FMU
+        self.cached_fmus: dict[Path, Path] = {}
 
     def create(self, node: Node, name: str, values: Mapping[str, Any]) -> Component:
         """Create the component `name` of the system `node`.
@@ -88,7 +90,7 @@ class ComponentFactory:
 
     def _build_modelica(self, folder: Path, spec: ComponentSpec) -> Path:
         """Return the FMU of "file.mo:Model", from the user's cache if source and tools are unchanged."""
-        from ..export.build import cached_fmu, packed_modelica_files
+        from ..export.build import cached_fmu
 
         reference = spec.modelica or ""
         file, _, model = reference.rpartition(":")
@@ -98,5 +100,5 @@ class ComponentFactory:
             raise InputError(f'file "{file}" does not exist{nearest_file(folder / file)}')
         self.modelica_files.append(folder / file)
         fmu = cached_fmu(folder / file, model, [folder / library for library in spec.libraries])
-        self.modelica_files += packed_modelica_files(folder / file, fmu)
+        self.cached_fmus[resolve_path(fmu)] = folder / file
         return fmu

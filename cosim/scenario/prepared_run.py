@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
@@ -159,9 +159,8 @@ class PreparedRun:
         modules = (spec.python.rpartition(":")[0] for spec in calls)
         functions = (self.root.folder / module for module in modules if module.endswith(".py"))
         factory, folder = self.component_factory, self.root.folder.resolve()
-        cache = resources.cache_directory()  # FMUs of Modelica sources, whose files are named themselves
-        fmus = (path for path, _ in factory.fmus if not path.is_relative_to(cache))
-        data = {file.resolve() for file in (*own, *fmus, *factory.modelica_files)}
+        fmus = (path for path, _ in factory.fmus if path not in factory.cached_fmus)
+        data = {file.resolve() for file in (*own, *fmus, *_modelica_files(factory))}
         files = data | package_files((*functions, *factory.python_files))
         return {_name_of_file(str(file), str(folder), _shipped()): file for file in sorted(files, key=str)}
 
@@ -184,6 +183,16 @@ class PreparedRun:
     def free(self) -> None:
         """Free the components of a scenario that is not simulated."""
         free_components(self.system.components)
+
+
+def _modelica_files(factory: ComponentFactory) -> Iterator[Path]:
+    """Yield the Modelica sources of components, and the files of packages from which FMUs in the user's cache were built."""
+    yield from factory.modelica_files
+    if factory.cached_fmus:
+        from ..export.modelica.frontend.rumoca_frontend import needed_files
+
+        for source in factory.cached_fmus.values():
+            yield from needed_files(source)
 
 
 def _shipped() -> str:

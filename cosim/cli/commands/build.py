@@ -99,17 +99,22 @@ def command(
             read_vehicle_file(source, examine_vehicle)
     if output is not None:
         _build_one(named, output, int(fmi_version), modelica_compiler, include, library, values)
-    elif fmi_version != "2":
-        raise InputError("--fmi requires --output: fmus/ contains FMUs of both FMI versions")
-    elif values:
-        raise InputError("--set requires --output: the FMUs in fmus/ have the values of their sources")
-    elif include:
-        raise InputError("--include requires --output: the FMUs in fmus/ contain the files that their sources import")
-    elif modelica_compiler != "cosim":
-        raise InputError("--modelica-compiler omc requires --output: the FMUs in fmus/ are built by the compiler of cosim")
     else:
+        _refuse_options_of_one_source(fmi_version, modelica_compiler, include, values)
         build(files or None, root, _print_built)
     return 0
+
+
+def _refuse_options_of_one_source(fmi: str, modelica_compiler: str, include: Sequence[Path], values: Sequence[str]) -> None:
+    """Raise InputError for an option that is valid with --output only."""
+    if fmi != "2":
+        raise InputError("--fmi requires --output: fmus/ contains FMUs of both FMI versions")
+    if values:
+        raise InputError("--set requires --output: the FMUs in fmus/ have the values of their sources")
+    if include:
+        raise InputError("--include requires --output: the FMUs in fmus/ contain the files that their sources import")
+    if modelica_compiler != "cosim":
+        raise InputError("--modelica-compiler omc requires --output: the FMUs in fmus/ are built by the compiler of cosim")
 
 
 def _build_one(

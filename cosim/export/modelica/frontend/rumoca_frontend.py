@@ -206,6 +206,12 @@ def readable_files(path: Path) -> list[Path]:
     return _with_package_files(path, find_packages(path, read_source(path)))
 
 
+def needed_files(path: Path) -> list[Path]:
+    """Return a Modelica file and the files of packages that its classes need; see `select_used_files`."""
+    path = path.resolve()
+    return select_used_files(path, find_packages(path, read_source(path)))
+
+
 def _with_package_files(path: Path, packages: Sequence[Path]) -> list[Path]:
     return [path, *(file for package in packages for file in sorted(package.rglob("*.mo")) if file != path)]
 

@@ -1,4 +1,4 @@
-/* made from sources f42531def6dadf1273d861fbcf205b25f8af1705d987861cfd44ba5b1467a4bb
+/* made from sources b0c9fe1a03dc72949514f45a8cb47dccd0ad83fcc3f38229273053d3dcf58c93
 
 three
 
