@@ -1,6 +1,9 @@
-"""Build steps beyond pyproject.toml: the optional extension modules and the bundle of shipped files.
+"""Build steps beyond pyproject.toml.
 
-The wheel carries scenarios, FMUs, plant and controller sources as cosim/_bundle/ in the layout of the checkout.
+The optional extension modules and the bundle of shipped files.
+
+The wheel carries scenarios, FMUs, plant and controller sources as cosim/_bundle/ in the layout of
+the checkout.
 """
 
 import os
@@ -24,16 +27,28 @@ class BuildWithBundle(build_py):
             return
         for name in BUNDLED:
             target = Path(self.build_lib) / "cosim" / "_bundle" / name
-            shutil.copytree(name, target, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__"))
+            shutil.copytree(
+                name, target, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__")
+            )
 
 
 def extension(name: str) -> Extension:
-    """Extension that is optional unless COSIM_REQUIRE_NATIVE is set; without it cosim runs slower, in pure Python."""
+    """Extension that is optional unless COSIM_REQUIRE_NATIVE is set.
+
+    Without it cosim runs slower, in pure Python.
+    """
     optional = not os.environ.get("COSIM_REQUIRE_NATIVE")
     flags = [] if sys.platform == "win32" else ["-std=c11", "-O2", "-ffp-contract=off"]
     libraries = [] if sys.platform == "win32" else ["m"]
     source = f"{name.replace('.', '/')}.c"
-    return Extension(name, [source], extra_compile_args=flags, libraries=libraries, py_limited_api=True, optional=optional)
+    return Extension(
+        name,
+        [source],
+        extra_compile_args=flags,
+        libraries=libraries,
+        py_limited_api=True,
+        optional=optional,
+    )
 
 
 #: modules in C; the last one reads the state of a Linux process

@@ -1,14 +1,17 @@
 """KPIs of any signal, for every scenario.
 
-    {"name": "altitude_error", "python": "cosim.kpis:rms", "arguments": {"signal": "plant.uav.position.z", "target": 2.0}}
+    {"name": "altitude_error", "python": "cosim.kpis:rms", "arguments": {"signal":
+    "plant.uav.position.z", "target": 2.0}}
 
-Each function returns one number with the name `value`, NaN if it is undefined. Its unit is that of the signal unless stated
-otherwise. Signals are interpolated linearly between rows; integrals use the trapezoidal rule.
+Each function returns one number with the name `value`, NaN if it is undefined. Its unit is that of
+the signal unless stated otherwise. Signals are interpolated linearly between rows; integrals use
+the trapezoidal rule.
 
 Arguments that several functions have:
     result: The recorded run.
     signal: Name of a recorded signal.
-    target: A number, or the name of another signal. The error is signal - target; without a target it is the signal itself.
+    target: A number, or the name of another signal. The error is signal - target; without a target
+        it is the signal itself.
     start: Time (s) of the first row that counts, by default the first row.
     stop: Time (s) of the last row that counts, by default the last row.
 """
@@ -39,7 +42,11 @@ FOREVER = math.inf
 @units(value="{signal}")
 @no_value("no rows from start to stop, or {signal} is NaN")
 def rms(
-    result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
+    result: Result,
+    signal: Signal,
+    target: Signal | float = 0.0,
+    start: float = -FOREVER,
+    stop: float = FOREVER,
 ) -> dict[str, float]:
     """Return the root mean square of the error over time."""
     time, error = control_error(result, signal, target, start, stop)
@@ -49,7 +56,11 @@ def rms(
 @units(value="{signal}")
 @no_value("no rows from start to stop, or {signal} is NaN")
 def mean(
-    result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
+    result: Result,
+    signal: Signal,
+    target: Signal | float = 0.0,
+    start: float = -FOREVER,
+    stop: float = FOREVER,
 ) -> dict[str, float]:
     """Return the mean of the error over time."""
     return {"value": time_average(*control_error(result, signal, target, start, stop))}
@@ -58,7 +69,11 @@ def mean(
 @units(value="{signal}")
 @no_value("no rows from start to stop, or {signal} is NaN")
 def maximum(
-    result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
+    result: Result,
+    signal: Signal,
+    target: Signal | float = 0.0,
+    start: float = -FOREVER,
+    stop: float = FOREVER,
 ) -> dict[str, float]:
     """Return the maximum of the error, a signed number."""
     _, error = control_error(result, signal, target, start, stop)
@@ -68,7 +83,11 @@ def maximum(
 @units(value="{signal}")
 @no_value("no rows from start to stop, or {signal} is NaN")
 def minimum(
-    result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
+    result: Result,
+    signal: Signal,
+    target: Signal | float = 0.0,
+    start: float = -FOREVER,
+    stop: float = FOREVER,
 ) -> dict[str, float]:
     """Return the minimum of the error, a signed number."""
     _, error = control_error(result, signal, target, start, stop)
@@ -79,7 +98,11 @@ def minimum(
 @units(value="{signal}")
 @no_value("no rows from start to stop, or {signal} is NaN")
 def peak(
-    result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
+    result: Result,
+    signal: Signal,
+    target: Signal | float = 0.0,
+    start: float = -FOREVER,
+    stop: float = FOREVER,
 ) -> dict[str, float]:
     """Return the maximum of the absolute error."""
     _, error = control_error(result, signal, target, start, stop)
@@ -88,7 +111,9 @@ def peak(
 
 @units(value="{signal}")
 @no_value("no rows from start to stop, or {signal} is NaN")
-def final(result: Result, signal: Signal, target: Signal | float = 0.0, stop: float = FOREVER) -> dict[str, float]:
+def final(
+    result: Result, signal: Signal, target: Signal | float = 0.0, stop: float = FOREVER
+) -> dict[str, float]:
     """Return the error in the last row."""
     _, error = control_error(result, signal, target, -FOREVER, stop)
     return {"value": float(error[-1]) if error.size else math.nan}
@@ -98,7 +123,11 @@ def final(result: Result, signal: Signal, target: Signal | float = 0.0, stop: fl
 @units(value="{signal}.s")
 @no_value("no rows from start to stop, or {signal} is NaN")
 def iae(
-    result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
+    result: Result,
+    signal: Signal,
+    target: Signal | float = 0.0,
+    start: float = -FOREVER,
+    stop: float = FOREVER,
 ) -> dict[str, float]:
     """Return the integral of the absolute error over time (IAE), in the unit of the signal times s."""
     time, error = control_error(result, signal, target, start, stop)
@@ -109,7 +138,11 @@ def iae(
 @units(value="{signal}2.s")
 @no_value("no rows from start to stop, or {signal} is NaN")
 def ise(
-    result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
+    result: Result,
+    signal: Signal,
+    target: Signal | float = 0.0,
+    start: float = -FOREVER,
+    stop: float = FOREVER,
 ) -> dict[str, float]:
     """Return the integral of the squared error over time (ISE), in the square of the unit of the signal times s."""
     time, error = control_error(result, signal, target, start, stop)
@@ -120,7 +153,11 @@ def ise(
 @units(value="{signal}.s2")
 @no_value("no rows from start to stop, or {signal} is NaN")
 def itae(
-    result: Result, signal: Signal, target: Signal | float = 0.0, start: float = -FOREVER, stop: float = FOREVER
+    result: Result,
+    signal: Signal,
+    target: Signal | float = 0.0,
+    start: float = -FOREVER,
+    stop: float = FOREVER,
 ) -> dict[str, float]:
     """Return the integral of the absolute error times the time since the first row (ITAE), in the unit of the signal times s2."""
     time, error = control_error(result, signal, target, start, stop)
@@ -131,19 +168,26 @@ def itae(
 @units(value="J")
 @no_value("no rows from start to stop, or {effort} is NaN")
 def energy(
-    result: Result, effort: Signal, flow: Signal | float = 1.0, start: float = -FOREVER, stop: float = FOREVER
+    result: Result,
+    effort: Signal,
+    flow: Signal | float = 1.0,
+    start: float = -FOREVER,
+    stop: float = FOREVER,
 ) -> dict[str, float]:
     """Return the integral of effort times flow over time (J).
 
     Args:
         result: The recorded run.
         effort: Name of a force, a torque or a power; its values are converted to N, N.m or W.
-        flow: Name of a speed for a force, of an angular rate for a torque, converted to m/s or rad/s; 1 for a power.
+        flow: Name of a speed for a force, of an angular rate for a torque, converted to m/s or
+            rad/s; 1 for a power.
         start: Time (s) of the first row that counts.
         stop: Time (s) of the last row that counts.
     """
     rows = row_slice(result, start, stop)
-    power = values_in_si(result, effort) * (values_in_si(result, flow) if isinstance(flow, str) else flow)
+    power = values_in_si(result, effort) * (
+        values_in_si(result, flow) if isinstance(flow, str) else flow
+    )
     return {"value": integrate(result.time[rows], power[rows])}
 
 
@@ -157,7 +201,9 @@ def saturation_share(
     start: float = -FOREVER,
     stop: float = FOREVER,
 ) -> dict[str, float]:
-    """Return the share of the time (1) during which a signal is saturated; each value holds until the next row.
+    """Return the share of the time (1) during which a signal is saturated.
+
+    Each value holds until the next row.
 
     Args:
         result: The recorded run.
@@ -194,7 +240,10 @@ def time_to_reach(
     rows = row_slice(result, start, stop)
     time, values = result.time[rows], result[signal][rows].astype(np.float64)
     side = -1.0 if values.size and values[0] > level else 1.0
-    return {"value": first_crossing_time(time, side * values, side * level) - (time[0] if time.size else 0.0)}
+    return {
+        "value": first_crossing_time(time, side * values, side * level)
+        - (time[0] if time.size else 0.0)
+    }
 
 
 @better(value="lower")
@@ -210,7 +259,9 @@ def rise_time(
     low: float = 0.1,
     high: float = 0.9,
 ) -> dict[str, float]:
-    """Return the rise time of a step response (s): from first reaching the fraction `low` of the step to first reaching `high`.
+    """Return the rise time of a step response (s).
+
+    From first reaching the fraction `low` of the step to first reaching `high`.
 
     Args:
         result: The recorded run.
@@ -224,7 +275,10 @@ def rise_time(
     """
     require(0 <= low < high, f"expected 0 <= low < high; found low {low:g}, high {high:g}")
     step = step_response(result, signal, start, stop, initial, target)
-    return {"value": first_crossing_time(step.time, step.fraction, high) - first_crossing_time(step.time, step.fraction, low)}
+    return {
+        "value": first_crossing_time(step.time, step.fraction, high)
+        - first_crossing_time(step.time, step.fraction, low)
+    }
 
 
 @better(value="lower")
@@ -254,7 +308,9 @@ def settling_time(
     target: float | None = None,
     band: float = 0.02,
 ) -> dict[str, float]:
-    """Return the settling time (s) after the first row; NaN if the last row is outside the band or any row is NaN.
+    """Return the settling time (s) after the first row.
+
+    NaN if the last row is outside the band or any row is NaN.
 
     Args:
         result: The recorded run.
@@ -263,7 +319,8 @@ def settling_time(
         stop: Time (s) of the last row that counts.
         initial: Value before the step; None: value of the first row.
         target: Value after the step; None: value of the last row.
-        band: Half width of the band around the target as a fraction of the step from `initial` to `target` (1).
+        band: Half width of the band around the target as a fraction of the step from `initial` to
+            `target` (1).
     """
     require(band >= 0, f"expected a band of 0 or more; found {band:g}")
     time, fraction = step_response(result, signal, start, stop, initial, target)

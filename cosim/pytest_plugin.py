@@ -18,15 +18,24 @@ from .studies.regression import EXPECTATION_KEYS, Regression, has_keys
 
 def pytest_collect_file(file_path: Path, parent: pytest.Collector) -> pytest.Collector | None:
     """Collect a scenario file that has checks or a reference (hook of pytest)."""
-    if file_path.suffix == ".json" and _may_be_scenario(file_path) and has_keys(file_path, ("components",), EXPECTATION_KEYS):
+    if (
+        file_path.suffix == ".json"
+        and _may_be_scenario(file_path)
+        and has_keys(file_path, ("components",), EXPECTATION_KEYS)
+    ):
         return ScenarioFile.from_parent(parent, path=file_path)
     return None
 
 
 def _may_be_scenario(file: Path) -> bool:
-    """Return whether a JSON file contains a key of scenarios; other files, possibly with comments, must not be parsed."""
+    """Return whether a JSON file contains a key of scenarios.
+
+    Other files, possibly with comments, must not be parsed.
+    """
     try:
-        return file.is_file() and any(key in file.read_bytes() for key in (b'"components"', b'"extends"'))
+        return file.is_file() and any(
+            key in file.read_bytes() for key in (b'"components"', b'"extends"')
+        )
     except OSError:
         return False
 
@@ -50,14 +59,25 @@ class ScenarioItem(pytest.Item):
 
     @property
     def _output_directory(self) -> Path:
-        """Separate output directory of the scenario: names may repeat across folders, and tests may run in parallel."""
+        """Separate output directory of the scenario.
+
+        Names may repeat across folders, and tests may run in parallel.
+        """
         root = self.config.rootpath
-        relative = self.path.relative_to(root if self.path.is_relative_to(root) else self.path.anchor)
+        relative = self.path.relative_to(
+            root if self.path.is_relative_to(root) else self.path.anchor
+        )
         return root / "runs" / relative.with_suffix("")
 
-    def repr_failure(self, excinfo: pytest.ExceptionInfo[BaseException], *more: Any, **options: Any) -> Any:
+    def repr_failure(
+        self, excinfo: pytest.ExceptionInfo[BaseException], *more: Any, **options: Any
+    ) -> Any:
         """Return the failures of the scenario without a traceback."""
-        return str(excinfo.value) if isinstance(excinfo.value, ScenarioError) else super().repr_failure(excinfo, *more, **options)
+        return (
+            str(excinfo.value)
+            if isinstance(excinfo.value, ScenarioError)
+            else super().repr_failure(excinfo, *more, **options)
+        )
 
     def reportinfo(self) -> tuple[Path, int | None, str]:
         """Return the location of the test."""

@@ -1,4 +1,7 @@
-"""Catalogue of the vehicle models: those of the files in `vehicles/data/`, and the vessels with equations of their own."""
+"""Catalogue of the vehicle models.
+
+Those of the files in `vehicles/data/`, and the vessels with equations of their own.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +37,8 @@ from .vehicles.surface_vessel import interface as surface_vessel_interface
 from .vehicles.surface_vessel.vehicle_data import read_surface_vessel
 from .vehicles.vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS
 
-#: lists of a vehicle file whose elements may name a link of a URDF file in place of position and axis
+#: lists of a vehicle file whose elements may name a link of a URDF file in place of position and
+#: axis
 NAMED_LISTS = ("rotors", "thrusters", "propellers")
 
 #: keys of a vehicle file of any family besides those of its family
@@ -136,13 +140,18 @@ def model_from_data(data: Mapping[str, Any], name: str = "") -> Model:
         name: Name of the vehicle, if the data have none.
 
     Raises:
-        InputError: With all problems; the subject of each begins with "arguments" and continues with the path in the data.
+        InputError: With all problems; the subject of each begins with "arguments" and continues
+            with the path in the data.
     """
     if link := next(_named_links(data), None):
         raise InputError(link)
     family = data.get("family")
     if family not in FAMILIES:
-        hint = did_you_mean(family, FAMILIES) if isinstance(family, str) else f", expected one of: {', '.join(FAMILIES)}"
+        hint = (
+            did_you_mean(family, FAMILIES)
+            if isinstance(family, str)
+            else f", expected one of: {', '.join(FAMILIES)}"
+        )
         found = f"found {family!r}" if "family" in data else '"family" is missing'
         raise InputError([Problem(f"{found}{hint}", "family", ("arguments", "family"))])
     return replace(FAMILIES[family](str(data.get("name", name)), data), visual=read_visual(data))
@@ -153,7 +162,10 @@ def _named_links(data: Mapping[str, Any]) -> Iterator[Problem]:
     for key in NAMED_LISTS:
         for i, element in enumerate(found if isinstance(found := data.get(key), list) else []):
             if isinstance(element, Mapping) and "link" in element:
-                text = f"found the link {element['link']!r}: `cosim new vehicle --urdf FILE` replaces it by position and axis"
+                text = (
+                    f"found the link {element['link']!r}: `cosim new vehicle --urdf FILE` replaces "
+                    "it by position and axis"
+                )
                 yield Problem(text, f"{key}.{i}.link", ("arguments", key, str(i), "link"))
 
 
@@ -212,7 +224,9 @@ for _model in MODELS.values():
 
 
 def models_of(vehicle: Any) -> Mapping[str, Model]:
-    """Return the models of a vehicle by their motion, as motion to model; the first motion is the default.
+    """Return the models of a vehicle by their motion, as motion to model.
+
+    The first motion is the default.
 
     Args:
         vehicle: Name of a vehicle of the catalogue, or its data.
@@ -224,10 +238,19 @@ def models_of(vehicle: Any) -> Mapping[str, Model]:
         model = model_from_data(vehicle, "vehicle")
         return {model.motion: model}
     if not isinstance(vehicle, str):
-        text = f"found {vehicle!r}, expected the name of a vehicle model, or its data: {', '.join(VEHICLE_MODELS)}"
+        text = (
+            f"found {vehicle!r}, expected the name of a vehicle model, or its data: "
+            f"{', '.join(VEHICLE_MODELS)}"
+        )
         raise InputError([Problem(text, "", ("arguments",))])
     if vehicle not in VEHICLE_MODELS:
         raise InputError(
-            [Problem(f'unknown vehicle model "{vehicle}"{did_you_mean(vehicle, VEHICLE_MODELS)}', "", ("arguments",))]
+            [
+                Problem(
+                    f'unknown vehicle model "{vehicle}"{did_you_mean(vehicle, VEHICLE_MODELS)}',
+                    "",
+                    ("arguments",),
+                )
+            ]
         )
     return VEHICLE_MODELS[vehicle]

@@ -1,7 +1,7 @@
 """Recorded motion of a vehicle relative to the landing deck of a vessel, in the axes of the deck.
 
-The deck's axes are those of the vessel: forward, left, and up along the normal of the deck. Arrays have one row per row of
-the result.
+The deck's axes are those of the vessel: forward, left, and up along the normal of the deck. Arrays
+have one row per row of the result.
 """
 
 from __future__ import annotations
@@ -33,14 +33,20 @@ def relative_velocity(result: Result, vehicle: str, deck: str) -> np.ndarray:
     vessel = deck.removesuffix(".deck")
     rates_body = np.stack([result[f"{vessel}.rates.{axis}"] for axis in "pqr"], axis=1)
     rates = np.einsum("nij,nj->ni", rotation_matrix(result, vessel), rates_body)
-    point = _vector_signal(result, f"{deck}.velocity") + np.cross(rates, _world_offset(result, vehicle, deck))
+    point = _vector_signal(result, f"{deck}.velocity") + np.cross(
+        rates, _world_offset(result, vehicle, deck)
+    )
     return _to_deck_axes(result, deck, _vector_signal(result, f"{vehicle}.velocity") - point)
 
 
 def relative_tilt(result: Result, vehicle: str, deck: str) -> np.ndarray:
     """Return the angle between the up axes of vehicle and deck (rad), shape (rows,)."""
-    up, normal = (rotation_matrix(result, name)[:, :, 2] for name in (vehicle, deck.removesuffix(".deck")))
-    angle: np.ndarray = np.arctan2(np.linalg.norm(np.cross(up, normal), axis=1), np.sum(up * normal, axis=1))
+    up, normal = (
+        rotation_matrix(result, name)[:, :, 2] for name in (vehicle, deck.removesuffix(".deck"))
+    )
+    angle: np.ndarray = np.arctan2(
+        np.linalg.norm(np.cross(up, normal), axis=1), np.sum(up * normal, axis=1)
+    )
     return angle
 
 
@@ -54,7 +60,8 @@ def slide_distance(result: Result, vehicle: str, deck: str, row: int) -> float:
         row: Row of the touchdown.
 
     Returns:
-        Largest distance in the plane of the deck from the position at `row`, over rows in contact from then on (m).
+        Largest distance in the plane of the deck from the position at `row`, over rows in contact
+        from then on (m).
     """
     position = relative_position(result, vehicle, deck)[row:, :2]
     contact = result[f"{vehicle}.contact.vessel"].astype(bool)[row:]
@@ -62,12 +69,16 @@ def slide_distance(result: Result, vehicle: str, deck: str, row: int) -> float:
 
 
 def _to_deck_axes(result: Result, deck: str, vectors: np.ndarray) -> np.ndarray:
-    rotated: np.ndarray = np.einsum("nji,nj->ni", rotation_matrix(result, deck.removesuffix(".deck")), vectors)
+    rotated: np.ndarray = np.einsum(
+        "nji,nj->ni", rotation_matrix(result, deck.removesuffix(".deck")), vectors
+    )
     return rotated
 
 
 def _world_offset(result: Result, vehicle: str, deck: str) -> np.ndarray:
-    offset: np.ndarray = _vector_signal(result, f"{vehicle}.position") - _vector_signal(result, f"{deck}.position")
+    offset: np.ndarray = _vector_signal(result, f"{vehicle}.position") - _vector_signal(
+        result, f"{deck}.position"
+    )
     return offset
 
 

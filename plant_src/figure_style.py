@@ -10,7 +10,12 @@ from matplotlib.figure import Figure
 from matplotlib.patheffects import withStroke
 from matplotlib.text import Text
 
-MULTIROTOR_COLOUR, VESSEL_COLOUR, REFERENCE_COLOUR, TOUCHDOWN_COLOUR = "#0072B2", "#D55E00", "#444444", "#111111"
+MULTIROTOR_COLOUR, VESSEL_COLOUR, REFERENCE_COLOUR, TOUCHDOWN_COLOUR = (
+    "#0072B2",
+    "#D55E00",
+    "#444444",
+    "#111111",
+)
 PHASE_COLOURS = ("#F4F4F4", "#FFF8E1", "#EAF2FA", "#EDF6E8", "#FDEFE7", "#F2EDF8")
 TOUCHDOWN_MARKER: Mapping[str, Any] = {
     "color": TOUCHDOWN_COLOUR,
@@ -34,7 +39,9 @@ def fit_height(figure: Figure, axes: Axes) -> None:
     axes.margins(0.05)
     (x_first, x_last), (y_first, y_last) = axes.get_xlim(), axes.get_ylim()
     ratio = (y_last - y_first) / (x_last - x_first)
-    figure.set_figheight(_panel_height(ratio * COLUMN_WIDTH) + 0.6)  # near the final one, for the number of ticks
+    figure.set_figheight(
+        _panel_height(ratio * COLUMN_WIDTH) + 0.6
+    )  # near the final one, for the number of ticks
     cast(Any, figure.get_layout_engine()).execute(figure)
     width, height = figure.get_size_inches()
     box = axes.get_position()
@@ -55,9 +62,18 @@ def add_legend(figure: Figure, location: str) -> None:
         legend.remove()
 
 
-def annotate(axes: Axes, text: str, position: tuple[float, float], offset: tuple[float, float], color: str) -> Text:
+def annotate(
+    axes: Axes, text: str, position: tuple[float, float], offset: tuple[float, float], color: str
+) -> Text:
     """Write a small text with a white outline at a position (m) plus `offset` (pt)."""
     halo = withStroke(linewidth=2, foreground="white")
     return axes.annotate(
-        text, position, offset, textcoords="offset points", fontsize=6.5, color=color, path_effects=[halo], zorder=5
+        text,
+        position,
+        offset,
+        textcoords="offset points",
+        fontsize=6.5,
+        color=color,
+        path_effects=[halo],
+        zorder=5,
     )

@@ -1,4 +1,6 @@
-"""Figures of a mission: horizontal paths, tracking error over time and landing over time (figures 14 to 16 of the paper).
+"""Figures of a mission.
+
+Horizontal paths, tracking error over time and landing over time (figures 14 to 16 of the paper).
 
 Every function takes a result and names of signals or signal prefixes, like the KPIs in `kpis.py`.
 """
@@ -47,7 +49,9 @@ def paths(
     waypoint_count: float | None = None,
     platforms: Mapping[str, Mapping[str, Sequence[float]]] | None = None,
 ) -> Figure:
-    """Draw the paths of a multirotor and a vessel in the horizontal plane; dots mark their first positions.
+    """Draw the paths of a multirotor and a vessel in the horizontal plane.
+
+    Dots mark their first positions.
 
     Args:
         result: Recorded mission.
@@ -57,8 +61,8 @@ def paths(
         waypoint_y: North coordinates of the vessel's waypoints (m, world).
         acceptance_radius: Radius of the circles of acceptance (m).
         waypoint_count: Number of waypoints that are used; None: all.
-        platforms: Platforms as in the arguments of the plant: {"start": {"size": [x, y, z], "position": [x, y, z]}},
-            edges and centre (m, world).
+        platforms: Platforms as in the arguments of the plant: {"start": {"size": [x, y, z],
+            "position": [x, y, z]}}, edges and centre (m, world).
 
     Returns:
         Figure of column width, one metre equally long along both axes.
@@ -69,10 +73,22 @@ def paths(
         _draw_platform(axes, name, platform)
     _draw_waypoints(axes, used_waypoints(waypoint_x, waypoint_y, waypoint_count), acceptance_radius)
     _draw_path(axes, result, deck.removesuffix(".deck"), color=VESSEL_COLOUR, label="vessel")
-    _draw_path(axes, result, vehicle, color=MULTIROTOR_COLOUR, label="quadcopter", linestyle=(0, (1.2, 1.0)))
+    _draw_path(
+        axes,
+        result,
+        vehicle,
+        color=MULTIROTOR_COLOUR,
+        label="quadcopter",
+        linestyle=(0, (1.2, 1.0)),
+    )
     row = touchdown_row(result, vehicle)
     if row is not None:
-        axes.plot(*(result[f"{vehicle}.position.{axis}"][row] for axis in "xy"), **TOUCHDOWN_MARKER, label="touchdown", zorder=6)
+        axes.plot(
+            *(result[f"{vehicle}.position.{axis}"][row] for axis in "xy"),
+            **TOUCHDOWN_MARKER,
+            label="touchdown",
+            zorder=6,
+        )
     add_legend(figure, "outside upper center")
     fit_height(figure, axes)
     return figure
@@ -81,22 +97,51 @@ def paths(
 def _draw_platform(axes: Axes, name: str, platform: Mapping[str, Sequence[float]]) -> None:
     (width, height), (x, y) = platform["size"][:2], platform["position"][:2]
     corner = (x - width / 2, y - height / 2)
-    axes.add_patch(Rectangle(corner, width, height, facecolor="#F0EAE0", edgecolor="#C8B89A", linewidth=0.6, zorder=1))
+    axes.add_patch(
+        Rectangle(
+            corner, width, height, facecolor="#F0EAE0", edgecolor="#C8B89A", linewidth=0.6, zorder=1
+        )
+    )
     annotate(axes, name, corner, offset=(3, 3), color="#8A7650")
 
 
 def _draw_waypoints(axes: Axes, waypoints: Sequence[tuple[float, float]], radius: float) -> None:
     if waypoints:
-        axes.plot(*zip(*waypoints, strict=True), "+", color="#555555", markersize=5, label="waypoints", zorder=2)
+        axes.plot(
+            *zip(*waypoints, strict=True),
+            "+",
+            color="#555555",
+            markersize=5,
+            label="waypoints",
+            zorder=2,
+        )
     for number, (east, north) in enumerate(waypoints, start=1):
-        axes.add_patch(Circle((east, north), radius, fill=False, color="#888888", linestyle="--", linewidth=0.7, zorder=2))
-        annotate(axes, str(number), (east + 0.7 * radius, north + 0.7 * radius), offset=(1, 1), color="#333333")
+        axes.add_patch(
+            Circle(
+                (east, north),
+                radius,
+                fill=False,
+                color="#888888",
+                linestyle="--",
+                linewidth=0.7,
+                zorder=2,
+            )
+        )
+        annotate(
+            axes,
+            str(number),
+            (east + 0.7 * radius, north + 0.7 * radius),
+            offset=(1, 1),
+            color="#333333",
+        )
 
 
 def _draw_path(axes: Axes, result: Result, vehicle: str, **line: Any) -> None:
     x, y = (result[f"{vehicle}.position.{axis}"] for axis in "xy")
     axes.plot(x, y, **line, linewidth=1.4, zorder=3)
-    axes.plot(x[:1], y[:1], "o", color=line["color"], markersize=4.5, markeredgecolor="white", zorder=4)
+    axes.plot(
+        x[:1], y[:1], "o", color=line["color"], markersize=4.5, markeredgecolor="white", zorder=4
+    )
 
 
 def landing(
@@ -128,7 +173,11 @@ def landing(
     """
     row = touchdown_row(result, vehicle)
     if stop is None:
-        stop = result.time[-1] if row is None else min(result.time[-1], result.time[row] + TIME_AFTER_TOUCHDOWN)
+        stop = (
+            result.time[-1]
+            if row is None
+            else min(result.time[-1], result.time[row] + TIME_AFTER_TOUCHDOWN)
+        )
     shown = slice(*np.searchsorted(result.time, (start, stop + 1e-9)))
     figure = Figure(figsize=(COLUMN_WIDTH, 3.4), layout="constrained")
     above, below = figure.subplots(2, sharex=True, height_ratios=(3, 2))
@@ -146,11 +195,16 @@ def landing(
     return figure
 
 
-def _altitudes(vehicle: str, deck: str, reference: str | None) -> Iterator[tuple[str, Mapping[str, Any]]]:
+def _altitudes(
+    vehicle: str, deck: str, reference: str | None
+) -> Iterator[tuple[str, Mapping[str, Any]]]:
     yield f"{deck}.position.z", {"color": VESSEL_COLOUR, "label": "deck"}
     yield f"{vehicle}.position.z", {"color": MULTIROTOR_COLOUR, "label": "quadcopter"}
     if reference is not None:
-        yield reference, {"color": REFERENCE_COLOUR, "label": "reference", "linestyle": "--", "linewidth": 0.9}
+        yield (
+            reference,
+            {"color": REFERENCE_COLOUR, "label": "reference", "linestyle": "--", "linewidth": 0.9},
+        )
 
 
 def _draw_error(axes: Axes, time: np.ndarray, error: np.ndarray, limit: float | None) -> None:
@@ -158,27 +212,47 @@ def _draw_error(axes: Axes, time: np.ndarray, error: np.ndarray, limit: float | 
     axes.set(yscale="log", ylabel="horizontal\nerror / m")
     axes.yaxis.set_major_formatter("{x:g}")
     if limit is not None:
-        axes.axhline(limit, color=REFERENCE_COLOUR, linestyle="--", linewidth=0.9, label=f"limit {limit:g} m")
+        axes.axhline(
+            limit, color=REFERENCE_COLOUR, linestyle="--", linewidth=0.9, label=f"limit {limit:g} m"
+        )
 
 
-def _shade_phases(figure: Figure, time: np.ndarray, mode: np.ndarray, phases: Sequence[str]) -> None:
+def _shade_phases(
+    figure: Figure, time: np.ndarray, mode: np.ndarray, phases: Sequence[str]
+) -> None:
     """Shade each time span of constant mode in all axes and write its name above the first axes."""
     changes = [0, *(np.flatnonzero(np.diff(mode)) + 1), len(time) - 1]
     for first, last in pairwise(changes):
         value = int(mode[first])
         for axes in figure.axes:
-            axes.axvspan(time[first], time[last], color=PHASE_COLOURS[value % len(PHASE_COLOURS)], linewidth=0, zorder=0)
+            axes.axvspan(
+                time[first],
+                time[last],
+                color=PHASE_COLOURS[value % len(PHASE_COLOURS)],
+                linewidth=0,
+                zorder=0,
+            )
         name = phases[value - 1] if 0 < value <= len(phases) else str(value)
         _label_span(figure.axes[0], time[first], time[last], name)
 
 
 def _label_span(axes: Axes, first: float, last: float, name: str) -> None:
-    """Write `name` above a time span: rotated by 90 degrees if it is too long, omitted if the span is under 6 pt wide."""
+    """Write `name` above a time span.
+
+    Rotated by 90 degrees if it is too long, omitted if the span is under 6 pt wide.
+    """
     left, right = axes.get_xlim()
     width = (last - first) / (right - left) * 0.78 * COLUMN_WIDTH * 72  # pt
     if width < 6:
         return
-    text = axes.text((first + last) / 2, 1.02, name, transform=axes.get_xaxis_transform(), fontsize=6.5, color="#444444")
+    text = axes.text(
+        (first + last) / 2,
+        1.02,
+        name,
+        transform=axes.get_xaxis_transform(),
+        fontsize=6.5,
+        color="#444444",
+    )
     text.set(ha="center", va="bottom", rotation=90 if width < 3.6 * len(name) else 0)
 
 
@@ -201,7 +275,8 @@ def tracking_error(
 ) -> Figure:
     """Draw the horizontal distance of a vehicle from its target over time, on a logarithmic axis.
 
-    Numbered lines mark the turns of the target's vessel: the times at which it reaches its waypoints.
+    Numbered lines mark the turns of the target's vessel: the times at which it reaches its
+    waypoints.
 
     Args:
         result: Recorded mission.
@@ -220,23 +295,37 @@ def tracking_error(
     figure = Figure(figsize=(COLUMN_WIDTH, 2.2), layout="constrained")
     axes = figure.add_subplot()
     shown = slice(int(np.searchsorted(result.time, start)), None)
-    _draw_error(axes, result.time[shown], horizontal_distance(result, vehicle, target)[shown], limit)
+    _draw_error(
+        axes, result.time[shown], horizontal_distance(result, vehicle, target)[shown], limit
+    )
     axes.set(xlabel="t / s", xlim=(start, max(result.time[-1], start + MIN_SPAN)))
     if limit is not None:
         figure.legend(loc="outside lower right")
     if len(waypoint_x):
         vessel = target.removesuffix(".deck")
-        _mark_turns(axes, waypoints(result, vessel, waypoint_x, waypoint_y, acceptance_radius, waypoint_count))
+        _mark_turns(
+            axes,
+            waypoints(result, vessel, waypoint_x, waypoint_y, acceptance_radius, waypoint_count),
+        )
     return figure
 
 
 def _mark_turns(axes: Axes, reached: Mapping[str, Any]) -> None:
-    """Draw a numbered line for every waypoint that was reached, except the last: no turn follows it."""
+    """Draw a numbered line for every waypoint that was reached, except the last.
+
+    No turn follows it.
+    """
     first, last = axes.get_xlim()
     *times, _ = (time for key, time in reached.items() if key.startswith("time"))
     for number, time in enumerate(times, start=1):
         if first <= time <= last:
             axes.axvline(time, color=VESSEL_COLOUR, linewidth=0.8, linestyle=":", zorder=1)
             axes.text(
-                time, 1.02, f"turn {number}", transform=axes.get_xaxis_transform(), ha="center", fontsize=6.5, color=VESSEL_COLOUR
+                time,
+                1.02,
+                f"turn {number}",
+                transform=axes.get_xaxis_transform(),
+                ha="center",
+                fontsize=6.5,
+                color=VESSEL_COLOUR,
             )

@@ -16,8 +16,8 @@ Numbers = tuple[float, ...]
 class JsonReader:
     """Reader of the JSON arguments of a component.
 
-    An invalid value is replaced by a valid one, so that reading continues. The path of a value is its place within the
-    arguments.
+    An invalid value is replaced by a valid one, so that reading continues. The path of a value is
+    its place within the arguments.
 
     Attributes:
         problems: All problems; the subject of each is ("arguments", *path).
@@ -36,7 +36,9 @@ class JsonReader:
     def add_missing(self, path: JsonPath, key: str, common: str) -> None:
         """Record that a key is missing at `path` and at `common`, whose values count for all, unless it is misspelt there."""
         places = (("arguments", *path), ("arguments", common))
-        misspelt = (each for each in self.problems if each.message.endswith(f'; did you mean "{key}"?'))
+        misspelt = (
+            each for each in self.problems if each.message.endswith(f'; did you mean "{key}"?')
+        )
         if not any(each.subject[:-1] in places for each in misspelt):
             self.add_problem(path, f'"{key}" is missing, here and in "{common}"')
 
@@ -44,17 +46,24 @@ class JsonReader:
         """Read an object whose keys become parts of variable names."""
         for name in (found := self.mapping(value, path)):
             if not re.fullmatch(r"[A-Za-z_]\w*", name):
-                self.add_problem((*path, name), f'found the name "{name}", expected letters, digits and underscores')
+                self.add_problem(
+                    (*path, name),
+                    f'found the name "{name}", expected letters, digits and underscores',
+                )
         return found
 
-    def read_object(self, value: Any, path: JsonPath, required: Sequence[str], optional: Sequence[str]) -> Mapping[str, Any]:
+    def read_object(
+        self, value: Any, path: JsonPath, required: Sequence[str], optional: Sequence[str]
+    ) -> Mapping[str, Any]:
         """Read an object with these keys and no others."""
         found = self.mapping(value, path)
         valid = (*required, *optional)
         hints = {key: did_you_mean(key, valid) for key in found if key not in valid}
         for key, hint in hints.items():
             self.add_problem((*path, key), f'unknown key "{key}"{hint}')
-        missing = [key for key in required if key not in found] if isinstance(value, Mapping) else []
+        missing = (
+            [key for key in required if key not in found] if isinstance(value, Mapping) else []
+        )
         self._missing.update((*path, key) for key in missing)
         for key in missing:
             if f'; did you mean "{key}"?' not in hints.values():
@@ -72,13 +81,29 @@ class JsonReader:
     def vector(self, value: Any, path: JsonPath, axes: Sequence[str]) -> Numbers:
         """Read a list of finite numbers, one for each of `axes`."""
         if not isinstance(value, list | tuple) or len(value) != len(axes):
-            self.add_problem(path, f"found {value!r}, expected a list of {len(axes)} numbers [{', '.join(axes)}]")
+            self.add_problem(
+                path, f"found {value!r}, expected a list of {len(axes)} numbers [{', '.join(axes)}]"
+            )
             return (1.0,) * len(axes)
         return tuple(self.number(number, path) for number in value)
 
-    def number(self, value: Any, path: JsonPath, low: float = -math.inf, high: float = math.inf, hint: str = "") -> float:
-        """Read a finite number from `low` to `high`; `hint` follows the message about another one."""
-        if not isinstance(value, int | float) or isinstance(value, bool) or not math.isfinite(value):
+    def number(
+        self,
+        value: Any,
+        path: JsonPath,
+        low: float = -math.inf,
+        high: float = math.inf,
+        hint: str = "",
+    ) -> float:
+        """Read a finite number from `low` to `high`.
+
+        `hint` follows the message about another one.
+        """
+        if (
+            not isinstance(value, int | float)
+            or isinstance(value, bool)
+            or not math.isfinite(value)
+        ):
             self.add_problem(path, f"found {value!r}, expected a finite number")
         elif not low <= value <= high:
             self.add_problem(path, f"found {value!r}, expected {_range_text(low, high)}{hint}")
@@ -95,7 +120,12 @@ class JsonReader:
 
     def integer(self, value: Any, path: JsonPath, low: int, high: int | None = None) -> int:
         """Read an integer from `low` to `high`."""
-        if isinstance(value, int) and not isinstance(value, bool) and value >= low and (high is None or value <= high):
+        if (
+            isinstance(value, int)
+            and not isinstance(value, bool)
+            and value >= low
+            and (high is None or value <= high)
+        ):
             return value
         expected = f"of at least {low}" if high is None else f"from {low} to {high}"
         self.add_problem(path, f"found {value!r}, expected an integer {expected}")
@@ -105,7 +135,11 @@ class JsonReader:
         """Read one of the strings `valid`."""
         if isinstance(value, str) and value in valid:
             return value
-        hint = did_you_mean(value, valid) if isinstance(value, str) else f", expected one of: {', '.join(valid)}"
+        hint = (
+            did_you_mean(value, valid)
+            if isinstance(value, str)
+            else f", expected one of: {', '.join(valid)}"
+        )
         self.add_problem(path, f"found {value!r}{hint}")
         return valid[0]
 

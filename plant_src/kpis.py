@@ -1,8 +1,11 @@
-"""KPIs of a mission: waypoints, path following, motor commands, failures, and those of `landing_kpis.py`.
+"""KPIs of a mission.
 
-Every function takes a result and names of signals or signal prefixes ("plant.uav", "plant.usv.deck") and returns values by
-name. All values are in SI units and belong to recorded rows; horizontal distances lie in the x-y plane of the world. A value
-that a run does not have is NaN or False.
+Waypoints, path following, motor commands, failures, and those of `landing_kpis.py`.
+
+Every function takes a result and names of signals or signal prefixes ("plant.uav",
+"plant.usv.deck") and returns values by name. All values are in SI units and belong to recorded
+rows; horizontal distances lie in the x-y plane of the world. A value that a run does not have is
+NaN or False.
 """
 
 from __future__ import annotations
@@ -20,7 +23,17 @@ from cosim.results.signal_analysis import require, row_slice, values_in_unit
 from .landing_kpis import descent, landing, touchdown
 from .recorded_motion import distance_from_line, horizontal_distance, used_waypoints
 
-__all__ = ["cross_track", "descent", "failures", "final", "landing", "motors", "touchdown", "tracking", "waypoints"]
+__all__ = [
+    "cross_track",
+    "descent",
+    "failures",
+    "final",
+    "landing",
+    "motors",
+    "touchdown",
+    "tracking",
+    "waypoints",
+]
 
 
 @better(reached="higher", all_reached="higher", time="lower")
@@ -36,8 +49,9 @@ def waypoints(
 ) -> dict[str, Number]:
     """Evaluate which waypoints a vehicle reached in their order.
 
-    A waypoint is reached at the first row inside its circle of acceptance (Fossen (2021), chapter 12), not before the
-    waypoint ahead of it. The last four arguments have the names of an autopilot's parameters.
+    A waypoint is reached at the first row inside its circle of acceptance (Fossen (2021), chapter
+    12), not before the waypoint ahead of it. The last four arguments have the names of an
+    autopilot's parameters.
 
     Args:
         result: Recorded mission.
@@ -54,7 +68,10 @@ def waypoints(
         - `all_reached`: true if all waypoints were reached in order
         - `time[1]`, `time[2]`, ...: time at which each waypoint was reached (s); NaN if it was not
     """
-    require(acceptance_radius > 0, f"expected a positive acceptance_radius (m); found {acceptance_radius:g}")
+    require(
+        acceptance_radius > 0,
+        f"expected a positive acceptance_radius (m); found {acceptance_radius:g}",
+    )
     route = used_waypoints(waypoint_x, waypoint_y, waypoint_count)
     times, row = [math.nan] * len(route), 0
     position_x, position_y = result[f"{vehicle}.position.x"], result[f"{vehicle}.position.y"]
@@ -85,9 +102,10 @@ def cross_track(
 ) -> dict[str, Number]:
     """Evaluate the cross-track error of a vehicle on the straight legs between waypoints.
 
-    The first leg starts at the position in the first row. A leg begins when the previous waypoint is reached (see
-    `waypoints`) and ends when the next waypoint is reached, or with the last row. The error is the horizontal distance from
-    the infinite line through both ends of the leg (Fossen (2021), chapter 12).
+    The first leg starts at the position in the first row. A leg begins when the previous waypoint
+    is reached (see `waypoints`) and ends when the next waypoint is reached, or with the last row.
+    The error is the horizontal distance from the infinite line through both ends of the leg (Fossen
+    (2021), chapter 12).
 
     Args:
         result: Recorded mission.
@@ -107,24 +125,34 @@ def cross_track(
     values = waypoints(result, vehicle, waypoint_x, waypoint_y, acceptance_radius, waypoint_count)
     times = [value for key, value in values.items() if key.startswith("time")]
     position = result[f"{vehicle}.position.x"] + 1j * result[f"{vehicle}.position.y"]
-    corners = [position[0], *(east + 1j * north for east, north in zip(waypoint_x, waypoint_y, strict=True))]
+    corners = [
+        position[0],
+        *(east + 1j * north for east, north in zip(waypoint_x, waypoint_y, strict=True)),
+    ]
     begin, errors_of_legs = float(result.time[0]), []
     for start, end, reached in zip(corners, corners[1:], times, strict=False):
-        rows = (result.time >= begin) & ~(result.time > reached)  # no time is later than NaN: an unfinished leg has all rows
+        rows = (result.time >= begin) & ~(
+            result.time > reached
+        )  # no time is later than NaN: an unfinished leg has all rows
         errors_of_legs.append(distance_from_line(position[rows], start, end))
         begin = reached  # no time is at or after NaN: the legs that follow have no rows
     errors = np.concatenate(errors_of_legs)
     return {
         "rms": float(np.sqrt(np.mean(errors**2))),
         "max": float(errors.max()),
-        **{f"leg[{i}]": float(leg.max()) if leg.size else math.nan for i, leg in enumerate(errors_of_legs, start=1)},
+        **{
+            f"leg[{i}]": float(leg.max()) if leg.size else math.nan
+            for i, leg in enumerate(errors_of_legs, start=1)
+        },
     }
 
 
 @better(rms="lower", max="lower")
 @units(rms="m", max="m")
 @no_value("no rows between start and stop")
-def tracking(result: Result, vehicle: Prefix, target: Prefix, start: float, stop: float = math.inf) -> dict[str, Number]:
+def tracking(
+    result: Result, vehicle: Prefix, target: Prefix, start: float, stop: float = math.inf
+) -> dict[str, Number]:
     """Evaluate the horizontal distance between a vehicle and the target that it follows.
 
     Args:
@@ -154,15 +182,16 @@ def motors(result: Result, rotor_speed: Prefix, threshold: float = 1.0) -> dict[
 
     Args:
         result: Recorded mission.
-        rotor_speed: Prefix of the commands `rotor_speed[1]`, `rotor_speed[2]`, ... ("uav.mixer.rotor_speed"), in any unit of a
-            speed of rotation.
+        rotor_speed: Prefix of the commands `rotor_speed[1]`, `rotor_speed[2]`, ...
+            ("uav.mixer.rotor_speed"), in any unit of a speed of rotation.
         threshold: Speed below which a rotor counts as stopped (rad/s).
 
     Returns:
         Values by name:
 
         - `stopped_at_end`: true if all commands of the last row are below `threshold`
-        - `stop_time`: first time from which all commands stay below `threshold` (s); NaN unless `stopped_at_end`
+        - `stop_time`: first time from which all commands stay below `threshold` (s); NaN unless
+          `stopped_at_end`
         - `final_speed`: largest command of the last row (rad/s)
         - `max_speed`: largest command of the run (rad/s)
     """
@@ -197,7 +226,9 @@ def failures(result: Result, vehicle: Prefix) -> dict[str, Number]:
         - `ditched`: true if the centre of mass of a multirotor was below the water
         - `time`: time of the first of both (s); NaN without a failure
     """
-    crashed, ditched = (result[f"{vehicle}.{failure}"].astype(bool) for failure in ("crashed", "ditched"))
+    crashed, ditched = (
+        result[f"{vehicle}.{failure}"].astype(bool) for failure in ("crashed", "ditched")
+    )
     rows = np.flatnonzero(crashed | ditched)
     time = float(result.time[rows[0]]) if rows.size else math.nan
     return {"crashed": bool(crashed.any()), "ditched": bool(ditched.any()), "time": time}

@@ -1,6 +1,7 @@
 """KPIs of a landing: touchdown, errors in the world and on the deck, descent.
 
-They follow the conventions of `kpis.py`, by which scenarios name them (`plant_src/kpis.py:landing`).
+They follow the conventions of `kpis.py`, by which scenarios name them
+(`plant_src/kpis.py:landing`).
 """
 
 from __future__ import annotations
@@ -27,12 +28,19 @@ from .recorded_motion import MIN_FLIGHT_TIME, horizontal_distance, touchdown_row
     landed_at_end="higher",
     final_lateral_error="lower",
 )
-@units(time="s", lateral_error="m", touchdown_speed="m/s", tangential_speed="m/s", slide="m", final_lateral_error="m")
+@units(
+    time="s",
+    lateral_error="m",
+    touchdown_speed="m/s",
+    tangential_speed="m/s",
+    slide="m",
+    final_lateral_error="m",
+)
 def landing(result: Result, vehicle: Prefix, deck: Prefix) -> dict[str, Number]:
     """Evaluate the landing of a multirotor on a vessel in the world frame.
 
-    Touchdown is the first row with contact between the vehicle and a vessel after a flight of at least 0.1 s. The lateral
-    error at touchdown is the landing error of the paper (docs/paper.md).
+    Touchdown is the first row with contact between the vehicle and a vessel after a flight of at
+    least 0.1 s. The lateral error at touchdown is the landing error of the paper (docs/paper.md).
 
     Args:
         result: Recorded mission.
@@ -43,12 +51,18 @@ def landing(result: Result, vehicle: Prefix, deck: Prefix) -> dict[str, Number]:
         Values by name:
 
         - `time`: time of the touchdown (s)
-        - `lateral_error`: horizontal distance of the vehicle's centre of mass from the deck centre at touchdown (m)
-        - `touchdown_speed`: vertical speed relative to the deck centre one row before touchdown, positive when approaching (m/s)
-        - `tangential_speed`: horizontal speed relative to the deck centre, one row before touchdown (m/s)
-        - `slide`: largest distance from the touchdown point in the plane of the deck, over rows in contact (m)
-        - `bounces`: number of times that contact with the vessel was lost and regained after touchdown
-        - `landed_at_end`: true if there was a touchdown and the last row is in contact with a vessel
+        - `lateral_error`: horizontal distance of the vehicle's centre of mass from the deck centre
+          at touchdown (m)
+        - `touchdown_speed`: vertical speed relative to the deck centre one row before touchdown,
+          positive when approaching (m/s)
+        - `tangential_speed`: horizontal speed relative to the deck centre, one row before touchdown
+          (m/s)
+        - `slide`: largest distance from the touchdown point in the plane of the deck, over rows in
+          contact (m)
+        - `bounces`: number of times that contact with the vessel was lost and regained after
+          touchdown
+        - `landed_at_end`: true if there was a touchdown and the last row is in contact with a
+          vessel
         - `final_lateral_error`: `lateral_error` at the last row (m); NaN unless `landed_at_end`
     """
     contact = result[f"{vehicle}.contact.vessel"].astype(bool)
@@ -56,7 +70,9 @@ def landing(result: Result, vehicle: Prefix, deck: Prefix) -> dict[str, Number]:
     if row is None:
         return _values_without_landing(_no_touchdown(result, vehicle))
     distance = horizontal_distance(result, vehicle, deck)
-    u, v, w = (result[f"{vehicle}.velocity.{axis}"] - result[f"{deck}.velocity.{axis}"] for axis in "xyz")
+    u, v, w = (
+        result[f"{vehicle}.velocity.{axis}"] - result[f"{deck}.velocity.{axis}"] for axis in "xyz"
+    )
     landed = bool(contact[-1])
     return {
         "time": float(result.time[row]),
@@ -66,13 +82,20 @@ def landing(result: Result, vehicle: Prefix, deck: Prefix) -> dict[str, Number]:
         "slide": deck_frame.slide_distance(result, vehicle, deck, row),
         "bounces": int(np.count_nonzero(contact[row + 1 :] & ~contact[row:-1])),
         "landed_at_end": landed,
-        "final_lateral_error": float(distance[-1]) if landed else NoValue(f"{vehicle} does not touch a vessel at the end"),
+        "final_lateral_error": float(distance[-1])
+        if landed
+        else NoValue(f"{vehicle} does not touch a vessel at the end"),
     }
 
 
 def _values_without_landing(reason: NoValue) -> dict[str, Number]:
     unknown = ("time", "lateral_error", "touchdown_speed", "tangential_speed", "slide")
-    return {**dict.fromkeys(unknown, reason), "bounces": 0, "landed_at_end": False, "final_lateral_error": reason}
+    return {
+        **dict.fromkeys(unknown, reason),
+        "bounces": 0,
+        "landed_at_end": False,
+        "final_lateral_error": reason,
+    }
 
 
 @better(
@@ -99,8 +122,8 @@ def _values_without_landing(reason: NoValue) -> dict[str, Number]:
 def touchdown(result: Result, vehicle: Prefix, deck: Prefix, mass: float) -> dict[str, Number]:
     """Evaluate a touchdown in the axes of a deck that may roll, pitch, heave and turn.
 
-    Touchdown is the row that `landing` finds. Speeds are those one row earlier, relative to the point of the deck below the
-    vehicle.
+    Touchdown is the row that `landing` finds. Speeds are those one row earlier, relative to the
+    point of the deck below the vehicle.
 
     Args:
         result: Recorded mission.
@@ -111,7 +134,8 @@ def touchdown(result: Result, vehicle: Prefix, deck: Prefix, mass: float) -> dic
     Returns:
         Values by name, all NaN without a touchdown:
 
-        - `forward_error`, `left_error`: vehicle's centre of mass relative to the deck centre, along the deck's axes (m)
+        - `forward_error`, `left_error`: vehicle's centre of mass relative to the deck centre, along
+          the deck's axes (m)
         - `lateral_error`: distance between the two in the plane of the deck (m)
         - `normal_speed`: speed along the normal of the deck, positive when approaching (m/s)
         - `tangential_speed`: speed in the plane of the deck (m/s)
@@ -158,8 +182,8 @@ def descent(result: Result, vehicle: Prefix, mode: Signal, descending: float) ->
     Returns:
         Values by name:
 
-        - `time_to_land`: time from the first row in the mode `descending` to the touchdown that `landing` finds, aborted
-          descents included (s)
+        - `time_to_land`: time from the first row in the mode `descending` to the touchdown that
+          `landing` finds, aborted descents included (s)
         - `aborts`: number of changes from the mode `descending` to a lower one
     """
     modes = result[mode]
@@ -177,7 +201,10 @@ def descent(result: Result, vehicle: Prefix, mode: Signal, descending: float) ->
 
 
 def _no_touchdown(result: Result, vehicle: str) -> NoValue:
-    """Return the reason for which a result has no touchdown: no flight, or no contact with a vessel after one."""
+    """Return the reason for which a result has no touchdown.
+
+    No flight, or no contact with a vessel after one.
+    """
     time, touching = result.time, result[f"{vehicle}.contact.touching"].astype(bool)
     contacts = np.concatenate((time[:1], time[touching], time[-1:]))
     if np.diff(contacts).max(initial=0.0) < MIN_FLIGHT_TIME:

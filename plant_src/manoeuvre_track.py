@@ -18,11 +18,15 @@ CENTRE_OF_MASS: Point = (0.0, 0.0, 0.0)
 
 @dataclass(frozen=True)
 class Track:
-    """Motion of a vessel from the order on; arrays of shape (rows,), the first row at the time of the order."""
+    """Motion of a vessel from the order on.
+
+    Arrays of shape (rows,), the first row at the time of the order.
+    """
 
     #: time of the result (s)
     time: np.ndarray
-    #: position relative to that at the order, complex: along the original course + i * to the left of it (m)
+    #: position relative to that at the order, complex: along the original course + i * to the left
+    #: of it (m)
     position: np.ndarray
     #: heading relative to the original course, counter-clockwise, not wrapped (rad)
     heading_change: np.ndarray
@@ -31,11 +35,17 @@ class Track:
 
     def interpolate(self, values: np.ndarray, time: float) -> complex:
         """Return `values` (rows,), real or complex, at `time` (s); NaN if `time` is NaN."""
-        return complex(np.interp(time, self.time, values)) if math.isfinite(time) else complex(math.nan, math.nan)
+        return (
+            complex(np.interp(time, self.time, values))
+            if math.isfinite(time)
+            else complex(math.nan, math.nan)
+        )
 
     def time_of_heading_change(self, angle: float) -> float:
         """Return the first time (s) at which the heading differs by `angle` (rad) from the original course."""
-        return first_crossing_time(self.time, self.turn_direction(angle) * self.heading_change, angle)
+        return first_crossing_time(
+            self.time, self.turn_direction(angle) * self.heading_change, angle
+        )
 
     def turn_direction(self, angle: float) -> int:
         """Return 1 if the heading first differs by `angle` (rad) to port, -1 if to starboard."""
@@ -74,7 +84,9 @@ def track(result: Result, vehicle: str, start: float, midships: Point = CENTRE_O
     )
     travelled = np.concatenate([[0.0], np.cumsum(np.abs(np.diff(position)))])
     ahead_and_left = (position - position[0]) * np.exp(-1j * heading[0])
-    return Track(np.concatenate([[start], time[later]]), ahead_and_left, heading - heading[0], travelled)
+    return Track(
+        np.concatenate([[start], time[later]]), ahead_and_left, heading - heading[0], travelled
+    )
 
 
 def _point_offset(result: Result, vehicle: str, point: Point) -> np.ndarray:

@@ -1,8 +1,11 @@
-"""KPIs of standard ship manoeuvres after IMO resolution MSC.137(76): turning circle, zig-zag, initial turning and stopping.
+"""KPIs of standard ship manoeuvres after IMO resolution MSC.137(76).
 
-Definitions are those of section 5 of the annex. A manoeuvre begins with the order to rudder or engine; the original course is
-the heading at that time. Positions are those of one point of the vessel in the x-y plane of the world. Headings, speeds and
-positions are interpolated linearly between rows. A value that was not reached is NaN.
+Turning circle, zig-zag, initial turning and stopping.
+
+Definitions are those of section 5 of the annex. A manoeuvre begins with the order to rudder or
+engine; the original course is the heading at that time. Positions are those of one point of the
+vessel in the x-y plane of the world. Headings, speeds and positions are interpolated linearly
+between rows. A value that was not reached is NaN.
 
 The criteria of the resolution are made for ships of at least 100 m:
 
@@ -29,7 +32,13 @@ from .manoeuvre_track import CENTRE_OF_MASS, Point, Track, track
 DEGREE = math.pi / 180  # rad
 
 
-@better(advance="lower", transfer="lower", tactical_diameter="lower", advance_lengths="lower", tactical_diameter_lengths="lower")
+@better(
+    advance="lower",
+    transfer="lower",
+    tactical_diameter="lower",
+    advance_lengths="lower",
+    tactical_diameter_lengths="lower",
+)
 @units(
     advance="m",
     transfer="m",
@@ -68,8 +77,14 @@ def turning_circle(
     """
     require(length > 0, f"expected a positive length (m); found {length:g}")
     motion = track(result, vehicle, start, midships)
-    quarter, half = motion.time_of_heading_change(math.pi / 2), motion.time_of_heading_change(math.pi)
-    advance, transfer = motion.interpolate(motion.position, quarter).real, motion.interpolate(motion.position, quarter).imag
+    quarter, half = (
+        motion.time_of_heading_change(math.pi / 2),
+        motion.time_of_heading_change(math.pi),
+    )
+    advance, transfer = (
+        motion.interpolate(motion.position, quarter).real,
+        motion.interpolate(motion.position, quarter).imag,
+    )
     tactical = motion.interpolate(motion.position, half).imag
     period, track_length = _last_full_turn(motion)
     speed = track_length / period
@@ -94,7 +109,9 @@ def _last_full_turn(motion: Track) -> tuple[float, float]:
     if not turned[-1] >= 2 * math.pi:
         return math.nan, math.nan
     begin = first_crossing_time(motion.time, turned, turned[-1] - 2 * math.pi)
-    return float(motion.time[-1]) - begin, float(motion.distance[-1]) - motion.interpolate(motion.distance, begin).real
+    return float(motion.time[-1]) - begin, float(motion.distance[-1]) - motion.interpolate(
+        motion.distance, begin
+    ).real
 
 
 def _speed_over_ground(result: Result, vehicle: str, time: float) -> float:
@@ -106,10 +123,13 @@ def _speed_over_ground(result: Result, vehicle: str, time: float) -> float:
 @better(overshoot="lower", initial_turning_time="lower", reach="lower")
 @units(overshoot="rad", execute="s", initial_turning_time="s", reach="s", period="s")
 @no_value("the heading of {vehicle} did not change far enough")
-def zigzag(result: Result, vehicle: Prefix, start: float, angle: float = 10 * DEGREE, overshoots: int = 2) -> dict[str, Number]:
+def zigzag(
+    result: Result, vehicle: Prefix, start: float, angle: float = 10 * DEGREE, overshoots: int = 2
+) -> dict[str, Number]:
     """Evaluate a zig-zag test (IMO MSC.137(76), 5.2.3).
 
-    The rudder is reversed whenever the heading differs by `angle` from the original course, alternately to both sides.
+    The rudder is reversed whenever the heading differs by `angle` from the original course,
+    alternately to both sides.
 
     Args:
         result: Recorded run.
@@ -121,10 +141,12 @@ def zigzag(result: Result, vehicle: Prefix, start: float, angle: float = 10 * DE
     Returns:
         Values by name:
 
-        - `overshoot[1]`, `overshoot[2]`, ...: heading change beyond `angle` after each reversal (rad)
+        - `overshoot[1]`, `overshoot[2]`, ...: heading change beyond `angle` after each reversal
+          (rad)
         - `execute[1]`, `execute[2]`, ...: time from the first order until each reversal (s)
         - `initial_turning_time`: `execute[1]` (s)
-        - `reach`: time from the first order until the heading is first back on the original course (s)
+        - `reach`: time from the first order until the heading is first back on the original course
+          (s)
         - `period`: time between the first and the third reversal (s)
     """
     require(angle > 0, f"expected a positive angle (rad); found {angle:g}")
@@ -132,7 +154,10 @@ def zigzag(result: Result, vehicle: Prefix, start: float, angle: float = 10 * DE
     times, overshoot_angles = _reversals(motion, angle, max(overshoots, 3))
     executes = [time - start for time in times]
     return {
-        **{f"overshoot[{i}]": overshoot for i, overshoot in enumerate(overshoot_angles[:overshoots], 1)},
+        **{
+            f"overshoot[{i}]": overshoot
+            for i, overshoot in enumerate(overshoot_angles[:overshoots], 1)
+        },
         **{f"execute[{i}]": time for i, time in enumerate(executes[:overshoots], 1)},
         "initial_turning_time": executes[0],
         "reach": _time_back_on_course(motion, times[0]) - start,
@@ -150,8 +175,15 @@ def _reversals(motion: Track, angle: float, count: int) -> tuple[list[float], li
     for _ in range(count):
         reversal = first_crossing_time(motion.time[rows], side * motion.heading_change[rows], angle)
         rows = slice(int(np.searchsorted(motion.time, reversal)), None)
-        following = first_crossing_time(motion.time[rows], -side * motion.heading_change[rows], angle)
-        swing = side * motion.heading_change[rows][motion.time[rows] <= (following if math.isfinite(following) else math.inf)]
+        following = first_crossing_time(
+            motion.time[rows], -side * motion.heading_change[rows], angle
+        )
+        swing = (
+            side
+            * motion.heading_change[rows][
+                motion.time[rows] <= (following if math.isfinite(following) else math.inf)
+            ]
+        )
         is_returning = swing.size > 0 and swing[-1] < swing.max()
         times.append(reversal)
         overshoots.append(float(swing.max()) - angle if is_returning else math.nan)
@@ -172,9 +204,16 @@ def _time_back_on_course(motion: Track, reversal: float) -> float:
 @units(distance="m", time="s")
 @no_value("the heading of {vehicle} did not change far enough")
 def initial_turning(
-    result: Result, vehicle: Prefix, start: float, length: float, angle: float = 10 * DEGREE, midships: Point = CENTRE_OF_MASS
+    result: Result,
+    vehicle: Prefix,
+    start: float,
+    length: float,
+    angle: float = 10 * DEGREE,
+    midships: Point = CENTRE_OF_MASS,
 ) -> dict[str, Number]:
-    """Evaluate the initial turning ability: the response to 10 deg of rudder (IMO MSC.137(76), 5.2.2).
+    """Evaluate the initial turning ability.
+
+    The response to 10 deg of rudder (IMO MSC.137(76), 5.2.2).
 
     Args:
         result: Recorded run.
@@ -198,11 +237,22 @@ def initial_turning(
     return {"distance": distance, "distance_lengths": distance / length, "time": time - start}
 
 
-@better(track_reach="lower", track_reach_lengths="lower", head_reach="lower", lateral_deviation="lower", time="lower")
+@better(
+    track_reach="lower",
+    track_reach_lengths="lower",
+    head_reach="lower",
+    lateral_deviation="lower",
+    time="lower",
+)
 @units(track_reach="m", head_reach="m", lateral_deviation="m", time="s")
 @no_value("{vehicle} did not slow down far enough")
 def stopping(
-    result: Result, vehicle: Prefix, start: float, length: float, speed: float = 0.0, midships: Point = CENTRE_OF_MASS
+    result: Result,
+    vehicle: Prefix,
+    start: float,
+    length: float,
+    speed: float = 0.0,
+    midships: Point = CENTRE_OF_MASS,
 ) -> dict[str, Number]:
     """Evaluate a stopping test (IMO MSC.137(76), 5.2.4).
 
@@ -211,8 +261,8 @@ def stopping(
         vehicle: Signal prefix of the vessel ("plant.usv").
         start: Time of the engine order (s).
         length: Length of the vessel (m).
-        speed: Forward speed `velocity_body.u` at or below which the vessel counts as stopped (m/s); positive for a vessel
-            that coasts.
+        speed: Forward speed `velocity_body.u` at or below which the vessel counts as stopped (m/s);
+            positive for a vessel that coasts.
         midships: Point whose position is evaluated, relative to the centre of mass (m, body frame).
 
     Returns:
@@ -221,14 +271,18 @@ def stopping(
         - `track_reach`: track length until the vessel has stopped (m)
         - `track_reach_lengths`: the same in lengths of the vessel
         - `head_reach`: distance along the original course (m)
-        - `lateral_deviation`: distance from the line of the original course, to port or starboard (m)
+        - `lateral_deviation`: distance from the line of the original course, to port or starboard
+          (m)
         - `time`: time from the order until the vessel has stopped (s)
     """
     require(length > 0, f"expected a positive length (m); found {length:g}")
     motion = track(result, vehicle, start, midships)
     forward = np.interp(motion.time, result.time, result[f"{vehicle}.velocity_body.u"])
     time = first_crossing_time(motion.time, -forward, -speed)
-    position, reach = motion.interpolate(motion.position, time), motion.interpolate(motion.distance, time).real
+    position, reach = (
+        motion.interpolate(motion.position, time),
+        motion.interpolate(motion.distance, time).real,
+    )
     return {
         "track_reach": reach,
         "track_reach_lengths": reach / length,

@@ -30,7 +30,8 @@ class Obstacle:
     Attributes:
         name: Name of the obstacle.
         triangles: Corners of the triangles (m, world frame), shape (n, 3, 3).
-        is_convex: Whether each connected part collides as its convex hull; otherwise the triangles themselves do.
+        is_convex: Whether each connected part collides as its convex hull; otherwise the triangles
+            themselves do.
         colour: Red, green, blue in 0 ... 1.
         surface: Friction and restitution.
     """
@@ -85,11 +86,17 @@ def _read_obstacle(reader: JsonReader, name: str, spec: Any) -> Obstacle | None:
     position = reader.vector(spec.get("position", [0.0] * 3), (*path, "position"), "xyz")
     yaw = reader.number(spec.get("yaw", 0.0), (*path, "yaw"))
     scale = reader.positive(spec.get("scale", 1.0), (*path, "scale"))
-    kind = reader.choice(spec.get("collision", "convex"), (*path, "collision"), ("convex", "concave"))
-    red, green, blue = reader.vector(spec.get("colour", CONCRETE), (*path, "colour"), ("red", "green", "blue"))
+    kind = reader.choice(
+        spec.get("collision", "convex"), (*path, "collision"), ("convex", "concave")
+    )
+    red, green, blue = reader.vector(
+        spec.get("colour", CONCRETE), (*path, "colour"), ("red", "green", "blue")
+    )
     surface = read_surface(reader, spec, path)
     if triangles is None:
         return None
-    turn = np.array([[math.cos(yaw), -math.sin(yaw), 0.0], [math.sin(yaw), math.cos(yaw), 0.0], [0.0, 0.0, 1.0]])
+    turn = np.array(
+        [[math.cos(yaw), -math.sin(yaw), 0.0], [math.sin(yaw), math.cos(yaw), 0.0], [0.0, 0.0, 1.0]]
+    )
     placed = scale * triangles @ turn.T + np.array(position)
     return Obstacle(name, placed, kind == "convex", (red, green, blue), surface)

@@ -29,7 +29,9 @@ DRY = ContactSurface()
 def read_surface(reader: JsonReader, spec: Mapping[str, Any], path: JsonPath) -> ContactSurface:
     """Read the keys "friction" and "restitution" of an object."""
     friction = reader.number(spec.get("friction", 1.0), (*path, "friction"), 0.0)
-    return ContactSurface(friction, reader.number(spec.get("restitution", 0.0), (*path, "restitution"), 0.0, 1.0))
+    return ContactSurface(
+        friction, reader.number(spec.get("restitution", 0.0), (*path, "restitution"), 0.0, 1.0)
+    )
 
 
 @dataclass(frozen=True)
@@ -39,7 +41,8 @@ class VehiclePlacement:
     Attributes:
         name: Name of the vehicle, the prefix of its variables.
         model: Model of the vehicle.
-        parameters: Values of the model's scalar parameters in order; the initial state is among them.
+        parameters: Values of the model's scalar parameters in order; the initial state is among
+            them.
         body: Rigid body in Bullet, with the mass and inertia of these parameters.
         crash_speed: Change of velocity by a collision above which the vehicle has crashed (m/s).
         surface: Friction and restitution in contact.

@@ -13,7 +13,10 @@ from cosim.core.component import Ports, Variable
 def variable_views(
     variables: Sequence[Variable], arrays: Mapping[np.dtype[Any], np.ndarray]
 ) -> Iterator[tuple[Variable, np.ndarray]]:
-    """Yield each variable with a view of its values; each array holds the variables of its dtype in order."""
+    """Yield each variable with a view of its values.
+
+    Each array holds the variables of its dtype in order.
+    """
     ends = dict.fromkeys(arrays, 0)
     for variable in variables:
         first = ends[variable.dtype]
@@ -21,7 +24,9 @@ def variable_views(
         yield variable, arrays[variable.dtype][first : ends[variable.dtype]]
 
 
-def views_in_parts(variables: Sequence[Variable], parts: Sequence[np.ndarray]) -> Iterator[tuple[Variable, np.ndarray]]:
+def views_in_parts(
+    variables: Sequence[Variable], parts: Sequence[np.ndarray]
+) -> Iterator[tuple[Variable, np.ndarray]]:
     """Yield each variable with a view of its values; the parts hold the variables in order."""
     remaining, part, first = iter(parts), np.zeros(0), 0
     for variable in variables:

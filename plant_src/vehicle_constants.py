@@ -15,7 +15,8 @@ from .variable_views import variable_views
 from .vehicles.otter.parameters import MAX_PROPELLER_SPEED, MIN_PROPELLER_SPEED
 from .world_settings import INITIAL_PREFIX, WAVE_PREFIX
 
-#: command -> parameters with the magnitude of its lower limit ("": the limit is 0) and with its upper limit
+#: command -> parameters with the magnitude of its lower limit ("": the limit is 0) and with its
+#: upper limit
 _PARAMETERS = {
     "rotor_speed": ("", "max_rotor_speed"),
     "thruster_speed": ("max_thruster_speed", "max_thruster_speed"),
@@ -23,18 +24,31 @@ _PARAMETERS = {
     "azimuth": ("max_azimuth", "max_azimuth"),
     "rudder_angle": ("max_rudder_angle", "max_rudder_angle"),
 }
-#: limits of commands for which a model has no parameter; a rudder beyond a right angle is in the wrong unit
-_FIXED = {"propeller_speed": (MIN_PROPELLER_SPEED, MAX_PROPELLER_SPEED), "rudder_angle": (-math.pi / 2, math.pi / 2)}
+#: limits of commands for which a model has no parameter; a rudder beyond a right angle is in the
+#: wrong unit
+_FIXED = {
+    "propeller_speed": (MIN_PROPELLER_SPEED, MAX_PROPELLER_SPEED),
+    "rudder_angle": (-math.pi / 2, math.pi / 2),
+}
 
 
 def vehicle_constants(body: ContactBody, pointer: str) -> Iterator[tuple[Variable, np.ndarray]]:
     """Yield the parameters of a vehicle, except those of initial state and waves, as constants that `pointer` sets."""
-    for variable, values in variable_views(body.model.real_variables("parameter"), {DTYPES["Float64"]: body.parameters}):
+    for variable, values in variable_views(
+        body.model.real_variables("parameter"), {DTYPES["Float64"]: body.parameters}
+    ):
         if not variable.name.startswith((INITIAL_PREFIX, WAVE_PREFIX)):
             value = values.tolist() if variable.shape else values.item()
             name = f"{body.name}.{variable.name}"
             text = f"{variable.description}; set by {pointer}/{variable.name}"
-            constant = replace(variable, name=name, causality="local", variability="constant", start=value, description=text)
+            constant = replace(
+                variable,
+                name=name,
+                causality="local",
+                variability="constant",
+                start=value,
+                description=text,
+            )
             yield constant, values
 
 
@@ -53,5 +67,7 @@ def input_limits(body: ContactBody) -> Iterator[tuple[str, tuple[float, float]]]
 
 
 def _limits(command: str, subscript: str, parameters: Mapping[str, float]) -> tuple[float, float]:
-    lower, upper = (parameters.get(name + subscript, parameters.get(name)) for name in _PARAMETERS[command])
+    lower, upper = (
+        parameters.get(name + subscript, parameters.get(name)) for name in _PARAMETERS[command]
+    )
     return _FIXED[command] if upper is None else (0.0 - (lower or 0.0), upper)

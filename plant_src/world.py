@@ -1,4 +1,7 @@
-"""The PyBullet world as one component: all vehicles, platforms and environment, with contact between them."""
+"""The PyBullet world as one component.
+
+All vehicles, platforms and environment, with contact between them.
+"""
 
 from __future__ import annotations
 
@@ -53,17 +56,23 @@ class WorldState(NamedTuple):
 class World(Component):
     """Vehicles and fixed platforms in one PyBullet client, with wind, waves and current.
 
-    The variables of a vehicle have its name as prefix, those of the environment the prefix "environment.".
+    The variables of a vehicle have its name as prefix, those of the environment the prefix
+    "environment.".
 
     Args:
         instance_name: Name of the component.
-        vehicles: Name to object with the keys "model" (in `catalogue.VEHICLE_MODELS`), "position" of the centre of mass
-            ([x, y, z], of vessels [x, y], m) and, optionally, "motion" ("planar" or "6dof"), "hull" ("paper" for the Strider
-            of the paper), "yaw" (rad), "velocity_body" ([u, v, w], m/s), "rates" ([p, q, r], rad/s), "parameters" (name to
-            value) and "crash_speed" (m/s), the change of velocity by a collision above which it has crashed. "friction" (default
-            1) and "restitution" (default 0) are those of its surface; the values of two bodies in contact are multiplied.
-        platforms: Name to object with "size" (edges [x, y, z], m), "position" (centre, m), optionally "friction", "restitution".
-        environment: Object that `environment/settings.py` describes; waves and gusts start with the run.
+        vehicles: Name to object with the keys "model" (in `catalogue.VEHICLE_MODELS`), "position"
+            of the centre of mass ([x, y, z], of vessels [x, y], m) and, optionally, "motion"
+            ("planar" or "6dof"), "hull" ("paper" for the Strider of the paper), "yaw" (rad),
+            "velocity_body" ([u, v, w], m/s), "rates" ([p, q, r], rad/s), "parameters" (name to
+            value) and "crash_speed" (m/s), the change of velocity by a collision above which it has
+            crashed. "friction" (default
+            1) and "restitution" (default 0) are those of its surface; the values of two bodies in
+              contact are multiplied.
+        platforms: Name to object with "size" (edges [x, y, z], m), "position" (centre, m),
+            optionally "friction", "restitution".
+        environment: Object that `environment/settings.py` describes; waves and gusts start with the
+            run.
         obstacles: Name to object with the key "mesh" and those of `obstacles.py`.
 
     Raises:
@@ -82,7 +91,11 @@ class World(Component):
         obstacles: Mapping[str, Any] | None = None,
     ):
         settings = world_settings.read_world_settings(
-            vehicles, *({} if argument is None else argument for argument in (platforms, environment, obstacles))
+            vehicles,
+            *(
+                {} if argument is None else argument
+                for argument in (platforms, environment, obstacles)
+            ),
         )
         self._name = instance_name
         self._bullet_step, self._step_size, self._start_time = np.zeros(1), math.nan, 0.0
@@ -96,7 +109,9 @@ class World(Component):
         except BaseException:
             self.free()
             raise
-        self._variables_by_name = {variable.name: (variable, values) for variable, values in self._variables_with_values()}
+        self._variables_by_name = {
+            variable.name: (variable, values) for variable, values in self._variables_with_values()
+        }
         self.variables = [variable for variable, _ in self._variables_by_name.values()]
 
     @classmethod
@@ -117,7 +132,9 @@ class World(Component):
         return replay.world_scene(name, scenario)
 
     @staticmethod
-    def video_frames(result: Result, camera: str, times: np.ndarray, size: tuple[int, int]) -> Iterator[np.ndarray]:
+    def video_frames(
+        result: Result, camera: str, times: np.ndarray, size: tuple[int, int]
+    ) -> Iterator[np.ndarray]:
         """Render the frames of a video, see `scene.video`."""
         from .scene.video import frames
 
@@ -125,10 +142,25 @@ class World(Component):
 
     def _populate(self, settings: WorldSettings) -> None:
         fixed = create_fixed_bodies(self._client, settings.platforms, settings.obstacles)
-        self._fleet = Fleet(self._client, settings.vehicles, fixed.boxes, self._bullet_step, self._flags, fixed.names)
-        self._advance, self._contacts, self._failures = self._fleet.advance, self._fleet.contacts, self._fleet.failures
-        self._check_overlaps(fixed.paths | {body.body_id: f"vehicles.{body.name}" for body in self._fleet.bodies})
-        self.input_limits = {name: limits for body in self._fleet.bodies for name, limits in input_limits(body)}
+        self._fleet = Fleet(
+            self._client,
+            settings.vehicles,
+            fixed.boxes,
+            self._bullet_step,
+            self._flags,
+            fixed.names,
+        )
+        self._advance, self._contacts, self._failures = (
+            self._fleet.advance,
+            self._fleet.contacts,
+            self._fleet.failures,
+        )
+        self._check_overlaps(
+            fixed.paths | {body.body_id: f"vehicles.{body.name}" for body in self._fleet.bodies}
+        )
+        self.input_limits = {
+            name: limits for body in self._fleet.bodies for name, limits in input_limits(body)
+        }
         self._environment = EnvironmentModel(
             settings.environment,
             settings.sea,
@@ -137,17 +169,29 @@ class World(Component):
             self._fleet.bodies,
         )
         self._has_environment = bool(self._environment.update_functions)
-        self.warnings = [warning for vehicle in settings.vehicles for warning in placement_warnings(vehicle)]
+        self.warnings = [
+            warning for vehicle in settings.vehicles for warning in placement_warnings(vehicle)
+        ]
         for name in self._environment.vessels_without_wave_motion:
-            component_log.log_message(self._name, component_log.WARNING, f"the planar vessel {name} does not move with the waves")
+            component_log.log_message(
+                self._name,
+                component_log.WARNING,
+                f"the planar vessel {name} does not move with the waves",
+            )
         if self._environment.wind_is_without_effect:
-            text = "the wind acts on no vehicle, because their air drag (air_drag, body_drag, rotor_drag) is 0"
+            text = (
+                "the wind acts on no vehicle, because their air drag (air_drag, body_drag, "
+                "rotor_drag) is 0"
+            )
             component_log.log_message(self._name, component_log.WARNING, text)
 
     def _check_overlaps(self, names: Mapping[int, str]) -> None:
         """Raise InputError if vehicles or platforms overlap initially."""
         problems = [
-            Problem(f"{names[b]} overlaps {names[a]} by {depth:.3g} m", subject=("arguments", *names[b].split("."), "position"))
+            Problem(
+                f"{names[b]} overlaps {names[a]} by {depth:.3g} m",
+                subject=("arguments", *names[b].split("."), "position"),
+            )
             for (a, b), depth in overlap_depths(self._client).items()
             if depth > MAX_INITIAL_OVERLAP
         ]
@@ -159,8 +203,13 @@ class World(Component):
         for body, flags in zip(self._fleet.bodies, self._flags, strict=True):
             prefixed = body.model.variables_of(body.name)
             yield from views_in_parts([v for v in prefixed if v.causality == "input"], body.inputs)
-            yield from variable_views([v for v in prefixed if v.causality == "output"], {_FLOAT: body.outputs, _FLAG: flags})
-            yield from vehicle_constants(body, f"/components/{self._name}/arguments/vehicles/{body.name}/parameters")
+            yield from variable_views(
+                [v for v in prefixed if v.causality == "output"],
+                {_FLOAT: body.outputs, _FLAG: flags},
+            )
+            yield from vehicle_constants(
+                body, f"/components/{self._name}/arguments/vehicles/{body.name}/parameters"
+            )
         environment = self._environment
         yield from variable_views(environment.input_variables, {_FLOAT: environment.inputs})
         yield from variable_views(environment.output_variables, {_FLOAT: environment.outputs})
@@ -181,18 +230,28 @@ class World(Component):
 
     def _variable(self, name: str, function: str) -> tuple[Variable, np.ndarray]:
         if name not in self._variables_by_name:
-            raise ComponentError(self._name, function, f'no variable "{name}"{did_you_mean(name, self._variables_by_name)}')
+            raise ComponentError(
+                self._name,
+                function,
+                f'no variable "{name}"{did_you_mean(name, self._variables_by_name)}',
+            )
         return self._variables_by_name[name]
 
     def bind(self, inputs: Ports, outputs: Ports) -> None:
         """Bind the arrays from which inputs are read and to which outputs are written."""
-        self._bound_inputs = {variable.name: values for variable, values in variable_views(inputs.variables, inputs.arrays)}
+        self._bound_inputs = {
+            variable.name: values
+            for variable, values in variable_views(inputs.variables, inputs.arrays)
+        }
         bound_inputs, bound_outputs = inputs.arrays[_FLOAT].data, outputs.arrays[_FLOAT].data
         # memoryviews: copying a few numbers is faster than with NumPy
         own_outputs = self._fleet.outputs.data
         parts = [part for body in self._fleet.bodies for part in body.inputs]
         ends = list(accumulate(map(len, parts)))
-        self._input_copies = [(part.data, bound_inputs[end - len(part) : end]) for part, end in zip(parts, ends, strict=True)]
+        self._input_copies = [
+            (part.data, bound_inputs[end - len(part) : end])
+            for part, end in zip(parts, ends, strict=True)
+        ]
         self._output_copies = [
             (bound_outputs[: len(own_outputs)], own_outputs),
             (outputs.arrays[_FLAG].data, self._flags.reshape(-1).data),
@@ -201,7 +260,9 @@ class World(Component):
         if self._has_environment:
             self._input_copies.append((self._environment.inputs.data, bound_inputs[ends[-1] :]))
             end = len(own_outputs) + len(self._environment.outputs)
-            self._output_copies.append((bound_outputs[len(own_outputs) : end], self._environment.outputs.data))
+            self._output_copies.append(
+                (bound_outputs[len(own_outputs) : end], self._environment.outputs.data)
+            )
 
     def set_inputs(self) -> None:
         """Copy the bound inputs."""
@@ -215,7 +276,9 @@ class World(Component):
         for name, recorded in self._recorded_others:
             recorded[:] = self.get(name)
 
-    def prepare_step_calls(self, clock: ctypes.c_double, step_size: float) -> Sequence[PreparedCall]:
+    def prepare_step_calls(
+        self, clock: ctypes.c_double, step_size: float
+    ) -> Sequence[PreparedCall]:
         """Return one call that copies inputs, makes a step and copies outputs."""
         return [PreparedCall(self._step, (clock, step_size), "do_step")]
 
@@ -247,7 +310,11 @@ class World(Component):
                 for fraction in self._step_fractions:
                     self._advance(fraction)
         except InvalidStateError as error:
-            hint = f"; probable cause: the step of {step_size:g} s, {MAX_BULLET_STEP:g} s is usual" if step_size > 0.05 else ""
+            hint = (
+                f"; probable cause: the step of {step_size:g} s, {MAX_BULLET_STEP:g} s is usual"
+                if step_size > 0.05
+                else ""
+            )
             raise ComponentError(self._name, "do_step", f"{error}{hint}", time) from None
         if self._failures.alarm:
             self._report_failures(time + step_size)
@@ -256,7 +323,9 @@ class World(Component):
         """Find and log the vehicles that have failed until `time` (s)."""
         level = partial(self._environment.water_level, time=time - self._start_time)
         for message in self._failures.examine(level):
-            component_log.log_message(self._name, component_log.WARNING, f"t = {time:g} s: {message}")
+            component_log.log_message(
+                self._name, component_log.WARNING, f"t = {time:g} s: {message}"
+            )
 
     def _advance_with_environment(self, time: float) -> None:
         """Make the Bullet steps with environment, from a time since the start (s)."""
@@ -268,11 +337,18 @@ class World(Component):
     def _set_step_size(self, time: float, step_size: float) -> None:
         """Split the component's step into equal Bullet steps."""
         if not 0 < step_size < math.inf:
-            raise ComponentError(self._name, "do_step", f"found step size {step_size}, expected a positive number", time)
+            raise ComponentError(
+                self._name,
+                "do_step",
+                f"found step size {step_size}, expected a positive number",
+                time,
+            )
         step_count = max(1, math.ceil(step_size / MAX_BULLET_STEP - 1e-9))
         self._step_fractions = (1 / step_count,) * step_count
         self._bullet_step[0] = step_size / step_count
-        pybullet.setPhysicsEngineParameter(fixedTimeStep=self._bullet_step[0], physicsClientId=self._client)
+        pybullet.setPhysicsEngineParameter(
+            fixedTimeStep=self._bullet_step[0], physicsClientId=self._client
+        )
         self._step_size = step_size
 
     def terminate(self) -> None:

@@ -1,8 +1,8 @@
 """The world of one scenario as a PythonFMU class, for importers that support FMUs only.
 
-`world_fmu.json` beside this file holds the arguments of the world, by default the plant of Demo 1. To export another world, edit
-this file and run `cosim build plant_src/world_fmu.py --output my_world.fmu`. The host requires Python with this project and
-PyBullet installed.
+`world_fmu.json` beside this file holds the arguments of the world, by default the plant of Demo 1.
+To export another world, edit this file and run `cosim build plant_src/world_fmu.py --output
+my_world.fmu`. The host requires Python with this project and PyBullet installed.
 """
 
 from __future__ import annotations
@@ -47,7 +47,10 @@ class RealWithUnit(Real):
 
 
 class SavedState:
-    """A state of the world with its bound values; the memory in Bullet is released together with this object."""
+    """A state of the world with its bound values.
+
+    The memory in Bullet is released together with this object.
+    """
 
     def __init__(self, world: World, ports: list[np.ndarray]):
         self.state: WorldState = world.get_state()
@@ -56,13 +59,17 @@ class SavedState:
 
 
 class WorldFmu(Fmi2Slave):
-    """The world as an FMI 2.0 slave; its variables are those of `world.World`, arrays as scalars."""
+    """The world as an FMI 2.0 slave.
+
+    Its variables are those of `world.World`, arrays as scalars.
+    """
 
     description = "Quadcopter and vessel in one PyBullet world"
 
     def __init__(self, **arguments: Any):
         super().__init__(**arguments)
-        # the module may have been imported from the resources of an earlier instance, which no longer exist
+        # the module may have been imported from the resources of an earlier instance, which no
+        # longer exist
         folder = Path(self.resources or Path(__file__).parent)
         self._world = World(self.instance_name, **json.loads((folder / ARGUMENTS_FILE).read_text()))
         weakref.finalize(self, self._world.free)
@@ -79,7 +86,9 @@ class WorldFmu(Fmi2Slave):
 
     def _ports(self, causality: str) -> Ports:
         """Return the variables of a causality with zeroed arrays."""
-        variables = [variable for variable in self._world.variables if variable.causality == causality]
+        variables = [
+            variable for variable in self._world.variables if variable.causality == causality
+        ]
         counts: dict[np.dtype[Any], int] = {}
         for variable in variables:
             counts[variable.dtype] = counts.get(variable.dtype, 0) + len(variable.scalar_names)
@@ -98,10 +107,14 @@ class WorldFmu(Fmi2Slave):
             if variable.type == "Boolean":
                 scalar = Boolean(name, variability=Fmi2Variability.discrete, **attributes)
             else:
-                scalar = RealWithUnit(name, variable.unit.name if variable.unit else "", **attributes)
+                scalar = RealWithUnit(
+                    name, variable.unit.name if variable.unit else "", **attributes
+                )
             self.register_variable(scalar, nested=False)
 
-    def setup_experiment(self, start_time: float, _stop_time: float | None, _tolerance: float | None) -> None:
+    def setup_experiment(
+        self, start_time: float, _stop_time: float | None, _tolerance: float | None
+    ) -> None:
         """Set the start time (s)."""
         self._start_time = start_time
 

@@ -1,4 +1,7 @@
-"""Reader of a world's arguments: JSON to vehicles, platforms and environment. All problems are reported together."""
+"""Reader of a world's arguments: JSON to vehicles, platforms and environment.
+
+All problems are reported together.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,16 @@ from .vehicles.model import Model
 WAVE_PREFIX, INITIAL_PREFIX = "wave.", "initial."
 
 #: keys of a vehicle besides "model" and "position"
-OPTIONAL_KEYS = ("motion", "hull", "yaw", "velocity_body", "rates", "parameters", "crash_speed", *ContactSurface._fields)
+OPTIONAL_KEYS = (
+    "motion",
+    "hull",
+    "yaw",
+    "velocity_body",
+    "rates",
+    "parameters",
+    "crash_speed",
+    *ContactSurface._fields,
+)
 
 
 @dataclass(frozen=True)
@@ -41,11 +53,15 @@ class WorldSettings:
     @property
     def body_count(self) -> int:
         """Number of bodies in Bullet."""
-        fixed = len(self.platforms) + sum(len(mesh.parts) if mesh.is_convex else 1 for mesh in self.obstacles)
+        fixed = len(self.platforms) + sum(
+            len(mesh.parts) if mesh.is_convex else 1 for mesh in self.obstacles
+        )
         return len(self.vehicles) + fixed
 
 
-def read_world_settings(vehicles: Any, platforms: Any, environment: Any, obstacles: Any) -> WorldSettings:
+def read_world_settings(
+    vehicles: Any, platforms: Any, environment: Any, obstacles: Any
+) -> WorldSettings:
     """Read the arguments of a world.
 
     Args:
@@ -55,11 +71,18 @@ def read_world_settings(vehicles: Any, platforms: Any, environment: Any, obstacl
         obstacles: JSON object, name to obstacle, see `obstacles.py`.
 
     Raises:
-        InputError: With all problems; the subject of each is the path of the setting in the component.
+        InputError: With all problems; the subject of each is the path of the setting in the
+            component.
     """
     reader = _WorldSettingsReader()
-    placements = [reader.read_vehicle(name, spec) for name, spec in reader.read_named_objects(vehicles, ("vehicles",)).items()]
-    boxes = [reader.read_platform(name, spec) for name, spec in reader.read_named_objects(platforms, ("platforms",)).items()]
+    placements = [
+        reader.read_vehicle(name, spec)
+        for name, spec in reader.read_named_objects(vehicles, ("vehicles",)).items()
+    ]
+    boxes = [
+        reader.read_platform(name, spec)
+        for name, spec in reader.read_named_objects(platforms, ("platforms",)).items()
+    ]
     meshes = read_obstacles(obstacles, reader)
     environment_settings = settings.read_environment(reader, environment)
     if vehicles == {}:
@@ -82,43 +105,75 @@ class _WorldSettingsReader(JsonReader):
         initial = self.read_initial_state(model, spec, path)
         problem_count = len(self.problems)
         given = self.read_hull(model, spec, path)
-        given |= self.read_parameters(model, initial, spec.get("parameters", {}), (*path, "parameters"))
+        given |= self.read_parameters(
+            model, initial, spec.get("parameters", {}), (*path, "parameters")
+        )
         starts = zip(model.slots("parameter"), model.start_values("parameter"), strict=True)
         parameters = {slot: (initial | given).get(slot, start) for slot, start in starts}
         valid = len(self.problems) == problem_count
-        body = self.collision_body(model, parameters, (*path, "parameters")) if valid else model.body
-        crash_speed = self.number(spec.get("crash_speed", model.crash_speed), (*path, "crash_speed"), 0.0)
-        return VehiclePlacement(name, model, tuple(parameters.values()), body, crash_speed, read_surface(self, spec, path))
+        body = (
+            self.collision_body(model, parameters, (*path, "parameters")) if valid else model.body
+        )
+        crash_speed = self.number(
+            spec.get("crash_speed", model.crash_speed), (*path, "crash_speed"), 0.0
+        )
+        return VehiclePlacement(
+            name,
+            model,
+            tuple(parameters.values()),
+            body,
+            crash_speed,
+            read_surface(self, spec, path),
+        )
 
     def read_hull(self, model: Model, spec: Mapping[str, Any], path: JsonPath) -> dict[str, float]:
         """Return the parameters of the hull with the name "hull", none if the vehicle has its default one."""
         if "hull" not in spec:
             return {}
         if not model.hulls:
-            self.add_problem((*path, "hull"), f"found {spec['hull']!r}; {model.name} has one hull only, remove the key")
+            self.add_problem(
+                (*path, "hull"),
+                f"found {spec['hull']!r}; {model.name} has one hull only, remove the key",
+            )
             return {}
         return dict(model.hulls[self.choice(spec["hull"], (*path, "hull"), tuple(model.hulls))])
 
-    def read_initial_state(self, model: Model, spec: Mapping[str, Any], path: JsonPath) -> dict[str, float]:
+    def read_initial_state(
+        self, model: Model, spec: Mapping[str, Any], path: JsonPath
+    ) -> dict[str, float]:
         """Read position, yaw, velocity and rates; return the parameters `initial.*`."""
         slots = model.slots("parameter")
-        axes = [slot.rpartition(".")[2] for slot in slots if slot.startswith(f"{INITIAL_PREFIX}position.")]
+        axes = [
+            slot.rpartition(".")[2]
+            for slot in slots
+            if slot.startswith(f"{INITIAL_PREFIX}position.")
+        ]
         values = {"yaw": self.number(spec.get("yaw", 0.0), (*path, "yaw"))}
         for key, letters in (("position", axes), ("velocity_body", "uvw"), ("rates", "pqr")):
             vector = self.vector(spec.get(key, [0.0] * len(letters)), (*path, key), letters)
-            values |= {f"{key}.{letter}": value for letter, value in zip(letters, vector, strict=True)}
+            values |= {
+                f"{key}.{letter}": value for letter, value in zip(letters, vector, strict=True)
+            }
         for key, value in values.items():
             if value and f"{INITIAL_PREFIX}{key}" not in slots:
-                self.add_problem((*path, key.partition(".")[0]), f"found {key} = {value}; a {model.name} does not move that way")
+                self.add_problem(
+                    (*path, key.partition(".")[0]),
+                    f"found {key} = {value}; a {model.name} does not move that way",
+                )
         return {f"{INITIAL_PREFIX}{key}": value for key, value in values.items()}
 
     def collision_body(self, model: Model, parameters: Mapping[str, float], path: JsonPath) -> Body:
-        """Return the body with these parameters; a problem is reported at the first parameter of its subject."""
+        """Return the body with these parameters.
+
+        A problem is reported at the first parameter of its subject.
+        """
         try:
             return model.body_with(parameters)
         except InputError as error:
             for problem in error.problems:
-                first = next(slot for slot in parameters if slot.partition(".")[0] == problem.subject[0])
+                first = next(
+                    slot for slot in parameters if slot.partition(".")[0] == problem.subject[0]
+                )
                 self.add_problem((*path, first), problem.message)
         return model.body
 
@@ -132,23 +187,35 @@ class _WorldSettingsReader(JsonReader):
             for problem in error.problems:
                 self.add_problem((*path, "model", *problem.subject[1:]), problem.message)
             return None
-        return motions[self.choice(spec.get("motion", next(iter(motions))), (*path, "motion"), tuple(motions))]
+        return motions[
+            self.choice(spec.get("motion", next(iter(motions))), (*path, "motion"), tuple(motions))
+        ]
 
-    def read_parameters(self, model: Model, initial: Mapping[str, float], spec: Any, path: JsonPath) -> dict[str, float]:
+    def read_parameters(
+        self, model: Model, initial: Mapping[str, float], spec: Any, path: JsonPath
+    ) -> dict[str, float]:
         """Read the object "parameters"; return values of scalar parameters by name.
 
         Parameters of the initial state and of the waves are refused: other keys set them.
         """
         free = {
-            v.name: v for v in model.real_variables("parameter") if v.name not in initial and not v.name.startswith(WAVE_PREFIX)
+            v.name: v
+            for v in model.real_variables("parameter")
+            if v.name not in initial and not v.name.startswith(WAVE_PREFIX)
         }
         values: dict[str, float] = {}
         for name, value in self.mapping(spec, path).items():
             if name in free:
-                values |= zip(free[name].scalar_names, self.read_values(free[name], value, (*path, name)), strict=True)
+                values |= zip(
+                    free[name].scalar_names,
+                    self.read_values(free[name], value, (*path, name)),
+                    strict=True,
+                )
             else:
                 hint = did_you_mean(name, free) if free else "; it has none"
-                self.add_problem((*path, name), f'{model.name} has no parameter "{name}" to set{hint}')
+                self.add_problem(
+                    (*path, name), f'{model.name} has no parameter "{name}" to set{hint}'
+                )
         return values
 
     def read_values(self, variable: Variable, value: Any, path: JsonPath) -> Numbers:
@@ -181,5 +248,8 @@ def _with_waves(sea: Sea, vehicle: VehiclePlacement) -> VehiclePlacement:
         return vehicle
     parameters[f"{WAVE_PREFIX}count"] = float(len(sea.amplitude))
     for name in ("amplitude", "frequency", "direction", "phase"):
-        parameters |= {f"{WAVE_PREFIX}{name}[{k}]": value for k, value in enumerate(getattr(sea, name).tolist(), start=1)}
+        parameters |= {
+            f"{WAVE_PREFIX}{name}[{k}]": value
+            for k, value in enumerate(getattr(sea, name).tolist(), start=1)
+        }
     return replace(vehicle, parameters=tuple(parameters.values()))

@@ -19,12 +19,18 @@ __all__ = ["ball", "balls", "executor", "probe", "probes"]
 
 
 def pytest_addoption(parser):
-    parser.addoption("--validation", metavar="FILE", help="run only the tests that validate the plant; write what they measured")
+    parser.addoption(
+        "--validation",
+        metavar="FILE",
+        help="run only the tests that validate the plant; write what they measured",
+    )
 
 
 def pytest_configure(config):
     compile_without_optimization()
-    if signal.getsignal(signal.SIGINT) == signal.SIG_IGN:  # as in the background of a script; commands would inherit it
+    if (
+        signal.getsignal(signal.SIGINT) == signal.SIG_IGN
+    ):  # as in the background of a script; commands would inherit it
         signal.signal(signal.SIGINT, signal.default_int_handler)
     target = config.getoption("--validation")
     if target and not hasattr(config, "workerinput"):
@@ -70,5 +76,7 @@ def executor(request, monkeypatch):
     """Whatever a test simulates, it does so with each executor."""
     if request.param == "native" and not native_available():
         pytest.skip("the native executor was not built")
-    monkeypatch.setattr("cosim.engine.plan_run.executor_class", lambda _kind: EXECUTORS[request.param])
+    monkeypatch.setattr(
+        "cosim.engine.plan_run.executor_class", lambda _kind: EXECUTORS[request.param]
+    )
     return request.param

@@ -12,8 +12,11 @@ from cosim_command import run_cosim
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = [ROOT / "README.md", ROOT / "CONTRIBUTING.md", *sorted((ROOT / "docs").glob("*.md"))]
-#: documents whose blocks are executed one by one; `docs/test_tutorials.py` executes the others in order
-WITH_SINGLE_BLOCKS = [document for document in DOCUMENTS if document.name not in ("analysis.md", "python.md")]
+#: documents whose blocks are executed one by one; `docs/test_tutorials.py` executes the others in
+#: order
+WITH_SINGLE_BLOCKS = [
+    document for document in DOCUMENTS if document.name not in ("analysis.md", "python.md")
+]
 
 
 def blocks(language):
@@ -23,9 +26,13 @@ def blocks(language):
 
 
 def commands():
-    """Every command line of the documents that runs cosim or Python, and what the document shows of its output."""
+    """Every command line of the documents that runs cosim or Python, and what the document shows of
+    its output.
+    """
     for document in WITH_SINGLE_BLOCKS:
-        for block, shown in re.findall(r"```sh\n(.*?)```\n(?:\n```text\n(.*?)```)?", document.read_text(), re.DOTALL):
+        for block, shown in re.findall(
+            r"```sh\n(.*?)```\n(?:\n```text\n(.*?)```)?", document.read_text(), re.DOTALL
+        ):
             for line in re.split(r"\n|&&", block):
                 if line.strip().startswith(("cosim ", "python docs/")) and "build" not in line:
                     yield pytest.param(line.strip(), shown, id=line.strip())
@@ -33,24 +40,35 @@ def commands():
 
 @pytest.mark.parametrize(("command", "shown"), list(commands()))
 def test_commands_run_and_print_what_is_shown(command, shown, tmp_path):
-    program, *words = (str(ROOT / word) if (ROOT / word).is_file() else word for word in shlex.split(command))
+    program, *words = (
+        str(ROOT / word) if (ROOT / word).is_file() else word for word in shlex.split(command)
+    )
     if program == "cosim":
         done = run_cosim(*words, cwd=tmp_path)
     else:
-        done = subprocess.run([sys.executable, *words], cwd=tmp_path, capture_output=True, text=True, check=False)
+        done = subprocess.run(
+            [sys.executable, *words], cwd=tmp_path, capture_output=True, text=True, check=False
+        )
     assert done.returncode == 0, done.stderr
     assert missing_lines(shown, done.stdout) == []
 
 
 def missing_lines(shown, output):
-    """Return the lines that a document shows and that were not printed; the last digits of numbers may differ."""
+    """Return the lines that a document shows and that were not printed; the last digits of numbers
+    may differ.
+    """
     printed = [line.split() for line in output.splitlines()]
-    return [line for line in shown.splitlines() if "─" not in line and not any(alike(line.split(), words) for words in printed)]
+    return [
+        line
+        for line in shown.splitlines()
+        if "─" not in line and not any(alike(line.split(), words) for words in printed)
+    ]
 
 
 def alike(words, others):
     return len(words) == len(others) and all(
-        a == b or number(a) == pytest.approx(number(b), rel=1e-3) for a, b in zip(words, others, strict=True)
+        a == b or number(a) == pytest.approx(number(b), rel=1e-3)
+        for a, b in zip(words, others, strict=True)
     )
 
 
@@ -60,7 +78,9 @@ def number(word):
 
 @pytest.mark.parametrize("code", list(blocks("python")))
 def test_python_examples_run(code, tmp_path):
-    done = subprocess.run([sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
     assert done.returncode == 0, done.stderr
 
 
@@ -77,17 +97,25 @@ def schema(example):
     from cosim.scenario.extension_schema import editor_schema
     from cosim.studies import schema as sweeps
 
-    for key, kind in (("factors", sweeps.SweepSpec), ("minimize", sweeps.TuneSpec), ("keep", sweeps.WorstCaseSpec)):
+    for key, kind in (
+        ("factors", sweeps.SweepSpec),
+        ("minimize", sweeps.TuneSpec),
+        ("keep", sweeps.WorstCaseSpec),
+    ):
         if key in example:
             return sweeps.study_json_schema(kind)
     return editor_schema(nested="ports" in example)
 
 
-@pytest.mark.parametrize("keeper", ["../controllers/python/course_keeper.py:CourseKeeper", "my_keeper.py:Keeper"])
+@pytest.mark.parametrize(
+    "keeper", ["../controllers/python/course_keeper.py:CourseKeeper", "my_keeper.py:Keeper"]
+)
 def test_the_example_scenario_runs(tmp_path, keeper):
     """With the KPI of the same page, and a gust to go with it; also with the page's own component."""
     text = (ROOT / "docs/scenarios.md").read_text()
-    (scenario,) = (block for block in re.findall(r"```json\n(.*?)```", text, re.DOTALL) if "stop_time" in block)
+    (scenario,) = (
+        block for block in re.findall(r"```json\n(.*?)```", text, re.DOTALL) if "stop_time" in block
+    )
     component, kpi = re.findall(r"```python\n(.*?)```", text, re.DOTALL)
     scenario = re.sub(r"[^\"]*course_keeper.py:CourseKeeper", keeper, scenario)
     (tmp_path / "example.json").write_text(scenario.replace("../", f"{ROOT}/"))
@@ -101,11 +129,17 @@ def test_the_example_scenario_runs(tmp_path, keeper):
 
 def is_reachable(document, target):
     """True for an address, a file, or a generated page of the site."""
-    return target.startswith("https://") or (document.parent / target).exists() or "reference" in Path(target).parts
+    return (
+        target.startswith("https://")
+        or (document.parent / target).exists()
+        or "reference" in Path(target).parts
+    )
 
 
 def test_links_lead_somewhere():
-    guides = [path for path in sorted((ROOT / "docs").rglob("*.md")) if path.parent != ROOT / "docs"]
+    guides = [
+        path for path in sorted((ROOT / "docs").rglob("*.md")) if path.parent != ROOT / "docs"
+    ]
     for document in (*DOCUMENTS, *guides):
         text = re.sub(r"```.*?```", "", document.read_text(), flags=re.DOTALL)
         for target in re.findall(r"\]\(([^)#]+)\)", text):
@@ -114,7 +148,11 @@ def test_links_lead_somewhere():
 
 def test_every_scenario_is_listed():
     text = (ROOT / "docs/shipped_scenarios.md").read_text()
-    missing = [path.stem for path in sorted((ROOT / "scenarios").glob("*.json")) if f"`{path.stem}`" not in text]
+    missing = [
+        path.stem
+        for path in sorted((ROOT / "scenarios").glob("*.json"))
+        if f"`{path.stem}`" not in text
+    ]
     assert missing == []
 
 

@@ -67,7 +67,9 @@ def module_name(path):
 def sources(package):
     """Return the Python files and stubs of a package, without those that are package data."""
     return sorted(
-        path for path in (ROOT / package).rglob("*.py*") if not {"_bundle", "templates", "__pycache__"} & set(path.parts)
+        path
+        for path in (ROOT / package).rglob("*.py*")
+        if not {"_bundle", "templates", "__pycache__"} & set(path.parts)
     )
 
 
@@ -77,7 +79,10 @@ def syntax_tree(path):
 
 
 MODULES = {
-    module_name(path): path for package in ("cosim", "plant_src") for path in sources(package) if path.suffix in (".py", ".pyi")
+    module_name(path): path
+    for package in ("cosim", "plant_src")
+    for path in sources(package)
+    if path.suffix in (".py", ".pyi")
 }
 
 
@@ -92,7 +97,9 @@ def runtime_nodes(tree):
 
 
 def imported(name):
-    """Yield the modules that a module imports, also inside functions, or names in a string such as "cosim.kpis:rms"."""
+    """Yield the modules that a module imports, also inside functions, or names in a string such as
+    "cosim.kpis:rms".
+    """
     path = MODULES[name]
     package = name.split(".") if path.name == "__init__.py" else name.split(".")[:-1]
     for node in runtime_nodes(syntax_tree(path)):
@@ -103,14 +110,20 @@ def imported(name):
                 yield f"{module}.{alias.name}" if f"{module}.{alias.name}" in MODULES else module
         elif isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names)
-        elif isinstance(node, ast.Constant) and "." in (module := str(node.value).partition(":")[0]) and module in MODULES:
+        elif (
+            isinstance(node, ast.Constant)
+            and "." in (module := str(node.value).partition(":")[0])
+            and module in MODULES
+        ):
             yield module
 
 
 @cache
 def import_graph():
     """Return the modules that each module imports."""
-    return {name: {other for other in imported(name) if other in MODULES} - {name} for name in MODULES}
+    return {
+        name: {other for other in imported(name) if other in MODULES} - {name} for name in MODULES
+    }
 
 
 def layer(name):
@@ -123,7 +136,9 @@ def test_imports_between_folders_point_down(package, layers):
         f"{name} imports {other}"
         for name, others in import_graph().items()
         for other in sorted(others)
-        if name.startswith(f"{package}.") and other.startswith(f"{package}.") and layer(name) != layer(other)
+        if name.startswith(f"{package}.")
+        and other.startswith(f"{package}.")
+        and layer(name) != layer(other)
         if layers.index(layer(name)) < layers.index(layer(other))
     ]
     assert upward == []
@@ -145,18 +160,36 @@ def test_cosim_knows_no_vehicle_and_no_bullet():
 @cache
 def imported_packages(path):
     """Return the names of the packages that a file imports, except by relative imports."""
-    nodes = [node for node in ast.walk(syntax_tree(path)) if isinstance(node, ast.Import | ast.ImportFrom)]
-    plain = {alias.name.split(".")[0] for node in nodes if isinstance(node, ast.Import) for alias in node.names}
-    return plain | {(node.module or "").split(".")[0] for node in nodes if isinstance(node, ast.ImportFrom) and not node.level}
+    nodes = [
+        node
+        for node in ast.walk(syntax_tree(path))
+        if isinstance(node, ast.Import | ast.ImportFrom)
+    ]
+    plain = {
+        alias.name.split(".")[0]
+        for node in nodes
+        if isinstance(node, ast.Import)
+        for alias in node.names
+    }
+    return plain | {
+        (node.module or "").split(".")[0]
+        for node in nodes
+        if isinstance(node, ast.ImportFrom) and not node.level
+    }
 
 
 def test_only_the_build_names_files_of_the_plant():
     named = [path for path in sources("cosim") if "plant_src" in path.read_text()]
-    assert {module_name(path) for path in named} <= {"cosim.export.sources", "cosim.export.vehicle_files"}
+    assert {module_name(path) for path in named} <= {
+        "cosim.export.sources",
+        "cosim.export.vehicle_files",
+    }
 
 
 def test_only_fmi_components_and_export_use_fmpy():
-    users = {layer(module_name(path)) for path in sources("cosim") if "fmpy" in imported_packages(path)}
+    users = {
+        layer(module_name(path)) for path in sources("cosim") if "fmpy" in imported_packages(path)
+    }
     assert users <= {"components", "export"}
 
 
@@ -169,18 +202,40 @@ def test_only_cli_and_report_print():
             assert layer(module_name(path)) in ("cli", "report"), path
 
 
-HEAVY = ("numpy", "scipy", "matplotlib", "fmpy", "pybullet", "pydantic", "rich", "casadi", "rumoca", "jinja2")
+HEAVY = (
+    "numpy",
+    "scipy",
+    "matplotlib",
+    "fmpy",
+    "pybullet",
+    "pydantic",
+    "rich",
+    "casadi",
+    "rumoca",
+    "jinja2",
+)
 
 
-@pytest.mark.parametrize("statement", ["import cosim", "from cosim.cli import cli; cli(['--help'], standalone_mode=False)"])
+@pytest.mark.parametrize(
+    "statement",
+    ["import cosim", "from cosim.cli import cli; cli(['--help'], standalone_mode=False)"],
+)
 def test_importing_and_helping_load_nothing_heavy(statement):
-    code = f"import sys; {statement}; print(*(m for m in {HEAVY!r} if m in sys.modules), file=sys.stderr)"
+    code = (
+        f"import sys; {statement}; print(*(m for m in {HEAVY!r} if m in sys.modules), "
+        "file=sys.stderr)"
+    )
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stderr.split() == []
 
 
 def test_a_world_loads_neither_scipy_nor_matplotlib():
     """A run imports the world in each new process."""
-    code = "import sys, plant_src.world; print(*({'scipy', 'matplotlib', 'casadi', 'trimesh'} & set(sys.modules)))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT)
+    code = (
+        "import sys, plant_src.world; print(*({'scipy', 'matplotlib', 'casadi', 'trimesh'} & "
+        "set(sys.modules)))"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True, cwd=ROOT
+    )
     assert done.stdout.split() == []

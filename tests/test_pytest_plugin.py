@@ -26,9 +26,23 @@ def folder(tmp_path):
 
 
 def scenario(folder, name, block="Gain", **more):
-    components = {"a": {"python": f"{BLOCKS}:{block}", **({"parameters": {"u": 1.5}} if block == "Gain" else {})}}
-    content = {"name": name, "stop_time": 3, "step_size": 1, "components": components, "kpis": KPIS, **more}
-    (folder / f"{name}.json").write_text(json.dumps({key: value for key, value in content.items() if value is not None}))
+    components = {
+        "a": {
+            "python": f"{BLOCKS}:{block}",
+            **({"parameters": {"u": 1.5}} if block == "Gain" else {}),
+        }
+    }
+    content = {
+        "name": name,
+        "stop_time": 3,
+        "step_size": 1,
+        "components": components,
+        "kpis": KPIS,
+        **more,
+    }
+    (folder / f"{name}.json").write_text(
+        json.dumps({key: value for key, value in content.items() if value is not None})
+    )
 
 
 OPTIONS = ("-p", "no:cacheprovider")
@@ -36,8 +50,12 @@ OPTIONS = ("-p", "no:cacheprovider")
 
 @pytest.fixture
 def run_pytest(folder, monkeypatch, capsys):
-    """Function that runs pytest in the folder, in this process, with forked commands; returns exit code and output."""
-    forked = SimpleNamespace(run=lambda command, **_: run_cosim(*command[3:]), DEVNULL=subprocess.DEVNULL)
+    """Function that runs pytest in the folder, in this process, with forked commands; returns exit
+    code and output.
+    """
+    forked = SimpleNamespace(
+        run=lambda command, **_: run_cosim(*command[3:]), DEVNULL=subprocess.DEVNULL
+    )
     monkeypatch.setattr("cosim.studies.regression.subprocess", forked)
     monkeypatch.setenv("PYTEST_DISABLE_PLUGIN_AUTOLOAD", "1")
     monkeypatch.setenv("PYTEST_ADDOPTS", "")
@@ -52,9 +70,22 @@ def run_pytest(folder, monkeypatch, capsys):
 
 def run_in_parallel(folder):
     """Run pytest with two processes of pytest-xdist; return its output."""
-    command = [sys.executable, "-m", "pytest", "-p", "cosim.pytest_plugin", *OPTIONS, "-p", "xdist", "-n", "2"]
+    command = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-p",
+        "cosim.pytest_plugin",
+        *OPTIONS,
+        "-p",
+        "xdist",
+        "-n",
+        "2",
+    ]
     environment = {**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTEST_ADDOPTS": ""}
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, env=environment).stdout
+    return subprocess.run(
+        command, cwd=folder, capture_output=True, text=True, check=False, env=environment
+    ).stdout
 
 
 def test_scenarios_with_expectations_are_tests(folder, run_pytest):
@@ -99,7 +130,9 @@ def test_invalid_files_fail_with_the_location(folder, run_pytest):
 def test_scenarios_with_equal_names_have_separate_results(folder, run_pytest):
     for calm, limit in (("calm", 3.0), ("storm", 4.0)):
         (folder / "scenarios" / calm).mkdir(parents=True)
-        scenario(folder / "scenarios" / calm, "course", checks=[{"kpi": "y.value", "equals": limit}])
+        scenario(
+            folder / "scenarios" / calm, "course", checks=[{"kpi": "y.value", "equals": limit}]
+        )
     assert "1 failed, 1 passed" in run_pytest()[1]
     results = (folder / "runs").rglob("result.csv")
     assert sorted(path.parent.relative_to(folder / "runs").as_posix() for path in results) == [
@@ -108,7 +141,9 @@ def test_scenarios_with_equal_names_have_separate_results(folder, run_pytest):
     ]
 
 
-def test_results_of_scenarios_outside_the_root_folder_are_inside_it(folder, run_pytest, tmp_path_factory):
+def test_results_of_scenarios_outside_the_root_folder_are_inside_it(
+    folder, run_pytest, tmp_path_factory
+):
     outside = tmp_path_factory.mktemp("outside")
     scenario(outside, "course", checks=[{"kpi": "y.value", "equals": 3.0}])
     assert "1 passed" in run_pytest(f"--rootdir={folder}", str(outside))[1]

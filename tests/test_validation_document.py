@@ -12,7 +12,15 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from plant_validation import DOCUMENT, TESTS, MeasurementCheck, Statement, ValidationReport, render_document, statement
+from plant_validation import (
+    DOCUMENT,
+    TESTS,
+    MeasurementCheck,
+    Statement,
+    ValidationReport,
+    render_document,
+    statement,
+)
 
 FILE = "plant_src/sensors/test_barometer_and_magnetometer.py"
 
@@ -20,19 +28,28 @@ FILE = "plant_src/sensors/test_barometer_and_magnetometer.py"
 def stated(file: Path) -> Iterator[Statement]:
     """Yield the statements of a test file: the literal arguments of their calls of `measured`."""
     tree = ast.parse(file.read_text())
-    constants = dict(constant for line in tree.body if isinstance(line, ast.Assign) for constant in texts(line))
+    constants = dict(
+        constant for line in tree.body if isinstance(line, ast.Assign) for constant in texts(line)
+    )
     for function in (line for line in tree.body if isinstance(line, ast.FunctionDef)):
         test = f"{file.relative_to(TESTS).as_posix()}::{function.name}"
         for node in ast.walk(function):
             if isinstance(node, ast.Call) and getattr(node.func, "id", "") == "measured":
                 arguments = [literal(node.args[k], constants) for k in (0, 1, 4, 5)]
-                limits = {word.arg: literal(word.value, constants) for word in node.keywords if word.arg != "case"}
+                limits = {
+                    word.arg: literal(word.value, constants)
+                    for word in node.keywords
+                    if word.arg != "case"
+                }
                 yield statement(test, *arguments, **limits)
 
 
 def texts(line: ast.Assign) -> Iterator[tuple[str, str]]:
     """Names and values of the strings that a line of a module assigns."""
-    names, values = (side.elts if isinstance(side, ast.Tuple) else [side] for side in (line.targets[0], line.value))
+    names, values = (
+        side.elts if isinstance(side, ast.Tuple) else [side]
+        for side in (line.targets[0], line.value)
+    )
     for name, value in zip(names, values, strict=False):
         if isinstance(value, ast.Constant) and isinstance(value.value, str):
             yield name.id, value.value
@@ -47,11 +64,17 @@ def listed(text: str) -> Iterator[tuple[Statement, str, list[float]]]:
     parts = re.split(r"^###? (.*)$", text, flags=re.MULTILINE)
     for model, section in zip(parts[1::2], parts[2::2], strict=True):
         for row in (line for line in section.splitlines() if "](../tests/" in line):
-            quantity, unit, *numbers, limit, source, test = row.removeprefix("| ").removesuffix(" |").split(" | ")
+            quantity, unit, *numbers, limit, source, test = (
+                row.removeprefix("| ").removesuffix(" |").split(" | ")
+            )
             name, file = re.fullmatch(r"\[(\w+)\]\(\.\./tests/(.*)\)", test).groups()
             what, _, case = quantity.partition(" [")
             values = [float(number.strip("< rel.") or 0) for number in numbers]
-            yield Statement(model, what, unit, limit, source, f"{file}::{name}"), case.removesuffix("]"), values
+            yield (
+                Statement(model, what, unit, limit, source, f"{file}::{name}"),
+                case.removesuffix("]"),
+                values,
+            )
 
 
 def test_the_page_lists_exactly_what_the_tests_state() -> None:
@@ -63,7 +86,16 @@ def test_the_page_lists_exactly_what_the_tests_state() -> None:
 
 def test_running_with_the_option_writes_what_the_page_says(tmp_path: Path) -> None:
     """Here a file's part of it, by a process of pytest-xdist."""
-    run = [sys.executable, "-m", "pytest", "-n", "1", "--validation", str(tmp_path / "page.md"), str(TESTS / FILE)]
+    run = [
+        sys.executable,
+        "-m",
+        "pytest",
+        "-n",
+        "1",
+        "--validation",
+        str(tmp_path / "page.md"),
+        str(TESTS / FILE),
+    ]
     subprocess.run(run, cwd=TESTS.parent, check=True, capture_output=True)
     again = list(listed((tmp_path / "page.md").read_text()))
     before = [row for row in listed(DOCUMENT.read_text()) if row[0].test.startswith(FILE)]
@@ -80,7 +112,9 @@ def records() -> list[tuple[str, dict[str, object]]]:
 @pytest.fixture
 def stating(records: list[tuple[str, dict[str, object]]]) -> MeasurementCheck:
     """The fixture `measured` of a test that is made up."""
-    return MeasurementCheck(SimpleNamespace(path=TESTS / FILE, originalname="test_it", user_properties=records))
+    return MeasurementCheck(
+        SimpleNamespace(path=TESTS / FILE, originalname="test_it", user_properties=records)
+    )
 
 
 @pytest.mark.parametrize(
@@ -93,7 +127,9 @@ def stating(records: list[tuple[str, dict[str, object]]]) -> MeasurementCheck:
         (float("nan"), 1.0, {"within": 1e9}),
     ],
 )
-def test_what_does_not_agree_fails(stating: MeasurementCheck, found: object, expected: object, limit: dict[str, float]) -> None:
+def test_what_does_not_agree_fails(
+    stating: MeasurementCheck, found: object, expected: object, limit: dict[str, float]
+) -> None:
     with pytest.raises(AssertionError, match="Otter: speed"):
         stating("Otter", "speed", found, expected, "m/s", "theory", **limit)
 
@@ -103,12 +139,17 @@ def test_a_model_without_a_section_is_refused(stating: MeasurementCheck) -> None
         stating("Ottter", "speed", 1.0, 1.0, "m/s", "theory")
 
 
-def test_of_several_values_the_worst_is_listed(stating: MeasurementCheck, records: list[tuple[str, dict[str, object]]]) -> None:
+def test_of_several_values_the_worst_is_listed(
+    stating: MeasurementCheck, records: list[tuple[str, dict[str, object]]]
+) -> None:
     for found in (1.001, [1.0, 0.996], 1.002):
         for case in ("10 s", "2 s"):
             stating("Otter", "speed", found, 1.0, "m/s", "theory", within=0.01, case=case)
     rows = list(listed(render_document([record for _, record in records])))
-    assert [row[1:] for row in rows] == [("2 s", [1.0, 0.996, 0.004]), ("10 s", [1.0, 0.996, 0.004])]
+    assert [row[1:] for row in rows] == [
+        ("2 s", [1.0, 0.996, 0.004]),
+        ("10 s", [1.0, 0.996, 0.004]),
+    ]
 
 
 @pytest.mark.parametrize("exitstatus", [0, 1])

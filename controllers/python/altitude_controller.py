@@ -27,9 +27,14 @@ class AltitudeController(SampledController):
         self.parameter("throttle_min", 35.0, "%")
         self.parameter("throttle_max", 90.0, "%")
         self.parameter("mass", 0.441, "kg", "Of the quadcopter, as the controller believes it")
-        self.parameter("thrust_coefficient", 8.24e-6, "N.s2/rad2", "Thrust of a rotor over its squared speed")
+        self.parameter(
+            "thrust_coefficient", 8.24e-6, "N.s2/rad2", "Thrust of a rotor over its squared speed"
+        )
         self.calculated_parameter(
-            "hover_throttle", self._hover_throttle, "%", "Throttle that carries the weight: the integral starts there"
+            "hover_throttle",
+            self._hover_throttle,
+            "%",
+            "Throttle that carries the weight: the integral starts there",
         )
         self.input("vehicle.position.z", 0.0, "m", "Up")
         self.input("altitude_reference", 0.0, "m", "Of the centre of mass")
@@ -52,4 +57,6 @@ class AltitudeController(SampledController):
 
     def _hover_throttle(self) -> float:
         """Return the throttle (%) at which four rotors carry the weight."""
-        return 100 / MAX_ROTOR_SPEED * math.sqrt(self.mass * GRAVITY / (4 * self.thrust_coefficient))
+        return (
+            100 / MAX_ROTOR_SPEED * math.sqrt(self.mass * GRAVITY / (4 * self.thrust_coefficient))
+        )

@@ -16,15 +16,27 @@ class CourseKeeper(Fmi2Slave):
 
     description = "Keeps a course and a speed"
     units = {
-        **{"vehicle.attitude.yaw": "rad", "vehicle.velocity_body.u": "m/s", "vehicle.rates.r": "rad/s"},
-        **{"course_command": "rad", "speed_command": "m/s", "course_P": "1", "course_D": "s", "rudder_limit": "rad"},
+        **{
+            "vehicle.attitude.yaw": "rad",
+            "vehicle.velocity_body.u": "m/s",
+            "vehicle.rates.r": "rad/s",
+        },
+        **{
+            "course_command": "rad",
+            "speed_command": "m/s",
+            "course_P": "1",
+            "course_D": "s",
+            "rudder_limit": "rad",
+        },
         **{"speed_P": "N.s/m", "thrust_limit": "N", "thrust": "N", "rudder_angle": "rad"},
     }
 
     def __init__(self, **arguments: object):
         super().__init__(**arguments)
         self.vehicle = SimpleNamespace(
-            attitude=SimpleNamespace(yaw=0.0), velocity_body=SimpleNamespace(u=0.0), rates=SimpleNamespace(r=0.0)
+            attitude=SimpleNamespace(yaw=0.0),
+            velocity_body=SimpleNamespace(u=0.0),
+            rates=SimpleNamespace(r=0.0),
         )
         self.course_command, self.speed_command = 0.0, 1.0
         self.course_P, self.course_D, self.rudder_limit = 1.5, 0.8, math.radians(35)
@@ -33,8 +45,18 @@ class CourseKeeper(Fmi2Slave):
 
         for name in ("vehicle.attitude.yaw", "vehicle.velocity_body.u", "vehicle.rates.r"):
             self.register_variable(Real(name, causality=Fmi2Causality.input))
-        for name in ("course_command", "speed_command", "course_P", "course_D", "rudder_limit", "speed_P", "thrust_limit"):
-            self.register_variable(Real(name, causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable))
+        for name in (
+            "course_command",
+            "speed_command",
+            "course_P",
+            "course_D",
+            "rudder_limit",
+            "speed_P",
+            "thrust_limit",
+        ):
+            self.register_variable(
+                Real(name, causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable)
+            )
         for name in ("thrust", "rudder_angle"):
             self.register_variable(Real(name, causality=Fmi2Causality.output))
 

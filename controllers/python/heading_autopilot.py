@@ -11,7 +11,10 @@ from .fleet.sampled_controller import SampledController
 
 
 class HeadingAutopilot(SampledController):
-    """PID control of the notch-filtered heading error; the same in controllers/modelica/HeadingAutopilot.mo."""
+    """PID control of the notch-filtered heading error.
+
+    The same in controllers/modelica/HeadingAutopilot.mo.
+    """
 
     description = "Heading loop of a vessel with integral action and a wave filter"
 
@@ -22,8 +25,15 @@ class HeadingAutopilot(SampledController):
         self.parameter("heading_D", 0.8, "s", "Rudder angle per rate of the heading error")
         self.parameter("heading_N", 10.0, "rad/s", "Bandwidth of the derivative filter")
         self.parameter("rudder_limit", 0.610865238198015, "rad", "35 degrees")
-        self.parameter("wave_period", 1.25, "s", "Of the encountered waves, which the rudder does not follow")
-        self.parameter("wave_depth", 0.1, "1", "Damping ratio of the zeros of the wave filter; equal to wave_width: no filter")
+        self.parameter(
+            "wave_period", 1.25, "s", "Of the encountered waves, which the rudder does not follow"
+        )
+        self.parameter(
+            "wave_depth",
+            0.1,
+            "1",
+            "Damping ratio of the zeros of the wave filter; equal to wave_width: no filter",
+        )
         self.parameter("wave_width", 0.4, "1", "Damping ratio of its poles")
         self.input("vehicle.attitude.yaw", 0.0, "rad", "Counter-clockwise from east")
         self.input("heading_reference", 0.0, "rad", "Counter-clockwise from east")
@@ -36,4 +46,6 @@ class HeadingAutopilot(SampledController):
         error = wrap_angle(self.vehicle.attitude.yaw - self.heading_reference)
         filtered = self.waves(error, self.wave_period, self.wave_depth, self.wave_width)
         gains = {"P": self.heading_P, "I": self.heading_I, "D": self.heading_D, "N": self.heading_N}
-        self.rudder_angle = self.yaw(filtered, limits=(-self.rudder_limit, self.rudder_limit), **gains)
+        self.rudder_angle = self.yaw(
+            filtered, limits=(-self.rudder_limit, self.rudder_limit), **gains
+        )

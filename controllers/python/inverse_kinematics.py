@@ -1,4 +1,7 @@
-"""Inverse kinematics: from horizontal acceleration and altitude commands to tilt commands and common throttle."""
+"""Inverse kinematics.
+
+From horizontal acceleration and altitude commands to tilt commands and common throttle.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,10 @@ class InverseKinematics(SampledController):
     order of the tilt.
     """
 
-    description = "From horizontal acceleration and altitude commands to tilt commands and the common throttle of the rotors"
+    description = (
+        "From horizontal acceleration and altitude commands to tilt commands and the common "
+        "throttle of the rotors"
+    )
 
     def __init__(self, **arguments: Any):
         super().__init__(**arguments)
@@ -29,23 +35,34 @@ class InverseKinematics(SampledController):
         self.input("acceleration_command.y", 0.0, "m/s2", "North")
         self.input("altitude_command", 2.0, "m", "Of the centre of mass")
         self.input("yaw_command", 0.0, "rad", "Counter-clockwise from east")
-        self.input("reset", False, description="Holds the start state: level, with the force that carries the weight")
+        self.input(
+            "reset",
+            False,
+            description="Holds the start state: level, with the force that carries the weight",
+        )
         self.output("roll_command", 0.0, "rad", "Positive: left side up, accelerates to the right")
         self.output("pitch_command", 0.0, "rad", "Positive: nose down, accelerates forward")
         self.output("throttle", 0.0, "%")
         self.output("thrust", 0.0, "N", "Wanted, of all rotors together")
-        self.climb, self.low_pass = self.add_block("climb", Pid()), self.add_block("low_pass", Butterworth())
+        self.climb, self.low_pass = (
+            self.add_block("climb", Pid()),
+            self.add_block("low_pass", Butterworth()),
+        )
 
     def _declare_parameters(self) -> None:
         self.parameter("altitude_P", 10.0, "N/m", "Vertical force per altitude error")
-        self.parameter("altitude_I", 10.0, "N/(m.s)", "Rate of the vertical force per altitude error")
+        self.parameter(
+            "altitude_I", 10.0, "N/(m.s)", "Rate of the vertical force per altitude error"
+        )
         self.parameter("altitude_D", 3.0, "N.s/m", "Vertical force per rate of the altitude error")
         self.parameter("altitude_N", 40.0, "rad/s", "Bandwidth of the derivative filter")
         self.parameter("force_min", 2.0, "N", "Of the vertical force")
         self.parameter("force_max", 7.0, "N", "Of the vertical force")
         self.parameter("filter_frequency", 20.0, "Hz", "Of the low-pass on the vertical force")
         self.parameter("mass", 0.441, "kg", "Of the quadcopter, as the controller believes it")
-        self.parameter("thrust_coefficient", 8.24e-6, "N.s2/rad2", "Thrust of a rotor over its squared speed")
+        self.parameter(
+            "thrust_coefficient", 8.24e-6, "N.s2/rad2", "Thrust of a rotor over its squared speed"
+        )
 
     def tick(self, time: float) -> None:
         """Compute the commands from the force t = m (x'', y'', z'' + g) (equation 15), its z component from the altitude PID."""
@@ -54,7 +71,9 @@ class InverseKinematics(SampledController):
         force_z = self._vertical_force()
         self.thrust = math.sqrt(force_x * force_x + force_y * force_y + force_z * force_z)
         self._tilt(force_x / self.thrust, force_y / self.thrust, force_z / self.thrust)
-        self.throttle = 100 / MAX_ROTOR_SPEED * math.sqrt(self.thrust / (4 * self.thrust_coefficient))
+        self.throttle = (
+            100 / MAX_ROTOR_SPEED * math.sqrt(self.thrust / (4 * self.thrust_coefficient))
+        )
 
     def _vertical_force(self) -> float:
         """Return the filtered vertical force (N)."""
@@ -74,7 +93,8 @@ class InverseKinematics(SampledController):
     def _tilt(self, z_x: float, z_y: float, z_z: float) -> None:
         """Set the tilt commands from the unit vector z of the thrust (equations 16 to 19).
 
-        y is perpendicular to the heading, x = y cross z, and roll and pitch are the ZYX angles of [x y z].
+        y is perpendicular to the heading, x = y cross z, and roll and pitch are the ZYX angles of
+        [x y z].
         """
         c, s = math.cos(self.yaw_command), math.sin(self.yaw_command)
         y_x, y_y, y_z = -z_z * s, z_z * c, z_x * s - z_y * c

@@ -12,7 +12,10 @@ from .waypoint_guidance import WaypointGuidance
 class PathGuidance(WaypointGuidance):
     """Adaptive line of sight (ALOS); the same in controllers/modelica/Fleet/PathGuidance.mo."""
 
-    description = "Adaptive line of sight (ALOS) along the legs between waypoints, with an estimate of the crab angle"
+    description = (
+        "Adaptive line of sight (ALOS) along the legs between waypoints, with an estimate of the "
+        "crab angle"
+    )
     running: bool
     leg: int
     start_x: float
@@ -24,8 +27,12 @@ class PathGuidance(WaypointGuidance):
 
     def __init__(self, **arguments: Any):
         super().__init__(**arguments)
-        self.parameter("look_ahead", 1.5, "m", "Distance along the leg to the point that is aimed at")
-        self.parameter("adaptation", 0.1, "rad/(m.s)", "Rate of the crab angle per cross-track error")
+        self.parameter(
+            "look_ahead", 1.5, "m", "Distance along the leg to the point that is aimed at"
+        )
+        self.parameter(
+            "adaptation", 0.1, "rad/(m.s)", "Rate of the crab angle per cross-track error"
+        )
         self.parameter("crab_limit", 1.0, "rad", "Largest crab angle")
         self.output("cross_track_error", 0.0, "m", "Positive: left of the leg")
         self.output("crab_angle", 0.0, "rad", "Estimate: course minus heading")
@@ -43,11 +50,21 @@ class PathGuidance(WaypointGuidance):
         if self.active_waypoint != self.leg:
             self._begin_leg()
         c, s = math.cos(self.course), math.sin(self.course)
-        error = self.cross_track_error = c * (position.y - self.start_y) - s * (position.x - self.start_x)
+        error = self.cross_track_error = c * (position.y - self.start_y) - s * (
+            position.x - self.start_x
+        )
         if self.finished:
             return
-        self.heading_reference = wrap_angle(self.course - self.crab_angle - math.atan2(error, self.look_ahead))
-        rate = SAMPLE_PERIOD * self.adaptation * error * self.look_ahead / horizontal_norm(self.look_ahead, error)
+        self.heading_reference = wrap_angle(
+            self.course - self.crab_angle - math.atan2(error, self.look_ahead)
+        )
+        rate = (
+            SAMPLE_PERIOD
+            * self.adaptation
+            * error
+            * self.look_ahead
+            / horizontal_norm(self.look_ahead, error)
+        )
         self.crab_angle = limit(self.crab_angle + rate, -self.crab_limit, self.crab_limit)
 
     def _begin_leg(self) -> None:

@@ -10,7 +10,10 @@ from .fleet.waypoint_guidance import WaypointGuidanceBase
 class StriderAutopilot(WaypointGuidanceBase, SpeedControl, HeadingControl):
     """Guidance, speed and heading control in one sample, equivalent to scenarios/systems/strider_autopilot.json."""
 
-    description = "Waypoint guidance, speed and heading control of a vessel with thruster and rudder in one block"
+    description = (
+        "Waypoint guidance, speed and heading control of a vessel with thruster and rudder in one "
+        "block"
+    )
 
     def tick(self, time: float) -> None:
         """Update the guidance, then thrust and rudder angle."""

@@ -14,7 +14,9 @@ class Vtol(SampledController):
     The table of modes is in controllers/modelica/README.md.
     """
 
-    description = "Path command of the quadcopter: take-off, pursuit of a vessel and landing on its deck"
+    description = (
+        "Path command of the quadcopter: take-off, pursuit of a vessel and landing on its deck"
+    )
     mode: int
     altitude_command: float
     altitude_reference: float
@@ -41,23 +43,54 @@ class Vtol(SampledController):
         self.local("home_yaw", 0.0, "rad", "Last heading before take-off")
         self.local("steady", 0.0, "s", "Time spent in the window that allows the descent")
         self.local("touching", 0.0, "s", "Time spent in contact with the vessel")
-        self.local("committed", False, description="To the touchdown: a calm deck at the waiting height")
+        self.local(
+            "committed", False, description="To the touchdown: a calm deck at the waiting height"
+        )
 
     def _declare_parameters(self) -> None:
         self.parameter("take_off_time", 0.0, "s", "Earliest start of the motors")
-        self.parameter("landing_enabled", True, description="False: keep following, also out of an approach or descent")
+        self.parameter(
+            "landing_enabled",
+            True,
+            description="False: keep following, also out of an approach or descent",
+        )
         self.parameter("landing_time", 5.0, "s", "Earliest start of the approach")
-        self.parameter("velocity_feed_forward", True, description="Follow with the velocity of the deck as feed-forward")
+        self.parameter(
+            "velocity_feed_forward",
+            True,
+            description="Follow with the velocity of the deck as feed-forward",
+        )
         self.parameter("ramp_time", 0.3, "s", "In which the motors spin up or down")
-        self.parameter("clearance", 0.4, "m", "Climb above the starting point before the pursuit begins")
-        self.parameter("resting_height", 0.056, "m", "Of the centre of mass above the deck when landed")
+        self.parameter(
+            "clearance", 0.4, "m", "Climb above the starting point before the pursuit begins"
+        )
+        self.parameter(
+            "resting_height", 0.056, "m", "Of the centre of mass above the deck when landed"
+        )
         self.parameter("approach_height", 0.675, "m", "Above the resting height")
-        self.parameter("waiting_height", 0.15, "m", "Above the resting height: the descent waits there until the deck is calm")
-        self.parameter("press_depth", 0.1, "m", "Below the resting height: end of the descent, which keeps the contact")
+        self.parameter(
+            "waiting_height",
+            0.15,
+            "m",
+            "Above the resting height: the descent waits there until the deck is calm",
+        )
+        self.parameter(
+            "press_depth",
+            0.1,
+            "m",
+            "Below the resting height: end of the descent, which keeps the contact",
+        )
         self.parameter("approach_band", 0.1, "m", "Altitude error that allows the descent")
-        self.parameter("landing_error", 0.05, "m", "Horizontal error that allows the descent to begin and to go on")
+        self.parameter(
+            "landing_error",
+            0.05,
+            "m",
+            "Horizontal error that allows the descent to begin and to go on",
+        )
         self.parameter("abort_error", 0.15, "m", "Horizontal error that aborts the descent")
-        self.parameter("hold_time", 0.3, "s", "In which both errors must stay small before the descent")
+        self.parameter(
+            "hold_time", 0.3, "s", "In which both errors must stay small before the descent"
+        )
         self.parameter("contact_time", 0.03, "s", "Of unbroken contact that counts as touchdown")
         self.parameter("climb_rate", 1.0, "m/s", "Of the altitude reference, up and down")
         self.parameter("descent_rate", 0.3, "m/s", "Of the altitude reference onto the deck")
@@ -80,10 +113,23 @@ class Vtol(SampledController):
             self.output(f"{name}.y", 0.0, unit, "North")
         self.output("altitude_reference", 0.0, "m")
         self.output("yaw_reference", 0.0, "rad")
-        self.output("motor_share", 0.0, "1", "Of the commanded rotor speeds: ramps at take-off and touchdown")
+        self.output(
+            "motor_share",
+            0.0,
+            "1",
+            "Of the commanded rotor speeds: ramps at take-off and touchdown",
+        )
         self.output("motors_on", False)
-        self.output("reset", True, description="Controllers hold their start state: the motors are not at full share")
-        self.output("mode", int(FlightMode.IDLE), description="1 idle, 2 take-off, 3 follow, 4 approach, 5 descend, 6 landed")
+        self.output(
+            "reset",
+            True,
+            description="Controllers hold their start state: the motors are not at full share",
+        )
+        self.output(
+            "mode",
+            int(FlightMode.IDLE),
+            description="1 idle, 2 take-off, 3 follow, 4 approach, 5 descend, 6 landed",
+        )
         self.output("horizontal_error", 0.0, "m", "Distance to the centre of the deck")
         self.output("aborts", 0, description="Aborted descents")
 
@@ -112,7 +158,8 @@ class Vtol(SampledController):
         self.home_x, self.home_y, self.home_z = position.x, position.y, position.z
         self.home_yaw = self.vehicle.attitude.yaw
 
-    # -- flight modes ----------------------------------------------------------------------------------------------------------
+    # -- flight modes
+    # ----------------------------------------------------------------------------------------------------------
 
     @property
     def _landed_altitude(self) -> float:
@@ -124,7 +171,10 @@ class Vtol(SampledController):
         return self.horizontal_error <= self.landing_error
 
     def _update_timers(self) -> None:
-        level = abs(self.vehicle.position.z - self._landed_altitude - self.approach_height) <= self.approach_band
+        level = (
+            abs(self.vehicle.position.z - self._landed_altitude - self.approach_height)
+            <= self.approach_band
+        )
         holding = self._is_centred and level and self.mode == FlightMode.APPROACH
         self.steady = self.steady + SAMPLE_PERIOD if holding else 0.0
         self.touching = self.touching + SAMPLE_PERIOD if self.vehicle.contact.vessel else 0.0
@@ -146,7 +196,9 @@ class Vtol(SampledController):
     def _after_approach(self) -> FlightMode:
         if not self.landing_enabled:
             return FlightMode.FOLLOW
-        return FlightMode.DESCEND if _has_elapsed(self.steady, self.hold_time) else FlightMode.APPROACH
+        return (
+            FlightMode.DESCEND if _has_elapsed(self.steady, self.hold_time) else FlightMode.APPROACH
+        )
 
     def _after_descent(self) -> FlightMode:
         if _has_elapsed(self.touching, self.contact_time):
@@ -161,13 +213,18 @@ class Vtol(SampledController):
     def _is_committed(self) -> bool:
         """Return True from a calm deck at the waiting height until the end of the descent."""
         lowest = self._landed_altitude + self.waiting_height + self.descent_rate * SAMPLE_PERIOD
-        return self.mode == FlightMode.DESCEND and (self.committed or (self.calm and self.altitude_reference <= lowest))
+        return self.mode == FlightMode.DESCEND and (
+            self.committed or (self.calm and self.altitude_reference <= lowest)
+        )
 
-    # -- outputs ---------------------------------------------------------------------------------------------------------------
+    # -- outputs
+    # ---------------------------------------------------------------------------------------------------------------
 
     def _update_motor_share(self) -> None:
         direction = -1 if self.mode in (FlightMode.IDLE, FlightMode.LANDED) else 1
-        self.motor_share = limit(self.motor_share + direction * SAMPLE_PERIOD / self.ramp_time, 0.0, 1.0)
+        self.motor_share = limit(
+            self.motor_share + direction * SAMPLE_PERIOD / self.ramp_time, 0.0, 1.0
+        )
         self.motors_on, self.reset = self.motor_share > 0, self.motor_share < 1
 
     def _set_horizontal_references(self) -> None:
@@ -176,9 +233,15 @@ class Vtol(SampledController):
             position.x, position.y, self.yaw_reference = self.home_x, self.home_y, self.home_yaw
             speed.x, speed.y = 0.0, 0.0
         else:
-            position.x, position.y, self.yaw_reference = self.target.position.x, self.target.position.y, self.yaw_command
+            position.x, position.y, self.yaw_reference = (
+                self.target.position.x,
+                self.target.position.y,
+                self.yaw_command,
+            )
             velocity = self.target.velocity
-            speed.x, speed.y = (velocity.x, velocity.y) if self.velocity_feed_forward else (0.0, 0.0)
+            speed.x, speed.y = (
+                (velocity.x, velocity.y) if self.velocity_feed_forward else (0.0, 0.0)
+            )
 
     def _set_altitude_reference(self) -> None:
         if self.reset:
@@ -195,7 +258,9 @@ class Vtol(SampledController):
             case FlightMode.APPROACH:
                 return self._landed_altitude + self.approach_height
             case FlightMode.DESCEND:
-                return self._landed_altitude + (-self.press_depth if self.committed else self.waiting_height)
+                return self._landed_altitude + (
+                    -self.press_depth if self.committed else self.waiting_height
+                )
         return self.altitude_command
 
     def _altitude_rate(self) -> float:

@@ -31,11 +31,19 @@ Scenario = str | Path | Mapping[str, Any]
 #: targets of each channel by the name of the channel
 Channels = Mapping[str, Sequence[PerturbationTarget]]
 
-#: samples of a response by default, the fewest, and the most macro steps between two of them if there is no duration
+#: samples of a response by default, the fewest, and the most macro steps between two of them if
+#: there is no duration
 DEFAULT_SAMPLES, MIN_SAMPLES, MAX_STRIDE = 256, 8, 64
 
-#: entries of a scenario that an experiment replaces: all outputs are recorded, and nothing is evaluated or ends the run
-_REPLACED: Mapping[str, Any] = {"/record": {"signals": ["*"]}, "/stop_when": [], "/kpis": [], "/figures": [], "/checks": []}
+#: entries of a scenario that an experiment replaces: all outputs are recorded, and nothing is
+#: evaluated or ends the run
+_REPLACED: Mapping[str, Any] = {
+    "/record": {"signals": ["*"]},
+    "/stop_when": [],
+    "/kpis": [],
+    "/figures": [],
+    "/checks": [],
+}
 
 
 class Response(NamedTuple):
@@ -58,7 +66,8 @@ class Experiment:
         step: Time between two samples (s), at which the steps of all components end.
         stride: Number of macro steps between two samples.
         sample_count: Number of samples of a response.
-        max_sample_count: Largest number of samples; more than `sample_count` if no duration was given.
+        max_sample_count: Largest number of samples; more than `sample_count` if no duration was
+            given.
         time: The point in time (s).
     """
 
@@ -78,13 +87,18 @@ class Experiment:
             duration: Duration of the responses (s); None: 256 samples.
 
         Raises:
-            InputError: The scenario cannot be run, it ends before `at`, or a component cannot return to a state.
+            InputError: The scenario cannot be run, it ends before `at`, or a component cannot
+                return to a state.
             ComponentError: A component failed.
         """
         settings = {**_REPLACED, **(parameters or {})}
         spec = load_scenario(scenario, settings).spec
         begin = spec.start_time if at is None else _time("at", at)
-        span = spec.step_size * DEFAULT_SAMPLES * MAX_STRIDE if duration is None else _time("duration", duration)
+        span = (
+            spec.step_size * DEFAULT_SAMPLES * MAX_STRIDE
+            if duration is None
+            else _time("duration", duration)
+        )
         self.prepared: PreparedRun = prepare(scenario, settings, stop_time=begin + span)
         self._run = PlanRun(self.prepared.plan, executor=PerturbingExecutor)
         try:
@@ -99,20 +113,31 @@ class Experiment:
             first = grid.index(begin)
         except ValueError as error:
             raise InputError(f"at: time {error}") from None
-        self.stride = lcm(*(int(period / grid.step) for period in self.prepared.system.periods.values()))
+        self.stride = lcm(
+            *(int(period / grid.step) for period in self.prepared.system.periods.values())
+        )
         if first % self.stride:
-            raise InputError(f"at: expected a time at which the steps of all components end, found {float(begin):.12g} s")
+            raise InputError(
+                "at: expected a time at which the steps of all components end, found "
+                f"{float(begin):.12g} s"
+            )
         self.time, self.step = grid.time_at(first), float(grid.step * self.stride)
         self.max_sample_count = (grid.whole_steps - first) // self.stride
-        self.sample_count = self.max_sample_count if span else min(DEFAULT_SAMPLES, self.max_sample_count)
+        self.sample_count = (
+            self.max_sample_count if span else min(DEFAULT_SAMPLES, self.max_sample_count)
+        )
         if self.sample_count < MIN_SAMPLES:
             raise InputError(
-                f"duration: expected at least {MIN_SAMPLES} samples of {self.step:.12g} s, found {self.sample_count}"
+                f"duration: expected at least {MIN_SAMPLES} samples of {self.step:.12g} s, found "
+                f"{self.sample_count}"
             )
         self._run.initialize()
         self._run.advance(first)
         if self._run.executor.termination:
-            raise InputError(f"the run ended at t = {self._run.executor.time:.12g} s, before t = {self.time:.12g} s")
+            raise InputError(
+                f"the run ended at t = {self._run.executor.time:.12g} s, before t = "
+                f"{self.time:.12g} s"
+            )
         self._saved = self._run.save()
         self._first_row = self._executor.recorder.row_count - 1
 
@@ -124,10 +149,17 @@ class Experiment:
     def __enter__(self) -> Experiment:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self._run.close()
 
-    def choose(self, channels: Channels, outputs: Sequence[str], active: Set[str] | None = None) -> None:
+    def choose(
+        self, channels: Channels, outputs: Sequence[str], active: Set[str] | None = None
+    ) -> None:
         """Choose what `respond` perturbs and returns.
 
         Args:
@@ -154,13 +186,21 @@ class Experiment:
         executor.set_values(np.repeat(values, stride, 0))
         self._run.advance(executor.completed_steps + stride * len(values))
         if executor.termination:
-            raise InputError(f"the run ended at t = {executor.time:.12g} s, before the end of the response")
+            raise InputError(
+                f"the run ended at t = {executor.time:.12g} s, before the end of the response"
+            )
         columns = executor.recorder.recording().columns
         rows = slice(self._first_row, self._first_row + stride * len(values) + 1, stride)
-        outputs = np.array([columns[name][rows] for name in self._outputs], float).reshape(len(self._outputs), len(values) + 1).T
+        outputs = (
+            np.array([columns[name][rows] for name in self._outputs], float)
+            .reshape(len(self._outputs), len(values) + 1)
+            .T
+        )
         return Response(outputs, executor.observed[::stride])
 
-    def directional_derivatives(self, component: str, unknowns: Sequence[str], knowns: Sequence[str]) -> np.ndarray | None:
+    def directional_derivatives(
+        self, component: str, unknowns: Sequence[str], knowns: Sequence[str]
+    ) -> np.ndarray | None:
         """Return the partial derivatives of variables of a component at the operating point, shape (unknowns, knowns).
 
         Args:
@@ -177,13 +217,16 @@ class Experiment:
         columns = []
         for known in knowns:
             with self._run.accessing(component, "get_directional_derivative"):
-                column = self.prepared.system.components[component].get_directional_derivative(unknowns, known)
+                column = self.prepared.system.components[component].get_directional_derivative(
+                    unknowns, known
+                )
             if column is None:
                 return None
             columns.append(column)
         return np.array(columns).reshape(len(knowns), len(unknowns)).T
 
-    # -- names -----------------------------------------------------------------------------------------------------------
+    # -- names
+    # -----------------------------------------------------------------------------------------------------------
 
     def find_outputs(self, names: Sequence[str]) -> list[str]:
         """Return the recorded floating-point outputs that names or patterns such as "plant.uav.position" stand for.
@@ -196,10 +239,16 @@ class Experiment:
         found: dict[str, None] = {}
         for text in names:
             matching = [
-                each for each in reals if each == text or each.startswith((f"{text}.", f"{text}[")) or fnmatchcase(each, text)
+                each
+                for each in reals
+                if each == text
+                or each.startswith((f"{text}.", f"{text}["))
+                or fnmatchcase(each, text)
             ]
             if not matching:
-                raise InputError(f'outputs: no floating-point output "{text}"{did_you_mean(text, reals)}')
+                raise InputError(
+                    f'outputs: no floating-point output "{text}"{did_you_mean(text, reals)}'
+                )
             found.update(dict.fromkeys(matching))
         return list(found)
 
@@ -215,7 +264,10 @@ class Experiment:
             for suffix, target in self._targets(text):
                 found.setdefault(f"{text}{suffix}", []).append(target)
             if not found:
-                raise InputError(f'inputs: "{text}" is no input, tunable parameter or connected output of floating-point numbers')
+                raise InputError(
+                    f'inputs: "{text}" is no input, tunable parameter or connected output of '
+                    "floating-point numbers"
+                )
             channels |= found
         return channels
 
@@ -225,13 +277,27 @@ class Experiment:
         targets = []
         for component, prefix in self._resolve(text):
             for causality in ("input", "parameter"):
-                for suffix, slot in SlotIndex(self.prepared.system.components[component], causality).below(prefix).items():
+                for suffix, slot in (
+                    SlotIndex(self.prepared.system.components[component], causality)
+                    .below(prefix)
+                    .items()
+                ):
                     endpoint = Endpoint(component, slot)
-                    if endpoint in fed or not not_settable_reason(component, self._variable(endpoint), fed):
+                    if endpoint in fed or not not_settable_reason(
+                        component, self._variable(endpoint), fed
+                    ):
                         targets.append((suffix, PerturbationTarget(endpoint)))
-            for suffix, slot in SlotIndex(self.prepared.system.components[component], "output").below(prefix).items():
+            for suffix, slot in (
+                SlotIndex(self.prepared.system.components[component], "output")
+                .below(prefix)
+                .items()
+            ):
                 targets += [(suffix, each) for each in self.targets_of(Endpoint(component, slot))]
-        return [(suffix, target) for suffix, target in targets if self._variable(target.endpoint).dtype.kind == "f"]
+        return [
+            (suffix, target)
+            for suffix, target in targets
+            if self._variable(target.endpoint).dtype.kind == "f"
+        ]
 
     def _resolve(self, text: str) -> list[Target]:
         found: list[Target] = []
@@ -247,15 +313,23 @@ class Experiment:
 
     def targets_of(self, source: Endpoint) -> list[PerturbationTarget]:
         """Return the inputs that an output feeds, with the factors of their units and gains."""
-        return [self.target_of(each) for each in self.prepared.system.connections if each.source == source]
+        return [
+            self.target_of(each)
+            for each in self.prepared.system.connections
+            if each.source == source
+        ]
 
     def target_of(self, connection: Connection) -> PerturbationTarget:
         """Return the input of a connection, with the factor of its unit and gain."""
-        factor, _ = unit_conversion(self._variable(connection.source), self._variable(connection.target))
+        factor, _ = unit_conversion(
+            self._variable(connection.source), self._variable(connection.target)
+        )
         return PerturbationTarget(connection.target, factor * connection.gain)
 
     def find_components(self, names: Sequence[str]) -> set[str]:
-        """Return the components that names stand for; the name of a nested system stands for its components.
+        """Return the components that names stand for.
+
+        The name of a nested system stands for its components.
 
         Raises:
             InputError: There is no such component.

@@ -23,7 +23,8 @@ from .recorded_run import recorded_scenario
 
 #: width of a column of a two-column paper, and of the page (in)
 _COLUMN, _PAGE = 3.5, 7.16
-#: line styles, each with the six colours of the common style; together the largest number of curves in a diagram
+#: line styles, each with the six colours of the common style; together the largest number of curves
+#: in a diagram
 _LINE_STYLES = ("-", "--")
 _MAX_CURVES = 6 * len(_LINE_STYLES)
 #: smallest gain (1) in a Bode diagram
@@ -32,7 +33,13 @@ _LEAST_GAIN = 1e-6
 _DECADES = 4
 
 
-def bode(result: Result, components: str, at: float, loops: list[str] | None = None, duration: float | None = None) -> Figure:
+def bode(
+    result: Result,
+    components: str,
+    at: float,
+    loops: list[str] | None = None,
+    duration: float | None = None,
+) -> Figure:
     """Draw the open loops at the inputs and outputs of a controller in a Bode diagram.
 
     Args:
@@ -42,15 +49,34 @@ def bode(result: Result, components: str, at: float, loops: list[str] | None = N
         loops: Names of signals; None: all connected inputs and outputs.
         duration: Duration of the impulse responses (s); None: 256 samples.
     """
-    return draw_loop_bode(measure_loops(recorded_scenario(result), [components], at, loops=loops or (), duration=duration))
+    return draw_loop_bode(
+        measure_loops(
+            recorded_scenario(result), [components], at, loops=loops or (), duration=duration
+        )
+    )
 
 
-def nyquist(result: Result, components: str, at: float, loops: list[str] | None = None, duration: float | None = None) -> Figure:
-    """Draw the open loops at the inputs and outputs of a controller in a Nyquist diagram; arguments as for `bode`."""
-    return draw_nyquist(measure_loops(recorded_scenario(result), [components], at, loops=loops or (), duration=duration))
+def nyquist(
+    result: Result,
+    components: str,
+    at: float,
+    loops: list[str] | None = None,
+    duration: float | None = None,
+) -> Figure:
+    """Draw the open loops at the inputs and outputs of a controller in a Nyquist diagram.
+
+    Arguments as for `bode`.
+    """
+    return draw_nyquist(
+        measure_loops(
+            recorded_scenario(result), [components], at, loops=loops or (), duration=duration
+        )
+    )
 
 
-def poles(result: Result, inputs: list[str], outputs: list[str], at: float, duration: float | None = None) -> Figure:
+def poles(
+    result: Result, inputs: list[str], outputs: list[str], at: float, duration: float | None = None
+) -> Figure:
     """Draw the poles of the linearised closed loop.
 
     Args:
@@ -63,17 +89,23 @@ def poles(result: Result, inputs: list[str], outputs: list[str], at: float, dura
     return draw_poles(linearize(recorded_scenario(result), inputs, outputs, at, duration=duration))
 
 
-def steps(result: Result, inputs: list[str], outputs: list[str], at: float, duration: float | None = None) -> Figure:
+def steps(
+    result: Result, inputs: list[str], outputs: list[str], at: float, duration: float | None = None
+) -> Figure:
     """Draw the step responses of the linearised closed loop; arguments as for `poles`."""
     model = linearize(recorded_scenario(result), inputs, outputs, at, duration=duration)
     return draw_steps(model, duration or 256 * (model.step or 0.0))
 
 
-# -- drawing -------------------------------------------------------------------------------------------------------------
+# -- drawing
+# -------------------------------------------------------------------------------------------------------------
 
 
 def draw_loop_bode(loops: Sequence[LoopResponse]) -> Figure:
-    """Draw gain and phase of open loops; dots mark the crossover, where the phase margin is read."""
+    """Draw gain and phase of open loops.
+
+    Dots mark the crossover, where the phase margin is read.
+    """
     figure = Figure(figsize=(_PAGE, 4.2), layout="constrained")
     gain, phase = figure.subplots(2, 1, sharex=True)
     for loop in loops[:_MAX_CURVES]:
@@ -83,7 +115,13 @@ def draw_loop_bode(loops: Sequence[LoopResponse]) -> Figure:
         line, angles = _draw_bode_curve(gain, phase, frequencies, values, loop.name)
         crossover = loop_margins(loop).crossover
         if np.isfinite(crossover):
-            phase.plot(crossover, np.interp(crossover, frequencies, angles), "o", color=line.get_color(), markersize=3)
+            phase.plot(
+                crossover,
+                np.interp(crossover, frequencies, angles),
+                "o",
+                color=line.get_color(),
+                markersize=3,
+            )
     _label_bode(gain, phase)
     phase.axhline(-180, color="#444444", linewidth=0.6)
     return figure
@@ -97,7 +135,13 @@ def draw_bode(model: LinearModel) -> Figure:
     frequencies = _frequencies(step)
     response = model.frequency_response(frequencies)
     for i, j in _curves(response):
-        _draw_bode_curve(gain, phase, frequencies, response[:, i, j], f"{model.inputs[j]} \u2192 {model.outputs[i]}")
+        _draw_bode_curve(
+            gain,
+            phase,
+            frequencies,
+            response[:, i, j],
+            f"{model.inputs[j]} \u2192 {model.outputs[i]}",
+        )
     _label_bode(gain, phase)
     return figure
 
@@ -116,9 +160,17 @@ def draw_nyquist(loops: Sequence[LoopResponse]) -> Figure:
         left, right = -(2 + disk) / max(2 - disk, 1e-6), -(2 - disk) / (2 + disk)
         angles = np.linspace(0, 2 * pi, 200)
         centre, radius = (left + right) / 2, (right - left) / 2
-        axes.plot(centre + radius * np.cos(angles), radius * np.sin(angles), "--", color="#444444", linewidth=0.6)
+        axes.plot(
+            centre + radius * np.cos(angles),
+            radius * np.sin(angles),
+            "--",
+            color="#444444",
+            linewidth=0.6,
+        )
     axes.plot(-1, 0, "+", color="#444444")
-    axes.set(xlim=(-3, 1), ylim=(-2, 2), xlabel="real part", ylabel="imaginary part", aspect="equal")
+    axes.set(
+        xlim=(-3, 1), ylim=(-2, 2), xlabel="real part", ylabel="imaginary part", aspect="equal"
+    )
     figure.legend(loc="outside right upper", fontsize=5)
     return figure
 
@@ -150,7 +202,12 @@ def draw_steps(model: LinearModel, duration: float) -> Figure:
     axes = figure.subplots()
     times, responses = model.step_response(duration)
     for i, j in _curves(responses):
-        axes.plot(times, responses[:, i, j], label=f"{model.inputs[j]} \u2192 {model.outputs[i]}", **_style(axes))
+        axes.plot(
+            times,
+            responses[:, i, j],
+            label=f"{model.inputs[j]} \u2192 {model.outputs[i]}",
+            **_style(axes),
+        )
     axes.set(xlabel="time (s)", ylabel="response to a unit step")
     axes.legend(fontsize=5)
     return figure
@@ -169,7 +226,11 @@ def _curves(responses: np.ndarray) -> list[tuple[int, int]]:
 def _style(axes: Axes) -> dict[str, Any]:
     """Return the style of the next curve."""
     number = len([line for line in axes.lines if not str(line.get_label()).startswith("_")])
-    return {"color": f"C{number % 6}", "linestyle": _LINE_STYLES[number // 6 % len(_LINE_STYLES)], "linewidth": 0.9}
+    return {
+        "color": f"C{number % 6}",
+        "linestyle": _LINE_STYLES[number // 6 % len(_LINE_STYLES)],
+        "linewidth": 0.9,
+    }
 
 
 def _draw_bode_curve(
@@ -177,7 +238,9 @@ def _draw_bode_curve(
 ) -> tuple[Line2D, np.ndarray]:
     """Draw gain and phase of one curve, and return its line and its phase (deg)."""
     style = _style(gain)
-    (line,) = gain.semilogx(frequencies, 20 * np.log10(np.maximum(np.abs(values), _LEAST_GAIN)), label=label, **style)
+    (line,) = gain.semilogx(
+        frequencies, 20 * np.log10(np.maximum(np.abs(values), _LEAST_GAIN)), label=label, **style
+    )
     angles = np.degrees(np.unwrap(np.angle(values)))
     angles -= 360 * np.ceil((angles[0] - 90) / 360)
     phase.semilogx(frequencies, angles, **style)

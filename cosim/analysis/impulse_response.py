@@ -8,9 +8,11 @@ import numpy as np
 
 from .experiment import Experiment, Response
 
-#: largest change of inputs and outputs, relative to their magnitudes or 1; a power of two, so that sums of values are exact
+#: largest change of inputs and outputs, relative to their magnitudes or 1; a power of two, so that
+#: sums of values are exact
 _CHANGE = 2.0**-12
-#: difference of the responses to two perturbations, as a fraction of the response, from which it is no linear one
+#: difference of the responses to two perturbations, as a fraction of the response, from which it is
+#: no linear one
 NONLINEAR = 1e-3
 #: part of the response after which a second perturbation begins
 _LATER = 8
@@ -22,10 +24,13 @@ class ImpulseResponses(NamedTuple):
     """Responses per unit of a perturbation that lasts one sample.
 
     Attributes:
-        outputs: Shape (samples + 1, outputs, channels); the perturbation acts from sample 0 to sample 1.
+        outputs: Shape (samples + 1, outputs, channels); the perturbation acts from sample 0 to
+            sample 1.
         observed: Channels before the addition, shape (samples, channels, channels).
-        nonlinearity: Largest difference of the responses to two perturbations of a channel, as a fraction of the response.
-        variation: Largest difference of the responses to perturbations at two instants, as a fraction of their peaks.
+        nonlinearity: Largest difference of the responses to two perturbations of a channel, as a
+            fraction of the response.
+        variation: Largest difference of the responses to perturbations at two instants, as a
+            fraction of their peaks.
     """
 
     outputs: np.ndarray
@@ -43,7 +48,10 @@ def measure_impulse_responses(experiment: Experiment, channel_count: int) -> Imp
     """
     base = experiment.respond(np.zeros((experiment.sample_count, channel_count)))
     magnitudes = Response(*(np.maximum(1, np.abs(part).max(0)) for part in base))
-    parts = [_measure_channel(experiment, channel, channel_count, magnitudes) for channel in range(channel_count)]
+    parts = [
+        _measure_channel(experiment, channel, channel_count, magnitudes)
+        for channel in range(channel_count)
+    ]
     return ImpulseResponses(
         np.stack([response.outputs for response, _, _ in parts], 2),
         np.stack([response.observed for response, _, _ in parts], 2),
@@ -52,7 +60,9 @@ def measure_impulse_responses(experiment: Experiment, channel_count: int) -> Imp
     )
 
 
-def _measure_channel(experiment: Experiment, channel: int, count: int, magnitudes: Response) -> tuple[Response, float, float]:
+def _measure_channel(
+    experiment: Experiment, channel: int, count: int, magnitudes: Response
+) -> tuple[Response, float, float]:
     """Return the response of one channel, its nonlinearity and its variation."""
 
     def difference(size: float, instant: int = 0) -> Response:
@@ -62,7 +72,10 @@ def _measure_channel(experiment: Experiment, channel: int, count: int, magnitude
         return Response(*((a - b) / (2 * size) for a, b in zip(plus, minus, strict=True)))
 
     def peak(response: Response) -> float:
-        return max(float(np.max(np.abs(a) / b, initial=0)) for a, b in zip(response, magnitudes, strict=True))
+        return max(
+            float(np.max(np.abs(a) / b, initial=0))
+            for a, b in zip(response, magnitudes, strict=True)
+        )
 
     trial = difference(_CHANGE)
     largest = peak(trial)
@@ -73,7 +86,11 @@ def _measure_channel(experiment: Experiment, channel: int, count: int, magnitude
     nonlinearity = peak(Response(*(a - b for a, b in zip(narrow, wide, strict=True)))) / largest
     shift = experiment.sample_count // _LATER
     variation = _variation(narrow, difference(size, shift), shift, magnitudes)
-    return Response(*((4 * a - b) / 3 for a, b in zip(narrow, wide, strict=True))), nonlinearity, variation
+    return (
+        Response(*((4 * a - b) / 3 for a, b in zip(narrow, wide, strict=True))),
+        nonlinearity,
+        variation,
+    )
 
 
 def _variation(response: Response, later: Response, shift: int, magnitudes: Response) -> float:

@@ -1,8 +1,10 @@
 """KPIs of the control loop, for checks such as "phase margin at least 45 degrees".
 
-    {"name": "loop", "python": "cosim.analysis.kpis:margins", "arguments": {"components": "uav", "at": 15}}
+    {"name": "loop", "python": "cosim.analysis.kpis:margins", "arguments": {"components": "uav",
+    "at": 15}}
 
-Each function runs the scenario of the result again up to a point in time, where it linearises the loop.
+Each function runs the scenario of the result again up to a point in time, where it linearises the
+loop.
 """
 
 from __future__ import annotations
@@ -15,11 +17,21 @@ from .loop_margins import margins as loop_margins
 from .recorded_run import recorded_scenario
 
 
-@better(gain_margin="higher", phase_margin="higher", delay_margin="higher", disk_margin="higher", stable="higher")
+@better(
+    gain_margin="higher",
+    phase_margin="higher",
+    delay_margin="higher",
+    disk_margin="higher",
+    stable="higher",
+)
 @units(gain_margin="dB", phase_margin="deg", delay_margin="s")
 @no_value("a loop of {components} is unstable, or its linear model is not valid")
 def margins(
-    result: Result, components: str, at: float, loops: list[str] | None = None, duration: float | None = None
+    result: Result,
+    components: str,
+    at: float,
+    loops: list[str] | None = None,
+    duration: float | None = None,
 ) -> dict[str, float | bool]:
     """Return the smallest gain (dB), phase (deg), delay (s) and disk margin (1) at the inputs and outputs of a controller.
 
@@ -32,9 +44,16 @@ def margins(
         loops: Names of signals; None: all connected inputs and outputs.
         duration: Duration of the impulse responses (s); None: 256 samples, and more for slow modes.
     """
-    found = loop_margins(recorded_scenario(result), components, at, loops=loops or (), duration=duration)
+    found = loop_margins(
+        recorded_scenario(result), components, at, loops=loops or (), duration=duration
+    )
     if not all(each.stable and each.valid for each in found):
-        return {**dict.fromkeys(("gain_margin", "phase_margin", "delay_margin", "disk_margin"), math.nan), "stable": False}
+        return {
+            **dict.fromkeys(
+                ("gain_margin", "phase_margin", "delay_margin", "disk_margin"), math.nan
+            ),
+            "stable": False,
+        }
     return {
         "gain_margin": 20 * math.log10(min((each.gain for each in found), default=math.inf)),
         "phase_margin": math.degrees(min((each.phase for each in found), default=math.inf)),

@@ -20,7 +20,9 @@ SUFFIXES = (".json", ".csv", ".mat")
 
 @dataclass(frozen=True, eq=False)
 class LinearModel:
-    """Deviations from an operating point: x[k+1] = A x[k] + B u[k] or x' = A x + B u, and y = C x + D u.
+    """Deviations from an operating point.
+
+    X[k+1] = A x[k] + B u[k] or x' = A x + B u, and y = C x + D u.
 
     Attributes:
         a: Matrix A, shape (states, states).
@@ -30,7 +32,8 @@ class LinearModel:
         inputs: Names of the inputs.
         outputs: Names of the outputs.
         states: Names of the states; those of outputs if the states are outputs, else x1, x2, ...
-        step: Step (s) of a discrete model, whose inputs are constant between two samples; None: continuous.
+        step: Step (s) of a discrete model, whose inputs are constant between two samples; None:
+            continuous.
         time: Time of the operating point (s).
         notes: Hints, for example that the operating point is no equilibrium.
     """
@@ -53,9 +56,15 @@ class LinearModel:
 
     def frequency_response(self, frequencies: np.ndarray) -> np.ndarray:
         """Return the transfer matrix at angular frequencies (rad/s), shape (frequencies, outputs, inputs)."""
-        points = 1j * np.asarray(frequencies) if self.step is None else np.exp(1j * np.asarray(frequencies) * self.step)
+        points = (
+            1j * np.asarray(frequencies)
+            if self.step is None
+            else np.exp(1j * np.asarray(frequencies) * self.step)
+        )
         resolvents = points[:, None, None] * np.eye(len(self.a)) - self.a
-        return np.asarray(self.c @ np.linalg.solve(resolvents, self.b.astype(complex)[None]) + self.d)
+        return np.asarray(
+            self.c @ np.linalg.solve(resolvents, self.b.astype(complex)[None]) + self.d
+        )
 
     def step_response(self, duration: float, count: int = 500) -> tuple[np.ndarray, np.ndarray]:
         """Return the response to a unit step of each input.
@@ -72,7 +81,10 @@ class LinearModel:
         step, a, b = self.step, self.a, self.b
         if step is None:
             step, states = duration / count, len(self.a)
-            sampled = expm(np.block([[self.a, self.b], [np.zeros((self.b.shape[1], sum(self.b.shape)))]]) * step)
+            sampled = expm(
+                np.block([[self.a, self.b], [np.zeros((self.b.shape[1], sum(self.b.shape)))]])
+                * step
+            )
             a, b = sampled[:states, :states], sampled[:states, states:]
         state, responses = np.zeros(self.b.shape), []
         times = np.arange(int(duration / step * (1 + 1e-12)) + 1) * step
@@ -84,15 +96,17 @@ class LinearModel:
     def to_dict(self) -> dict[str, Any]:
         """Return everything as numbers, texts and lists, with the poles as pairs of real and imaginary part."""
         matrices = {name.upper(): getattr(self, name).tolist() for name in "abcd"}
-        names = {name: list(getattr(self, name)) for name in ("inputs", "outputs", "states", "notes")}
+        names = {
+            name: list(getattr(self, name)) for name in ("inputs", "outputs", "states", "notes")
+        }
         poles = [[pole.real, pole.imag] for pole in self.poles().tolist()]
         return {"time": self.time, "step": self.step, **names, **matrices, "poles": poles}
 
     def write(self, file: Path) -> None:
         """Write the model to a JSON, CSV or MAT file.
 
-        The CSV file is the table of A, B, C and D with the names of states, inputs and outputs. A MAT file holds the variables A,
-        B, C, D, Ts (s; 0: continuous) and cell arrays of names.
+        The CSV file is the table of A, B, C and D with the names of states, inputs and outputs. A
+        MAT file holds the variables A, B, C, D, Ts (s; 0: continuous) and cell arrays of names.
 
         Raises:
             InputError: The name of the file has another suffix.
@@ -102,7 +116,9 @@ class LinearModel:
             raise InputError(f"{file}: expected a file name with {', '.join(SUFFIXES)}")
         try:
             file.parent.mkdir(parents=True, exist_ok=True)
-            file.write_bytes({".json": self._json, ".csv": self._csv, ".mat": self._mat}[file.suffix]())
+            file.write_bytes(
+                {".json": self._json, ".csv": self._csv, ".mat": self._mat}[file.suffix]()
+            )
         except OSError as error:
             raise write_error(f"cannot write {file}: {error.strerror}", error) from None
 
@@ -116,7 +132,10 @@ class LinearModel:
         rows = np.block([[self.a, self.b], [self.c, self.d]]).tolist()
         following = "{}'" if self.step is None else "{}[k+1]"
         writer.writerows(
-            [name, *row] for name, row in zip([*map(following.format, self.states), *self.outputs], rows, strict=True)
+            [name, *row]
+            for name, row in zip(
+                [*map(following.format, self.states), *self.outputs], rows, strict=True
+            )
         )
         return stream.getvalue().encode()
 
@@ -125,7 +144,10 @@ class LinearModel:
 
         stream = io.BytesIO()
         matrices = {name.upper(): getattr(self, name) for name in "abcd"}
-        names = {name: np.array(list(getattr(self, name)), object) for name in ("inputs", "outputs", "states")}
+        names = {
+            name: np.array(list(getattr(self, name)), object)
+            for name in ("inputs", "outputs", "states")
+        }
         savemat(stream, {**matrices, "Ts": self.step or 0.0, **names})
         # the header of the file holds the time of writing, which would make equal models differ
         return b"MATLAB 5.0 MAT-file, linear model".ljust(116) + stream.getvalue()[116:]

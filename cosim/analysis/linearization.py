@@ -1,8 +1,8 @@
 """Linearisation of a scenario or of some of its components at a point in time.
 
-An FMU that offers directional derivatives gives the continuous model of itself. For all other models, impulse responses from a
-saved state are measured and realized, so components need no access to their states. The model then holds the states that the
-inputs reach and the outputs show.
+An FMU that offers directional derivatives gives the continuous model of itself. For all other
+models, impulse responses from a saved state are measured and realized, so components need no access
+to their states. The model then holds the states that the inputs reach and the outputs show.
 """
 
 from __future__ import annotations
@@ -22,10 +22,12 @@ from .realization import Realization, misfit, realize
 MAX_MISFIT = 1e-4
 #: hint at the causes of a larger error
 NO_EQUILIBRIUM = (
-    "the operating point is no equilibrium (see cosim trim), or a mode changes during the response (choose another --at or a "
+    "the operating point is no equilibrium (see cosim trim), or a mode changes during the "
+    "response (choose another --at or a "
     "shorter --duration)"
 )
-#: part of an output's row in C that no other output has, as a fraction of the row, from which it counts as a state
+#: part of an output's row in C that no other output has, as a fraction of the row, from which it
+#: counts as a state
 _INDEPENDENT = 1e-6
 #: feedthrough, as a fraction of the peak of the impulse response, that is rounding
 _NO_FEEDTHROUGH = 1e-7
@@ -47,31 +49,38 @@ def linearize(
 ) -> LinearModel:
     """Linearise a scenario, or some of its components, at a point in time.
 
-    A discrete model has the common step of all components. Its outputs are those at the communication points, before the inputs
-    of the following step act; an output with feedthrough is therefore a state. A continuous model is the one whose sampling with
-    held inputs gives the discrete model.
+    A discrete model has the common step of all components. Its outputs are those at the
+    communication points, before the inputs of the following step act; an output with feedthrough is
+    therefore a state. A continuous model is the one whose sampling with held inputs gives the
+    discrete model.
 
     Args:
-        scenario: Path of a scenario file, name of a shipped scenario, or the content of a scenario file as a dict.
-        inputs: Names of inputs, tunable parameters or connected outputs. A value is added to a connected input after its
-            connection; the loop remains closed.
-        outputs: Names or patterns of outputs. If they are enough, the states of the model are outputs, in the given order.
+        scenario: Path of a scenario file, name of a shipped scenario, or the content of a scenario
+            file as a dict.
+        inputs: Names of inputs, tunable parameters or connected outputs. A value is added to a
+            connected input after its connection; the loop remains closed.
+        outputs: Names or patterns of outputs. If they are enough, the states of the model are
+            outputs, in the given order.
         at: Point in time (s); None: the start time.
         parameters: Values that replace those of the scenario, see `cosim.load`.
-        components: Components that step; the others hold their outputs, which opens the loops through them. None: all.
-        continuous: Return a continuous model, by directional derivatives of a single component, else by the matrix logarithm.
+        components: Components that step; the others hold their outputs, which opens the loops
+            through them. None: all.
+        continuous: Return a continuous model, by directional derivatives of a single component,
+            else by the matrix logarithm.
         duration: Duration of the impulse responses (s); None: 256 samples.
         order: Largest number of states; None: as many as the responses show.
 
     Raises:
-        InputError: The scenario cannot be run, a name is unknown, a component cannot return to a state, or there is no continuous
-            model.
+        InputError: The scenario cannot be run, a name is unknown, a component cannot return to a
+            state, or there is no continuous model.
         ComponentError: A component failed.
     """
     with Experiment(scenario, parameters, at, duration) as experiment:
         channels, names = experiment.find_inputs(inputs), experiment.find_outputs(outputs)
         active = experiment.find_components(components) if components else None
-        if continuous and (exact := by_directional_derivatives(experiment, channels, names, active)):
+        if continuous and (
+            exact := by_directional_derivatives(experiment, channels, names, active)
+        ):
             return exact
         experiment.choose(channels, names, active)
         responses = measure_impulse_responses(experiment, len(channels))
@@ -81,7 +90,10 @@ def linearize(
     if continuous:
         realization = to_continuous(realization, experiment.step)
         peaks = np.abs(held).max(0)
-        realization.d[np.abs(realization.d) < np.maximum(_NO_FEEDTHROUGH * peaks, _ROUNDING * peaks.max(1)[:, None])] = 0
+        realization.d[
+            np.abs(realization.d)
+            < np.maximum(_NO_FEEDTHROUGH * peaks, _ROUNDING * peaks.max(1)[:, None])
+        ] = 0
     realization, states = _with_outputs_as_states(realization, names)
     step = None if continuous else experiment.step
     return LinearModel(*realization, list(channels), names, states, step, experiment.time, notes)
@@ -90,7 +102,9 @@ def linearize(
 def by_directional_derivatives(
     experiment: Experiment, channels: Channels, outputs: Sequence[str], active: Set[str] | None
 ) -> LinearModel | None:
-    """Return the continuous model of one component whose FMU offers directional derivatives; None for any other.
+    """Return the continuous model of one component whose FMU offers directional derivatives.
+
+    None for any other.
 
     Args:
         experiment: The scenario at its operating point.
@@ -102,11 +116,18 @@ def by_directional_derivatives(
     component = next(iter(names))
     states = dict(experiment.prepared.system.components[component].continuous_states)
     targets = [target for group in channels.values() for target in group]
-    own_outputs = [each.removeprefix(f"{component}.") for each in outputs if each.startswith(f"{component}.")]
-    is_own = len(targets) == len(channels) and all(each.endpoint.component == component for each in targets)
+    own_outputs = [
+        each.removeprefix(f"{component}.") for each in outputs if each.startswith(f"{component}.")
+    ]
+    is_own = len(targets) == len(channels) and all(
+        each.endpoint.component == component for each in targets
+    )
     if len(names) > 1 or not states or not is_own or len(own_outputs) < len(outputs):
         return None
-    unknowns, knowns = [*states.values(), *own_outputs], [*states, *(each.endpoint.scalar for each in targets)]
+    unknowns, knowns = (
+        [*states.values(), *own_outputs],
+        [*states, *(each.endpoint.scalar for each in targets)],
+    )
     found = experiment.directional_derivatives(component, unknowns, knowns)
     if found is None:
         return None
@@ -116,15 +137,23 @@ def by_directional_derivatives(
     return LinearModel(*matrices, list(channels), list(outputs), state_names, None, experiment.time)
 
 
-def _notes(realization: Realization, measured: np.ndarray, responses: ImpulseResponses) -> list[str]:
+def _notes(
+    realization: Realization, measured: np.ndarray, responses: ImpulseResponses
+) -> list[str]:
     """Return hints about the validity of the model."""
     error = misfit(realization, measured)
     notes = []
     if responses.nonlinearity > NONLINEAR:
         share = f"{responses.nonlinearity:.2g}"
-        notes.append(f"the responses to two perturbations differ by {share} of their peak: a limit, a mode or contact acts")
+        notes.append(
+            f"the responses to two perturbations differ by {share} of their peak: a limit, a mode "
+            "or contact acts"
+        )
     if error > MAX_MISFIT:
-        notes.append(f"the model reproduces the measured responses only to {error:.2g} of their peak: {NO_EQUILIBRIUM}")
+        notes.append(
+            f"the model reproduces the measured responses only to {error:.2g} of their peak: "
+            f"{NO_EQUILIBRIUM}"
+        )
     return notes
 
 
@@ -141,19 +170,26 @@ def to_continuous(realization: Realization, step: float) -> Realization:
     from scipy.linalg import logm
 
     poles = np.linalg.eigvals(realization.a)
-    if bad := [pole for pole in poles if abs(pole) < 1e-8 or (pole.real < 0 and abs(pole.imag) < 1e-8)]:
+    if bad := [
+        pole for pole in poles if abs(pole) < 1e-8 or (pole.real < 0 and abs(pole.imag) < 1e-8)
+    ]:
         found = f"the discrete model has a pole at {bad[0].real:.3g}"
         raise InputError(
-            f"no continuous model: {found}, as those of discrete controllers and of delays do; expected the discrete one"
+            f"no continuous model: {found}, as those of discrete controllers and of delays do; "
+            "expected the discrete one"
         )
     states, inputs = realization.b.shape
     held = np.block([[realization.a, realization.b], [np.zeros((inputs, states)), np.eye(inputs)]])
     rates = np.real(logm(held)) / step
     c = np.linalg.solve(realization.a.T, realization.c.T).T
-    return Realization(rates[:states, :states], rates[:states, states:], c, realization.d - c @ realization.b)
+    return Realization(
+        rates[:states, :states], rates[:states, states:], c, realization.d - c @ realization.b
+    )
 
 
-def _with_outputs_as_states(realization: Realization, names: Sequence[str]) -> tuple[Realization, list[str]]:
+def _with_outputs_as_states(
+    realization: Realization, names: Sequence[str]
+) -> tuple[Realization, list[str]]:
     """Return the realization with outputs as states if there are enough, and the names of the states."""
     order = len(realization.a)
     chosen: list[int] = []
@@ -162,7 +198,12 @@ def _with_outputs_as_states(realization: Realization, names: Sequence[str]) -> t
         length = float(np.linalg.norm(row))
         rest = row - basis.T @ (basis @ row)
         rest -= basis.T @ (basis @ rest)
-        if len(chosen) < order and length and np.linalg.norm(rest) > _INDEPENDENT * length and not realization.d[i].any():
+        if (
+            len(chosen) < order
+            and length
+            and np.linalg.norm(rest) > _INDEPENDENT * length
+            and not realization.d[i].any()
+        ):
             chosen.append(i)
             basis = np.vstack([basis, rest / np.linalg.norm(rest)])
     if len(chosen) < order:

@@ -1,7 +1,8 @@
 """Open-loop frequency responses at the inputs and outputs of components in a closed loop.
 
-A value d is added to one signal. The value v before the addition is V = -L (V + D). L is the transfer function of the loop that
-is broken at this signal while all others remain closed, with the sign of negative feedback.
+A value d is added to one signal. The value v before the addition is V = -L (V + D). L is the
+transfer function of the loop that is broken at this signal while all others remain closed, with the
+sign of negative feedback.
 """
 
 from __future__ import annotations
@@ -26,7 +27,8 @@ Excitation = Literal["sines", "chirp"]
 
 #: error of a model, as a fraction of the peak of the response, from which its margins mean nothing
 _INVALID = 0.05
-#: the same for an unstable model: a slightly unstable mode may be fitted to what is no linear response
+#: the same for an unstable model: a slightly unstable mode may be fitted to what is no linear
+#: response
 _UNCERTAIN = 1e-3
 #: factor by which a response is made longer whose slowest mode it does not show, and how often
 _LONGER, _MAX_EXTENSIONS = 4, 3
@@ -38,7 +40,8 @@ class LoopResponse:
 
     Attributes:
         name: Name of the signal.
-        closed: Discrete model from the added value d to the value v before the addition, in the closed loop.
+        closed: Discrete model from the added value d to the value v before the addition, in the
+            closed loop.
         error: Error of its impulse response, as a fraction of the peak of the measured one.
     """
 
@@ -70,15 +73,19 @@ class LoopResponse:
         return bool(self._largest_pole ** (sample_count / 2) < np.exp(-1))
 
 
-def find_loops(experiment: Experiment, components: Sequence[str]) -> dict[str, list[PerturbationTarget]]:
+def find_loops(
+    experiment: Experiment, components: Sequence[str]
+) -> dict[str, list[PerturbationTarget]]:
     """Return the connected inputs and outputs of components as channels.
 
     Args:
         experiment: The scenario.
-        components: Names of components or nested systems. Connections between them are not included.
+        components: Names of components or nested systems. Connections between them are not
+            included.
 
     Returns:
-        The channels by the names of the connected outputs: first what the components read, then what they publish.
+        The channels by the names of the connected outputs: first what the components read, then
+        what they publish.
     """
     inside, system = experiment.find_components(components), experiment.prepared.system
     names = {endpoint: name for name, endpoint in system.aliases.items()}
@@ -86,7 +93,9 @@ def find_loops(experiment: Experiment, components: Sequence[str]) -> dict[str, l
     published: dict[str, list[PerturbationTarget]] = {}
     for connection in system.connections:
         source, target = connection.source, connection.target
-        is_real = all(system.find_element(end).variable.dtype.kind == "f" for end in (source, target))
+        is_real = all(
+            system.find_element(end).variable.dtype.kind == "f" for end in (source, target)
+        )
         if is_real and (source.component in inside) != (target.component in inside):
             channels = published if source.component in inside else read
             channels.setdefault(_name(source, names), []).append(experiment.target_of(connection))
@@ -97,7 +106,9 @@ def _name(endpoint: Endpoint, aliases: Mapping[Endpoint, str]) -> str:
     return aliases.get(endpoint, str(endpoint))
 
 
-def choose_loops(experiment: Experiment, components: Sequence[str], loops: Sequence[str]) -> dict[str, list[PerturbationTarget]]:
+def choose_loops(
+    experiment: Experiment, components: Sequence[str], loops: Sequence[str]
+) -> dict[str, list[PerturbationTarget]]:
     """Return the loops of components that names select; all without names.
 
     Raises:
@@ -106,9 +117,16 @@ def choose_loops(experiment: Experiment, components: Sequence[str], loops: Seque
     found = find_loops(experiment, components)
     chosen: dict[str, list[PerturbationTarget]] = {}
     for text in loops:
-        matching = {each: found[each] for each in found if each == text or each.startswith((f"{text}.", f"{text}["))}
+        matching = {
+            each: found[each]
+            for each in found
+            if each == text or each.startswith((f"{text}.", f"{text}["))
+        }
         if not matching:
-            raise InputError(f'loops: no connected signal "{text}" of {", ".join(components)}{did_you_mean(text, found)}')
+            raise InputError(
+                f'loops: no connected signal "{text}" of '
+                f"{', '.join(components)}{did_you_mean(text, found)}"
+            )
         chosen |= matching
     return chosen if loops else found
 
@@ -149,17 +167,26 @@ def measure_loops(
 
 
 def _measure_long_enough(name: str, experiment: Experiment) -> LoopResponse | None:
-    """Measure a loop, and again with a longer response while it does not show the slowest mode; None: the signal is in no loop.
+    """Measure a loop, and again with a longer response while it does not show the slowest mode.
 
-    A longer response counts only if its model is about as good: later the mode of a controller may change.
+    None: the signal is in no loop.
+
+    A longer response counts only if its model is about as good: later the mode of a controller may
+    change.
     """
     count = experiment.sample_count
     try:
         found = _measure(name, experiment)
         for _ in range(_MAX_EXTENSIONS):
-            if not found or found.is_covered(experiment.sample_count) or experiment.sample_count == experiment.max_sample_count:
+            if (
+                not found
+                or found.is_covered(experiment.sample_count)
+                or experiment.sample_count == experiment.max_sample_count
+            ):
                 break
-            experiment.sample_count = min(_LONGER * experiment.sample_count, experiment.max_sample_count)
+            experiment.sample_count = min(
+                _LONGER * experiment.sample_count, experiment.max_sample_count
+            )
             longer = _measure(name, experiment)
             if longer is None or longer.error > max(found.error, MAX_MISFIT):
                 break
@@ -186,10 +213,15 @@ def _notes(loop: LoopResponse, nonlinearity: float) -> list[str]:
     notes = []
     if nonlinearity > NONLINEAR:
         share = f"{nonlinearity:.2g}"
-        notes.append(f"the responses to two perturbations differ by {share} of their peak: a limit, a mode or contact acts")
+        notes.append(
+            f"the responses to two perturbations differ by {share} of their peak: a limit, a mode "
+            "or contact acts"
+        )
     if loop.error > MAX_MISFIT:
         found = f"the model reproduces the measured response only to {loop.error:.2g} of its peak"
-        notes.append(f"{found}{'' if loop.is_valid else ', so its margins mean nothing'}: {NO_EQUILIBRIUM}")
+        notes.append(
+            f"{found}{'' if loop.is_valid else ', so its margins mean nothing'}: {NO_EQUILIBRIUM}"
+        )
     return notes
 
 
@@ -237,9 +269,14 @@ def estimate_loop(
             raise InputError(f'loops: "{loop}" names {len(chosen)} signals, expected one')
         experiment.choose(chosen, [])
         samples = round(period / experiment.step)
-        make: Callable[..., tuple[np.ndarray, np.ndarray, slice]] = _sines if excitation == "sines" else _chirp
+        make: Callable[..., tuple[np.ndarray, np.ndarray, slice]] = (
+            _sines if excitation == "sines" else _chirp
+        )
         used, added, window = make(wanted, samples, experiment.step, amplitude)
-        excited, free = (experiment.respond(values[:, None]).observed[:, 0] for values in (added, np.zeros(len(added))))
+        excited, free = (
+            experiment.respond(values[:, None]).observed[:, 0]
+            for values in (added, np.zeros(len(added)))
+        )
     times = np.arange(len(added)) * experiment.step
     before = excited - free
     kernel = np.exp(-1j * used[:, None] * times[window])
@@ -247,10 +284,13 @@ def estimate_loop(
     return used, -value / sum_
 
 
-def _sines(frequencies: np.ndarray, samples: int, step: float, amplitude: float) -> tuple[np.ndarray, np.ndarray, slice]:
+def _sines(
+    frequencies: np.ndarray, samples: int, step: float, amplitude: float
+) -> tuple[np.ndarray, np.ndarray, slice]:
     """Return the used frequencies, the added values, and the samples that are evaluated.
 
-    The phases are those of M. R. Schroeder (IEEE Trans. Inf. Theory 16 (1970), 85-89), which keep the peak low.
+    The phases are those of M. R. Schroeder (IEEE Trans. Inf. Theory 16 (1970), 85-89), which keep
+    the peak low.
     """
     base = 2 * np.pi / (samples * step)
     harmonics = np.unique(np.clip(np.round(frequencies / base), 1, (samples - 1) // 2)).astype(int)
@@ -258,10 +298,16 @@ def _sines(frequencies: np.ndarray, samples: int, step: float, amplitude: float)
     number = np.arange(count)
     phases = -np.pi * number * (number + 1) / count
     values = np.cos(2 * np.pi * harmonics[:, None] * times / samples + phases[:, None]).sum(0)
-    return harmonics * base, amplitude * values / np.abs(values).max(), slice(4 * samples, 5 * samples)
+    return (
+        harmonics * base,
+        amplitude * values / np.abs(values).max(),
+        slice(4 * samples, 5 * samples),
+    )
 
 
-def _chirp(frequencies: np.ndarray, samples: int, step: float, amplitude: float) -> tuple[np.ndarray, np.ndarray, slice]:
+def _chirp(
+    frequencies: np.ndarray, samples: int, step: float, amplitude: float
+) -> tuple[np.ndarray, np.ndarray, slice]:
     """Return the used frequencies, the added values, and the samples that are evaluated."""
     times, duration = np.arange(8 * samples) * step, 8 * samples * step
     first, last = frequencies[0] / 2, min(1.5 * frequencies[-1], np.pi / step)

@@ -1,7 +1,8 @@
 """Minimal state-space realization of measured impulse responses.
 
-The method is the eigensystem realization algorithm (J.-N. Juang and R. S. Pappa, J. Guidance 8 (1985), 620-627). The lags of the
-rows and columns of the Hankel matrix grow geometrically, so that a small matrix covers fast and slow modes.
+The method is the eigensystem realization algorithm (J.-N. Juang and R. S. Pappa, J. Guidance 8
+(1985), 620-627). The lags of the rows and columns of the Hankel matrix grow geometrically, so that
+a small matrix covers fast and slow modes.
 """
 
 from __future__ import annotations
@@ -10,7 +11,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-#: fractions of the largest singular value below which the others may be noise of the measured responses
+#: fractions of the largest singular value below which the others may be noise of the measured
+#: responses
 _TOLERANCES = 10.0 ** -np.arange(8, 2, -1)
 #: factor by which the misfit of a lower order may exceed the smallest misfit
 _MISFIT_FACTOR = 3.0
@@ -35,7 +37,9 @@ class Realization(NamedTuple):
         return np.array(response)
 
 
-def realize(response: np.ndarray, max_order: int | None = None, tolerance: float = 0.0) -> Realization:
+def realize(
+    response: np.ndarray, max_order: int | None = None, tolerance: float = 0.0
+) -> Realization:
     """Return a balanced realization of the lowest order that reproduces a response about as well as any.
 
     Args:
@@ -54,10 +58,20 @@ def realize(response: np.ndarray, max_order: int | None = None, tolerance: float
         root = np.sqrt(singular[:order])
         reach, show = root[:, None] * right[:order], left[:, :order] * root
         a = (left[:, :order] / root).T @ later @ (right[:order].T / root)
-        return Realization(a, reach[:, :inputs] * columns, show[:outputs] * rows[:, None], response[0])
+        return Realization(
+            a, reach[:, :inputs] * columns, show[:outputs] * rows[:, None], response[0]
+        )
 
-    orders = {int(np.sum(singular > tolerance * singular[0])) if singular[0] > 0 else 0 for tolerance in _TOLERANCES}
-    found = [realization(order) for order in sorted({order if max_order is None else min(order, max_order) for order in orders})]
+    orders = {
+        int(np.sum(singular > tolerance * singular[0])) if singular[0] > 0 else 0
+        for tolerance in _TOLERANCES
+    }
+    found = [
+        realization(order)
+        for order in sorted(
+            {order if max_order is None else min(order, max_order) for order in orders}
+        )
+    ]
     misfits = [misfit(each, response) for each in found]
     enough = _MISFIT_FACTOR * max(min(misfits), min(tolerance, _MAX_TOLERANCE))
     return next(each for each, value in zip(found, misfits, strict=True) if value <= enough)

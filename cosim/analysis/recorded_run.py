@@ -18,11 +18,16 @@ def recorded_scenario(result: Result) -> dict[str, Any]:
     """
     about = result.metadata
     if "scenario" not in about or "scenario_file" not in about:
-        raise InputError("the result does not hold its scenario, expected one of cosim.run or of a folder that cosim run wrote")
+        raise InputError(
+            "the result does not hold its scenario, expected one of cosim.run or of a folder that "
+            "cosim run wrote"
+        )
     folder = Path(about["scenario_file"]).parent
     scenario = change_paths(about["scenario"], relocating(folder, None))
     for name, value in about.get("parameters", {}).items():
         component, _, variable = name.partition(".")
         spec = scenario["components"][component]
-        scenario["components"] |= {component: {**spec, "parameters": {**spec.get("parameters", {}), variable: value}}}
+        scenario["components"] |= {
+            component: {**spec, "parameters": {**spec.get("parameters", {}), variable: value}}
+        }
     return scenario

@@ -38,7 +38,8 @@ class Trim:
 
     Attributes:
         parameters: Found values, for the `parameters` of `cosim.load`.
-        residuals: Rate of change of each steady signal (its unit per s), and deviation of each required signal.
+        residuals: Rate of change of each steady signal (its unit per s), and deviation of each
+            required signal.
         evaluations: Number of times that the scenario was started.
         without_effect: Free values that change no residual.
     """
@@ -69,13 +70,14 @@ def trim(
 ) -> Trim:
     """Find values with which a scenario starts in equilibrium.
 
-    The scenario is started again and again with changed values, and makes one macro step. A trust region method with finite
-    differences minimises the sum of the squared residuals.
+    The scenario is started again and again with changed values, and makes one macro step. A trust
+    region method with finite differences minimises the sum of the squared residuals.
 
     Args:
-        scenario: Path of a scenario file, name of a shipped scenario, or the content of a scenario file as a dict.
-        free: Changed values: names of inputs without connection, parameters and initial states, or JSON pointers of numbers.
-            The search begins with their present values.
+        scenario: Path of a scenario file, name of a shipped scenario, or the content of a scenario
+            file as a dict.
+        free: Changed values: names of inputs without connection, parameters and initial states, or
+            JSON pointers of numbers. The search begins with their present values.
         steady: Names of signals that do not change during the first macro step.
         required: Values of signals at the start time.
         parameters: Values that replace those of the scenario, see `cosim.load`.
@@ -91,7 +93,13 @@ def trim(
 
     if not free or not (steady or required):
         raise InputError("expected at least one free value, and one steady or required signal")
-    search = _Search(scenario, {**_REPLACED, **(parameters or {})}, list(free), list(steady), dict(required or {}))
+    search = _Search(
+        scenario,
+        {**_REPLACED, **(parameters or {})},
+        list(free),
+        list(steady),
+        dict(required or {}),
+    )
     start = np.array(search.begin())
     found = least_squares(
         search.residuals,
@@ -105,7 +113,9 @@ def trim(
         max_nfev=100,
     )
     residuals = dict(zip(search.names, search.residuals(found.x).tolist(), strict=True))
-    return Trim(search.settings(found.x), residuals, search.evaluations, search.without_effect(found.jac))
+    return Trim(
+        search.settings(found.x), residuals, search.evaluations, search.without_effect(found.jac)
+    )
 
 
 @dataclass
@@ -132,7 +142,10 @@ class _Search:
                 _refuse_connected(simulation.prepared, name)
                 present = _pointed(document, name) if name.startswith("/") else simulation.get(name)
                 self.sizes.append(len(present) if isinstance(present, list) else None)
-                values += [_number(name, each) for each in (present if isinstance(present, list) else [present])]
+                values += [
+                    _number(name, each)
+                    for each in (present if isinstance(present, list) else [present])
+                ]
         return values
 
     def settings(self, values: np.ndarray) -> dict[str, Any]:
@@ -155,14 +168,23 @@ class _Search:
         """Start the scenario with values, and return all residuals."""
         self.evaluations += 1
         with load(self.scenario, {**self.parameters, **self.settings(values)}) as simulation:
-            before = {name: _elements(name, simulation.get(name)) for name in (*self.steady, *self.required)}
+            before = {
+                name: _elements(name, simulation.get(name))
+                for name in (*self.steady, *self.required)
+            }
             begin = simulation.time
             simulation.step()
             span = simulation.time - begin
             after = {name: _elements(name, simulation.get(name)) for name in self.steady}
-        rates = {f"{name}{key}": (after[name][key] - value) / span for name in self.steady for key, value in before[name].items()}
+        rates = {
+            f"{name}{key}": (after[name][key] - value) / span
+            for name in self.steady
+            for key, value in before[name].items()
+        }
         deviations = {
-            f"{name}{key}": value - target for name, target in self.required.items() for key, value in before[name].items()
+            f"{name}{key}": value - target
+            for name, target in self.required.items()
+            for key, value in before[name].items()
         }
         residuals = [*rates.items(), *deviations.items()]
         self.names = [name for name, _ in residuals]
@@ -179,7 +201,9 @@ def _refuse_connected(prepared: PreparedRun, name: str) -> None:
         return
     sources = {connection.target: connection.source for connection in prepared.system.connections}
     for component, prefix in targets:
-        for slot in SlotIndex(prepared.system.components[component], "input").below(prefix).values():
+        for slot in (
+            SlotIndex(prepared.system.components[component], "input").below(prefix).values()
+        ):
             if source := sources.get(Endpoint(component, slot)):
                 expected = "expected an input without connection, a parameter or an initial state"
                 raise InputError(f'free: "{component}.{slot}" is fed by "{source}", {expected}')

@@ -25,7 +25,12 @@ def expect(name: str, value: Any, accepted: bool, description: str) -> None:
         InputError: The value is not accepted.
     """
     if not accepted:
-        raise InputError(Problem(f"expected {description}; found {shorten(repr(value))} ({type(value).__name__})", name))
+        raise InputError(
+            Problem(
+                f"expected {description}; found {shorten(repr(value))} ({type(value).__name__})",
+                name,
+            )
+        )
 
 
 def check_names(name: str, value: Any) -> None:
@@ -38,7 +43,9 @@ def check_options(options: Mapping[str, Any], valid: Iterable[str]) -> None:
     """Check the names of keyword arguments; InputError with the nearest valid name."""
     names = list(valid)
     if unknown := [name for name in options if name not in names]:
-        raise InputError(f'unknown argument "{name}"{did_you_mean(name, names)}' for name in unknown)
+        raise InputError(
+            f'unknown argument "{name}"{did_you_mean(name, names)}' for name in unknown
+        )
 
 
 def check_load_arguments(scenario: Any, parameters: Any, options: Mapping[str, Any]) -> None:
@@ -47,8 +54,18 @@ def check_load_arguments(scenario: Any, parameters: Any, options: Mapping[str, A
     expect("scenario", scenario, isinstance(scenario, str | os.PathLike | Mapping), text)
     check_names("parameters", parameters)
     for name in ("stop_time", "step_size"):
-        expect(name, options[name], _is_optional(options[name], _is_number_or_text), "seconds as a number or a text")
-    expect("real_time", options["real_time"], _is_optional(options["real_time"], is_number), "a number or None")
+        expect(
+            name,
+            options[name],
+            _is_optional(options[name], _is_number_or_text),
+            "seconds as a number or a text",
+        )
+    expect(
+        "real_time",
+        options["real_time"],
+        _is_optional(options["real_time"], is_number),
+        "a number or None",
+    )
     for name, literal in (("late", LatePolicy), ("isolation", IsolationMode)):
         valid = get_args(literal)
         expect(name, options[name], options[name] in valid, f"one of {', '.join(map(repr, valid))}")

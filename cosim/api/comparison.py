@@ -34,7 +34,8 @@ class ComparisonTask(NamedTuple):
         result: The result.
         reference: The reference.
         tolerances: Tolerances by patterns of signals.
-        changes: What has changed since the reference of a scenario was made, in one line; "" if nothing is known.
+        changes: What has changed since the reference of a scenario was made, in one line; "" if
+            nothing is known.
     """
 
     result: Result
@@ -44,13 +45,18 @@ class ComparisonTask(NamedTuple):
 
     @classmethod
     def read(
-        cls, result: ResultSource, reference: ResultSource, tolerance: Tolerance, signals: Sequence[str] = ()
+        cls,
+        result: ResultSource,
+        reference: ResultSource,
+        tolerance: Tolerance,
+        signals: Sequence[str] = (),
     ) -> ComparisonTask:
         """Read a result and its reference.
 
         Args:
             result: A result, a CSV file, or a folder that `cosim run` has written.
-            reference: The same, or a scenario (JSON file or name of a shipped scenario) with its own reference and tolerances.
+            reference: The same, or a scenario (JSON file or name of a shipped scenario) with its
+                own reference and tolerances.
             tolerance: Tolerance of all signals, unless the reference is a scenario.
             signals: Patterns of the signals that are compared; all by default.
 
@@ -61,8 +67,14 @@ class ComparisonTask(NamedTuple):
             scenario = find_scenario(Path(reference))
             file, tolerances = _scenario_reference(scenario)
             run = _read_result(result)
-            return cls(run, _read_result(file), tolerances, reference_changes(run, file, scenario.parent))
-        return cls(_read_result(result), _read_result(reference), dict.fromkeys(signals or ("*",), tolerance))
+            return cls(
+                run, _read_result(file), tolerances, reference_changes(run, file, scenario.parent)
+            )
+        return cls(
+            _read_result(result),
+            _read_result(reference),
+            dict.fromkeys(signals or ("*",), tolerance),
+        )
 
     def compare(self) -> Comparison:
         """Return the verdict on each signal of the reference."""
@@ -72,7 +84,11 @@ class ComparisonTask(NamedTuple):
         """Return name, function and arguments of the figure with the largest deviations."""
         from ..report.comparison_figure import draw_tubes
 
-        arguments = {"reference": self.reference, "tolerances": self.tolerances, "comparison": comparison}
+        arguments = {
+            "reference": self.reference,
+            "tolerances": self.tolerances,
+            "comparison": comparison,
+        }
         return "comparison", draw_tubes, arguments
 
     def needed_share(self) -> float:
@@ -91,44 +107,58 @@ def compare(
 ) -> Comparison:
     """Compare a result with a reference, signal by signal.
 
-    Every signal must stay within the larger of the absolute and the relative tolerance, and within the tolerance of time. Without
-    tolerances it must be equal.
+    Every signal must stay within the larger of the absolute and the relative tolerance, and within
+    the tolerance of time. Without tolerances it must be equal.
 
     Args:
         result: A result, a CSV file, or a folder that `cosim run` has written.
-        reference: The same, or a scenario (JSON file or name of a shipped scenario) whose reference and tolerances are used.
+        reference: The same, or a scenario (JSON file or name of a shipped scenario) whose reference
+            and tolerances are used.
         absolute: Absolute tolerance, in the unit of each signal.
         relative: Relative tolerance, a fraction of the range of the reference signal.
         time: Tolerance along the time axis (s).
-        signals: Patterns of the signals of the reference that are compared; "*" matches any text. All by default.
+        signals: Patterns of the signals of the reference that are compared; "*" matches any text.
+            All by default.
 
     Returns:
         The comparison with `passed`, `failures` and one verdict for each signal.
 
     Raises:
-        InputError: A file cannot be read, the scenario has no reference, or a tolerance is negative.
+        InputError: A file cannot be read, the scenario has no reference, or a tolerance is
+            negative.
     """
     for name, source in (("result", result), ("reference", reference)):
         expect(name, source, isinstance(source, Result | str | os.PathLike), "a result or a path")
     for name, value in (("absolute", absolute), ("relative", relative), ("time", time)):
         expect(name, value, is_number(value), "a number")
     patterns = [signals] if isinstance(signals, str) else signals
-    expect("signals", signals, all(isinstance(each, str) for each in patterns), "a list of patterns")
-    return ComparisonTask.read(result, reference, Tolerance(absolute, relative, time), patterns).compare()
+    expect(
+        "signals", signals, all(isinstance(each, str) for each in patterns), "a list of patterns"
+    )
+    return ComparisonTask.read(
+        result, reference, Tolerance(absolute, relative, time), patterns
+    ).compare()
 
 
 def reference_changes(result: Result, reference: Path, folder: Path) -> str:
-    """Return one line that lists what has changed since the reference of a scenario was made; "" if nothing is known.
+    """Return one line that lists what has changed since the reference of a scenario was made.
+
+    "" if nothing is known.
 
     Args:
         result: A run of the scenario.
-        reference: The reference, a CSV file with a JSON file of the same name that states its origin.
+        reference: The reference, a CSV file with a JSON file of the same name that states its
+            origin.
         folder: Folder of the scenario.
     """
 
     def shown(name: str) -> str:
         """Return a file of the run, which metadata name from the scenario's folder, relative to the working directory."""
-        return name if name.startswith(SHIPPED) else os.path.relpath(folder / name).replace(os.sep, "/")
+        return (
+            name
+            if name.startswith(SHIPPED)
+            else os.path.relpath(folder / name).replace(os.sep, "/")
+        )
 
     try:
         made_by = parse_object(reference.with_suffix(".json").read_text(encoding="utf-8"))
@@ -136,7 +166,11 @@ def reference_changes(result: Result, reference: Path, folder: Path) -> str:
         return ""
     changes = describe_provenance_changes(made_by, result.metadata, shown)
     own_first = sorted(changes, key=lambda change: change.startswith(SHIPPED))
-    return f"changed since the reference was made: {abbreviate_names(own_first, MAX_LISTED_CHANGES)}" if changes else ""
+    return (
+        f"changed since the reference was made: {abbreviate_names(own_first, MAX_LISTED_CHANGES)}"
+        if changes
+        else ""
+    )
 
 
 def _read_result(source: ResultSource) -> Result:
@@ -153,7 +187,9 @@ def _read_result(source: ResultSource) -> Result:
 
 def is_scenario(path: Path) -> bool:
     """Return whether a path is a JSON file, or a name without a folder that is no existing file (a shipped scenario)."""
-    return path.suffix == ".json" or (path.name == str(path) and not path.suffix and not path.exists())
+    return path.suffix == ".json" or (
+        path.name == str(path) and not path.suffix and not path.exists()
+    )
 
 
 def _scenario_reference(path: Path) -> tuple[Path, Mapping[str, Tolerance]]:
@@ -161,4 +197,6 @@ def _scenario_reference(path: Path) -> tuple[Path, Mapping[str, Tolerance]]:
     spec = load_scenario(path).spec.reference
     if spec is None:
         raise InputError(f'{path} has no "reference"')
-    return path.parent / spec.file, {name: Tolerance(**vars(part)) for name, part in spec.tolerances.items()}
+    return path.parent / spec.file, {
+        name: Tolerance(**vars(part)) for name, part in spec.tolerances.items()
+    }

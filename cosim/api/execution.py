@@ -34,7 +34,9 @@ class Execution:
 
 
 @default_float_mode()
-def evaluate_outcome(prepared: PreparedRun, outcome: SimulationOutcome, complete: bool) -> Execution:
+def evaluate_outcome(
+    prepared: PreparedRun, outcome: SimulationOutcome, complete: bool
+) -> Execution:
     """Return the result of a run.
 
     Args:
@@ -48,7 +50,11 @@ def evaluate_outcome(prepared: PreparedRun, outcome: SimulationOutcome, complete
     if complete or outcome.failure:
         warn_exceeded_limits(prepared, outcome.recording)
     result = Result(outcome.recording, timing=timing, metadata=metadata)
-    return _evaluate_run(result, prepared) if complete and not outcome.failure else Execution(result, outcome.failure)
+    return (
+        _evaluate_run(result, prepared)
+        if complete and not outcome.failure
+        else Execution(result, outcome.failure)
+    )
 
 
 def _add_timings(first: Mapping[str, float], second: Mapping[str, float]) -> dict[str, float]:
@@ -67,7 +73,9 @@ def _evaluate_run(result: Result, prepared: PreparedRun) -> Execution:
                 values.update(evaluate_kpis(result, [kpi]))
         except (CosimError, KeyboardInterrupt) as error:
             failures.append(error)
-    kpis = Kpis({name: math.nan if isinstance(value, NoValue) else value for name, value in values.items()})
+    kpis = Kpis(
+        {name: math.nan if isinstance(value, NoValue) else value for name, value in values.items()}
+    )
     checks = evaluate_all_checks(kpis, prepared.checks)
     failed = [check.check["kpi"] for check in checks if not check.passed]
     about = {
@@ -85,7 +93,11 @@ def _signals_of_optional_kpis(
 ) -> Iterator[tuple[str, dict[str, str]]]:
     """Yield name and signals by argument of each optional KPI, since a signal may have another meaning in a user's component."""
     for name, _, arguments in functions:
-        signals = {key: value for key, value in arguments.items() if isinstance(value, str) and value in result}
+        signals = {
+            key: value
+            for key, value in arguments.items()
+            if isinstance(value, str) and value in result
+        }
         if signals and name in prepared.optional_kpis:
             yield name, signals
 
@@ -98,7 +110,8 @@ def evaluate_scenario_checks(prepared: PreparedRun, result: Result) -> list[Chec
         result: A result with KPIs.
 
     Returns:
-        The outcome of each check, in the order of the scenario. A check of an optional KPI that was left out fails.
+        The outcome of each check, in the order of the scenario. A check of an optional KPI that was
+        left out fails.
 
     Raises:
         InputError: A check names a KPI that the result does not have.
@@ -107,7 +120,9 @@ def evaluate_scenario_checks(prepared: PreparedRun, result: Result) -> list[Chec
     for i, check in enumerate(prepared.checks):
         with _adding_location(prepared, "checks", i):
             is_optional = check["kpi"].partition(".")[0] in prepared.optional_kpis
-            outcomes += (evaluate_all_checks if is_optional else evaluate_checks)(result.kpis, [check])
+            outcomes += (evaluate_all_checks if is_optional else evaluate_checks)(
+                result.kpis, [check]
+            )
     return outcomes
 
 
@@ -117,18 +132,27 @@ def _adding_location(prepared: PreparedRun, *path: str | int) -> Iterator[None]:
     try:
         yield
     except InputError as error:
-        raise InputError([Problem(str(problem), prepared.root.where(*path)) for problem in error.problems]) from error
+        raise InputError(
+            [Problem(str(problem), prepared.root.where(*path)) for problem in error.problems]
+        ) from error
 
 
 def _outcome_metadata(prepared: PreparedRun, outcome: SimulationOutcome) -> dict[str, Any]:
-    """Return the metadata that is known after the run: steps, timing, signals that are not finite, termination, failure."""
+    """Return the metadata that is known after the run.
+
+    Steps, timing, signals that are not finite, termination, failure.
+    """
     termination = outcome.termination
     return {
         "macro_steps": outcome.macro_steps,
         "real_time": outcome.real_time,
-        "non_finite": {} if prepared.spec.non_finite == "allow" else warn_non_finite(outcome.recording),
+        "non_finite": {}
+        if prepared.spec.non_finite == "allow"
+        else warn_non_finite(outcome.recording),
         "terminated_by": _describe_termination(termination),
-        "failure": "interrupted" if isinstance(outcome.failure, KeyboardInterrupt) else _failure_text(outcome.failure),
+        "failure": "interrupted"
+        if isinstance(outcome.failure, KeyboardInterrupt)
+        else _failure_text(outcome.failure),
     }
 
 

@@ -48,12 +48,20 @@ def warn_exceeded_limits(prepared: PreparedRun, recording: Recording) -> None:
     if not len(recording.time):
         return
     known = set_excesses(prepared)
-    excesses = groupby(_find_excesses(prepared, recording, known), lambda excess: (excess.end.component, excess.variable.name))
-    for text in (*map(str, known.values()), *(_describe(list(elements)) for _, elements in excesses)):
+    excesses = groupby(
+        _find_excesses(prepared, recording, known),
+        lambda excess: (excess.end.component, excess.variable.name),
+    )
+    for text in (
+        *map(str, known.values()),
+        *(_describe(list(elements)) for _, elements in excesses),
+    ):
         logging.getLogger("cosim").warning("%s", text)
 
 
-def _find_excesses(prepared: PreparedRun, recording: Recording, known: Collection[tuple[str, str]]) -> Iterator[_Excess]:
+def _find_excesses(
+    prepared: PreparedRun, recording: Recording, known: Collection[tuple[str, str]]
+) -> Iterator[_Excess]:
     """Yield the elements outside their limits, without unconnected inputs that are `known` by component and variable."""
     system = prepared.system
     limits = {
@@ -63,14 +71,24 @@ def _find_excesses(prepared: PreparedRun, recording: Recording, known: Collectio
     }
     if not limits:
         return
-    recorded = {end: recording.columns[name] for name, end in prepared.settings.columns.items() if name in recording.columns}
+    recorded = {
+        end: recording.columns[name]
+        for name, end in prepared.settings.columns.items()
+        if name in recording.columns
+    }
     feeding: dict[Endpoint, list[Connection]] = {}
     for connection in system.connections:
         feeding.setdefault(connection.target, []).append(connection)
     for end, each in limits.items():
-        values = recorded[end] if end in recorded else _fed_values(prepared, feeding.get(end, ()), recorded)
+        values = (
+            recorded[end]
+            if end in recorded
+            else _fed_values(prepared, feeding.get(end, ()), recorded)
+        )
         variable = system.find_element(end).variable
-        if values is not None and not ((end.component, variable.name) in known and end not in feeding):
+        if values is not None and not (
+            (end.component, variable.name) in known and end not in feeding
+        ):
             exceeding = outside(values, each)
             if (share := float(np.mean(exceeding))) >= MIN_SHARE:
                 extreme = values[exceeding][np.argmax(np.abs(values[exceeding]))]
@@ -78,9 +96,14 @@ def _find_excesses(prepared: PreparedRun, recording: Recording, known: Collectio
 
 
 def _fed_values(
-    prepared: PreparedRun, connections: Iterable[Connection], recorded: Mapping[Endpoint, np.ndarray]
+    prepared: PreparedRun,
+    connections: Iterable[Connection],
+    recorded: Mapping[Endpoint, np.ndarray],
 ) -> np.ndarray | None:
-    """Return the sum of the values that connections transfer, without their delay; None without any or if one is not recorded."""
+    """Return the sum of the values that connections transfer, without their delay.
+
+    None without any or if one is not recorded.
+    """
     total: np.ndarray | None = None
     for connection in connections:
         if connection.source not in recorded:
@@ -97,8 +120,14 @@ def _describe(elements: list[_Excess]) -> str:
     unit = worst.variable.unit.name if worst.variable.unit else ""
     low, high = worst.limits
     others = f" (and {count_noun(len(elements) - 1, 'more element')})" if len(elements) > 1 else ""
-    cause = probable_cause(worst.extreme, worst.limits, unit, "the controller saturates, or a value of the vehicle is wrong")
+    cause = probable_cause(
+        worst.extreme,
+        worst.limits,
+        unit,
+        "the controller saturates, or a value of the vehicle is wrong",
+    )
     return (
-        f"{worst.end}{others} is outside its limits {low:.4g} ... {high:.4g} {unit} in {100 * worst.share:.0f} % of the run, "
+        f"{worst.end}{others} is outside its limits {low:.4g} ... {high:.4g} {unit} in "
+        f"{100 * worst.share:.0f} % of the run, "
         f"up to {worst.extreme:.4g} {unit}; {cause}"
     )

@@ -24,19 +24,23 @@ Prepare = Callable[[Mapping[str, Any]], PreparedRun]
 
 
 class Simulation:
-    """Simulation of a scenario, made by `cosim.load`: run it to the end, or step it from your own loop.
+    """Simulation of a scenario, made by `cosim.load`.
+
+    Run it to the end, or step it from your own loop.
 
         with cosim.load("demo1_box") as simulation:
             while simulation.step():
                 print(simulation.time, simulation.get("plant.uav.position.z"))
 
-    The components are initialized by the first method that needs them. They are terminated and freed by `close`, at the end of a
-    `with` block, or when the object is garbage-collected. Several simulations may be alive in one process, also in several
-    threads; methods called from several threads wait for each other. Between two steps the process is in the state in which the
-    caller left it: what components change (working directory, environment, floating-point mode and others) is changed back.
+    The components are initialized by the first method that needs them. They are terminated and
+    freed by `close`, at the end of a `with` block, or when the object is garbage-collected. Several
+    simulations may be alive in one process, also in several threads; methods called from several
+    threads wait for each other. Between two steps the process is in the state in which the caller
+    left it: what components change (working directory, environment, floating-point mode and others)
+    is changed back.
 
-    After an error of a component, or an interrupt during a step, the components are in an unknown state. Then only `result`,
-    `reset` and `close` can be called.
+    After an error of a component, or an interrupt during a step, the components are in an unknown
+    state. Then only `result`, `reset` and `close` can be called.
 
     Attributes:
         prepared: The scenario with its system and settings.
@@ -67,11 +71,18 @@ class Simulation:
     def __enter__(self) -> Simulation:
         return self
 
-    def __exit__(self, kind: type[BaseException] | None, error: BaseException | None, trace: TracebackType | None) -> None:
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
         self.close()
 
     def close(self) -> None:
-        """Terminate and free the components. Later calls do nothing; `result` and `reset` still work.
+        """Terminate and free the components.
+
+        Later calls do nothing; `result` and `reset` still work.
 
         Raises:
             ComponentError: A component failed to terminate or to be freed.
@@ -82,7 +93,8 @@ class Simulation:
             while self._ends:
                 self._ends.pop()()
 
-    # -- time ------------------------------------------------------------------------------------------------------------
+    # -- time
+    # ------------------------------------------------------------------------------------------------------------
 
     @property
     def time(self) -> float:
@@ -105,7 +117,8 @@ class Simulation:
 
         Raises:
             InputError: The simulation has reached its end, or `n` is no positive integer.
-            ComponentError: A component failed; `result` of the error holds what was recorded until then.
+            ComponentError: A component failed; `result` of the error holds what was recorded until
+                then.
             LateError: The simulation fell behind real time and `late` is "fail".
         """
         if n.__class__ is not int or n < 1:
@@ -113,7 +126,10 @@ class Simulation:
         with self._lock:
             run = self._running()
             if run.is_finished:
-                raise InputError(f"the simulation has reached its end at t = {self.time:.12g} s; reset() starts it again")
+                raise InputError(
+                    f"the simulation has reached its end at t = {self.time:.12g} s; reset() starts "
+                    "it again"
+                )
             self._advance(run, run.executor.completed_steps + n)
             return not run.is_finished
 
@@ -121,26 +137,37 @@ class Simulation:
         """Run from the present time to the end, and evaluate the KPIs and checks.
 
         Args:
-            observers: Functions called about 100 times with the number of finished and of all macro steps.
+            observers: Functions called about 100 times with the number of finished and of all macro
+                steps.
 
         Returns:
             The result; see `cosim.run`.
 
         Raises:
-            InputError: The simulation has already failed or was closed, or a KPI refuses its arguments.
-            ComponentError: A component or a KPI function failed; `result` of the error holds what was recorded until then.
+            InputError: The simulation has already failed or was closed, or a KPI refuses its
+                arguments.
+            ComponentError: A component or a KPI function failed; `result` of the error holds what
+                was recorded until then.
             LateError: The simulation fell behind real time and `late` is "fail".
         """
         return _result_or_failure(self.execute(observers))
 
-    def execute(self, observers: Sequence[Observer] = (), step_hook: StepHook | None = None) -> Execution:
+    def execute(
+        self, observers: Sequence[Observer] = (), step_hook: StepHook | None = None
+    ) -> Execution:
         """Like `run`, but return a failure with the result instead of raising it.
 
         Args:
             observers: See `run`.
-            step_hook: Called with n before the macro step that starts at communication point n; only before the first step.
+            step_hook: Called with n before the macro step that starts at communication point n;
+                only before the first step.
         """
-        expect("observers", observers, isinstance(observers, Sequence) and all(map(callable, observers)), "a list of functions")
+        expect(
+            "observers",
+            observers,
+            isinstance(observers, Sequence) and all(map(callable, observers)),
+            "a list of functions",
+        )
         with self._lock:
             with suppress(Exception, KeyboardInterrupt):  # it is the failure of the run
                 self._advance(self._running(step_hook), self.prepared.plan.grid.count, observers)
@@ -160,18 +187,23 @@ class Simulation:
             if self._run is None and self._ends:
                 self._running()
             execution = self._evaluate()
-            return execution.result if self._run and self._run.failure else _result_or_failure(execution)
+            return (
+                execution.result
+                if self._run and self._run.failure
+                else _result_or_failure(execution)
+            )
 
     def reset(self, seed: int | None = None, parameters: Mapping[str, Any] | None = None) -> None:
         """Return to the start time with new components.
 
         Args:
             seed: Value of the entries that the key "seeds" of the scenario lists; None: as loaded.
-            parameters: Values that replace those of the scenario and of `load`, until the next reset.
+            parameters: Values that replace those of the scenario and of `load`, until the next
+                reset.
 
         Raises:
-            InputError: The scenario cannot be run with these values, it lists no seeds, or it contains a Python object, which
-                cannot be made again.
+            InputError: The scenario cannot be run with these values, it lists no seeds, or it
+                contains a Python object, which cannot be made again.
             ComponentError: A component failed to terminate or to be freed.
         """
         check_names("parameters", parameters)
@@ -179,24 +211,32 @@ class Simulation:
         settings: dict[str, Any] = {}
         if seed is not None:
             if not self.prepared.spec.seeds:
-                raise InputError('the scenario has no key "seeds", which lists the JSON pointers that a seed sets')
+                raise InputError(
+                    'the scenario has no key "seeds", which lists the JSON pointers that a seed '
+                    "sets"
+                )
             settings = dict.fromkeys(self.prepared.spec.seeds, int(seed))
         with self._lock:
             self._refuse_recursion()
-            self.prepared.document.refuse_objects("expected a class, of which reset() makes a new object", classes=False)
+            self.prepared.document.refuse_objects(
+                "expected a class, of which reset() makes a new object", classes=False
+            )
             self.close()
             self._open({**settings, **(parameters or {})})
 
-    # -- variables -------------------------------------------------------------------------------------------------------
+    # -- variables
+    # -------------------------------------------------------------------------------------------------------
 
     def get(self, name: str) -> Any:
         """Return the present value of a variable.
 
-        Outputs have the values of the last step. A connected input has the value of its last transfer.
+        Outputs have the values of the last step. A connected input has the value of its last
+        transfer.
 
         Args:
-            name: Name of a signal such as "plant.uav.position.z", of an input or a parameter. The name of an array, of
-                variables with indices ("plant.uav.rotor_speed") or of a vector ("plant.uav.position") gives a list.
+            name: Name of a signal such as "plant.uav.position.z", of an input or a parameter. The
+                name of an array, of variables with indices ("plant.uav.rotor_speed") or of a vector
+                ("plant.uav.position") gives a list.
 
         Raises:
             InputError: There is no such variable.
@@ -213,13 +253,15 @@ class Simulation:
             value: The value, in the unit of the variable; a list for an array or a vector.
 
         Raises:
-            InputError: There is no such variable, it cannot be set now, or it does not accept the value.
+            InputError: There is no such variable, it cannot be set now, or it does not accept the
+                value.
             ComponentError: The component failed.
         """
         with self._lock:
             self._variables.set(name, value, self._running())
 
-    # -- states ----------------------------------------------------------------------------------------------------------
+    # -- states
+    # ----------------------------------------------------------------------------------------------------------
 
     def save(self) -> SavedState:
         """Return the present state, for `restore`.
@@ -243,7 +285,8 @@ class Simulation:
             self._execution = None
             self._running().restore(state)
 
-    # -- internal --------------------------------------------------------------------------------------------------------
+    # -- internal
+    # --------------------------------------------------------------------------------------------------------
 
     def _running(self, step_hook: StepHook | None = None) -> PlanRun:
         """Return the run with its components in step mode."""
@@ -257,12 +300,18 @@ class Simulation:
                 self._ends[:] = [run.close]
                 run.initialize()
             elif run.failure:
-                raise InputError(f"the simulation failed: {str(run.failure) or 'interrupted'}; reset() starts it again")
+                raise InputError(
+                    f"the simulation failed: {str(run.failure) or 'interrupted'}; reset() starts "
+                    "it again"
+                )
         return run
 
     def _refuse_recursion(self) -> None:
         if self._is_stepping:
-            raise InputError("the simulation is stepping; a component or an observer cannot step or change it meanwhile")
+            raise InputError(
+                "the simulation is stepping; a component or an observer cannot step or change it "
+                "meanwhile"
+            )
 
     def _advance(self, run: PlanRun, end: int, observers: Sequence[Observer] = ()) -> None:
         self._is_stepping, self._execution = True, None
@@ -277,15 +326,21 @@ class Simulation:
     def _evaluate(self) -> Execution:
         if self._execution is None:
             if self._run is None:
-                raise InputError("the simulation was closed before it began; reset() opens it again")
-            self._execution = evaluate_outcome(self.prepared, self._run.outcome(), self._run.is_finished)
+                raise InputError(
+                    "the simulation was closed before it began; reset() opens it again"
+                )
+            self._execution = evaluate_outcome(
+                self.prepared, self._run.outcome(), self._run.is_finished
+            )
         return self._execution
 
 
 def _result_or_failure(execution: Execution) -> Result:
     """Return the result of a run, or raise its failure with the result."""
     if execution.failure:
-        vars(execution.failure)["result"] = execution.result  # any exception has it, a KeyboardInterrupt too
+        vars(execution.failure)["result"] = (
+            execution.result
+        )  # any exception has it, a KeyboardInterrupt too
         raise execution.failure
     return execution.result
 

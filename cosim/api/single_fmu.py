@@ -33,7 +33,8 @@ from .arguments import check_names, expect
 #: names of the components
 FMU_NAME, PROFILE_NAME = "fmu", "profile"
 
-#: times and values of inputs: a CSV file, or columns by name, the first one "time" (dict, pandas DataFrame, structured array)
+#: times and values of inputs: a CSV file, or columns by name, the first one "time" (dict, pandas
+#: DataFrame, structured array)
 InputValues = str | Path | Mapping[str, Any] | np.ndarray
 
 
@@ -75,20 +76,34 @@ def simulate(
     expect("fmu", fmu, isinstance(fmu, str | os.PathLike), "the path of an FMU")
     check_names("start_values", start_values)
     names = [output] if isinstance(output, str) else output
-    accepted = names is None or (isinstance(names, Sequence) and all(isinstance(name, str) for name in names))
+    accepted = names is None or (
+        isinstance(names, Sequence) and all(isinstance(name, str) for name in names)
+    )
     expect("output", output, accepted, "a list of names")
     expect("isolation", isolation, isolation in ("fmu", "none"), "'fmu' or 'none'")
     setup = Isolation() if isolation == "fmu" else None
     settings = InstanceSettings(tolerance, parse_solver(solver, solver_step_size))
-    plan, warnings = compile_fmu(Path(fmu), stop_time, step_size, input, start_values or {}, names, setup, settings)
+    plan, warnings = compile_fmu(
+        Path(fmu), stop_time, step_size, input, start_values or {}, names, setup, settings
+    )
     for warning in warnings:
         component_log.log_message(FMU_NAME, component_log.WARNING, warning)
     result = None
     try:
         with simulating(plan) as run:
-            about = {"name": Path(fmu).stem, "non_finite": warn_non_finite(run.recording), "macro_steps": run.macro_steps}
-            ended = {"component": run.termination.component, "time": run.termination.time} if run.termination else None
-            result = Result(run.recording, timing=dict(run.timing), metadata={**about, "terminated_by": ended})
+            about = {
+                "name": Path(fmu).stem,
+                "non_finite": warn_non_finite(run.recording),
+                "macro_steps": run.macro_steps,
+            }
+            ended = (
+                {"component": run.termination.component, "time": run.termination.time}
+                if run.termination
+                else None
+            )
+            result = Result(
+                run.recording, timing=dict(run.timing), metadata={**about, "terminated_by": ended}
+            )
             if run.failure:
                 raise run.failure
     except (ComponentError, KeyboardInterrupt) as error:
@@ -131,7 +146,9 @@ def compile_fmu(
     settings = settings.with_structural_parameters(file.description, start_values)
     experiment = file.description.default_experiment
     start = experiment.start_time or Fraction(0)
-    stop = experiment.stop_time or start + 1 if stop_time is None else _seconds("stop_time", stop_time)
+    stop = (
+        experiment.stop_time or start + 1 if stop_time is None else _seconds("stop_time", stop_time)
+    )
     default_step = exact_divisor(stop - start, experiment.step_size or (stop - start) / 100)
     step = default_step if step_size is None else _seconds("step_size", step_size)
     component = create_component(file, file.description.model_name, settings, isolation)
@@ -141,7 +158,10 @@ def compile_fmu(
         if input_values is not None:
             components[PROFILE_NAME] = profile = _read_inputs(input_values, component)
             stages.append((PROFILE_NAME,))
-            connections = [Connection(Endpoint(PROFILE_NAME, v.name), Endpoint(FMU_NAME, v.name)) for v in profile.variables]
+            connections = [
+                Connection(Endpoint(PROFILE_NAME, v.name), Endpoint(FMU_NAME, v.name))
+                for v in profile.variables
+            ]
         assigned = _check_start_values(component, start_values)
         columns = {name: Endpoint(FMU_NAME, name) for name in _recorded_names(component, output)}
         system = System(components, connections, stages, start_values={FMU_NAME: assigned})
@@ -166,35 +186,53 @@ def parse_solver(method: Method | None, step_size: float | str | None) -> Solver
     expect("solver", method, method is None or method in known, f"one of {', '.join(known)}")
     seconds = None if step_size is None else _seconds("solver_step_size", step_size)
     if seconds is not None and seconds <= 0:
-        raise InputError(f"solver_step_size: expected a positive number of seconds, found {step_size!r}")
+        raise InputError(
+            f"solver_step_size: expected a positive number of seconds, found {step_size!r}"
+        )
     return SolverSettings(method, seconds) if method else None
 
 
 def _recorded_names(component: Component, output: Sequence[str] | None) -> list[str]:
-    scalars = {scalar: variable for variable in component.variables for scalar in variable.scalar_names}
+    scalars = {
+        scalar: variable for variable in component.variables for scalar in variable.scalar_names
+    }
     if output is None:
         return [scalar for scalar, variable in scalars.items() if variable.causality == "output"]
     arrays = {variable.name: variable.scalar_names for variable in component.variables}
     if unknown := [name for name in output if name not in scalars and name not in arrays]:
-        raise InputError(Problem(f'the FMU has no variable "{name}"{did_you_mean(name, scalars)}', "output") for name in unknown)
+        raise InputError(
+            Problem(f'the FMU has no variable "{name}"{did_you_mean(name, scalars)}', "output")
+            for name in unknown
+        )
     return [scalar for name in output for scalar in arrays.get(name, (name,))]
 
 
 def _read_inputs(values: InputValues, component: Component) -> InputTable:
     """Return the table of the inputs of an FMU."""
-    inputs = {slot: v for v in component.variables if v.causality == "input" for slot in v.scalar_names}
+    inputs = {
+        slot: v for v in component.variables if v.causality == "input" for slot in v.scalar_names
+    }
     file = Path(values) if isinstance(values, str | os.PathLike) else None
     columns = read_rows(file)[0][1:] if file else _column_names(values)
     if unknown := [column for column in columns if column not in inputs]:
         where = str(file or "input")
-        raise InputError(Problem(f'the FMU has no input "{column}"{did_you_mean(column, inputs)}', where) for column in unknown)
+        raise InputError(
+            Problem(f'the FMU has no input "{column}"{did_you_mean(column, inputs)}', where)
+            for column in unknown
+        )
     targets = {column: inputs[column] for column in columns}
     return read_input_table(file, targets, "linear") if file else _table_of_columns(values, targets)
 
 
 def _column_names(values: Any) -> list[str]:
     """Return the names of the columns after "time" of a dict, a pandas DataFrame or a structured array."""
-    found = values.dtype.names if isinstance(values, np.ndarray) else values if hasattr(values, "keys") else ()
+    found = (
+        values.dtype.names
+        if isinstance(values, np.ndarray)
+        else values
+        if hasattr(values, "keys")
+        else ()
+    )
     names = list(found or ())
     text = 'a CSV file, or columns by name with a column "time"'
     expect("input", values, "time" in names and all(isinstance(name, str) for name in names), text)
@@ -207,16 +245,27 @@ def _table_of_columns(values: Any, targets: Mapping[str, Variable]) -> InputTabl
         table = {name: _column_values(values[name], variable) for name, variable in targets.items()}
     except (TypeError, ValueError) as error:
         raise InputError(Problem(f"expected numbers: {error}", "input")) from None
-    sizes_agree = time.ndim == 1 and len(time) and all(len(each) == len(time) for each in table.values())
+    sizes_agree = (
+        time.ndim == 1 and len(time) and all(len(each) == len(time) for each in table.values())
+    )
     if not sizes_agree or not np.isfinite(time).all() or (np.diff(time) <= 0).any():
-        raise InputError(Problem("expected columns of equal length with finite numbers, and increasing time", "input"))
+        raise InputError(
+            Problem(
+                "expected columns of equal length with finite numbers, and increasing time", "input"
+            )
+        )
     return make_input_table(time.tolist(), table, targets, "linear")
 
 
 def _column_values(values: Any, variable: Variable) -> list[Any]:
-    """Return the values of one column in the type of the input; a text, as in CSV, is accepted for each type."""
+    """Return the values of one column in the type of the input.
+
+    A text, as in CSV, is accepted for each type.
+    """
     column = values.tolist() if hasattr(values, "tolist") else list(values)
-    return [value if isinstance(value, bytes) else parse_cell(str(value), variable) for value in column]
+    return [
+        value if isinstance(value, bytes) else parse_cell(str(value), variable) for value in column
+    ]
 
 
 def _check_start_values(component: Component, start_values: Mapping[str, Any]) -> dict[str, Any]:

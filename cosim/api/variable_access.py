@@ -12,7 +12,13 @@ from ..engine.layout import Layout
 from ..engine.plan_run import PlanRun
 from ..engine.run_checks import not_settable_reason
 from ..scenario import PreparedRun
-from ..scenario.name_resolution import Target, UnknownNameError, check_assignment, resolve_name, vector_names
+from ..scenario.name_resolution import (
+    Target,
+    UnknownNameError,
+    check_assignment,
+    resolve_name,
+    vector_names,
+)
 from .arguments import expect
 
 #: returns the present value of a variable of the run
@@ -45,20 +51,35 @@ class VariableAccess:
             component = target.component
             read = self._system.components[component].get
             try:
-                values = check_assignment(component, self._variables_of(component), target.prefix, value, True, read)
+                values = check_assignment(
+                    component, self._variables_of(component), target.prefix, value, True, read
+                )
             except (UnknownNameError, ValueError) as error:
                 raise InputError(Problem(str(error), f'set("{name}")')) from None
             for variable in values:
-                if reason := not_settable_reason(component, self._variables_of(component)[variable], self._connected):
-                    hint = "" if "connection" in reason else "; load() and reset() take start values as `parameters`"
-                    raise InputError(Problem(f"{reason}, it cannot be set during the simulation{hint}", f'set("{name}")'))
+                if reason := not_settable_reason(
+                    component, self._variables_of(component)[variable], self._connected
+                ):
+                    hint = (
+                        ""
+                        if "connection" in reason
+                        else "; load() and reset() take start values as `parameters`"
+                    )
+                    raise InputError(
+                        Problem(
+                            f"{reason}, it cannot be set during the simulation{hint}",
+                            f'set("{name}")',
+                        )
+                    )
             with run.accessing(component, "set"):
                 for variable, each in values.items():
                     self._system.components[component].set(variable, each)
 
     def _variables_of(self, component: str) -> Mapping[str, Variable]:
         if component not in self._variables:
-            self._variables[component] = {variable.name: variable for variable in self._system.components[component].variables}
+            self._variables[component] = {
+                variable.name: variable for variable in self._system.components[component].variables
+            }
         return self._variables[component]
 
     def _find_targets(self, name: str) -> list[Target]:
@@ -90,12 +111,21 @@ class VariableAccess:
             return self._make_scalar_reader(Endpoint(component, text))
         variables = self._variables_of(component)
         variable = variables.get(text)
-        names = variable.scalar_names if variable else [slot for slot in elements if slot.startswith(f"{text}[")]
+        names = (
+            variable.scalar_names
+            if variable
+            else [slot for slot in elements if slot.startswith(f"{text}[")]
+        )
         names = names or vector_names(variables, text)
         if not names and (below := [slot for slot in elements if slot.startswith(f"{text}.")]):
-            raise InputError(f'"{component}.{text}" is a prefix, expected a variable such as "{component}.{below[0]}"')
+            raise InputError(
+                f'"{component}.{text}" is a prefix, expected a variable such as '
+                f'"{component}.{below[0]}"'
+            )
         if not names:
-            raise InputError(f'component "{component}" has no variable "{text}"{did_you_mean(text, elements)}')
+            raise InputError(
+                f'component "{component}" has no variable "{text}"{did_you_mean(text, elements)}'
+            )
         readers = [self._make_scalar_reader(Endpoint(component, slot)) for slot in names]
         return lambda run: [read(run) for read in readers]
 
@@ -119,4 +149,6 @@ def _make_array_reader(layout: Layout, endpoint: Endpoint, variable: Variable) -
     """Return a reader of a value in the arrays of the engine, without a call of the component."""
     dtype, offset = layout.positions[endpoint]
     read = layout.arrays[dtype].item
-    return (lambda _: bool(read(offset))) if variable.type == "Boolean" else (lambda _: read(offset))
+    return (
+        (lambda _: bool(read(offset))) if variable.type == "Boolean" else (lambda _: read(offset))
+    )

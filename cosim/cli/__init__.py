@@ -1,4 +1,7 @@
-"""Command line of cosim; each command imports its packages only when it runs, which keeps `cosim --help` fast."""
+"""Command line of cosim.
+
+Each command imports its packages only when it runs, which keeps `cosim --help` fast.
+"""
 
 from __future__ import annotations
 
@@ -24,24 +27,45 @@ COMMANDS = {
     "recover": ("recover", "Write the results of a run that could not be written when it ended."),
     "simulate": ("simulate", "Simulate a single FMU."),
     "compare": ("compare", "Compare a result with a reference, signal by signal."),
-    "regress": ("regress", "Run all scenarios that have checks or a reference, and compare their results with these."),
-    "bench-controller": ("bench_controller", "Benchmark a controller in every scenario with its role."),
+    "regress": (
+        "regress",
+        "Run all scenarios that have checks or a reference, and compare their results with these.",
+    ),
+    "bench-controller": (
+        "bench_controller",
+        "Benchmark a controller in every scenario with its role.",
+    ),
     "sweep": ("sweep", "Run a scenario at many points: parameter studies and Monte Carlo."),
     "tune": ("tune", "Find the parameters that minimise a KPI."),
     "trim": ("trim", "Find values with which a scenario starts in equilibrium."),
-    "linearize": ("linearize", "Linearise a scenario, or some of its components, at a point in time."),
-    "margins": ("margins", "Print the stability margins at the inputs and outputs of a controller."),
+    "linearize": (
+        "linearize",
+        "Linearise a scenario, or some of its components, at a point in time.",
+    ),
+    "margins": (
+        "margins",
+        "Print the stability margins at the inputs and outputs of a controller.",
+    ),
     "plot": ("plot", "Draw the figures of finished runs again."),
     "report": ("report", "Write the report of a finished run again."),
     "replay": ("replay", "Write a page with the 3-D replay of one run, or of two runs to compare."),
     "info": ("info", "Print the properties and variables of an FMU."),
     "validate": ("validate", "Validate FMUs against the FMI standard without running them."),
     "build": ("build", "Export controllers and plants to fmus/."),
-    "init": ("init", "Create a project with a controller, a scenario, its reference, tests and CI."),
+    "init": (
+        "init",
+        "Create a project with a controller, a scenario, its reference, tests and CI.",
+    ),
     "new": ("new", "Create a controller, a scenario, or a vehicle."),
-    "list": ("list", "List the shipped scenarios, sweeps, vehicle models, roles of controllers and KPIs."),
+    "list": (
+        "list",
+        "List the shipped scenarios, sweeps, vehicle models, roles of controllers and KPIs.",
+    ),
     "schema": ("schema", "Print the JSON Schema of scenarios, sweeps or tunings."),
-    "doctor": ("doctor", "Print which packages, tools and sandboxes are available on this machine."),
+    "doctor": (
+        "doctor",
+        "Print which packages, tools and sandboxes are available on this machine.",
+    ),
 }
 
 
@@ -64,8 +88,13 @@ class _LazyGroup(click.Group):
         import_module(".output_options", __name__).add_verbosity_options(command)
         return command
 
-    def resolve_command(self, ctx: click.Context, args: list[str]) -> tuple[str | None, click.Command | None, list[str]]:
-        """Return name, command and remaining arguments; the error of an unknown command names the nearest valid one."""
+    def resolve_command(
+        self, ctx: click.Context, args: list[str]
+    ) -> tuple[str | None, click.Command | None, list[str]]:
+        """Return name, command and remaining arguments.
+
+        The error of an unknown command names the nearest valid one.
+        """
         if args and args[0] not in COMMANDS and not args[0].startswith("-"):
             ctx.fail(f"No such command '{args[0]}'{did_you_mean(args[0], COMMANDS)}")
         return super().resolve_command(ctx, args)
@@ -94,7 +123,10 @@ class CommandLine:
 
 
 def current_command_line() -> CommandLine:
-    """Return the command line of the running command; an empty one if it was called without the group `cosim`."""
+    """Return the command line of the running command.
+
+    An empty one if it was called without the group `cosim`.
+    """
     context = click.get_current_context(silent=True)
     return context.find_root().ensure_object(CommandLine) if context else CommandLine()
 
@@ -129,7 +161,10 @@ def _raise_collection_threshold() -> None:
 def _run_command_line(arguments: list[str]) -> int:
     command_line = CommandLine(tuple(arguments))
     return run_guarded(
-        lambda: _exit_code(cli.main(arguments, prog_name="cosim", standalone_mode=False, obj=command_line)), command_line
+        lambda: _exit_code(
+            cli.main(arguments, prog_name="cosim", standalone_mode=False, obj=command_line)
+        ),
+        command_line,
     )
 
 
@@ -158,7 +193,10 @@ def report_error(error: BaseException, command_line: CommandLine) -> int:
     elif isinstance(error, MemoryError):
         text = "the memory of the process is used up"
     else:
-        text = f"internal error: {type(error).__name__}: {error}  (`cosim --debug ...` prints the traceback)"
+        text = (
+            f"internal error: {type(error).__name__}: {error}  (`cosim --debug ...` prints the "
+            "traceback)"
+        )
     click.echo(text, err=True)
     return exit_code_of(error)
 

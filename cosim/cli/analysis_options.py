@@ -1,4 +1,7 @@
-"""Common parts of the commands that analyse a scenario as a control loop: trim, linearize and margins."""
+"""Common parts of the commands that analyse a scenario as a control loop.
+
+Trim, linearize and margins.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +19,9 @@ if TYPE_CHECKING:
 
 def scenario_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """Add the argument SCENARIO and the option `--set` to a command."""
-    settings = click.option("--set", "settings", multiple=True, metavar="NAME=value", help="As for `cosim run`.")
+    settings = click.option(
+        "--set", "settings", multiple=True, metavar="NAME=value", help="As for `cosim run`."
+    )
     return click.argument("scenario", shell_complete=complete_scenario)(settings(function))
 
 
@@ -24,13 +29,18 @@ def time_options(function: Callable[..., Any]) -> Callable[..., Any]:
     """Add the options `--at` and `--duration` to a command."""
     at = click.option("--at", help="Time (s) of the operating point; default: the start time.")
     duration = click.option(
-        "--duration", type=click.FloatRange(min=0, min_open=True), help="Duration (s) of the responses; default: 256 samples."
+        "--duration",
+        type=click.FloatRange(min=0, min_open=True),
+        help="Duration (s) of the responses; default: 256 samples.",
     )
     return at(duration(function))
 
 
 def split_names(texts: Iterable[str]) -> list[str]:
-    """Return the names in texts such as "a,b"; commas in brackets, as in "gain[1,2]", separate no names."""
+    """Return the names in texts such as "a,b".
+
+    Commas in brackets, as in "gain[1,2]", separate no names.
+    """
     names: list[str] = []
     for text in texts:
         depth, begin = 0, 0

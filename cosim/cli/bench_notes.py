@@ -27,15 +27,26 @@ class BenchProgress:
     """
 
     def __init__(self, count: int, quiet: bool) -> None:
-        self._count, self._quiet, self._finished, self._began = count, quiet, -1, time.perf_counter()
+        self._count, self._quiet, self._finished, self._began = (
+            count,
+            quiet,
+            -1,
+            time.perf_counter(),
+        )
 
     def print_next(self, name: str) -> None:
         """Print the number and the name of the controller that runs next."""
         self._finished += 1
         rest = ""
         if self._finished:
-            seconds = (time.perf_counter() - self._began) / self._finished * (self._count - self._finished)
-            rest = f", about {f'{seconds:.0f} s' if seconds < 100 else f'{seconds / 60:.0f} min'} left"
+            seconds = (
+                (time.perf_counter() - self._began)
+                / self._finished
+                * (self._count - self._finished)
+            )
+            rest = (
+                f", about {f'{seconds:.0f} s' if seconds < 100 else f'{seconds / 60:.0f} min'} left"
+            )
         self._print(f"{name} (controller {self._finished + 1} of {self._count}{rest})")
 
     def print_costs(self) -> None:
@@ -48,7 +59,10 @@ class BenchProgress:
 
 
 def print_trial(result: TrialResult, candidate: str) -> None:
-    """Print a line about a scenario, its problems and what the candidate ignored in it; with --verbose also all KPIs."""
+    """Print a line about a scenario, its problems and what the candidate ignored in it.
+
+    With --verbose also all KPIs.
+    """
     if not result.is_applicable:
         _print_not_applicable(result)
         return
@@ -56,14 +70,19 @@ def print_trial(result: TrialResult, candidate: str) -> None:
     is_verbose = current_command_line().verbosity > 0
     if result.outcome.code and result.trial.ignored_settings:
         click.echo(f"        ignored settings: {', '.join(result.trial.ignored_settings)}")
-    if (result.outcome.code or is_verbose) and (text := settings_text(result.trial.applied_settings)):
+    if (result.outcome.code or is_verbose) and (
+        text := settings_text(result.trial.applied_settings)
+    ):
         click.echo(f"        settings applied: {text}")
     if is_verbose:
         print_comparison(result.rows(), candidate)
 
 
 def settings_text(settings: Mapping[str, Mapping[str, Any]]) -> str:
-    """Return the values of each variable of the candidate ("landing_time = 5.0"); several if its components differ."""
+    """Return the values of each variable of the candidate ("landing_time = 5.0").
+
+    Several if its components differ.
+    """
     from ..scenario.variable_values import quote_value
 
     values: dict[str, dict[str, None]] = {}
@@ -80,7 +99,9 @@ def _print_not_applicable(result: TrialResult) -> None:
 
 
 def print_omissions(omissions: Sequence[tuple[str, Omission]], controller: str = "") -> None:
-    """Print what is left out of the scenarios: a line of variables and one of KPIs and figures; with --verbose, a line for each.
+    """Print what is left out of the scenarios: a line of variables and one of KPIs and figures.
+
+    With --verbose, a line for each.
 
     Args:
         omissions: names of scenarios, and what is left out of each.
@@ -88,16 +109,31 @@ def print_omissions(omissions: Sequence[tuple[str, Omission]], controller: str =
     """
     begin = f"note: {controller}: " if controller else "note: "
     is_verbose = current_command_line().verbosity > 0
-    for line in [f"{scenario}: {each}" for scenario, each in omissions] if is_verbose else summarize_omissions(omissions):
+    for line in (
+        [f"{scenario}: {each}" for scenario, each in omissions]
+        if is_verbose
+        else summarize_omissions(omissions)
+    ):
         click.echo(f"{begin}{line}")
 
 
 def summarize_omissions(omissions: Sequence[tuple[str, Omission]]) -> list[str]:
     """Return a line of ignored settings and one of KPIs and figures that are left out, each with its number of scenarios."""
     settings = [(scenario, each.lacking) for scenario, each in omissions if not each.entry]
-    entries = [(scenario, f'{each.entry} without "{each.lacking}"') for scenario, each in omissions if each.entry]
-    headings = {"ignored settings, for which the controller has no variable": settings, "left out": entries}
-    return [f"{heading} (number of scenarios): {_count_scenarios(items)}" for heading, items in headings.items() if items]
+    entries = [
+        (scenario, f'{each.entry} without "{each.lacking}"')
+        for scenario, each in omissions
+        if each.entry
+    ]
+    headings = {
+        "ignored settings, for which the controller has no variable": settings,
+        "left out": entries,
+    }
+    return [
+        f"{heading} (number of scenarios): {_count_scenarios(items)}"
+        for heading, items in headings.items()
+        if items
+    ]
 
 
 def _count_scenarios(items: Iterable[tuple[str, str]]) -> str:

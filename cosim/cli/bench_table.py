@@ -35,7 +35,10 @@ def print_ranking(ranking: Ranking, candidate: str) -> None:
         found = standings[name]
         checks = f"{found.met} of {count_noun(found.checks, 'check')} passed"
         place = 1 if ranking.verdict == "equal" else place
-        click.echo(f"{place}. {name:{width}}  {found.passed} of {count_noun(found.scenarios, 'scenario')} passed, {checks}")
+        click.echo(
+            f"{place}. {name:{width}}  {found.passed} of {count_noun(found.scenarios, 'scenario')} "
+            f"passed, {checks}"
+        )
     goals = [
         f"{goal} {counts['better']} better, {counts['worse']} worse"
         for goal, counts in ranking.goals.items()
@@ -47,7 +50,9 @@ def print_ranking(ranking: Ranking, candidate: str) -> None:
 
 
 def print_side_by_side(controllers: Sequence[BenchedController], reference: str) -> None:
-    """Print a line per controller: scenarios passed, checks passed and costs per step; below the table what orders them.
+    """Print a line per controller: scenarios passed, checks passed and costs per step.
+
+    Below the table what orders them.
 
     Args:
         controllers: the controllers, the best first.
@@ -65,18 +70,30 @@ def print_side_by_side(controllers: Sequence[BenchedController], reference: str)
     for each in controllers:
         found = each.ranking.candidate
         counts = (f"{found.passed} of {found.scenarios}", f"{found.met} of {found.checks}")
-        costs = ("-" if math.isnan(value) else f"{value:.3g}" for value in (1e6 * each.cost, each.cost_ratio))
+        costs = (
+            "-" if math.isnan(value) else f"{value:.3g}"
+            for value in (1e6 * each.cost, each.cost_ratio)
+        )
         table.add_row(cell_text(each.name), *counts, *costs)
     click.echo()
     table_console().print(table)
     click.echo("order: passed checks, then passed scenarios, then the goals of the role")
     if have_different_totals(controllers):
-        click.echo("the totals differ: scenarios that are not applicable (n/a) and checks of KPIs that are left out do not count")
-    click.echo(f"cost: smallest processor time per step; ratio: to {reference}" if reference else "the costs were not measured")
+        click.echo(
+            "the totals differ: scenarios that are not applicable (n/a) and checks of KPIs that "
+            "are left out do not count"
+        )
+    click.echo(
+        f"cost: smallest processor time per step; ratio: to {reference}"
+        if reference
+        else "the costs were not measured"
+    )
 
 
 def print_comparison(rows: Sequence[KpiComparison], candidate: str) -> None:
-    """Print one line per KPI: values of the candidate, the scenario's own controller and the last run, verdicts and checks.
+    """Print one line per KPI.
+
+    Values of the candidate, the scenario's own controller and the last run, verdicts and checks.
 
     Args:
         rows: the KPIs; without any, nothing is printed.
@@ -87,7 +104,10 @@ def print_comparison(rows: Sequence[KpiComparison], candidate: str) -> None:
 
     if not rows:
         return
-    with_last, with_checks = any(row.last is not None for row in rows), any(row.checks for row in rows)
+    with_last, with_checks = (
+        any(row.last is not None for row in rows),
+        any(row.checks for row in rows),
+    )
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
     table.add_column("KPI", overflow="fold")
     for header in (
@@ -99,13 +119,18 @@ def print_comparison(rows: Sequence[KpiComparison], candidate: str) -> None:
         *(("check",) if with_checks else ()),
     ):
         table.add_column(
-            cell_text(header), justify="right" if header in (candidate, OWN_CONTROLLER, "last run") else "left", overflow="fold"
+            cell_text(header),
+            justify="right" if header in (candidate, OWN_CONTROLLER, "last run") else "left",
+            overflow="fold",
         )
     for row in rows:
         cells = [row.name, row.unit, _format_value(row.candidate), _format_value(row.shipped)]
         last = [_format_value(row.last), _COLOURS[row.against_last]] if with_last else []
         table.add_row(
-            *map(cell_text, cells), _COLOURS[row.against_shipped], *last, *([_format_checks(row)] if with_checks else [])
+            *map(cell_text, cells),
+            _COLOURS[row.against_shipped],
+            *last,
+            *([_format_checks(row)] if with_checks else []),
         )
     table_console().print(table)
 
@@ -115,5 +140,10 @@ def _format_value(value: Number | None) -> str:
 
 
 def _format_checks(row: KpiComparison) -> str:
-    words = ("[green]{} passed[/]" if outcome.passed else "[bold red]{} failed[/]" for outcome in row.checks)
-    return ", ".join(word.format(outcome.limits) for word, outcome in zip(words, row.checks, strict=True))
+    words = (
+        "[green]{} passed[/]" if outcome.passed else "[bold red]{} failed[/]"
+        for outcome in row.checks
+    )
+    return ", ".join(
+        word.format(outcome.limits) for word, outcome in zip(words, row.checks, strict=True)
+    )

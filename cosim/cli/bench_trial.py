@@ -33,8 +33,10 @@ class ControllerTrial:
         file: the scenario with the candidate.
         original: the original scenario.
         own_name: name of the controller of the original scenario.
-        ignored_settings: variables that the scenario sets and the candidate lacks, such as "vtol.landing_time".
-        applied_settings: values that the scenario gives the candidate, by component and the candidate's own variable.
+        ignored_settings: variables that the scenario sets and the candidate lacks, such as
+            "vtol.landing_time".
+        applied_settings: values that the scenario gives the candidate, by component and the
+            candidate's own variable.
         kpi_descriptions: meanings of the KPI values (see `describe_kpis`).
         candidate_folder: output directory of the scenario with the candidate.
         shipped_folder: output directory of the original scenario.
@@ -56,7 +58,9 @@ class ControllerTrial:
         from ..studies.controller_bench.score import RunKpis
 
         last = RunKpis.read(self.candidate_folder)
-        return TrialResult(self, Regression(self.file, self.candidate_folder, False, self.run_command).run(), last)
+        return TrialResult(
+            self, Regression(self.file, self.candidate_folder, False, self.run_command).run(), last
+        )
 
     def run_shipped(self) -> None:
         """Run the original scenario unless the results of its last run are up to date."""
@@ -81,7 +85,10 @@ class TrialResult:
 
     @property
     def unfed_inputs(self) -> list[str]:
-        """Problems of the inputs of the candidate that the scenario does not feed; empty if it was refused for another reason."""
+        """Problems of the inputs of the candidate that the scenario does not feed.
+
+        Empty if it was refused for another reason.
+        """
         from ..scenario.wiring import NO_MATCHING_OUTPUT
 
         problems = [line for line in self.outcome.details if not line.startswith(LOG_LEVELS)]
@@ -100,10 +107,16 @@ class TrialResult:
         from ..studies.controller_bench.ranking import ScenarioKpis
         from ..studies.controller_bench.score import RunKpis
 
-        candidate = RunKpis.read(self.trial.candidate_folder) if self.outcome.code in (0, 3) else None
+        candidate = (
+            RunKpis.read(self.trial.candidate_folder) if self.outcome.code in (0, 3) else None
+        )
         checks = json.loads(self.trial.file.read_text(encoding="utf-8-sig"))["checks"]
         shipped = RunKpis.read(self.trial.shipped_folder)
-        about = self.trial.own_name, self.trial.kpi_descriptions, settings_text(self.trial.applied_settings)
+        about = (
+            self.trial.own_name,
+            self.trial.kpi_descriptions,
+            settings_text(self.trial.applied_settings),
+        )
         return ScenarioKpis(candidate, shipped, checks, self.is_applicable, *about)
 
     def as_json(self) -> dict[str, Any]:
@@ -133,8 +146,13 @@ def _row_as_json(row: KpiComparison) -> dict[str, Any]:
 
 
 def run_trials(trials: Sequence[ControllerTrial], jobs: int) -> Iterator[TrialResult]:
-    """Run all trials, `jobs` at a time; yield the results in order, as soon as both controllers have run."""
-    work: list[Callable[[], TrialResult | None]] = [each for trial in trials for each in (trial.run_shipped, trial.run)]
+    """Run all trials, `jobs` at a time.
+
+    Yield the results in order, as soon as both controllers have run.
+    """
+    work: list[Callable[[], TrialResult | None]] = [
+        each for trial in trials for each in (trial.run_shipped, trial.run)
+    ]
     return (result for result in run_in_parallel(work, jobs) if result)
 
 
@@ -160,12 +178,25 @@ class ControllerTrials:
         from ..studies.controller_bench.substitution import Omission
 
         found = self.prepared["omissions"]
-        return [(each["scenario"], Omission(each["entry"], each["variable"], each["lacking"])) for each in found]
+        return [
+            (each["scenario"], Omission(each["entry"], each["variable"], each["lacking"]))
+            for each in found
+        ]
 
     def first_finished(self) -> Mapping[str, str] | None:
-        """Return the first scenario that the controller ran to its end, with all its inputs fed; None if there is none."""
+        """Return the first scenario that the controller ran to its end, with all its inputs fed.
+
+        None if there is none.
+        """
         scenarios = zip(self.prepared["scenarios"], self.results, strict=True)
-        return next((each for each, result in scenarios if result.is_applicable and result.outcome.code in (0, 3)), None)
+        return next(
+            (
+                each
+                for each, result in scenarios
+                if result.is_applicable and result.outcome.code in (0, 3)
+            ),
+            None,
+        )
 
     def as_json(self) -> dict[str, Any]:
         """Return ranking, scenarios and notes as JSON."""
@@ -174,10 +205,14 @@ class ControllerTrials:
         summary = {**asdict(self.ranking), "verdict": self.ranking.verdict}
         return {"candidate": self.name, "ranking": summary, "scenarios": scenarios, "notes": notes}
 
-    def as_benched(self, cost: float = math.nan, reference_cost: float = math.nan) -> BenchedController:
+    def as_benched(
+        self, cost: float = math.nan, reference_cost: float = math.nan
+    ) -> BenchedController:
         """Return the controller as the page shows it; costs in s per step."""
         from ..studies.controller_bench.page import BenchedController
 
         kpis = {result.name: result.kpis for result in self.results}
         notes, goals = summarize_omissions(self.omissions), tuple(self.prepared["goals"])
-        return BenchedController(self.name, self.ranking, kpis, goals, notes, cost, cost / reference_cost)
+        return BenchedController(
+            self.name, self.ranking, kpis, goals, notes, cost, cost / reference_cost
+        )

@@ -20,10 +20,16 @@ def complete_shipped(pattern: str) -> Completion:
     The shell completes other paths if none of these fits.
     """
 
-    def complete(_context: click.Context, _parameter: click.Parameter, incomplete: str) -> list[CompletionItem]:
+    def complete(
+        _context: click.Context, _parameter: click.Parameter, incomplete: str
+    ) -> list[CompletionItem]:
         folder = Path(incomplete).parent if not incomplete.endswith("/") else Path(incomplete)
         files = sorted(str(path) for path in folder.glob("*.json"))
-        names = [name for name in (*resources.shipped_names(pattern), *files) if name.startswith(incomplete)]
+        names = [
+            name
+            for name in (*resources.shipped_names(pattern), *files)
+            if name.startswith(incomplete)
+        ]
         return [CompletionItem(incomplete, type="file"), *map(CompletionItem, names)]
 
     return complete

@@ -19,7 +19,10 @@ _excel_safe = click.option(
     is_flag=True,
     expose_value=False,
     callback=_apply,
-    help="In CSV files, write an apostrophe before texts that begin with = + - or @, which spreadsheets take for formulas.",
+    help=(
+        "In CSV files, write an apostrophe before texts that begin with = + - or @, which "
+        "spreadsheets take for formulas."
+    ),
 )
 
 

@@ -21,7 +21,9 @@ if TYPE_CHECKING:
     from .run_outputs import RunOptions
 
 
-def write_partial_result(partial: Result, folder: Path, shown_folder: Path, unfinished: Path | None) -> None:
+def write_partial_result(
+    partial: Result, folder: Path, shown_folder: Path, unfinished: Path | None
+) -> None:
     """Write the rows recorded before a failure, if there are any; see `writing_results`."""
     from ..results.result import write_run
 
@@ -59,7 +61,9 @@ def report_failed_run(partial: Result, folder: Path, options: RunOptions, exit_c
 
 
 def save_after_crash(outcome: SupervisedOutcome, options: RunOptions) -> None:
-    """Write the rows of a child process that crashed, was killed or was interrupted; a crash also has a report.
+    """Write the rows of a child process that crashed, was killed or was interrupted.
+
+    A crash also has a report.
 
     The report is written by another supervised process, because it calls functions of the user.
     """
@@ -70,7 +74,11 @@ def save_after_crash(outcome: SupervisedOutcome, options: RunOptions) -> None:
     folder = outcome.journal.folder
     if folder is not None:
         failure = "interrupted" if outcome.interrupted else str(outcome.failure)
-        metadata = {**read_metadata(folder), "macro_steps": outcome.journal[STEP_COUNT], "failure": failure}
+        metadata = {
+            **read_metadata(folder),
+            "macro_steps": outcome.journal[STEP_COUNT],
+            "failure": failure,
+        }
         recording = supervision.recover_outcome_recording(outcome)
         if metadata.get("scenario", {}).get("non_finite") != "allow":
             print_log()
@@ -80,5 +88,7 @@ def save_after_crash(outcome: SupervisedOutcome, options: RunOptions) -> None:
         if outcome.failure:
             code = outcome.failure.exit_code
             supervision.run_supervised_command(
-                lambda: report_failed_run(partial, folder.parent, options, code), "run", lambda _outcome: None
+                lambda: report_failed_run(partial, folder.parent, options, code),
+                "run",
+                lambda _outcome: None,
             )

@@ -43,10 +43,12 @@ SignalMask = set[int | signal.Signals]
 
 @contextmanager
 def forked_commands(count: int) -> Iterator[CommandRunner]:
-    """Yield a function that runs a `cosim` command in a separate process; `count` threads may call it at the same time.
+    """Yield a function that runs a `cosim` command in a separate process.
 
-    This process must have no threads and must not have loaded FMUs. Where processes cannot be forked, the function starts a new
-    process for each command.
+    `count` threads may call it at the same time.
+
+    This process must have no threads and must not have loaded FMUs. Where processes cannot be
+    forked, the function starts a new process for each command.
     """
     if not hasattr(os, "fork"):
         yield run_in_new_process
@@ -107,12 +109,19 @@ class _ForkingProcess:
 
 
 def _serve(connection: socket.socket, mask: SignalMask) -> NoReturn:
-    """Run commands until the connection is closed; interrupts, which commands receive too, are blocked."""
+    """Run commands until the connection is closed.
+
+    Interrupts, which commands receive too, are blocked.
+    """
     try:
         _redirect_streams((0, 1, 2))
         with connection.makefile("rw", encoding="utf-8") as stream:
             for line in stream:
-                print(json.dumps(_run_command(json.loads(line), connection, mask)), file=stream, flush=True)
+                print(
+                    json.dumps(_run_command(json.loads(line), connection, mask)),
+                    file=stream,
+                    flush=True,
+                )
     finally:
         os._exit(0)
 

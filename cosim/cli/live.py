@@ -17,7 +17,8 @@ if TYPE_CHECKING:
     from ..report.live.control import LiveControl
     from ..scenario import PreparedRun
 
-#: simulated seconds per second of wall time without `--real-time`; at full speed a run ends before it can be seen
+#: simulated seconds per second of wall time without `--real-time`; at full speed a run ends before
+#: it can be seen
 _DEFAULT_SPEED = 1.0
 
 _view = click.option(
@@ -27,9 +28,14 @@ _view = click.option(
     "inputs. Starts in real time, or with the FACTOR of --real-time.",
 )
 _port = click.option(
-    "--view-port", type=click.IntRange(0, 65535), default=0, help="Port of the live page; default: any free port."
+    "--view-port",
+    type=click.IntRange(0, 65535),
+    default=0,
+    help="Port of the live page; default: any free port.",
 )
-_wait = click.option("--wait", is_flag=True, help="With --view: begin when the live page has been opened.")
+_wait = click.option(
+    "--wait", is_flag=True, help="With --view: begin when the live page has been opened."
+)
 
 
 def view_options(command: Callable[..., Any]) -> Callable[..., Any]:
@@ -43,12 +49,17 @@ def check_view_options(isolation: str, sandbox: str | None, late: str) -> None:
 
     if isolation == "none" or not can_supervise():
         raise click.UsageError(
-            "--view requires a supervised run: it cannot be combined with --isolation none, and needs a platform with supervision"
+            "--view requires a supervised run: it cannot be combined with --isolation none, and "
+            "needs a platform with supervision"
         )
     if sandbox == "strict":
-        raise click.UsageError("--view requires a network connection to the browser, which --sandbox strict blocks")
+        raise click.UsageError(
+            "--view requires a network connection to the browser, which --sandbox strict blocks"
+        )
     if late == "fail":
-        raise click.UsageError("--view cannot be combined with --late fail: the user may pause the run")
+        raise click.UsageError(
+            "--view cannot be combined with --late fail: the user may pause the run"
+        )
 
 
 def run_with_view(
@@ -62,7 +73,8 @@ def run_with_view(
     """Run a command in a supervised child process while this process serves the live page.
 
     Args:
-        run: the command's work in the child; receives the connection to the page and returns the exit code.
+        run: the command's work in the child; receives the connection to the page and returns the
+            exit code.
         isolation: value of `--isolation`.
         save_partial: see `run_supervised_command`.
         port: port of the page; 0: any free port.
@@ -76,7 +88,9 @@ def run_with_view(
     with temporary_run_folder() as folder:
         if has_display():
             open_browser(view.url, Path(folder))
-        return supervision.run_supervised_command(lambda: run(view.open_in_child()), isolation, save_partial, view.serve)
+        return supervision.run_supervised_command(
+            lambda: run(view.open_in_child()), isolation, save_partial, view.serve
+        )
 
 
 def create_control(prepared: PreparedRun, link: Connection, speed: float | None) -> LiveControl:
@@ -94,7 +108,9 @@ def create_control(prepared: PreparedRun, link: Connection, speed: float | None)
     about = {
         "name": prepared.spec.name,
         "description": prepared.spec.description,
-        "scene": build_scene({"scenario": value, "scenario_file": str(prepared.document.file.resolve())}),
+        "scene": build_scene(
+            {"scenario": value, "scenario_file": str(prepared.document.file.resolve())}
+        ),
         "rows": plan.row_count,
         "stop_time": float(plan.settings.stop_time),
     }

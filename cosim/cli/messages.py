@@ -53,14 +53,20 @@ def print_log() -> list[str]:
 
 
 def collect_log() -> list[str]:
-    """Print no message of the logger "cosim" from now on; return the list that collects the texts of warnings and errors."""
+    """Print no message of the logger "cosim" from now on.
+
+    Return the list that collects the texts of warnings and errors.
+    """
     collector = _WarningCollector()
     logging.getLogger("cosim").handlers[:] = [collector]
     return collector.texts
 
 
 def print_line(text: str) -> None:
-    """Print a text that may contain foreign text as one line of standard output; line breaks in it are escaped."""
+    """Print a text that may contain foreign text as one line of standard output.
+
+    Line breaks in it are escaped.
+    """
     click.echo(escape_control_characters(text, keep=SPACES))
 
 
@@ -68,12 +74,17 @@ def print_json(value: Any) -> None:
     """Print a value as JSON; NumPy values become numbers, and NaN and infinity become null."""
     from ..results.files import to_json_types
 
-    click.echo(json.dumps(to_json_types(value), indent=2, ensure_ascii=False), file=current_command_line().data)
+    click.echo(
+        json.dumps(to_json_types(value), indent=2, ensure_ascii=False),
+        file=current_command_line().data,
+    )
 
 
 def print_verdict(passed: bool) -> None:
     """Print the word "passed" or "FAILED", coloured on a terminal, without a line break."""
-    word = click.style("passed", fg="green") if passed else click.style("FAILED", fg="red", bold=True)
+    word = (
+        click.style("passed", fg="green") if passed else click.style("FAILED", fg="red", bold=True)
+    )
     click.echo(word, nl=False, file=unescaped(sys.stdout))
 
 
@@ -89,7 +100,8 @@ def warn_overwriting(folder: Path, about: str, kind: str, file: Path) -> None:
     Args:
         folder: The output directory.
         about: Name of the JSON file that describes the earlier results.
-        kind: "scenario" or "sweep"; the JSON file names its file as "scenario_file" or "sweep_file".
+        kind: "scenario" or "sweep"; the JSON file names its file as "scenario_file" or
+            "sweep_file".
         file: The file whose results are written now.
     """
     try:
@@ -97,5 +109,8 @@ def warn_overwriting(folder: Path, about: str, kind: str, file: Path) -> None:
     except (OSError, ValueError, LookupError):  # no earlier results, or an unreadable file
         return
     if former != str(file):
-        text = f'replaces the results of {former} in {folder}; another "name" in the {kind} or --output-dir keeps both'
+        text = (
+            f'replaces the results of {former} in {folder}; another "name" in the {kind} or '
+            "--output-dir keeps both"
+        )
         click.echo(text, err=True)

@@ -1,4 +1,7 @@
-"""Options that choose what a command prints: --quiet and --verbose of every command, --json of those that print data."""
+"""Options that choose what a command prints.
+
+--quiet and --verbose of every command, --json of those that print data.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +34,9 @@ def _be_verbose(context: click.Context, _option: click.Parameter, enabled: bool)
 def _prepare_json(context: click.Context, _option: click.Parameter, enabled: bool) -> bool:
     """Send what components and functions of the user print to standard error, so that the output is JSON."""
     if enabled:
-        _redirect_output(context, sys.stdout if _command_line(context).verbosity < 0 else sys.stderr)
+        _redirect_output(
+            context, sys.stdout if _command_line(context).verbosity < 0 else sys.stderr
+        )
     return enabled
 
 
@@ -48,7 +53,10 @@ QUIET = click.Option(
     is_eager=True,
     expose_value=False,
     callback=_be_quiet,
-    help="Print only warnings, errors and failed checks, to standard error; with --json also the JSON text.",
+    help=(
+        "Print only warnings, errors and failed checks, to standard error; with --json also the "
+        "JSON text."
+    ),
 )
 VERBOSE = click.Option(
     ["-v", "--verbose"],
@@ -65,7 +73,13 @@ def json_option(content: str) -> Callable[[Callable[..., Any]], Callable[..., An
     Args:
         content: the JSON value in words, for the help text.
     """
-    return click.option("--json", "as_json", is_flag=True, callback=_prepare_json, help=f"Print only JSON: {content}.")
+    return click.option(
+        "--json",
+        "as_json",
+        is_flag=True,
+        callback=_prepare_json,
+        help=f"Print only JSON: {content}.",
+    )
 
 
 def add_verbosity_options(command: click.Command) -> None:

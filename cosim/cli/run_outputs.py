@@ -113,19 +113,25 @@ def write_outputs(outcome: RunOutcome) -> int:
     for write in _EVERY_RUN_WRITERS:
         write(outcome)
     if outcome.options.as_json and not outcome.execution.failure:
-        print_json(summarize_run(outcome.result, outcome.checks, outcome.shown_folder, outcome.files, code))
+        print_json(
+            summarize_run(outcome.result, outcome.checks, outcome.shown_folder, outcome.files, code)
+        )
     return code
 
 
 def _end_failed_run(outcome: RunOutcome, failure: BaseException) -> int:
     from ..process.run_files.folder import remove_run_files, run_folder
 
-    outcome.result.metadata["failure"] = outcome.result.metadata["failure"] or str(failure)  # a KPI may have failed
+    outcome.result.metadata["failure"] = outcome.result.metadata["failure"] or str(
+        failure
+    )  # a KPI may have failed
     try:
         write_partial_result(outcome.result, outcome.folder, outcome.shown_folder, run_folder())
         remove_run_files()
         if not isinstance(failure, KeyboardInterrupt):
-            report_failed_run(outcome.result, outcome.folder, outcome.options, exit_code_of(failure))
+            report_failed_run(
+                outcome.result, outcome.folder, outcome.options, exit_code_of(failure)
+            )
     except CosimError as error:
         if isinstance(failure, OSError | OutputError):  # most likely the same cause
             raise
@@ -169,14 +175,20 @@ def _write_report(outcome: RunOutcome) -> None:
         return
     from ..report.run_page import write_report
 
-    write_report(outcome.result, outcome.checks, _write_figures(outcome), outcome.folder / "report.html")
+    write_report(
+        outcome.result, outcome.checks, _write_figures(outcome), outcome.folder / "report.html"
+    )
     outcome.files.append("report.html")
 
 
 def _write_figures(outcome: RunOutcome) -> Iterator[tuple[str, str]]:
     """Write the figures, and yield name and SVG text of each."""
     for i, spec in enumerate(outcome.prepared.spec.figures):
-        picture = outcome.drawing.picture(spec.name, spec.python.rpartition(":")[2]) if outcome.drawing else None
+        picture = (
+            outcome.drawing.picture(spec.name, spec.python.rpartition(":")[2])
+            if outcome.drawing
+            else None
+        )
         picture = picture or _draw_figure(outcome, i)
         outcome.files.append(f"{spec.name}.png")
         yield spec.name, picture
@@ -199,14 +211,18 @@ def _print_summary(outcome: RunOutcome) -> None:
     loop, simulated = result.timing["loop_seconds"], float(result.time[-1] - result.time[0])
     seconds = time.perf_counter() - outcome.began
     checks = _summarize_checks(outcome.checks, outcome.kpi_units)
-    click.echo(f"\n{checks}{simulated:g} s simulated in {loop:.2f} s: {simulated / loop:.0f} times real time")
+    click.echo(
+        f"\n{checks}{simulated:g} s simulated in {loop:.2f} s: {simulated / loop:.0f} times real "
+        "time"
+    )
     click.echo(f"{', '.join(outcome.files)} in {outcome.shown_folder} ({seconds:.1f} s in all)")
     if pacing := result.metadata["real_time"]:
         click.echo(_format_pacing(pacing))
     if events := result.metadata.get("live_events"):
         times = count_noun(len(events), "time")
         click.echo(
-            f"values were set {times} while it ran: copy live_events of run.json into the scenario's events to repeat the run"
+            f"values were set {times} while it ran: copy live_events of run.json into the "
+            "scenario's events to repeat the run"
         )
     if current_command_line().verbosity > 0:
         for name, value in result.timing.items():
@@ -214,12 +230,17 @@ def _print_summary(outcome: RunOutcome) -> None:
 
 
 def _summarize_checks(checks: Sequence[CheckOutcome], units: Mapping[str, str]) -> str:
-    """Return a line that says how many checks passed, and which ones failed; "" if there are none."""
+    """Return a line that says how many checks passed, and which ones failed.
+
+    "" if there are none.
+    """
     if not checks:
         return ""
     failed = "".join(f"\n  {check.text(units)}" for check in checks if not check.passed)
     passed = sum(check.passed for check in checks)
-    return f"{passed} of {count_noun(len(checks), 'check')} passed{failed and ', failed:'}{failed}\n"
+    return (
+        f"{passed} of {count_noun(len(checks), 'check')} passed{failed and ', failed:'}{failed}\n"
+    )
 
 
 def _print_termination(outcome: RunOutcome) -> None:
@@ -228,7 +249,9 @@ def _print_termination(outcome: RunOutcome) -> None:
 
 
 def _format_pacing(pacing: Mapping[str, Any]) -> str:
-    lateness = ", ".join(f"{label} {1e3 * pacing[key]:.3g} ms" for label, key in _LATENESS_LABELS.items())
+    lateness = ", ".join(
+        f"{label} {1e3 * pacing[key]:.3g} ms" for label, key in _LATENESS_LABELS.items()
+    )
     late = f"{pacing['late_steps']} of {count_noun(pacing['steps'], 'step')} late"
     return f"paced to {pacing['factor']:g} times real time: {late}; lateness {lateness}"
 
@@ -253,4 +276,8 @@ _COMPLETE_RUN_WRITERS: Sequence[Callable[[RunOutcome], None]] = (
     _print_summary,
 )
 #: outputs of every run, also of one that failed
-_EVERY_RUN_WRITERS: Sequence[Callable[[RunOutcome], None]] = (_print_termination, _write_parquet, _write_mcap)
+_EVERY_RUN_WRITERS: Sequence[Callable[[RunOutcome], None]] = (
+    _print_termination,
+    _write_parquet,
+    _write_mcap,
+)

@@ -12,7 +12,11 @@ if TYPE_CHECKING:
 
 
 def summarize_run(
-    result: Result, checks: Sequence[CheckOutcome], folder: Path, files: Sequence[str], exit_code: int
+    result: Result,
+    checks: Sequence[CheckOutcome],
+    folder: Path,
+    files: Sequence[str],
+    exit_code: int,
 ) -> dict[str, Any]:
     """Return the JSON value that `cosim run --json` prints.
 
@@ -33,7 +37,9 @@ def summarize_run(
         "end_time": times[-1] if len(times) else None,
         "loop_seconds": result.timing.get("loop_seconds"),
         "kpis": dict(result.kpis),
-        "checks": [{**check.check, "value": check.value, "passed": check.passed} for check in checks],
+        "checks": [
+            {**check.check, "value": check.value, "passed": check.passed} for check in checks
+        ],
         "warnings": about.get("warnings", []),
         "folder": folder,
         "files": files,

@@ -7,11 +7,16 @@ from fnmatch import fnmatchcase
 
 from .shipped import Entry
 
-#: patterns of names by the heading of a group; the first matching pattern counts, "*" is the group of all others
+#: patterns of names by the heading of a group; the first matching pattern counts, "*" is the group
+#: of all others
 SCENARIO_GROUPS: Mapping[str, tuple[str, ...]] = {
     "demos of the paper": ("demo1_box", "demo2_sweep", "demo3_inverse_kinematics", "vtol_*"),
     "demo 1 in other surroundings": ("demo1_waves", "demo1_wind", "demo1_current", "harbour"),
-    "landings in waves and on other vessels": ("landing_waves", "landing_on_otter", "landing_on_helping_vessel"),
+    "landings in waves and on other vessels": (
+        "landing_waves",
+        "landing_on_otter",
+        "landing_on_helping_vessel",
+    ),
     "landings on measurements alone": ("*_on_sensors",),
     "faults": ("fault_*",),
     "vessels": ("station_keeping", "path_in_current", "otter_*", "vehicle_library"),
@@ -32,4 +37,8 @@ def group_scenarios(entries: Iterable[Entry]) -> dict[str, list[Entry]]:
 
 
 def _heading(name: str) -> str:
-    return next(h for h, patterns in SCENARIO_GROUPS.items() if any(fnmatchcase(name, pattern) for pattern in patterns))
+    return next(
+        h
+        for h, patterns in SCENARIO_GROUPS.items()
+        if any(fnmatchcase(name, pattern) for pattern in patterns)
+    )

@@ -1,4 +1,7 @@
-"""Lists of what cosim ships: scenarios, sweeps, vehicle models, controllers, roles of controllers and KPIs."""
+"""Lists of what cosim ships.
+
+Scenarios, sweeps, vehicle models, controllers, roles of controllers and KPIs.
+"""
 
 from __future__ import annotations
 
@@ -36,7 +39,11 @@ class Entry:
 def _list_documents(pattern: str) -> Iterator[Entry]:
     """Yield the JSON files that match a pattern, with their "description"."""
     for path in sorted(resources.root().glob(pattern)):
-        yield Entry(path.stem, parse_object(path.read_text(encoding="utf-8")).get("description", ""), str(path))
+        yield Entry(
+            path.stem,
+            parse_object(path.read_text(encoding="utf-8")).get("description", ""),
+            str(path),
+        )
 
 
 def _list_models() -> Iterator[Entry]:
@@ -46,15 +53,25 @@ def _list_models() -> Iterator[Entry]:
     for source in find_sources(resources.root()):
         readme = source.path.parent / "README.md"
         if source.kind.name == "vehicle file":
-            yield Entry(source.name, parse_object(source.path.read_text(encoding="utf-8"))["description"], str(source.path))
+            yield Entry(
+                source.name,
+                parse_object(source.path.read_text(encoding="utf-8"))["description"],
+                str(source.path),
+            )
         elif source.kind.name == "equations" and readme.is_file():
-            yield Entry(source.name, readme.read_text(encoding="utf-8").partition("\n")[0].lstrip("# "), str(readme))
+            yield Entry(
+                source.name,
+                readme.read_text(encoding="utf-8").partition("\n")[0].lstrip("# "),
+                str(readme),
+            )
 
 
 def shipped_fmus() -> dict[str, Path]:
     """Return the shipped FMUs by name; of those with the same name the one for FMI 2.0."""
     folders = ("fmus", "fmus/python", "fmus/c", "fmus/fmi3")
-    files = [path for folder in folders for path in sorted((resources.root() / folder).glob("*.fmu"))]
+    files = [
+        path for folder in folders for path in sorted((resources.root() / folder).glob("*.fmu"))
+    ]
     return {path.stem: path for path in reversed(files)}
 
 
@@ -64,7 +81,9 @@ def _list_controllers() -> Iterator[Entry]:
     from ..export.sources import find_sources
 
     folder, files = resources.root() / "controllers", shipped_fmus()
-    names = {source.name for source in find_sources(resources.root()) if folder in source.path.parents}
+    names = {
+        source.name for source in find_sources(resources.root()) if folder in source.path.parents
+    }
     for name in sorted(names & files.keys()):
         yield Entry(name, FmuFile(files[name]).description.description, str(files[name]))
 
@@ -75,7 +94,11 @@ def _list_kpis() -> Iterator[Entry]:
 
     for name, path in sorted(_kpi_files().items()):
         for node in function_definitions(path).values():
-            if node.returns and ast.unparse(node.returns) in _KPI_TYPES and not node.name.startswith("_"):
+            if (
+                node.returns
+                and ast.unparse(node.returns) in _KPI_TYPES
+                and not node.name.startswith("_")
+            ):
                 text = (ast.get_docstring(node) or "").partition("\n")[0]
                 arguments = ast.unparse(node.args).partition(", ")[2]  # without the result
                 yield Entry(f"{name}:{node.name}", text, str(path), arguments.replace("'", '"'))
@@ -89,7 +112,9 @@ def _kpi_files() -> dict[str, Path]:
     )
     for scenario in folder.glob("*.json"):
         kpis = parse_object(scenario.read_text(encoding="utf-8")).get("kpis", [])
-        for kpi in kpis if isinstance(kpis, list) else ():  # a scenario that extends another may change single KPIs
+        for kpi in (
+            kpis if isinstance(kpis, list) else ()
+        ):  # a scenario that extends another may change single KPIs
             path = (folder / kpi["python"].rpartition(":")[0]).resolve()
             if path.suffix == ".py":
                 files[path.relative_to(resources.root().resolve()).as_posix()] = path

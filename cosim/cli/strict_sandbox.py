@@ -1,4 +1,7 @@
-"""`--sandbox strict`: execution of the same command in bubblewrap, while this process only waits."""
+"""`--sandbox strict`.
+
+Execution of the same command in bubblewrap, while this process only waits.
+"""
 
 from __future__ import annotations
 
@@ -25,11 +28,31 @@ _INSIDE_VARIABLE = "COSIM_INSIDE_STRICT_SANDBOX"
 #: variables that name folders for a program's own files
 _HOME_VARIABLES = ("TMPDIR", "HOME", "XDG_CACHE_HOME", "XDG_CONFIG_HOME")
 
-#: variables that the command keeps in addition to those of a sandboxed FMU: programs, modules, compiler and terminal
-_COMMAND_VARIABLES = ("PATH", "LD_LIBRARY_PATH", "PYTHONPATH", "PYTHONHASHSEED", "CC", "TERM", "COLUMNS", "LINES", "NO_COLOR")
+#: variables that the command keeps in addition to those of a sandboxed FMU: programs, modules,
+#: compiler and terminal
+_COMMAND_VARIABLES = (
+    "PATH",
+    "LD_LIBRARY_PATH",
+    "PYTHONPATH",
+    "PYTHONHASHSEED",
+    "CC",
+    "TERM",
+    "COLUMNS",
+    "LINES",
+    "NO_COLOR",
+)
 
-#: programs (compilers for Modelica sources), shared libraries and fonts; without private files and sockets
-_SYSTEM_PATHS = ("/usr", "/bin", "/lib", "/lib64", "/etc/ld.so.cache", "/etc/alternatives", "/etc/fonts")
+#: programs (compilers for Modelica sources), shared libraries and fonts; without private files and
+#: sockets
+_SYSTEM_PATHS = (
+    "/usr",
+    "/bin",
+    "/lib",
+    "/lib64",
+    "/etc/ld.so.cache",
+    "/etc/alternatives",
+    "/etc/fonts",
+)
 
 
 class SandboxCommand(click.Command):
@@ -42,7 +65,11 @@ class SandboxCommand(click.Command):
 
 def _with_explicit_kind(words: list[str]) -> Iterator[str]:
     for word, following in zip_longest(words, words[1:]):
-        yield f"--sandbox={SANDBOX_KINDS[0]}" if word == "--sandbox" and following not in SANDBOX_KINDS else word
+        yield (
+            f"--sandbox={SANDBOX_KINDS[0]}"
+            if word == "--sandbox" and following not in SANDBOX_KINDS
+            else word
+        )
 
 
 def must_rerun(sandbox: str | None) -> bool:
@@ -55,10 +82,12 @@ def rerun_in_bubblewrap(files: Iterable[Path], output: Path | None) -> int:
 
     Args:
         files: files whose folders the command may read, in addition to those of Python and cosim.
-        output: the only folder that the command may write, apart from a temporary one; None: no other.
+        output: the only folder that the command may write, apart from a temporary one; None: no
+            other.
 
     Raises:
-        InputError: if bubblewrap is missing or cannot start the command, or a folder contains the home folder.
+        InputError: if bubblewrap is missing or cannot start the command, or a folder contains the
+            home folder.
     """
     from ..core.errors import InputError
     from ..process.sandbox import KEPT_VARIABLES, bubblewrap_command
@@ -75,10 +104,16 @@ def rerun_in_bubblewrap(files: Iterable[Path], output: Path | None) -> int:
         with os.fdopen(writer):
             python = [sys.executable, "-P", "-m", "cosim", *current_command_line().arguments]
             writable = [temporary, *([output] if output else [])]
-            words = bubblewrap_command(python, [*_readable_folders(), *folders], writable, status=writer)
+            words = bubblewrap_command(
+                python, [*_readable_folders(), *folders], writable, status=writer
+            )
             if output:
                 stack.enter_context(_output_folder(output))
-            kept = {name: os.environ[name] for name in (*KEPT_VARIABLES, *_COMMAND_VARIABLES) if name in os.environ}
+            kept = {
+                name: os.environ[name]
+                for name in (*KEPT_VARIABLES, *_COMMAND_VARIABLES)
+                if name in os.environ
+            }
             homes = dict.fromkeys(_HOME_VARIABLES, str(temporary))
             process = subprocess.Popen(  # noqa: S603
                 words,
@@ -95,7 +130,11 @@ def rerun_in_bubblewrap(files: Iterable[Path], output: Path | None) -> int:
 
 def _named_folders(files: Iterable[Path]) -> list[Path]:
     """Return the existing folders of the files, also of link targets."""
-    paths = [Path(path) for file in files for path in (os.path.abspath(file), os.path.realpath(file))]  # noqa: PTH100
+    paths = [
+        Path(path)
+        for file in files
+        for path in (os.path.abspath(file), os.path.realpath(file))  # noqa: PTH100
+    ]
     return [path.parent for path in paths if path.parent.exists()]
 
 
@@ -106,14 +145,18 @@ def _refuse_home_folder(folders: Iterable[Path]) -> None:
     home = Path.home().resolve()
     if found := next((folder for folder in folders if home.is_relative_to(folder.resolve())), None):
         raise InputError(
-            f'--sandbox strict: "{found}" holds a file or the results of this run, but contains the home folder, '
+            f'--sandbox strict: "{found}" holds a file or the results of this run, but contains '
+            "the home folder, "
             f"all of which would be visible inside; expected a folder of the project"
         )
 
 
 @contextmanager
 def _output_folder(path: Path) -> Iterator[None]:
-    """Create the output directory; afterwards, remove the folders created for it if they are empty."""
+    """Create the output directory.
+
+    Afterwards, remove the folders created for it if they are empty.
+    """
     from ..results.files import check_writable
 
     created = [folder for folder in (path, *path.parents) if not folder.exists()]
@@ -125,7 +168,10 @@ def _output_folder(path: Path) -> Iterator[None]:
 
 
 def _wait_for_exit(process: subprocess.Popen[bytes], status: IO[str]) -> dict[str, int]:
-    """Wait until bubblewrap exits and return the status that it reported; forward interrupts to the command."""
+    """Wait until bubblewrap exits and return the status that it reported.
+
+    Forward interrupts to the command.
+    """
     report: dict[str, int] = {}
     while True:
         try:
@@ -143,4 +189,8 @@ def _readable_folders() -> list[Path]:
     from ..core import resources
     from ..process.sandbox import interpreter_folders
 
-    return [path for path in (*interpreter_folders(), *map(Path, _SYSTEM_PATHS), resources.root()) if path.exists()]
+    return [
+        path
+        for path in (*interpreter_folders(), *map(Path, _SYSTEM_PATHS), resources.root())
+        if path.exists()
+    ]

@@ -1,4 +1,7 @@
-"""Common parts of `cosim sweep` and `cosim tune`: options, run store, runner, progress and tables."""
+"""Common parts of `cosim sweep` and `cosim tune`.
+
+Options, run store, runner, progress and tables.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,9 @@ if TYPE_CHECKING:
 _LINE_INTERVAL = 30.0
 
 _workers = click.option(
-    "--workers", type=click.IntRange(min=1), help="Number of runs at a time on this machine; default: one per processor."
+    "--workers",
+    type=click.IntRange(min=1),
+    help="Number of runs at a time on this machine; default: one per processor.",
 )
 _scheduler = click.option(
     "--scheduler",
@@ -35,9 +40,15 @@ _scheduler = click.option(
     "answers, so that it can run code here as you run code there.",
 )
 _max_runs = click.option(
-    "--max-runs", type=click.IntRange(min=1), default=MAX_RUNS, show_default=True, help="Refuse a study of more runs."
+    "--max-runs",
+    type=click.IntRange(min=1),
+    default=MAX_RUNS,
+    show_default=True,
+    help="Refuse a study of more runs.",
 )
-_retry = click.option("--retry-failed", is_flag=True, help="Repeat the runs that failed in an earlier call.")
+_retry = click.option(
+    "--retry-failed", is_flag=True, help="Repeat the runs that failed in an earlier call."
+)
 
 
 def study_options(command: Callable[..., int]) -> Callable[..., int]:
@@ -61,7 +72,13 @@ def open_run_store(folder: Path, retry: bool) -> RunStore:
     check_writable(folder)
     run_store = RunStore(folder, retry)
     if count := run_store.unreadable_lines:
-        click.echo(f"{run_store.path}: {count_noun(count, 'unreadable line')}; the missing runs are repeated", err=True)
+        click.echo(
+            (
+                f"{run_store.path}: {count_noun(count, 'unreadable line')}; the missing runs are "
+                "repeated"
+            ),
+            err=True,
+        )
     return run_store
 
 
@@ -72,7 +89,10 @@ def create_runner(study: Study, workers: int | None, scheduler: str | None) -> C
 
         return LocalRunner(study.context, workers or available_processors())
     if workers is not None:
-        raise click.UsageError("--workers is the number of processes on this machine; it cannot be combined with --scheduler")
+        raise click.UsageError(
+            "--workers is the number of processes on this machine; it cannot be combined with "
+            "--scheduler"
+        )
     from ..studies.cluster import ClusterRunner
 
     return ClusterRunner(study, scheduler)
@@ -107,7 +127,10 @@ class StudyProgress:
         rate = self.finished / max(seconds, 1e-9)
         left = format_duration((self._total - done) / rate) if rate else "?"
         failed = f", {self.failed} failed" if self.failed else ""
-        return f"{done} of {count_noun(self._total, 'run')}{failed}, {rate:.3g} per second, {left} left"
+        return (
+            f"{done} of {count_noun(self._total, 'run')}{failed}, {rate:.3g} per second, {left} "
+            "left"
+        )
 
 
 def format_duration(seconds: float) -> str:
@@ -132,9 +155,16 @@ def show_progress(total: int) -> Iterator[StudyProgress]:
 
     from ..process.standard_streams import unescaped
 
-    with Bar(BarColumn(), TextColumn("{task.description}"), console=Console(file=unescaped(sys.stderr)), transient=True) as bar:
+    with Bar(
+        BarColumn(),
+        TextColumn("{task.description}"),
+        console=Console(file=unescaped(sys.stderr)),
+        transient=True,
+    ) as bar:
         task = bar.add_task("", total=total)
-        yield StudyProgress(total, lambda text, done: bar.update(task, completed=done, description=text))
+        yield StudyProgress(
+            total, lambda text, done: bar.update(task, completed=done, description=text)
+        )
 
 
 class _ProgressLines:
@@ -158,7 +188,11 @@ def print_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
 
     table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
     for i, name in enumerate(header):
-        table.add_column(cell_text(name), justify="left" if i == 0 or name == "unit" else "right", overflow="fold")
+        table.add_column(
+            cell_text(name),
+            justify="left" if i == 0 or name == "unit" else "right",
+            overflow="fold",
+        )
     for row in rows:
         table.add_row(*map(cell_text, row))
     table_console(width=200).print(table, "")

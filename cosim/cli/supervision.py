@@ -24,7 +24,10 @@ _isolation = click.option(
     type=click.Choice(["run", "fmu", "none"]),
     default="run",
     show_default=True,
-    help="run: in a supervised child process; fmu: also each FMU in its own process; none: in this process.",
+    help=(
+        "run: in a supervised child process; fmu: also each FMU in its own process; none: in this "
+        "process."
+    ),
 )
 _sandbox = click.option(
     "--sandbox",
@@ -32,7 +35,8 @@ _sandbox = click.option(
     metavar="[strict]",
     help="Run each FMU in its own process that reads only its own files, writes only to a temporary folder, has no network and "
     "starts no programs. "
-    "strict: also confine the whole command to the files it needs and to its output directory (requires bubblewrap).",
+    "strict: also confine the whole command to the files it needs and to its output directory "
+    "(requires bubblewrap).",
 )
 
 
@@ -52,11 +56,13 @@ def run_supervised_command(
     Args:
         entry: the command's work; returns the exit code.
         isolation: value of `--isolation`; with "none", `entry` is called in this process.
-        save_partial: called if the child left files of an unfinished run, to save the rows recorded until then.
+        save_partial: called if the child left files of an unfinished run, to save the rows recorded
+            until then.
         while_running: context of this process while the child runs.
 
     Raises:
-        ComponentError: if the child crashed or exceeded a deadline; names the responsible component.
+        ComponentError: if the child crashed or exceeded a deadline; names the responsible
+            component.
         KeyboardInterrupt: if the user interrupted the child.
     """
     from ..process.supervisor import can_supervise, run_supervised
@@ -77,7 +83,9 @@ def run_supervised_command(
     return outcome.exit_code
 
 
-def _save_partial(outcome: SupervisedOutcome, save_partial: Callable[[SupervisedOutcome], None], folder: Path) -> None:
+def _save_partial(
+    outcome: SupervisedOutcome, save_partial: Callable[[SupervisedOutcome], None], folder: Path
+) -> None:
     """Save the rows of an unfinished run and remove its folder, unless writing fails or the child kept the rows and said so."""
     from ..process.run_files.folder import find_kept_rows
 

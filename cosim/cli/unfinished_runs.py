@@ -40,7 +40,10 @@ class OutputFiles:
     @classmethod
     def of_file(cls, file: Path) -> OutputFiles:
         """Return the files that accompany the output file of `cosim simulate`."""
-        return cls(file.with_name(f".{file.name}{_UNFINISHED_FOLDER}"), file.with_name(f".{file.name}{LOCK_FILE}"))
+        return cls(
+            file.with_name(f".{file.name}{_UNFINISHED_FOLDER}"),
+            file.with_name(f".{file.name}{LOCK_FILE}"),
+        )
 
 
 @contextmanager
@@ -72,11 +75,20 @@ def writing_results(result: Result, folder: Path | None, shown: Path) -> Iterato
         except OSError:
             raise error from None
         rows = count_noun(len(result.time), "row")
-        raise type(error)(f"{error}; kept {rows}: {how_to_recover(result, folder, shown, error)}") from None
+        raise type(error)(
+            f"{error}; kept {rows}: {how_to_recover(result, folder, shown, error)}"
+        ) from None
 
 
 def how_to_recover(result: Result, folder: Path, shown: Path, error: CosimError) -> str:
-    """Return an instruction for the user: the remedy for an error, and the `cosim recover` command to call afterwards."""
+    """Return an instruction for the user.
+
+    The remedy for an error, and the `cosim recover` command to call afterwards.
+    """
     missing = len(result.time) * (len(result) + 1) * BYTES_PER_NUMBER - disk_usage(folder).free
-    remedy = f"free about {max(1, round(missing / 1e6))} MB" if isinstance(error, OutputError) else "remove the cause"
+    remedy = (
+        f"free about {max(1, round(missing / 1e6))} MB"
+        if isinstance(error, OutputError)
+        else "remove the cause"
+    )
     return f"{remedy}, then call `cosim recover {shown}`"

@@ -29,8 +29,13 @@ def read_vehicle_file(file: Path, read: Callable[[Mapping[str, Any], str], _Resu
     if not isinstance(document.value, dict):
         raise InputError(Problem("expected an object, the data of a vehicle", document.where(())))
     if "family" not in document.value and not SCENARIO_KEYS.isdisjoint(document.value):
-        raise InputError(f"{file} is a scenario or a study, expected a vehicle file; `cosim check {file}` describes a scenario")
+        raise InputError(
+            f"{file} is a scenario or a study, expected a vehicle file; `cosim check {file}` "
+            "describes a scenario"
+        )
     try:
         return read(document.value, file.stem)
     except InputError as error:
-        raise InputError([replace(each, where=document.where(each.subject[1:])) for each in error.problems]) from None
+        raise InputError(
+            [replace(each, where=document.where(each.subject[1:])) for each in error.problems]
+        ) from None

@@ -1,7 +1,8 @@
 """Input profiles: a component whose outputs are read from a table over time.
 
-The scenario puts all input tables into a separate last stage. Row n of the results therefore contains the profile at
-communication point n, and every other component reads the profile at n in its step from n.
+The scenario puts all input tables into a separate last stage. Row n of the results therefore
+contains the profile at communication point n, and every other component reads the profile at n in
+its step from n.
 """
 
 from __future__ import annotations
@@ -47,18 +48,22 @@ class InputTable(Component):
         Args:
             time: Increasing times of the rows (s), shape (rows,).
             columns: Values of each output, shape (rows,), in the dtype of its type.
-            interpolation: "linear" interpolates floating-point numbers between rows; "hold" keeps a row's value until the time
-                of the next row. Values of other types are always held.
+            interpolation: "linear" interpolates floating-point numbers between rows; "hold" keeps a
+                row's value until the time of the next row. Values of other types are always held.
             types: FMI 3.0 type names of outputs that are not Float64.
         """
         self._time, self._columns, self._interpolation = time, columns, interpolation
         self._current_time = float(time[0])
         self._cells: Sequence[tuple[np.ndarray, int, np.ndarray]] = ()
-        self.variables = [_output_variable(name, (types or {}).get(name, "Float64")) for name in columns]
+        self.variables = [
+            _output_variable(name, (types or {}).get(name, "Float64")) for name in columns
+        ]
 
     def set(self, name: str, value: Any) -> None:
         """Refuse the value: an input table has only outputs."""
-        raise AttributeError(f'an input profile has no settable variables, found "{name}" = {value!r}')
+        raise AttributeError(
+            f'an input profile has no settable variables, found "{name}" = {value!r}'
+        )
 
     def get(self, name: str) -> Any:
         """Return the present value of a column."""
@@ -76,7 +81,13 @@ class InputTable(Component):
         filled = dict.fromkeys(outputs.arrays, 0)
         cells = []
         for variable in outputs.variables:
-            cells.append((outputs.arrays[variable.dtype], filled[variable.dtype], self._columns[variable.name]))
+            cells.append(
+                (
+                    outputs.arrays[variable.dtype],
+                    filled[variable.dtype],
+                    self._columns[variable.name],
+                )
+            )
             filled[variable.dtype] += 1
         self._cells = cells
 
@@ -86,7 +97,14 @@ class InputTable(Component):
     def do_step(self, time: float, step_size: float) -> None:
         """Move to the end of the step, or to a row's time that differs from it only by rounding."""
         end = time + step_size
-        row = int(np.searchsorted(self._time, end + _MAX_ULPS * np.spacing(max(abs(time), abs(end))), side="right")) - 1
+        row = (
+            int(
+                np.searchsorted(
+                    self._time, end + _MAX_ULPS * np.spacing(max(abs(time), abs(end))), side="right"
+                )
+            )
+            - 1
+        )
         self._current_time = max(end, float(self._time[row])) if row >= 0 else end
 
     def get_outputs(self) -> None:
@@ -122,26 +140,34 @@ def _output_variable(name: str, kind: str) -> Variable:
 
 
 def read_input_table(
-    path: Path, targets: Mapping[str, Variable | None], interpolation: Interpolation, where: str = ""
+    path: Path,
+    targets: Mapping[str, Variable | None],
+    interpolation: Interpolation,
+    where: str = "",
 ) -> InputTable:
     """Read an input table from a CSV file with a header and a first column `time` (s).
 
     Args:
         path: The CSV file, in UTF-8.
-        targets: Columns that become outputs, with the variable whose type their values have; None: Float64. Other columns are
-            ignored.
+        targets: Columns that become outputs, with the variable whose type their values have; None:
+            Float64. Other columns are ignored.
         interpolation: Interpolation between rows, see `InputTable`.
         where: Place in the scenario that refers to the file, for messages.
 
     Raises:
-        InputError: The file or a column is missing, a column occurs twice, a cell is not a value of the column's type, or time
-            does not increase.
+        InputError: The file or a column is missing, a column occurs twice, a cell is not a value of
+            the column's type, or time does not increase.
     """
     header, rows = read_rows(path)
-    problems = [Problem(f'profile "{path}" {text}', where) for text in _header_violations(header, list(targets))]
+    problems = [
+        Problem(f'profile "{path}" {text}', where)
+        for text in _header_violations(header, list(targets))
+    ]
     if problems:
         raise InputError(problems)
-    used = {name: (header.index(name), variable) for name, variable in {"time": None, **targets}.items()}
+    used = {
+        name: (header.index(name), variable) for name, variable in {"time": None, **targets}.items()
+    }
     try:
         time, *values = _read_columns(rows, len(header), used)
     except ValueError as error:
@@ -166,7 +192,10 @@ def make_input_table(
 def _read_columns(
     rows: Sequence[Sequence[str]], cell_count: int, used: Mapping[str, tuple[int, Variable | None]]
 ) -> list[list[Any]]:
-    """Return the values of the used columns, the first one `time`; raise ValueError with the line of the first invalid cell."""
+    """Return the values of the used columns, the first one `time`.
+
+    Raise ValueError with the line of the first invalid cell.
+    """
     columns: list[list[Any]] = [[] for _ in used]
     last_time = -math.inf
     for line, row in ((line, row) for line, row in enumerate(rows, start=2) if row):
@@ -189,14 +218,16 @@ def parse_cell(text: str, variable: Variable | None) -> Any:
     """Return the value of a cell of a table.
 
     Args:
-        text: A number; 0, 1, true or false for a Boolean; the name or number of an item for an Enumeration; hexadecimal digits
-            for a Binary.
+        text: A number; 0, 1, true or false for a Boolean; the name or number of an item for an
+            Enumeration; hexadecimal digits for a Binary.
         variable: Variable whose type the value has; None: Float64.
 
     Raises:
         ValueError: The text is not a value of the type.
     """
-    kind, dtype = ("Float64", DTYPES["Float64"]) if variable is None else (variable.type, variable.dtype)
+    kind, dtype = (
+        ("Float64", DTYPES["Float64"]) if variable is None else (variable.type, variable.dtype)
+    )
     if kind == "String":
         return text
     if kind == "Binary":
@@ -210,7 +241,12 @@ def parse_cell(text: str, variable: Variable | None) -> Any:
         return dict(variable.items)[word]
     limits = np.iinfo(dtype) if dtype.kind in "iu" else None
     number = _parse_integer(word)
-    if limits is None or number is None or kind == "Boolean" or not limits.min <= number <= limits.max:
+    if (
+        limits is None
+        or number is None
+        or kind == "Boolean"
+        or not limits.min <= number <= limits.max
+    ):
         raise ValueError(f"found {text[:80]!r}, expected a value of type {kind}")
     return number
 
@@ -236,7 +272,10 @@ def _parse_integer(word: str) -> int | None:
 
 def _header_violations(header: Sequence[str], columns: Sequence[str]) -> Iterator[str]:
     if header[:1] != ["time"]:
-        yield f'has the first column "{(header or [""])[0]}", expected "time" and columns separated by commas'
+        yield (
+            f'has the first column "{(header or [""])[0]}", expected "time" and columns separated '
+            "by commas"
+        )
         return
     names = header[1:]
     for name in columns:

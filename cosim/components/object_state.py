@@ -1,6 +1,7 @@
 """Snapshot and restore a Python object's state in place, so references into it stay valid.
 
-Exported FMUs contain a copy of this file. It imports only the standard library; NumPy objects exist only if NumPy is imported.
+Exported FMUs contain a copy of this file. It imports only the standard library; NumPy objects exist
+only if NumPy is imported.
 """
 
 from __future__ import annotations
@@ -15,14 +16,25 @@ from typing import Any
 Restore = Callable[[], object]
 
 #: types that are immutable or shared, so they are not traversed
-_OPAQUE_TYPES = (type, str, bytes, int, float, complex, FunctionType, BuiltinFunctionType, MethodType, ModuleType)
+_OPAQUE_TYPES = (
+    type,
+    str,
+    bytes,
+    int,
+    float,
+    complex,
+    FunctionType,
+    BuiltinFunctionType,
+    MethodType,
+    ModuleType,
+)
 
 
 def snapshot(root: object, exclude: Collection[str] = ()) -> Restore:
     """Save the state of all objects reachable from `root`.
 
-    Attributes, lists, dicts, sets, deques, tuples, NumPy arrays and random generators are traversed. Objects that do not expose
-    their state, such as files and iterators, are not saved.
+    Attributes, lists, dicts, sets, deques, tuples, NumPy arrays and random generators are
+    traversed. Objects that do not expose their state, such as files and iterators, are not saved.
 
     Args:
         root: The object to save.
@@ -41,7 +53,9 @@ def snapshot(root: object, exclude: Collection[str] = ()) -> Restore:
     return restore_all
 
 
-def _snapshot_object(target: Any, restores: list[Restore], visited: set[int], exclude: Collection[str] = ()) -> None:
+def _snapshot_object(
+    target: Any, restores: list[Restore], visited: set[int], exclude: Collection[str] = ()
+) -> None:
     if id(target) in visited or isinstance(target, _OPAQUE_TYPES):
         return
     visited.add(id(target))
@@ -69,7 +83,10 @@ def _snapshot_object(target: Any, restores: list[Restore], visited: set[int], ex
 
 def _snapshot_members(container: Any, restores: list[Restore]) -> list[Any]:
     """Save the members of a dict, list, deque or set, and return them."""
-    refill = next((getattr(container, name) for name in ("update", "extend") if hasattr(container, name)), None)
+    refill = next(
+        (getattr(container, name) for name in ("update", "extend") if hasattr(container, name)),
+        None,
+    )
     if refill is None:
         return []
     members = dict(container) if hasattr(container, "items") else list(container)
@@ -82,7 +99,9 @@ def _snapshot_members(container: Any, restores: list[Restore]) -> list[Any]:
     return [*members.values()] if isinstance(members, dict) else members
 
 
-def _snapshot_attributes(target: Any, restores: list[Restore], exclude: Collection[str]) -> list[Any]:
+def _snapshot_attributes(
+    target: Any, restores: list[Restore], exclude: Collection[str]
+) -> list[Any]:
     """Save the attributes of an object, and return their values."""
     if not hasattr(target, "__dict__"):
         return []

@@ -21,7 +21,12 @@ from .python_units import checked_units, units_place
 from .slave_protection import PYTHONFMU_ATTRIBUTES
 
 _TYPES = {Real: "Float64", Integer: "Int32", Boolean: "Boolean", String: "String"}
-_CASTS: Mapping[str, Callable[[Any], Any]] = {"Float64": float, "Int32": int, "Boolean": bool, "String": str}
+_CASTS: Mapping[str, Callable[[Any], Any]] = {
+    "Float64": float,
+    "Int32": int,
+    "Boolean": bool,
+    "String": str,
+}
 
 
 def _to_float(value: Any) -> float:
@@ -54,7 +59,12 @@ _OUTPUT_TYPES: Mapping[str, tuple[type, Callable[[Any], Any]]] = {
     "String": (object, _to_str),  # of no type without a check of its characters
 }
 #: FMI type -> what a message about an output expects
-_EXPECTED = {"Float64": "a number", "Int32": "an integer of 32 bits", "Boolean": "True or False", "String": "a text"}
+_EXPECTED = {
+    "Float64": "a number",
+    "Int32": "an integer of 32 bits",
+    "Boolean": "True or False",
+    "String": "a text",
+}
 
 
 class PythonFmuComponent(Component):
@@ -69,12 +79,16 @@ class PythonFmuComponent(Component):
 
     def __init__(self, slave: Fmi2Slave, instance_name: str):
         self._slave, self._name, self._time = slave, instance_name, 0.0
-        self._pythonfmu_variables: dict[str, ScalarVariable] = {v.name: v for v in slave.vars.values()}
+        self._pythonfmu_variables: dict[str, ScalarVariable] = {
+            v.name: v for v in slave.vars.values()
+        }
         types = {v.name: _fmi_type(v) for v in slave.vars.values()}
         self._units = checked_units(getattr(type(slave), "units", {}), types, type(slave))
         self.variables = [_to_variable(v, self._units.get(v.name)) for v in slave.vars.values()]
         self._setters: list[tuple[Callable[[Any], None], np.ndarray, int]] = []
-        self._getters: list[tuple[str, Callable[[], Any], type, Callable[[Any], Any], np.ndarray, int]] = []
+        self._getters: list[
+            tuple[str, Callable[[], Any], type, Callable[[Any], Any], np.ndarray, int]
+        ] = []
         self._types = {variable.name: variable.type for variable in self.variables}
         self._has_custom_state = type(slave)._get_fmu_state is not Fmi2Slave._get_fmu_state
 
@@ -95,7 +109,9 @@ class PythonFmuComponent(Component):
     def enter_initialization_mode(self, start_time: float, stop_time: float) -> None:
         """Call the slave's `setup_experiment` and `enter_initialization_mode`."""
         self._time = start_time
-        self._call_user_code("setup_experiment", self._slave.setup_experiment, start_time, stop_time, None)
+        self._call_user_code(
+            "setup_experiment", self._slave.setup_experiment, start_time, stop_time, None
+        )
         self._call_user_code("enter_initialization_mode", self._slave.enter_initialization_mode)
 
     def exit_initialization_mode(self) -> None:
@@ -104,7 +120,10 @@ class PythonFmuComponent(Component):
 
     def bind(self, inputs: Ports, outputs: Ports) -> None:
         """Pair the slave's setters and getters with the elements of the bound arrays."""
-        self._setters = [(self._pythonfmu_variables[v.name].setter, *element) for v, element in _array_elements(inputs)]
+        self._setters = [
+            (self._pythonfmu_variables[v.name].setter, *element)
+            for v, element in _array_elements(inputs)
+        ]
         self._getters = [
             (v.name, self._pythonfmu_variables[v.name].getter, *_OUTPUT_TYPES[v.type], *element)
             for v, element in _array_elements(outputs)
@@ -135,12 +154,19 @@ class PythonFmuComponent(Component):
             try:
                 array[index] = value if value.__class__ is usual_type else convert(value)
             except (TypeError, ValueError, OverflowError):
-                text = f'output "{name}" is {shorten(repr(value))}, expected {_EXPECTED[self._types[name]]}'
+                text = (
+                    f'output "{name}" is {shorten(repr(value))}, expected '
+                    f"{_EXPECTED[self._types[name]]}"
+                )
                 raise ComponentError(self._name, "get_outputs", text, self._time) from None
 
     def get_state(self) -> Any:
         """Return the slave's own state, or a snapshot of its attributes."""
-        return self._slave._get_fmu_state() if self._has_custom_state else snapshot(self._slave, PYTHONFMU_ATTRIBUTES)
+        return (
+            self._slave._get_fmu_state()
+            if self._has_custom_state
+            else snapshot(self._slave, PYTHONFMU_ATTRIBUTES)
+        )
 
     def set_state(self, state: Any) -> None:
         """Restore a state that `get_state` returned."""
@@ -163,16 +189,19 @@ class PythonFmuComponent(Component):
         except (*PASS_THROUGH_EXCEPTIONS, ComponentError):
             raise
         except BaseException as error:
-            raise ComponentError(self._name, function, describe_exception(error), self._time) from error
+            raise ComponentError(
+                self._name, function, describe_exception(error), self._time
+            ) from error
         finally:
             if self._slave.log_queue:
                 self._forward_log()
 
     def _forward_log(self) -> None:
         for message in self._slave.log_queue:
-            level = {Fmi2Status.ok: component_log.INFO, Fmi2Status.warning: component_log.WARNING}.get(
-                message.status, component_log.ERROR
-            )
+            level = {
+                Fmi2Status.ok: component_log.INFO,
+                Fmi2Status.warning: component_log.WARNING,
+            }.get(message.status, component_log.ERROR)
             component_log.log_message(self._name, level, message.msg)
         self._slave.log_queue.clear()
 
@@ -199,7 +228,9 @@ def _start_value(registered: ScalarVariable) -> Any:
     try:
         return registered.getter()
     except AttributeError as error:
-        raise InputError(f'the variable "{registered.name}" is registered, but has no value: {error}') from None
+        raise InputError(
+            f'the variable "{registered.name}" is registered, but has no value: {error}'
+        ) from None
 
 
 def _array_elements(ports: Ports) -> list[tuple[Variable, tuple[np.ndarray, int]]]:

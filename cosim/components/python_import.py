@@ -17,7 +17,14 @@ from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
 
-from ..core.errors import PASS_THROUGH_EXCEPTIONS, InputError, Problem, describe_exception, did_you_mean, nearest_file
+from ..core.errors import (
+    PASS_THROUGH_EXCEPTIONS,
+    InputError,
+    Problem,
+    describe_exception,
+    did_you_mean,
+    nearest_file,
+)
 from ..core.paths import is_file, resolve_path
 from .sibling_imports import read_with_relative_imports, with_imported_siblings
 
@@ -33,7 +40,8 @@ def load_object(reference: str, folder: Path) -> Any:
         folder: Folder that a relative file path starts from.
 
     Raises:
-        InputError: The reference is malformed, the file is missing or cannot be imported, or it does not define the name.
+        InputError: The reference is malformed, the file is missing or cannot be imported, or it
+            does not define the name.
     """
     file, separator, name = reference.rpartition(":")
     if not separator or not file.endswith(".py") or not name.isidentifier():
@@ -43,7 +51,11 @@ def load_object(reference: str, folder: Path) -> Any:
         raise InputError(f'file "{file}" does not exist{nearest_file(path)}')
     module = _import_file(path)
     if not hasattr(module, name):
-        public_names = [key for key, value in vars(module).items() if getattr(value, "__module__", None) == module.__name__]
+        public_names = [
+            key
+            for key, value in vars(module).items()
+            if getattr(value, "__module__", None) == module.__name__
+        ]
         raise InputError(Problem(f'"{file}" defines no "{name}"{did_you_mean(name, public_names)}'))
     return getattr(module, name)
 
@@ -59,18 +71,33 @@ def package_root(path: Path) -> Path:
 def package_files(paths: Iterable[Path]) -> set[Path]:
     """Return Python files, and all modules and JSON files of their folder or outermost package that they can use."""
     files = {path.resolve() for path in paths}
-    packages = {root / path.relative_to(root).parts[0] for path in files if (root := package_root(path)) != path.parent}
+    packages = {
+        root / path.relative_to(root).parts[0]
+        for path in files
+        if (root := package_root(path)) != path.parent
+    }
     siblings = (_imported_siblings(path) for path in files if package_root(path) == path.parent)
     return files.union(*siblings, *map(_modules_and_data, packages))
 
 
 def _modules_and_data(package: Path) -> list[Path]:
-    """Return all Python and JSON files below a folder; one walk takes a third of the time of two `rglob`."""
-    return [Path(folder, name) for folder, _, names in os.walk(package) for name in names if name.endswith((".py", ".json"))]
+    """Return all Python and JSON files below a folder.
+
+    One walk takes a third of the time of two `rglob`.
+    """
+    return [
+        Path(folder, name)
+        for folder, _, names in os.walk(package)
+        for name in names
+        if name.endswith((".py", ".json"))
+    ]
 
 
 def _imported_siblings(path: Path) -> list[Path]:
-    """Return the files beside a file that it imports; none if it cannot be read, which its import reports."""
+    """Return the files beside a file that it imports.
+
+    None if it cannot be read, which its import reports.
+    """
     with suppress(OSError, ValueError, SyntaxError):
         return with_imported_siblings(path)
     return []
@@ -92,22 +119,38 @@ def _import_file(path: Path) -> ModuleType:
     except PASS_THROUGH_EXCEPTIONS:
         raise
     except BaseException as error:
-        raise InputError(f'"{path.name}" cannot be imported: {describe_exception(error)}') from error
+        raise InputError(
+            f'"{path.name}" cannot be imported: {describe_exception(error)}'
+        ) from error
 
 
 class _FolderFinder(MetaPathFinder):
     """Finder of files in folders that are no packages, below the namespace packages of `_import_file`."""
 
-    def find_spec(self, name: str, path: Sequence[str] | None, _target: object = None) -> ModuleSpec | None:
-        """Return the spec of a file; None for packages and files in packages, which Python's own finder finds."""
-        if not name.startswith(_NAMESPACE_PREFIX) or not path or (Path(path[0]) / "__init__.py").is_file():
+    def find_spec(
+        self, name: str, path: Sequence[str] | None, _target: object = None
+    ) -> ModuleSpec | None:
+        """Return the spec of a file.
+
+        None for packages and files in packages, which Python's own finder finds.
+        """
+        if (
+            not name.startswith(_NAMESPACE_PREFIX)
+            or not path
+            or (Path(path[0]) / "__init__.py").is_file()
+        ):
             return None
         spec = FileFinder(path[0], (_SiblingLoader, [".py"])).find_spec(name)
-        return None if spec is None or spec.loader is None or spec.submodule_search_locations else spec
+        return (
+            None if spec is None or spec.loader is None or spec.submodule_search_locations else spec
+        )
 
 
 class _SiblingLoader(SourceFileLoader):
-    """Loader that makes imports of files beside the loaded one relative; it uses no compiled files, which do not have this."""
+    """Loader that makes imports of files beside the loaded one relative.
+
+    It uses no compiled files, which do not have this.
+    """
 
     def get_code(self, fullname: str) -> CodeType:
         """Compile the file."""

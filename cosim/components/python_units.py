@@ -14,7 +14,9 @@ from ..core.errors import InputError, Problem, abbreviate_names
 from ..core.units import parse_unit
 
 
-def checked_units(units: Any, types: Mapping[str, str], owner: type | None = None) -> Mapping[str, str]:
+def checked_units(
+    units: Any, types: Mapping[str, str], owner: type | None = None
+) -> Mapping[str, str]:
     """Return the attribute `units` of a PythonFMU class, such as `{"rudder_angle": "rad"}`, after a check.
 
     Args:
@@ -26,7 +28,9 @@ def checked_units(units: Any, types: Mapping[str, str], owner: type | None = Non
         InputError: The attribute is not a dict of texts, names a variable that does not exist or is not of type Real, or contains
             an unknown unit.
     """
-    if not isinstance(units, Mapping) or not all(isinstance(text, str) for item in units.items() for text in item):
+    if not isinstance(units, Mapping) or not all(
+        isinstance(text, str) for item in units.items() for text in item
+    ):
         raise _refusal(owner, "is not a dict of names of variables and units")
     numbers = [name for name, kind in types.items() if kind == "Float64"]
     names_by_fault: dict[str, list[str]] = defaultdict(list)
@@ -34,7 +38,13 @@ def checked_units(units: Any, types: Mapping[str, str], owner: type | None = Non
         if fault := _find_fault(name, unit, numbers):
             names_by_fault[fault].append(f'"{name}"')
     if names_by_fault:
-        raise _refusal(owner, *(fault.format(names=abbreviate_names(names, 4)) for fault, names in names_by_fault.items()))
+        raise _refusal(
+            owner,
+            *(
+                fault.format(names=abbreviate_names(names, 4))
+                for fault, names in names_by_fault.items()
+            ),
+        )
     return units
 
 
@@ -48,20 +58,30 @@ def units_place(owner: type) -> str:
     except (OSError, TypeError, ValueError, SyntaxError):
         return f"{kind.__name__}.units"
     names = ((node.lineno, ast.unparse(node)) for node in getattr(definition, "body", ()))
-    line = next((number for number, text in names if text.partition(" ")[0].rstrip(":") == "units"), 1)
+    line = next(
+        (number for number, text in names if text.partition(" ")[0].rstrip(":") == "units"), 1
+    )
     return f"{kind.__name__}.units ({file}:{first + line - 1})"
 
 
 def _refusal(owner: type | None, *faults: str) -> InputError:
-    attribute = f"the class attribute {units_place(owner)}" if owner else 'the class attribute "units"'
+    attribute = (
+        f"the class attribute {units_place(owner)}" if owner else 'the class attribute "units"'
+    )
     return InputError([Problem(f"{attribute} {fault}") for fault in faults])
 
 
 def _find_fault(name: str, unit: str, numbers: Collection[str]) -> str:
-    """Return the fault of an entry, with "{names}" in place of its variable; "" if there is none."""
+    """Return the fault of an entry, with "{names}" in place of its variable.
+
+    "" if there is none.
+    """
     if name not in numbers:
         registered = abbreviate_names(numbers) or "none"
-        return f"names {{names}}, but no register_variable of type Real does; registered: {_escaped(registered)}"
+        return (
+            "names {names}, but no register_variable of type Real does; registered: "
+            f"{_escaped(registered)}"
+        )
     try:
         parse_unit(unit)
     except ValueError as error:

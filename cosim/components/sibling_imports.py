@@ -1,7 +1,10 @@
-"""Imports of a Python file from its own folder: relative ones, and absolute ones as in a script (`import pid`).
+"""Imports of a Python file from its own folder.
 
-Python would find an absolutely imported module in `sys.path` and store it under one name for all folders. Therefore absolute
-imports of modules in the folder are rewritten as relative ones, and two folders can have modules of the same name.
+Relative ones, and absolute ones as in a script (`import pid`).
+
+Python would find an absolutely imported module in `sys.path` and store it under one name for all
+folders. Therefore absolute imports of modules in the folder are rewritten as relative ones, and two
+folders can have modules of the same name.
 """
 
 from __future__ import annotations
@@ -18,7 +21,8 @@ _OTHER_MODULES = {*sys.stdlib_module_names, "cosim", "pythonfmu"}
 def with_imported_siblings(path: Path) -> list[Path]:
     """Return a file and all files of its folder that it imports, directly or indirectly.
 
-    Relative imports may also lead out of the folder. A file that is not a Python file has no imports.
+    Relative imports may also lead out of the folder. A file that is not a Python file has no
+    imports.
 
     Raises:
         SyntaxError: A Python file cannot be parsed.
@@ -45,12 +49,23 @@ def read_with_relative_imports(path: Path, root: Path) -> str:
     lines = text.encode().splitlines(keepends=True)  # the columns of `ast` count bytes
     is_changed = path.is_relative_to(root) and not (path.parent / "__init__.py").is_file()
     dots = "." * len(path.relative_to(root).parts) if is_changed else ""
-    nodes = [node for node in ast.walk(ast.parse(text, str(path))) if isinstance(node, ast.Import | ast.ImportFrom)]
-    for node in sorted(nodes, key=lambda node: (node.lineno, node.col_offset), reverse=True) if dots else ():
+    nodes = [
+        node
+        for node in ast.walk(ast.parse(text, str(path)))
+        if isinstance(node, ast.Import | ast.ImportFrom)
+    ]
+    for node in (
+        sorted(nodes, key=lambda node: (node.lineno, node.col_offset), reverse=True) if dots else ()
+    ):
         if _imports_sibling(node, root):
             first, last = node.lineno - 1, (node.end_lineno or node.lineno) - 1
             before, after = lines[first][: node.col_offset], lines[last][node.end_col_offset :]
-            lines[first] = before + _relative_statements(node, dots, root).encode() + b" \\\n" * (last - first) + after
+            lines[first] = (
+                before
+                + _relative_statements(node, dots, root).encode()
+                + b" \\\n" * (last - first)
+                + after
+            )
             del lines[first + 1 : last + 1]
     return b"".join(lines).decode()[:-1]
 
@@ -66,14 +81,21 @@ def _is_sibling(module: str, root: Path) -> bool:
     top = root / module.partition(".")[0]
     if top.name in _OTHER_MODULES:
         return False
-    candidates = (top.with_suffix(".py"), top / "__init__.py", root.joinpath(*module.split(".")).with_suffix(".py"))
+    candidates = (
+        top.with_suffix(".py"),
+        top / "__init__.py",
+        root.joinpath(*module.split(".")).with_suffix(".py"),
+    )
     return any(file.is_file() for file in candidates)
 
 
 def _relative_statements(node: ast.Import | ast.ImportFrom, dots: str, root: Path) -> str:
     if isinstance(node, ast.ImportFrom):
         return ast.unparse(ast.ImportFrom(f"{dots}{node.module}", node.names, 0))
-    return "; ".join(_relative_import(alias, dots) if _is_sibling(alias.name, root) else _import(alias) for alias in node.names)
+    return "; ".join(
+        _relative_import(alias, dots) if _is_sibling(alias.name, root) else _import(alias)
+        for alias in node.names
+    )
 
 
 def _import(alias: ast.alias) -> str:
@@ -83,7 +105,9 @@ def _import(alias: ast.alias) -> str:
 def _relative_import(alias: ast.alias, dots: str) -> str:
     package, _, module = alias.name.rpartition(".")
     if alias.asname or not package:
-        return f"from {dots}{package} import {module}" + (f" as {alias.asname}" if alias.asname else "")
+        return f"from {dots}{package} import {module}" + (
+            f" as {alias.asname}" if alias.asname else ""
+        )
     top = package.partition(".")[0]
     return f"from {dots} import {top}; from {dots}{package} import {module} as _{module}"
 

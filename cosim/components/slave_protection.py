@@ -1,6 +1,9 @@
-"""Protection of a PythonFMU class in an exported FMU: its import, a log of its exceptions, and its whole state.
+"""Protection of a PythonFMU class in an exported FMU.
 
-Exported FMUs contain copies of this file and of `object_state.py`. They import only PythonFMU and the standard library.
+Its import, a log of its exceptions, and its whole state.
+
+Exported FMUs contain copies of this file and of `object_state.py`. They import only PythonFMU and
+the standard library.
 """
 
 from __future__ import annotations
@@ -20,8 +23,19 @@ from .object_state import Restore, snapshot
 
 #: methods of a class that PythonFMU calls
 _METHODS = (
-    *("__init__", "setup_experiment", "enter_initialization_mode", "exit_initialization_mode", "do_step", "terminate"),
-    *(f"{access}_{kind}" for access in ("get", "set") for kind in ("real", "integer", "boolean", "string")),
+    *(
+        "__init__",
+        "setup_experiment",
+        "enter_initialization_mode",
+        "exit_initialization_mode",
+        "do_step",
+        "terminate",
+    ),
+    *(
+        f"{access}_{kind}"
+        for access in ("get", "set")
+        for kind in ("real", "integer", "boolean", "string")
+    ),
     *("_get_fmu_state", "_set_fmu_state"),
 )
 #: attributes of a slave that belong to PythonFMU and are no state
@@ -41,12 +55,16 @@ class SlaveError(Exception):
 def protected_class(slave_class: type[Fmi2Slave]) -> type[Fmi2Slave]:
     """Return a subclass with the same name.
 
-    It logs class, text, file and line of each exception before it raises it. Its states contain all attributes of the object,
-    not only the registered variables, unless the class overrides `_get_fmu_state`.
+    It logs class, text, file and line of each exception before it raises it. Its states contain all
+    attributes of the object, not only the registered variables, unless the class overrides
+    `_get_fmu_state`.
     """
     methods = {name: _with_log(getattr(slave_class, name)) for name in _METHODS}
     if slave_class._get_fmu_state is Fmi2Slave._get_fmu_state:
-        methods |= {"_get_fmu_state": _with_log(_get_state), "_set_fmu_state": _with_log(_set_state)}
+        methods |= {
+            "_get_fmu_state": _with_log(_get_state),
+            "_set_fmu_state": _with_log(_set_state),
+        }
     return type(slave_class.__name__, (slave_class,), {**methods, "__doc__": slave_class.__doc__})
 
 
@@ -68,7 +86,11 @@ def load_class(entry: dict[str, Any], source: str, name: str) -> type[Fmi2Slave]
     package = entry["__name__"]
     if not Path(entry["__path__"][0]).is_dir():
         entry["__path__"][:] = sys.path[:1]  # where PythonFMU has just inserted the folder
-        for module in [module for module in sys.modules if module.startswith(f"{package}.") and module != __name__]:
+        for module in [
+            module
+            for module in sys.modules
+            if module.startswith(f"{package}.") and module != __name__
+        ]:
             del sys.modules[module]
     slave_class = protected_class(getattr(importlib.import_module(f"{package}.{source}"), name))
     entry[name] = slave_class  # PythonFMU reads it from there
@@ -100,8 +122,14 @@ def _with_log(method: Callable[..., Any]) -> Callable[..., Any]:
 def _describe(error: BaseException) -> str:
     """Return class and text of an exception, with the innermost line in the files of this FMU."""
     folder = sys.modules[__package__].__path__[0]
-    frames = [(Path(frame.filename), frame.lineno) for frame in traceback.extract_tb(error.__traceback__)]
+    frames = [
+        (Path(frame.filename), frame.lineno) for frame in traceback.extract_tb(error.__traceback__)
+    ]
     others = ("pythonfmu", Path(__file__).name)
-    own = [(file.name, line) for file, line in frames if file.is_relative_to(folder) and not {*file.parts[-2:]} & {*others}]
+    own = [
+        (file.name, line)
+        for file, line in frames
+        if file.is_relative_to(folder) and not {*file.parts[-2:]} & {*others}
+    ]
     where = f" ({own[-1][0]}:{own[-1][1]})" if own else ""
     return f"{type(error).__name__}: {error}{where}"

@@ -1,4 +1,7 @@
-"""Binary values as text: two hexadecimal digits per byte, as in the `start` attribute of FMI 3.0 (section 2.4.7.5)."""
+"""Binary values as text.
+
+Two hexadecimal digits per byte, as in the `start` attribute of FMI 3.0 (section 2.4.7.5).
+"""
 
 from __future__ import annotations
 

@@ -6,7 +6,9 @@ import numpy as np
 
 from .component import Variable
 
-INTEGER_TYPES = frozenset({"Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64"})
+INTEGER_TYPES = frozenset(
+    {"Int8", "UInt8", "Int16", "UInt16", "Int32", "UInt32", "Int64", "UInt64"}
+)
 FLOAT_TYPES = frozenset({"Float64", "Float32"})
 
 
@@ -42,4 +44,6 @@ def _is_convertible(source: Variable, target: Variable) -> bool:
         return target.type in ("Int32", "Int64")
     if target.type == "Enumeration":
         return source.type in INTEGER_TYPES - {"UInt64"}
-    return {source.type, target.type} <= INTEGER_TYPES and bool(np.can_cast(source.dtype, target.dtype, "safe"))
+    return {source.type, target.type} <= INTEGER_TYPES and bool(
+        np.can_cast(source.dtype, target.dtype, "safe")
+    )

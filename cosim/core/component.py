@@ -5,12 +5,14 @@ The methods of a component are called in the order of the FMI Co-Simulation life
     bind                                            once: pass the arrays for inputs and outputs
     instantiate                                     once: load foreign code, not earlier
     set                                             parameters and start values
-    enter_initialization_mode                       { set_inputs, get_outputs } may be repeated in this mode
-    exit_initialization_mode                        then get_outputs: the initial outputs
-    { set_inputs, do_step, get_outputs }            once per step; set tunable parameters between steps
-    terminate, free                                 free is always called exactly once, also after a failure
+    enter_initialization_mode                       { set_inputs, get_outputs } may be repeated in
+    this mode exit_initialization_mode                        then get_outputs: the initial outputs
+    { set_inputs, do_step, get_outputs }            once per step; set tunable parameters between
+    steps terminate, free                                 free is always called exactly once, also
+    after a failure
 
-Values are exchanged in typed arrays ("ports") that belong to the engine. A step makes no conversions, allocations or look-ups.
+Values are exchanged in typed arrays ("ports") that belong to the engine. A step makes no
+conversions, allocations or look-ups.
 """
 
 from __future__ import annotations
@@ -29,7 +31,15 @@ import numpy as np
 from .errors import ComponentError, Problem, did_you_mean
 from .units import Unit
 
-Causality = Literal["parameter", "calculatedParameter", "structuralParameter", "input", "output", "local", "independent"]
+Causality = Literal[
+    "parameter",
+    "calculatedParameter",
+    "structuralParameter",
+    "input",
+    "output",
+    "local",
+    "independent",
+]
 Variability = Literal["constant", "fixed", "tunable", "discrete", "continuous"]
 
 DTYPES: Mapping[str, np.dtype[Any]] = {
@@ -68,9 +78,10 @@ class Variable:
         maximum: Largest permitted value; None if unlimited.
         items: Names and values of an enumeration.
         relative_quantity: The value is a difference, to which the offset of a unit does not apply.
-        dtype: NumPy type of a value in memory, by default that of `type`. FMI 2.0 stores Boolean and Enumeration as C int.
-        derivative_of: Name of the input or output whose time derivative (per s) this value is; only in `bind`, see
-            `Component.interpolates_inputs`.
+        dtype: NumPy type of a value in memory, by default that of `type`. FMI 2.0 stores Boolean
+            and Enumeration as C int.
+        derivative_of: Name of the input or output whose time derivative (per s) this value is; only
+            in `bind`, see `Component.interpolates_inputs`.
     """
 
     name: str
@@ -91,7 +102,8 @@ class Variable:
     def __post_init__(self) -> None:
         if self.type not in DTYPES:
             raise ValueError(
-                f'variable "{self.name}": type is "{self.type}", expected one of FMI 3.0{did_you_mean(self.type, DTYPES)}'
+                f'variable "{self.name}": type is "{self.type}", expected one of FMI '
+                f"3.0{did_you_mean(self.type, DTYPES)}"
             )
         if self.dtype is None:
             object.__setattr__(self, "dtype", DTYPES[self.type])
@@ -107,16 +119,24 @@ class Variable:
 @lru_cache(16)
 def _subscripts(shape: tuple[int, ...]) -> Sequence[str]:
     """Return "[1]", "[2]" or "[1,2]" for each element of an array."""
-    return [f"[{','.join(map(str, index))}]" for index in product(*(range(1, n + 1) for n in shape))]
+    return [
+        f"[{','.join(map(str, index))}]" for index in product(*(range(1, n + 1) for n in shape))
+    ]
 
 
 def count_scalars(variables: Iterable[Variable]) -> int:
-    """Return the number of scalars of variables, without making their names; an array counts with all its elements."""
+    """Return the number of scalars of variables, without making their names.
+
+    An array counts with all its elements.
+    """
     return sum(math.prod(variable.shape) for variable in variables)
 
 
 class StepResult(NamedTuple):
-    """Outcome of a step that ended early, needs event handling or requests termination; `time_reached` in s."""
+    """Outcome of a step that ended early, needs event handling or requests termination.
+
+    `time_reached` in s.
+    """
 
     time_reached: float
     event_needed: bool = False
@@ -138,8 +158,8 @@ class NativeGetSet(NamedTuple):
 class NativeDoStep(NamedTuple):
     """Call of the C function fmiXDoStep.
 
-    `flags` is the address of the three Booleans eventHandlingNeeded, terminateSimulation and earlyReturn of FMI 3.0,
-    `last_successful_time` that of lastSuccessfulTime.
+    `flags` is the address of the three Booleans eventHandlingNeeded, terminateSimulation and
+    earlyReturn of FMI 3.0, `last_successful_time` that of lastSuccessfulTime.
     """
 
     version: int
@@ -151,7 +171,10 @@ class NativeDoStep(NamedTuple):
 
 
 class NativeFlagCheck(NamedTuple):
-    """Check of the three Booleans at the address `flags` after fmi3DoStep; yields the status 2 (discard) if one is set."""
+    """Check of the three Booleans at the address `flags` after fmi3DoStep.
+
+    Yields the status 2 (discard) if one is set.
+    """
 
     flags: int
 
@@ -186,26 +209,32 @@ class Ports(NamedTuple):
 
 
 class Component(Protocol):
-    """One steppable part of a system; every method raises `cosim.core.errors.ComponentError` when it fails.
+    """One steppable part of a system.
+
+    Every method raises `cosim.core.errors.ComponentError` when it fails.
 
     Attributes:
         variables: All variables; fixed after construction.
-        binds_everything: `bind` gets all inputs and outputs, not only those that are connected or recorded. The outputs are
-            followed by the recorded variables of other causalities.
-        shared_code: Components with an equal value other than None never step at the same time, because their common code may
-            have static variables.
-        runs_foreign_code: Code that is not cosim's runs in this process, where it may change the state of the process.
-        continuous_states: Names of the derivatives by the names of the states, if `get_directional_derivative` accepts both.
+        binds_everything: `bind` gets all inputs and outputs, not only those that are connected or
+            recorded. The outputs are followed by the recorded variables of other causalities.
+        shared_code: Components with an equal value other than None never step at the same time,
+            because their common code may have static variables.
+        runs_foreign_code: Code that is not cosim's runs in this process, where it may change the
+            state of the process.
+        continuous_states: Names of the derivatives by the names of the states, if
+            `get_directional_derivative` accepts both.
         variable_step: Steps may have different sizes (FMI: canHandleVariableCommunicationStepSize).
         has_state: `get_state` and `set_state` are supported (FMI: canGetAndSetFMUState).
-        dependencies: Names of the inputs on which an output depends directly, by the name of the output (FMI: ModelStructure).
-            An output without an entry may depend on every input.
+        dependencies: Names of the inputs on which an output depends directly, by the name of the
+            output (FMI: ModelStructure). An output without an entry may depend on every input.
         initial_dependencies: The same in initialization mode.
-        interpolates_inputs: Inputs may change linearly within a step (FMI 2.0: canInterpolateInputs). The inputs of `bind` end
-            with the time derivatives of those that do, see `Variable.derivative_of`.
-        gives_output_slopes: First time derivatives of outputs are available (FMI: maxOutputDerivativeOrder). The outputs of
-            `bind` end with those that are used.
-        input_limits: Lower and upper limit to which the component limits an input, by the name of the scalar.
+        interpolates_inputs: Inputs may change linearly within a step (FMI 2.0:
+            canInterpolateInputs). The inputs of `bind` end with the time derivatives of those that
+            do, see `Variable.derivative_of`.
+        gives_output_slopes: First time derivatives of outputs are available (FMI:
+            maxOutputDerivativeOrder). The outputs of `bind` end with those that are used.
+        input_limits: Lower and upper limit to which the component limits an input, by the name of
+            the scalar.
         warnings: Probable mistakes in the arguments; the subject of each begins with "arguments".
     """
 
@@ -224,10 +253,16 @@ class Component(Protocol):
     warnings: Sequence[Problem] = ()
 
     def set(self, name: str, value: Any) -> None:
-        """Set a variable to a Python value, an array to nested lists; not called while stepping through a macro step."""
+        """Set a variable to a Python value, an array to nested lists.
+
+        Not called while stepping through a macro step.
+        """
 
     def get(self, name: str) -> Any:
-        """Return the present value of a variable, an array as flat list; not called while stepping through a macro step."""
+        """Return the present value of a variable, an array as flat list.
+
+        Not called while stepping through a macro step.
+        """
 
     def unit_source(self, name: str) -> str:  # noqa: ARG002
         """Return the declaration of a variable's unit for messages, such as "Pilot.units (pilot.py:7)"; "" if it is unknown."""
@@ -243,7 +278,10 @@ class Component(Protocol):
         """Read inputs from and write outputs to these arrays from now on."""
 
     def instantiate(self) -> None:
-        """Create the instance and acquire its resources (FMI: fmi3InstantiateCoSimulation); called once, after `bind`."""
+        """Create the instance and acquire its resources (FMI: fmi3InstantiateCoSimulation).
+
+        Called once, after `bind`.
+        """
         return
 
     def set_inputs(self) -> None:
@@ -263,7 +301,11 @@ class Component(Protocol):
     def get_outputs(self) -> None:
         """Write the present values into the bound output arrays."""
 
-    def get_directional_derivative(self, outputs: Sequence[str], input_name: str) -> Sequence[float] | None:  # noqa: ARG002
+    def get_directional_derivative(
+        self,
+        outputs: Sequence[str],  # noqa: ARG002
+        input_name: str,  # noqa: ARG002
+    ) -> Sequence[float] | None:
         """Return the partial derivatives of outputs with respect to one input, at the present values.
 
         Args:
@@ -275,7 +317,11 @@ class Component(Protocol):
         """
         return None
 
-    def prepare_step_calls(self, current_time: ctypes.c_double, step_size: float) -> Sequence[PreparedCall] | None:  # noqa: ARG002
+    def prepare_step_calls(
+        self,
+        current_time: ctypes.c_double,  # noqa: ARG002
+        step_size: float,  # noqa: ARG002
+    ) -> Sequence[PreparedCall] | None:
         """Return `set_inputs`, `do_step` and `get_outputs` of one step as prepared calls, in step mode.
 
         Called before the first step, and again before a step of another size.

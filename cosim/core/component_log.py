@@ -50,7 +50,10 @@ def discarding_messages() -> Iterator[None]:
 
 
 def _is_within_rate_limit() -> bool:
-    """Return whether one more message is permitted in this second; report the dropped ones when a new second begins."""
+    """Return whether one more message is permitted in this second.
+
+    Report the dropped ones when a new second begins.
+    """
     global _current_second, _passed_count, _dropped_count
     now = int(time.monotonic())
     if now != _current_second:
@@ -67,5 +70,7 @@ def report_dropped_messages() -> None:
     """Warn of the number of messages that were dropped since the last report."""
     global _dropped_count
     if _dropped_count:
-        logging.getLogger(LOGGER_NAME).warning("%d messages of components were not shown", _dropped_count)
+        logging.getLogger(LOGGER_NAME).warning(
+            "%d messages of components were not shown", _dropped_count
+        )
         _dropped_count = 0

@@ -32,7 +32,10 @@ def set_excel_safe(enabled: bool) -> None:
 
 
 def text_cell(text: str) -> str:
-    """Return a text for a cell; with `set_excel_safe`, an apostrophe precedes texts that would be formulas."""
+    """Return a text for a cell.
+
+    With `set_excel_safe`, an apostrophe precedes texts that would be formulas.
+    """
     return f"'{text}" if _excel_safe and text.startswith(_FORMULA_STARTS) else text
 
 
@@ -72,9 +75,13 @@ def read_text(path: Path) -> str:
         with open_text(path, encoding="utf-8-sig", newline="") as file:
             return file.read()
     except UnicodeDecodeError as error:
-        raise InputError(f"cannot read {path}: it is not UTF-8 text: {error.reason} at byte {error.start}") from None
+        raise InputError(
+            f"cannot read {path}: it is not UTF-8 text: {error.reason} at byte {error.start}"
+        ) from None
     except (OSError, ValueError) as error:
-        raise InputError(f"cannot read {path}: {getattr(error, 'strerror', None) or error}") from error
+        raise InputError(
+            f"cannot read {path}: {getattr(error, 'strerror', None) or error}"
+        ) from error
 
 
 def parse_rows(path: Path, text: str) -> tuple[list[str], list[list[str]]]:
@@ -88,7 +95,9 @@ def parse_rows(path: Path, text: str) -> tuple[list[str], list[list[str]]]:
     try:
         rows = list(reader)
     except csv.Error as error:
-        raise InputError(Problem(f"cannot read the row: {error}", f"{path}:{reader.line_num}")) from None
+        raise InputError(
+            Problem(f"cannot read the row: {error}", f"{path}:{reader.line_num}")
+        ) from None
     if not rows:
         raise InputError(Problem("the file is empty, expected a header", str(path)))
     return rows[0], rows[1:]
@@ -97,14 +106,22 @@ def parse_rows(path: Path, text: str) -> tuple[list[str], list[list[str]]]:
 def parse_number_rows(text: str) -> tuple[list[str], list[list[float]]] | None:
     """Return header and rows of numbers of a CSV text as cosim writes it; None for any other text.
 
-    Rows of numbers are JSON arrays without brackets. `pydantic_core` parses these in 0.4 of the time of `csv` and NumPy.
+    Rows of numbers are JSON arrays without brackets. `pydantic_core` parses these in 0.4 of the
+    time of `csv` and NumPy.
     """
     header, _, body = text.partition("\n")
     data = body.encode()
-    if not header or header.count('"') % 2 or data.translate(None, _NUMBER_CHARACTERS) or _NEGATIVE_ZERO.search(data):
+    if (
+        not header
+        or header.count('"') % 2
+        or data.translate(None, _NUMBER_CHARACTERS)
+        or _NEGATIVE_ZERO.search(data)
+    ):
         return None
     try:
-        rows = pydantic_core.from_json(b"[[" + data.removesuffix(b"\n").replace(b"\n", b"],[") + b"]]")
+        rows = pydantic_core.from_json(
+            b"[[" + data.removesuffix(b"\n").replace(b"\n", b"],[") + b"]]"
+        )
         return next(csv.reader([header])), rows
     except (ValueError, csv.Error, StopIteration):
         return None

@@ -24,13 +24,15 @@ from .paths import resolve_path
 from .text import MAX_QUOTATION_LENGTH, count_noun, escape_control_characters, shorten
 from .user_code import innermost_user_line
 
-#: exceptions that are not a failure of the foreign code they pass through; all others are, even if not derived from Exception
+#: exceptions that are not a failure of the foreign code they pass through; all others are, even if
+#: not derived from Exception
 PASS_THROUGH_EXCEPTIONS = (KeyboardInterrupt, GeneratorExit)
 #: errors of the disk, not of the path
 _DISK_ERRORS = {errno.ENOSPC, errno.EDQUOT, errno.EFBIG, errno.EIO}
 #: maximum number of characters shown of an exception's text
 _MAX_EXCEPTION_LENGTH = 2000
-#: parts of regular expressions and of patterns of a shell; indices such as [1] and [1,2] belong to names
+#: parts of regular expressions and of patterns of a shell; indices such as [1] and [1,2] belong to
+#: names
 _FOREIGN_WILDCARD = re.compile(r"[?(|{^$\\]|\[(?!\d+(,\d+)*\])")
 #: maximum number of characters of the line of an error
 _MAX_LINE_LENGTH = 8000
@@ -41,8 +43,8 @@ class CosimError(Exception):
 
     Attributes:
         exit_code: Exit code of the command `cosim` for this class of error.
-        result: The `cosim.Result` recorded before the failure, if `cosim.run` raised the error after it began to simulate; else
-            None.
+        result: The `cosim.Result` recorded before the failure, if `cosim.run` raised the error
+            after it began to simulate; else None.
     """
 
     exit_code = 70
@@ -56,7 +58,8 @@ class Problem:
     Attributes:
         message: Description of the problem.
         where: Location (file, line, JSON path); "" if unknown.
-        subject: Keys of the setting in the scenario ("components", "usv", "period"), from which a caller can find the location.
+        subject: Keys of the setting in the scenario ("components", "usv", "period"), from which a
+            caller can find the location.
     """
 
     message: str
@@ -80,7 +83,9 @@ class InputError(CosimError):
     def __init__(self, problems: str | Problem | Iterable[str | Problem]):
         if isinstance(problems, str | Problem):
             problems = [problems]
-        self.problems: Sequence[Problem] = tuple(p if isinstance(p, Problem) else Problem(p) for p in problems)
+        self.problems: Sequence[Problem] = tuple(
+            p if isinstance(p, Problem) else Problem(p) for p in problems
+        )
         super().__init__("\n".join(map(str, self.problems)))
 
 
@@ -125,14 +130,18 @@ class CheckError(CosimError):
 
 
 def write_error(text: str, error: OSError) -> CosimError:
-    """Return the error for a file that cannot be written: OutputError if the disk is full or defective, else InputError."""
+    """Return the error for a file that cannot be written.
+
+    OutputError if the disk is full or defective, else InputError.
+    """
     return OutputError(text) if error.errno in _DISK_ERRORS else InputError(text)
 
 
 def describe_exception(error: BaseException) -> str:
     """Return class, text, file and line of an exception that foreign code raised.
 
-    The line is the innermost one in the user's code, or the innermost one of all if libraries alone were running.
+    The line is the innermost one in the user's code, or the innermost one of all if libraries alone
+    were running.
 
     >>> describe_exception(ValueError("no such mode"))
     'ValueError: no such mode'
@@ -141,20 +150,28 @@ def describe_exception(error: BaseException) -> str:
         text = str(error)
     except Exception:
         text = "(its text cannot be made)"
-    frames = [] if isinstance(error, SyntaxError) else traceback.extract_tb(error.__traceback__)[::-1]  # its text has a line
+    frames = (
+        [] if isinstance(error, SyntaxError) else traceback.extract_tb(error.__traceback__)[::-1]
+    )  # its text has a line
     where = innermost_user_line((frame.filename, frame.lineno) for frame in frames)
     where = where or next((f"{Path(frame.filename).name}:{frame.lineno}" for frame in frames), "")
-    return f"{type(error).__name__}: {shorten(text, _MAX_EXCEPTION_LENGTH)}" + (f" ({where})" if where else "")
+    return f"{type(error).__name__}: {shorten(text, _MAX_EXCEPTION_LENGTH)}" + (
+        f" ({where})" if where else ""
+    )
 
 
 def abbreviate_names(names: Iterable[str], limit: int = 8) -> str:
-    """Return the names as a list in one line, each name once; after the first `limit` names only the number of the others.
+    """Return the names as a list in one line, each name once.
+
+    After the first `limit` names only the number of the others.
 
     >>> abbreviate_names("abcdea", limit=3)
     'a, b, c and 2 more'
     """
     different = list(dict.fromkeys(names))
-    return ", ".join(different[:limit]) + (f" and {len(different) - limit} more" if len(different) > limit else "")
+    return ", ".join(different[:limit]) + (
+        f" and {len(different) - limit} more" if len(different) > limit else ""
+    )
 
 
 def join_alternatives(names: Iterable[str]) -> str:
@@ -168,7 +185,9 @@ def join_alternatives(names: Iterable[str]) -> str:
 
 
 def merge_problems(problems: Iterable[Problem], beginning: str) -> list[Problem]:
-    """Return different problems; of those in a file with the same message, the first one stands for all, with their number.
+    """Return different problems.
+
+    Of those in a file with the same message, the first one stands for all, with their number.
 
     Args:
         problems: The problems in their order.
@@ -184,14 +203,19 @@ def merge_problems(problems: Iterable[Problem], beginning: str) -> list[Problem]
 def _with_count(problem: Problem, count: int) -> Problem:
     if count == 1:
         return problem
-    return replace(problem, message=f"{problem.message}; {count_noun(count - 1, 'more place')} likewise")
+    return replace(
+        problem, message=f"{problem.message}; {count_noun(count - 1, 'more place')} likewise"
+    )
 
 
 def did_you_mean(name: str, valid: Iterable[str]) -> str:
-    """Return a hint for the end of a message: the most similar valid name, else up to 12 valid names, else "".
+    """Return a hint for the end of a message.
 
-    A name that differs by two swapped neighbouring letters counts as the most similar one. For a name with dots, names that begin
-    with the same component come first; others must be nearly equal.
+    The most similar valid name, else up to 12 valid names, else "".
+
+    A name that differs by two swapped neighbouring letters counts as the most similar one. For a
+    name with dots, names that begin with the same component come first; others must be nearly
+    equal.
 
     >>> did_you_mean("stop_tme", ["start_time", "stop_time"])
     '; did you mean "stop_time"?'
@@ -204,14 +228,20 @@ def did_you_mean(name: str, valid: Iterable[str]) -> str:
 
 
 def pattern_hint(pattern: str, valid: Iterable[str]) -> str:
-    """Return a hint for the end of a message about a pattern that matches no name; see `did_you_mean`.
+    """Return a hint for the end of a message about a pattern that matches no name.
+
+    See `did_you_mean`.
 
     >>> pattern_hint("usv.position.[xy]", ["usv.position.x"])
     '; only "*" is a wildcard'
     >>> pattern_hint("usv.positoin[1]", ["usv.position[1]"])
     '; did you mean "usv.position[1]"?'
     """
-    return '; only "*" is a wildcard' if _FOREIGN_WILDCARD.search(pattern) else did_you_mean(pattern, valid)
+    return (
+        '; only "*" is a wildcard'
+        if _FOREIGN_WILDCARD.search(pattern)
+        else did_you_mean(pattern, valid)
+    )
 
 
 def near_or_valid_names(name: str, valid: Iterable[str]) -> str:
@@ -221,28 +251,44 @@ def near_or_valid_names(name: str, valid: Iterable[str]) -> str:
     '; valid: landing.*, path.*'
     """
     names = tuple(valid)
-    parts = (first + dot.replace(".", ".*") for first, dot, _ in (each.partition(".") for each in names))
+    parts = (
+        first + dot.replace(".", ".*") for first, dot, _ in (each.partition(".") for each in names)
+    )
     return did_you_mean(name, names) or (f"; valid: {abbreviate_names(parts, 12)}" if names else "")
 
 
 def nearest_file(path: Path) -> str:
-    """Return a hint for the end of a message about a missing file: the most similar name in its folder, else its files.
+    """Return a hint for the end of a message about a missing file.
 
-    Files are those with the same ending, up to 12; without one, the hint is the absolute path of the folder. A name without an
-    ending that is similar to none has no hint.
+    The most similar name in its folder, else its files.
+
+    Files are those with the same ending, up to 12; without one, the hint is the absolute path of
+    the folder. A name without an ending that is similar to none has no hint.
     """
     try:
         folder = resolve_path(path.parent) if ".." in path.parts else path.parent
-        names = tuple(sorted(each.name for each in folder.iterdir() if not path.suffix or each.suffix == path.suffix))
+        names = tuple(
+            sorted(
+                each.name
+                for each in folder.iterdir()
+                if not path.suffix or each.suffix == path.suffix
+            )
+        )
     except FileNotFoundError:
         return f'; there is no folder "{folder.absolute()}"'
     except (OSError, ValueError):
         return ""
-    if near := [name for name in names if Path(name).stem == path.name] or _close_matches(path.name, names):
+    if near := [name for name in names if Path(name).stem == path.name] or _close_matches(
+        path.name, names
+    ):
         return f'; did you mean "{near[0]}"?'
     if not path.suffix:
         return ""
-    return f'; files in "{folder}": {abbreviate_names(names, 12)}' if names else f'; no *{path.suffix} in "{folder.absolute()}"'
+    return (
+        f'; files in "{folder}": {abbreviate_names(names, 12)}'
+        if names
+        else f'; no *{path.suffix} in "{folder.absolute()}"'
+    )
 
 
 @lru_cache(16)  # the same wrong name often occurs several times
@@ -255,7 +301,10 @@ def _did_you_mean(name: str, names: tuple[str, ...]) -> str:
 
 
 def nearest_name(name: str, valid: Iterable[str]) -> str:
-    """Return the valid name that a wrong one probably means, as in `did_you_mean`; "" if none is similar."""
+    """Return the valid name that a wrong one probably means, as in `did_you_mean`.
+
+    "" if none is similar.
+    """
     if len(name) > MAX_QUOTATION_LENGTH:  # no slip of the pen, and the search takes quadratic time
         return ""
     names = tuple(valid)
@@ -271,4 +320,6 @@ def _close_matches(name: str, names: tuple[str, ...]) -> list[str]:
     if not dot or not any("." in other for other in names):
         return difflib.get_close_matches(name, names, n=1)
     siblings = [other for other in names if other.startswith(f"{component}.")]
-    return difflib.get_close_matches(name, siblings, n=1) or difflib.get_close_matches(name, names, n=1, cutoff=0.85)
+    return difflib.get_close_matches(name, siblings, n=1) or difflib.get_close_matches(
+        name, names, n=1, cutoff=0.85
+    )

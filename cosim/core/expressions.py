@@ -30,7 +30,10 @@ _BINARY_OPERATORS: Mapping[type[ast.operator], Callable[[Any, Any], Any]] = {
     ast.Div: operator.truediv,
     ast.Pow: lambda a, b: math.pow(a, b),
 }
-_UNARY_OPERATORS: Mapping[type[ast.unaryop], Callable[[Any], Any]] = {ast.USub: operator.neg, ast.UAdd: operator.pos}
+_UNARY_OPERATORS: Mapping[type[ast.unaryop], Callable[[Any], Any]] = {
+    ast.USub: operator.neg,
+    ast.UAdd: operator.pos,
+}
 _COMPARISONS: Mapping[type[ast.cmpop], Callable[[Any, Any], bool]] = {
     ast.Lt: operator.lt,
     ast.LtE: operator.le,
@@ -42,7 +45,10 @@ _COMPARISONS: Mapping[type[ast.cmpop], Callable[[Any, Any], bool]] = {
 
 
 class AllowedFunction(NamedTuple):
-    """Function of an expression: the permitted numbers of arguments, and a text that states them."""
+    """Function of an expression.
+
+    The permitted numbers of arguments, and a text that states them.
+    """
 
     call: Callable[..., float]
     counts: range = range(1, 2)
@@ -75,13 +81,15 @@ class Expression:
     def unknown_name_problem(self, known: Mapping[str, Any], kind: str = "KPI or parameter") -> str:
         """Return a message about the first name that is not `known`; "" if all are."""
         missing = [name for name in self.names if name not in known]
-        return f'no {kind} "{missing[0]}"{near_or_valid_names(missing[0], known)}' if missing else ""
+        return (
+            f'no {kind} "{missing[0]}"{near_or_valid_names(missing[0], known)}' if missing else ""
+        )
 
     def bind(self, reader: Callable[[str], Reader]) -> Reader:
         """Return a function that returns the present value.
 
-        The value is NaN if any part is undefined, as after a division by zero or with a value that is NaN. The second operand of
-        `and` and `or` is evaluated only if it matters.
+        The value is NaN if any part is undefined, as after a division by zero or with a value that
+        is NaN. The second operand of `and` and `or` is evaluated only if it matters.
 
         Args:
             reader: Returns for each name a function that returns its present value.
@@ -117,7 +125,10 @@ def parse_expression(text: str) -> Expression:
 
 
 def parse_condition(text: str) -> Expression:
-    """Parse an expression with comparisons, `and`, `or` and `not`, whose value is 0 or not; raise ValueError if it is invalid."""
+    """Parse an expression with comparisons, `and`, `or` and `not`, whose value is 0 or not.
+
+    Raise ValueError if it is invalid.
+    """
     tree = parse_syntax(text)
     check_node(tree, conditions=True)
     return Expression(text, tree)
@@ -130,8 +141,16 @@ def parse_syntax(text: str) -> ast.expr:
     try:
         return ast.parse(text.strip(), mode="eval").body
     except (SyntaxError, ValueError, RecursionError, MemoryError) as error:
-        reserved = [word for word in _WORD.findall(text) if iskeyword(word) and word not in ("and", "or", "not")]
-        reason = f'"{reserved[0]}" is a reserved word of Python' if reserved else getattr(error, "msg", error)
+        reserved = [
+            word
+            for word in _WORD.findall(text)
+            if iskeyword(word) and word not in ("and", "or", "not")
+        ]
+        reason = (
+            f'"{reserved[0]}" is a reserved word of Python'
+            if reserved
+            else getattr(error, "msg", error)
+        )
         raise ValueError(f'"{text}" is not an expression: {reason}') from None
 
 
@@ -143,15 +162,21 @@ def check_node(node: ast.AST, conditions: bool = False) -> None:
         conditions: Allow comparisons, `and`, `or` and `not`.
     """
     match node:
-        case ast.Constant(value=value) if isinstance(value, int | float) and not isinstance(value, bool):
+        case ast.Constant(value=value) if isinstance(value, int | float) and not isinstance(
+            value, bool
+        ):
             operands: Sequence[ast.AST] = ()
         case ast.BinOp(left=left, op=op, right=right) if type(op) in _BINARY_OPERATORS:
             operands = left, right
-        case ast.UnaryOp(op=op, operand=operand) if type(op) in _UNARY_OPERATORS or (conditions and isinstance(op, ast.Not)):
+        case ast.UnaryOp(op=op, operand=operand) if type(op) in _UNARY_OPERATORS or (
+            conditions and isinstance(op, ast.Not)
+        ):
             operands = (operand,)
         case ast.BoolOp(values=values) if conditions:
             operands = values
-        case ast.Compare(left=left, ops=ops, comparators=right_sides) if conditions and all(type(o) in _COMPARISONS for o in ops):
+        case ast.Compare(left=left, ops=ops, comparators=right_sides) if conditions and all(
+            type(o) in _COMPARISONS for o in ops
+        ):
             operands = left, *right_sides
         case ast.Call(func=ast.Name(id=name), args=[_, *_] as arguments, keywords=[]):
             _check_call(name, arguments, conditions)
@@ -176,7 +201,10 @@ def _check_call(name: str, arguments: Sequence[ast.AST], conditions: bool) -> No
 
 
 def spelt_name(node: ast.AST) -> str:
-    """Return the name that a syntax node spells, such as "landing.time[2]" or "plant.a[1,2]"; "" for any other node."""
+    """Return the name that a syntax node spells, such as "landing.time[2]" or "plant.a[1,2]".
+
+    "" for any other node.
+    """
     match node:
         case ast.Name(id=name):
             return name
@@ -184,9 +212,13 @@ def spelt_name(node: ast.AST) -> str:
             return f"{outer}.{name}" if (outer := spelt_name(inner)) else ""
         case ast.Subscript(value=inner, slice=ast.Constant(value=int(index))):
             return f"{outer}[{index}]" if (outer := spelt_name(inner)) else ""
-        case ast.Subscript(value=inner, slice=ast.Tuple(elts=elements)) if outer := spelt_name(inner):
+        case ast.Subscript(value=inner, slice=ast.Tuple(elts=elements)) if outer := spelt_name(
+            inner
+        ):
             indices = [element.value for element in elements if isinstance(element, ast.Constant)]
-            return f"{outer}[{','.join(map(str, indices))}]" if len(indices) == len(elements) else ""
+            return (
+                f"{outer}[{','.join(map(str, indices))}]" if len(indices) == len(elements) else ""
+            )
     return ""
 
 
@@ -220,19 +252,32 @@ def _bind_operation(node: ast.AST, reader: Callable[[str], Reader]) -> Callable[
         case ast.Constant(value=value):
             return lambda: value
         case ast.BinOp(left=left, op=op, right=right):
-            first, second, binary = _bind(left, reader), _bind(right, reader), _BINARY_OPERATORS[type(op)]
+            first, second, binary = (
+                _bind(left, reader),
+                _bind(right, reader),
+                _BINARY_OPERATORS[type(op)],
+            )
             return lambda: binary(first(), second())
         case ast.UnaryOp(op=op, operand=operand):
             inner, unary = _bind(operand, reader), _UNARY_OPERATORS.get(type(op), operator.not_)
             return lambda: unary(inner())
         case ast.BoolOp(op=op, values=values):
-            parts, combine = [_bind(value, reader) for value in values], any if isinstance(op, ast.Or) else all
+            parts, combine = (
+                [_bind(value, reader) for value in values],
+                any if isinstance(op, ast.Or) else all,
+            )
             return lambda: combine(part() for part in parts)
         case ast.Compare(left=left, ops=ops, comparators=right_sides):
             sides = [_bind(side, reader) for side in (left, *right_sides)]
-            pairs = [(_COMPARISONS[type(op)], a, b) for op, a, b in zip(ops, sides, sides[1:], strict=False)]
+            pairs = [
+                (_COMPARISONS[type(op)], a, b)
+                for op, a, b in zip(ops, sides, sides[1:], strict=False)
+            ]
             return lambda: all(compare(a(), b()) for compare, a, b in pairs)
         case ast.Call(func=ast.Name(id=name), args=arguments):
-            terms, function = [_bind(argument, reader) for argument in arguments], FUNCTIONS[name].call
+            terms, function = (
+                [_bind(argument, reader) for argument in arguments],
+                FUNCTIONS[name].call,
+            )
             return lambda: function(*(term() for term in terms))
     return reader(spelt_name(node))

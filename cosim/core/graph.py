@@ -31,7 +31,14 @@ def strong_components(successors: Mapping[T, Iterable[T]]) -> list[list[T]]:
         path = [] if root in index else [enter(root)]
         while path:
             node, rest = path[-1]
-            following = next((other for other in rest if other in successors and (other not in index or other in on_stack)), None)
+            following = next(
+                (
+                    other
+                    for other in rest
+                    if other in successors and (other not in index or other in on_stack)
+                ),
+                None,
+            )
             if following is None:
                 path.pop()
                 if path:
@@ -52,12 +59,16 @@ def ordered_groups(predecessors: Mapping[T, Iterable[T]]) -> list[list[T]]:
     """Return groups of nodes that depend on each other, each group after those that it depends on.
 
     Args:
-        predecessors: Nodes that every node depends on. The order of the nodes decides wherever their dependencies do not.
+        predecessors: Nodes that every node depends on. The order of the nodes decides wherever
+            their dependencies do not.
     """
     position = {node: i for i, node in enumerate(predecessors)}
     groups = [sorted(group, key=position.__getitem__) for group in strong_components(predecessors)]
     number = {node: k for k, group in enumerate(groups) for node in group}
-    needed = [{number[p] for node in group for p in predecessors[node] if p in number} - {k} for k, group in enumerate(groups)]
+    needed = [
+        {number[p] for node in group for p in predecessors[node] if p in number} - {k}
+        for k, group in enumerate(groups)
+    ]
     followers: list[list[int]] = [[] for _ in groups]
     for k, others in enumerate(needed):
         for other in others:

@@ -1,7 +1,7 @@
 """Conversion of values from and to JSON.
 
-Values that JSON does not have are written as others: bytes become {"bytes": hexadecimal digits}, NumPy values become lists and
-numbers.
+Values that JSON does not have are written as others: bytes become {"bytes": hexadecimal digits},
+NumPy values become lists and numbers.
 """
 
 from __future__ import annotations
@@ -17,7 +17,10 @@ def encode_value(value: Any) -> Any:
 
 
 def decode_object(value: dict[str, Any]) -> Any:
-    """Return the bytes that `encode_value` encoded, and any other object unchanged; the `object_hook` of `json.loads`."""
+    """Return the bytes that `encode_value` encoded, and any other object unchanged.
+
+    The `object_hook` of `json.loads`.
+    """
     return bytes.fromhex(value["bytes"]) if value.keys() == {"bytes"} else value
 
 
@@ -37,7 +40,10 @@ def parse_object(text: str | bytes) -> dict[str, Any]:
 
 
 def copy_json(value: Any) -> Any:
-    """Return a deep copy of a value of objects and lists; five times faster than `copy.deepcopy`."""
+    """Return a deep copy of a value of objects and lists.
+
+    Five times faster than `copy.deepcopy`.
+    """
     if isinstance(value, dict):
         return {key: copy_json(each) for key, each in value.items()}
     return [copy_json(each) for each in value] if isinstance(value, list) else value

@@ -10,17 +10,26 @@ from typing import TextIO
 
 
 def is_file(path: Path) -> bool:
-    """Return whether the file exists; False for names that no file can have, for which `Path.is_file` raises."""
+    """Return whether the file exists.
+
+    False for names that no file can have, for which `Path.is_file` raises.
+    """
     return os.path.isfile(path)  # noqa: PTH113
 
 
 def is_folder(path: Path) -> bool:
-    """Return whether the folder exists; False for names that no folder can have, for which `Path.is_dir` raises."""
+    """Return whether the folder exists.
+
+    False for names that no folder can have, for which `Path.is_dir` raises.
+    """
     return os.path.isdir(path)  # noqa: PTH112
 
 
 def resolve_path(path: Path) -> Path:
-    """Return the path with symbolic links resolved; a loop of links is left unresolved instead of raising."""
+    """Return the path with symbolic links resolved.
+
+    A loop of links is left unresolved instead of raising.
+    """
     return Path(os.path.realpath(path))
 
 
@@ -33,7 +42,8 @@ def open_text(path: Path, encoding: str, newline: str | None = None) -> TextIO:
         newline: As in `open`.
 
     Raises:
-        OSError: The file cannot be opened, or is a pipe or a device, from which reading might never end.
+        OSError: The file cannot be opened, or is a pipe or a device, from which reading might never
+            end.
     """
     number = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0))
     mode = os.fstat(number).st_mode

@@ -6,5 +6,8 @@ import os
 
 
 def available_processors() -> int:
-    """Return how many processors this process may use; its CPU affinity may exclude some of the machine's."""
+    """Return how many processors this process may use.
+
+    Its CPU affinity may exclude some of the machine's.
+    """
     return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

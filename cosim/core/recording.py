@@ -14,7 +14,8 @@ class Recording:
 
     Attributes:
         time: Time of each row (s), shape (rows,); at an event two rows may have the same time.
-        columns: Values of each signal by name, shape (rows,), in the type of the signal; strings have the dtype object.
+        columns: Values of each signal by name, shape (rows,), in the type of the signal; strings
+            have the dtype object.
         units: Unit of each signal by name, in Modelica syntax; "" if unknown.
     """
 

@@ -15,7 +15,10 @@ def package_folder() -> Path:
 
 @cache
 def root() -> Path:
-    """Return the folder of scenarios, FMUs, plant and controller sources: the installed bundle, else the checkout."""
+    """Return the folder of scenarios, FMUs, plant and controller sources.
+
+    The installed bundle, else the checkout.
+    """
     bundle = package_folder() / "_bundle"
     return bundle if bundle.is_dir() else package_folder().parent
 

@@ -1,4 +1,7 @@
-"""Limits of the size of a system, far above real ones; larger systems are refused before they are expanded."""
+"""Limits of the size of a system, far above real ones.
+
+Larger systems are refused before they are expanded.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +37,12 @@ def require_at_most(limit: int, count: int, noun: str, where: str = "", hint: st
         InputError: The count exceeds the limit.
     """
     if count > limit:
-        raise InputError(Problem(f"found {format_count(count)} {noun}, expected at most {format_count(limit)}{hint}", where))
+        raise InputError(
+            Problem(
+                f"found {format_count(count)} {noun}, expected at most {format_count(limit)}{hint}",
+                where,
+            )
+        )
 
 
 def format_count(count: int) -> str:

@@ -40,10 +40,11 @@ class Connection:
         where: Location in the scenario file, for messages.
         gain: Factor that is applied after the conversion of units.
         offset: Value that is added after `gain`, in the unit of the input.
-        term: Number, from 1, of the value among those that are added at the input; 0: it is the only one.
+        term: Number, from 1, of the value among those that are added at the input; 0: it is the
+            only one.
         convert: Booleans and all integers are converted to floating-point numbers.
-        interpolation: Course of the input within a step: constant, or linear with the slope that the source gives, or else
-            through the last two values of the output.
+        interpolation: Course of the input within a step: constant, or linear with the slope that
+            the source gives, or else through the last two values of the output.
     """
 
     source: Endpoint
@@ -129,7 +130,8 @@ class System:
     Attributes:
         components: All components by name.
         connections: Connections between their variables.
-        stages: Stages, which step one after the other. Outputs reach other components of the same stage in the next macro step.
+        stages: Stages, which step one after the other. Outputs reach other components of the same
+            stage in the next macro step.
         periods: Periods (s) of components that step less often than every macro step.
         start_values: Parameters and start values by component and variable name.
         aliases: Additional names under which outputs are recorded.
@@ -173,14 +175,18 @@ class System:
         for name in component_names(self.stages):
             if name not in self.components:
                 unknown += 1
-                yield Problem(f'unknown component "{name}"{did_you_mean(name, unnamed)}', subject=subject)
+                yield Problem(
+                    f'unknown component "{name}"{did_you_mean(name, unnamed)}', subject=subject
+                )
             elif name in seen:
                 yield Problem(f'component "{name}" is in the stages twice', subject=subject)
             seen.add(name)
         for group in iterate_groups(self.stages):
             if group.iteration:
                 yield from self._find_iteration_problems(group)
-        missing = dict.fromkeys(_unlisted_member(name, seen) for name in self.components if name not in seen)
+        missing = dict.fromkeys(
+            _unlisted_member(name, seen) for name in self.components if name not in seen
+        )
         if len(missing) > unknown:  # otherwise the unknown names probably stand for them
             for name in missing:
                 text = f'component "{name}" is in no stage of "algorithm", so it would never step'
@@ -190,10 +196,15 @@ class System:
         repeated = f"the stages of {group.name} are iterated"
         for name in component_names(group.stages):
             if name in self.components and not self.components[name].has_state:
-                text = f'{repeated}, but "{name}" cannot return to a state (FMI: canGetAndSetFMUState)'
+                text = (
+                    f'{repeated}, but "{name}" cannot return to a state (FMI: canGetAndSetFMUState)'
+                )
                 yield Problem(text, subject=("components", name))
             if name in self.periods:
-                yield Problem(f'{repeated}, so "{name}" cannot have a period of its own', subject=("components", name, "period"))
+                yield Problem(
+                    f'{repeated}, so "{name}" cannot have a period of its own',
+                    subject=("components", name, "period"),
+                )
 
     def _find_connection_problems(self) -> Iterator[Problem]:
         by_target: dict[Endpoint, Connection] = {}
@@ -206,18 +217,28 @@ class System:
                 continue
             other = by_target.setdefault(connection.target, connection)
             if other is not connection and not 0 < other.term < connection.term:
-                text = f"input {connection.target} is connected twice: it is already fed by {other.source}"
+                text = (
+                    f"input {connection.target} is connected twice: it is already fed by "
+                    f"{other.source}"
+                )
                 yield Problem(text, connection.where)
-            source_variable, target_variable = (self.find_element(end).variable for end in (connection.source, connection.target))
+            source_variable, target_variable = (
+                self.find_element(end).variable for end in (connection.source, connection.target)
+            )
             text = incompatibility(source_variable, target_variable, connection.convert)
             if text and text == unit_conflict(source_variable, target_variable):
                 text += self._unit_sources(connection)
             if connection.is_mapped and not text and target_variable.type not in FLOAT_TYPES:
-                text = f"gains, offsets and sums are for inputs of floating-point numbers, found {target_variable.type}"
+                text = (
+                    "gains, offsets and sums are for inputs of floating-point numbers, found "
+                    f"{target_variable.type}"
+                )
             if connection.interpolation == "linear" and not text:
                 text = self._linear_problem(connection)
             if text:
-                refused[connection.where, connection.source.component, connection.target.component, text].append(connection)
+                refused[
+                    connection.where, connection.source.component, connection.target.component, text
+                ].append(connection)
         for (where, _, _, text), (first, *others) in refused.items():
             more = f", and {count_noun(len(others), 'more element')} likewise" if others else ""
             yield Problem(f"{first.source} cannot feed {first.target}{more}: {text}", where)
@@ -227,7 +248,9 @@ class System:
         found = ""
         for end in (connection.source, connection.target):
             variable = self.find_element(end).variable
-            if variable.unit and (place := self.components[end.component].unit_source(variable.name)):
+            if variable.unit and (
+                place := self.components[end.component].unit_source(variable.name)
+            ):
                 found += f'; "{variable.unit.name}" is declared by {place}'
         return found
 
@@ -235,10 +258,15 @@ class System:
         """Return the reason why an input cannot change linearly within a step; "" if it can."""
         name = connection.target.component
         if not self.components[name].interpolates_inputs:
-            return f'"interpolation" is "linear", but "{name}" does not interpolate its inputs (FMI: canInterpolateInputs)'
+            return (
+                f'"interpolation" is "linear", but "{name}" does not interpolate its inputs (FMI: '
+                "canInterpolateInputs)"
+            )
         if connection.delay or connection.term:
             return '"interpolation" is "linear", so it cannot have a delay or be part of a sum'
-        if {self.find_element(end).variable.type for end in (connection.source, connection.target)} != {"Float64"}:
+        if {
+            self.find_element(end).variable.type for end in (connection.source, connection.target)
+        } != {"Float64"}:
             return '"interpolation" is "linear", expected two variables of the type Float64'
         if {name, connection.source.component} & self.periods.keys():
             return '"interpolation" is "linear", so both components must step in every macro step'
@@ -246,11 +274,18 @@ class System:
 
     def _find_endpoint_problem(self, end: Endpoint, causality: str) -> str:
         if end.component not in self.components:
-            return f'unknown component "{end.component}"{did_you_mean(end.component, self.components)}'
+            return (
+                f'unknown component "{end.component}"{did_you_mean(end.component, self.components)}'
+            )
         slots = self.slots[end.component]
         if end.scalar not in slots:
-            valid = (name for name, element in slots.items() if element.variable.causality == causality)
-            return f'component "{end.component}" has no variable "{end.scalar}"{did_you_mean(end.scalar, valid)}'
+            valid = (
+                name for name, element in slots.items() if element.variable.causality == causality
+            )
+            return (
+                f'component "{end.component}" has no variable '
+                f'"{end.scalar}"{did_you_mean(end.scalar, valid)}'
+            )
         if (actual := slots[end.scalar].variable.causality) != causality:
             return f"{end} is of causality {actual}, expected an {causality}"
         return ""
@@ -260,4 +295,7 @@ def _unlisted_member(name: str, listed: Collection[str]) -> str:
     """Return the outermost system around a component, or itself, of which the stages contain no component."""
     parts = name.split(".")
     systems = (".".join(parts[:n]) for n in range(1, len(parts)))
-    return next((system for system in systems if not any(each.startswith(f"{system}.") for each in listed)), name)
+    return next(
+        (system for system in systems if not any(each.startswith(f"{system}.") for each in listed)),
+        name,
+    )

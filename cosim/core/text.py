@@ -1,4 +1,7 @@
-"""Texts of scenarios, callers and other programs: limits of length, forbidden characters, escape sequences for printing."""
+"""Texts of scenarios, callers and other programs.
+
+Limits of length, forbidden characters, escape sequences for printing.
+"""
 
 from __future__ import annotations
 
@@ -24,14 +27,18 @@ def text_problem(text: str) -> str:
     ('the character U+0000 is not allowed', '')
     """
     if len(text) > MAX_TEXT_LENGTH:
-        return f"a text of {len(text)} characters is not allowed, expected at most {MAX_TEXT_LENGTH}"
+        return (
+            f"a text of {len(text)} characters is not allowed, expected at most {MAX_TEXT_LENGTH}"
+        )
     match = _FORBIDDEN_CHARACTERS.search(text)
     return f"the character U+{ord(match.group()):04X} is not allowed" if match else ""
 
 
 def acceptable_text(text: str) -> str:
     """Return a text, shortened and without forbidden characters if `text_problem` refuses it."""
-    return _FORBIDDEN_CHARACTERS.sub(REPLACEMENT, text if len(text) <= MAX_TEXT_LENGTH else shorten(text))
+    return _FORBIDDEN_CHARACTERS.sub(
+        REPLACEMENT, text if len(text) <= MAX_TEXT_LENGTH else shorten(text)
+    )
 
 
 def count_noun(count: int, noun: str) -> str:

@@ -1,4 +1,7 @@
-"""Exact communication points: integers on a grid that are converted to seconds with one rounding."""
+"""Exact communication points.
+
+Integers on a grid that are converted to seconds with one rounding.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +15,11 @@ import numpy as np
 #: largest magnitude of a time (s); all integers up to this one are exact as float64
 MAX_TIME = 2**53
 
-#: a decimal number or a fraction; the number of digits is limited because Fraction expands 1e999999999
-_SECONDS_PATTERN = re.compile(r"[-+]?(\d{1,400}/\d{1,400}|(\d{1,400}\.?\d{0,400}|\.\d{1,400})([eE][-+]?\d{1,3})?)", re.ASCII)
+#: a decimal number or a fraction; the number of digits is limited because Fraction expands
+#: 1e999999999
+_SECONDS_PATTERN = re.compile(
+    r"[-+]?(\d{1,400}/\d{1,400}|(\d{1,400}\.?\d{0,400}|\.\d{1,400})([eE][-+]?\d{1,3})?)", re.ASCII
+)
 
 
 def exact_fraction(value: float | int | str | Fraction) -> Fraction:
@@ -50,7 +56,9 @@ def time_text(value: Fraction) -> str:
 
 
 def exact_divisor(duration: Fraction, step: Fraction) -> Fraction:
-    """Return the exact divisor of a duration that a rounded decimal number stands for: 1/30 s of 10 s for 0.0333333333333333 s.
+    """Return the exact divisor of a duration that a rounded decimal number stands for.
+
+    1/30 s of 10 s for 0.0333333333333333 s.
 
     Args:
         duration: Duration (s).
@@ -66,7 +74,10 @@ def exact_divisor(duration: Fraction, step: Fraction) -> Fraction:
 
 @dataclass(frozen=True, slots=True)
 class TimeGrid:
-    """Communication points start + n * step, n = 0 ... count (seconds, as exact fractions); the last step may be shorter."""
+    """Communication points start + n * step, n = 0 ... count (seconds, as exact fractions).
+
+    The last step may be shorter.
+    """
 
     start: Fraction
     step: Fraction
@@ -87,19 +98,29 @@ class TimeGrid:
             step: Step size (s).
 
         Raises:
-            ValueError: `stop` is less than `start`, `step` is not positive, or no whole step fits between `start` and `stop`.
+            ValueError: `stop` is less than `start`, `step` is not positive, or no whole step fits
+                between `start` and `stop`.
         """
         if step <= 0:
             raise ValueError(f"the step size must be positive, found {float(step)!r}")
         if stop < start:
-            raise ValueError(f"the stop time {float(stop)!r} lies before the start time {float(start)!r}")
+            raise ValueError(
+                f"the stop time {float(stop)!r} lies before the start time {float(start)!r}"
+            )
         count = (stop - start) / step
         if count > MAX_TIME:
-            raise ValueError(f"{float(stop - start)!r} s are more than {MAX_TIME} steps of {float(step)!r} s")
+            raise ValueError(
+                f"{float(stop - start)!r} s are more than {MAX_TIME} steps of {float(step)!r} s"
+            )
         if 0 < count < 1:
-            raise ValueError(f"the duration {float(stop - start)!r} s is shorter than the step size {float(step)!r} s")
+            raise ValueError(
+                f"the duration {float(stop - start)!r} s is shorter than the step size "
+                f"{float(step)!r} s"
+            )
         denominator = lcm(start.denominator, step.denominator)
-        return cls(start, step, int(count), denominator, int(start * denominator), int(step * denominator))
+        return cls(
+            start, step, int(count), denominator, int(start * denominator), int(step * denominator)
+        )
 
     def ending_at(self, stop: Fraction) -> TimeGrid:
         """Return the grid with a shorter last step, which ends at `stop` (s), if `stop` lies between two points."""
@@ -110,7 +131,11 @@ class TimeGrid:
 
     def time_at(self, n: int) -> float:
         """Return the time of communication point n (s), correctly rounded."""
-        return float(self._stop) if self._stop is not None and n >= self.count else self._regular_time(n)
+        return (
+            float(self._stop)
+            if self._stop is not None and n >= self.count
+            else self._regular_time(n)
+        )
 
     def _regular_time(self, n: int) -> float:
         return (self._origin + n * self._stride) / self._denominator
@@ -127,7 +152,10 @@ class TimeGrid:
 
     @property
     def integer_coefficients(self) -> dict[str, int]:
-        """Coefficients of the time of communication point n: (origin + n * stride) / denominator, in s."""
+        """Coefficients of the time of communication point n.
+
+        (origin + n * stride) / denominator, in s.
+        """
         return {"origin": self._origin, "stride": self._stride, "denominator": self._denominator}
 
     def times(self, points: range) -> np.ndarray:
@@ -149,7 +177,12 @@ class TimeGrid:
         Returns:
             None if some operation other than the division would be inexact up to `last`.
         """
-        largest = max(abs(self._origin), abs(self._origin + last * self._stride), last * self._stride, self._denominator)
+        largest = max(
+            abs(self._origin),
+            abs(self._origin + last * self._stride),
+            last * self._stride,
+            self._denominator,
+        )
         return (self._origin, self._stride, self._denominator) if largest <= MAX_TIME else None
 
     def index(self, time: Fraction) -> int:
@@ -165,7 +198,10 @@ class TimeGrid:
             return self.count
         n = (time - self.start) / self.step
         if n.denominator != 1:
-            raise ValueError(f"{float(time)!r} s lies between two communication points ({float(self.step)!r} s apart)")
+            raise ValueError(
+                f"{float(time)!r} s lies between two communication points ({float(self.step)!r} s "
+                "apart)"
+            )
         if n < 0:
             raise ValueError(f"{float(time)!r} s lies before the start time {self.time_at(0)!r} s")
         return int(n)

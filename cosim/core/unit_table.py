@@ -39,10 +39,29 @@ def _power(*exponents: int) -> tuple[int, ...]:
     return (*exponents, *(0,) * (len(BASE_UNITS) - len(exponents)))
 
 
-_ONE, _LENGTH, _AREA, _VOLUME, _MASS, _TIME = _power(), _power(0, 1), _power(0, 2), _power(0, 3), _power(1), _power(0, 0, 1)
-_FREQUENCY, _SPEED, _FORCE, _PRESSURE = _power(0, 0, -1), _power(0, 1, -1), _power(1, 1, -2), _power(1, -1, -2)
-_ENERGY, _POWER, _CHARGE, _DOSE = _power(1, 2, -2), _power(1, 2, -3), _power(0, 0, 1, 1), _power(0, 2, -2)
-_KELVIN, _AMOUNT, _LIGHT, _ANGLE = ((0,) * BASE_UNITS.index(base) + (1,) for base in ("K", "mol", "cd", "rad"))
+_ONE, _LENGTH, _AREA, _VOLUME, _MASS, _TIME = (
+    _power(),
+    _power(0, 1),
+    _power(0, 2),
+    _power(0, 3),
+    _power(1),
+    _power(0, 0, 1),
+)
+_FREQUENCY, _SPEED, _FORCE, _PRESSURE = (
+    _power(0, 0, -1),
+    _power(0, 1, -1),
+    _power(1, 1, -2),
+    _power(1, -1, -2),
+)
+_ENERGY, _POWER, _CHARGE, _DOSE = (
+    _power(1, 2, -2),
+    _power(1, 2, -3),
+    _power(0, 0, 1, 1),
+    _power(0, 2, -2),
+)
+_KELVIN, _AMOUNT, _LIGHT, _ANGLE = (
+    (0,) * BASE_UNITS.index(base) + (1,) for base in ("K", "mol", "cd", "rad")
+)
 
 _UnitTable = Mapping[str, tuple[float, tuple[int, ...]]]
 
@@ -123,8 +142,42 @@ UNPREFIXED: _UnitTable = {
 
 #: abbreviations and words that are no units, in lower case and singular -> the unit
 WORDS = {
-    **{"meter": "m", "metre": "m", "foot": "ft", "feet": "ft", "mps": "m/s", "kmh": "km/h", "kph": "km/h", "knot": "kn"},
-    **{"mps2": "m/s2", "second": "s", "sec": "s", "minute": "min", "hour": "h", "hertz": "Hz", "radian": "rad", "degree": "deg"},
-    **{"gram": "g", "kilogram": "kg", "newton": "N", "newtonmeter": "N.m", "pascal": "Pa", "joule": "J", "watt": "W"},
-    **{"volt": "V", "ampere": "A", "amp": "A", "ohm": "Ohm", "kelvin": "K", "celsius": "degC", "percent": "%"},
+    **{
+        "meter": "m",
+        "metre": "m",
+        "foot": "ft",
+        "feet": "ft",
+        "mps": "m/s",
+        "kmh": "km/h",
+        "kph": "km/h",
+        "knot": "kn",
+    },
+    **{
+        "mps2": "m/s2",
+        "second": "s",
+        "sec": "s",
+        "minute": "min",
+        "hour": "h",
+        "hertz": "Hz",
+        "radian": "rad",
+        "degree": "deg",
+    },
+    **{
+        "gram": "g",
+        "kilogram": "kg",
+        "newton": "N",
+        "newtonmeter": "N.m",
+        "pascal": "Pa",
+        "joule": "J",
+        "watt": "W",
+    },
+    **{
+        "volt": "V",
+        "ampere": "A",
+        "amp": "A",
+        "ohm": "Ohm",
+        "kelvin": "K",
+        "celsius": "degC",
+        "percent": "%",
+    },
 }

@@ -1,8 +1,8 @@
 """Physical units as FMI defines them: exponents of the SI base units, a factor and an offset.
 
-A value is converted to SI by `si = factor * value + offset` (FMI 2.0 section 2.2.2, FMI 3.0 section 2.4.3).
-FMUs define their own units; `parse_unit` reads the Modelica/FMI unit syntax ("kg.m2/s3") of other texts, and common spellings
-such as "W/m²" or "°C". `named_unit` accepts any text.
+A value is converted to SI by `si = factor * value + offset` (FMI 2.0 section 2.2.2, FMI 3.0 section
+2.4.3). FMUs define their own units; `parse_unit` reads the Modelica/FMI unit syntax ("kg.m2/s3") of
+other texts, and common spellings such as "W/m²" or "°C". `named_unit` accepts any text.
 """
 
 from __future__ import annotations
@@ -24,8 +24,9 @@ class Unit:
 
     Attributes:
         name: Name, usually in Modelica syntax.
-        exponents: Exponents of `BASE_UNITS`; units with equal exponents can be converted into each other. Empty if the quantity
-            is unknown; such a unit is compatible with all others, and values are not converted.
+        exponents: Exponents of `BASE_UNITS`; units with equal exponents can be converted into each
+            other. Empty if the quantity is unknown; such a unit is compatible with all others, and
+            values are not converted.
         factor: Factor of the conversion to SI.
         offset: Offset of the conversion to SI, in SI units.
     """
@@ -40,7 +41,10 @@ class Unit:
         return self.exponents == other.exponents or not (self.exponents and other.exponents)
 
     def conversion(self, other: Unit) -> tuple[float, float]:
-        """Return (factor, offset) of other = factor * self + offset; exactly (1.0, 0.0) for equal units and unknown ones."""
+        """Return (factor, offset) of other = factor * self + offset.
+
+        Exactly (1.0, 0.0) for equal units and unknown ones.
+        """
         if not (self.exponents and other.exponents):
             return 1.0, 0.0
         return self.factor / other.factor, (self.offset - other.offset) / other.factor
@@ -50,7 +54,8 @@ KNOWN_UNITS = {
     name: Unit(name, exponents, factor, OFFSETS.get(name, 0.0))
     for name, (factor, exponents) in {**PREFIXED, **UNPREFIXED}.items()
 }
-#: common spellings -> Modelica syntax, after Unicode compatibility normalization, which converts superscripts
+#: common spellings -> Modelica syntax, after Unicode compatibility normalization, which converts
+#: superscripts
 _SPELLINGS = {
     "**": "",
     "^": "",
@@ -70,7 +75,10 @@ _FACTOR_PATTERN = re.compile(r"(1(?!\d)|\{\w+\}|[^\s\d./(){}+-]+)([+-]?\d{1,3})?
 
 
 def named_unit(text: str) -> Unit:
-    """Return the unit that a text means; a text that `parse_unit` cannot read is a unit of an unknown quantity."""
+    """Return the unit that a text means.
+
+    A text that `parse_unit` cannot read is a unit of an unknown quantity.
+    """
     try:
         return parse_unit(text)
     except ValueError:
@@ -112,7 +120,10 @@ def _hint_at_unit(symbol: str) -> str:
         return f'; did you mean "{meaning}"?'
     letters = sorted(word)
     near = nearest_name(
-        symbol, KNOWN_UNITS if len(symbol) > 3 else [name for name in KNOWN_UNITS if sorted(name.lower()) == letters]
+        symbol,
+        KNOWN_UNITS
+        if len(symbol) > 3
+        else [name for name in KNOWN_UNITS if sorted(name.lower()) == letters],
     )
     return f'; did you mean "{near}"?' if near else ""
 
@@ -163,7 +174,9 @@ def _split_factors(text: str) -> list[tuple[str, int]]:
 
 
 def split_unit(text: str) -> list[tuple[str, int]]:
-    """Return the factors of a unit as pairs of symbol and power; a text that cannot be read is one factor.
+    """Return the factors of a unit as pairs of symbol and power.
+
+    A text that cannot be read is one factor.
 
     >>> split_unit("kg.m2/s3")
     [('kg', 1), ('m', 2), ('s', -3)]
@@ -181,7 +194,8 @@ def multiply_units(units: Iterable[tuple[str, int]]) -> str:
     'm2/s'
 
     Args:
-        units: Pairs of unit and power. A unit that cannot be read becomes one factor, in parentheses.
+        units: Pairs of unit and power. A unit that cannot be read becomes one factor, in
+            parentheses.
 
     Returns:
         The product, "1" if all factors cancel out.
@@ -193,7 +207,8 @@ def multiply_units(units: Iterable[tuple[str, int]]) -> str:
             powers[name] = powers.get(name, 0) + power * own
     powers.pop("1", None)
     numerator, denominator = (
-        [f"{unit}{abs(n) if abs(n) > 1 else ''}" for unit, n in powers.items() if sign * n > 0] for sign in (1, -1)
+        [f"{unit}{abs(n) if abs(n) > 1 else ''}" for unit, n in powers.items() if sign * n > 0]
+        for sign in (1, -1)
     )
     divisor = f"({'.'.join(denominator)})" if len(denominator) > 1 else "".join(denominator)
     return (".".join(numerator) or "1") + (f"/{divisor}" if denominator else "")

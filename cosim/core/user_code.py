@@ -33,7 +33,9 @@ def _is_user_file(file: str) -> bool:
     if path.is_relative_to(_BUNDLE):
         return True
     # exported Python FMUs contain a copy of PythonFMU
-    is_library = path.parent.name == "pythonfmu" or any(path.is_relative_to(folder) for folder in _library_folders())
+    is_library = path.parent.name == "pythonfmu" or any(
+        path.is_relative_to(folder) for folder in _library_folders()
+    )
     return not (file.startswith("<") or is_library or is_cosim_file(file))
 
 
@@ -41,4 +43,6 @@ def _is_user_file(file: str) -> bool:
 def _library_folders() -> set[Path]:
     import sysconfig  # takes some milliseconds, and only failures need it
 
-    return {Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib", "purelib", "platlib")}
+    return {
+        Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib", "purelib", "platlib")
+    }

@@ -19,7 +19,9 @@ def executor_class(kind: ExecutorKind) -> type[Executor]:
         InputError: the native executor was built from other sources.
     """
     if kind == "native" and not native_available():
-        raise ValueError("the native executor was not built: install cosim on a machine with a C compiler")
+        raise ValueError(
+            "the native executor was not built: install cosim on a machine with a C compiler"
+        )
     if kind == "auto":
         return EXECUTORS["native" if native_available() else "python"]
     return EXECUTORS[kind]

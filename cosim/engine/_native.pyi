@@ -7,7 +7,8 @@ FLOAT_MODE_CHANGED: Final[int]
 FLOAT_TRAPS_ENABLED: Final[int]
 NOT_FINITE: Final[int]
 CONDITIONS_CHANGED: Final[int]
-#: answers of `on_status`: continue, or end the simulation with this macro step or with the one before
+#: answers of `on_status`: continue, or end the simulation with this macro step or with the one
+#: before
 CONTINUE: Final[int]
 END_AFTER_STEP: Final[int]
 END_BEFORE_STEP: Final[int]
@@ -19,7 +20,9 @@ MARKER_ROWS: Final[int]
 MEASURED_STEPS: Final[int]
 
 class Program:
-    def __init__(self, current_time: int, marker: int, on_status: Callable[[int, int], int], /) -> None: ...
+    def __init__(
+        self, current_time: int, marker: int, on_status: Callable[[int, int], int], /
+    ) -> None: ...
     def add_transfer(
         self,
         target: int,
@@ -55,23 +58,60 @@ class Program:
         /,
     ) -> None: ...
     def add_do_step2(
-        self, call_number: int, function: int, instance: int, step_size: float, flags: int, last_successful_time: int, /
+        self,
+        call_number: int,
+        function: int,
+        instance: int,
+        step_size: float,
+        flags: int,
+        last_successful_time: int,
+        /,
     ) -> None: ...
     def add_do_step3(
-        self, call_number: int, function: int, instance: int, step_size: float, flags: int, last_successful_time: int, /
+        self,
+        call_number: int,
+        function: int,
+        instance: int,
+        step_size: float,
+        flags: int,
+        last_successful_time: int,
+        /,
     ) -> None: ...
     def add_flag_check(
-        self, call_number: int, function: int, instance: int, step_size: float, flags: int, last_successful_time: int, /
+        self,
+        call_number: int,
+        function: int,
+        instance: int,
+        step_size: float,
+        flags: int,
+        last_successful_time: int,
+        /,
     ) -> None: ...
-    def add_python_call(self, call_number: int, callable: Callable[..., int], arguments: tuple[Any, ...], /) -> None: ...
-    def set_monitored_floats(self, doubles: int, double_count: int, singles: int, single_count: int, /) -> None: ...
+    def add_python_call(
+        self, call_number: int, callable: Callable[..., int], arguments: tuple[Any, ...], /
+    ) -> None: ...
+    def set_monitored_floats(
+        self, doubles: int, double_count: int, singles: int, single_count: int, /
+    ) -> None: ...
     def set_recording(
-        self, record_every: int, row_size: int, buffer: int, buffer_size: int, record: Callable[[int], None] | None, /
+        self,
+        record_every: int,
+        row_size: int,
+        buffer: int,
+        buffer_size: int,
+        record: Callable[[int], None] | None,
+        /,
     ) -> None: ...
-    def add_row_part(self, source: int, indices: int, count: int, item_size: int, position: int, /) -> None: ...
+    def add_row_part(
+        self, source: int, indices: int, count: int, item_size: int, position: int, /
+    ) -> None: ...
     def begin_condition(self) -> None: ...
-    def add_instruction(self, kind: int, value: float, source: int, source_kind: str, skip: int, /) -> None: ...
+    def add_instruction(
+        self, kind: int, value: float, source: int, source_kind: str, skip: int, /
+    ) -> None: ...
     def set_wake_point(self, point: int, /) -> None: ...
     def set_row_address(self, address: int, /) -> None: ...
     def step_durations(self) -> list[tuple[int, int]]: ...
-    def run(self, first: int, count: int, origin: float, stride: float, denominator: float, /) -> None: ...
+    def run(
+        self, first: int, count: int, origin: float, stride: float, denominator: float, /
+    ) -> None: ...

@@ -17,7 +17,10 @@ Access = Callable[[str, str], AbstractContextManager[None]]
 
 
 class ComponentState:
-    """State of each component by its name; the memory in the components is released after the last reference is gone."""
+    """State of each component by its name.
+
+    The memory in the components is released after the last reference is gone.
+    """
 
     def __init__(self, states: Mapping[str, Any]):
         self.states = states
@@ -41,7 +44,8 @@ class SavedState:
 class ComponentStates:
     """All states that were saved of the components of a simulation.
 
-    A state that is garbage-collected is freed with the next call only, because a component may be stepping meanwhile.
+    A state that is garbage-collected is freed with the next call only, because a component may be
+    stepping meanwhile.
     """
 
     def __init__(self, components: Mapping[str, Component], access: Access):
@@ -60,9 +64,13 @@ class ComponentStates:
             InputError: a component cannot return to a state.
             ComponentError: a component failed.
         """
-        if unable := [name for name, component in self._components.items() if not component.has_state]:
+        if unable := [
+            name for name, component in self._components.items() if not component.has_state
+        ]:
             verb = "cannot return to a state (FMI: canGetAndSetFMUState)"
-            raise InputError(f"the state of the simulation cannot be saved: {abbreviate_names(unable)} {verb}")
+            raise InputError(
+                f"the state of the simulation cannot be saved: {abbreviate_names(unable)} {verb}"
+            )
         self._free_discarded()
         states: dict[str, Any] = {}
         saved = ComponentState(states)

@@ -11,7 +11,10 @@ from .plan import Step
 
 
 class ScheduledStep(NamedTuple):
-    """A component's step as calls that return an FMI status; `first_call` is the number of the first call."""
+    """A component's step as calls that return an FMI status.
+
+    `first_call` is the number of the first call.
+    """
 
     step: Step
     calls: Sequence[PreparedCall]
@@ -19,7 +22,10 @@ class ScheduledStep(NamedTuple):
 
 
 class StepFailure(NamedTuple):
-    """Call `call_index` of a step that returned `status`; a status None means that it changed the floating-point mode."""
+    """Call `call_index` of a step that returned `status`.
+
+    A status None means that it changed the floating-point mode.
+    """
 
     step: ScheduledStep
     call_index: int

@@ -31,4 +31,9 @@ def find_space_problems(plan: Plan, folder: Path, csv: bool, replaced: int = 0) 
         return []
     amount = f"{count_noun(rows, 'row')} of {count_noun(columns, 'signal')}"
     text = f"{amount} take about {size / 1e9:.3g} GB, {free / 1e9:.3g} GB are free in {folder}"
-    return [Problem(f'{text}; make the step longer, or set "record": {{"interval": ...}}', subject=("step_size",))]
+    return [
+        Problem(
+            f'{text}; make the step longer, or set "record": {{"interval": ...}}',
+            subject=("step_size",),
+        )
+    ]

@@ -43,8 +43,9 @@ class Executor(ABC):
     Args:
         plan: the compiled system.
         recorder: stores the recorded outputs.
-        marker: int64 array, shape (MARKER_SIZE,), updated before every call, so that a process which shares its memory can see
-            the current call; see CALL_NUMBER, STEP_COUNT and ROW_COUNT in `process.journal`.
+        marker: int64 array, shape (MARKER_SIZE,), updated before every call, so that a process
+            which shares its memory can see the current call; see CALL_NUMBER, STEP_COUNT and
+            ROW_COUNT in `process.journal`.
     """
 
     def __init__(self, plan: Plan, recorder: Recorder, marker: np.ndarray | None = None):
@@ -52,7 +53,9 @@ class Executor(ABC):
         self.marker = np.zeros(MARKER_SIZE, np.int64) if marker is None else marker
         self._runner = StepRunner(self.marker)
         self._finite_check = FiniteCheck(plan, self._runner)
-        self._delay_lines = {t: DelayLine(t) for phase in plan.all_phases for t in phase.transfers if t.delay}
+        self._delay_lines = {
+            t: DelayLine(t) for phase in plan.all_phases for t in phase.transfers if t.delay
+        }
         self._schedule = Schedule(plan, self._runner, self._delay_lines)
         self._parallel_steps = ParallelSteps(self._runner)
         #: conditions that end the simulation, and their state
@@ -76,7 +79,10 @@ class Executor(ABC):
     @property
     def is_finished(self) -> bool:
         """True at the last communication point, and after a component has requested termination."""
-        return self._runner.completed_steps >= self.plan.grid.count or self._runner.termination is not None
+        return (
+            self._runner.completed_steps >= self.plan.grid.count
+            or self._runner.termination is not None
+        )
 
     def describe_call(self) -> tuple[str, str]:
         """Return component and function of the present call of the stepping loop."""
@@ -134,20 +140,34 @@ class Executor(ABC):
                 self._choose_step_sizes(n)
             try:
                 next_change = next((point for point in changes if point > n), end)
-                self._run_macro_steps(n, min(end, next_change, self.recorder.last_point_in_chunk(n)))
+                self._run_macro_steps(
+                    n, min(end, next_change, self.recorder.last_point_in_chunk(n))
+                )
                 if enabled_traps():
                     self._restore_float_traps(self.completed_steps)
             finally:
                 self.recorder.set_row_count(runner.recorded_rows)
 
     def _choose_step_sizes(self, n: int) -> None:
-        """Prepare the steps with their sizes in macro step `n`, if these have changed; they run on one thread from now on."""
-        sizes = {name: size for begin, some in self.plan.shorter_steps.items() if begin <= n for name, size in some.items()}
+        """Prepare the steps with their sizes in macro step `n`, if these have changed.
+
+        They run on one thread from now on.
+        """
+        sizes = {
+            name: size
+            for begin, some in self.plan.shorter_steps.items()
+            if begin <= n
+            for name, size in some.items()
+        }
         if sizes == self._schedule.shorter_steps:
             return
         self._parallel_steps.withdraw_candidates()
         self._schedule.prepare(sizes)
-        last = self.plan.grid.end - self.plan.grid.start - self.plan.grid.whole_steps * self.plan.grid.step
+        last = (
+            self.plan.grid.end
+            - self.plan.grid.start
+            - self.plan.grid.whole_steps * self.plan.grid.step
+        )
         for line in self._delay_lines.values():
             line.shorten_step(float(last) if n + 1 == self.plan.grid.count else None)
         self._rebuild()
@@ -158,7 +178,15 @@ class Executor(ABC):
         rings = [line.ring.copy() for line in self._delay_lines.values()]
         inputs, outputs = self.plan.inputs.copy_values(), self.plan.outputs.copy_values()
         begins = list(self.stop_conditions.begins)
-        return ExecutorState(self.completed_steps, self.recorder.row_count, self.termination, inputs, outputs, rings, begins)
+        return ExecutorState(
+            self.completed_steps,
+            self.recorder.row_count,
+            self.termination,
+            inputs,
+            outputs,
+            rings,
+            begins,
+        )
 
     def restore(self, state: ExecutorState) -> None:
         """Restore a state that `save` returned; the components are restored separately."""
@@ -201,11 +229,17 @@ class Executor(ABC):
 
     @abstractmethod
     def _prepare(self) -> None:
-        """Prepare the macro steps; called after initialization, and again when the schedule has changed."""
+        """Prepare the macro steps.
+
+        Called after initialization, and again when the schedule has changed.
+        """
 
     @abstractmethod
     def _run_macro_steps(self, first: int, end: int) -> None:
-        """Run macro steps from number `first` up to at most `end`; the current chunk has room for their rows."""
+        """Run macro steps from number `first` up to at most `end`.
+
+        The current chunk has room for their rows.
+        """
 
     @abstractmethod
     def _step_durations(self) -> Mapping[int, float]:

@@ -24,18 +24,34 @@ class FiniteCheck:
         policy, recorded = plan.settings.non_finite, plan.settings.columns.values()
         connections = plan.system.connections if policy != "allow" else ()
         reader_of = {connection.source: connection.target for connection in reversed(connections)}
-        checked = [*dict.fromkeys(connection.source for connection in connections), *(recorded if policy == "fail" else ())]
-        order = {step.name: k for k, step in enumerate(step for phase in plan.all_phases for step in phase.steps)}
-        checked.sort(key=lambda endpoint: order.get(endpoint.component, 0))  # the cause before those that depend on it
-        positions = [(endpoint, plan.outputs.positions[endpoint], reader_of.get(endpoint)) for endpoint in dict.fromkeys(checked)]
+        checked = [
+            *dict.fromkeys(connection.source for connection in connections),
+            *(recorded if policy == "fail" else ()),
+        ]
+        order = {
+            step.name: k
+            for k, step in enumerate(step for phase in plan.all_phases for step in phase.steps)
+        }
+        checked.sort(
+            key=lambda endpoint: order.get(endpoint.component, 0)
+        )  # the cause before those that depend on it
+        positions = [
+            (endpoint, plan.outputs.positions[endpoint], reader_of.get(endpoint))
+            for endpoint in dict.fromkeys(checked)
+        ]
         self._checked = [each for each in positions if each[1].dtype in _FLOAT_DTYPES]
 
     @property
     def monitored_floats(self) -> list[np.ndarray]:
-        """Arrays to monitor after each macro step; a value in them that is not finite requires a call of `run`."""
+        """Arrays to monitor after each macro step.
+
+        A value in them that is not finite requires a call of `run`.
+        """
         arrays = []
         for dtype in _FLOAT_DTYPES:
-            if offsets := [position.offset for _, position, _ in self._checked if position.dtype == dtype]:
+            if offsets := [
+                position.offset for _, position, _ in self._checked if position.dtype == dtype
+            ]:
                 arrays.append(self._plan.outputs.arrays[dtype][min(offsets) : max(offsets) + 1])
         return arrays
 
@@ -51,7 +67,11 @@ class FiniteCheck:
         for endpoint, position, reader in self._checked:
             value = self._plan.outputs.arrays[position.dtype][position.offset]
             if not np.isfinite(value):
-                time = self._plan.grid.time_at(self._runner.completed_steps + (function == "do_step"))
+                time = self._plan.grid.time_at(
+                    self._runner.completed_steps + (function == "do_step")
+                )
                 use = f"and {reader} reads it" if reader else f"and is recorded for t = {time!r} s"
                 text = f'the output "{endpoint.scalar}" is {value}, {use}'
-                raise ComponentError(endpoint.component, function, text, self._runner.current_time.value)
+                raise ComponentError(
+                    endpoint.component, function, text, self._runner.current_time.value
+                )

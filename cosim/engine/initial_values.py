@@ -1,4 +1,7 @@
-"""Consistent initial values: outputs are passed to inputs until no value changes; algebraic loops are solved."""
+"""Consistent initial values: outputs are passed to inputs until no value changes.
+
+Algebraic loops are solved.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +22,8 @@ from .plan import Plan
 from .transfer_calls import compile_transfer
 from .transfer_plan import connection_conversion
 
-#: sweeps beyond one per component before Newton's method, for loops that are contractions; relative tolerance of their outputs
+#: sweeps beyond one per component before Newton's method, for loops that are contractions; relative
+#: tolerance of their outputs
 EXTRA_SWEEPS, TOLERANCE = 100, 1e-12
 #: largest number of steps of Newton's method
 MAX_NEWTON_STEPS = 50
@@ -38,16 +42,22 @@ class InitialValues:
     def __init__(self, plan: Plan, time: float):
         self._plan, self._time = plan, time
         self._components = plan.system.components
-        self._transfers = [compile_transfer(transfer) for phase in plan.all_phases for transfer in phase.transfers]
+        self._transfers = [
+            compile_transfer(transfer) for phase in plan.all_phases for transfer in phase.transfers
+        ]
         self._last_inputs: dict[str, PortValues] = {}
-        self._last_outputs = {name: _copy_values(plan.outputs.ports[name]) for name in self._components}
+        self._last_outputs = {
+            name: _copy_values(plan.outputs.ports[name]) for name in self._components
+        }
         #: values of the inputs that do not get those of the connected outputs
         self._held: dict[ArrayPosition, float] = {}
         #: largest absolute change of a floating-point output in the present sweep
         self._largest_change = 0.0
 
     def solve(self) -> None:
-        """Find values with which every input has the value of its output; loops by fixed point, else by Newton's method.
+        """Find values with which every input has the value of its output.
+
+        Loops by fixed point, else by Newton's method.
 
         Raises:
             ComponentError: a component failed, or an algebraic loop did not converge.
@@ -56,7 +66,9 @@ class InitialValues:
         changing = self._propagate()
         if not changing:
             return
-        loops = [loop for loop in find_loops(self._plan.system) if not set(changing).isdisjoint(loop)]
+        loops = [
+            loop for loop in find_loops(self._plan.system) if not set(changing).isdisjoint(loop)
+        ]
         unknowns = [_Unknowns(self._plan, loop) for loop in loops]
         if not all(each.targets for each in unknowns) or not unknowns:
             self._require_settled(changing)
@@ -74,13 +86,15 @@ class InitialValues:
 
     def _require_settled(self, changing: Sequence[Endpoint]) -> None:
         if changing:
-            raise self._failure(changing, f"the outputs {abbreviate_names(map(str, changing))} do not settle")
+            raise self._failure(
+                changing, f"the outputs {abbreviate_names(map(str, changing))} do not settle"
+            )
 
     def _propagate(self) -> list[Endpoint]:
         """Sweep until no output changes, and return the outputs that still change after all sweeps.
 
-        In a loop of n components that is a contraction, the largest change is smaller than n sweeps before. If it is not, the
-        sweeps end, because components may fail with diverging values.
+        In a loop of n components that is a contraction, the largest change is smaller than n sweeps
+        before. If it is not, the sweeps end, because components may fail with diverging values.
         """
         changing: list[Endpoint] = []
         largest: list[float] = []
@@ -89,7 +103,9 @@ class InitialValues:
             changing = self._sweep(TOLERANCE if number > len(self._components) else 0.0)
             before = largest[-len({end.component for end in changing}) :][:1]
             largest.append(self._largest_change)
-            if not changing or (number > len(self._components) and 0.0 < before[0] <= self._largest_change):
+            if not changing or (
+                number > len(self._components) and 0.0 < before[0] <= self._largest_change
+            ):
                 break
         return changing
 
@@ -106,13 +122,22 @@ class InitialValues:
         changing: list[Endpoint] = []
         for name in self._components:
             now = _copy_values(inputs.ports[name])
-            if name in self._last_inputs and not _changed_scalars(inputs.ports[name], self._last_inputs[name], now):
+            if name in self._last_inputs and not _changed_scalars(
+                inputs.ports[name], self._last_inputs[name], now
+            ):
                 continue
             self._evaluate(name)
             before, self._last_inputs[name] = self._last_outputs[name], now
             self._last_outputs[name] = _copy_values(outputs[name])
-            self._largest_change = max(self._largest_change, _largest_difference(before, self._last_outputs[name]))
-            changing += [Endpoint(name, s) for s in _changed_scalars(outputs[name], before, self._last_outputs[name], tolerance)]
+            self._largest_change = max(
+                self._largest_change, _largest_difference(before, self._last_outputs[name])
+            )
+            changing += [
+                Endpoint(name, s)
+                for s in _changed_scalars(
+                    outputs[name], before, self._last_outputs[name], tolerance
+                )
+            ]
         return changing
 
     def _evaluate(self, name: str) -> None:
@@ -120,7 +145,8 @@ class InitialValues:
             self._components[name].set_inputs()
             self._components[name].get_outputs()
 
-    # -- algebraic loops ---------------------------------------------------------------------------------------------------
+    # -- algebraic loops
+    # ---------------------------------------------------------------------------------------------------
 
     def _solve_loop(self, unknowns: _Unknowns) -> None:
         """Solve one loop; the inputs of all loops are held, and earlier loops have been solved."""
@@ -141,11 +167,18 @@ class InitialValues:
 
         solution = newton.solve(residuals, jacobian, start, unknowns.tolerances, MAX_NEWTON_STEPS)
         if not solution.converged:
-            texts = [f"{end} {residual:.3g}" for end, residual in zip(unknowns.targets, solution.residuals, strict=True)]
-            raise self._failure(unknowns.targets, f"residuals after Newton's method: {abbreviate_names(texts)}")
+            texts = [
+                f"{end} {residual:.3g}"
+                for end, residual in zip(unknowns.targets, solution.residuals, strict=True)
+            ]
+            raise self._failure(
+                unknowns.targets, f"residuals after Newton's method: {abbreviate_names(texts)}"
+            )
         self._held |= dict(zip(unknowns.positions, solution.values.tolist(), strict=True))
 
-    def _column(self, unknowns: _Unknowns, i: int, values: np.ndarray, found: np.ndarray) -> np.ndarray:
+    def _column(
+        self, unknowns: _Unknowns, i: int, values: np.ndarray, found: np.ndarray
+    ) -> np.ndarray:
         """Return the derivatives of the values that all inputs of a loop receive with respect to input `i`."""
         name, position = unknowns.targets[i].component, unknowns.positions[i]
         if (exact := self._exact_column(unknowns, i)) is not None:
@@ -165,13 +198,25 @@ class InitialValues:
         """Return the column by directional derivatives; None if the component offers none."""
         target = unknowns.targets[i]
         sources = unknowns.sources_of(target.component)
-        with calling_component(target.component, "get_directional_derivative", "initialization", self._time):
-            derivatives = self._components[target.component].get_directional_derivative(sources, target.scalar)
-        return None if derivatives is None else unknowns.received(target.component, dict(zip(sources, derivatives, strict=True)))
+        with calling_component(
+            target.component, "get_directional_derivative", "initialization", self._time
+        ):
+            derivatives = self._components[target.component].get_directional_derivative(
+                sources, target.scalar
+            )
+        return (
+            None
+            if derivatives is None
+            else unknowns.received(target.component, dict(zip(sources, derivatives, strict=True)))
+        )
 
     def _failure(self, ends: Sequence[Endpoint], reason: str) -> ComponentError:
         names = abbreviate_names(dict.fromkeys(end.component for end in ends))
-        connections = [f"{c.source} -> {c.target}" for c in self._plan.system.connections if {c.source, c.target} & set(ends)]
+        connections = [
+            f"{c.source} -> {c.target}"
+            for c in self._plan.system.connections
+            if {c.source, c.target} & set(ends)
+        ]
         text = f"an algebraic loop does not converge ({abbreviate_names(connections)}): {reason}"
         return ComponentError(names, "initialization", text, self._time)
 
@@ -182,17 +227,28 @@ class _Unknowns:
     def __init__(self, plan: Plan, loop: Sequence[Endpoint]):
         members = set(loop)
         self._plan = plan
-        self._connections = [c for c in plan.system.connections if c.source in members and c.target in members]
+        self._connections = [
+            c for c in plan.system.connections if c.source in members and c.target in members
+        ]
         inputs = dict.fromkeys(connection.target for connection in self._connections)
-        self.targets = [end for end in inputs if plan.system.find_element(end).variable.type in FLOAT_TYPES]
+        self.targets = [
+            end for end in inputs if plan.system.find_element(end).variable.type in FLOAT_TYPES
+        ]
         self.positions = [plan.inputs.positions[end] for end in self.targets]
         self._rows = {end: i for i, end in enumerate(self.targets)}
         precisions = [np.finfo(position.dtype).eps for position in self.positions]
-        self.tolerances = np.maximum(TOLERANCE, 100 * np.array(precisions, np.float64)) if precisions else np.zeros(0)
+        self.tolerances = (
+            np.maximum(TOLERANCE, 100 * np.array(precisions, np.float64))
+            if precisions
+            else np.zeros(0)
+        )
 
     def read(self) -> np.ndarray:
         """Return the present values of the inputs in memory."""
-        return np.array([self._plan.inputs.arrays[dtype][offset] for dtype, offset in self.positions], np.float64)
+        return np.array(
+            [self._plan.inputs.arrays[dtype][offset] for dtype, offset in self.positions],
+            np.float64,
+        )
 
     def write(self, values: np.ndarray) -> None:
         """Write values of the inputs to memory."""
@@ -205,7 +261,11 @@ class _Unknowns:
 
     def sources_of(self, component: str) -> list[str]:
         """Return the outputs of a component in the loop."""
-        return list(dict.fromkeys(c.source.scalar for c in self._connections if c.source.component == component))
+        return list(
+            dict.fromkeys(
+                c.source.scalar for c in self._connections if c.source.component == component
+            )
+        )
 
     def received(self, component: str, values: Mapping[str, float]) -> np.ndarray:
         """Return the part of the inputs' values that is proportional to these outputs of a component."""
@@ -234,12 +294,16 @@ def find_loops(system: System) -> list[list[Endpoint]]:
         successors[end] = [
             Endpoint(end.component, scalar)
             for scalar in outputs.get(end.component, ())
-            if depends_on(system, component.initial_dependencies, Endpoint(end.component, scalar), end)
+            if depends_on(
+                system, component.initial_dependencies, Endpoint(end.component, scalar), end
+            )
         ]
     return [loop for loop in reversed(strong_components(successors)) if len(loop) > 1]
 
 
-def depends_on(system: System, dependencies: Mapping[str, frozenset[str]], output: Endpoint, end: Endpoint) -> bool:
+def depends_on(
+    system: System, dependencies: Mapping[str, frozenset[str]], output: Endpoint, end: Endpoint
+) -> bool:
     """Return whether an output may depend on an input, from the declared dependencies of variables."""
     known = dependencies.get(system.find_element(output).variable.name)
     return known is None or system.find_element(end).variable.name in known
@@ -249,12 +313,21 @@ def _copy_values(ports: Ports) -> PortValues:
     return {dtype: array.copy() for dtype, array in ports.arrays.items()}
 
 
-def _changed_scalars(ports: Ports, old: PortValues, new: PortValues, tolerance: float = 0.0) -> list[str]:
+def _changed_scalars(
+    ports: Ports, old: PortValues, new: PortValues, tolerance: float = 0.0
+) -> list[str]:
     """Return the names of the scalars whose values differ; with tolerance 0, in any bit."""
     if all(_bit_pattern(old[dtype]) == _bit_pattern(new[dtype]) for dtype in new):
         return []
-    changed = {dtype: iter(_changed_elements(old[dtype], new[dtype], tolerance).tolist()) for dtype in new}
-    return [name for variable in ports.variables for name in variable.scalar_names if next(changed[variable.dtype])]
+    changed = {
+        dtype: iter(_changed_elements(old[dtype], new[dtype], tolerance).tolist()) for dtype in new
+    }
+    return [
+        name
+        for variable in ports.variables
+        for name in variable.scalar_names
+        if next(changed[variable.dtype])
+    ]
 
 
 def _changed_elements(old: np.ndarray, new: np.ndarray, tolerance: float) -> np.ndarray:

@@ -22,7 +22,9 @@ def instantiate_components(plan: Plan) -> None:
 
 
 def initialize_components(plan: Plan) -> None:
-    """Bring instantiated components to step mode: start values, initialization mode, consistent initial outputs.
+    """Bring instantiated components to step mode.
+
+    Start values, initialization mode, consistent initial outputs.
 
     Raises:
         ComponentError: a component failed, or an algebraic loop did not converge.
@@ -46,7 +48,10 @@ def initialize_components(plan: Plan) -> None:
 
 
 def copy_start_values(component: Component, ports: Ports) -> None:
-    """Fill the bound inputs with the component's start values; inputs without a connection keep them."""
+    """Fill the bound inputs with the component's start values.
+
+    Inputs without a connection keep them.
+    """
     filled = dict.fromkeys(ports.arrays, 0)
     for variable in ports.variables:
         begin = filled[variable.dtype]

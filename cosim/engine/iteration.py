@@ -57,7 +57,9 @@ class FixedPointIteration:
         for connection in loop.connections:
             position = outputs.positions[connection.source]
             sources[position.dtype][position.offset] = str(connection.source)
-        self._coupled_outputs = [(outputs.arrays[dtype], list(names)) for dtype, names in sources.items()]
+        self._coupled_outputs = [
+            (outputs.arrays[dtype], list(names)) for dtype, names in sources.items()
+        ]
         self._output_names = [list(names.values()) for names in sources.values()]
 
     def step(self, time: float, discard_requests: Callable[[], None]) -> None:
@@ -68,12 +70,16 @@ class FixedPointIteration:
             discard_requests: discards the termination requests of a rejected iteration.
 
         Raises:
-            ComponentError: a component failed, or the outputs did not converge within the allowed iterations.
+            ComponentError: a component failed, or the outputs did not converge within the allowed
+                iterations.
         """
         for store_values in self._prepare:
             store_values()
         with ExitStack() as stack:
-            states = {name: self._get_state(name, component, time, stack) for name, component in self._components.items()}
+            states = {
+                name: self._get_state(name, component, time, stack)
+                for name, component in self._components.items()
+            }
             is_first = True
 
             def run_round() -> list[np.ndarray]:
@@ -85,7 +91,10 @@ class FixedPointIteration:
                 before = self._output_values()
                 self._iterate_once(is_first)
                 is_first = False
-                return [self._changed(old, new) for old, new in zip(before, self._output_values(), strict=True)]
+                return [
+                    self._changed(old, new)
+                    for old, new in zip(before, self._output_values(), strict=True)
+                ]
 
             if self._loop.iteration.method == "newton":
                 self._solve_by_newton(run_round)
@@ -96,8 +105,13 @@ class FixedPointIteration:
         raise ComponentError(self._loop.name, "iteration", self._divergence_message(changed), time)
 
     def _solve_by_newton(self, run_round: Callable[[], object]) -> None:
-        """Store the solution for the outputs that are floating-point numbers; all others have the values of the round before."""
-        floats = [(array, offsets) for array, offsets in self._coupled_outputs if array.dtype.kind == "f"]
+        """Store the solution for the outputs that are floating-point numbers.
+
+        All others have the values of the round before.
+        """
+        floats = [
+            (array, offsets) for array, offsets in self._coupled_outputs if array.dtype.kind == "f"
+        ]
 
         def read() -> np.ndarray:
             return np.concatenate([array[offsets].astype(np.float64) for array, offsets in floats])
@@ -117,9 +131,15 @@ class FixedPointIteration:
             iteration = self._loop.iteration
             start = read()
             if len(floats) < len(self._coupled_outputs):
-                residuals(start)  # the differences of the Jacobian need the integers and texts that belong to these values
+                residuals(
+                    start
+                )  # the differences of the Jacobian need the integers and texts that belong to these values
             jacobian = newton.difference_jacobian(residuals)
-            write(newton.solve(residuals, jacobian, start, iteration.tolerance, iteration.max_rounds).values)
+            write(
+                newton.solve(
+                    residuals, jacobian, start, iteration.tolerance, iteration.max_rounds
+                ).values
+            )
 
     def _get_state(self, name: str, component: Component, time: float, stack: ExitStack) -> Any:
         """Return the component's state, which is freed when `stack` is closed."""
@@ -154,9 +174,14 @@ class FixedPointIteration:
         return exceeds_tolerance(old, new, self._loop.iteration.tolerance)
 
     def _divergence_message(self, changed: Sequence[np.ndarray]) -> str:
-        changing = [name for names, mask in zip(self._output_names, changed, strict=True) for name in np.array(names)[mask]]
+        changing = [
+            name
+            for names, mask in zip(self._output_names, changed, strict=True)
+            for name in np.array(names)[mask]
+        ]
         iteration = self._loop.iteration
         return (
-            f"no convergence after {iteration.max_rounds} iterations; outputs that still change by more than "
+            f"no convergence after {iteration.max_rounds} iterations; outputs that still change "
+            "by more than "
             f"{iteration.tolerance:g}: {abbreviate_names(changing)}"
         )

@@ -1,4 +1,7 @@
-"""Memory layout of the values of all components: a buffer with one array per dtype, each with one part per component."""
+"""Memory layout of the values of all components.
+
+A buffer with one array per dtype, each with one part per component.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +34,8 @@ class Layout:
     """Arrays of all components.
 
     Attributes:
-        buffer: bytes that all numeric arrays share; strings and binaries are objects in a separate array.
+        buffer: bytes that all numeric arrays share; strings and binaries are objects in a separate
+            array.
         arrays: one array per dtype.
         ports: each component's variables and its parts of the arrays.
         positions: position of every scalar.
@@ -58,7 +62,9 @@ class Layout:
     @cached_property
     def _array_offsets(self) -> dict[Dtype, int]:
         numeric = (dtype for dtype in self.arrays if not dtype.hasobject)
-        return {dtype: self.arrays[dtype].ctypes.data - self.buffer.ctypes.data for dtype in numeric}
+        return {
+            dtype: self.arrays[dtype].ctypes.data - self.buffer.ctypes.data for dtype in numeric
+        }
 
 
 def build_layout(variables: Mapping[str, Sequence[Variable]]) -> Layout:
@@ -69,28 +75,42 @@ def build_layout(variables: Mapping[str, Sequence[Variable]]) -> Layout:
     for name, owned in variables.items():
         for dtype in {variable.dtype: None for variable in owned}:
             first = lengths[dtype]
-            for scalar in (scalar for variable in owned if variable.dtype == dtype for scalar in variable.scalar_names):
+            for scalar in (
+                scalar
+                for variable in owned
+                if variable.dtype == dtype
+                for scalar in variable.scalar_names
+            ):
                 positions[Endpoint(name, scalar)] = ArrayPosition(dtype, lengths[dtype])
                 lengths[dtype] += 1
             parts[name][dtype] = slice(first, lengths[dtype])
     buffer, arrays = _allocate(lengths)
     ports = {
-        name: Ports(tuple(owned), {dtype: arrays[dtype][part] for dtype, part in parts[name].items()})
+        name: Ports(
+            tuple(owned), {dtype: arrays[dtype][part] for dtype, part in parts[name].items()}
+        )
         for name, owned in variables.items()
     }
     return Layout(buffer, arrays, ports, positions)
 
 
 def _allocate(lengths: Mapping[Dtype, int]) -> tuple[np.ndarray, dict[Dtype, np.ndarray]]:
-    """Return the buffer and its arrays, largest item size first; numbers are zero, objects are empty strings."""
-    numeric = sorted((dtype for dtype in lengths if not dtype.hasobject), key=lambda dtype: -dtype.itemsize)
+    """Return the buffer and its arrays, largest item size first.
+
+    Numbers are zero, objects are empty strings.
+    """
+    numeric = sorted(
+        (dtype for dtype in lengths if not dtype.hasobject), key=lambda dtype: -dtype.itemsize
+    )
     sizes = {dtype: _round_up(lengths[dtype] * dtype.itemsize) for dtype in numeric}
     buffer = _allocate_aligned(sum(sizes.values()))
     arrays, begin = {}, 0
     for dtype in numeric:
         arrays[dtype] = buffer[begin : begin + lengths[dtype] * dtype.itemsize].view(dtype)
         begin += sizes[dtype]
-    objects = {dtype: np.full(length, "", dtype) for dtype, length in lengths.items() if dtype.hasobject}
+    objects = {
+        dtype: np.full(length, "", dtype) for dtype, length in lengths.items() if dtype.hasobject
+    }
     return buffer, arrays | objects
 
 

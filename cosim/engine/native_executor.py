@@ -22,11 +22,13 @@ try:
 except ImportError:  # installed without a C compiler
     _native = None  # type: ignore[assignment]  # a module cannot be declared optional
 
-#: number of the interface of `_native.c`; raised with every change of a function, an argument, a code or the marker
+#: number of the interface of `_native.c`; raised with every change of a function, an argument, a
+#: code or the marker
 INTERFACE = 7
 #: average number of values in contiguous runs from which a run is copied as a block of memory
 MIN_BLOCK_VALUES = 8
-#: most macro steps per call; the first call is shorter, because it measures the durations of the steps
+#: most macro steps per call; the first call is shorter, because it measures the durations of the
+#: steps
 MAX_STEPS_PER_CALL = 1 << 16
 
 
@@ -34,14 +36,16 @@ def native_available() -> bool:
     """Return whether the native executor was built.
 
     Raises:
-        InputError: it was built from older or newer sources than this module, as happens in an editable installation.
+        InputError: it was built from older or newer sources than this module, as happens in an
+            editable installation.
     """
     if _native is None:
         return False
     found = getattr(_native, "INTERFACE", 0)
     if found != INTERFACE:
         raise InputError(
-            f"the native executor {_native.__file__} has interface {found}, expected {INTERFACE}: build it again with "
+            f"the native executor {_native.__file__} has interface {found}, expected {INTERFACE}: "
+            "build it again with "
             "`python setup.py build_ext --inplace` in the checkout"
         )
     return True
@@ -63,21 +67,32 @@ class NativeExecutor(Executor):
                 self._add_transfer(transfer)
             for step in steps:
                 self._add_step(step)
-        by_item_size = {array.dtype.itemsize: array for array in self._finite_check.monitored_floats}
-        doubles, singles = (_address_and_length(by_item_size.get(size, np.zeros(0))) for size in (8, 4))
+        by_item_size = {
+            array.dtype.itemsize: array for array in self._finite_check.monitored_floats
+        }
+        doubles, singles = (
+            _address_and_length(by_item_size.get(size, np.zeros(0))) for size in (8, 4)
+        )
         self._program.set_monitored_floats(*doubles, *singles)
         self._add_recording()
         for instructions in self.stop_conditions.instructions():
             self._program.begin_condition()
             for each, source in instructions:
                 kind = source.dtype.char.translate(_STRUCT_CODES)
-                self._program.add_instruction(getattr(_native, each.operation), each.value, _address(source), kind, each.skip)
+                self._program.add_instruction(
+                    getattr(_native, each.operation), each.value, _address(source), kind, each.skip
+                )
 
     def _native_transfers(self, transfer: Transfer) -> int:
         in_loop = all(transfer not in phase.transfers for phase in self.plan.phases)
-        return 0 if in_loop or transfer.source.dtype.hasobject else self.completed_steps - self._program_start
+        return (
+            0
+            if in_loop or transfer.source.dtype.hasobject
+            else self.completed_steps - self._program_start
+        )
 
-    # -- adding operations ---------------------------------------------------------------------------------------------
+    # -- adding operations
+    # ---------------------------------------------------------------------------------------------
 
     def _add_transfer(self, transfer: Transfer) -> None:
         if transfer.source.dtype.hasobject:
@@ -86,7 +101,9 @@ class NativeExecutor(Executor):
         views = contiguous_views(transfer)
         if views and len(transfer.target_indices) >= MIN_BLOCK_VALUES * len(views):
             for target, source in views:
-                self._program.add_block_copy(_address(np.asarray(target)), _address(np.asarray(source)), target.nbytes)
+                self._program.add_block_copy(
+                    _address(np.asarray(target)), _address(np.asarray(source)), target.nbytes
+                )
             return
         first, count = int(transfer.target_indices[0]), len(transfer.target_indices)
         is_contiguous = transfer.slope_indices is None and np.array_equal(
@@ -126,7 +143,9 @@ class NativeExecutor(Executor):
         if isinstance(native, NativeGetSet):
             program.add_get_set(number, *native)
         elif isinstance(native, NativeDoStep):
-            (program.add_do_step2 if native.version == 2 else program.add_do_step3)(number, *native[1:])
+            (program.add_do_step2 if native.version == 2 else program.add_do_step3)(
+                number, *native[1:]
+            )
         elif isinstance(native, NativeFlagCheck):
             program.add_flag_check(number, 0, 0, 0.0, native.flags, 0)
         else:
@@ -141,9 +160,12 @@ class NativeExecutor(Executor):
             self._record if recorder.has_strings else None,
         )
         for source, indices, position in recorder.row_parts:
-            self._program.add_row_part(_address(source), _address(indices), len(indices), source.itemsize, position)
+            self._program.add_row_part(
+                _address(source), _address(indices), len(indices), source.itemsize, position
+            )
 
-    # -- running -------------------------------------------------------------------------------------------------------
+    # -- running
+    # -------------------------------------------------------------------------------------------------------
 
     def _run_macro_steps(self, first: int, end: int) -> None:
         grid = self.plan.grid
@@ -154,13 +176,19 @@ class NativeExecutor(Executor):
         self._program.run(first, count, *(coefficients or (grid.time_at(first), 0.0, 1.0)))
 
     def _steps_per_call(self, first: int) -> int:
-        """Return the largest number of macro steps in one call; the first call is short and measures the durations of steps."""
+        """Return the largest number of macro steps in one call.
+
+        The first call is short and measures the durations of steps.
+        """
         measured = first >= self._program_start + _native.MEASURED_STEPS
         return MAX_STEPS_PER_CALL if measured else _native.MEASURED_STEPS
 
     def _step_durations(self) -> dict[int, float]:
         durations = self._program.step_durations()
-        return {self._schedule.find_call(number)[0].first_call: nanoseconds * 1e-9 for number, nanoseconds in durations}
+        return {
+            self._schedule.find_call(number)[0].first_call: nanoseconds * 1e-9
+            for number, nanoseconds in durations
+        }
 
     def _record(self, n: int) -> None:
         self.recorder.record(n)

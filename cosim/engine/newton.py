@@ -9,7 +9,8 @@ import numpy as np
 
 #: largest number of halvings of one step
 MAX_HALVINGS = 20
-#: a solution at which the residuals cannot be reduced is accepted if they are at most this many times the tolerance
+#: a solution at which the residuals cannot be reduced is accepted if they are at most this many
+#: times the tolerance
 ACCEPTED_MULTIPLE = 1000.0
 
 

@@ -23,9 +23,10 @@ _LONGEST_SLEEP = 10**15
 class Pacer:
     """Delays communication point n until n * step / factor after the start.
 
-    Deadlines are absolute and computed in whole nanoseconds, so errors do not accumulate: after a late step the following ones
-    start immediately until the run has caught up. Lateness is the time from a step's deadline to its completion, 0 if it was
-    completed in time. Waiting can be interrupted.
+    Deadlines are absolute and computed in whole nanoseconds, so errors do not accumulate: after a
+    late step the following ones start immediately until the run has caught up. Lateness is the time
+    from a step's deadline to its completion, 0 if it was completed in time. Waiting can be
+    interrupted.
 
     Args:
         grid: the communication points.
@@ -61,17 +62,25 @@ class Pacer:
 
     def _report_lateness(self, n: int, late: float) -> None:
         step = float(self._grid.step) / self._factor
-        text = f"t = {self._grid.time_at(n):.12g} s was reached {late:.3g} s late, more than one step ({step:.3g} s)"
+        text = (
+            f"t = {self._grid.time_at(n):.12g} s was reached {late:.3g} s late, more than one step "
+            f"({step:.3g} s)"
+        )
         if self._late == "fail":
             raise LateError(f"too slow for {self._factor:g} times real time: {text}")
         if not self._warned:
             self._warned = True
             component_log.log_message(
-                "real time", component_log.WARNING, f"{text}; reported once, the summary of the run counts all late steps"
+                "real time",
+                component_log.WARNING,
+                f"{text}; reported once, the summary of the run counts all late steps",
             )
 
     def statistics(self) -> dict[str, Any]:
-        """Return the factor, the number of steps and of late steps, and the lateness (s): maximum, mean, 99 % quantile."""
+        """Return the factor, the number of steps and of late steps, and the lateness (s).
+
+        Maximum, mean, 99 % quantile.
+        """
         lateness = np.array(self._lateness, np.float64) * 1e-9 if self._lateness else np.zeros(1)
         return {
             "factor": self._factor,

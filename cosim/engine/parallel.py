@@ -1,7 +1,8 @@
 """FMUs of one stage that step at the same time, on threads.
 
-All inputs of a stage are set before its first component steps, so neither the order of the steps nor running them concurrently
-changes a value. Python components are excluded, since they would wait for each other's interpreter lock.
+All inputs of a stage are set before its first component steps, so neither the order of the steps
+nor running them concurrently changes a value. Python components are excluded, since they would wait
+for each other's interpreter lock.
 """
 
 from __future__ import annotations
@@ -43,22 +44,31 @@ class ParallelGroup:
         """Return the steps in groups; steps of one group must not run at the same time."""
         groups: dict[object, list[ScheduledStep]] = defaultdict(list)
         for step in self.steps:
-            groups[step.first_call if self.parallel is True else step.step.component.shared_code].append(step)
+            groups[
+                step.first_call if self.parallel is True else step.step.component.shared_code
+            ].append(step)
         return groups
 
     def partition(self, durations: Mapping[int, float], processors: int) -> None:
         """Choose the partitions from measured durations; none if threads do not pay off.
 
-        "auto" requires at least two exclusive groups of long steps. It keeps instances of one FMU file in one partition, since
-        their code may share state. True treats every component as independent and worth a thread.
+        "auto" requires at least two exclusive groups of long steps. It keeps instances of one FMU
+        file in one partition, since their code may share state. True treats every component as
+        independent and worth a thread.
 
         Args:
             durations: measured doStep durations (s) by the number of the step's first call.
             processors: number of available processors.
         """
         groups = self.exclusive_groups()
-        costs = {key: sum(durations[step.first_call] for step in group) for key, group in groups.items()}
-        long_groups = [key for key, cost in costs.items() if self.parallel is True or cost >= MIN_PARALLEL_DURATION]
+        costs = {
+            key: sum(durations[step.first_call] for step in group) for key, group in groups.items()
+        }
+        long_groups = [
+            key
+            for key, cost in costs.items()
+            if self.parallel is True or cost >= MIN_PARALLEL_DURATION
+        ]
         count = min(max(2, processors) if self.parallel is True else processors, len(long_groups))
         self.partitions = _balance_load(groups, costs, count) if count > 1 else ()
 
@@ -66,14 +76,19 @@ class ParallelGroup:
 def _balance_load(
     groups: Mapping[object, Sequence[ScheduledStep]], costs: Mapping[object, float], count: int
 ) -> list[list[ScheduledStep]]:
-    """Distribute groups over `count` partitions of similar cost: each group, longest first, to the least loaded partition."""
+    """Distribute groups over `count` partitions of similar cost.
+
+    Each group, longest first, to the least loaded partition.
+    """
     partitions: list[list[ScheduledStep]] = [[] for _ in range(count)]
     loads = [0.0] * count
     for key in sorted(groups, key=lambda key: -costs[key]):
         least_loaded = loads.index(min(loads))
         partitions[least_loaded] += groups[key]
         loads[least_loaded] += costs[key]
-    return [sorted(partition, key=lambda step: step.first_call) for partition in partitions if partition]
+    return [
+        sorted(partition, key=lambda step: step.first_call) for partition in partitions if partition
+    ]
 
 
 def releases_gil(step: ScheduledStep) -> bool:
@@ -86,7 +101,8 @@ class ParallelSteps:
 
     def __init__(self, runner: StepRunner):
         self._runner = runner
-        #: by the index of the phase: the steps that may run at the same time, and the one step that replaces them
+        #: by the index of the phase: the steps that may run at the same time, and the one step that
+        #: replaces them
         self._candidates: dict[int, tuple[ParallelGroup, ScheduledStep]] = {}
         self._threads: ThreadPool | None = None
 
@@ -116,7 +132,10 @@ class ParallelSteps:
         for index, (group, parallel_step) in self._candidates.items():
             group.partition(durations, available_processors())
             if group.partitions:
-                schedule.phases[index] = [parallel_step, *(s for s in schedule.phases[index] if not releases_gil(s))]
+                schedule.phases[index] = [
+                    parallel_step,
+                    *(s for s in schedule.phases[index] if not releases_gil(s)),
+                ]
             largest = max(largest, len(group.partitions))
         self._candidates = {}
         if largest > 1:
@@ -132,7 +151,11 @@ class ParallelSteps:
         assert self._threads is not None
         run_partition = partial(run_due, n=self._runner.completed_steps)
         with calling_several_components():
-            failures = [failure for found in self._threads.map(run_partition, group.partitions) for failure in found]
+            failures = [
+                failure
+                for found in self._threads.map(run_partition, group.partitions)
+                for failure in found
+            ]
         for failure in sorted(failures, key=lambda failure: failure.step.first_call):
             if failure.status is None:
                 self._runner.restore_float_mode(failure.step.step.name)

@@ -25,7 +25,10 @@ class PerturbationTarget(NamedTuple):
 
 
 class _ConnectedInput(NamedTuple):
-    """Element of a connected input; `observed`: its value before the addition is that of the channel."""
+    """Element of a connected input.
+
+    `observed`: its value before the addition is that of the channel.
+    """
 
     values: memoryview
     offset: int
@@ -37,11 +40,13 @@ class _ConnectedInput(NamedTuple):
 class PerturbingExecutor(PythonExecutor):
     """Executor in pure Python that adds a row of values to channels of inputs in every macro step.
 
-    A value is added to a connected input after its transfer. An input without a connection and a tunable parameter are set to the
-    value that they had when the channels were chosen, plus the added value.
+    A value is added to a connected input after its transfer. An input without a connection and a
+    tunable parameter are set to the value that they had when the channels were chosen, plus the
+    added value.
 
     Attributes:
-        observed: Value of each channel before the addition, shape (steps, channels); 0 for a channel without a connection.
+        observed: Value of each channel before the addition, shape (steps, channels); 0 for a
+            channel without a connection.
     """
 
     def __init__(self, plan: Plan, recorder: Recorder, marker: np.ndarray | None = None):
@@ -51,8 +56,12 @@ class PerturbingExecutor(PythonExecutor):
         self._setters: list[tuple[int, Callable[[float], None]]] = []
         self.set_values(np.zeros((0, 0)))
 
-    def set_channels(self, channels: Sequence[Sequence[PerturbationTarget]], active: Set[str] | None = None) -> None:
-        """Choose the inputs of each channel, and the components that step; the others hold their outputs.
+    def set_channels(
+        self, channels: Sequence[Sequence[PerturbationTarget]], active: Set[str] | None = None
+    ) -> None:
+        """Choose the inputs of each channel, and the components that step.
+
+        The others hold their outputs.
 
         Args:
             channels: Targets of each channel.
@@ -67,16 +76,25 @@ class PerturbingExecutor(PythonExecutor):
         fed = {connection.target for connection in self.plan.system.connections}
         for channel, targets in enumerate(channels):
             inputs = [target for target in targets if target.endpoint in fed]
-            if iterated := [str(each.endpoint) for each in inputs if positions[each.endpoint] not in last_phases]:
+            if iterated := [
+                str(each.endpoint) for each in inputs if positions[each.endpoint] not in last_phases
+            ]:
                 raise InputError(
-                    f"{iterated[0]} belongs to components that are iterated within a macro step, expected another input"
+                    f"{iterated[0]} belongs to components that are iterated within a macro step, "
+                    "expected another input"
                 )
             inputs.sort(key=lambda each: last_phases[positions[each.endpoint]])
             for i, (endpoint, factor) in enumerate(inputs):
                 dtype, offset = position = positions[endpoint]
-                element = _ConnectedInput(self.plan.inputs.arrays[dtype].data, offset, channel, factor, not i)
+                element = _ConnectedInput(
+                    self.plan.inputs.arrays[dtype].data, offset, channel, factor, not i
+                )
                 self._connected[last_phases[position]].append(element)
-            self._setters += [(channel, _setter(self.plan.system, each)) for each in targets if each.endpoint not in fed]
+            self._setters += [
+                (channel, _setter(self.plan.system, each))
+                for each in targets
+                if each.endpoint not in fed
+            ]
         self._prepare()
 
     def set_values(self, values: np.ndarray) -> None:
@@ -95,14 +113,21 @@ class PerturbingExecutor(PythonExecutor):
 
     def _prepare(self) -> None:
         super()._prepare()
-        hooks: dict[int, list[Callable[[], object]]] = {i: [partial(self._add, inputs)] for i, inputs in self._connected.items()}
+        hooks: dict[int, list[Callable[[], object]]] = {
+            i: [partial(self._add, inputs)] for i, inputs in self._connected.items()
+        }
         if self._setters:
             hooks.setdefault(0, []).append(self._set_free_inputs)
-        self._phases = [each._replace(transfers=[*each.transfers, *hooks.get(i, ())]) for i, each in enumerate(self._phases)]
+        self._phases = [
+            each._replace(transfers=[*each.transfers, *hooks.get(i, ())])
+            for i, each in enumerate(self._phases)
+        ]
 
     def _compile_phase(self, phase: Phase, steps: Sequence[ScheduledStep]) -> _CompiledPhase:
         active = self._active
-        return super()._compile_phase(phase, [step for step in steps if active is None or step.step.name in active])
+        return super()._compile_phase(
+            phase, [step for step in steps if active is None or step.step.name in active]
+        )
 
     def _add(self, inputs: Sequence[_ConnectedInput]) -> None:
         row = self.completed_steps - self._begin
@@ -125,7 +150,10 @@ class PerturbingExecutor(PythonExecutor):
 def _setter(system: System, target: PerturbationTarget) -> Callable[[float], None]:
     """Return a function that sets an input to its present value plus a multiple of its argument."""
     endpoint, factor = target
-    component, (variable, element) = system.components[endpoint.component], system.find_element(endpoint)
+    component, (variable, element) = (
+        system.components[endpoint.component],
+        system.find_element(endpoint),
+    )
     present = component.get(variable.name)
 
     def assign(value: float) -> None:

@@ -1,8 +1,8 @@
 """Compilation of a system into a flat plan: phases of transfers and steps on shared arrays.
 
-A stage becomes a phase: all its inputs are set first, then its components step. The order within a stage therefore has no
-influence (Jacobi); one component per stage is Gauss-Seidel. A group (nested system) gets its outer inputs with its stage and
-then runs its own phases.
+A stage becomes a phase: all its inputs are set first, then its components step. The order within a
+stage therefore has no influence (Jacobi); one component per stage is Gauss-Seidel. A group (nested
+system) gets its outer inputs with its stage and then runs its own phases.
 """
 
 from __future__ import annotations
@@ -15,7 +15,16 @@ from typing import NamedTuple
 
 from ..core.component import Causality, Component, Variable
 from ..core.errors import abbreviate_names
-from ..core.system import Connection, Endpoint, Group, Iteration, Parallel, Stage, System, component_names
+from ..core.system import (
+    Connection,
+    Endpoint,
+    Group,
+    Iteration,
+    Parallel,
+    Stage,
+    System,
+    component_names,
+)
 from ..core.time_grid import TimeGrid
 from .layout import Layout, build_layout
 from .run_checks import check_run, components_with_fixed_steps
@@ -102,7 +111,8 @@ class Plan:
         reason = f"the last whole multiple of the step size {float(self.grid.step):.12g} s{periods}"
         names = abbreviate_names(components_with_fixed_steps(self.system, self.settings))
         return (
-            f"the run ends at t = {float(end):.12g} s, {reason} before the stop time {float(stop):.12g} s, "
+            f"the run ends at t = {float(end):.12g} s, {reason} before the stop time "
+            f"{float(stop):.12g} s, "
             f"because {names} cannot make a shorter step"
         )
 
@@ -131,13 +141,16 @@ def compile_plan(system: System, settings: Settings) -> Plan:
         settings: when and how to simulate.
 
     Raises:
-        InputError: the system cannot be simulated with these settings; `problems` lists all reasons, see `check_run`.
+        InputError: the system cannot be simulated with these settings; `problems` lists all
+            reasons, see `check_run`.
     """
     grid = check_run(system, settings)
     phases = list(_split_into_phases(system))
     connections = [connection for phase in phases for connection in _connections_of(phase)]
     inputs = _input_layout(system, connections)
-    outputs = _output_layout(system, connections, settings.columns.values(), _extrapolated_sources(system, phases, set()))
+    outputs = _output_layout(
+        system, connections, settings.columns.values(), _extrapolated_sources(system, phases, set())
+    )
     planner = TransferPlanner(system, inputs, outputs, float(grid.step))
     stepped: set[str] = set()
 
@@ -156,7 +169,9 @@ def compile_plan(system: System, settings: Settings) -> Plan:
 
     record_every = int((settings.record_interval or grid.step) / grid.step)
     events = _events_by_point(settings.events, grid)
-    return Plan(system, settings, grid, record_every, events, inputs, outputs, list(map(make_phase, phases)))
+    return Plan(
+        system, settings, grid, record_every, events, inputs, outputs, list(map(make_phase, phases))
+    )
 
 
 def _events_by_point(events: Iterable[Event], grid: TimeGrid) -> dict[int, list[Event]]:
@@ -179,7 +194,10 @@ def _make_step(system: System, grid: TimeGrid, name: str) -> Step:
 
 
 class _PhaseDraft(NamedTuple):
-    """A phase before its transfers are planned: connections, names of components, and the inner phases of an iterated group."""
+    """A phase before its transfers are planned.
+
+    Connections, names of components, and the inner phases of an iterated group.
+    """
 
     connections: list[Connection]
     names: list[str]
@@ -199,26 +217,35 @@ def _split_into_phases(system: System) -> Iterator[_PhaseDraft]:
     incoming: dict[str, list[Connection]] = defaultdict(list)
     for connection in system.connections:
         incoming[connection.target.component].append(connection)
-    yield from _phases_of_stages(system.stages, system.parallel, frozenset(system.components), incoming)
+    yield from _phases_of_stages(
+        system.stages, system.parallel, frozenset(system.components), incoming
+    )
 
 
 def _phases_of_stages(
-    stages: Sequence[Stage], parallel: Parallel, inside: frozenset[str], incoming: Mapping[str, Sequence[Connection]]
+    stages: Sequence[Stage],
+    parallel: Parallel,
+    inside: frozenset[str],
+    incoming: Mapping[str, Sequence[Connection]],
 ) -> Iterator[_PhaseDraft]:
     """Yield the phases of the stages.
 
-    Connections from components outside `inside` are not read here: an enclosing stage has read them.
+    Connections from components outside `inside` are not read here: an enclosing stage has read
+    them.
     """
     for stage in stages:
         groups = [member for member in stage if isinstance(member, Group)]
         members = [frozenset(component_names(group.stages)) for group in groups]
         own_group = {name: names for names in members for name in names}
-        connections = [connection for name in component_names([stage]) for connection in incoming.get(name, ())]
+        connections = [
+            connection for name in component_names([stage]) for connection in incoming.get(name, ())
+        ]
         yield _PhaseDraft(
             [
                 c
                 for c in connections
-                if c.source.component in inside and c.source.component not in own_group.get(c.target.component, ())
+                if c.source.component in inside
+                and c.source.component not in own_group.get(c.target.component, ())
             ],
             [member for member in stage if not isinstance(member, Group)],
             parallel,
@@ -234,26 +261,46 @@ def _phases_of_stages(
 def _input_layout(system: System, connections: Iterable[Connection]) -> Layout:
     """Lay out the inputs in the order of the transfers, so that the targets of a transfer are consecutive."""
     connections = list(connections)
-    terms = [Variable(term_endpoint(connection).scalar) for connection in connections if connection.term]
-    linear = [connection.target for connection in connections if connection.interpolation == "linear"]
-    return _layout_of_endpoints(system, (connection.target for connection in connections), "input", terms, linear)
+    terms = [
+        Variable(term_endpoint(connection).scalar) for connection in connections if connection.term
+    ]
+    linear = [
+        connection.target for connection in connections if connection.interpolation == "linear"
+    ]
+    return _layout_of_endpoints(
+        system, (connection.target for connection in connections), "input", terms, linear
+    )
 
 
-def _extrapolated_sources(system: System, phases: Iterable[_PhaseDraft], stepped: set[str]) -> Iterator[Endpoint]:
+def _extrapolated_sources(
+    system: System, phases: Iterable[_PhaseDraft], stepped: set[str]
+) -> Iterator[Endpoint]:
     """Yield the outputs whose slopes are given, and are used by linear connections before their components step."""
     for phase in phases:
         for source in (c.source for c in phase.connections if c.interpolation == "linear"):
-            if source.component not in stepped and system.components[source.component].gives_output_slopes:
+            if (
+                source.component not in stepped
+                and system.components[source.component].gives_output_slopes
+            ):
                 yield source
         stepped.update(phase.names, component_names(phase.group.stages) if phase.group else ())
         yield from _extrapolated_sources(system, phase.inner, stepped)
 
 
 def _output_layout(
-    system: System, connections: Iterable[Connection], recorded: Iterable[Endpoint], sloped: Iterable[Endpoint]
+    system: System,
+    connections: Iterable[Connection],
+    recorded: Iterable[Endpoint],
+    sloped: Iterable[Endpoint],
 ) -> Layout:
     """Lay out the connected and recorded outputs, in the order in which they are first read, and the slopes of some of them."""
-    return _layout_of_endpoints(system, (*(connection.source for connection in connections), *recorded), "output", (), sloped)
+    return _layout_of_endpoints(
+        system,
+        (*(connection.source for connection in connections), *recorded),
+        "output",
+        (),
+        sloped,
+    )
 
 
 def _layout_of_endpoints(
@@ -267,7 +314,10 @@ def _layout_of_endpoints(
     for endpoint in endpoints:
         variable = system.find_element(endpoint).variable
         used[endpoint.component][variable.name] = variable
-    bound = {name: _variables_to_bind(system.components[name], some, causality) for name, some in used.items()}
+    bound = {
+        name: _variables_to_bind(system.components[name], some, causality)
+        for name, some in used.items()
+    }
     slopes: dict[str, dict[str, Variable]] = defaultdict(dict)
     for endpoint in sloped:
         variable = system.find_element(endpoint).variable
@@ -276,7 +326,9 @@ def _layout_of_endpoints(
     return build_layout({**bound, "": terms} if terms else bound)
 
 
-def _variables_to_bind(component: Component, used: Mapping[str, Variable], causality: Causality) -> Sequence[Variable]:
+def _variables_to_bind(
+    component: Component, used: Mapping[str, Variable], causality: Causality
+) -> Sequence[Variable]:
     if not component.binds_everything:
         return _group_by_type(list(used.values()))
     own = [variable for variable in component.variables if variable.causality == causality]
@@ -284,6 +336,14 @@ def _variables_to_bind(component: Component, used: Mapping[str, Variable], causa
 
 
 def _group_by_type(variables: Sequence[Variable]) -> list[Variable]:
-    """Group variables by type, so that one FMI call sets or gets all of a type; enumerations count as integers."""
+    """Group variables by type, so that one FMI call sets or gets all of a type.
+
+    Enumerations count as integers.
+    """
     types = [f"Int{8 * v.dtype.itemsize}" if v.type == "Enumeration" else v.type for v in variables]
-    return [variable for kind in dict.fromkeys(types) for variable, type_ in zip(variables, types, strict=True) if type_ == kind]
+    return [
+        variable
+        for kind in dict.fromkeys(types)
+        for variable, type_ in zip(variables, types, strict=True)
+        if type_ == kind
+    ]

@@ -1,4 +1,7 @@
-"""A plan that is being simulated: initialize its components, step them with events and observers, and free them in every case."""
+"""A plan that is being simulated.
+
+Initialize its components, step them with events and observers, and free them in every case.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +23,15 @@ from ..core.recording import Recording
 from ..core.stopwatch import Stopwatch
 from ..process.float_mode import default_float_mode, is_default
 from ..process.forks import attributing_forks, report_forks
-from ..process.journal import MARKER_SIZE, OVERWRITTEN, Journal, Phase, calling_component, current_journal, suspending_deadline
+from ..process.journal import (
+    MARKER_SIZE,
+    OVERWRITTEN,
+    Journal,
+    Phase,
+    calling_component,
+    current_journal,
+    suspending_deadline,
+)
 from ..process.process_state import call_restoring_process_state, restoring_process_state
 from . import Executor, Plan, Recorder, Termination, executor_class
 from .component_states import ComponentStates, SavedState
@@ -32,7 +43,8 @@ from .saving_recorder import SavingRecorder
 #: called with (completed macro steps, all macro steps); must not change the system
 Observer = Callable[[int, int], None]
 
-#: called with n before the macro step that starts at communication point n; may wait, and may set variables like an event
+#: called with n before the macro step that starts at communication point n; may wait, and may set
+#: variables like an event
 StepHook = Callable[[int], None]
 
 
@@ -42,12 +54,13 @@ class SimulationOutcome:
 
     Attributes:
         recording: the recorded rows; after a failure, the rows until then.
-        timing: wall time (s) of extracting and instantiating ("instantiate_seconds"), of initialization mode
-            ("initialize_seconds") and of the stepping loop ("loop_seconds").
+        timing: wall time (s) of extracting and instantiating ("instantiate_seconds"), of
+            initialization mode ("initialize_seconds") and of the stepping loop ("loop_seconds").
         macro_steps: number of completed macro steps.
         termination: a component's request to end the simulation, if there was one.
         failure: the error that ended the run early, if there was one.
-        real_time: lateness of the steps, see `pacer.Pacer.statistics`; None for a run without pacing.
+        real_time: lateness of the steps, see `pacer.Pacer.statistics`; None for a run without
+            pacing.
     """
 
     recording: Recording
@@ -59,22 +72,29 @@ class SimulationOutcome:
 
 
 class PlanRun:
-    """A plan that is being simulated: call `initialize`, then `advance` as often as needed, and `close` in every case.
+    """A plan that is being simulated.
 
-    Every method that runs components sets the default floating-point mode, and restores the state of the process that components
-    have changed. The first error is final: the components are then in an unknown state, and `close` only frees them.
+    Call `initialize`, then `advance` as often as needed, and `close` in every case.
+
+    Every method that runs components sets the default floating-point mode, and restores the state
+    of the process that components have changed. The first error is final: the components are then
+    in an unknown state, and `close` only frees them.
 
     Attributes:
         executor: steps the components.
         failure: the error that ended the simulation early, if there was one.
-        is_finished: true at the last communication point, and after a component has requested termination.
+        is_finished: true at the last communication point, and after a component has requested
+            termination.
     """
 
-    def __init__(self, plan: Plan, step_hook: StepHook | None = None, executor: type[Executor] | None = None):
+    def __init__(
+        self, plan: Plan, step_hook: StepHook | None = None, executor: type[Executor] | None = None
+    ):
         """Create the executor of a plan.
 
         Args:
-            plan: the compiled system. The run owns its components, and frees them also if it cannot be created.
+            plan: the compiled system. The run owns its components, and frees them also if it cannot
+                be created.
             step_hook: called before every macro step.
             executor: class of the executor; None: as the settings of the plan choose it.
 
@@ -92,9 +112,13 @@ class PlanRun:
             raise
         self.failure: BaseException | None = None
         self._plan, self._step_hook, self._watch = plan, step_hook, Stopwatch()
-        self._pacer = Pacer(plan.grid, settings.real_time, settings.late) if settings.real_time else None
+        self._pacer = (
+            Pacer(plan.grid, settings.real_time, settings.late) if settings.real_time else None
+        )
         self._names = join_alternatives(self._components)
-        self._runs_foreign_code = any(component.runs_foreign_code for component in self._components.values())
+        self._runs_foreign_code = any(
+            component.runs_foreign_code for component in self._components.values()
+        )
         self._event_points = sorted(n for n in plan.events if n < plan.grid.count)
         self.is_finished = self._is_initialized = self._is_closed = False
         self._states = ComponentStates(self._components, self.accessing)
@@ -135,7 +159,10 @@ class PlanRun:
         if journal:
             journal.enter_phase(Phase.STEPPING, journal.deadlines.step)
         try:
-            with nullcontext() if is_default() else default_float_mode(), attributing_forks(self.executor.describe_call):
+            with (
+                nullcontext() if is_default() else default_float_mode(),
+                attributing_forks(self.executor.describe_call),
+            ):
                 if self._runs_foreign_code:
                     call_restoring_process_state(self._names, self._run_to_stops, end, observers)
                 else:
@@ -148,14 +175,18 @@ class PlanRun:
             if journal:
                 journal.enter_phase(Phase.IDLE)
             self.is_finished = self.executor.is_finished
-            if self.failure or (self.is_finished and not self._states):  # else a saved state may be restored
+            if self.failure or (
+                self.is_finished and not self._states
+            ):  # else a saved state may be restored
                 self.executor.close()
 
     def _run_to_stops(self, end: int, observers: Sequence[Observer]) -> None:
         """Run up to `end`, interrupted at events and whenever the observers are called."""
         executor, begin, events = self.executor, self.executor.completed_steps, self._event_points
         observed = range(begin, end, max(1, (end - begin) // 100)) if observers else ()
-        between = events[bisect_left(events, begin) : bisect_right(events, end)] if events else events
+        between = (
+            events[bisect_left(events, begin) : bisect_right(events, end)] if events else events
+        )
         for stop in sorted({*between, *observed, end}) if between or observed else (end,):
             if self._pacer or self._step_hook:
                 self._run_in_single_steps(stop)
@@ -195,7 +226,11 @@ class PlanRun:
         """
         time = self.executor.time
         try:
-            with default_float_mode(), restoring_process_state(component), calling_component(component, function, "step", time):
+            with (
+                default_float_mode(),
+                restoring_process_state(component),
+                calling_component(component, function, "step", time),
+            ):
                 yield
         except ComponentError as error:
             self.failure = error
@@ -218,7 +253,9 @@ class PlanRun:
             ComponentError: a component failed.
         """
         if saved.owner is not self._states:
-            raise InputError("the state was saved by another simulation, or by this one before it was reset")
+            raise InputError(
+                "the state was saved by another simulation, or by this one before it was reset"
+            )
         self._states.restore(saved.components)
         self.executor.restore(saved.executor)
         self.is_finished = self.executor.is_finished
@@ -232,11 +269,18 @@ class PlanRun:
         executor, lateness = self.executor, self._pacer.statistics() if self._pacer else None
         recording = executor.recorder.recording()
         return SimulationOutcome(
-            recording, self._watch.seconds, executor.completed_steps, executor.termination, self.failure, lateness
+            recording,
+            self._watch.seconds,
+            executor.completed_steps,
+            executor.termination,
+            self.failure,
+            lateness,
         )
 
     def close(self) -> None:
-        """Terminate the components unless one of them failed, and free them all; later calls do nothing.
+        """Terminate the components unless one of them failed, and free them all.
+
+        Later calls do nothing.
 
         A component that fails here changes no result, so its failure is logged as a warning.
 
@@ -253,7 +297,9 @@ class PlanRun:
                     if not self.failure:
                         self._states.free_all()
                 finally:
-                    _end_components(self._components, terminate=self._is_initialized and not self.failure)
+                    _end_components(
+                        self._components, terminate=self._is_initialized and not self.failure
+                    )
         finally:
             report_forks()
 
@@ -278,7 +324,8 @@ def _call_or_warn(component: str, name: str, function: Callable[[], None]) -> No
     """Call a function of a component after its last step; log a warning if it fails.
 
     Raises:
-        ComponentError: the component has overwritten memory that is not its own, so the results may be wrong.
+        ComponentError: the component has overwritten memory that is not its own, so the results may
+            be wrong.
     """
     try:
         with calling_component(component, name, "end"):
@@ -286,11 +333,16 @@ def _call_or_warn(component: str, name: str, function: Callable[[], None]) -> No
     except ComponentError as error:
         if error.reason == OVERWRITTEN:
             raise
-        component_log.log_message(component, component_log.WARNING, f"{error.function} failed: {error.reason}")
+        component_log.log_message(
+            component, component_log.WARNING, f"{error.function} failed: {error.reason}"
+        )
 
 
 def _claim_journal() -> Journal | None:
-    """Return the journal of this process for its first run; None for a later one, such as that of a KPI that simulates."""
+    """Return the journal of this process for its first run.
+
+    None for a later one, such as that of a KPI that simulates.
+    """
     journal = current_journal()
     return journal if journal and journal.claim() else None
 
@@ -298,10 +350,14 @@ def _claim_journal() -> Journal | None:
 def _space_problems(plan: Plan, journal: Journal | None) -> list[Problem]:
     settings = plan.settings
     rows = (journal and journal.folder) or (settings.rows_file and settings.rows_file.parent)
-    return find_space_problems(plan, rows or Path(tempfile.gettempdir()), csv=bool(journal and journal.csv_path))
+    return find_space_problems(
+        plan, rows or Path(tempfile.gettempdir()), csv=bool(journal and journal.csv_path)
+    )
 
 
-def _create_executor(plan: Plan, executor: type[Executor] | None, journal: Journal | None) -> Executor:
+def _create_executor(
+    plan: Plan, executor: type[Executor] | None, journal: Journal | None
+) -> Executor:
     settings = plan.settings
     if journal and journal.folder and not settings.rows_file:
         recorder: Recorder = SavingRecorder(plan, journal.folder)

@@ -39,7 +39,9 @@ class _CompiledPhase(NamedTuple):
 class _DueSteps:
     """Iterable over the steps that are due in the current macro step, for a phase with several periods."""
 
-    def __init__(self, steps: Sequence[Sequence[NumberedCall]], divisors: Sequence[int], marker: memoryview):
+    def __init__(
+        self, steps: Sequence[Sequence[NumberedCall]], divisors: Sequence[int], marker: memoryview
+    ):
         self._steps, self._divisors, self._marker = steps, divisors, marker
 
     def __iter__(self) -> Iterator[Sequence[NumberedCall]]:
@@ -56,32 +58,50 @@ class PythonExecutor(Executor):
 
     def _prepare(self) -> None:
         self._phases = [
-            self._compile_phase(phase, steps) for phase, steps in zip(self.plan.phases, self._schedule.phases, strict=True)
+            self._compile_phase(phase, steps)
+            for phase, steps in zip(self.plan.phases, self._schedule.phases, strict=True)
         ]
-        self._exponents = [_exponent_bytes(floats) for floats in self._finite_check.monitored_floats]
+        self._exponents = [
+            _exponent_bytes(floats) for floats in self._finite_check.monitored_floats
+        ]
 
     def _compile_phase(self, phase: Phase, steps: Sequence[ScheduledStep]) -> _CompiledPhase:
         divisors = [step.step.divisor for step in steps]
         views = [contiguous_views(transfer) for transfer in phase.transfers]
         copies = [pair for pairs in views if pairs is not None for pair in pairs]
-        transfers = [self._transfer_call(t) for t, pairs in zip(phase.transfers, views, strict=True) if pairs is None]
+        transfers = [
+            self._transfer_call(t)
+            for t, pairs in zip(phase.transfers, views, strict=True)
+            if pairs is None
+        ]
         calls = [self._number_calls(step) for step in steps]
-        return _CompiledPhase(copies, transfers, calls if set(divisors) <= {1} else _DueSteps(calls, divisors, self.marker.data))
+        return _CompiledPhase(
+            copies,
+            transfers,
+            calls if set(divisors) <= {1} else _DueSteps(calls, divisors, self.marker.data),
+        )
 
     def _number_calls(self, step: ScheduledStep) -> list[NumberedCall]:
         measure = self._parallel_steps.has_candidates and self.completed_steps < MEASURED_STEPS
         functions = [
-            self._with_timing(c, step.first_call) if measure and isinstance(c.native, NativeDoStep) else c.function
+            self._with_timing(c, step.first_call)
+            if measure and isinstance(c.native, NativeDoStep)
+            else c.function
             for c in step.calls
         ]
-        return [(step.first_call + i, f, c.arguments) for i, (f, c) in enumerate(zip(functions, step.calls, strict=True))]
+        return [
+            (step.first_call + i, f, c.arguments)
+            for i, (f, c) in enumerate(zip(functions, step.calls, strict=True))
+        ]
 
     def _with_timing(self, call: PreparedCall, first_call: int) -> Callable[..., int]:
         def timed(*arguments: Any) -> int:
             start = perf_counter()
             status = call.function(*arguments)
             duration = perf_counter() - start
-            self._shortest_durations[first_call] = min(self._shortest_durations.get(first_call, inf), duration)
+            self._shortest_durations[first_call] = min(
+                self._shortest_durations.get(first_call, inf), duration
+            )
             return status
 
         return timed
@@ -90,9 +110,18 @@ class PythonExecutor(Executor):
         return self._shortest_durations
 
     def _run_macro_steps(self, first: int, end: int) -> None:
-        runner, marker, phases, exponents = self._runner, self.marker.data, self._phases, self._exponents
+        runner, marker, phases, exponents = (
+            self._runner,
+            self.marker.data,
+            self._phases,
+            self._exponents,
+        )
         current_time, find_call = runner.current_time, self._schedule.find_call
-        row_writers, row, every = self.recorder.row_writers, self.recorder.row_count, self.recorder.every
+        row_writers, row, every = (
+            self.recorder.row_writers,
+            self.recorder.row_count,
+            self.recorder.every,
+        )
         one, little, least = float_mode.PROBE_VALUES
         stops = bool(self.stop_conditions)
         origin, stride, denominator = self.plan.grid.integer_coefficients.values()
@@ -132,6 +161,12 @@ def _exponent_bytes(floats: np.ndarray) -> tuple[Callable[[], bytes], slice]:
 
     A slice that contains neither 0x7F nor 0xFF has finite floats only. One of them also occurs for very large finite floats.
     """
-    high_bytes = slice(floats.itemsize - 1 if sys.byteorder == "little" else 0, None, floats.itemsize)
+    high_bytes = slice(
+        floats.itemsize - 1 if sys.byteorder == "little" else 0, None, floats.itemsize
+    )
     memory = floats.view(np.uint8)
-    return (memory.data.tobytes, high_bytes) if len(floats) < MIN_NUMPY_FLOATS else (memory[high_bytes].tobytes, slice(None))
+    return (
+        (memory.data.tobytes, high_bytes)
+        if len(floats) < MIN_NUMPY_FLOATS
+        else (memory[high_bytes].tobytes, slice(None))
+    )

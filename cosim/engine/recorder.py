@@ -30,25 +30,39 @@ class RowPart(NamedTuple):
 class Recorder:
     """Stores the values of the recorded outputs at every `every`-th communication point.
 
-    A row is a copy of the whole output buffer if at least half of it is recorded; otherwise it contains only the recorded values.
-    Strings and binaries are stored in memory, apart from the rows.
+    A row is a copy of the whole output buffer if at least half of it is recorded; otherwise it
+    contains only the recorded values. Strings and binaries are stored in memory, apart from the
+    rows.
 
     Args:
         plan: the compiled system.
-        file: file for the rows; by default they are in memory, or in a temporary file if there are very many.
+        file: file for the rows; by default they are in memory, or in a temporary file if there are
+            very many.
     """
 
     def __init__(self, plan: Plan, file: Path | None = None):
         self._plan, self.every = plan, plan.record_every
         columns = plan.settings.columns
         #: recorded name -> its variable
-        self.variables = {name: plan.system.find_element(endpoint).variable for name, endpoint in columns.items()}
-        self._positions = {name: plan.outputs.positions[endpoint] for name, endpoint in columns.items()}
-        numeric = sorted({p for p in self._positions.values() if not p.dtype.hasobject}, key=_alignment_order)
+        self.variables = {
+            name: plan.system.find_element(endpoint).variable for name, endpoint in columns.items()
+        }
+        self._positions = {
+            name: plan.outputs.positions[endpoint] for name, endpoint in columns.items()
+        }
+        numeric = sorted(
+            {p for p in self._positions.values() if not p.dtype.hasobject}, key=_alignment_order
+        )
         #: a row is a copy of the whole output buffer
-        self.whole_buffer = 2 * sum(position.dtype.itemsize for position in numeric) >= plan.outputs.buffer.nbytes > 0
+        self.whole_buffer = (
+            2 * sum(position.dtype.itemsize for position in numeric)
+            >= plan.outputs.buffer.nbytes
+            > 0
+        )
         #: the parts of a row otherwise
-        self.row_parts: Sequence[RowPart] = () if self.whole_buffer else list(self._pack_row(numeric))
+        self.row_parts: Sequence[RowPart] = (
+            () if self.whole_buffer else list(self._pack_row(numeric))
+        )
         self.row_store = open_row_store(self._row_dtype(numeric), plan.row_count, file)
         #: number of rows recorded so far
         self.row_count = 0
@@ -57,10 +71,13 @@ class Recorder:
             for name, position in self._positions.items()
             if position.dtype.hasobject
         }
-        self._string_writers: list[RowWriter] = [column.append for column in self._string_columns.values()]
+        self._string_writers: list[RowWriter] = [
+            column.append for column in self._string_columns.values()
+        ]
         #: functions that write a row of the current chunk
         self.row_writers: Sequence[RowWriter] = ()
-        #: number of rows that still fit into the current chunk, the bytes of the chunk, and the address of its end
+        #: number of rows that still fit into the current chunk, the bytes of the chunk, and the
+        #: address of its end
         self.free_rows, self.chunk, self._chunk_end = 0, np.zeros(0, np.uint8), 0
 
     def _pack_row(self, numeric: Sequence[ArrayPosition]) -> Iterator[RowPart]:
@@ -71,14 +88,24 @@ class Recorder:
             row_offset += len(indices) * dtype.itemsize
 
     def _row_dtype(self, numeric: Sequence[ArrayPosition]) -> np.dtype[Any]:
-        """Return the structured dtype of a row: one field per recorded name; names of the same output share their bytes."""
+        """Return the structured dtype of a row: one field per recorded name.
+
+        Names of the same output share their bytes.
+        """
         outputs = self._plan.outputs
         ends = np.cumsum([0, *(position.dtype.itemsize for position in numeric)]).tolist()
         if self.whole_buffer:
-            offsets, size = {position: outputs.byte_offset(position) for position in numeric}, outputs.buffer.nbytes
+            offsets, size = (
+                {position: outputs.byte_offset(position) for position in numeric},
+                outputs.buffer.nbytes,
+            )
         else:
             offsets, size = dict(zip(numeric, ends, strict=False)), -(-ends[-1] // 8) * 8
-        fields = {name: position for name, position in self._positions.items() if not position.dtype.hasobject}
+        fields = {
+            name: position
+            for name, position in self._positions.items()
+            if not position.dtype.hasobject
+        }
         return np.dtype(
             {
                 "names": list(fields),
@@ -89,7 +116,10 @@ class Recorder:
         )
 
     def write_header(self, call_names: Sequence[tuple[str, str]]) -> None:
-        """Write a description of the rows for other processes; this recorder keeps its rows private and writes none."""
+        """Write a description of the rows for other processes.
+
+        This recorder keeps its rows private and writes none.
+        """
 
     def start_chunk(self) -> None:
         """Add a chunk to the row store; call it when the current chunk is full."""
@@ -121,7 +151,10 @@ class Recorder:
         self.free_rows -= 1
 
     def last_point_in_chunk(self, n: int) -> int:
-        """Return the last communication point after `n` whose row fits into the current chunk; a full chunk is replaced."""
+        """Return the last communication point after `n` whose row fits into the current chunk.
+
+        A full chunk is replaced.
+        """
         if not self.free_rows:
             self.start_chunk()
         return n - n % self.every + (self.free_rows + 1) * self.every - 1
@@ -132,8 +165,14 @@ class Recorder:
         self.row_count = rows
 
     def rewind(self, rows: int) -> None:
-        """Forget all but the first `rows` rows; results that share memory with the others keep them."""
-        self.chunk, first = self.row_store.rewind(rows).view(np.uint8), rows - rows % self.row_store.chunk_rows
+        """Forget all but the first `rows` rows.
+
+        Results that share memory with the others keep them.
+        """
+        self.chunk, first = (
+            self.row_store.rewind(rows).view(np.uint8),
+            rows - rows % self.row_store.chunk_rows,
+        )
         self.row_count = first
         self._use_chunk()
         self.set_row_count(rows)
@@ -155,8 +194,14 @@ class Recorder:
         rows = self.row_store.read_first(self.row_count)
         columns: dict[str, np.ndarray] = {}
         for name, variable in self.variables.items():
-            values = self._string_columns[name].column(self.row_count) if name in self._string_columns else rows[name]
-            columns[name] = values.astype(bool, copy=False) if variable.type == "Boolean" else values
+            values = (
+                self._string_columns[name].column(self.row_count)
+                if name in self._string_columns
+                else rows[name]
+            )
+            columns[name] = (
+                values.astype(bool, copy=False) if variable.type == "Boolean" else values
+            )
         return Recording(self._times(), columns, self.units)
 
     def _times(self) -> np.ndarray:
@@ -170,11 +215,17 @@ class Recorder:
     @property
     def units(self) -> dict[str, str]:
         """Unit of each column; "" if it has none."""
-        return {name: variable.unit.name if variable.unit else "" for name, variable in self.variables.items()}
+        return {
+            name: variable.unit.name if variable.unit else ""
+            for name, variable in self.variables.items()
+        }
 
 
 def _alignment_order(position: ArrayPosition) -> tuple[int, str, int]:
-    """Return a sort key: largest item size first, so that every value of a packed row is aligned."""
+    """Return a sort key.
+
+    Largest item size first, so that every value of a packed row is aligned.
+    """
     return -position.dtype.itemsize, position.dtype.str, position.offset
 
 
@@ -194,7 +245,8 @@ def _part_writer(chunk: np.ndarray, size: int, part: RowPart, first: int) -> Row
     shape, strides = (len(chunk) // size, len(indices)), (size, source.itemsize)
     cells = np.ndarray(shape, source.dtype, chunk.data, position, strides)
     columns = [
-        (column.data, source.data, index) for column, index in zip(cells.T, indices[:MAX_SINGLE_COPIES].tolist(), strict=False)
+        (column.data, source.data, index)
+        for column, index in zip(cells.T, indices[:MAX_SINGLE_COPIES].tolist(), strict=False)
     ]
 
     def write_each(row: int) -> None:

@@ -53,7 +53,10 @@ def check_run(system: System, settings: Settings) -> TimeGrid:
         return grid.ending_at(settings.stop_time)
     common = lcm(*(int(period / grid.step) for period in system.periods.values()))
     if 0 < grid.count < common:
-        text = f"the steps of all components end together only after {float(common * grid.step)!r} s, after the stop time"
+        text = (
+            f"the steps of all components end together only after {float(common * grid.step)!r} s, "
+            "after the stop time"
+        )
         raise InputError(Problem(text, subject=("stop_time",)))
     return replace(grid, count=grid.count - grid.count % common)
 
@@ -64,7 +67,8 @@ def components_with_fixed_steps(system: System, settings: Settings) -> list[str]
     return [
         name
         for name, component in system.components.items()
-        if not component.variable_step and (duration / system.periods.get(name, settings.step_size)).denominator != 1
+        if not component.variable_step
+        and (duration / system.periods.get(name, settings.step_size)).denominator != 1
     ]
 
 
@@ -75,7 +79,10 @@ def _find_real_time_problems(settings: Settings) -> Iterator[Problem]:
     if not 0 < factor < inf:
         yield Problem(f"expected a positive factor for real time, found {factor!r}")
     elif settings.step_size > MAX_STEP_DURATION * Fraction(factor):
-        text = f"a step of {float(settings.step_size)!r} s takes more than {MAX_STEP_DURATION} s of wall time"
+        text = (
+            f"a step of {float(settings.step_size)!r} s takes more than {MAX_STEP_DURATION} s of "
+            "wall time"
+        )
         yield Problem(f"{text} with the factor {factor!r} for real time")
 
 
@@ -85,7 +92,9 @@ def _find_resolution_problems(settings: Settings) -> Iterator[Problem]:
     if settings.step_size < MIN_ULPS_PER_STEP * Fraction(ulp(largest)):
         step = f"a step of {float(settings.step_size)!r} s is not resolved at t = {largest!r} s"
         text = f"{step}, where the times of components are {ulp(largest):.3g} s apart"
-        yield Problem(f"{text}; make the step longer, or move the times towards 0", subject=("step_size",))
+        yield Problem(
+            f"{text}; make the step longer, or move the times towards 0", subject=("step_size",)
+        )
 
 
 def settable_variables(system: System) -> Iterator[tuple[str, Variable]]:
@@ -98,10 +107,18 @@ def settable_variables(system: System) -> Iterator[tuple[str, Variable]]:
 
 
 def not_settable_reason(name: str, variable: Variable, connected: Set[Endpoint]) -> str:
-    """Return why a variable cannot be set during a run; "" for tunable parameters and for inputs without a connection."""
-    if variable.causality == "input" and any(Endpoint(name, scalar) in connected for scalar in variable.scalar_names):
+    """Return why a variable cannot be set during a run.
+
+    "" for tunable parameters and for inputs without a connection.
+    """
+    if variable.causality == "input" and any(
+        Endpoint(name, scalar) in connected for scalar in variable.scalar_names
+    ):
         return f"{name}.{variable.name} is fed by a connection"
-    if variable.causality != "input" and (variable.causality, variable.variability) != ("parameter", "tunable"):
+    if variable.causality != "input" and (variable.causality, variable.variability) != (
+        "parameter",
+        "tunable",
+    ):
         return f"{name}.{variable.name} is neither a tunable parameter nor an input"
     return ""
 
@@ -154,31 +171,43 @@ def _step_problem(system: System, settings: Settings, fitting: Fraction) -> Prob
     """Return the problem of a step size that does not fit, with the valid ones."""
     step, common = settings.step_size, _common_divisor(_intervals(system, settings))
     longer = [name for name, period in system.periods.items() if period < step]
-    unfit = longer or [name for name, period in system.periods.items() if (period / step).denominator != 1]
+    unfit = longer or [
+        name for name, period in system.periods.items() if (period / step).denominator != 1
+    ]
     fault = (
         f"is longer than the period of {abbreviate_names(longer, 3)}"
         if longer
         else f"divides no period of {abbreviate_names(unfit, 3)}"
     )
     example = "" if fitting == common else f", such as {time_text(fitting)}"
-    text = f"step size {float(step)!r} s {fault}: expected {time_text(common)} or a whole fraction of it{example}"
+    text = (
+        f"step size {float(step)!r} s {fault}: expected {time_text(common)} or a whole fraction of "
+        f"it{example}"
+    )
     return Problem(text, subject=("step_size",))
 
 
 def _find_period_problems(system: System, settings: Settings, grid: TimeGrid) -> Iterator[Problem]:
-    """Yield the problems of single periods and of the recording interval; a too short duration is one problem."""
+    """Yield the problems of single periods and of the recording interval.
+
+    A too short duration is one problem.
+    """
     yield from _find_recording_problems(settings, grid)
     late: dict[str, Fraction] = {}
     for name, period in system.periods.items():
         ratio = period / grid.step
         if ratio.denominator != 1:
-            text = f"period {float(period)!r} s is no multiple of the step size {float(grid.step)!r} s"
+            text = (
+                f"period {float(period)!r} s is no multiple of the step size {float(grid.step)!r} s"
+            )
             yield Problem(text, subject=("components", name, "period"))
         elif 0 < grid.count < ratio:
             late[name] = period
     if late:
         duration, longest = float(grid.step * grid.count), float(max(late.values()))
-        text = f"the duration {duration!r} s is shorter than the period of {abbreviate_names(late, 3)}"
+        text = (
+            f"the duration {duration!r} s is shorter than the period of {abbreviate_names(late, 3)}"
+        )
         yield Problem(
             f"{text}: expected at least {longest!r} s",
             subject=("stop_time",) if len(late) > 1 else ("components", *late, "period"),
@@ -192,12 +221,18 @@ def _find_delay_problems(system: System) -> Iterator[Problem]:
         stored[connection.where] += connection.delay
     total = stored.total()
     if total > MAX_DELAYED_VALUES:
-        text = f"the delays store {format_count(total)} values, expected at most {format_count(MAX_DELAYED_VALUES)}"
+        text = (
+            f"the delays store {format_count(total)} values, expected at most "
+            f"{format_count(MAX_DELAYED_VALUES)}"
+        )
         yield Problem(text, max(stored, key=lambda where: stored[where]), subject=("connections",))
 
 
 def _find_recording_problems(settings: Settings, grid: TimeGrid) -> Iterator[Problem]:
     interval = settings.record_interval or grid.step
     if interval < grid.step or (interval / grid.step).denominator != 1:
-        text = f"recording interval {float(interval)!r} s is no multiple of the step size {float(grid.step)!r} s"
+        text = (
+            f"recording interval {float(interval)!r} s is no multiple of the step size "
+            f"{float(grid.step)!r} s"
+        )
         yield Problem(text, subject=("record", "interval"))

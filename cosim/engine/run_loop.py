@@ -15,7 +15,10 @@ from .settings import Settings
 
 
 def simulate(
-    system: System, settings: Settings, observers: Sequence[Observer] = (), step_hook: StepHook | None = None
+    system: System,
+    settings: Settings,
+    observers: Sequence[Observer] = (),
+    step_hook: StepHook | None = None,
 ) -> SimulationOutcome:
     """Simulate a system of new components, and free them in every case.
 
@@ -26,7 +29,8 @@ def simulate(
         step_hook: called before every macro step.
 
     Returns:
-        The outcome. An error during the run is its `failure`; the rows recorded before are in its `recording`.
+        The outcome. An error during the run is its `failure`; the rows recorded before are in its
+        `recording`.
 
     Raises:
         InputError: the system cannot be simulated with these settings.
@@ -49,7 +53,9 @@ def simulate(
 
 
 @contextmanager
-def simulating(plan: Plan, observers: Sequence[Observer] = (), step_hook: StepHook | None = None) -> Iterator[SimulationOutcome]:
+def simulating(
+    plan: Plan, observers: Sequence[Observer] = (), step_hook: StepHook | None = None
+) -> Iterator[SimulationOutcome]:
     """Simulate a plan like `simulate`, but terminate and free its components only at the end of the block.
 
     The block can save the outcome first, so that a crash in terminate or free cannot lose it.

@@ -27,15 +27,24 @@ class SavingRecorder(Recorder):
         super().__init__(plan, folder / ROWS_FILE)
         self._header_file = folder / HEADER_FILE
         positions = self._positions.items()
-        self._strings = [(name, plan.outputs.arrays[p.dtype], p.offset) for name, p in positions if p.dtype.hasobject]
-        self._saved_strings: dict[str, Any] = dict.fromkeys((name for name, _, _ in self._strings), "")
+        self._strings = [
+            (name, plan.outputs.arrays[p.dtype], p.offset)
+            for name, p in positions
+            if p.dtype.hasobject
+        ]
+        self._saved_strings: dict[str, Any] = dict.fromkeys(
+            (name for name, _, _ in self._strings), ""
+        )
         self._path = folder / TEXTS_FILE
         self._path.write_bytes(b"")
         if self._strings:
             self._string_writers.append(self._save_changed_strings)
 
     def write_header(self, call_names: Sequence[tuple[str, str]]) -> None:
-        """Write the header of the unfinished run: time grid, format of a row, and (component, function) of each call."""
+        """Write the header of the unfinished run.
+
+        Time grid, format of a row, and (component, function) of each call.
+        """
         dtype = self.row_store.dtype
         fields: Mapping[str, Any] = dtype.fields or {}
         columns = [
@@ -56,7 +65,11 @@ class SavingRecorder(Recorder):
             "row_size": dtype.itemsize,
             "columns": columns,
             "calls": call_names,
-            "texts": [(i, name) for i, name in enumerate(self.variables) if name not in (dtype.names or ())],
+            "texts": [
+                (i, name)
+                for i, name in enumerate(self.variables)
+                if name not in (dtype.names or ())
+            ],
         }
         self._header_file.write_text(json.dumps(header), encoding="utf-8")
 
@@ -66,7 +79,9 @@ class SavingRecorder(Recorder):
         The file is not left open, because foreign code could truncate it.
         """
         strings = {name: array[index] for name, array, index in self._strings}
-        if changed := {name: value for name, value in strings.items() if value != self._saved_strings[name]}:
+        if changed := {
+            name: value for name, value in strings.items() if value != self._saved_strings[name]
+        }:
             self._saved_strings |= changed
             with self._path.open("ab", buffering=0) as file:
                 file.write(json.dumps([row, changed], default=encode_value).encode() + b"\n")

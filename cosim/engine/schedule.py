@@ -30,7 +30,10 @@ class Schedule:
         self.shorter_steps: Mapping[str, float] = {}
 
     def prepare(self, shorter_steps: Mapping[str, float] = MappingProxyType({})) -> None:
-        """Schedule all phases, again for other sizes of steps; the components must be in step mode and prepare their calls."""
+        """Schedule all phases, again for other sizes of steps.
+
+        The components must be in step mode and prepare their calls.
+        """
         self.shorter_steps, self._steps = shorter_steps, []
         self.phases = [self._schedule_phase(phase) for phase in self._plan.phases]
 
@@ -51,7 +54,10 @@ class Schedule:
         return [(step.step.name, call.name) for step in self._steps for call in step.calls]
 
     def _schedule_phase(self, phase: Phase, is_outermost: bool = True) -> list[ScheduledStep]:
-        sized = [replace(step, step_size=self.shorter_steps.get(step.name, step.step_size)) for step in phase.steps]
+        sized = [
+            replace(step, step_size=self.shorter_steps.get(step.name, step.step_size))
+            for step in phase.steps
+        ]
         steps = [self.add_step(step, self._step_calls(step)) for step in sized]
         return [*steps, self._schedule_loop(phase.loop, is_outermost)] if phase.loop else steps
 
@@ -63,19 +69,32 @@ class Schedule:
     def _schedule_loop(self, loop: Loop, is_outermost: bool) -> ScheduledStep:
         """Schedule all iterations of a loop as one call.
 
-        The outermost loop stores the values at the start of the macro step for the linear transfers of all inner loops.
+        The outermost loop stores the values at the start of the macro step for the linear transfers
+        of all inner loops.
         """
         phases = [self._iteration_phase(phase) for phase in loop.phases]
-        linear = [t for phase in loop.all_phases for t in phase.transfers if t.slope_indices is not None]
+        linear = [
+            t for phase in loop.all_phases for t in phase.transfers if t.slope_indices is not None
+        ]
         prepare = [self._delay_lines[transfer].fill for transfer in linear] if is_outermost else []
-        iteration = FixedPointIteration(loop, self._plan.outputs, phases, prepare, self._runner.run_step)
+        iteration = FixedPointIteration(
+            loop, self._plan.outputs, phases, prepare, self._runner.run_step
+        )
         step = Step(loop.name, next(iter(loop.components.values())), 1, 0.0)
-        return self.add_step(step, [PreparedCall(self._runner.run_iteration, (iteration,), "iterated step")])
+        return self.add_step(
+            step, [PreparedCall(self._runner.run_iteration, (iteration,), "iterated step")]
+        )
 
     def _iteration_phase(self, phase: Phase) -> IterationPhase:
         linear = [transfer for transfer in phase.transfers if transfer.slope_indices is not None]
-        delayed = [transfer for transfer in phase.transfers if transfer.delay and transfer.slope_indices is None]
-        every_iteration: list[TransferCall] = [compile_transfer(transfer) for transfer in phase.transfers if not transfer.delay]
+        delayed = [
+            transfer
+            for transfer in phase.transfers
+            if transfer.delay and transfer.slope_indices is None
+        ]
+        every_iteration: list[TransferCall] = [
+            compile_transfer(transfer) for transfer in phase.transfers if not transfer.delay
+        ]
         every_iteration += [self._delay_lines[transfer].deliver_line for transfer in linear]
         first_iteration = [self._delay_lines[transfer].apply for transfer in delayed]
         return IterationPhase(every_iteration, first_iteration, self._schedule_phase(phase, False))

@@ -19,7 +19,9 @@ StopOutcome = Literal["crash", "decided"]
 
 @dataclass(frozen=True, slots=True)
 class Event:
-    """Values that are set at a time, before the macro step that starts there; an event after the stop time has no effect.
+    """Values that are set at a time, before the macro step that starts there.
+
+    An event after the stop time has no effect.
 
     Attributes:
         time: a communication point (s, exact).
@@ -60,13 +62,15 @@ class Settings:
         columns: recorded name -> output.
         record_interval: time between recorded points (s, exact); None: every macro step.
         events: values to set during the run.
-        stop_conditions: conditions that end the simulation before the stop time; their signals are recorded.
+        stop_conditions: conditions that end the simulation before the stop time; their signals are
+            recorded.
         executor: kind of the executor.
-        non_finite: treatment of NaN and infinity; "error": a connected output ends the run; "fail": a recorded output ends it
-            too; "allow": no output ends it.
+        non_finite: treatment of NaN and infinity; "error": a connected output ends the run; "fail":
+            a recorded output ends it too; "allow": no output ends it.
         real_time: simulated seconds per second of wall time; None: as fast as possible.
         late: reaction to a step that is more than one step late in real time.
-        rows_file: file for the recorded rows; None: in memory, or in a temporary file if there are very many.
+        rows_file: file for the recorded rows; None: in memory, or in a temporary file if there are
+            very many.
     """
 
     start_time: Fraction

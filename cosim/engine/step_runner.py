@@ -9,7 +9,13 @@ from typing import NamedTuple
 import numpy as np
 
 from ..core.component import SUCCESS_STATUSES, PreparedCall, StepResult
-from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, CosimError, describe_exception, join_alternatives
+from ..core.errors import (
+    PASS_THROUGH_EXCEPTIONS,
+    ComponentError,
+    CosimError,
+    describe_exception,
+    join_alternatives,
+)
 from ..process import float_mode
 from ..process.journal import CALL_NUMBER, ROW_COUNT, STEP_COUNT
 from .component_step import ScheduledStep
@@ -80,13 +86,17 @@ class StepRunner:
             self.restore_float_mode(step.step.name)
 
     def run_python_component(self, step: Step) -> int:
-        """Run set_inputs, do_step and get_outputs of a component without prepared calls; returns a status.
+        """Run set_inputs, do_step and get_outputs of a component without prepared calls.
+
+        Returns a status.
 
         Raises:
             ComponentError: the component raised an exception or did not reach the end of its step.
         """
         component = step.component
-        try:  # written out: the context manager `as_component_error` costs as much as the step of some components
+        # written out: the context manager `as_component_error` costs as much as the step of some
+        # components
+        try:
             component.set_inputs()
             result = component.do_step(self.current_time.value, step.step_size)
             if result is not None:
@@ -95,7 +105,9 @@ class StepRunner:
         except (CosimError, *PASS_THROUGH_EXCEPTIONS):
             raise
         except BaseException as error:
-            raise ComponentError(step.name, "do_step", describe_exception(error), self.current_time.value) from error
+            raise ComponentError(
+                step.name, "do_step", describe_exception(error), self.current_time.value
+            ) from error
         return self.termination_status
 
     def run_iteration(self, iteration: FixedPointIteration) -> int:
@@ -119,12 +131,16 @@ class StepRunner:
             ComponentError: the status means that the call failed.
         """
         if status != _STATUS_TERMINATION:
-            self._handle_step_result(step.step, step.step.component.interpret_status(call.name, status))
+            self._handle_step_result(
+                step.step, step.step.component.interpret_status(call.name, status)
+            )
 
     def _handle_step_result(self, step: Step, result: StepResult) -> None:
         time = self.current_time.value
         if not isinstance(result, StepResult):
-            raise ComponentError(step.name, "do_step", f"returned {result!r}, expected None or a StepResult", time)
+            raise ComponentError(
+                step.name, "do_step", f"returned {result!r}, expected None or a StepResult", time
+            )
         end = time + step.step_size
         complete = result.time_reached >= end
         if result.terminate_requested:
@@ -132,7 +148,9 @@ class StepRunner:
                 self.termination = Termination(step.name, min(result.time_reached, end), complete)
         elif not complete:
             reached = f"reached only t = {result.time_reached!r} s of {end!r} s"
-            raise ComponentError(step.name, "do_step", f"{reached}; early return is not supported", time)
+            raise ComponentError(
+                step.name, "do_step", f"{reached}; early return is not supported", time
+            )
 
     def restore_float_mode(self, component: str) -> None:
         """Restore the default floating-point mode, which a step of `component` has changed."""

@@ -39,19 +39,23 @@ class MetCondition(NamedTuple):
 class StopConditions:
     """Evaluation of the stop conditions of a plan at recorded communication points.
 
-    A condition ends the simulation at the first recorded point at which it has been met for its hold time: at this point, at an
-    earlier recorded point that lies at least the hold time back, and at all recorded points between them. Of several conditions
-    that end at the same point the first one counts. A condition without a value is not met.
+    A condition ends the simulation at the first recorded point at which it has been met for its
+    hold time: at this point, at an earlier recorded point that lies at least the hold time back,
+    and at all recorded points between them. Of several conditions that end at the same point the
+    first one counts. A condition without a value is not met.
 
     Attributes:
-        begins: for each condition the first of the uninterrupted points at which it was met; None: it is not met now. These are
-            its state.
-        wake_point: communication point from which on a condition may have been met for its hold time.
+        begins: for each condition the first of the uninterrupted points at which it was met; None:
+            it is not met now. These are its state.
+        wake_point: communication point from which on a condition may have been met for its hold
+            time.
     """
 
     def __init__(self, plan: Plan):
         self._plan, self._conditions = plan, plan.settings.stop_conditions
-        self._evaluators = [condition.expression.bind(self._reader) for condition in self._conditions]
+        self._evaluators = [
+            condition.expression.bind(self._reader) for condition in self._conditions
+        ]
         self._holds = [math.ceil(condition.hold / plan.grid.step) for condition in self._conditions]
         self.begins: list[int | None] = [None] * len(self._conditions)
         self.wake_point = NEVER
@@ -71,7 +75,10 @@ class StopConditions:
     def instructions(self) -> Iterator[list[tuple[Instruction, np.ndarray]]]:
         """Yield for each condition its instructions in C, each with an array that begins with the value that it loads."""
         for condition in self._conditions:
-            yield [(each, self._values_from(each.name)) for each in compile_condition(condition.expression.tree)]
+            yield [
+                (each, self._values_from(each.name))
+                for each in compile_condition(condition.expression.tree)
+            ]
 
     def _values_from(self, name: str) -> np.ndarray:
         """Return the values from that of a signal on; an empty array without a name."""
@@ -101,12 +108,19 @@ class StopConditions:
         self._set_wake_point()
 
     def _set_wake_point(self) -> None:
-        pending = (begin + hold for begin, hold in zip(self.begins, self._holds, strict=True) if begin is not None)
+        pending = (
+            begin + hold
+            for begin, hold in zip(self.begins, self._holds, strict=True)
+            if begin is not None
+        )
         self.wake_point = min(pending, default=NEVER)
 
     def _describe(self, condition: StopCondition, begin: int, end: int) -> MetCondition:
         parts = condition.expression.alternatives
-        cause = " or ".join(part.text for part in parts if self._is_met(part)) or condition.expression.text
+        cause = (
+            " or ".join(part.text for part in parts if self._is_met(part))
+            or condition.expression.text
+        )
         time_at = self._plan.grid.time_at
         return MetCondition(condition.name, condition.outcome, cause, time_at(begin), time_at(end))
 

@@ -1,4 +1,7 @@
-"""Concurrent calls on a pool of threads; a separate module, since importing `concurrent.futures` takes milliseconds."""
+"""Concurrent calls on a pool of threads.
+
+A separate module, since importing `concurrent.futures` takes milliseconds.
+"""
 
 from __future__ import annotations
 
@@ -17,9 +20,12 @@ class ThreadPool:
         self._executor = ThreadPoolExecutor(size, thread_name_prefix="cosim")
 
     def map(self, function: Callable[[Item], Result], items: Sequence[Item]) -> list[Result]:
-        """Call `function` with every item: with the first one in this thread, with the others in the pool.
+        """Call `function` with every item.
 
-        Returns or raises only when all calls have ended, since a component must not be freed during its step.
+        With the first one in this thread, with the others in the pool.
+
+        Returns or raises only when all calls have ended, since a component must not be freed during
+        its step.
 
         Args:
             function: called with one item; may raise.

@@ -18,7 +18,10 @@ MAX_SINGLE_COPIES = 4
 
 
 def contiguous_views(transfer: Transfer) -> list[tuple[memoryview, memoryview]] | None:
-    """Return (target, source) views of every contiguous run; None for many runs and for transfers that are not plain copies."""
+    """Return (target, source) views of every contiguous run.
+
+    None for many runs and for transfers that are not plain copies.
+    """
     if (
         transfer.delay
         or transfer.factor is not None
@@ -32,7 +35,13 @@ def contiguous_views(transfer: Transfer) -> list[tuple[memoryview, memoryview]] 
     runs = [slice(begin, end) for begin, end in pairwise([0, *breaks.tolist(), len(targets)])]
     if len(runs) > MAX_SINGLE_COPIES:
         return None
-    return [(_contiguous_view(transfer.target, targets[run]), _contiguous_view(transfer.source, sources[run])) for run in runs]
+    return [
+        (
+            _contiguous_view(transfer.target, targets[run]),
+            _contiguous_view(transfer.source, sources[run]),
+        )
+        for run in runs
+    ]
 
 
 def _contiguous_view(array: np.ndarray, indices: np.ndarray) -> memoryview:
@@ -45,17 +54,35 @@ def compile_transfer(transfer: Transfer) -> TransferCall:
         return partial(_add_terms, transfer)
     first, count = int(transfer.target_indices[0]), len(transfer.target_indices)
     is_contiguous = np.array_equal(transfer.target_indices, np.arange(first, first + count))
-    if count <= MAX_SINGLE_COPIES and transfer.factor is None and _is_safe_cast(transfer.source.dtype, transfer.target.dtype):
-        indices = list(zip(transfer.target_indices.tolist(), transfer.source_indices.tolist(), strict=True))
+    if (
+        count <= MAX_SINGLE_COPIES
+        and transfer.factor is None
+        and _is_safe_cast(transfer.source.dtype, transfer.target.dtype)
+    ):
+        indices = list(
+            zip(transfer.target_indices.tolist(), transfer.source_indices.tolist(), strict=True)
+        )
         return partial(_copy_items, transfer.target.data, transfer.source.data, indices)
-    if transfer.factor is not None or transfer.source.dtype != transfer.target.dtype or not is_contiguous:
+    if (
+        transfer.factor is not None
+        or transfer.source.dtype != transfer.target.dtype
+        or not is_contiguous
+    ):
         return partial(_scatter, transfer, transfer.source, transfer.source_indices)
-    return partial(transfer.source.take, transfer.source_indices, None, transfer.target[first : first + count], "clip")
+    return partial(
+        transfer.source.take,
+        transfer.source_indices,
+        None,
+        transfer.target[first : first + count],
+        "clip",
+    )
 
 
 def _is_safe_cast(source: np.dtype[Any], target: np.dtype[Any]) -> bool:
     """Return whether a memoryview of dtype `target` accepts every value of dtype `source`."""
-    return not source.hasobject and (target.kind == "b" or bool(np.can_cast(source, target, "safe")))
+    return not source.hasobject and (
+        target.kind == "b" or bool(np.can_cast(source, target, "safe"))
+    )
 
 
 def _copy_items(target: memoryview, source: memoryview, indices: Sequence[tuple[int, int]]) -> None:
@@ -79,7 +106,10 @@ def _add_terms(transfer: Transfer) -> None:
 
 
 class DelayLine:
-    """Ring buffer of a delayed or linear transfer; during the first `delay` macro steps it delivers the initial outputs."""
+    """Ring buffer of a delayed or linear transfer.
+
+    During the first `delay` macro steps it delivers the initial outputs.
+    """
 
     def __init__(self, transfer: Transfer):
         self.transfer = transfer
@@ -95,7 +125,10 @@ class DelayLine:
         self.ring[:] = self.transfer.source[self.transfer.source_indices]
 
     def shorten_step(self, step_size: float | None) -> None:
-        """Set the size of the present step (s), to which slopes between its ends belong; None: it is not shorter."""
+        """Set the size of the present step (s), to which slopes between its ends belong.
+
+        None: it is not shorter.
+        """
         if self.transfer.interpolates:
             self.step_size = step_size or self.transfer.step_size
 
@@ -113,7 +146,9 @@ class DelayLine:
         transfer, (before,) = self.transfer, self.ring
         now = transfer.source[transfer.source_indices]
         slopes = (now - before) / self.step_size
-        transfer.target[transfer.slope_indices] = slopes if transfer.factor is None else transfer.factor * slopes
+        transfer.target[transfer.slope_indices] = (
+            slopes if transfer.factor is None else transfer.factor * slopes
+        )
         _scatter(transfer, before if transfer.interpolates else now, self._all)
 
     def apply(self) -> None:

@@ -16,14 +16,17 @@ from .layout import ArrayPosition, Dtype, Layout
 
 @dataclass(frozen=True, eq=False)
 class Transfer:
-    """Values of one dtype that are copied together: target = factor * source + offset, `delay` macro steps late.
+    """Values of one dtype that are copied together.
 
-    Without `factor` and `offset` the values are copied, and converted to the dtype of the target. `source_indices` has the shape
-    (values,), or (terms, values) for sums of terms.
+    Target = factor * source + offset, `delay` macro steps late.
 
-    With `slope_indices` the inputs change linearly within the next step of `step_size` (s): the slope of the output since the
-    last transfer is stored at these indices of `target`. The values are those of the last transfer if the output already has its
-    value of the end of the step (`interpolates`). The delay is then 1. Slopes that the source gives are plain transfers.
+    Without `factor` and `offset` the values are copied, and converted to the dtype of the target.
+    `source_indices` has the shape (values,), or (terms, values) for sums of terms.
+
+    With `slope_indices` the inputs change linearly within the next step of `step_size` (s): the
+    slope of the output since the last transfer is stored at these indices of `target`. The values
+    are those of the last transfer if the output already has its value of the end of the step
+    (`interpolates`). The delay is then 1. Slopes that the source gives are plain transfers.
     """
 
     source: np.ndarray
@@ -39,18 +42,29 @@ class Transfer:
 
     @property
     def term_count(self) -> int:
-        """Number of source values that are added to each target value; 0: the transfer makes no sums."""
+        """Number of source values that are added to each target value.
+
+        0: the transfer makes no sums.
+        """
         return len(self.source_indices) if self.source_indices.ndim == 2 else 0
 
 
 def term_endpoint(connection: Connection) -> Endpoint:
-    """Return the name of the value of one term of a sum in the layout of the inputs; no component has the name ""."""
+    """Return the name of the value of one term of a sum in the layout of the inputs.
+
+    No component has the name "".
+    """
     return Endpoint("", f"{connection.target}+{connection.term}")
 
 
 def slope_variable(variable: Variable) -> Variable:
     """Return the variable with the time derivative of an input or output."""
-    return Variable(f"slope of {variable.name}", causality=variable.causality, shape=variable.shape, derivative_of=variable.name)
+    return Variable(
+        f"slope of {variable.name}",
+        causality=variable.causality,
+        shape=variable.shape,
+        derivative_of=variable.name,
+    )
 
 
 def slope_endpoint(system: System, end: Endpoint) -> Endpoint:
@@ -60,9 +74,12 @@ def slope_endpoint(system: System, end: Endpoint) -> Endpoint:
 
 
 def unit_conversion(source: Variable, target: Variable) -> tuple[float, float]:
-    """Return (factor, offset) from the source's unit to the target's unit; (1.0, 0.0) if one of them has no unit.
+    """Return (factor, offset) from the source's unit to the target's unit.
 
-    A relative quantity has no offset (FMI 2.0 section 2.2.3, FMI 3.0 section 2.4.4: relativeQuantity).
+    (1.0, 0.0) if one of them has no unit.
+
+    A relative quantity has no offset (FMI 2.0 section 2.2.3, FMI 3.0 section 2.4.4:
+    relativeQuantity).
     """
     if source.unit is None or target.unit is None:
         return 1.0, 0.0
@@ -88,8 +105,14 @@ class TransferPlanner:
     """
 
     def __init__(self, system: System, inputs: Layout, outputs: Layout, step_size: float):
-        self._system, self._inputs, self._outputs, self._step_size = system, inputs, outputs, step_size
-        #: (dtype of source, position of target) -> offset of source, for connections without delay and conversion
+        self._system, self._inputs, self._outputs, self._step_size = (
+            system,
+            inputs,
+            outputs,
+            step_size,
+        )
+        #: (dtype of source, position of target) -> offset of source, for connections without delay
+        #: and conversion
         self._copies: dict[tuple[Dtype, ArrayPosition], int] = {}
         for connection in system.connections:
             is_copy = not connection.delay and connection.interpolation == "hold"
@@ -101,7 +124,8 @@ class TransferPlanner:
         for connection in system.connections:
             if connection.term:
                 self._terms[connection.target].append(connection)
-        #: targets of the connections of this phase and of earlier ones, which must not be overwritten with newer values
+        #: targets of the connections of this phase and of earlier ones, which must not be
+        #: overwritten with newer values
         self._targets_read: set[ArrayPosition] = set()
 
     def _positions(self, connection: Connection) -> tuple[ArrayPosition, ArrayPosition]:
@@ -111,18 +135,27 @@ class TransferPlanner:
     def _conversion(self, connection: Connection) -> tuple[float, float]:
         return connection_conversion(self._system, connection)
 
-    def plan_transfers(self, connections: Iterable[Connection], stepped: Set[str] = frozenset()) -> Iterator[Transfer]:
-        """Yield the transfers of one phase, grouped by dtypes, delay and conversion; then the sums of the transferred terms.
+    def plan_transfers(
+        self, connections: Iterable[Connection], stepped: Set[str] = frozenset()
+    ) -> Iterator[Transfer]:
+        """Yield the transfers of one phase, grouped by dtypes, delay and conversion.
+
+        Then the sums of the transferred terms.
 
         Args:
-            connections: those that are read in this phase; call this method in the order of the phases.
+            connections: those that are read in this phase; call this method in the order of the
+                phases.
             stepped: components that have already made the present macro step.
         """
         connections = list(connections)
         self._targets_read |= {self._positions(connection)[1] for connection in connections}
         groups: dict[tuple[Dtype, Dtype, int, bool], list[Connection]] = defaultdict(list)
-        yield from self._linear_transfers([c for c in connections if c.interpolation == "linear"], stepped)
-        for connection in (connection for connection in connections if connection.interpolation == "hold"):
+        yield from self._linear_transfers(
+            [c for c in connections if c.interpolation == "linear"], stepped
+        )
+        for connection in (
+            connection for connection in connections if connection.interpolation == "hold"
+        ):
             source, target = self._positions(connection)
             converted = self._conversion(connection) != (1.0, 0.0)
             groups[source.dtype, target.dtype, connection.delay, converted].append(connection)
@@ -131,7 +164,9 @@ class TransferPlanner:
                 yield self._delayed_or_converted(group, delay, converted)
             else:
                 yield from self._contiguous_copies(group)
-        yield from self._sums(dict.fromkeys(connection.target for connection in connections if connection.term))
+        yield from self._sums(
+            dict.fromkeys(connection.target for connection in connections if connection.term)
+        )
 
     def _sums(self, targets: Iterable[Endpoint]) -> Iterator[Transfer]:
         """Yield the transfers that add up the terms of these inputs, grouped by dtype and number of terms."""
@@ -139,64 +174,107 @@ class TransferPlanner:
         for target in targets:
             groups[self._inputs.positions[target].dtype, len(self._terms[target])].append(target)
         for (dtype, _), group in groups.items():
-            terms = [[self._inputs.positions[term_endpoint(term)] for term in self._terms[target]] for target in group]
+            terms = [
+                [self._inputs.positions[term_endpoint(term)] for term in self._terms[target]]
+                for target in group
+            ]
             yield Transfer(
                 self._inputs.arrays[terms[0][0].dtype],
-                np.ascontiguousarray(np.transpose([[position.offset for position in row] for row in terms]), np.intp),
+                np.ascontiguousarray(
+                    np.transpose([[position.offset for position in row] for row in terms]), np.intp
+                ),
                 self._inputs.arrays[dtype],
                 np.array([self._inputs.positions[target].offset for target in group], np.intp),
             )
 
-    def _linear_transfers(self, connections: Sequence[Connection], stepped: Set[str]) -> Iterator[Transfer]:
-        """Yield the transfers of values and slopes: slopes that the source gives, else those of the line through two values."""
-        given = [c for c in connections if slope_endpoint(self._system, c.source) in self._outputs.positions]
+    def _linear_transfers(
+        self, connections: Sequence[Connection], stepped: Set[str]
+    ) -> Iterator[Transfer]:
+        """Yield the transfers of values and slopes.
+
+        Slopes that the source gives, else those of the line through two values.
+        """
+        given = [
+            c
+            for c in connections
+            if slope_endpoint(self._system, c.source) in self._outputs.positions
+        ]
         given = [connection for connection in given if connection.source.component not in stepped]
         if given:
             yield self._delayed_or_converted(given, 0, True)
             yield self._slope_transfer(given)
         for interpolates in (False, True):
-            rest = [c for c in connections if (c.source.component in stepped) == interpolates and c not in given]
+            rest = [
+                c
+                for c in connections
+                if (c.source.component in stepped) == interpolates and c not in given
+            ]
             if rest:
                 yield self._linear_transfer(rest, interpolates)
 
     def _slope_transfer(self, connections: Sequence[Connection]) -> Transfer:
-        ends = [[slope_endpoint(self._system, end) for end in (c.source, c.target)] for c in connections]
+        ends = [
+            [slope_endpoint(self._system, end) for end in (c.source, c.target)] for c in connections
+        ]
         factor = np.array([self._conversion(connection)[0] for connection in connections])
         sources = [self._outputs.positions[source] for source, _ in ends]
-        return self._make_transfer(sources, [self._inputs.positions[t] for _, t in ends], 0, factor, np.zeros_like(factor))
+        return self._make_transfer(
+            sources, [self._inputs.positions[t] for _, t in ends], 0, factor, np.zeros_like(factor)
+        )
 
     def _linear_transfer(self, connections: Sequence[Connection], interpolates: bool) -> Transfer:
         converted = any(self._conversion(connection) != (1.0, 0.0) for connection in connections)
-        slopes = [self._inputs.positions[slope_endpoint(self._system, connection.target)].offset for connection in connections]
+        slopes = [
+            self._inputs.positions[slope_endpoint(self._system, connection.target)].offset
+            for connection in connections
+        ]
         plain = self._delayed_or_converted(list(connections), 1, converted)
-        return replace(plain, slope_indices=np.array(slopes, np.intp), interpolates=interpolates, step_size=self._step_size)
+        return replace(
+            plain,
+            slope_indices=np.array(slopes, np.intp),
+            interpolates=interpolates,
+            step_size=self._step_size,
+        )
 
-    def _delayed_or_converted(self, connections: list[Connection], delay: int, converted: bool) -> Transfer:
+    def _delayed_or_converted(
+        self, connections: list[Connection], delay: int, converted: bool
+    ) -> Transfer:
         sources, targets = zip(*map(self._positions, connections), strict=True)
         if not converted:
             return self._make_transfer(sources, targets, delay)
-        factor, offset = np.ascontiguousarray(np.transpose([self._conversion(connection) for connection in connections]))
+        factor, offset = np.ascontiguousarray(
+            np.transpose([self._conversion(connection) for connection in connections])
+        )
         return self._make_transfer(sources, targets, delay, factor, offset)
 
     def _contiguous_copies(self, connections: list[Connection]) -> Iterator[Transfer]:
         """Yield plain copies with consecutive targets.
 
-        A gap between targets is filled with connections of later phases, which are copied again in their own phase: one long
-        transfer costs less than two short ones.
+        A gap between targets is filled with connections of later phases, which are copied again in
+        their own phase: one long transfer costs less than two short ones.
         """
-        source_dtype, target_dtype = (position.dtype for position in self._positions(connections[0]))
+        source_dtype, target_dtype = (
+            position.dtype for position in self._positions(connections[0])
+        )
         offsets = sorted(self._positions(connection)[1].offset for connection in connections)
         runs = [[offsets[0]]]
         for before, after in pairwise(offsets):
             gap = range(before + 1, after)
-            if all(self._may_be_read_early(source_dtype, ArrayPosition(target_dtype, offset)) for offset in gap):
+            if all(
+                self._may_be_read_early(source_dtype, ArrayPosition(target_dtype, offset))
+                for offset in gap
+            ):
                 runs[-1] += [*gap, after]
             else:
                 runs.append([after])
         for run in runs:
             targets = [ArrayPosition(target_dtype, offset) for offset in run]
             yield self._make_transfer(
-                [ArrayPosition(source_dtype, self._copies[source_dtype, target]) for target in targets], targets
+                [
+                    ArrayPosition(source_dtype, self._copies[source_dtype, target])
+                    for target in targets
+                ],
+                targets,
             )
 
     def _may_be_read_early(self, source_dtype: Dtype, target: ArrayPosition) -> bool:

@@ -1,6 +1,9 @@
-"""Comparison of two FMUs by behaviour: declared variables, and outputs under random inputs and parameters.
+"""Comparison of two FMUs by behaviour.
 
-The files themselves are not compared: different compilers produce different binaries for the same model.
+Declared variables, and outputs under random inputs and parameters.
+
+The files themselves are not compared: different compilers produce different binaries for the same
+model.
 """
 
 from __future__ import annotations
@@ -40,8 +43,9 @@ class Trace:
 def compare_fmus(first: Sequence[Path], second: Sequence[Path], seed: int = 1) -> dict[Path, str]:
     """Compare each FMU of `second` with its counterpart in `first`.
 
-    The FMUs of each side run in a separate process, so that a crashing FMU is reported and does not end this process. Their
-    messages are discarded, because random inputs and parameters make models complain.
+    The FMUs of each side run in a separate process, so that a crashing FMU is reported and does not
+    end this process. Their messages are discarded, because random inputs and parameters make models
+    complain.
 
     Args:
         first: The reference FMUs.
@@ -49,7 +53,8 @@ def compare_fmus(first: Sequence[Path], second: Sequence[Path], seed: int = 1) -
         seed: Seed of the random inputs and parameters.
 
     Returns:
-        The first difference of each FMU of `second` that behaves differently. FMUs that behave alike are omitted.
+        The first difference of each FMU of `second` that behaves differently. FMUs that behave
+        alike are omitted.
     """
     if not first:
         return {}
@@ -58,7 +63,10 @@ def compare_fmus(first: Sequence[Path], second: Sequence[Path], seed: int = 1) -
     with pools[0] as first_pool, pools[1] as second_pool:
         first_traces = [first_pool.submit(record_traces, path, seed) for path in first]
         second_traces = [second_pool.submit(record_traces, path, seed) for path in second]
-        differences = {path: _difference_of_results(a, b) for path, a, b in zip(second, first_traces, second_traces, strict=True)}
+        differences = {
+            path: _difference_of_results(a, b)
+            for path, a, b in zip(second, first_traces, second_traces, strict=True)
+        }
     return {path: difference for path, difference in differences.items() if difference}
 
 
@@ -74,19 +82,29 @@ def _difference_of_results(first: Future[list[Trace]], second: Future[list[Trace
 
 def first_difference(first: Trace, second: Trace) -> str:
     """Return a description of the first difference between two traces, or "" if they agree within the tolerances."""
-    first_variables, second_variables = ({variable.name: variable for variable in trace.variables} for trace in (first, second))
+    first_variables, second_variables = (
+        {variable.name: variable for variable in trace.variables} for trace in (first, second)
+    )
     for name in sorted(first_variables.keys() | second_variables.keys()):
         a, b = first_variables.get(name), second_variables.get(name)
         if a != b:
             return f'variable "{name}" {_declaration_difference(a, b)}'
     if first.failure != second.failure:
-        return f'outcome differs: "{first.failure or "no failure"}" and "{second.failure or "no failure"}"'
+        return (
+            f'outcome differs: "{first.failure or "no failure"}" and '
+            f'"{second.failure or "no failure"}"'
+        )
     for name, x, y in zip(first.outputs, first.values.T, second.values.T, strict=True):
         scale = np.nanmax(np.abs([*x, *y, 0.0]))
-        differing = ~np.isclose(x, y, rtol=0, atol=RELATIVE_TOLERANCE * scale + ABSOLUTE_TOLERANCE, equal_nan=True)
+        differing = ~np.isclose(
+            x, y, rtol=0, atol=RELATIVE_TOLERANCE * scale + ABSOLUTE_TOLERANCE, equal_nan=True
+        )
         if differing.any():
             row = int(np.argmax(differing))
-            return f'output "{name}" differs at t = {row * STEP_SIZE:.12g} s: {x[row]!r} and {y[row]!r}'
+            return (
+                f'output "{name}" differs at t = {row * STEP_SIZE:.12g} s: {x[row]!r} and '
+                f"{y[row]!r}"
+            )
     return ""
 
 
@@ -94,7 +112,9 @@ def _declaration_difference(first: Variable | None, second: Variable | None) -> 
     if first is None or second is None:
         return f"exists only in the {'rebuilt' if first is None else 'present'} FMU"
     changed = [key for key in Variable.__slots__ if getattr(first, key) != getattr(second, key)]
-    return "; ".join(f"has {key} {getattr(first, key)!r} and {getattr(second, key)!r}" for key in changed)
+    return "; ".join(
+        f"has {key} {getattr(first, key)!r} and {getattr(second, key)!r}" for key in changed
+    )
 
 
 def record_traces(path: Path, seed: int) -> list[Trace]:
@@ -102,7 +122,10 @@ def record_traces(path: Path, seed: int) -> list[Trace]:
 
     The random numbers depend on `seed` and on the file name.
     """
-    return [_record_trace(path, np.random.default_rng([seed, crc32(path.name.encode())]), vary) for vary in (False, True)]
+    return [
+        _record_trace(path, np.random.default_rng([seed, crc32(path.name.encode())]), vary)
+        for vary in (False, True)
+    ]
 
 
 def _record_trace(path: Path, random: np.random.Generator, vary_parameters: bool) -> Trace:
@@ -111,7 +134,9 @@ def _record_trace(path: Path, random: np.random.Generator, vary_parameters: bool
     component = create_component(FmuFile(path), path.stem)
     variables = [variable for variable in component.variables if variable.type in _NUMERIC_TYPES]
     inputs = _allocate_ports([variable for variable in variables if variable.causality == "input"])
-    outputs = _allocate_ports([variable for variable in variables if variable.causality == "output"])
+    outputs = _allocate_ports(
+        [variable for variable in variables if variable.causality == "output"]
+    )
     rows: list[np.ndarray] = []
     failure = ""
     try:
@@ -128,7 +153,9 @@ def _record_trace(path: Path, random: np.random.Generator, vary_parameters: bool
         failure = str(error)
     finally:
         component.free()
-    names = [name for variable in _variables_in_memory_order(outputs) for name in variable.scalar_names]
+    names = [
+        name for variable in _variables_in_memory_order(outputs) for name in variable.scalar_names
+    ]
     return Trace(component.variables, names, np.array(rows).reshape(len(rows), len(names)), failure)
 
 
@@ -157,7 +184,12 @@ def _allocate_ports(variables: Sequence[Variable]) -> Ports:
 
 def _variables_in_memory_order(ports: Ports) -> list[Variable]:
     """Return the variables in the order of their values in the concatenated arrays."""
-    return [variable for dtype in ports.arrays for variable in ports.variables if variable.dtype == dtype]
+    return [
+        variable
+        for dtype in ports.arrays
+        for variable in ports.variables
+        if variable.dtype == dtype
+    ]
 
 
 def _concatenate(ports: Ports) -> np.ndarray:
@@ -166,28 +198,49 @@ def _concatenate(ports: Ports) -> np.ndarray:
 
 def _set_random_inputs(inputs: Ports, random: np.random.Generator) -> None:
     for dtype, array in inputs.arrays.items():
-        array[:] = np.concatenate([_random_values(variable, random) for variable in inputs.variables if variable.dtype == dtype])
+        array[:] = np.concatenate(
+            [
+                _random_values(variable, random)
+                for variable in inputs.variables
+                if variable.dtype == dtype
+            ]
+        )
 
 
-def _set_random_parameters(component: Component, random: np.random.Generator, variabilities: Sequence[str]) -> None:
+def _set_random_parameters(
+    component: Component, random: np.random.Generator, variabilities: Sequence[str]
+) -> None:
     for variable in component.variables:
-        if variable.causality == "parameter" and variable.variability in variabilities and variable.type in _NUMERIC_TYPES:
+        if (
+            variable.causality == "parameter"
+            and variable.variability in variabilities
+            and variable.type in _NUMERIC_TYPES
+        ):
             values = _random_values(variable, random).tolist()
             component.set(variable.name, values if variable.shape else values[0])
 
 
 def _random_values(variable: Variable, random: np.random.Generator) -> np.ndarray:
-    """Return random values: within the declared limits for bounded inputs, else around the start value."""
+    """Return random values.
+
+    Within the declared limits for bounded inputs, else around the start value.
+    """
     size = len(variable.scalar_names)
     start = np.resize(np.array(variable.start if variable.start is not None else 0, float), size)
-    low, high = (np.nan if limit is None else limit for limit in (variable.minimum, variable.maximum))
+    low, high = (
+        np.nan if limit is None else limit for limit in (variable.minimum, variable.maximum)
+    )
     bounded = np.isfinite(high - low)
     if variable.type == "Boolean":
         return random.integers(0, 2, size).astype(variable.dtype)
     if variable.type != "Float64":
-        return (random.integers(int(low), int(high) + 1, size) if bounded else start).astype(variable.dtype)
+        return (random.integers(int(low), int(high) + 1, size) if bounded else start).astype(
+            variable.dtype
+        )
     if variable.causality == "input" and bounded:
         return random.uniform(low, high, size)
     absolute_range, relative_range = (0.1, 0.2) if variable.causality == "parameter" else (2.0, 2.0)
-    values = start + np.where(start == 0, absolute_range, relative_range * np.abs(start)) * random.uniform(-1, 1, size)
+    values = start + np.where(
+        start == 0, absolute_range, relative_range * np.abs(start)
+    ) * random.uniform(-1, 1, size)
     return np.fmin(np.fmax(values, low), high)

@@ -14,7 +14,15 @@ from ..core.json_values import parse_object
 from ..results.files import writing_atomically
 from .cache import cached_file, file_hash
 from .foreign.python_class import write_python_fmu
-from .sources import SOURCE_KINDS, Source, classify_source, export_source, find_sources, resolve_source_path, tool_versions
+from .sources import (
+    SOURCE_KINDS,
+    Source,
+    classify_source,
+    export_source,
+    find_sources,
+    resolve_source_path,
+    tool_versions,
+)
 
 #: FMI version -> folder of the FMUs
 FMU_FOLDERS = {2: Path("fmus"), 3: Path("fmus/fmi3")}
@@ -30,12 +38,15 @@ class BuildResult:
 
 
 def build(
-    sources: Sequence[Path] | None, root: Path, report: Callable[[BuildResult], None] = lambda _result: None
+    sources: Sequence[Path] | None,
+    root: Path,
+    report: Callable[[BuildResult], None] = lambda _result: None,
 ) -> list[BuildResult]:
     """Export sources to `fmus/` and `fmus/fmi3/` and record them in the manifest.
 
     Args:
-        sources: The files to export. None exports all sources below `root` and removes FMUs whose source no longer exists.
+        sources: The files to export. None exports all sources below `root` and removes FMUs whose
+            source no longer exists.
         root: The project folder.
         report: Called after each exported source.
 
@@ -54,7 +65,9 @@ def build(
         fmus = fmu_files(source, root)
         files = export_source(source, fmus)
         entry = _manifest_entry(source, files, fmus, root)
-        manifest = (manifest if sources is None else read_manifest(root)) | {source.manifest_key: entry}
+        manifest = (manifest if sources is None else read_manifest(root)) | {
+            source.manifest_key: entry
+        }
         _write_manifest(manifest, root)
         results.append(BuildResult(source.path, fmus))
         report(results[-1])
@@ -81,24 +94,29 @@ def build_to(
 
     Args:
         source: The source file; it may be anywhere.
-        model: Name of the Modelica model, or of the Python class. None selects the model with the name of the file, or the
-            only class.
+        model: Name of the Modelica model, or of the Python class. None selects the model with the
+            name of the file, or the only class.
         target: The FMU to write.
         fmi_version: 2 or 3.
         include: Further files of the FMU of a Python source, see `write_python_fmu`.
-        library_path: Folders of Modelica libraries, which are searched before those of MODELICAPATH.
+        library_path: Folders of Modelica libraries, which are searched before those of
+            MODELICAPATH.
         values: Values of parameters of a Modelica model by name, also of structural parameters.
 
     Returns:
         `target`.
 
     Raises:
-        InputError: The file cannot be exported, or not for this FMI version, or files or values are given for another kind of
-            FMU.
+        InputError: The file cannot be exported, or not for this FMI version, or files or values are
+            given for another kind of FMU.
     """
     classified = classify_source(source, model)
     if fmi_version not in classified.fmi_versions:
-        raise InputError(Problem(f"a {classified.kind.name} cannot be exported as FMI {fmi_version}.0", str(source)))
+        raise InputError(
+            Problem(
+                f"a {classified.kind.name} cannot be exported as FMI {fmi_version}.0", str(source)
+            )
+        )
     if classified.kind.package == "pythonfmu" and not values:
         write_python_fmu(classified.path, target, include, model)
     elif include:
@@ -107,21 +125,26 @@ def build_to(
         from .modelica import ModelicaOptions
 
         if values and classified.kind.package != "rumoca":
-            raise InputError(Problem("only parameters of Modelica models can be set when building", str(source)))
-        export_source(classified, {fmi_version: target}, model, ModelicaOptions(library_path, values or {}))
+            raise InputError(
+                Problem("only parameters of Modelica models can be set when building", str(source))
+            )
+        export_source(
+            classified, {fmi_version: target}, model, ModelicaOptions(library_path, values or {})
+        )
     return target
 
 
 def cached_fmu(source: Path, model: str | None, library_path: Sequence[Path] = ()) -> Path:
     """Return the FMI 2.0 FMU of a Modelica model from the user's cache.
 
-    The FMU is built if the model, the packages beside it, a library that it uses, the exporter or the tools have changed
-    since the last build.
+    The FMU is built if the model, the packages beside it, a library that it uses, the exporter or
+    the tools have changed since the last build.
 
     Args:
         source: The Modelica file.
         model: Name of the model. None selects the model with the name of the file.
-        library_path: Folders of Modelica libraries, which are searched before those of MODELICAPATH.
+        library_path: Folders of Modelica libraries, which are searched before those of
+            MODELICAPATH.
 
     Raises:
         InputError: The model cannot be exported, or the cache cannot be written.
@@ -132,10 +155,17 @@ def cached_fmu(source: Path, model: str | None, library_path: Sequence[Path] = (
 
     classified = classify_source(source, model)
     files = readable_files(source)
-    exporter = sorted(path for path in Path(__file__).parent.rglob("*") if path.suffix in (".py", ".c", ".h"))
+    exporter = sorted(
+        path for path in Path(__file__).parent.rglob("*") if path.suffix in (".py", ".c", ".h")
+    )
     contents = [(str(path), file_hash(path)) for path in [*files, *exporter]]
-    contents += [(str(library.path), library.digest) for library in find_libraries([source], library_folders(library_path), ())]
-    key = sha256(json.dumps([str(source.resolve()), model, tool_versions(classified), contents]).encode())
+    contents += [
+        (str(library.path), library.digest)
+        for library in find_libraries([source], library_folders(library_path), ())
+    ]
+    key = sha256(
+        json.dumps([str(source.resolve()), model, tool_versions(classified), contents]).encode()
+    )
     return cached_file(
         key.hexdigest()[:24],
         f"{classified.name}.fmu",
@@ -145,7 +175,10 @@ def cached_fmu(source: Path, model: str | None, library_path: Sequence[Path] = (
 
 def fmu_files(source: Source, root: Path) -> dict[int, Path]:
     """Return the path of a source's FMU below `root` for each FMI version."""
-    return {version: root / FMU_FOLDERS[version] / source.kind.folder / f"{source.name}.fmu" for version in source.fmi_versions}
+    return {
+        version: root / FMU_FOLDERS[version] / source.kind.folder / f"{source.name}.fmu"
+        for version in source.fmi_versions
+    }
 
 
 def _select_sources(sources: Sequence[Path] | None, root: Path) -> list[Source]:
@@ -158,21 +191,28 @@ def _select_sources(sources: Sequence[Path] | None, root: Path) -> list[Source]:
     for path in files:
         if path.resolve() not in known:
             patterns = ", ".join(kind.pattern for kind in SOURCE_KINDS)
-            text = f"is not a source of an FMU of cosim ({patterns}){did_you_mean(str(path), known_names)}"
-            problems.append(Problem(f"{text}; --output FILE.fmu exports a source of your own", str(path)))
+            text = (
+                "is not a source of an FMU of cosim "
+                f"({patterns}){did_you_mean(str(path), known_names)}"
+            )
+            problems.append(
+                Problem(f"{text}; --output FILE.fmu exports a source of your own", str(path))
+            )
     if problems:
         raise InputError(problems)
     return [known[path.resolve()] for path in files]
 
 
-# -- the manifest --------------------------------------------------------------------------------------------------------------
+# -- the manifest
+# --------------------------------------------------------------------------------------------------------------
 
 
 def read_manifest(root: Path) -> dict[str, Any]:
     """Return the manifest of the built FMUs, or {} if there is none.
 
     Returns:
-        For each FMU name, the keys "sources" (file -> SHA-256), "fmus" (file -> SHA-256) and "tools" (name -> version).
+        For each FMU name, the keys "sources" (file -> SHA-256), "fmus" (file -> SHA-256) and
+        "tools" (name -> version).
 
     Raises:
         InputError: The file is not valid JSON.
@@ -181,7 +221,9 @@ def read_manifest(root: Path) -> dict[str, Any]:
     try:
         manifest = parse_object(path.read_text()) if path.is_file() else {}
     except ValueError as error:
-        raise InputError(Problem(f"is not valid JSON: {error}; remove it and run `cosim build`", str(path))) from None
+        raise InputError(
+            Problem(f"is not valid JSON: {error}; remove it and run `cosim build`", str(path))
+        ) from None
     return manifest
 
 
@@ -190,8 +232,14 @@ def _write_manifest(manifest: Mapping[str, Any], root: Path) -> None:
         temporary.write_text(json.dumps(manifest, indent=1, sort_keys=True) + "\n")
 
 
-def _manifest_entry(source: Source, files: Iterable[Path], fmus: Mapping[int, Path], root: Path) -> dict[str, Any]:
-    return {"sources": _file_hashes(files, root), "fmus": _file_hashes(fmus.values(), root), "tools": tool_versions(source)}
+def _manifest_entry(
+    source: Source, files: Iterable[Path], fmus: Mapping[int, Path], root: Path
+) -> dict[str, Any]:
+    return {
+        "sources": _file_hashes(files, root),
+        "fmus": _file_hashes(fmus.values(), root),
+        "tools": tool_versions(source),
+    }
 
 
 def _file_hashes(files: Iterable[Path], root: Path) -> dict[str, str]:

@@ -17,7 +17,8 @@ from .sources import Source, export_source, find_sources
 def check_fmus(root: Path) -> list[Problem]:
     """Check that the FMUs in `fmus/` correspond to their sources.
 
-    The hashes of all files must agree with the manifest, and rebuilt FMUs must behave like the present ones.
+    The hashes of all files must agree with the manifest, and rebuilt FMUs must behave like the
+    present ones.
 
     Args:
         root: The project folder.
@@ -40,7 +41,10 @@ def _orphans(root: Path, manifest: Mapping[str, Any], sources: Sequence[Source])
     expected = {path for source in sources for path in fmu_files(source, root).values()}
     present = set((root / "fmus").rglob("*.fmu"))
     listed = {root / fmu for entry in manifest.values() for fmu in entry["fmus"]}
-    return [Problem("has no source", path.relative_to(root).as_posix()) for path in sorted((present | listed) - expected)]
+    return [
+        Problem("has no source", path.relative_to(root).as_posix())
+        for path in sorted((present | listed) - expected)
+    ]
 
 
 def _manifest_mismatches(root: Path, manifest: Mapping[str, Any], source: Source) -> list[Problem]:
@@ -51,7 +55,9 @@ def _manifest_mismatches(root: Path, manifest: Mapping[str, Any], source: Source
     problems = []
     for name, recorded in entry["sources"].items():
         if not (root / name).is_file() or file_hash(root / name) != recorded:
-            problems.append(Problem(f'changed since "{source.manifest_key}" was built; run `cosim build`', name))
+            problems.append(
+                Problem(f'changed since "{source.manifest_key}" was built; run `cosim build`', name)
+            )
     for path in fmu_files(source, root).values():
         name = path.relative_to(root).as_posix()
         if not path.is_file():
@@ -71,10 +77,18 @@ def _changed_behaviour(root: Path, sources: Sequence[Source]) -> list[Problem]:
             try:
                 export_source(source, targets)
             except CosimError as error:
-                problems.append(Problem(f"can no longer be built: {error}", source.path.relative_to(root).as_posix()))
+                problems.append(
+                    Problem(
+                        f"can no longer be built: {error}", source.path.relative_to(root).as_posix()
+                    )
+                )
                 continue
             present += fmu_files(source, root).values()
             rebuilt += targets.values()
         for path, difference in compare_fmus(present, rebuilt).items():
-            problems.append(Problem(f"differs from a rebuild: {difference}", path.relative_to(temporary).as_posix()))
+            problems.append(
+                Problem(
+                    f"differs from a rebuild: {difference}", path.relative_to(temporary).as_posix()
+                )
+            )
     return problems

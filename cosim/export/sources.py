@@ -37,13 +37,15 @@ class SourceKind:
     pattern: str
     #: distribution package that the exporter needs
     package: str
-    #: read a source file (and the named model in it) as a block, which is exported for FMI 2.0 and 3.0
+    #: read a source file (and the named model in it) as a block, which is exported for FMI 2.0 and
+    #: 3.0
     load_block: Callable[[Path, str | None, ModelicaOptions | None], Block] | None
     #: folder of the FMUs below `fmus/`
     folder: str = ""
     #: write the FMI 2.0 FMU of a source file and return the files that it was made from
     write_fmi2: Callable[[Path, Path], list[Path]] | None = None
-    #: Python file below the project folder that makes the block of a data file; the FMU is also made from what it imports
+    #: Python file below the project folder that makes the block of a data file; the FMU is also
+    #: made from what it imports
     program: str = ""
     #: true if the exporter runs the C compiler
     compiled: bool = True
@@ -83,7 +85,9 @@ def _load_equations(path: Path, _model: str | None, _options: ModelicaOptions | 
     except CosimError:
         raise
     except Exception as error:
-        raise InputError(Problem(f"block() failed: {type(error).__name__}: {error}", str(path))) from error
+        raise InputError(
+            Problem(f"block() failed: {type(error).__name__}: {error}", str(path))
+        ) from error
 
 
 #: program whose function `vehicle_block` makes the block of a vehicle file
@@ -97,7 +101,9 @@ _VEHICLE_SCHEMA = "plant_src/schemas/vehicle.py:vehicle_schema"
 def _load_vehicle(path: Path, _model: str | None, _options: ModelicaOptions | None) -> Block:
     from ..components.python_import import load_object
 
-    create_block: Callable[[Path], Block] = load_object(f"{_VEHICLE_PROGRAM}:vehicle_block", resources.root())
+    create_block: Callable[[Path], Block] = load_object(
+        f"{_VEHICLE_PROGRAM}:vehicle_block", resources.root()
+    )
     return create_block(path)
 
 
@@ -119,11 +125,35 @@ def vehicle_file_schema() -> dict[str, Any]:
 
 SOURCE_KINDS = (
     SourceKind("Modelica model", "controllers/modelica/*.mo", "rumoca", _load_modelica),
-    SourceKind("PythonFMU class", "controllers/python/*.py", "pythonfmu", None, "python", write_python_fmu, compiled=False),
+    SourceKind(
+        "PythonFMU class",
+        "controllers/python/*.py",
+        "pythonfmu",
+        None,
+        "python",
+        write_python_fmu,
+        compiled=False,
+    ),
     SourceKind("equations", "plant_src/**/equations.py", "casadi", _load_equations),
-    SourceKind("vehicle file", "plant_src/vehicles/data/*.json", "casadi", _load_vehicle, program=_VEHICLE_PROGRAM),
-    SourceKind("PythonFMU class", "plant_src/*_fmu.py", "pythonfmu", None, "python", write_python_fmu, compiled=False),
-    SourceKind("C controller", f"controllers/c/*/{DESCRIPTION_FILE}", "fmpy", None, "c", write_c_fmu),
+    SourceKind(
+        "vehicle file",
+        "plant_src/vehicles/data/*.json",
+        "casadi",
+        _load_vehicle,
+        program=_VEHICLE_PROGRAM,
+    ),
+    SourceKind(
+        "PythonFMU class",
+        "plant_src/*_fmu.py",
+        "pythonfmu",
+        None,
+        "python",
+        write_python_fmu,
+        compiled=False,
+    ),
+    SourceKind(
+        "C controller", f"controllers/c/*/{DESCRIPTION_FILE}", "fmpy", None, "c", write_c_fmu
+    ),
 )
 
 
@@ -135,20 +165,39 @@ def find_sources(root: Path) -> list[Source]:
     Raises:
         InputError: Two sources have the same FMU name.
     """
-    paths = [path for kind in SOURCE_KINDS for path in root.glob(kind.pattern) if not path.name.startswith("_")]
+    paths = [
+        path
+        for kind in SOURCE_KINDS
+        for path in root.glob(kind.pattern)
+        if not path.name.startswith("_")
+    ]
     sources = sorted(map(classify_source, paths), key=lambda source: source.manifest_key)
     clashes = [(a, b) for a, b in pairwise(sources) if a.manifest_key == b.manifest_key]
     if clashes:
         raise InputError(
-            [Problem(f'has the same FMU name "{a.manifest_key}.fmu" as {b.path}; rename one', str(a.path)) for a, b in clashes]
+            [
+                Problem(
+                    f'has the same FMU name "{a.manifest_key}.fmu" as {b.path}; rename one',
+                    str(a.path),
+                )
+                for a, b in clashes
+            ]
         )
     return sources
 
 
 def vehicle_files(root: Path) -> dict[str, Path]:
     """Return the shipped vehicle files by the names of their vehicles, also those of vehicles with equations of their own."""
-    templates = {path.stem: path for path in root.glob("plant_src/vehicles/*/*.json") if path.parent.name == path.stem}
-    return templates | {source.name: source.path for source in find_sources(root) if source.kind.name == "vehicle file"}
+    templates = {
+        path.stem: path
+        for path in root.glob("plant_src/vehicles/*/*.json")
+        if path.parent.name == path.stem
+    }
+    return templates | {
+        source.name: source.path
+        for source in find_sources(root)
+        if source.kind.name == "vehicle file"
+    }
 
 
 def classify_source(path: Path, model: str | None = None) -> Source:
@@ -156,14 +205,20 @@ def classify_source(path: Path, model: str | None = None) -> Source:
 
     Args:
         path: The source file, or the folder of a C controller.
-        model: Name of the Modelica model, or of the Python class. None selects the model with the name of the file.
+        model: Name of the Modelica model, or of the Python class. None selects the model with the
+            name of the file.
 
     Raises:
         InputError: The file cannot be exported.
     """
     path = resolve_source_path(path)
     if model and path.suffix not in MEMBERS:
-        raise InputError(Problem(f'contains no models or classes to choose from; write it without ":{model}"', str(path)))
+        raise InputError(
+            Problem(
+                f'contains no models or classes to choose from; write it without ":{model}"',
+                str(path),
+            )
+        )
     if path.suffix == ".mo":
         return Source(path, SOURCE_KINDS[0], snake_case((model or path.stem).rpartition(".")[2]))
     if path.name == "equations.py" and not model:
@@ -176,7 +231,10 @@ def classify_source(path: Path, model: str | None = None) -> Source:
         return Source(path, SOURCE_KINDS[3], path.stem)
     raise InputError(
         Problem(
-            f"cannot be exported; expected a .mo or .py file, a vehicle file (.json), or a C controller's {DESCRIPTION_FILE}",
+            (
+                "cannot be exported; expected a .mo or .py file, a vehicle file (.json), or a C "
+                f"controller's {DESCRIPTION_FILE}"
+            ),
             str(path),
         )
     )
@@ -193,7 +251,10 @@ def split_reference(reference: str) -> tuple[Path, str | None]:
     if not kind:
         return Path(reference), None
     if not member:
-        raise InputError(f"{reference}: expected the name of a {kind.lower()} after the colon, as in {reference}{kind}")
+        raise InputError(
+            f"{reference}: expected the name of a {kind.lower()} after the colon, as in "
+            f"{reference}{kind}"
+        )
     return Path(file), member
 
 
@@ -212,7 +273,10 @@ def snake_case(name: str) -> str:
 
 
 def export_source(
-    source: Source, targets: Mapping[int, Path], model: str | None = None, options: ModelicaOptions | None = None
+    source: Source,
+    targets: Mapping[int, Path],
+    model: str | None = None,
+    options: ModelicaOptions | None = None,
 ) -> list[Path]:
     """Export a source to one FMU per FMI version.
 
@@ -235,7 +299,11 @@ def export_source(
     block = replace(source.kind.load_block(source.path, model, options), identifier=source.name)
     for fmi_version, target in targets.items():
         write_fmu(block, fmi_version, target)
-    programs = with_imported_siblings(resources.root() / source.kind.program) if source.kind.program else []
+    programs = (
+        with_imported_siblings(resources.root() / source.kind.program)
+        if source.kind.program
+        else []
+    )
     return [*with_imported_siblings(source.path), *programs, *block.resources.values()]
 
 
@@ -248,7 +316,9 @@ def tool_version(package: str) -> str:
     try:
         return version(package)
     except PackageNotFoundError:
-        raise InputError(f'exporting needs "{package}", which is not installed: pip install "fmi-cosim[build]"') from None
+        raise InputError(
+            f'exporting needs "{package}", which is not installed: pip install "fmi-cosim[build]"'
+        ) from None
 
 
 def tool_versions(source: Source) -> dict[str, str]:

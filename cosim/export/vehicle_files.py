@@ -18,8 +18,8 @@ _DESCRIPTION = "plant_src/vehicle_files/summary.py:describe_vehicle"
 
 #: data of a vehicle, its centre of mass in the frame of the imported file (m), and warnings
 ImportedVehicle = tuple[dict[str, Any], list[float], list[str]]
-#: mass (kg), inertia (kg m2), parameters of the controller that flies a multirotor (or none), probable mistakes, and draught, top
-#: speed and sense of turning of a vessel in words
+#: mass (kg), inertia (kg m2), parameters of the controller that flies a multirotor (or none),
+#: probable mistakes, and draught, top speed and sense of turning of a vessel in words
 VehicleSummary = tuple[float, Any, Mapping[str, Any], Sequence[Problem], Mapping[str, str]]
 #: properties by name, and variables of a vehicle in a scenario
 VehicleDescription = tuple[Mapping[str, str], Sequence[Variable]]
@@ -38,7 +38,9 @@ def vehicle_from_urdf(urdf: Path, data: Mapping[str, Any]) -> ImportedVehicle:
     Raises:
         InputError: The URDF file cannot be read, or does not describe one rigid body.
     """
-    read: Callable[[Path, Mapping[str, Any]], ImportedVehicle] = load_object(_URDF_READER, resources.root())
+    read: Callable[[Path, Mapping[str, Any]], ImportedVehicle] = load_object(
+        _URDF_READER, resources.root()
+    )
     return read(urdf, data)
 
 
@@ -56,7 +58,9 @@ def vehicle_from_mesh(mesh: Path, data: Mapping[str, Any], scale: float) -> Impo
     Raises:
         InputError: The mesh cannot be read or encloses no volume, or the data have no mass.
     """
-    read: Callable[[Path, Mapping[str, Any], float], ImportedVehicle] = load_object(_MESH_READER, resources.root())
+    read: Callable[[Path, Mapping[str, Any], float], ImportedVehicle] = load_object(
+        _MESH_READER, resources.root()
+    )
     return read(mesh, data, scale)
 
 
@@ -64,12 +68,16 @@ def examine_vehicle(data: Mapping[str, Any], name: str) -> VehicleSummary:
     """Read the data of a vehicle as a scenario does.
 
     Returns:
-        Mass, inertia, parameters of the controller that flies it, warnings about probable mistakes, and properties of a vessel.
+        Mass, inertia, parameters of the controller that flies it, warnings about probable mistakes,
+        and properties of a vessel.
 
     Raises:
-        InputError: With all problems of the data; the subject of each begins with "arguments" and continues with the path.
+        InputError: With all problems of the data; the subject of each begins with "arguments" and
+            continues with the path.
     """
-    examine: Callable[[Mapping[str, Any], str], VehicleSummary] = load_object(_VEHICLE_CHECK, resources.root())
+    examine: Callable[[Mapping[str, Any], str], VehicleSummary] = load_object(
+        _VEHICLE_CHECK, resources.root()
+    )
     return examine(data, name)
 
 
@@ -79,5 +87,7 @@ def describe_vehicle(data: Mapping[str, Any], name: str) -> VehicleDescription:
     Raises:
         InputError: As of `examine_vehicle`.
     """
-    describe: Callable[[Mapping[str, Any], str], VehicleDescription] = load_object(_DESCRIPTION, resources.root())
+    describe: Callable[[Mapping[str, Any], str], VehicleDescription] = load_object(
+        _DESCRIPTION, resources.root()
+    )
     return describe(data, name)

@@ -1,1 +1,4 @@
-"""Operating-system processes: supervision, journal, restoring of process state, sandbox, files of a run."""
+"""Operating-system processes.
+
+Supervision, journal, restoring of process state, sandbox, files of a run.
+"""

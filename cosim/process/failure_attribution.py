@@ -21,11 +21,20 @@ def attribute_failure(journal: Journal, reason: str) -> ComponentError:
     header = read_header(journal.folder)
     if journal.phase == Phase.STEPPING and header:
         number, time = journal[CALL_NUMBER], header.time_at(journal[STEP_COUNT])
-        component, function = header.calls[number] if 0 <= number < len(header.calls) else ("the run", "moving values")
+        component, function = (
+            header.calls[number]
+            if 0 <= number < len(header.calls)
+            else ("the run", "moving values")
+        )
         return ComponentError(component, function, reason, time)
     if journal.phase in (Phase.CALLING, Phase.RESULTS_WRITTEN):
         activity = journal.activity()
-        return ComponentError(activity.component, activity.function, reason, None if math.isnan(activity.time) else activity.time)
+        return ComponentError(
+            activity.component,
+            activity.function,
+            reason,
+            None if math.isnan(activity.time) else activity.time,
+        )
     return unattributed_failure(journal, f"{reason}, while no component was being called")
 
 
@@ -46,6 +55,11 @@ def describe_exit_status(status: int) -> str:
     if os.WIFSIGNALED(status):
         number = os.WTERMSIG(status)
         name = signal.Signals(number).name if number in set(signal.Signals) else "unknown"
-        text = f"the process was ended by signal {number} ({name}, {(signal.strsignal(number) or '').lower()})"
-        return f"{text}: out of memory, or killed from outside" if number == signal.SIGKILL else text
+        text = (
+            f"the process was ended by signal {number} ({name}, "
+            f"{(signal.strsignal(number) or '').lower()})"
+        )
+        return (
+            f"{text}: out of memory, or killed from outside" if number == signal.SIGKILL else text
+        )
     return f"it ended the process with exit code {os.WEXITSTATUS(status)}"

@@ -13,12 +13,15 @@ from typing import Any
 
 from ..core import component_log
 
-#: 1, a number too small to change 1 when rounding to nearest, and the smallest subnormal number, which flush to zero makes 0 (a
-#: literal could already be flushed when it is parsed)
+#: 1, a number too small to change 1 when rounding to nearest, and the smallest subnormal number,
+#: which flush to zero makes 0 (a literal could already be flushed when it is parsed)
 PROBE_VALUES = 1.0, 2.0**-54, float(struct.unpack("=d", (1).to_bytes(8, sys.byteorder))[0])
 
 _ENVIRONMENT_SIZE = 512  # more than any platform's fenv_t
-_MXCSR_OFFSET, _MXCSR_DEFAULT = 28, 0x1F80  # offset in fenv_t of Linux on x86-64, and initial value of a process
+_MXCSR_OFFSET, _MXCSR_DEFAULT = (
+    28,
+    0x1F80,
+)  # offset in fenv_t of Linux on x86-64, and initial value of a process
 
 
 def is_changed() -> bool:
@@ -68,7 +71,8 @@ class FloatEnvironment:
 def default_float_mode() -> Iterator[None]:
     """Use the mode of a new process inside the block, then restore the mode of the caller.
 
-    Some libraries change the mode permanently when they are imported; results must not depend on that.
+    Some libraries change the mode permanently when they are imported; results must not depend on
+    that.
     """
     if is_default():
         yield
@@ -87,7 +91,10 @@ def set_default() -> None:
 
 
 class FloatModeGuard:
-    """Restorer of the default mode after calls of components; it warns of the first change by each component."""
+    """Restorer of the default mode after calls of components.
+
+    It warns of the first change by each component.
+    """
 
     def __init__(self) -> None:
         self._reported: set[str] = set()
@@ -104,8 +111,13 @@ class FloatModeGuard:
         set_default()
         if component not in self._reported:
             self._reported.add(component)
-            change = f"{function} changed the floating-point mode (rounding, flush to zero or traps)"
-            text = f"{change} {preposition} t = {time:.12g} s; it is restored after every such call, which is reported once"
+            change = (
+                f"{function} changed the floating-point mode (rounding, flush to zero or traps)"
+            )
+            text = (
+                f"{change} {preposition} t = {time:.12g} s; it is restored after every such call, "
+                "which is reported once"
+            )
             component_log.log_message(component, component_log.WARNING, text)
 
 
@@ -113,7 +125,9 @@ class FloatModeGuard:
 def _default_environment() -> Any:
     """Return FE_DFL_ENV of <fenv.h>, on x86-64 without flush to zero, which FE_DFL_ENV does not reset there."""
     if sys.platform == "darwin":
-        return ctypes.c_void_p(ctypes.addressof(ctypes.c_char.in_dll(ctypes.PyDLL(None), "_FE_DFL_ENV")))
+        return ctypes.c_void_p(
+            ctypes.addressof(ctypes.c_char.in_dll(ctypes.PyDLL(None), "_FE_DFL_ENV"))
+        )
     environment = ctypes.c_void_p(-1)
     if platform.machine() != "x86_64":
         return environment

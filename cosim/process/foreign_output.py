@@ -31,7 +31,10 @@ class ForeignOutput:
         return max(0, self._size - MAX_OUTPUT_SIZE)
 
     def forward(self) -> bool:
-        """Forward the output that has arrived; return False if the other end of the pipe is closed."""
+        """Forward the output that has arrived.
+
+        Return False if the other end of the pipe is closed.
+        """
         for _ in range(_MAX_READS):
             try:
                 data = os.read(self._reader, _READ_SIZE)
@@ -42,6 +45,8 @@ class ForeignOutput:
             remaining = max(0, MAX_OUTPUT_SIZE - self._size)
             self._size += len(data)
             if remaining:
-                sys.stderr.write(escape_control_characters(self._decode(data[:remaining]), keep=f"\n{SPACES}"))
+                sys.stderr.write(
+                    escape_control_characters(self._decode(data[:remaining]), keep=f"\n{SPACES}")
+                )
                 sys.stderr.flush()
         return True

@@ -1,8 +1,11 @@
-"""Forks of this process by foreign code: they are reported, and a copy that returns from the foreign call is ended.
+"""Forks of this process by foreign code.
 
-A copy must not continue the run: it would write the same files. In a supervised process the journal is not mapped in copies (see
-`Journal.exclude_from_forks`), so that the first access to it, which follows each call, ends them. Elsewhere a copy ends with the
-block of `attributing_forks` in which it was made.
+They are reported, and a copy that returns from the foreign call is ended.
+
+A copy must not continue the run: it would write the same files. In a supervised process the journal
+is not mapped in copies (see `Journal.exclude_from_forks`), so that the first access to it, which
+follows each call, ends them. Elsewhere a copy ends with the block of `attributing_forks` in which
+it was made.
 """
 
 from __future__ import annotations
@@ -29,7 +32,8 @@ class attributing_forks:  # noqa: N801  # a generator as context manager would t
         """Prepare the block.
 
         Args:
-            describe_call: Returns component and function of the present call; None for forks that are not made by foreign code.
+            describe_call: Returns component and function of the present call; None for forks that
+                are not made by foreign code.
         """
         self._inner = describe_call
 
@@ -55,9 +59,14 @@ def report_forks() -> None:
 
 @cache
 def watch_forks() -> None:
-    """Note the present call at each fork from now on; for processes that end without finalizing the interpreter."""
+    """Note the present call at each fork from now on.
+
+    For processes that end without finalizing the interpreter.
+    """
     library = ctypes.CDLL(None)
-    register = getattr(library, "pthread_atfork", None) or getattr(library, "__register_atfork", None)
+    register = getattr(library, "pthread_atfork", None) or getattr(
+        library, "__register_atfork", None
+    )
     if register:
         register(None, _note_fork_callback, None, None)
 

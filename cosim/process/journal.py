@@ -24,10 +24,17 @@ from .forks import attributing_forks
 JOURNAL_SIZE = 5 * 4096
 #: indices of the int64 fields, which occupy the first 64 bytes
 CALL_NUMBER, STEP_COUNT, ROW_COUNT, PHASE, CHANGE_COUNT, DEADLINE, EXIT_CODE, CSV_UPDATE = range(8)
-#: number of leading fields that form the marker, which the executor updates: present call, finished macro steps, recorded rows
+#: number of leading fields that form the marker, which the executor updates: present call, finished
+#: macro steps, recorded rows
 MARKER_SIZE = 3
 #: offsets of a float64 and of four texts; a text is its length (uint32) followed by UTF-8
-_TIME_OFFSET, _COMPONENT_OFFSET, _FUNCTION_OFFSET, _FOLDER_OFFSET, _CSV_PATH_OFFSET = 64, 4096, 8192, 12288, 16384
+_TIME_OFFSET, _COMPONENT_OFFSET, _FUNCTION_OFFSET, _FOLDER_OFFSET, _CSV_PATH_OFFSET = (
+    64,
+    4096,
+    8192,
+    12288,
+    16384,
+)
 _MAX_TEXT_SIZE = 4092
 #: reason of a failure after which the journal is not valid
 OVERWRITTEN = "it wrote over memory of the process that is not its own"
@@ -88,7 +95,8 @@ class Journal:
         self.memory = memory
         self._integers = memoryview(memory)[:_TIME_OFFSET].cast("q")
         self.deadlines = Deadlines()
-        #: several components are being called at the same time; their calls are not recorded one by one
+        #: several components are being called at the same time; their calls are not recorded one by
+        #: one
         self.is_shared = False
         self._is_claimed = False
         self.enter_phase(Phase.IDLE)
@@ -103,15 +111,26 @@ class Journal:
     def is_valid(self) -> bool:
         """True if the content is plausible; foreign code in the process can overwrite it."""
         deadline, counts = self[DEADLINE], (self[STEP_COUNT], self[ROW_COUNT], self[CHANGE_COUNT])
-        return self[PHASE] in _PHASES and self[CSV_UPDATE] in (0, 1) and -1 <= deadline <= _MAX_DEADLINE and min(counts) >= 0
+        return (
+            self[PHASE] in _PHASES
+            and self[CSV_UPDATE] in (0, 1)
+            and -1 <= deadline <= _MAX_DEADLINE
+            and min(counts) >= 0
+        )
 
     def claim(self) -> bool:
-        """Return True at the first call: the journal records one run of the process, and not those that its KPIs make."""
+        """Return True at the first call.
+
+        The journal records one run of the process, and not those that its KPIs make.
+        """
         first, self._is_claimed = not self._is_claimed, True
         return first
 
     def exclude_from_forks(self) -> None:
-        """Make later forks of this process crash at their first access to the journal (Linux); see `process.forks`."""
+        """Make later forks of this process crash at their first access to the journal (Linux).
+
+        See `process.forks`.
+        """
         if hasattr(mmap, "MADV_DONTFORK"):
             self.memory.madvise(mmap.MADV_DONTFORK)
 
@@ -134,8 +153,13 @@ class Journal:
         return self[PHASE] in _LOOP_PHASES
 
     def enter_phase(self, phase: Phase, deadline: float = math.inf) -> None:
-        """Begin a phase with a maximum duration of each call (s); wait for the end of an update of the result file."""
-        self[CHANGE_COUNT] += 1  # first, so that a reader of the new deadline also reads the new count
+        """Begin a phase with a maximum duration of each call (s).
+
+        Wait for the end of an update of the result file.
+        """
+        self[CHANGE_COUNT] += (
+            1  # first, so that a reader of the new deadline also reads the new count
+        )
         self[DEADLINE] = -1 if math.isinf(deadline) else int(min(deadline * 1000, _MAX_DEADLINE))
         self[PHASE] = phase
         while self[CSV_UPDATE]:
@@ -143,7 +167,10 @@ class Journal:
 
     @contextmanager
     def updating_csv(self) -> Iterator[bool]:
-        """Yield whether the supervisor may replace the result file; the run does not write it during the block."""
+        """Yield whether the supervisor may replace the result file.
+
+        The run does not write it during the block.
+        """
         self[CSV_UPDATE] = 1
         try:
             yield self.in_loop
@@ -159,7 +186,12 @@ class Journal:
     def activity(self) -> Activity:
         """Return the call that was recorded last."""
         (time,) = struct.unpack_from("d", self.memory, _TIME_OFFSET)
-        return Activity(self._read_text(_COMPONENT_OFFSET), self._read_text(_FUNCTION_OFFSET), time, self.deadline)
+        return Activity(
+            self._read_text(_COMPONENT_OFFSET),
+            self._read_text(_FUNCTION_OFFSET),
+            time,
+            self.deadline,
+        )
 
     @property
     def deadline(self) -> float:
@@ -220,7 +252,9 @@ def calling_several_components() -> Iterator[None]:
 
 
 @contextmanager
-def calling_component(component: str, function: str, deadline_name: str, time: float = math.nan) -> Iterator[None]:
+def calling_component(
+    component: str, function: str, deadline_name: str, time: float = math.nan
+) -> Iterator[None]:
     """Record a call into a component, outside the stepping loop, for the duration of the block.
 
     Args:
@@ -234,16 +268,23 @@ def calling_component(component: str, function: str, deadline_name: str, time: f
     """
     journal = _current
     if journal is None or journal.is_shared:
-        with attributing_forks(lambda: (component, function)), as_component_error(component, function, time):
+        with (
+            attributing_forks(lambda: (component, function)),
+            as_component_error(component, function, time),
+        ):
             yield
         return
     phase, deadline, before = journal.phase, journal.deadline, journal.activity()
     journal.record_call(component, function, time)
     journal.enter_phase(
-        Phase.RESULTS_WRITTEN if phase == Phase.RESULTS_WRITTEN else Phase.CALLING, getattr(journal.deadlines, deadline_name)
+        Phase.RESULTS_WRITTEN if phase == Phase.RESULTS_WRITTEN else Phase.CALLING,
+        getattr(journal.deadlines, deadline_name),
     )
     try:
-        with attributing_forks(lambda: (component, function)), as_component_error(component, function, time):
+        with (
+            attributing_forks(lambda: (component, function)),
+            as_component_error(component, function, time),
+        ):
             yield
     finally:
         journal.record_call(before.component, before.function, before.time)
@@ -258,7 +299,9 @@ def as_component_error(component: str, function: str, time: float = math.nan) ->
     except (CosimError, *PASS_THROUGH_EXCEPTIONS):
         raise
     except BaseException as error:
-        raise ComponentError(component, function, describe_exception(error), None if math.isnan(time) else time) from error
+        raise ComponentError(
+            component, function, describe_exception(error), None if math.isnan(time) else time
+        ) from error
 
 
 @contextmanager

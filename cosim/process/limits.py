@@ -18,7 +18,8 @@ def detach(parent: int | None) -> None:
     On Linux the process is killed when the thread that started it ends.
 
     Args:
-        parent: Process id of the parent; the process ends at once if it is no longer its parent. None: no check.
+        parent: Process id of the parent; the process ends at once if it is no longer its parent.
+            None: no check.
     """
     if os.getpgrp() != os.getpid():
         os.setsid()
@@ -50,7 +51,10 @@ def set_limits(memory: int, open_files: int, file_size: int, cpu_seconds: int | 
 
 
 def lower_limit(kind: int, value: int) -> None:
-    """Set the soft and the hard limit of a resource (`resource.RLIMIT_*`); a lower hard limit is kept."""
+    """Set the soft and the hard limit of a resource (`resource.RLIMIT_*`).
+
+    A lower hard limit is kept.
+    """
     _, hard = resource.getrlimit(kind)
     value = value if hard == resource.RLIM_INFINITY else min(value, hard)
     resource.setrlimit(kind, (value, value))

@@ -1,7 +1,7 @@
 """Locks of outputs and of the cache, so that two processes never write the same file at once.
 
-The operating system releases a lock when the processes that hold it have ended, even if they were killed. A lock file that a
-killed process left behind locks nothing.
+The operating system releases a lock when the processes that hold it have ended, even if they were
+killed. A lock file that a killed process left behind locks nothing.
 """
 
 from __future__ import annotations
@@ -55,7 +55,10 @@ class OutputLock:
         os.close(self._descriptor)
 
     def send(self, connection: socket.socket) -> None:
-        """Hand the lock over to the process at the other end of a connection; it stays locked on the way."""
+        """Hand the lock over to the process at the other end of a connection.
+
+        It stays locked on the way.
+        """
         socket.send_fds(connection, [os.fsencode(self._path)], [self._descriptor])
         os.close(self._descriptor)
 
@@ -85,12 +88,19 @@ def acquire_lock(path: Path, output: Path, process: int | None = None) -> Output
     try:
         lock = OutputLock(path, descriptor := _open_locked(path))
     except BlockingIOError:
-        text = f'"{output}" is in use by {_read_holder(path)}; wait until it has ended, or choose another output'
+        text = (
+            f'"{output}" is in use by {_read_holder(path)}; wait until it has ended, or choose '
+            "another output"
+        )
         raise InputError(text) from None
     except OSError as error:
         raise write_error(f'cannot write to "{output}": {error.strerror or error}', error) from None
     try:
-        holder = {"process": process or os.getpid(), "host": _host(), "start": f"{datetime.now():%Y-%m-%d %H:%M:%S}"}
+        holder = {
+            "process": process or os.getpid(),
+            "host": _host(),
+            "start": f"{datetime.now():%Y-%m-%d %H:%M:%S}",
+        }
         os.ftruncate(descriptor, 0)
         os.write(descriptor, json.dumps(holder).encode())
     except OSError as error:
@@ -122,7 +132,10 @@ def waiting_for_lock(path: Path) -> Iterator[None]:
 
 
 def _open_locked(path: Path, wait: bool = False) -> int:
-    """Create, open and lock a file; repeat this if its former holder removed the file before it was locked."""
+    """Create, open and lock a file.
+
+    Repeat this if its former holder removed the file before it was locked.
+    """
     while True:
         descriptor = os.open(path, os.O_RDWR | os.O_CREAT | getattr(os, "O_NOFOLLOW", 0), 0o666)
         try:
@@ -171,7 +184,10 @@ class LockKeeper:
         return self
 
     def lock(self, path: Path, output: Path) -> None:
-        """Lock an output, see `acquire_lock`; called at most once, in this process or in a child that was forked."""
+        """Lock an output, see `acquire_lock`.
+
+        Called at most once, in this process or in a child that was forked.
+        """
         acquire_lock(path, output, self._process).send(self._sender)
         self._sender.close()
         if os.getpid() != self._process:

@@ -17,9 +17,23 @@ from typing import Any, NamedTuple
 
 from .float_mode import FloatEnvironment
 
-_SIGNALS = (signal.SIGINT, signal.SIGTERM, signal.SIGSEGV, signal.SIGFPE, signal.SIGABRT, signal.SIGPIPE, signal.SIGCHLD)
+_SIGNALS = (
+    signal.SIGINT,
+    signal.SIGTERM,
+    signal.SIGSEGV,
+    signal.SIGFPE,
+    signal.SIGABRT,
+    signal.SIGPIPE,
+    signal.SIGCHLD,
+)
 _TIMERS = (signal.ITIMER_REAL, signal.ITIMER_VIRTUAL, signal.ITIMER_PROF)
-_LIMITS = (resource.RLIMIT_AS, resource.RLIMIT_CPU, resource.RLIMIT_DATA, resource.RLIMIT_FSIZE, resource.RLIMIT_NOFILE)
+_LIMITS = (
+    resource.RLIMIT_AS,
+    resource.RLIMIT_CPU,
+    resource.RLIMIT_DATA,
+    resource.RLIMIT_FSIZE,
+    resource.RLIMIT_NOFILE,
+)
 #: descriptors that foreign code cannot use up (see `reserve_descriptors`)
 _RESERVED_DESCRIPTORS = 32
 _SIGACTION_SIZE = 512  # more than any platform's struct sigaction, which begins with the handler
@@ -34,7 +48,10 @@ class ProcessState:
 
     def restore(self) -> list[str]:
         """Restore all attributes; return a description of each one that had changed."""
-        details = ((attribute.name, attribute.restore(value)) for attribute, value in zip(_ATTRIBUTES, self._values, strict=True))
+        details = (
+            (attribute.name, attribute.restore(value))
+            for attribute, value in zip(_ATTRIBUTES, self._values, strict=True)
+        )
         return [f"{name}{detail}" for name, detail in details if detail is not None]
 
 
@@ -85,7 +102,9 @@ def _c_environment() -> dict[bytes, bytes]:
 
 def _set_c_environment(variables: dict[bytes, bytes]) -> None:
     current = _c_environment()
-    for name in (name for name in {*current, *variables} if current.get(name) != variables.get(name)):
+    for name in (
+        name for name in {*current, *variables} if current.get(name) != variables.get(name)
+    ):
         with suppress(OSError, ValueError):  # a name that is not permitted
             if (value := variables.get(name)) is None:
                 os.environb.pop(name, None)
@@ -121,7 +140,11 @@ def _signal_actions() -> dict[int, bytes]:
 def _restore_signal_actions(saved: dict[int, bytes]) -> str | None:
     """Restore the actions whose handlers differ; return the names of their signals."""
     current = _signal_actions()
-    changed = [number for number in saved if current[number][:_POINTER_SIZE] != saved[number][:_POINTER_SIZE]]
+    changed = [
+        number
+        for number in saved
+        if current[number][:_POINTER_SIZE] != saved[number][:_POINTER_SIZE]
+    ]
     for number in changed:
         _c_library().sigaction(int(number), saved[number], None)
     return f" {', '.join(signal.Signals(number).name for number in changed)}" if changed else None
@@ -182,8 +205,8 @@ def _release_descriptors(had_free: bool) -> str | None:
 class _Attribute(NamedTuple):
     """One attribute of the process.
 
-    `restore` takes the value that `read` returned earlier. It returns None if nothing had changed, else details that follow the
-    name in the warning.
+    `restore` takes the value that `read` returned earlier. It returns None if nothing had changed,
+    else details that follow the name in the warning.
     """
 
     name: str

@@ -24,7 +24,8 @@ except ImportError:  # not Linux, or installed without a C compiler
         return b""
 
 
-#: held while foreign code may change the state of the process, so that only one thread at a time runs foreign code
+#: held while foreign code may change the state of the process, so that only one thread at a time
+#: runs foreign code
 _lock = threading.RLock()
 #: states at the begin of the nested blocks of the thread that holds the lock
 _saved_states: list[ProcessState] = []
@@ -44,16 +45,20 @@ class _StateCache:
         return encoding, self._state
 
 
-#: device and inode of the files behind the standard streams, see `_output_files`; root folder and permission, see `_file_access`
+#: device and inode of the files behind the standard streams, see `_output_files`; root folder and
+#: permission, see `_file_access`
 _Files = tuple[list[tuple[int, int]], tuple[int, bool]]
 
 
 @contextmanager
 def restoring_process_state(component: str) -> Iterator[None]:
-    """Restore the process state at the end of the block and warn of each change; other threads wait before such a block.
+    """Restore the process state at the end of the block and warn of each change.
 
-    A supervised process that lost its standard output, its standard error or the access to the files of the run ends here: only
-    its supervisor can still report the component and save the rows.
+    Other threads wait before such a block.
+
+    A supervised process that lost its standard output, its standard error or the access to the
+    files of the run ends here: only its supervisor can still report the component and save the
+    rows.
 
     Args:
         component: Name of the component or components that may change the state, for messages.
@@ -66,7 +71,9 @@ def restoring_process_state(component: str) -> Iterator[None]:
             _restore_state(component, *saved)
 
 
-def call_restoring_process_state(component: str, function: Callable[..., object], *arguments: Any) -> None:
+def call_restoring_process_state(
+    component: str, function: Callable[..., object], *arguments: Any
+) -> None:
     """Call a function in a block of `restoring_process_state`; takes half as long."""
     with _lock:
         saved = _save_state()
@@ -83,13 +90,21 @@ def _save_state() -> tuple[bytes, ProcessState, _Files | None]:
     return encoding, state, (_output_files(), _file_access()) if current_journal() else None
 
 
-def _restore_state(component: str, encoding: bytes, state: ProcessState, files: _Files | None) -> None:
+def _restore_state(
+    component: str, encoding: bytes, state: ProcessState, files: _Files | None
+) -> None:
     _saved_states.pop()
     journal = current_journal()
     if journal and files and files != (now := (_output_files(), _file_access())):
-        activity = "closed the files of the process" if files[0] != now[0] else "gave up the access to the files of the run"
+        activity = (
+            "closed the files of the process"
+            if files[0] != now[0]
+            else "gave up the access to the files of the run"
+        )
         journal.record_call(component, f"a call that {activity}")
-        journal.enter_phase(journal.phase if journal.phase == Phase.RESULTS_WRITTEN else Phase.CALLING)
+        journal.enter_phase(
+            journal.phase if journal.phase == Phase.RESULTS_WRITTEN else Phase.CALLING
+        )
         os._exit(70)
     if not encoding or _encode() != encoding:
         for change in state.restore():

@@ -1,4 +1,7 @@
-"""Python stack of a supervised child: its signal handlers write it when it crashes or when the supervisor requests it."""
+"""Python stack of a supervised child.
+
+Its signal handlers write it when it crashes or when the supervisor requests it.
+"""
 
 from __future__ import annotations
 
@@ -14,9 +17,11 @@ from itertools import takewhile
 from ..core.user_code import innermost_user_line, is_cosim_file
 
 _REQUEST_SIGNAL = signal.SIGUSR2
-#: lowest descriptor of the file in the child, so that later files do not get its number if foreign code closes it
+#: lowest descriptor of the file in the child, so that later files do not get its number if foreign
+#: code closes it
 _MIN_DESCRIPTOR = 200
-#: maximum time for which the supervisor waits for a requested stack, and interval at which it looks (s)
+#: maximum time for which the supervisor waits for a requested stack, and interval at which it looks
+#: (s)
 _MAX_WAIT, _WAIT_INTERVAL = 0.3, 0.01
 #: largest number of bytes read (foreign code can write to the file too)
 _MAX_SIZE = 1 << 16
@@ -48,7 +53,10 @@ def request_stack(process: int, file: int) -> None:
 
 
 def innermost_line(file: int) -> str:
-    """Return " (file:line)" of the user's Python code that was running when the stack was written; "" if none was running."""
+    """Return " (file:line)" of the user's Python code that was running when the stack was written.
+
+    "" if none was running.
+    """
     text = os.pread(file, _MAX_SIZE, 0).decode(errors="replace")
     frames = [(match[1], int(match[2])) for match in _FRAME.finditer(text)]
     # frames outside those of cosim belong to a program that called cosim

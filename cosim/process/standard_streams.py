@@ -45,7 +45,9 @@ class _EscapingStream(io.TextIOWrapper):
 
     def __init__(self, buffer: io.BufferedWriter, encoding: str):
         super().__init__(buffer, encoding=encoding, errors="replace", line_buffering=True)
-        self.unescaped = io.TextIOWrapper(buffer, encoding=encoding, errors="replace", write_through=True)
+        self.unescaped = io.TextIOWrapper(
+            buffer, encoding=encoding, errors="replace", write_through=True
+        )
 
     def write(self, text: str) -> int:
         return super().write(escape_control_characters(text, keep=f"\n{SPACES}"))
@@ -57,7 +59,9 @@ def open_closed_streams() -> None:
         try:
             os.fstat(descriptor)
         except OSError:
-            os.set_inheritable(os.open(os.devnull, os.O_RDWR), True)  # the lowest free descriptor, which is this one
+            os.set_inheritable(
+                os.open(os.devnull, os.O_RDWR), True
+            )  # the lowest free descriptor, which is this one
     for descriptor, name in enumerate(("stdin", "stdout", "stderr")):
         if getattr(sys, name) is None:
             setattr(sys, name, os.fdopen(descriptor, "w" if descriptor else "r", closefd=False))
@@ -78,7 +82,11 @@ def protected_stream(stream: TextIO, duplicate: bool = False) -> TextIO:
         descriptor = stream.fileno()
     except (OSError, AttributeError):
         return stream
-    raw = _StandardFile(os.dup(descriptor) if duplicate else descriptor, closefd=duplicate, ignore_disk_errors=descriptor == 2)
+    raw = _StandardFile(
+        os.dup(descriptor) if duplicate else descriptor,
+        closefd=duplicate,
+        ignore_disk_errors=descriptor == 2,
+    )
     return _EscapingStream(io.BufferedWriter(raw), stream.encoding)
 
 

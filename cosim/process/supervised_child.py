@@ -22,7 +22,12 @@ MEMORY_LIMIT = 4 << 30
 
 
 def run_child(
-    entry: Callable[[], int], journal: Journal, output: int, stack: int, temporary_folder: str, supervisor: int
+    entry: Callable[[], int],
+    journal: Journal,
+    output: int,
+    stack: int,
+    temporary_folder: str,
+    supervisor: int,
 ) -> NoReturn:
     """Run `entry` in this process, which was just forked, and end the process.
 
@@ -61,7 +66,10 @@ def _isolate(output: int, supervisor: int) -> None:
     lower_limit(resource.RLIMIT_DATA, MEMORY_LIMIT)
     lower_limit(resource.RLIMIT_CORE, 0)
     reserve_descriptors()
-    sys.stdout, sys.stderr = protected_stream(sys.stdout, duplicate=True), protected_stream(sys.stderr, duplicate=True)
+    sys.stdout, sys.stderr = (
+        protected_stream(sys.stdout, duplicate=True),
+        protected_stream(sys.stderr, duplicate=True),
+    )
     os.dup2(output, 1)
     os.dup2(output, 2)
     os.close(output)

@@ -1,7 +1,8 @@
 """Supervision of a function that runs foreign code in a child process.
 
-The child records its present call in a journal in shared memory. So a crash, an exit or a hang is attributed to the component and
-function that were called, at no cost per step. The recorded rows are in a file, which survives the child.
+The child records its present call in a journal in shared memory. So a crash, an exit or a hang is
+attributed to the component and function that were called, at no cost per step. The recorded rows
+are in a file, which survives the child.
 """
 
 from __future__ import annotations
@@ -23,7 +24,17 @@ from tempfile import TemporaryFile
 from ..core.errors import ComponentError
 from .failure_attribution import attribute_failure, describe_exit_status, unattributed_failure
 from .foreign_output import ForeignOutput
-from .journal import CALL_NUMBER, CHANGE_COUNT, EXIT_CODE, JOURNAL_SIZE, OVERWRITTEN, ROW_COUNT, STEP_COUNT, Journal, Phase
+from .journal import (
+    CALL_NUMBER,
+    CHANGE_COUNT,
+    EXIT_CODE,
+    JOURNAL_SIZE,
+    OVERWRITTEN,
+    ROW_COUNT,
+    STEP_COUNT,
+    Journal,
+    Phase,
+)
 from .python_stack import innermost_line, request_stack
 from .run_files.live_csv_writer import LiveCsvWriter
 from .supervised_child import run_child
@@ -42,7 +53,8 @@ STOP_TIMEOUT = 5.0
 #: largest ratio of the wall time of a call to its deadline, on a busy machine
 MAX_EXTENSION = 4.0
 
-#: number of searches for orphaned processes; each one may find children of the processes killed before
+#: number of searches for orphaned processes; each one may find children of the processes killed
+#: before
 _MAX_ORPHAN_SCANS = 10
 
 _TERMINATION_SIGNALS = (signal.SIGTERM, signal.SIGHUP)
@@ -79,7 +91,8 @@ def can_supervise() -> bool:
 
 
 def run_supervised(
-    entry: Callable[[], int], alongside: Callable[[Journal], AbstractContextManager[object]] = nullcontext
+    entry: Callable[[], int],
+    alongside: Callable[[Journal], AbstractContextManager[object]] = nullcontext,
 ) -> SupervisedOutcome:
     """Run a function in a child process with a journal.
 
@@ -92,7 +105,11 @@ def run_supervised(
     """
     journal = Journal(mmap.mmap(-1, JOURNAL_SIZE))
     _adopt_orphans()
-    with temporary_run_folder() as folder, TemporaryFile(dir=folder) as stack, interrupt_on_termination():
+    with (
+        temporary_run_folder() as folder,
+        TemporaryFile(dir=folder) as stack,
+        interrupt_on_termination(),
+    ):
         sys.stdout.flush()
         sys.stderr.flush()
         reader, writer = os.pipe()
@@ -108,11 +125,16 @@ def run_supervised(
 
 @contextmanager
 def interrupt_on_termination() -> Iterator[None]:
-    """Raise KeyboardInterrupt on SIGTERM and SIGHUP inside the block; does nothing outside the main thread."""
+    """Raise KeyboardInterrupt on SIGTERM and SIGHUP inside the block.
+
+    Does nothing outside the main thread.
+    """
     if threading.current_thread() is not threading.main_thread():
         yield
         return
-    handlers = {number: signal.signal(number, signal.default_int_handler) for number in _TERMINATION_SIGNALS}
+    handlers = {
+        number: signal.signal(number, signal.default_int_handler) for number in _TERMINATION_SIGNALS
+    }
     try:
         yield
     finally:
@@ -174,7 +196,10 @@ class _Supervisor:
         return self._outcome(status)
 
     def _poll_child(self, poll: select.poll, csv: LiveCsvWriter) -> int:
-        """Forward output, check the deadline and update the CSV file until the child ends; return its status."""
+        """Forward output, check the deadline and update the CSV file until the child ends.
+
+        Return its status.
+        """
         while True:
             try:
                 poll.poll(POLL_INTERVAL * 1000)
@@ -198,10 +223,16 @@ class _Supervisor:
             os.kill(self.child, signal.SIGKILL)
             return
         self._last_contents = journal.to_bytes()
-        deadline = journal.deadline  # read before `progress`: a later deadline might belong to the next call
+        deadline = (
+            journal.deadline
+        )  # read before `progress`: a later deadline might belong to the next call
         progress = journal[CHANGE_COUNT], journal[STEP_COUNT], journal[CALL_NUMBER]
         if progress != self._progress:
-            self._progress, self._progress_time, self._waiting_time = progress, now, waiting_time(self.child)
+            self._progress, self._progress_time, self._waiting_time = (
+                progress,
+                now,
+                waiting_time(self.child),
+            )
         elif now - self._progress_time > deadline and self._exceeds(deadline, now):
             self._timeout_reason = f"did not return within {deadline:g} s"
             request_stack(self.child, self.stack)
@@ -217,7 +248,10 @@ class _Supervisor:
     def _exceeds(self, deadline: float, now: float) -> bool:
         """Return whether a call exceeds a deadline (s) without the time in which a busy machine gave it no processor."""
         waiting = waiting_time(self.child) - self._waiting_time
-        return now - self._progress_time - waiting > deadline or now - self._progress_time > MAX_EXTENSION * deadline
+        return (
+            now - self._progress_time - waiting > deadline
+            or now - self._progress_time > MAX_EXTENSION * deadline
+        )
 
     def _forward_interrupt(self) -> None:
         """Send SIGINT to the child for the first interrupt, SIGKILL for the second."""
@@ -255,7 +289,9 @@ class _Supervisor:
         reason = (self._timeout_reason or describe_exit_status(status)) + innermost_line(self.stack)
         failure = self._stop_failure or attribute_failure(journal, reason)
         if phase == Phase.RESULTS_WRITTEN:
-            return SupervisedOutcome(code, rows, journal, warning=f"{failure}; all results were written before")
+            return SupervisedOutcome(
+                code, rows, journal, warning=f"{failure}; all results were written before"
+            )
         return SupervisedOutcome(1, rows, journal, failure)
 
 
@@ -265,12 +301,18 @@ def is_stopped(process: int) -> bool:
 
 
 def has_ended(process: int) -> bool:
-    """Return whether a process has ended, waited for or not; False on systems that do not report it."""
+    """Return whether a process has ended, waited for or not.
+
+    False on systems that do not report it.
+    """
     return _process_state(process) in ("Z", "X", "")
 
 
 def _process_state(process: int) -> str:
-    """Return the letter of a process's state in /proc; "" if it does not exist, "?" on systems without /proc."""
+    """Return the letter of a process's state in /proc.
+
+    "" if it does not exist, "?" on systems without /proc.
+    """
     try:
         return Path(f"/proc/{process}/stat").read_text().rpartition(") ")[2][:1]
     except OSError:
@@ -280,6 +322,9 @@ def _process_state(process: int) -> str:
 def _child_processes() -> list[int]:
     """Return the ids of the children of this process; empty where the system does not list them."""
     try:
-        return [int(word) for word in Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()]
+        return [
+            int(word)
+            for word in Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+        ]
     except OSError:
         return []

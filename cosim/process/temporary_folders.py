@@ -21,10 +21,10 @@ RUN_PREFIX, FMU_PREFIX, WORKER_PREFIX = "cosim-run-", "cosim-fmu-", "cosim-worke
 class LockedFolder:
     """New temporary folder, removed by `cleanup` or at the end of the process.
 
-    The process holds a lock on the folder, which the operating system releases even if the process is killed. An unlocked folder
-    is therefore abandoned. Process ids would not be sufficient, because they are reused, and another container may share /tmp.
-    Abandoned folders are
-    removed before the new one is created.
+    The process holds a lock on the folder, which the operating system releases even if the process
+    is killed. An unlocked folder is therefore abandoned. Process ids would not be sufficient,
+    because they are reused, and another container may share /tmp. Abandoned folders are removed
+    before the new one is created.
 
     Attributes:
         name: Path of the folder.
@@ -82,7 +82,10 @@ def _remove_abandoned_folders(directory: str) -> None:
 
 
 def _lock_folder(folder: str | Path, wait: bool) -> int | None:
-    """Lock a folder of this user and return the descriptor that holds the lock; None if that is impossible."""
+    """Lock a folder of this user and return the descriptor that holds the lock.
+
+    None if that is impossible.
+    """
     if sys.platform == "win32":
         return None
     with suppress(OSError):

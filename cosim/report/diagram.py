@@ -1,4 +1,7 @@
-"""Layout of the system diagram: components in the order of their stages from left to right, and their connections."""
+"""Layout of the system diagram.
+
+Components in the order of their stages from left to right, and their connections.
+"""
 
 from __future__ import annotations
 
@@ -42,7 +45,10 @@ class Frame(NamedTuple):
 
 
 class Wire(NamedTuple):
-    """Line for all connections from one component to another: SVG path, position (px) of the number of connections, texts."""
+    """Line for all connections from one component to another.
+
+    SVG path, position (px) of the number of connections, texts.
+    """
 
     path: str
     x: float
@@ -66,13 +72,21 @@ def build_diagram(system: Mapping[str, Any]) -> Diagram:
     """Return the diagram of a system that `cosim.scenario.overview.describe_system` has described."""
     known = {component["name"]: component for component in system["components"]}
     layout = _place_side_by_side(system["stages"])
-    boxes = {name: _build_box(known[name], *position) for name, position in layout.positions.items()}
+    boxes = {
+        name: _build_box(known[name], *position) for name, position in layout.positions.items()
+    }
     connections = _connections_by_pair(system["connections"], boxes)
     feedbacks = sum(boxes[target].x <= boxes[source].x for source, target in connections)
     bottom = MARGIN + layout.rows * (HEIGHT + GAP_Y)
     width = 2 * MARGIN + layout.columns * (WIDTH + GAP_X) - GAP_X
     wires = list(_wires(connections, boxes, bottom))
-    return Diagram(width, bottom + LANE * feedbacks + MARGIN / 2, list(boxes.values()), list(_frames(boxes.values())), wires)
+    return Diagram(
+        width,
+        bottom + LANE * feedbacks + MARGIN / 2,
+        list(boxes.values()),
+        list(_frames(boxes.values())),
+        wires,
+    )
 
 
 class _GridLayout(NamedTuple):
@@ -85,7 +99,9 @@ class _GridLayout(NamedTuple):
 
 def _place_side_by_side(stages: Sequence[Sequence[Any]]) -> _GridLayout:
     """Lay out stages from left to right, each centred vertically."""
-    blocks = [_place_below_each_other([_layout_member(member) for member in stage]) for stage in stages]
+    blocks = [
+        _place_below_each_other([_layout_member(member) for member in stage]) for stage in stages
+    ]
     rows = max((block.rows for block in blocks), default=0)
     positions: dict[str, tuple[float, float]] = {}
     columns = 0
@@ -121,7 +137,10 @@ def _build_box(component: Mapping[str, Any], column: float, row: float) -> Box:
     position = (MARGIN + column * (WIDTH + GAP_X), MARGIN + row * (HEIGHT + GAP_Y))
     name, origin = component["name"], component["origin"]
     every = f", every {component['period']:g} s" if component["period"] else ""
-    tooltip = f"{name}\n{origin}\n{count_noun(component['inputs'], 'input')}, {count_noun(component['outputs'], 'output')}{every}"
+    tooltip = (
+        f"{name}\n{origin}\n{count_noun(component['inputs'], 'input')}, "
+        f"{count_noun(component['outputs'], 'output')}{every}"
+    )
     file = origin.rpartition("/")[2]
     return Box(name, *position, _fit(name, TITLE_SIZE), _fit(file, ORIGIN_SIZE), tooltip)
 
@@ -135,7 +154,10 @@ def _fit(text: str, size: float) -> str:
 
 
 def _letter_width(letter: str) -> float:
-    """Return the width of a letter (em) in a wide sans-serif font, DejaVu Sans; the reader's font is at most as wide."""
+    """Return the width of a letter (em) in a wide sans-serif font, DejaVu Sans.
+
+    The reader's font is at most as wide.
+    """
     if letter in _NARROW_LETTERS:
         return 0.41
     if letter in _WIDE_LETTERS or not letter.isascii():
@@ -143,12 +165,18 @@ def _letter_width(letter: str) -> float:
     return 0.78 if letter.isupper() else 0.64
 
 
-def _connections_by_pair(connections: Sequence[Sequence[str]], boxes: Mapping[str, Box]) -> dict[tuple[str, str], list[str]]:
+def _connections_by_pair(
+    connections: Sequence[Sequence[str]], boxes: Mapping[str, Box]
+) -> dict[tuple[str, str], list[str]]:
     """Return a line of text for each connection, by (source component, target component)."""
     lines: dict[tuple[str, str], list[str]] = {}
     for source, target, unit, note in connections:
         ends = _component_of(source, boxes), _component_of(target, boxes)
-        text = f"{source} → {target}" + (f"  [{unit}]" if unit else "") + (f"  ({note})" if note else "")
+        text = (
+            f"{source} → {target}"
+            + (f"  [{unit}]" if unit else "")
+            + (f"  ({note})" if note else "")
+        )
         if ends[0] and ends[1]:
             lines.setdefault(ends, []).append(text)
     return lines
@@ -159,11 +187,15 @@ def _component_of(name: str, boxes: Mapping[str, Box]) -> str:
     return max((box for box in boxes if name.startswith(f"{box}.")), key=len, default="")
 
 
-def _wires(connections: Mapping[tuple[str, str], list[str]], boxes: Mapping[str, Box], bottom: float) -> Iterator[Wire]:
+def _wires(
+    connections: Mapping[tuple[str, str], list[str]], boxes: Mapping[str, Box], bottom: float
+) -> Iterator[Wire]:
     feedbacks = 0
     for (source, target), lines in connections.items():
         start, end = boxes[source], boxes[target]
-        more = [f"and {len(lines) - MAX_TOOLTIP_LINES} more"] if len(lines) > MAX_TOOLTIP_LINES else []
+        more = (
+            [f"and {len(lines) - MAX_TOOLTIP_LINES} more"] if len(lines) > MAX_TOOLTIP_LINES else []
+        )
         tooltip = "\n".join([*lines[:MAX_TOOLTIP_LINES], *more])
         if end.x > start.x:
             path, x, y = _forward_path(start, end)
@@ -188,7 +220,11 @@ def _feedback_path(start: Box, end: Box, number: int, bottom: float) -> tuple[st
     aside, lane = 12 + 4 * (number % 6), bottom - GAP_Y / 2 + LANE * (number + 1)
     x1, y1, x2, y2 = start.x + WIDTH, start.y + 0.75 * HEIGHT, end.x, end.y + 0.75 * HEIGHT
     right, left = x1 + aside, x2 - aside
-    return _rounded_path([(x1, y1), (right, y1), (right, lane), (left, lane), (left, y2), (x2, y2)]), (left + right) / 2, lane
+    return (
+        _rounded_path([(x1, y1), (right, y1), (right, lane), (left, lane), (left, y2), (x2, y2)]),
+        (left + right) / 2,
+        lane,
+    )
 
 
 def _rounded_path(points: Sequence[tuple[float, float]], radius: float = 6.0) -> str:
@@ -200,7 +236,9 @@ def _rounded_path(points: Sequence[tuple[float, float]], radius: float = 6.0) ->
     return path + "L{:g} {:g}".format(*points[-1])
 
 
-def _point_towards(corner: tuple[float, float], other: tuple[float, float], distance: float) -> tuple[float, float]:
+def _point_towards(
+    corner: tuple[float, float], other: tuple[float, float], distance: float
+) -> tuple[float, float]:
     share = min(0.5, distance / max(math.dist(corner, other), 1e-9))
     return corner[0] + share * (other[0] - corner[0]), corner[1] + share * (other[1] - corner[1])
 
@@ -214,5 +252,8 @@ def _frames(boxes: Iterable[Box]) -> Iterator[Frame]:
             groups.setdefault(outer, []).append(box)
     for name, members in groups.items():
         x, y = min(box.x for box in members) - FRAME_GAP, min(box.y for box in members) - FRAME_GAP
-        right, low = max(box.x for box in members) + WIDTH + FRAME_GAP, max(box.y for box in members) + HEIGHT + FRAME_GAP
+        right, low = (
+            max(box.x for box in members) + WIDTH + FRAME_GAP,
+            max(box.y for box in members) + HEIGHT + FRAME_GAP,
+        )
         yield Frame(name, x, y, right - x, low - y)

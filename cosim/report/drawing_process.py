@@ -47,7 +47,9 @@ class DrawingProcess:
         if self._process == 0:
             os.close(requests[1])
             os.close(answers[0])
-            _run_process(load_figures, os.fdopen(requests[0], "rb"), os.fdopen(answers[1], "wb", buffering=0))
+            _run_process(
+                load_figures, os.fdopen(requests[0], "rb"), os.fdopen(answers[1], "wb", buffering=0)
+            )
         os.close(requests[0])
         os.close(answers[1])
         self._requests, self._answers = os.fdopen(requests[1], "wb"), os.fdopen(answers[0], "rb")
@@ -72,10 +74,23 @@ class DrawingProcess:
             run_folder: Folder with its recorded rows, until `wait_until_read` has returned.
             folder: Folder of the PNG files.
         """
-        content = {"kpis": result.kpis, "timing": result.timing, "metadata": result.metadata, "checks": result.checks}
-        request = {"run_folder": str(run_folder), "rows": len(result.time), "folder": str(folder), "result": content}
+        content = {
+            "kpis": result.kpis,
+            "timing": result.timing,
+            "metadata": result.metadata,
+            "checks": result.checks,
+        }
+        request = {
+            "run_folder": str(run_folder),
+            "rows": len(result.time),
+            "folder": str(folder),
+            "result": content,
+        }
         with suppress(OSError):  # the process has ended
-            self._requests.write(json.dumps({**request, "pictures": self._pictures.name}, default=str).encode() + b"\n")
+            self._requests.write(
+                json.dumps({**request, "pictures": self._pictures.name}, default=str).encode()
+                + b"\n"
+            )
             self._requests.flush()
 
     def wait_until_read(self) -> None:
@@ -83,7 +98,9 @@ class DrawingProcess:
         self._answers.readline()
 
     def picture(self, name: str, function: str) -> str | None:
-        """Wait until all figures are drawn, and return one as SVG text; None if drawing it raised an exception.
+        """Wait until all figures are drawn, and return one as SVG text.
+
+        None if drawing it raised an exception.
 
         Args:
             name: Name of the figure.
@@ -102,7 +119,9 @@ class DrawingProcess:
         return file.read_text(encoding="utf-8")
 
 
-def _run_process(load_figures: Callable[[], Iterable[Figure]], requests: IO[bytes], answers: IO[bytes]) -> NoReturn:
+def _run_process(
+    load_figures: Callable[[], Iterable[Figure]], requests: IO[bytes], answers: IO[bytes]
+) -> NoReturn:
     """Serve one request in this process, which was just forked, and end the process."""
     try:
         set_current_journal(None)
@@ -115,7 +134,10 @@ def _run_process(load_figures: Callable[[], Iterable[Figure]], requests: IO[byte
 
 
 def _load(load_figures: Callable[[], Iterable[Figure]]) -> Sequence[Figure]:
-    """Import the figure functions and matplotlib; after a failure, the simulation process draws and reports the error."""
+    """Import the figure functions and matplotlib.
+
+    After a failure, the simulation process draws and reports the error.
+    """
     with suppress(Exception):
         if figures := list(load_figures()):
             draw_nothing()
@@ -124,14 +146,25 @@ def _load(load_figures: Callable[[], Iterable[Figure]]) -> Sequence[Figure]:
 
 
 def _serve(request: Mapping[str, Any], figures: Sequence[Figure], answers: IO[bytes]) -> None:
-    content, recording = request["result"], recover_recording(Path(request["run_folder"]), request["rows"])
+    content, recording = (
+        request["result"],
+        recover_recording(Path(request["run_folder"]), request["rows"]),
+    )
     checks = [CheckOutcome(*outcome) for outcome in content["checks"]]
-    result = Result(recording, Kpis(content["kpis"]), content["timing"], content["metadata"], checks)
+    result = Result(
+        recording, Kpis(content["kpis"]), content["timing"], content["metadata"], checks
+    )
     answers.write(b"\n")
     folders = Path(request["folder"]), Path(request["pictures"])
     functions = {name: function for name, function, _ in figures}
-    specs = result.metadata["scenario"].get("figures", ())  # with the arguments that the run has resolved
-    resolved = [(spec["name"], functions[spec["name"]], spec.get("arguments", {})) for spec in specs if spec["name"] in functions]
+    specs = result.metadata["scenario"].get(
+        "figures", ()
+    )  # with the arguments that the run has resolved
+    resolved = [
+        (spec["name"], functions[spec["name"]], spec.get("arguments", {}))
+        for spec in specs
+        if spec["name"] in functions
+    ]
     processes = {figure[0]: _fork_drawing(result, figure, *folders) for figure in resolved}
     statuses = {name: os.waitpid(process, 0)[1] for name, process in processes.items()}
     answers.write(json.dumps(statuses).encode() + b"\n")

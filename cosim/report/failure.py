@@ -32,14 +32,18 @@ class Failure(NamedTuple):
 
     def __str__(self) -> str:
         """Return the sentences about the mark and the opening of the replay."""
-        return f"The replay opens at t = {self.opens:.6g} s. Mark × at t = {self.time:.6g} s: {self.label}."
+        return (
+            f"The replay opens at t = {self.opens:.6g} s. Mark × at t = {self.time:.6g} s: "
+            f"{self.label}."
+        )
 
 
 def find_failure(result: Result, outcomes: Sequence[CheckOutcome]) -> Failure | None:
     """Return the failure of a run; None if it ended with all checks passed.
 
-    A component that failed: the last row. A crash: the time at which its condition was met. A check: the value `time` of the same
-    KPI function (of a touchdown, for example) if there is one, the row of a peak, a maximum or a minimum, else the last row.
+    A component that failed: the last row. A crash: the time at which its condition was met. A
+    check: the value `time` of the same KPI function (of a touchdown, for example) if there is one,
+    the row of a peak, a maximum or a minimum, else the last row.
     """
     failed = [outcome for outcome in outcomes if not outcome.passed]
     if result.metadata.get("failure"):
@@ -64,5 +68,7 @@ def _kpi_time(result: Result, name: str) -> float:
         if kpi["name"] == name and kpi["python"] in _EXTREMES:
             given = {"target": 0.0, "start": -math.inf, "stop": math.inf, **kpi["arguments"]}
             time, error = control_error(result, **given)
-            return float(time[np.argmax(_EXTREMES[kpi["python"]](error))]) if error.size else math.nan
+            return (
+                float(time[np.argmax(_EXTREMES[kpi["python"]](error))]) if error.size else math.nan
+            )
     return math.nan

@@ -1,7 +1,7 @@
 """Figures in a common style, written to files that are reproducible byte by byte.
 
-A scenario names functions `function(result, **arguments) -> matplotlib.figure.Figure`, as it does for KPIs. They should not
-use pyplot, which keeps global state and may need a window system.
+A scenario names functions `function(result, **arguments) -> matplotlib.figure.Figure`, as it does
+for KPIs. They should not use pyplot, which keeps global state and may need a window system.
 """
 
 from __future__ import annotations
@@ -20,14 +20,17 @@ from .figure_data import write_figure_data
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-#: matplotlib settings for a column (3.5 in) of a two-column paper; colours for colour-blind readers (Okabe and Ito 2008)
+#: matplotlib settings for a column (3.5 in) of a two-column paper; colours for colour-blind readers
+#: (Okabe and Ito 2008)
 STYLE: Mapping[Any, Any] = {
     "axes.axisbelow": True,
     "axes.edgecolor": "#444444",
     "axes.grid": True,
     "axes.labelsize": 8,
     "axes.linewidth": 0.6,
-    "axes.prop_cycle": "cycler('color', ['0072B2', 'D55E00', '009E73', 'CC79A7', 'E69F00', '56B4E9'])",
+    "axes.prop_cycle": (
+        "cycler('color', ['0072B2', 'D55E00', '009E73', 'CC79A7', 'E69F00', '56B4E9'])"
+    ),
     "axes.spines.right": False,
     "axes.spines.top": False,
     "axes.titlesize": 8,
@@ -63,7 +66,9 @@ def figure_style() -> Iterator[None]:
         yield
 
 
-def draw_figure(result: Result, name: str, function: Callable[..., Figure], arguments: Mapping[str, Any]) -> Figure:
+def draw_figure(
+    result: Result, name: str, function: Callable[..., Figure], arguments: Mapping[str, Any]
+) -> Figure:
     """Draw a figure in the common style.
 
     Args:
@@ -73,7 +78,8 @@ def draw_figure(result: Result, name: str, function: Callable[..., Figure], argu
         arguments: Its keyword arguments.
 
     Returns:
-        The figure with its final layout, by matplotlib's constrained layout unless the function sets another one.
+        The figure with its final layout, by matplotlib's constrained layout unless the function
+        sets another one.
 
     Raises:
         InputError: The result lacks a signal that the function needs.
@@ -85,13 +91,18 @@ def draw_figure(result: Result, name: str, function: Callable[..., Figure], argu
     with figure_style():
         figure = evaluation.evaluate("figure", result)
         if not isinstance(figure, Figure):
-            raise evaluation.failure("figure", f"returned {type(figure).__name__}, expected a matplotlib.figure.Figure")
+            raise evaluation.failure(
+                "figure", f"returned {type(figure).__name__}, expected a matplotlib.figure.Figure"
+            )
         _fix_layout(figure)
     return figure
 
 
 def _fix_layout(figure: Figure) -> None:
-    """Lay a figure out once, for all of its files; axes that are not in a grid keep their positions."""
+    """Lay a figure out once, for all of its files.
+
+    Axes that are not in a grid keep their positions.
+    """
     engine = figure.get_layout_engine()
     if engine and any(axes.get_subplotspec() for axes in figure.axes):
         engine.execute(figure)
@@ -99,7 +110,10 @@ def _fix_layout(figure: Figure) -> None:
 
 
 def save_figure(figure: Figure, path: Path) -> None:
-    """Write a figure as PNG or SVG, according to the suffix of `path`: atomically, without dates and versions."""
+    """Write a figure as PNG or SVG, according to the suffix of `path`.
+
+    Atomically, without dates and versions.
+    """
     with figure_style(), writing_atomically(path) as temporary:
         metadata = {"Software": None} if path.suffix == ".png" else _SVG_METADATA
         figure.savefig(temporary, format=path.suffix[1:], dpi="figure", metadata=metadata)

@@ -19,9 +19,11 @@ class Deviation(NamedTuple):
     """Failed comparison with a reference.
 
     Attributes:
-        summary: Number of the signals that failed, which becomes the verdict, and one line for each of them.
+        summary: Number of the signals that failed, which becomes the verdict, and one line for each
+            of them.
         changes: What has changed since the reference was made; "" if nothing is known.
-        accept: How to make the run the reference, which is shown if its checks passed; "" if unknown.
+        accept: How to make the run the reference, which is shown if its checks passed; "" if
+            unknown.
     """
 
     summary: str
@@ -30,17 +32,21 @@ class Deviation(NamedTuple):
 
 
 def write_folder_report(
-    folder: Path, target: Path, more_figures: Iterable[NamedCall] = (), deviation: Deviation | None = None
+    folder: Path,
+    target: Path,
+    more_figures: Iterable[NamedCall] = (),
+    deviation: Deviation | None = None,
 ) -> None:
     """Write the report of the run in a folder: KPIs, checks, figures, system and 3-D replay.
 
-    The report of a run that failed shows the cause and what was recorded until then. Its figures are drawn as far as that is
-    possible; the others are logged as warnings.
+    The report of a run that failed shows the cause and what was recorded until then. Its figures
+    are drawn as far as that is possible; the others are logged as warnings.
 
     Args:
         folder: Folder that `cosim run` wrote.
         target: The HTML file.
-        more_figures: Name, function and arguments of figures that are drawn before those of the scenario.
+        more_figures: Name, function and arguments of figures that are drawn before those of the
+            scenario.
         deviation: Failed comparison with a reference.
 
     Raises:
@@ -50,8 +56,14 @@ def write_folder_report(
     run = read_run(folder)
     checks = run.metadata.get("scenario", {}).get("checks", [])
     outcomes = evaluate_checks(run.kpis, [check for check in checks if check["kpi"] in run.kpis])
-    is_accepted = not run.crashed and len(outcomes) == len(checks) and all(outcome.passed for outcome in outcomes)
-    run.metadata["deviation"] = list(_deviation_lines(run, deviation, is_accepted)) if deviation else []
+    is_accepted = (
+        not run.crashed
+        and len(outcomes) == len(checks)
+        and all(outcome.passed for outcome in outcomes)
+    )
+    run.metadata["deviation"] = (
+        list(_deviation_lines(run, deviation, is_accepted)) if deviation else []
+    )
     write_report(run, outcomes, _draw_figures(run, [*more_figures, *load_figures(run)]), target)
 
 
@@ -59,7 +71,11 @@ def _deviation_lines(run: Result, deviation: Deviation, is_accepted: bool) -> It
     """Yield the verdict of a failed comparison, the deviations, the reason of the tolerances, and how to accept the run."""
     yield from deviation.summary.splitlines()
     reason = (run.metadata.get("scenario", {}).get("reference") or {}).get("reason")
-    notes = (reason and f"reason of the tolerances: {reason}", deviation.changes, is_accepted and deviation.accept)
+    notes = (
+        reason and f"reason of the tolerances: {reason}",
+        deviation.changes,
+        is_accepted and deviation.accept,
+    )
     yield from (note[0].upper() + note[1:] for note in notes if note)
 
 

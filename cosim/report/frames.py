@@ -1,7 +1,10 @@
-"""Parallel rendering of video frames: of n worker processes, number k renders the frames k, k + n, k + 2n, ...
+"""Parallel rendering of video frames.
 
-A worker process runs this module as a program. It reads a pickled job from standard input and writes one pickle per frame to
-standard output. The pipe blocks it until the frames are read, so that they do not fill the memory.
+Of n worker processes, number k renders the frames k, k + n, k + 2n, ...
+
+A worker process runs this module as a program. It reads a pickled job from standard input and
+writes one pickle per frame to standard output. The pipe blocks it until the frames are read, so
+that they do not fill the memory.
 """
 
 from __future__ import annotations
@@ -34,7 +37,10 @@ RENDER_METHOD = "video_frames"
 
 @dataclass(frozen=True)
 class RenderJob:
-    """Frames to render: the class `source` ("file.py:Class") renders one at each of `times` (s) with its `video_frames`."""
+    """Frames to render.
+
+    The class `source` ("file.py:Class") renders one at each of `times` (s) with its `video_frames`.
+    """
 
     source: str
     result: Result
@@ -44,11 +50,15 @@ class RenderJob:
 
     def frames(self) -> Iterator[np.ndarray]:
         """Render the frames in this process: uint8, shape (height, width, 3)."""
-        render: Callable[..., Iterator[np.ndarray]] = getattr(load_object(self.source, Path()), RENDER_METHOD)
+        render: Callable[..., Iterator[np.ndarray]] = getattr(
+            load_object(self.source, Path()), RENDER_METHOD
+        )
         return render(self.result, self.camera, self.times, self.size)
 
 
-def render_frames(job: RenderJob, processes: int | None = None) -> Generator[np.ndarray, None, None]:
+def render_frames(
+    job: RenderJob, processes: int | None = None
+) -> Generator[np.ndarray, None, None]:
     """Yield the frames of a job in their order, rendered by several processes.
 
     Args:
@@ -59,12 +69,17 @@ def render_frames(job: RenderJob, processes: int | None = None) -> Generator[np.
         CosimError: A process ended without an error message, for example by a crash.
     """
     if processes is None:
-        processes = min(available_processors(), MAX_PROCESSES, len(job.times) // MIN_FRAMES_PER_PROCESS)
+        processes = min(
+            available_processors(), MAX_PROCESSES, len(job.times) // MIN_FRAMES_PER_PROCESS
+        )
     if processes < 2:
         yield from job.frames()
         return
     with ExitStack() as stack:
-        workers = [stack.enter_context(_render_process(replace(job, times=job.times[k::processes]))) for k in range(processes)]
+        workers = [
+            stack.enter_context(_render_process(replace(job, times=job.times[k::processes])))
+            for k in range(processes)
+        ]
         for i in range(len(job.times)):
             yield _receive_frame(workers[i % processes])
 
@@ -90,7 +105,9 @@ def _receive_frame(worker: subprocess.Popen[bytes]) -> np.ndarray:
     try:
         item: np.ndarray | BaseException = pickle.load(worker.stdout)  # noqa: S301
     except EOFError:
-        raise CosimError(f"a process that renders frames ended with exit code {worker.wait()}") from None
+        raise CosimError(
+            f"a process that renders frames ended with exit code {worker.wait()}"
+        ) from None
     if isinstance(item, BaseException):
         raise item
     return item
@@ -98,7 +115,9 @@ def _receive_frame(worker: subprocess.Popen[bytes]) -> np.ndarray:
 
 def main() -> None:
     """Render the job on standard input and write the frames to standard output."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # an interrupt reaches the parent too, which kills this process
+    signal.signal(
+        signal.SIGINT, signal.SIG_IGN
+    )  # an interrupt reaches the parent too, which kills this process
     with os.fdopen(os.dup(1), "wb") as channel:
         os.dup2(2, 1)  # what libraries print goes to standard error
         job: RenderJob = pickle.load(sys.stdin.buffer)  # noqa: S301

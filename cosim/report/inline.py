@@ -24,7 +24,9 @@ MAX_SIGNALS = 12
 
 
 def result_as_html(result: Result) -> str:
-    """Return a result for a cell of a notebook: the table of KPIs, and the report with figures and replay in a frame.
+    """Return a result for a cell of a notebook.
+
+    The table of KPIs, and the report with figures and replay in a frame.
 
     The frame has its own origin, so that scripts of the report have no access to the notebook.
     """
@@ -33,8 +35,13 @@ def result_as_html(result: Result) -> str:
     lines = [f"<p><b>{html.escape(name or 'Result')}</b>: {rows}</p>"]
     lines += [f"<p>ended early: {html.escape(failure)}</p>"] if failure else []
     if result.kpis:
-        lines += ["<table><thead><tr><th>KPI</th><th>value</th><th>unit</th><th>check</th></tr></thead><tbody>"]
-        lines += [f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>" for row in _kpi_rows(result)]
+        lines += [
+            "<table><thead><tr><th>KPI</th><th>value</th><th>unit</th><th>check</th></tr></thead><tbody>"
+        ]
+        lines += [
+            f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>"
+            for row in _kpi_rows(result)
+        ]
         lines += ["</tbody></table>"]
     if len(result.time):
         page = html.escape(render_report(result, result.checks, _figures(result)), quote=True)
@@ -53,7 +60,10 @@ def _kpi_rows(result: Result) -> Iterator[tuple[str, str, str, str]]:
 
 
 def _figures(result: Result) -> Iterator[tuple[str, str]]:
-    """Yield name and SVG of each figure of the scenario; a result that ended early may lack what a figure needs."""
+    """Yield name and SVG of each figure of the scenario.
+
+    A result that ended early may lack what a figure needs.
+    """
     for name, function, arguments in load_figures(result):
         try:
             yield name, figure_to_svg(draw_figure(result, name, function, arguments))
@@ -87,8 +97,12 @@ def plot_signals(result: Result, patterns: Sequence[str]) -> Figure:
     units = list(dict.fromkeys(result.units.get(name, "") for name in names))
     width, height = STYLE["figure.figsize"]
     with figure_style():
-        figure = NotebookFigure(figsize=(2 * width, max(height, 1.6 * len(units))), layout="constrained")
-        for axes, unit in zip(figure.subplots(len(units), sharex=True, squeeze=False)[:, 0], units, strict=True):
+        figure = NotebookFigure(
+            figsize=(2 * width, max(height, 1.6 * len(units))), layout="constrained"
+        )
+        for axes, unit in zip(
+            figure.subplots(len(units), sharex=True, squeeze=False)[:, 0], units, strict=True
+        ):
             for name in (name for name in names if result.units.get(name, "") == unit):
                 axes.plot(result.time, result[name], label=name)
             axes.set_ylabel(unit)

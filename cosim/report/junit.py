@@ -32,8 +32,16 @@ def write_junit(suite: str, cases: Sequence[JUnitCase], path: Path) -> None:
         InputError: The file cannot be written.
         OutputError: The disk is full or failed.
     """
-    counts = {kind: str(sum(case.outcome == word for case in cases)) for kind, word in _OUTCOME_COUNTERS.items()}
-    attributes = {"name": suite, "tests": str(len(cases)), **counts, "time": f"{sum(case.seconds for case in cases):.3f}"}
+    counts = {
+        kind: str(sum(case.outcome == word for case in cases))
+        for kind, word in _OUTCOME_COUNTERS.items()
+    }
+    attributes = {
+        "name": suite,
+        "tests": str(len(cases)),
+        **counts,
+        "time": f"{sum(case.seconds for case in cases):.3f}",
+    }
     root = ElementTree.Element("testsuites")
     element = ElementTree.SubElement(root, "testsuite", attributes)
     for case in cases:
@@ -48,7 +56,11 @@ _OUTCOME_COUNTERS = {"failures": "failure", "errors": "error"}
 
 
 def _add_case(parent: ElementTree.Element, suite: str, case: JUnitCase) -> None:
-    element = ElementTree.SubElement(parent, "testcase", classname=suite, name=case.name, time=f"{case.seconds:.3f}")
+    element = ElementTree.SubElement(
+        parent, "testcase", classname=suite, name=case.name, time=f"{case.seconds:.3f}"
+    )
     if case.outcome in _OUTCOME_COUNTERS.values():
         details = [_INVALID_XML_CHARACTERS.sub("?", line) for line in case.details]
-        ElementTree.SubElement(element, case.outcome, message=details[0] if details else "").text = "\n".join(details)
+        ElementTree.SubElement(
+            element, case.outcome, message=details[0] if details else ""
+        ).text = "\n".join(details)

@@ -1,4 +1,7 @@
-"""Self-contained HTML pages: template, script, style and data in one file that opens from disk without a network."""
+"""Self-contained HTML pages.
+
+Template, script, style and data in one file that opens from disk without a network.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,8 @@ TEMPLATE_FOLDER = Path(__file__).with_name("page")
 
 #: allows the scripts, styles and pictures inside the page and forbids all network requests
 CONTENT_SECURITY_POLICY = (
-    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; form-action 'none'"
+    "default-src 'none'; script-src 'unsafe-inline'; style-src 'unsafe-inline'; img-src data:; "
+    "form-action 'none'"
 )
 
 _ABSOLUTE_PATH = re.compile(r"(?<![\w./:])(?:/[\w.+@ -]*[\w.+@-])+")
@@ -49,10 +53,12 @@ def _breakable(name: str) -> str:
 
 
 def _hide_folders(value: Any) -> Any:
-    """Return a text of a page without folders of this machine, because pages are shared; other values are returned unchanged.
+    """Return a text of a page without folders of this machine, because pages are shared.
 
-    A path below the working directory becomes relative. Another one, also one that climbs three folders or more, is replaced by
-    its file name.
+    Other values are returned unchanged.
+
+    A path below the working directory becomes relative. Another one, also one that climbs three
+    folders or more, is replaced by its file name.
     """
     from markupsafe import Markup
 
@@ -72,7 +78,9 @@ def _shown_path(path: Path) -> str:
 @cache
 def _page_assets() -> dict[str, Any]:
     names = ("replay.js", "tables.js", "replay.css")
-    script, table_script, style = ((TEMPLATE_FOLDER / "bundle" / name).read_text(encoding="utf-8") for name in names)
+    script, table_script, style = (
+        (TEMPLATE_FOLDER / "bundle" / name).read_text(encoding="utf-8") for name in names
+    )
     return {
         "script": safe_markup(script.replace("</script", "<\\/script")),
         "table_script": safe_markup(table_script),
@@ -89,11 +97,16 @@ def safe_markup(text: str) -> str:
 
 
 def render_page(template: str, **values: Any) -> str:
-    """Return a page as HTML; all `values` are escaped, and freed from folders of this machine, except those of `safe_markup`."""
+    """Return a page as HTML.
+
+    All `values` are escaped, and freed from folders of this machine, except those of `safe_markup`.
+    """
     return _jinja_environment().get_template(template).render(**{**_page_assets(), **values})
 
 
 def embed_json(data: Any) -> str:
     """Return data as JSON that is safe inside a script element, whatever texts it contains."""
-    text = json.dumps(to_json_types(data), ensure_ascii=False, separators=(",", ":"), allow_nan=False)
+    text = json.dumps(
+        to_json_types(data), ensure_ascii=False, separators=(",", ":"), allow_nan=False
+    )
     return safe_markup(text.replace("<", "\\u003c"))

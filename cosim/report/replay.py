@@ -28,7 +28,10 @@ def replay_data(runs: Sequence[Result]) -> dict[str, Any]:
     """
     for result in runs:
         if not len(result.time):
-            raise InputError(f"the result {result.metadata.get('name', '')} has no rows, so there is nothing to replay")
+            raise InputError(
+                f"the result {result.metadata.get('name', '')} has no rows, so there is nothing to "
+                "replay"
+            )
     scene = build_scene(runs[0].metadata)
     checked = list(_group_by_unit(runs[0], _checked_signals(runs[0])))
     others = scene["plots"] or ([] if scene["bodies"] else _default_plots(runs[0]))
@@ -39,7 +42,11 @@ def replay_data(runs: Sequence[Result]) -> dict[str, Any]:
 def _default_plots(result: Result) -> list[list[str]]:
     """Return the first numeric signals, grouped by unit; constant ones only if all are constant."""
     numeric = [name for name in result if result[name].dtype != object]
-    return list(_group_by_unit(result, [name for name in numeric if not is_constant(result[name])] or numeric))
+    return list(
+        _group_by_unit(
+            result, [name for name in numeric if not is_constant(result[name])] or numeric
+        )
+    )
 
 
 def _group_by_unit(result: Result, names: Iterable[str]) -> Iterator[list[str]]:
@@ -54,7 +61,9 @@ def _checked_signals(result: Result) -> Iterable[str]:
     """Return the numeric signals in the arguments of those KPIs that are checked, each once."""
     scenario = result.metadata.get("scenario", {})
     checked = {check["kpi"].partition(".")[0] for check in scenario.get("checks", [])}
-    arguments = [kpi.get("arguments", {}) for kpi in scenario.get("kpis", []) if kpi["name"] in checked]
+    arguments = [
+        kpi.get("arguments", {}) for kpi in scenario.get("kpis", []) if kpi["name"] in checked
+    ]
     texts = [value for each in arguments for value in each.values() if isinstance(value, str)]
     return dict.fromkeys(name for name in texts if name in result and result[name].dtype != object)
 
@@ -62,7 +71,9 @@ def _checked_signals(result: Result) -> Iterable[str]:
 def write_replay(runs: Sequence[Result], path: Path) -> None:
     """Write the replay of one run, or of two runs for comparison, as a self-contained page."""
     names = dict.fromkeys(str(result.metadata.get("name", "run")) for result in runs)
-    description = "Two runs; the second is tinted and dashed" if len(runs) > 1 else _description(runs[0])
+    description = (
+        "Two runs; the second is tinted and dashed" if len(runs) > 1 else _description(runs[0])
+    )
     _write_page(path, " and ".join(names), description, replay_data(runs))
 
 
@@ -76,16 +87,30 @@ def write_judged_replay(result: Result, outcomes: Sequence[CheckOutcome], path: 
     """
     failure, units = find_failure(result, outcomes), result.metadata.get("kpi_units") or {}
     reasons = [outcome.text(units) for outcome in outcomes if not outcome.passed]
-    cause = result.metadata.get("failure") or (result.termination if result.crashed else "") or "; ".join(reasons)
+    cause = (
+        result.metadata.get("failure")
+        or (result.termination if result.crashed else "")
+        or "; ".join(reasons)
+    )
     data = {**replay_data([result]), "failure": failure and failure._asdict()}
     verdict = (
-        f"Not successful: {cause.rstrip('.')}. {failure}" if failure else "Successful." if outcomes else _description(result)
+        f"Not successful: {cause.rstrip('.')}. {failure}"
+        if failure
+        else "Successful."
+        if outcomes
+        else _description(result)
     )
-    _write_page(path, str(result.metadata.get("name", "run")), verdict, data, failed=failure is not None)
+    _write_page(
+        path, str(result.metadata.get("name", "run")), verdict, data, failed=failure is not None
+    )
 
 
-def _write_page(path: Path, title: str, description: str, data: dict[str, Any], failed: bool = False) -> None:
-    text = render_page("replay.html", title=title, description=description, data=embed_json(data), failed=failed)
+def _write_page(
+    path: Path, title: str, description: str, data: dict[str, Any], failed: bool = False
+) -> None:
+    text = render_page(
+        "replay.html", title=title, description=description, data=embed_json(data), failed=failed
+    )
     with writing_atomically(path) as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
 

@@ -41,7 +41,9 @@ class KpiRow(NamedTuple):
     passed: bool = True
 
 
-def write_report(result: Result, outcomes: Sequence[CheckOutcome], figures: Iterable[tuple[str, str]], path: Path) -> None:
+def write_report(
+    result: Result, outcomes: Sequence[CheckOutcome], figures: Iterable[tuple[str, str]], path: Path
+) -> None:
     """Write the report of a run, see `render_report`, to the HTML file `path`.
 
     Raises:
@@ -53,13 +55,18 @@ def write_report(result: Result, outcomes: Sequence[CheckOutcome], figures: Iter
         temporary.write_text(text, encoding="utf-8", newline="\n")
 
 
-def render_report(result: Result, outcomes: Sequence[CheckOutcome], figures: Iterable[tuple[str, str]]) -> str:
-    """Return the report of a run: KPIs, checks, figures, system diagram, scenario, versions, timings, warnings and replay.
+def render_report(
+    result: Result, outcomes: Sequence[CheckOutcome], figures: Iterable[tuple[str, str]]
+) -> str:
+    """Return the report of a run.
+
+    KPIs, checks, figures, system diagram, scenario, versions, timings, warnings and replay.
 
     Args:
         result: The run.
         outcomes: The outcomes of the scenario's checks.
-        figures: Name and SVG text of each figure; read when the rest of the page is ready, so drawing them may end later.
+        figures: Name and SVG text of each figure; read when the rest of the page is ready, so
+            drawing them may end later.
 
     Returns:
         A self-contained HTML page.
@@ -68,7 +75,10 @@ def render_report(result: Result, outcomes: Sequence[CheckOutcome], figures: Ite
         InputError: The result has no rows.
     """
     if not len(result.time):
-        raise InputError(f"the result {result.metadata.get('name', '')} has no rows, so there is nothing to report")
+        raise InputError(
+            f"the result {result.metadata.get('name', '')} has no rows, so there is nothing to "
+            "report"
+        )
     about, units = _metadata_with_defaults(result), result.metadata.get("kpi_units", {})
     failure = find_failure(result, outcomes)
     return render_page(
@@ -152,4 +162,8 @@ def _timings(result: Result) -> Iterator[tuple[str, str]]:
 
 def _figure_element(name: str, svg: str) -> dict[str, Any]:
     """Return an SVG file as an element of the page; `drawn` is False if it contains a bitmap."""
-    return {"name": name, "svg": safe_markup(svg[svg.index("<svg") :]), "drawn": "<image" not in svg}
+    return {
+        "name": name,
+        "svg": safe_markup(svg[svg.index("<svg") :]),
+        "drawn": "<image" not in svg,
+    }

@@ -1,4 +1,7 @@
-"""Schema of the files that `cosim run` writes, as far as reports read them; other keys are allowed."""
+"""Schema of the files that `cosim run` writes, as far as reports read them.
+
+Other keys are allowed.
+"""
 
 from __future__ import annotations
 
@@ -75,7 +78,11 @@ class _System(_Part):
 
 def _member_names(stages: list[list[str | _Group]]) -> list[str]:
     members = [member for stage in stages for member in stage]
-    return [name for member in members for name in ([member] if isinstance(member, str) else _member_names(member.stages))]
+    return [
+        name
+        for member in members
+        for name in ([member] if isinstance(member, str) else _member_names(member.stages))
+    ]
 
 
 class _Termination(_Part):

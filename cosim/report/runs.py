@@ -33,23 +33,34 @@ def read_run(directory: str | Path) -> Result:
     directory = Path(directory)
     about = _read_json(directory / "run.json", RunFile)
     timing, units = about.pop("timing", {}), about.pop("units", {})
-    kpis = _read_json(directory / "kpis.json", KpiFile) if (directory / "kpis.json").exists() else {}
+    kpis = (
+        _read_json(directory / "kpis.json", KpiFile) if (directory / "kpis.json").exists() else {}
+    )
     numbers = {name: math.nan if value is None else value for name, value in kpis.items()}
     recording = Result.from_csv(directory / "result.csv").recording
-    return Result(replace(recording, units={**recording.units, **units}), Kpis(numbers), timing, about)
+    return Result(
+        replace(recording, units={**recording.units, **units}), Kpis(numbers), timing, about
+    )
 
 
 def _read_json(path: Path, schema: type[BaseModel]) -> dict[str, Any]:
-    """Read a JSON object that `cosim run` has written; raise InputError, with the line, if another program has changed it."""
+    """Read a JSON object that `cosim run` has written.
+
+    Raise InputError, with the line, if another program has changed it.
+    """
     try:
         value = parse_object(path.read_text(encoding="utf-8"))
         schema.model_validate(value)
     except OSError as error:
-        raise InputError(f"cannot read {path}: {error.strerror}; expected a folder that `cosim run` wrote") from error
+        raise InputError(
+            f"cannot read {path}: {error.strerror}; expected a folder that `cosim run` wrote"
+        ) from error
     except ValidationError as error:
         raise InputError(schema_problems(schema, read_document(path), error)) from None
     except ValueError as error:
-        raise InputError(f"{path} is not valid JSON: {error}; expected a file that `cosim run` wrote") from error
+        raise InputError(
+            f"{path} is not valid JSON: {error}; expected a file that `cosim run` wrote"
+        ) from error
     return value
 
 
@@ -63,6 +74,12 @@ def load_figures(result: Result) -> list[NamedCall]:
     if not specs:
         return []
     if "scenario_file" not in result.metadata:
-        raise InputError('run.json has no "scenario_file", so the figure functions cannot be found: run the scenario again')
+        raise InputError(
+            'run.json has no "scenario_file", so the figure functions cannot be found: run the '
+            "scenario again"
+        )
     folder = Path(result.metadata["scenario_file"]).parent
-    return [(spec["name"], load_function(spec["python"], folder), spec.get("arguments", {})) for spec in specs]
+    return [
+        (spec["name"], load_function(spec["python"], folder), spec.get("arguments", {}))
+        for spec in specs
+    ]

@@ -18,15 +18,18 @@ MAX_ROWS, MAX_VALUES = 5000, 1_000_000
 def pack_run(result: Result) -> dict[str, Any]:
     """Return time and numeric signals of a run in the form that `page/src/run.js` unpacks.
 
-    Signals that never change are in `constants`. Long runs are downsampled, but keep the extremes of signals. `samples` holds
-    the float32 columns of the names `columns`, with `rows` rows each, encoded in these steps:
+    Signals that never change are in `constants`. Long runs are downsampled, but keep the extremes
+    of signals. `samples` holds the float32 columns of the names `columns`, with `rows` rows each,
+    encoded in these steps:
 
     1. differences of the 32-bit words from row to row
     2. for each column all lowest bytes, then all second bytes, and so on
     3. zlib, then base64
     """
     numeric = {name: result[name] for name in result if result[name].dtype != object}
-    constants = {name: _to_float32(values[0]) for name, values in numeric.items() if is_constant(values)}
+    constants = {
+        name: _to_float32(values[0]) for name, values in numeric.items() if is_constant(values)
+    }
     varying = {name: values for name, values in numeric.items() if name not in constants}
     max_rows = max(2, min(MAX_ROWS, MAX_VALUES // (len(varying) + 1)))
     columns = {"time": downsample(result.time, max_rows)} | {
@@ -55,11 +58,16 @@ def _stride_blocks(values: np.ndarray, max_count: int) -> tuple[np.ndarray, int]
     """Return the values in blocks, shape (blocks, 2 * stride), the last one padded with the last value, and the stride."""
     stride = -(-len(values) // max_count)
     count = -(-len(values) // (2 * stride))
-    return np.pad(values, (0, 2 * stride * count - len(values)), mode="edge").reshape(count, -1), stride
+    return np.pad(values, (0, 2 * stride * count - len(values)), mode="edge").reshape(
+        count, -1
+    ), stride
 
 
 def downsample(values: np.ndarray, max_count: int) -> np.ndarray:
-    """Return every n-th value and the last one, about `max_count` in all; short arrays are returned as they are."""
+    """Return every n-th value and the last one, about `max_count` in all.
+
+    Short arrays are returned as they are.
+    """
     if len(values) <= max_count:
         return values
     blocks, stride = _stride_blocks(values, max_count)
@@ -69,7 +77,8 @@ def downsample(values: np.ndarray, max_count: int) -> np.ndarray:
 def downsample_with_extremes(values: np.ndarray, max_count: int) -> np.ndarray:
     """Downsample like `downsample`, but keep peaks.
 
-    Where the values vary strongly within two strides, their minimum and maximum, in the order of time, replace the two samples.
+    Where the values vary strongly within two strides, their minimum and maximum, in the order of
+    time, replace the two samples.
     """
     samples = downsample(values.astype(np.float32), max_count)
     if len(values) <= max_count:

@@ -1,4 +1,7 @@
-"""Tables in the terminal: KPIs and checks after a run, and the console for tables of other commands."""
+"""Tables in the terminal.
+
+KPIs and checks after a run, and the console for tables of other commands.
+"""
 
 from __future__ import annotations
 
@@ -27,13 +30,13 @@ def print_kpis(
 ) -> None:
     """Print a table of all KPIs with their units and checks; print nothing if there are none.
 
-    It does not use Rich, because importing Rich takes about 5 % of the time of a short run. Colours are used only on a terminal
-    without
-    NO_COLOR.
+    It does not use Rich, because importing Rich takes about 5 % of the time of a short run. Colours
+    are used only on a terminal without NO_COLOR.
 
     Args:
         kpis: The values by name.
-        outcomes: The outcomes of the scenario's checks; a KPI that was not evaluated is shown without a value.
+        outcomes: The outcomes of the scenario's checks; a KPI that was not evaluated is shown
+            without a value.
         units: The units by name (see `cosim.results.kpi.kpi_units`).
         file: The output stream; default: standard output.
         notes: Lines below the table, such as the reasons of missing values.
@@ -45,8 +48,16 @@ def print_kpis(
     plain, coloured = not file.encoding.lower().startswith("utf"), _has_colours(file)
     rows = [("KPI", "value", "unit", "check" if outcomes else "", "")]
     for name, value in values.items():
-        checks = [(o.limits, _check_mark(o.passed, plain, coloured)) for o in outcomes if o.check["kpi"] == name] or [("", "")]
-        cells = escape_control_characters(name), format_number(value), escape_control_characters((units or {}).get(name, ""))
+        checks = [
+            (o.limits, _check_mark(o.passed, plain, coloured))
+            for o in outcomes
+            if o.check["kpi"] == name
+        ] or [("", "")]
+        cells = (
+            escape_control_characters(name),
+            format_number(value),
+            escape_control_characters((units or {}).get(name, "")),
+        )
         rows += [(*(("", "", "") if i else cells), *check) for i, check in enumerate(checks)]
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = [_join_cells(row, widths) for row in rows]
@@ -57,7 +68,10 @@ def print_kpis(
 
 def _join_cells(row: Sequence[str], widths: Sequence[int]) -> str:
     name, value, unit, limits, mark = row
-    return f"{name:{widths[0]}}   {value:>{widths[1]}}   {unit:{widths[2]}}   {limits:{widths[3]}}   {mark}".rstrip()
+    return (
+        f"{name:{widths[0]}}   {value:>{widths[1]}}   {unit:{widths[2]}}   {limits:{widths[3]}}   "
+        f"{mark}"
+    ).rstrip()
 
 
 def _check_mark(passed: bool, plain: bool, coloured: bool) -> str:
@@ -69,7 +83,9 @@ def _has_colours(file: TextIO) -> bool:
     """Return whether a stream shows colours; see no-color.org and force-color.org."""
     if os.environ.get("NO_COLOR"):
         return False
-    return bool(os.environ.get("FORCE_COLOR")) or (file.isatty() and os.environ.get("TERM") not in ("dumb", "unknown"))
+    return bool(os.environ.get("FORCE_COLOR")) or (
+        file.isatty() and os.environ.get("TERM") not in ("dumb", "unknown")
+    )
 
 
 def table_console(file: TextIO | None = None, width: int = MAX_LINE_WIDTH) -> Console:

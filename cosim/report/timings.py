@@ -12,7 +12,8 @@ if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
 COLUMN_WIDTH, PAGE_WIDTH, BAR_WIDTH = 3.5, 7.16, 0.8  # in
-#: range of real-time factors of the published simulator (Simulink and V-REP over TCP): figure 18 and section 6.3 of the paper
+#: range of real-time factors of the published simulator (Simulink and V-REP over TCP): figure 18
+#: and section 6.3 of the paper
 PUBLISHED_FACTORS = (0.5, 0.7)
 
 
@@ -28,9 +29,14 @@ def draw_timings(result: Result, others: Sequence[Result] = ()) -> Figure:
 
     runs = [result, *others]
     names, factors = [_tick_label(run) for run in runs], [real_time_factor(run) for run in runs]
-    figure = Figure(figsize=(min(PAGE_WIDTH, max(COLUMN_WIDTH, BAR_WIDTH * len(runs))), 2.6), layout="constrained")
+    figure = Figure(
+        figsize=(min(PAGE_WIDTH, max(COLUMN_WIDTH, BAR_WIDTH * len(runs))), 2.6),
+        layout="constrained",
+    )
     axes = figure.add_subplot(yscale="log", ylabel="simulated time / elapsed time")
-    axes.axhspan(*PUBLISHED_FACTORS, color="#D55E00", alpha=0.35, linewidth=0, label="published simulator")
+    axes.axhspan(
+        *PUBLISHED_FACTORS, color="#D55E00", alpha=0.35, linewidth=0, label="published simulator"
+    )
     bars = axes.bar(range(len(runs)), factors, width=0.6, color="#0072B2", label="cosim")
     axes.bar_label(bars, [f"{factor:.3g}" for factor in factors], padding=1, fontsize=7)
     axes.axhline(1.0, color="#444444", linestyle="--", linewidth=0.9, label="real time")
@@ -52,7 +58,8 @@ def real_time_factor(result: Result) -> float:
     loop = result.timing.get("loop_seconds", 0.0)
     if not loop or len(result.time) < 2:
         raise InputError(
-            f"{_tick_label(result)}: the wall time of the stepping loop is missing (timing.loop_seconds in run.json)"
+            f"{_tick_label(result)}: the wall time of the stepping loop is missing "
+            "(timing.loop_seconds in run.json)"
         )
     return float(result.time[-1] - result.time[0]) / loop
 

@@ -1,7 +1,8 @@
 """Videos of runs: frames that a component of the scenario renders, encoded as MP4 (H.264).
 
-The class of a Python component may have a static method `video_frames(result, camera, times, size)` that yields a uint8 frame
-of shape (height, width, 3) for each of `times` (s), seen from the camera of that name; `size` is (width, height) in pixels.
+The class of a Python component may have a static method `video_frames(result, camera, times, size)`
+that yields a uint8 frame of shape (height, width, 3) for each of `times` (s), seen from the camera
+of that name; `size` is (width, height) in pixels.
 """
 
 from __future__ import annotations
@@ -43,11 +44,13 @@ def write_video(
         camera: The name of a camera of the scene.
         size: Width and height in pixels, both even.
         frame_rate: Frames per second.
-        frame_source: The class "file.py:Class" with the method `video_frames`; None: that of a component of the scenario.
+        frame_source: The class "file.py:Class" with the method `video_frames`; None: that of a
+            component of the scenario.
         progress: Called with the number of finished frames and the number of all frames.
 
     Raises:
-        InputError: The extra "video" is missing, the camera is unknown, or no component of the run renders frames.
+        InputError: The extra "video" is missing, the camera is unknown, or no component of the run
+            renders frames.
     """
     encoder = _import_encoder()
     source = frame_source or find_frame_source(result)
@@ -70,11 +73,14 @@ def find_frame_source(result: Result) -> str:
     """
     if "scenario_file" in result.metadata:
         folder = Path(result.metadata["scenario_file"]).parent
-        for _, component, component_folder in flatten_components(result.metadata["scenario"], folder):
+        for _, component, component_folder in flatten_components(
+            result.metadata["scenario"], folder
+        ):
             if static_method(component, component_folder, RENDER_METHOD):
                 return str(component_folder / component["python"])
     raise InputError(
-        f'no component of the scenario renders a video: none is a Python class with a static method "{RENDER_METHOD}"'
+        "no component of the scenario renders a video: none is a Python class with a static "
+        f'method "{RENDER_METHOD}"'
     )
 
 
@@ -97,11 +103,19 @@ def _import_encoder() -> ModuleType:
 
 
 def _encode_video(
-    encoder: ModuleType, job: RenderJob, file: Path, rate: int, progress: Callable[[int, int], None] | None
+    encoder: ModuleType,
+    job: RenderJob,
+    file: Path,
+    rate: int,
+    progress: Callable[[int, int], None] | None,
 ) -> None:
     with closing(render_frames(job)) as frames:
-        first = next(frames)  # before the encoder starts, which would add its own message to an error
-        writer = encoder.write_frames(str(file), job.size, fps=rate, macro_block_size=2, quality=7, ffmpeg_log_level="error")
+        first = next(
+            frames
+        )  # before the encoder starts, which would add its own message to an error
+        writer = encoder.write_frames(
+            str(file), job.size, fps=rate, macro_block_size=2, quality=7, ffmpeg_log_level="error"
+        )
         writer.send(None)
         with closing(writer):
             for finished, frame in enumerate(chain([first], frames), start=1):

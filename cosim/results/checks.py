@@ -11,7 +11,11 @@ from ..core.errors import InputError, Problem, did_you_mean, near_or_valid_names
 
 Number = float | int | bool
 
-LIMIT_OPERATORS: Mapping[str, Callable[[Any, Any], bool]] = {"min": operator.ge, "max": operator.le, "equals": operator.eq}
+LIMIT_OPERATORS: Mapping[str, Callable[[Any, Any], bool]] = {
+    "min": operator.ge,
+    "max": operator.le,
+    "equals": operator.eq,
+}
 
 _LIMIT_WORDS = {"min": "at least ", "max": "at most ", "equals": ""}
 
@@ -32,7 +36,9 @@ class CheckOutcome(NamedTuple):
     @property
     def limits(self) -> str:
         """The limits in words, such as "max 0.1"."""
-        return ", ".join(f"{key} {str(limit).lower()}" for key, limit in self.check.items() if key != "kpi")
+        return ", ".join(
+            f"{key} {str(limit).lower()}" for key, limit in self.check.items() if key != "kpi"
+        )
 
     def __str__(self) -> str:
         return self.text({})
@@ -45,24 +51,34 @@ class CheckOutcome(NamedTuple):
         """
         unit = units.get(self.check["kpi"]) or "1"
         suffix = "" if unit == "1" else f" {unit}"
-        value = str(self.value).lower() if isinstance(self.value, bool) else f"{self.value:.6g}{suffix}"
+        value = (
+            str(self.value).lower() if isinstance(self.value, bool) else f"{self.value:.6g}{suffix}"
+        )
         found = "has no value" if math.isnan(self.value) else f"is {value}"
-        limits = (f"{_LIMIT_WORDS[key]}{str(limit).lower()}{suffix}" for key, limit in self.check.items() if key != "kpi")
+        limits = (
+            f"{_LIMIT_WORDS[key]}{str(limit).lower()}{suffix}"
+            for key, limit in self.check.items()
+            if key != "kpi"
+        )
         return f"{self.check['kpi']} {found}, expected {' and '.join(limits)}"
 
 
-def evaluate_checks(kpis: Mapping[str, Number], checks: Iterable[Mapping[str, Any]]) -> list[CheckOutcome]:
+def evaluate_checks(
+    kpis: Mapping[str, Number], checks: Iterable[Mapping[str, Any]]
+) -> list[CheckOutcome]:
     """Evaluate checks; NaN violates every limit.
 
     Args:
         kpis: Values of KPIs by name.
-        checks: Checks such as {"kpi": "landing.lateral_error", "max": 0.1}, with the limits "min", "max" and "equals".
+        checks: Checks such as {"kpi": "landing.lateral_error", "max": 0.1}, with the limits "min",
+            "max" and "equals".
 
     Returns:
         The outcomes, in the order of the checks.
 
     Raises:
-        InputError: A KPI was not evaluated, or a limit does not exist; `problems` lists all such checks.
+        InputError: A KPI was not evaluated, or a limit does not exist; `problems` lists all such
+            checks.
     """
     checks = list(checks)
     if problems := [problem for check in checks for problem in _find_check_problems(kpis, check)]:
@@ -70,14 +86,19 @@ def evaluate_checks(kpis: Mapping[str, Number], checks: Iterable[Mapping[str, An
     return [_evaluate_check(check, kpis[check["kpi"]]) for check in checks]
 
 
-def evaluate_all_checks(kpis: Mapping[str, Number], checks: Iterable[Mapping[str, Any]]) -> list[CheckOutcome]:
+def evaluate_all_checks(
+    kpis: Mapping[str, Number], checks: Iterable[Mapping[str, Any]]
+) -> list[CheckOutcome]:
     """Evaluate checks like `evaluate_checks`, but a missing KPI fails its check with the value NaN."""
     checks = list(checks)
     return evaluate_checks({**{check["kpi"]: math.nan for check in checks}, **kpis}, checks)
 
 
 def kpi_hint(name: str, kpis: Iterable[str]) -> str:
-    """Return a hint for the end of a message about an unknown KPI: the most similar name, else the valid names."""
+    """Return a hint for the end of a message about an unknown KPI.
+
+    The most similar name, else the valid names.
+    """
     return near_or_valid_names(name, kpis) or "; there are no KPIs"
 
 
@@ -92,7 +113,9 @@ def _find_check_problems(kpis: Mapping[str, Number], check: Mapping[str, Any]) -
     if name not in kpis:
         problems.append(Problem(f"no such KPI{kpi_hint(name, kpis)}", where))
     if not limits:
-        problems.append(Problem(f"no limit given, expected one of {', '.join(LIMIT_OPERATORS)}", where))
+        problems.append(
+            Problem(f"no limit given, expected one of {', '.join(LIMIT_OPERATORS)}", where)
+        )
     return problems
 
 

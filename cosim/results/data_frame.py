@@ -13,7 +13,9 @@ def require_pandas() -> Any:
     try:
         import pandas as pd
     except ImportError:
-        raise InputError('data frames need the package pandas: pip install "fmi-cosim[dataframe]"') from None
+        raise InputError(
+            'data frames need the package pandas: pip install "fmi-cosim[dataframe]"'
+        ) from None
     return pd
 
 

@@ -73,13 +73,18 @@ def writing_atomically(path: str | Path) -> Iterator[Path]:
 
 
 def check_writable(directory: Path) -> None:
-    """Create a folder if necessary; raise OutputError or InputError if no file can be written there."""
+    """Create a folder if necessary.
+
+    Raise OutputError or InputError if no file can be written there.
+    """
     try:
         directory.mkdir(parents=True, exist_ok=True)
         with TemporaryFile(dir=directory):
             pass
     except OSError as error:
-        raise write_error(f'cannot write to "{directory}": {error.strerror or error}', error) from None
+        raise write_error(
+            f'cannot write to "{directory}": {error.strerror or error}', error
+        ) from None
 
 
 def remove_files(directory: Path, *names: str) -> None:
@@ -95,7 +100,10 @@ def remove_files(directory: Path, *names: str) -> None:
     """
     try:
         for name in names:
-            for path in (directory / name, *directory.glob(f".{glob.escape(name)}.*{_PART_SUFFIX}")):
+            for path in (
+                directory / name,
+                *directory.glob(f".{glob.escape(name)}.*{_PART_SUFFIX}"),
+            ):
                 path.unlink(missing_ok=True)
     except OSError as error:
         raise write_error(f'cannot replace "{path}": {error.strerror or error}', error) from None
@@ -109,7 +117,10 @@ def write_json(data: Mapping[str, Any], path: str | Path) -> None:
 
 
 def to_json_types(value: Any) -> Any:
-    """Convert a value to types that JSON supports: bytes become hexadecimal digits, NaN and infinities become None."""
+    """Convert a value to types that JSON supports.
+
+    Bytes become hexadecimal digits, NaN and infinities become None.
+    """
     match value:
         case bytes():
             return value.hex()

@@ -6,7 +6,8 @@ A KPI is a function `function(result, **arguments)` that returns one or more val
     @better(lateral_error="lower")
     def landing(result: Result, vehicle: Prefix, deck: Prefix) -> dict[str, float]: ...
 
-Arguments annotated as `Signal` or `Prefix` are compared with the recorded signals before a scenario runs.
+Arguments annotated as `Signal` or `Prefix` are compared with the recorded signals before a scenario
+runs.
 """
 
 from __future__ import annotations
@@ -103,7 +104,9 @@ class ResultFunction(NamedTuple):
         try:
             return self.function(result, **self.arguments)
         except InputError as error:
-            raise InputError([Problem(str(problem), f'{kind} "{self.name}"') for problem in error.problems]) from error
+            raise InputError(
+                [Problem(str(problem), f'{kind} "{self.name}"') for problem in error.problems]
+            ) from error
         except PASS_THROUGH_EXCEPTIONS:
             raise
         except BaseException as error:
@@ -128,8 +131,9 @@ def units(**unit_of: str) -> Callable[[KpiFunction], KpiFunction]:
         def motion(result: Result, speed: Signal) -> dict[str, float]: ...
 
     Args:
-        **unit_of: Unit of each value, in Modelica syntax. "{speed}" is the unit of the signal that the argument `speed` names;
-            "{speed}2.s" is the unit of the integral of its square. Values without a unit are counts, ratios or Booleans.
+        **unit_of: Unit of each value, in Modelica syntax. "{speed}" is the unit of the signal that
+            the argument `speed` names; "{speed}2.s" is the unit of the integral of its square.
+            Values without a unit are counts, ratios or Booleans.
 
     Returns:
         A decorator that returns the function itself.
@@ -188,7 +192,9 @@ def declared_units(function: Callable[..., Any]) -> Mapping[str, str]:
     return unit_of
 
 
-def evaluate_kpis(result: Result, kpis: Iterable[tuple[str, Callable[..., Any], Mapping[str, Any]]]) -> dict[str, Number]:
+def evaluate_kpis(
+    result: Result, kpis: Iterable[tuple[str, Callable[..., Any], Mapping[str, Any]]]
+) -> dict[str, Number]:
     """Evaluate KPIs.
 
     Args:
@@ -206,8 +212,14 @@ def evaluate_kpis(result: Result, kpis: Iterable[tuple[str, Callable[..., Any], 
     for evaluation in map(ResultFunction._make, kpis):
         numbers = evaluation.evaluate("KPI", result)
         if not isinstance(numbers, Mapping):
-            raise evaluation.failure("KPI", f"returned {type(numbers).__name__}, expected a mapping from names to numbers")
-        values |= {f"{evaluation.name}.{key}": _checked_number(evaluation, key, value) for key, value in numbers.items()}
+            raise evaluation.failure(
+                "KPI",
+                f"returned {type(numbers).__name__}, expected a mapping from names to numbers",
+            )
+        values |= {
+            f"{evaluation.name}.{key}": _checked_number(evaluation, key, value)
+            for key, value in numbers.items()
+        }
     return values
 
 
@@ -217,7 +229,9 @@ def _checked_number(evaluation: ResultFunction, key: str, value: Any) -> Number:
     if isinstance(number, int) and abs(number) > sys.float_info.max:
         raise evaluation.failure("KPI", f'"{key}" is larger than any double')
     if not isinstance(number, Number):
-        raise evaluation.failure("KPI", f'"{key}" is {type(value).__name__}, expected a number or Boolean')
+        raise evaluation.failure(
+            "KPI", f'"{key}" is {type(value).__name__}, expected a number or Boolean'
+        )
     if math.isnan(number) and not isinstance(number, NoValue):
         return NoValue(evaluation.reason_without_value())
     return number
@@ -232,11 +246,13 @@ def kpi_units(
 
     Args:
         kpis: Name, function and arguments of each KPI.
-        names: Names of values, such as "landing.time"; the unit of "waypoints.time[3]" is that of "waypoints.time".
+        names: Names of values, such as "landing.time"; the unit of "waypoints.time[3]" is that of
+            "waypoints.time".
         signal_units: Units of the signals of the result.
 
     Returns:
-        The unit of each name; "" if none is declared, or if it depends on the unknown unit of a signal.
+        The unit of each name; "" if none is declared, or if it depends on the unknown unit of a
+        signal.
     """
     declared = {
         f"{name}.{key}": _resolve_unit(unit, arguments, signal_units)
@@ -246,12 +262,19 @@ def kpi_units(
     return {name: declared.get(name.partition("[")[0], "") for name in names}
 
 
-def _resolve_unit(declared: str, arguments: Mapping[str, Any], signal_units: Mapping[str, str]) -> str:
+def _resolve_unit(
+    declared: str, arguments: Mapping[str, Any], signal_units: Mapping[str, str]
+) -> str:
     """Replace the names of arguments in a declared unit by the units of their signals."""
     if "{" not in declared:
         return declared
     factors = [
-        (signal_units.get(str(arguments.get(match[1])), "") if (match := _PLACEHOLDER.fullmatch(symbol)) else symbol, power)
+        (
+            signal_units.get(str(arguments.get(match[1])), "")
+            if (match := _PLACEHOLDER.fullmatch(symbol))
+            else symbol,
+            power,
+        )
         for symbol, power in split_unit(declared)
     ]
     if not all(unit for unit, _ in factors):
@@ -260,7 +283,9 @@ def _resolve_unit(declared: str, arguments: Mapping[str, Any], signal_units: Map
     return unit if power == 1 and not others else multiply_units(factors)
 
 
-def kpi_notes(kpis: Mapping[str, Number], taken: Iterable[tuple[str, Mapping[str, Any]]] = ()) -> list[str]:
+def kpi_notes(
+    kpis: Mapping[str, Number], taken: Iterable[tuple[str, Mapping[str, Any]]] = ()
+) -> list[str]:
     """Return lines that give the reason of each value that is missing, and the signals that KPIs took.
 
     Args:
@@ -279,13 +304,19 @@ def kpi_notes(kpis: Mapping[str, Number], taken: Iterable[tuple[str, Mapping[str
     ]
 
 
-def kpi_senses(kpis: Iterable[tuple[str, Callable[..., Any], Mapping[str, Any]]], names: Iterable[str]) -> dict[str, str]:
+def kpi_senses(
+    kpis: Iterable[tuple[str, Callable[..., Any], Mapping[str, Any]]], names: Iterable[str]
+) -> dict[str, str]:
     """Return "lower" or "higher" for those KPI values that declare it (see `better`).
 
     Args:
         kpis: Name, function and arguments of each KPI.
         names: Names of values, such as "landing.time".
     """
-    declared = {f"{name}.{key}": sense for name, function, _ in kpis for key, sense in getattr(function, "better", {}).items()}
+    declared = {
+        f"{name}.{key}": sense
+        for name, function, _ in kpis
+        for key, sense in getattr(function, "better", {}).items()
+    }
     senses = {name: declared.get(name.partition("[")[0]) for name in names}
     return {name: sense for name, sense in senses.items() if sense}

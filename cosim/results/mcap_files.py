@@ -2,13 +2,15 @@
 
 Topics:
 
-- /tf (foxglove.FrameTransforms): pose of everything that was recorded with `position.x|y|z` and `orientation.w|x|y|z`, in the
-  frame "world" (z up, m); the frame of a body has its name ("plant.uav")
+- /tf (foxglove.FrameTransforms): pose of everything that was recorded with `position.x|y|z` and
+  `orientation.w|x|y|z`, in the frame "world" (z up, m); the frame of a body has its name
+  ("plant.uav")
 - /scene (foxglove.SceneUpdate): shapes of the bodies, logged once, see `write_mcap`
-- /signals/NAME (JSON): all signals of a component, nested by the dots of their names; NaN and infinities are null, units are in
-  the schema
+- /signals/NAME (JSON): all signals of a component, nested by the dots of their names; NaN and
+  infinities are null, units are in the schema
 
-Simulation time 0 s is 1970-01-01 00:00 in the file. A run that starts before 0 s is shifted to start there.
+Simulation time 0 s is 1970-01-01 00:00 in the file. A run that starts before 0 s is shifted to
+start there.
 """
 
 from __future__ import annotations
@@ -27,9 +29,13 @@ from ..core.recording import Recording
 from .files import iterate_chunks, to_json_types, writing_atomically
 
 ROWS_PER_CHUNK = 2000
-_POSE_SIGNALS = [*(f"position.{axis}" for axis in "xyz"), *(f"orientation.{axis}" for axis in "wxyz")]
+_POSE_SIGNALS = [
+    *(f"position.{axis}" for axis in "xyz"),
+    *(f"orientation.{axis}" for axis in "wxyz"),
+]
 _ELEMENT_PATTERN = re.compile(r"(.*)\[[\d,]+\]")
-#: maps each part of a name to an index of a column, indices of the elements of an array, or a subtree
+#: maps each part of a name to an index of a column, indices of the elements of an array, or a
+#: subtree
 SignalTree = dict[str, "int | list[int] | SignalTree"]
 
 
@@ -38,18 +44,24 @@ def require_mcap() -> None:
     try:
         import foxglove  # noqa: F401
     except ImportError:
-        raise InputError('MCAP files need the package foxglove-sdk: pip install "fmi-cosim[mcap]"') from None
+        raise InputError(
+            'MCAP files need the package foxglove-sdk: pip install "fmi-cosim[mcap]"'
+        ) from None
 
 
 def write_mcap(
-    recording: Recording, path: str | Path, scene: Mapping[str, Any] | None = None, metadata: Mapping[str, Any] | None = None
+    recording: Recording,
+    path: str | Path,
+    scene: Mapping[str, Any] | None = None,
+    metadata: Mapping[str, Any] | None = None,
 ) -> None:
     """Write an MCAP file; an existing file is replaced only when the new one is complete.
 
     Args:
         recording: The recording.
         path: The MCAP file.
-        scene: "bodies", "fixed" and "markers" of the scene, in the format of `cosim.report.scene`; None for no scene.
+        scene: "bodies", "fixed" and "markers" of the scene, in the format of `cosim.report.scene`;
+            None for no scene.
         metadata: Description of the run, written as metadata record "run".
 
     Raises:
@@ -67,7 +79,9 @@ def write_mcap(
         foxglove.open_mcap(temporary, context=context, writer_options=options) as writer,
     ):
         if metadata:
-            writer.write_metadata("run", {key: json.dumps(to_json_types(value)) for key, value in metadata.items()})
+            writer.write_metadata(
+                "run", {key: json.dumps(to_json_types(value)) for key, value in metadata.items()}
+            )
         times = _to_nanoseconds(recording.time)
         if scene and len(times):
             from .mcap_scene import log_scene
@@ -93,7 +107,10 @@ def _log_poses(recording: Recording, times: list[int], context: Any) -> None:
     columns = [recording.columns[f"{name}.{signal}"] for name in names for signal in _POSE_SIGNALS]
     for now, row in zip(times, _iterate_rows(columns), strict=True):
         stamp = Timestamp(*divmod(now, 10**9))
-        numbers = (row[first : first + len(_POSE_SIGNALS)] for first in range(0, len(row), len(_POSE_SIGNALS)))
+        numbers = (
+            row[first : first + len(_POSE_SIGNALS)]
+            for first in range(0, len(row), len(_POSE_SIGNALS))
+        )
         transforms = [
             FrameTransform(
                 timestamp=stamp,
@@ -109,8 +126,16 @@ def _log_poses(recording: Recording, times: list[int], context: Any) -> None:
 
 def find_poses(recording: Recording) -> list[str]:
     """Return the prefixes of everything that was recorded with position and orientation."""
-    prefixes = (name.removesuffix(".position.x") for name in recording.columns if name.endswith(".position.x"))
-    return [prefix for prefix in prefixes if all(f"{prefix}.{signal}" in recording.columns for signal in _POSE_SIGNALS)]
+    prefixes = (
+        name.removesuffix(".position.x")
+        for name in recording.columns
+        if name.endswith(".position.x")
+    )
+    return [
+        prefix
+        for prefix in prefixes
+        if all(f"{prefix}.{signal}" in recording.columns for signal in _POSE_SIGNALS)
+    ]
 
 
 def _log_signals(recording: Recording, times: list[int], context: Any) -> None:
@@ -121,10 +146,15 @@ def _log_signals(recording: Recording, times: list[int], context: Any) -> None:
     for component, node in tree.items():
         data = json.dumps(_json_schema(node, columns, list(recording.units.values()))).encode()
         schema = Schema(name=f"cosim.{component}", encoding="jsonschema", data=data)
-        channels[component] = Channel(f"/signals/{component}", schema=schema, message_encoding="json", context=context)
+        channels[component] = Channel(
+            f"/signals/{component}", schema=schema, message_encoding="json", context=context
+        )
     for now, row in zip(times, _iterate_rows(columns), strict=True):
         for component, channel in channels.items():
-            channel.log(pydantic_core.to_json(_nest_values(tree[component], row), inf_nan_mode="null"), log_time=now)
+            channel.log(
+                pydantic_core.to_json(_nest_values(tree[component], row), inf_nan_mode="null"),
+                log_time=now,
+            )
 
 
 def _iterate_rows(columns: list[np.ndarray]) -> Iterator[tuple[Any, ...]]:
@@ -133,7 +163,10 @@ def _iterate_rows(columns: list[np.ndarray]) -> Iterator[tuple[Any, ...]]:
 
 
 def _build_tree(names: list[str]) -> SignalTree:
-    """Group columns by the parts of their names; a name that is also the prefix of others gets the part `value` appended."""
+    """Group columns by the parts of their names.
+
+    A name that is also the prefix of others gets the part `value` appended.
+    """
     inner = {name[:i] for name in names for i, letter in enumerate(name) if letter == "."}
     tree: SignalTree = {}
     for column, name in enumerate(names):
@@ -158,8 +191,15 @@ def _nest_values(node: Any, row: tuple[Any, ...]) -> Any:
 def _json_schema(node: Any, columns: list[np.ndarray], units: list[str]) -> dict[str, Any]:
     """Return the JSON Schema of the messages that `_nest_values` returns for a node of the tree."""
     if isinstance(node, dict):
-        return {"type": "object", "properties": {name: _json_schema(child, columns, units) for name, child in node.items()}}
+        return {
+            "type": "object",
+            "properties": {
+                name: _json_schema(child, columns, units) for name, child in node.items()
+            },
+        }
     if isinstance(node, list):
         return {"type": "array", "items": _json_schema(node[0], columns, units)}
-    kind = {"b": "boolean", "i": "integer", "u": "integer", "f": "number"}.get(columns[node].dtype.kind, "string")
+    kind = {"b": "boolean", "i": "integer", "u": "integer", "f": "number"}.get(
+        columns[node].dtype.kind, "string"
+    )
     return {"type": kind, **({"description": units[node]} if units[node] else {})}

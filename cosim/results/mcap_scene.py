@@ -16,7 +16,12 @@ def log_scene(scene: Mapping[str, Any], now: int, context: Any) -> None:
     from foxglove.messages import SceneUpdate
 
     markers = [
-        {"shape": "ring", "size": (marker["radius"], 0.02), "position": marker["position"], "colour": (0.9, 0.6, 0.1)}
+        {
+            "shape": "ring",
+            "size": (marker["radius"], 0.02),
+            "position": marker["position"],
+            "colour": (0.9, 0.6, 0.1),
+        }
         for marker in scene.get("markers", ())
     ]
     parts = {body["name"]: body["parts"] for body in scene.get("bodies", ())}
@@ -53,14 +58,18 @@ def _sphere_primitive(part: Mapping[str, Any]) -> Any:
     from foxglove.messages import SpherePrimitive
 
     diameter = 2 * part["size"][0]
-    return SpherePrimitive(pose=_pose(part), size=_size(diameter, diameter, diameter), color=_colour(part))
+    return SpherePrimitive(
+        pose=_pose(part), size=_size(diameter, diameter, diameter), color=_colour(part)
+    )
 
 
 def _cylinder_primitive(part: Mapping[str, Any]) -> Any:
     """Convert a cylinder (radius, length) or a cone (lower and upper radius, length)."""
     from foxglove.messages import CylinderPrimitive
 
-    lower, upper, length = part["size"] if part["shape"] == "cone" else (part["size"][0], *part["size"])
+    lower, upper, length = (
+        part["size"] if part["shape"] == "cone" else (part["size"][0], *part["size"])
+    )
     widest = max(lower, upper)
     return CylinderPrimitive(
         pose=_pose(part),
@@ -80,7 +89,10 @@ def _line_primitive(part: Mapping[str, Any]) -> Any:
         type=LinePrimitiveLineType.LineLoop,
         pose=_pose(part),
         thickness=thickness,
-        points=[Point3(x=radius * math.cos(angle), y=radius * math.sin(angle), z=0.0) for angle in angles],
+        points=[
+            Point3(x=radius * math.cos(angle), y=radius * math.sin(angle), z=0.0)
+            for angle in angles
+        ],
         color=_colour(part),
     )
 

@@ -29,7 +29,9 @@ def warn_non_finite(recording: Recording) -> dict[str, float]:
     logger = logging.getLogger("cosim")
     for name, row in islice(rows.items(), _MAX_WARNINGS):
         value, time = recording.columns[name][row], recording.time[row]
-        logger.warning("%s is %s at t = %.12g s, its first value that is not finite", name, value, time)
+        logger.warning(
+            "%s is %s at t = %.12g s, its first value that is not finite", name, value, time
+        )
     if len(rows) > _MAX_WARNINGS:
         logger.warning("%d further recorded signals are not finite", len(rows) - _MAX_WARNINGS)
     return {name: float(recording.time[row]) for name, row in rows.items()}
@@ -37,7 +39,9 @@ def warn_non_finite(recording: Recording) -> dict[str, float]:
 
 def _first_rows(recording: Recording) -> dict[str, int]:
     """Return the first row that is not finite by name of the signal, in ascending order of the rows."""
-    floats = {name: values for name, values in recording.columns.items() if values.dtype.kind == "f"}
+    floats = {
+        name: values for name, values in recording.columns.items() if values.dtype.kind == "f"
+    }
     first_rows: dict[str, int] = {}
     for rows in iterate_chunks([recording.time, *floats.values()], _CHUNK_ROWS):
         for name in [name for name in floats if name not in first_rows]:

@@ -19,11 +19,15 @@ def require_parquet() -> None:
     try:
         import pyarrow.parquet  # noqa: F401
     except ImportError:
-        raise InputError('Parquet files need the package pyarrow: pip install "fmi-cosim[parquet]"') from None
+        raise InputError(
+            'Parquet files need the package pyarrow: pip install "fmi-cosim[parquet]"'
+        ) from None
 
 
 def write_parquet(recording: Recording, path: str | Path) -> None:
-    """Write a Parquet file in bounded memory; an existing file is replaced only when the new one is complete.
+    """Write a Parquet file in bounded memory.
+
+    An existing file is replaced only when the new one is complete.
 
     The first column is `time` (s). The metadata of each field contains its unit.
 
@@ -42,12 +46,17 @@ def write_parquet(recording: Recording, path: str | Path) -> None:
     columns = {"time": recording.time, **recording.columns}
     units = {"time": "s", **recording.units}
     schema = pa.schema(
-        [pa.field(name, _arrow_type(pa, values), metadata={"unit": units[name]}) for name, values in columns.items()]
+        [
+            pa.field(name, _arrow_type(pa, values), metadata={"unit": units[name]})
+            for name, values in columns.items()
+        ]
     )
     with writing_atomically(path) as temporary, ParquetWriter(temporary, schema) as writer:
         for piece in iterate_chunks(list(columns.values()), ROWS_PER_GROUP):
             values = (np.ascontiguousarray(column[piece]) for column in columns.values())
-            arrays = [pa.array(part, field.type) for part, field in zip(values, schema, strict=True)]
+            arrays = [
+                pa.array(part, field.type) for part, field in zip(values, schema, strict=True)
+            ]
             writer.write_batch(pa.record_batch(arrays, schema=schema))
 
 

@@ -38,7 +38,8 @@ class KpiError(InputError, KeyError):
 class Kpis(dict[str, float | int | bool]):
     """Values of KPIs by name, such as `result.kpis["landing.lateral_error"]`.
 
-    An unknown name raises KpiError (an InputError and a KeyError). Its message contains the most similar name, or the KPIs.
+    An unknown name raises KpiError (an InputError and a KeyError). Its message contains the most
+    similar name, or the KPIs.
     """
 
     def __missing__(self, name: str) -> float | int | bool:
@@ -46,7 +47,9 @@ class Kpis(dict[str, float | int | bool]):
 
 
 class Presentation:
-    """Functions that show a result. The package `api` sets them, because they belong to a higher layer than results.
+    """Functions that show a result.
+
+    The package `api` sets them, because they belong to a higher layer than results.
 
     Attributes:
         plot: Draws the signals with these names.
@@ -69,8 +72,8 @@ class Result:
         kpis: KPIs by name, such as "landing.lateral_error".
         timing: Wall time by name (s), such as "loop_seconds" for the stepping loop alone.
         metadata: Description of the run: scenario, versions, hashes, failure.
-        checks: Outcomes of the scenario's checks, each with `check`, `value` and `passed`; empty if the result was read from a
-            file.
+        checks: Outcomes of the scenario's checks, each with `check`, `value` and `passed`; empty if
+            the result was read from a file.
     """
 
     recording: Recording
@@ -101,7 +104,11 @@ class Result:
         try:
             return self.recording.columns[name]
         except KeyError:
-            hint = "; the time of each row is in `result.time`" if name == "time" else pattern_hint(name, self)
+            hint = (
+                "; the time of each row is in `result.time`"
+                if name == "time"
+                else pattern_hint(name, self)
+            )
             raise SignalError(f'no signal "{name}" was recorded{hint}') from None
 
     def __contains__(self, name: object) -> bool:
@@ -130,7 +137,10 @@ class Result:
         rows = f"{count_noun(len(self.time), 'row')} of {count_noun(len(self), 'signal')}"
         span = f", {self.time[0]:g} s to {self.time[-1]:g} s" if len(self.time) else ""
         failure, units = self.metadata.get("failure"), self.metadata.get("kpi_units", {})
-        lines = [f"{self.metadata.get('name', 'Result')}: {rows}{span}", *([f"ended early: {failure}"] if failure else [])]
+        lines = [
+            f"{self.metadata.get('name', 'Result')}: {rows}{span}",
+            *([f"ended early: {failure}"] if failure else []),
+        ]
         lines += [self.termination] if self.termination else []
         lines += self._summarize_checks(units)
         width = max(map(len, self.kpis), default=0)
@@ -144,7 +154,10 @@ class Result:
             return []
         failed = [f"  {outcome.text(units)}" for outcome in self.checks if not outcome.passed]
         return [
-            f"{len(self.checks) - len(failed)} of {count_noun(len(self.checks), 'check')} passed{':' * bool(failed)}",
+            (
+                f"{len(self.checks) - len(failed)} of {count_noun(len(self.checks), 'check')} "
+                f"passed{':' * bool(failed)}"
+            ),
             *failed,
         ]
 
@@ -239,7 +252,11 @@ class Result:
         """
         from .mcap_files import write_mcap
 
-        about = {key: value for key, value in self.metadata.items() if key in ("name", "versions", "sha256")}
+        about = {
+            key: value
+            for key, value in self.metadata.items()
+            if key in ("name", "versions", "sha256")
+        }
         write_mcap(self.recording, path, scene, about)
 
     @classmethod
@@ -256,9 +273,17 @@ class Result:
 
 
 def describe_termination(
-    time: float, component: str = "", condition: str = "", outcome: str = "", cause: str = "", since: float = 0.0
+    time: float,
+    component: str = "",
+    condition: str = "",
+    outcome: str = "",
+    cause: str = "",
+    since: float = 0.0,
 ) -> str:
-    """Return a sentence that says what ended the run at `time` (s): a component, or a condition met since `since` (s)."""
+    """Return a sentence that says what ended the run at `time` (s).
+
+    A component, or a condition met since `since` (s).
+    """
     if component:
         return f"{component} requested the end of the simulation at t = {time:.12g} s"
     end = "crashed" if outcome == "crash" else "decided"
@@ -279,4 +304,6 @@ def write_run(result: Result, directory: str | Path) -> None:
     directory = Path(directory)
     result.to_csv(directory / "result.csv")
     write_json(result.kpis, directory / "kpis.json")
-    write_json({**result.metadata, "timing": result.timing, "units": result.units}, directory / "run.json")
+    write_json(
+        {**result.metadata, "timing": result.timing, "units": result.units}, directory / "run.json"
+    )

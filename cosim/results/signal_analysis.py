@@ -13,14 +13,22 @@ from .result import Result
 
 
 class StepResponse(NamedTuple):
-    """Step response scaled to 0 at the initial value and 1 at the target; both arrays of shape (rows,)."""
+    """Step response scaled to 0 at the initial value and 1 at the target.
+
+    Both arrays of shape (rows,).
+    """
 
     time: np.ndarray
     fraction: np.ndarray
 
 
 def step_response(
-    result: Result, signal: str, start: float, stop: float, initial: float | None, target: float | None
+    result: Result,
+    signal: str,
+    start: float,
+    stop: float,
+    initial: float | None,
+    target: float | None,
 ) -> StepResponse:
     """Return the scaled step response.
 
@@ -41,7 +49,11 @@ def step_response(
         return StepResponse(time, values)
     begin = float(values[0]) if initial is None else initial
     end = float(values[-1]) if target is None else target
-    return StepResponse(time, (values - begin) / (end - begin)) if end != begin else StepResponse(time[:0], values[:0])
+    return (
+        StepResponse(time, (values - begin) / (end - begin))
+        if end != begin
+        else StepResponse(time[:0], values[:0])
+    )
 
 
 def require(holds: bool, message: str) -> None:
@@ -57,16 +69,22 @@ def row_slice(result: Result, start: float, stop: float) -> slice:
         InputError: `stop` is before `start`.
     """
     require(start <= stop, f"start {start:g} s is after stop {stop:g} s")
-    return slice(int(np.searchsorted(result.time, start, "left")), int(np.searchsorted(result.time, stop, "right")))
+    return slice(
+        int(np.searchsorted(result.time, start, "left")),
+        int(np.searchsorted(result.time, stop, "right")),
+    )
 
 
-def control_error(result: Result, signal: str, target: str | float, start: float, stop: float) -> tuple[np.ndarray, np.ndarray]:
+def control_error(
+    result: Result, signal: str, target: str | float, start: float, stop: float
+) -> tuple[np.ndarray, np.ndarray]:
     """Return time (s) and error, both of shape (rows,).
 
     Args:
         result: The run.
         signal: Name of the signal.
-        target: A number, or the name of another signal, which is converted to the unit of `signal` and subtracted.
+        target: A number, or the name of another signal, which is converted to the unit of `signal`
+            and subtracted.
         start: Time (s) of the first row that counts.
         stop: Time (s) of the last row that counts.
 
@@ -79,7 +97,9 @@ def control_error(result: Result, signal: str, target: str | float, start: float
 
 
 def values_in_unit(result: Result, signal: str, unit: str) -> np.ndarray:
-    """Return the values of a signal in a unit, for KPIs that expect a unit; a signal without unit is not converted.
+    """Return the values of a signal in a unit, for KPIs that expect a unit.
+
+    A signal without unit is not converted.
 
     Args:
         result: The run.
@@ -90,23 +110,42 @@ def values_in_unit(result: Result, signal: str, unit: str) -> np.ndarray:
         InputError: The unit of the signal measures another quantity.
     """
     found = result.units.get(signal, "")
-    return _convert(result[signal], found, unit, f'"{signal}" has the unit {found}, which does not convert to {unit}')
+    return _convert(
+        result[signal],
+        found,
+        unit,
+        f'"{signal}" has the unit {found}, which does not convert to {unit}',
+    )
 
 
 def values_in_si(result: Result, signal: str) -> np.ndarray:
-    """Return the values of a signal in the SI unit of its quantity; a signal without known unit is not converted."""
+    """Return the values of a signal in the SI unit of its quantity.
+
+    A signal without known unit is not converted.
+    """
     unit = named_unit(result.units.get(signal, ""))
     return unit.factor * result[signal].astype(np.float64) + unit.offset
 
 
 def _converted(result: Result, name: str, to_unit_of: str) -> np.ndarray:
-    """Return the values of a signal in the unit of another one; a signal without unit is not converted."""
+    """Return the values of a signal in the unit of another one.
+
+    A signal without unit is not converted.
+    """
     found, expected = (result.units.get(each, "") for each in (name, to_unit_of))
-    return _convert(result[name], found, expected, f'"{name}" ({found}) cannot be compared with "{to_unit_of}" ({expected})')
+    return _convert(
+        result[name],
+        found,
+        expected,
+        f'"{name}" ({found}) cannot be compared with "{to_unit_of}" ({expected})',
+    )
 
 
 def _convert(values: np.ndarray, found: str, expected: str, problem: str) -> np.ndarray:
-    """Return values in another unit; raise InputError with the text `problem` if the quantity is another one."""
+    """Return values in another unit.
+
+    Raise InputError with the text `problem` if the quantity is another one.
+    """
     if not (found and expected) or found == expected:
         return values
     unit, target = named_unit(found), named_unit(expected)
@@ -124,7 +163,11 @@ def time_average(time: np.ndarray, values: np.ndarray) -> float:
     """Return the mean over time by the trapezoidal rule, NaN without rows."""
     if not time.size:
         return math.nan
-    return integrate(time, values) / float(time[-1] - time[0]) if time[-1] > time[0] else float(values.mean())
+    return (
+        integrate(time, values) / float(time[-1] - time[0])
+        if time[-1] > time[0]
+        else float(values.mean())
+    )
 
 
 def first_crossing_time(time: np.ndarray, values: np.ndarray, level: float) -> float:

@@ -27,7 +27,8 @@ _OBJECTS = ("dict", "Dict", "Mapping")
 def argument_problem(annotation: ast.expr | None, value: Any) -> str:
     """Return why a value does not have the type that an annotation declares, or "" if it does.
 
-    Annotations with other types than numbers, texts, Booleans, lists, objects and unions of these accept every value.
+    Annotations with other types than numbers, texts, Booleans, lists, objects and unions of these
+    accept every value.
 
     >>> argument_problem(ast.parse("float | None", mode="eval").body, "300")
     'expected a number or null; found "300"'
@@ -36,7 +37,10 @@ def argument_problem(annotation: ast.expr | None, value: Any) -> str:
     """
     if annotation is None or _accepts(annotation, value):
         return ""
-    return f"expected {_describe(annotation)}; found {shorten(json.dumps(value, ensure_ascii=False, default=repr))}"
+    return (
+        f"expected {_describe(annotation)}; found "
+        f"{shorten(json.dumps(value, ensure_ascii=False, default=repr))}"
+    )
 
 
 def _accepts(annotation: ast.expr, value: Any) -> bool:
@@ -48,14 +52,19 @@ def _accepts(annotation: ast.expr, value: Any) -> bool:
         case ast.Subscript(kind, inner) if _name(kind) == "Optional":
             return value is None or _accepts(inner, value)
         case ast.Subscript(kind, inner) if _name(kind) in _LISTS:
-            return _accepts_name("list", value) and all(_accepts(each, item) for each, item in _elements(inner, value))
+            return _accepts_name("list", value) and all(
+                _accepts(each, item) for each, item in _elements(inner, value)
+            )
         case ast.Subscript(kind):
             return _accepts_name(_name(kind), value)
     return _accepts_name(_name(annotation), value)
 
 
 def _elements(inner: ast.expr, value: Sequence[Any]) -> list[tuple[ast.expr, Any]]:
-    """Return (annotation, element) of every element of a list; the elements of a fixed tuple are not compared."""
+    """Return (annotation, element) of every element of a list.
+
+    The elements of a fixed tuple are not compared.
+    """
     match inner:
         case ast.Tuple([kind, ast.Constant(value=ellipsis)]) if ellipsis is ...:
             return [(kind, item) for item in value]
@@ -96,7 +105,13 @@ def _describe(annotation: ast.expr) -> str:
         case ast.Subscript(kind):
             return _describe(kind)
     name = _name(annotation)
-    return "a list" if name in _LISTS else "an object" if name in _OBJECTS else _DESCRIPTIONS.get(name, name)
+    return (
+        "a list"
+        if name in _LISTS
+        else "an object"
+        if name in _OBJECTS
+        else _DESCRIPTIONS.get(name, name)
+    )
 
 
 def _name(annotation: ast.expr) -> str:

@@ -12,7 +12,10 @@ from .nested_systems import Node
 
 
 class Assignment(NamedTuple):
-    """Assignment of a value to the variable `name` in the system `node`; `where` is its place, for messages."""
+    """Assignment of a value to the variable `name` in the system `node`.
+
+    `where` is its place, for messages.
+    """
 
     node: Node
     name: str
@@ -21,17 +24,28 @@ class Assignment(NamedTuple):
 
 
 def iterate_assignments(root: Node, settings: Mapping[str, Any]) -> Iterator[Assignment]:
-    """Yield the assignments of start values: outer systems override nested ones, and the caller's settings override both."""
+    """Yield the assignments of start values.
+
+    Outer systems override nested ones, and the caller's settings override both.
+    """
     for node in root.walk():
         for name, spec in node.spec.components.items():
             for variable, value in spec.parameters.items():
-                yield Assignment(node, f"{name}.{variable}", value, node.where("components", name, "parameters", variable))
+                yield Assignment(
+                    node,
+                    f"{name}.{variable}",
+                    value,
+                    node.where("components", name, "parameters", variable),
+                )
     for name, value in settings.items():
         yield Assignment(root, name, value, f'setting "{name}"')
 
 
 def values_by_component(root: Node, settings: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return the assigned values by full name of the component and name of the variable; unknown names are left out."""
+    """Return the assigned values by full name of the component and name of the variable.
+
+    Unknown names are left out.
+    """
     values: dict[str, dict[str, Any]] = defaultdict(dict)
     for node, name, value, _ in iterate_assignments(root, settings):
         with suppress(UnknownNameError):

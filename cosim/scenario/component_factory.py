@@ -7,7 +7,14 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..components.fmi import FmuFile, InstanceSettings, Interface, Isolation, SolverSettings, create_component
+from ..components.fmi import (
+    FmuFile,
+    InstanceSettings,
+    Interface,
+    Isolation,
+    SolverSettings,
+    create_component,
+)
 from ..core.component import Component
 from ..core.errors import InputError, nearest_file
 from ..core.paths import is_file, resolve_path
@@ -25,14 +32,21 @@ class ComponentFactory:
     """Factory of components that reads every FMU file once, however many components use it.
 
     Args:
-        isolation: How isolated FMUs run. An FMU is isolated if its component has `isolation`, if `isolate_fmus` is set, and
-            from the second instance on if it allows only one instance per process.
+        isolation: How isolated FMUs run. An FMU is isolated if its component has `isolation`, if
+            `isolate_fmus` is set, and from the second instance on if it allows only one instance
+            per process.
         isolate_fmus: Isolate every FMU.
         loaded_fmus: FMU files that have already been read, by resolved path.
     """
 
-    def __init__(self, isolation: Isolation, isolate_fmus: bool, loaded_fmus: Mapping[Path, FmuFile]) -> None:
-        self._isolation, self._isolate_fmus, self._loaded_fmus = isolation, isolate_fmus, loaded_fmus
+    def __init__(
+        self, isolation: Isolation, isolate_fmus: bool, loaded_fmus: Mapping[Path, FmuFile]
+    ) -> None:
+        self._isolation, self._isolate_fmus, self._loaded_fmus = (
+            isolation,
+            isolate_fmus,
+            loaded_fmus,
+        )
         #: FMU files in use, by resolved path and the interface that the scenario demands
         self.fmus: dict[tuple[Path, Interface | None], FmuFile] = {}
         #: solver of each Model Exchange FMU, by full name of its component
@@ -49,7 +63,8 @@ class ComponentFactory:
         Args:
             node: The system.
             name: Name of the component in it.
-            values: Values of variables that the scenario sets, by name; structural parameters among them size the arrays.
+            values: Values of variables that the scenario sets, by name; structural parameters among
+                them size the arrays.
 
         Raises:
             InputError: The source of the component does not exist or cannot be used.
@@ -58,8 +73,13 @@ class ComponentFactory:
         if spec.python is not None:
             return self._load_python(node, name, spec, full_name)
         if spec.fmu and (other := _OTHER_SOURCE.search(spec.fmu)):
-            raise InputError(f'"{spec.fmu}" is not an FMU; it is named by "{_SOURCE_KEYS[other[1]]}" instead of "fmu"')
-        path = self._build_modelica(node.folder, spec) if spec.fmu is None else node.folder / spec.fmu
+            raise InputError(
+                f'"{spec.fmu}" is not an FMU; it is named by "{_SOURCE_KEYS[other[1]]}" instead of '
+                '"fmu"'
+            )
+        path = (
+            self._build_modelica(node.folder, spec) if spec.fmu is None else node.folder / spec.fmu
+        )
         solver = SolverSettings(spec.solver.method, spec.solver.step_size) if spec.solver else None
         settings = InstanceSettings(spec.tolerance, solver)
         interface = settings.interface
@@ -69,11 +89,15 @@ class ComponentFactory:
         if used is None:
             loaded = None if interface else self._loaded_fmus.get(key[0])
             self.fmus[key] = loaded or usable_fmu(path, interface)
-        elif needs_own_process:  # its process must not inherit the library that is loaded in this one
+        elif (
+            needs_own_process
+        ):  # its process must not inherit the library that is loaded in this one
             self.fmus[key] = usable_fmu(path, interface)
         settings = settings.with_structural_parameters(self.fmus[key].description, values)
         isolated = self._isolate_fmus or spec.isolation is not None or needs_own_process
-        component = create_component(self.fmus[key], full_name, settings, self._isolation if isolated else None)
+        component = create_component(
+            self.fmus[key], full_name, settings, self._isolation if isolated else None
+        )
         if (description := self.fmus[key].description).interface == "model-exchange":
             self.solvers[full_name] = settings.describe_solver(description.default_experiment)
         return component
@@ -84,7 +108,9 @@ class ComponentFactory:
         assert spec.python is not None
         with calling_component(full_name, "loading the class", "load"):
             if name in node.document.objects:
-                return create_python_component(node.document.objects[name], spec.python, full_name, spec.arguments)
+                return create_python_component(
+                    node.document.objects[name], spec.python, full_name, spec.arguments
+                )
             self.python_files.append(node.folder / spec.python.rpartition(":")[0])
             return load_component(spec.python, node.folder, full_name, spec.arguments)
 

@@ -20,7 +20,9 @@ _MAX_LEVELS = 100
 
 
 def document_of_dict(scenario: Mapping[str, Any]) -> Document:
-    """Return the document of a scenario that is given as a dict; relative paths start from the working directory.
+    """Return the document of a scenario that is given as a dict.
+
+    Relative paths start from the working directory.
 
     Raises:
         InputError: The dict contains values that JSON cannot express.
@@ -41,10 +43,16 @@ def move_objects(document: Document, path: Sequence[str], value: Any) -> Any:
     Returns:
         The value with a text in place of the class or object. Values at other paths are unchanged.
     """
-    if path[0] != "components" or len(path) not in (2, 3) or (len(path) == 3 and path[2] != "python"):
+    if (
+        path[0] != "components"
+        or len(path) not in (2, 3)
+        or (len(path) == 3 and path[2] != "python")
+    ):
         return value
     found = _objects_of({path[1]: value if len(path) == 2 else {"python": value}})
-    document.objects = {name: target for name, target in document.objects.items() if name != path[1]} | found
+    document.objects = {
+        name: target for name, target in document.objects.items() if name != path[1]
+    } | found
     return _to_json(value, tuple(path), found) if found else value
 
 
@@ -85,7 +93,9 @@ def _to_json(value: Any, path: JsonPath, objects: Mapping[str, Any]) -> Any:
         return os.fspath(value)
     if hasattr(value, "tolist"):  # of NumPy
         return _to_json(value.tolist(), path, objects)
-    raise _refusal(path, f"expected a value as in JSON, found {shorten(repr(value))} ({type(value).__name__})")
+    raise _refusal(
+        path, f"expected a value as in JSON, found {shorten(repr(value))} ({type(value).__name__})"
+    )
 
 
 def _refusal(path: JsonPath, text: str) -> InputError:

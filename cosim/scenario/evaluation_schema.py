@@ -10,7 +10,10 @@ from .schema_types import INVALID, BoolOrNumber, Name, NameList, Spec, key
 
 #: the rules of `CheckSpec._check_bounds` that JSON Schema can express
 _CHECK_RULES: dict[str, Any] = {
-    "anyOf": [{"required": [bound], "properties": {bound: {"not": {"type": "null"}}}} for bound in ("min", "max", "equals")]
+    "anyOf": [
+        {"required": [bound], "properties": {bound: {"not": {"type": "null"}}}}
+        for bound in ("min", "max", "equals")
+    ]
 }
 
 
@@ -19,13 +22,15 @@ class CallSpec(Spec):
 
     python: str = key('"file.py:function" or "package.module:function"', "cosim.kpis:rms")
     arguments: dict[str, Any] = key(
-        'keyword arguments of the function; {"from": "usv.waypoint_x"} is the value of a parameter, and '
+        'keyword arguments of the function; {"from": "usv.waypoint_x"} is the value of a '
+        "parameter, and "
         '{"from": "/components/plant/arguments/platforms"} that of an entry of the scenario',
         {"signal": "plant.uav.position.z", "target": 2.0},
         default={},
     )
     sources: NameList = key(
-        'components ("usv"), prefixes of variables ("plant.uav") or JSON pointers of objects, from which arguments that are not '
+        'components ("usv"), prefixes of variables ("plant.uav") or JSON pointers of objects, '
+        "from which arguments that are not "
         "given are taken by name",
         "usv",
         default=[],
@@ -34,11 +39,22 @@ class CallSpec(Spec):
 
 
 class FunctionSpec(CallSpec):
-    """A Python function that is called with the result: a KPI returns numbers, a figure returns a matplotlib Figure."""
+    """A Python function that is called with the result.
 
-    name: Name = key("unique name; that of a KPI is the prefix of its values, that of a figure the file name", "altitude")
+    A KPI returns numbers, a figure returns a matplotlib Figure.
+    """
+
+    name: Name = key(
+        "unique name; that of a KPI is the prefix of its values, that of a figure the file name",
+        "altitude",
+    )
     optional: bool = key(
-        "leave it out with a warning if an argument names a signal or parameter that does not exist", True, default=False
+        (
+            "leave it out with a warning if an argument names a signal or parameter that does not "
+            "exist"
+        ),
+        True,
+        default=False,
     )
 
 
@@ -50,7 +66,9 @@ class CheckSpec(Spec):
     kpi: str = key("name of a KPI value", "landing.lateral_error")
     min: float | None = key("smallest value that passes", 0.0, unit="that of the KPI", default=None)
     max: float | None = key("largest value that passes", 0.1, unit="that of the KPI", default=None)
-    equals: BoolOrNumber | None = key("the only value that passes", True, unit="that of the KPI", default=None)
+    equals: BoolOrNumber | None = key(
+        "the only value that passes", True, unit="that of the KPI", default=None
+    )
 
     @model_validator(mode="after")
     def _bounded(self) -> CheckSpec:
@@ -68,8 +86,16 @@ class CheckSpec(Spec):
 class ToleranceSpec(Spec):
     """Half width of the tolerance tube around a reference signal."""
 
-    absolute: float = key("along the axis of values", 0.01, unit="that of the signal", default=0.0, ge=0)
-    relative: float = key("fraction of the range (maximum - minimum) of the reference signal", 0.05, unit="1", default=0.0, ge=0)
+    absolute: float = key(
+        "along the axis of values", 0.01, unit="that of the signal", default=0.0, ge=0
+    )
+    relative: float = key(
+        "fraction of the range (maximum - minimum) of the reference signal",
+        0.05,
+        unit="1",
+        default=0.0,
+        ge=0,
+    )
     time: float = key("along the time axis", 0.02, unit="s", default=0.0, ge=0)
 
 
@@ -78,6 +104,9 @@ class ReferenceSpec(Spec):
 
     file: str = key("path of a CSV file with recorded signals", "references/demo1_box.csv")
     tolerances: dict[str, ToleranceSpec] = key(
-        "tolerances by pattern; only matching signals are compared", {"plant.*.position.*": {"absolute": 0.01, "time": 0.02}}
+        "tolerances by pattern; only matching signals are compared",
+        {"plant.*.position.*": {"absolute": 0.01, "time": 0.02}},
     )
-    reason: str = key("why the tolerances are as they are", "a tenth of the size of the deck", default="")
+    reason: str = key(
+        "why the tolerances are as they are", "a tenth of the size of the deck", default=""
+    )

@@ -8,7 +8,13 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import Any
 
-from ..core.size_limits import MAX_COMPONENTS, MAX_CONNECTIONS, MAX_DELAYED_VALUES, MAX_SCALARS, require_at_most
+from ..core.size_limits import (
+    MAX_COMPONENTS,
+    MAX_CONNECTIONS,
+    MAX_DELAYED_VALUES,
+    MAX_SCALARS,
+    require_at_most,
+)
 from .json_document import Document
 from .schema import ScenarioSpec, SystemSpec, ports_of
 from .schema_types import accepted
@@ -47,12 +53,24 @@ class SystemFile:
 
     @cached_property
     def connections(self) -> int:
-        """Number of connections and output ports; a connection to an input port counts once for each of its readers."""
+        """Number of connections and output ports.
+
+        A connection to an input port counts once for each of its readers.
+        """
         targets = [spec.target for _, spec in accepted(self.spec.connections) for _ in spec.sources]
         if isinstance(self.spec, ScenarioSpec):
-            targets += [name for _, spec in accepted(self.spec.inputs) for names in spec.to.values() for name in names]
+            targets += [
+                name
+                for _, spec in accepted(self.spec.inputs)
+                for names in spec.to.values()
+                for name in names
+            ]
         own = sum(self._count_targets(target, CONNECTION_PORTS) for target in targets)
-        return own + len(ports_of(self.spec).outputs) + sum(child.connections for child in self.children.values())
+        return (
+            own
+            + len(ports_of(self.spec).outputs)
+            + sum(child.connections for child in self.children.values())
+        )
 
     @cached_property
     def delayed_values(self) -> int:
@@ -72,13 +90,18 @@ class SystemFile:
     def _assignments(self) -> Iterator[tuple[str, Any]]:
         """Yield (name, value) of all parameters and events of this file."""
         for component, spec in self.spec.components.items():
-            yield from ((f"{component}.{variable}", value) for variable, value in spec.parameters.items())
+            yield from (
+                (f"{component}.{variable}", value) for variable, value in spec.parameters.items()
+            )
         if isinstance(self.spec, ScenarioSpec):
             for _, event in accepted(self.spec.events):
                 yield from event.values.items()
 
     def _count_targets(self, text: str, kinds: Sequence[str]) -> int:
-        """Return the number of inner names that a name refers to. A nested system counts as its largest port."""
+        """Return the number of inner names that a name refers to.
+
+        A nested system counts as its largest port.
+        """
         name, _, rest = text.partition(".")
         child = self.children.get(name)
         if child is None:
@@ -87,7 +110,9 @@ class SystemFile:
         port = re.split(r"[.\[]", rest, maxsplit=1)[0]
         if port:
             return targets[port] if port in targets else child._count_targets(rest, kinds)
-        return max(1, *targets.values(), *(child._count_targets(inner, kinds) for inner in child.children))
+        return max(
+            1, *targets.values(), *(child._count_targets(inner, kinds) for inner in child.children)
+        )
 
     @cached_property
     def _targets_by_port(self) -> Mapping[Sequence[str], Mapping[str, int]]:
@@ -114,4 +139,6 @@ def check_expanded_size(file: SystemFile) -> None:
         ("connections", MAX_DELAYED_VALUES, file.delayed_values, "values that delays store"),
         ("components", MAX_SCALARS, file.assigned_values, "values of parameters and events"),
     ):
-        require_at_most(limit, count, f"{noun} in the expanded scenario", file.document.where((key,)))
+        require_at_most(
+            limit, count, f"{noun} in the expanded scenario", file.document.where((key,))
+        )

@@ -24,13 +24,14 @@ def extending_scenario(
     """Return the content of a scenario file that extends another one.
 
     Args:
-        base: Path of a scenario file, or name of a shipped scenario. A shipped scenario is extended by its name, so that the new
-            file runs wherever cosim is installed.
+        base: Path of a scenario file, or name of a shipped scenario. A shipped scenario is extended
+            by its name, so that the new file runs wherever cosim is installed.
         folder: Folder of the new file.
         name: Name of the new scenario.
         description: Its description.
         settings: Changed values by names of variables or JSON pointers, as for `cosim.load`.
-        settings_folder: Folder that paths in the values of JSON pointers start from; None: the working directory.
+        settings_folder: Folder that paths in the values of JSON pointers start from; None: the
+            working directory.
 
     Raises:
         InputError: The base does not exist, or a JSON pointer leads nowhere.
@@ -38,7 +39,9 @@ def extending_scenario(
     found = find_scenario(base)
     is_shipped = found.resolve().parent == (resources.root() / "scenarios").resolve()
     extended = found.stem if is_shipped else os.path.relpath(found, folder).replace(os.sep, "/")
-    changed = load_scenario(found, settings, settings_folder).root.document.value if settings else {}
+    changed = (
+        load_scenario(found, settings, settings_folder).root.document.value if settings else {}
+    )
     values: dict[str, Any] = {}
     for key in settings or {}:
         if key.startswith("/"):
@@ -47,7 +50,9 @@ def extending_scenario(
     for key, value in (settings or {}).items():
         if not key.startswith("/"):
             component, _, variable = key.partition(".")
-            values.setdefault("components", {}).setdefault(component, {}).setdefault("parameters", {})[variable] = value
+            values.setdefault("components", {}).setdefault(component, {}).setdefault(
+                "parameters", {}
+            )[variable] = value
     return {"extends": extended, "name": name, "description": description, **values}
 
 

@@ -1,12 +1,16 @@
 """Scenarios and nested systems that extend another one.
 
-- "extends" names a file, with or without ".json", a file that cosim ships ("cosim:..."), or a shipped scenario.
+- "extends" names a file, with or without ".json", a file that cosim ships ("cosim:..."), or a
+  shipped scenario.
 - Objects are merged key by key. Every other value replaces that of the base. `null` removes a key.
-- The lists `connections`, `kpis`, `figures` and `checks` of the base are changed by an object whose keys are the names of
-  elements: `to`, `name`, `name` and `kpi`. New names are appended.
-- An entry that the base lacks needs a source, or `from`, `python` or `when`. Without one it is a misspelt entry of the base.
-- A component that gets a source of another kind inherits only `period`, and `isolation` where it is valid.
-- With a component that `null` removes go its connections, its place in the stages and its recorded signals.
+- The lists `connections`, `kpis`, `figures` and `checks` of the base are changed by an object whose
+  keys are the names of elements: `to`, `name`, `name` and `kpi`. New names are appended.
+- An entry that the base lacks needs a source, or `from`, `python` or `when`. Without one it is a
+  misspelt entry of the base.
+- A component that gets a source of another kind inherits only `period`, and `isolation` where it is
+  valid.
+- With a component that `null` removes go its connections, its place in the stages and its recorded
+  signals.
 - `name`, `description`, `reference` and `$schema` describe the base alone and are not inherited.
 """
 
@@ -26,7 +30,8 @@ from .included_files import include_files
 from .json_document import Document, JsonPath, Origin, read_document
 from .schema import KEYED_LISTS, NOT_INHERITED
 
-#: entries with names -> their noun, and the keys of which an entry needs one to be new; without them it changes one of the base
+#: entries with names -> their noun, and the keys of which an entry needs one to be new; without
+#: them it changes one of the base
 _NEW_ENTRIES: Mapping[str, tuple[str, tuple[str, ...]]] = {
     "components": ("component", SOURCES),
     "connections": ("connection to", ("from",)),
@@ -67,20 +72,34 @@ def expand_document(document: Document, extending: tuple[Path, ...] = ()) -> Doc
     merger = _Merger(document, base)
     inherited = _inherited(base, document.file.parent)
     changes = {key: each for key, each in value.items() if key != "extends"}
-    merged = merger.merge_objects((), inherited, {**changes, **_removals_with_components(inherited, changes)})
-    invalid = [path for path, origin in merger.origins.items() if origin.path in origin.document.invalid_paths]
+    merged = merger.merge_objects(
+        (), inherited, {**changes, **_removals_with_components(inherited, changes)}
+    )
+    invalid = [
+        path
+        for path, origin in merger.origins.items()
+        if origin.path in origin.document.invalid_paths
+    ]
     problems = [*document.problems, *base.problems, *merger.problems]
     bases = (*document.bases, base.file, *base.bases)
     origins, removed = merger.origins, merger.removed
     return replace(
-        document, value=merged, problems=problems, invalid_paths=invalid, origins=origins, bases=bases, removed=removed
+        document,
+        value=merged,
+        problems=problems,
+        invalid_paths=invalid,
+        origins=origins,
+        bases=bases,
+        removed=removed,
     )
 
 
 def _read_base(document: Document, name: Any, extending: tuple[Path, ...]) -> Document:
     where = document.where(("extends",))
     if not isinstance(name, str):
-        raise InputError([Problem("expected the path of a file or the name of a shipped scenario", where)])
+        raise InputError(
+            [Problem("expected the path of a file or the name of a shipped scenario", where)]
+        )
     near = path_in(document.file.parent, name if name.endswith(".json") else f"{name}.json")
     try:
         file = near if paths.is_file(near) or name.endswith(".json") else find_scenario(name)
@@ -90,7 +109,9 @@ def _read_base(document: Document, name: Any, extending: tuple[Path, ...]) -> Do
             raise InputError(f"more than {MAX_LEVELS} files extend each other")
         base = read_document(file)
     except InputError as error:
-        raise InputError([Problem(problem.message, problem.where or where) for problem in error.problems]) from None
+        raise InputError(
+            [Problem(problem.message, problem.where or where) for problem in error.problems]
+        ) from None
     if not isinstance(base.value, dict):
         raise InputError([Problem("expected an object", base.where(()))])
     return base
@@ -104,24 +125,43 @@ def _inherited(base: Document, folder: Path) -> dict[str, Any]:
     return change_paths(value, relocating(base.file.parent, folder))
 
 
-def _removals_with_components(inherited: Mapping[str, Any], changes: Mapping[str, Any]) -> dict[str, Any]:
+def _removals_with_components(
+    inherited: Mapping[str, Any], changes: Mapping[str, Any]
+) -> dict[str, Any]:
     """Return the changes, each with its key, that remove what belongs to the components that `changes` remove by `null`.
 
     What the extending file replaces itself is not among them.
     """
     components = changes.get("components")
-    removed = {name for name, each in components.items() if each is None} if isinstance(components, dict) else set()
+    removed = (
+        {name for name, each in components.items() if each is None}
+        if isinstance(components, dict)
+        else set()
+    )
     if not removed:
         return {}
     result: dict[str, Any] = {}
     connections, own = inherited.get("connections"), changes.get("connections", {})
     if isinstance(connections, list) and isinstance(own, dict):
-        ends = [each for each in connections if isinstance(each, dict) and isinstance(each.get("to"), str)]
-        gone = {each["to"]: change for each in ends if (change := _without_sources(each, removed)) != each}
+        ends = [
+            each
+            for each in connections
+            if isinstance(each, dict) and isinstance(each.get("to"), str)
+        ]
+        gone = {
+            each["to"]: change
+            for each in ends
+            if (change := _without_sources(each, removed)) != each
+        }
         result["connections"] = {**gone, **own}
     for key, entry in (("algorithm", "stages"), ("record", "signals")):
         old, own = inherited.get(key), changes.get(key, {})
-        if isinstance(old, dict) and isinstance(old.get(entry), list) and isinstance(own, dict) and entry not in own:
+        if (
+            isinstance(old, dict)
+            and isinstance(old.get(entry), list)
+            and isinstance(own, dict)
+            and entry not in own
+        ):
             result[key] = {**own, entry: _without_components(old[entry], removed)}
     return result
 
@@ -135,13 +175,19 @@ def _without_sources(connection: Mapping[str, Any], removed: Set[str]) -> Mappin
         return None
     if len(kept) == len(names):
         return connection
-    gains = {"gain": [gain[i] for i in kept]} if isinstance(gain, list) and len(gain) == len(names) else {}
+    gains = (
+        {"gain": [gain[i] for i in kept]}
+        if isinstance(gain, list) and len(gain) == len(names)
+        else {}
+    )
     return {**connection, "from": [names[i] for i in kept], **gains}
 
 
 def _without_components(names: Sequence[Any], removed: Set[str]) -> list[Any]:
     """Return a list of names, or of lists of names, without those of removed components and without lists that become empty."""
-    kept = [_without_components(each, removed) if isinstance(each, list) else each for each in names]
+    kept = [
+        _without_components(each, removed) if isinstance(each, list) else each for each in names
+    ]
     return [each for each in kept if each != [] and _component_of(each) not in removed]
 
 
@@ -153,11 +199,18 @@ def _component_of(name: Any) -> str:
 def _is_change_of_nothing(kind: str, new: Any) -> bool:
     """Return True if an entry that the base lacks adds nothing, because it has no key that makes it new, misspelt or not."""
     _, keys = _NEW_ENTRIES.get(kind, ("", ()))
-    return isinstance(new, dict) and bool(keys) and not any(key in keys or nearest_name(key, keys) for key in new)
+    return (
+        isinstance(new, dict)
+        and bool(keys)
+        and not any(key in keys or nearest_name(key, keys) for key in new)
+    )
 
 
 class _Merger:
-    """Merger of a document with its base. Results besides the value: `origins`, `problems`, `removed`."""
+    """Merger of a document with its base.
+
+    Results besides the value: `origins`, `problems`, `removed`.
+    """
 
     def __init__(self, document: Document, base: Document) -> None:
         self._document, self._base = document, base
@@ -166,15 +219,27 @@ class _Merger:
         self.removed = set(base.removed)
 
     def merge_objects(
-        self, path: JsonPath, old: Mapping[str, Any], new: Mapping[str, Any], old_path: JsonPath = (), new_path: JsonPath = ()
+        self,
+        path: JsonPath,
+        old: Mapping[str, Any],
+        new: Mapping[str, Any],
+        old_path: JsonPath = (),
+        new_path: JsonPath = (),
     ) -> dict[str, Any]:
-        """Merge two objects; the paths are those of the result and of the two objects in their documents."""
+        """Merge two objects.
+
+        The paths are those of the result and of the two objects in their documents.
+        """
         result = {}
         for key in dict.fromkeys((*old, *new)):
             places = ((*path, key), (*old_path, key), (*new_path, key))
             if key not in new:
                 result[key] = self._copy(self._base, places[0], old[key], places[1])
-            elif path == ("components",) and key not in old and _is_change_of_nothing("components", new[key]):
+            elif (
+                path == ("components",)
+                and key not in old
+                and _is_change_of_nothing("components", new[key])
+            ):
                 self._report_unknown(places[2], old)
             elif new[key] is not None:
                 result[key] = self._merge(*places, old.get(key), new[key])
@@ -182,19 +247,31 @@ class _Merger:
                 self.removed.add(places[0])
             else:
                 own = not path and key in NOT_INHERITED
-                self._report(places[2], f"nothing to remove{', it is not inherited' if own else did_you_mean(key, old)}")
+                self._report(
+                    places[2],
+                    (
+                        "nothing to "
+                        f"remove{', it is not inherited' if own else did_you_mean(key, old)}"
+                    ),
+                )
         return result
 
-    def _merge(self, path: JsonPath, old_path: JsonPath, new_path: JsonPath, old: Any, new: Any) -> Any:
+    def _merge(
+        self, path: JsonPath, old_path: JsonPath, new_path: JsonPath, old: Any, new: Any
+    ) -> Any:
         """Merge two values; `old` is None if the base has no such value."""
         if isinstance(new, dict):
             self.origins[path] = Origin(self._document, new_path)
             if path in KEYED_LISTS:
-                return self._merge_list(str(path[0]), KEYED_LISTS[path], old if isinstance(old, list) else [], new)
+                return self._merge_list(
+                    str(path[0]), KEYED_LISTS[path], old if isinstance(old, list) else [], new
+                )
             if len(path) == 2 and path[0] == "components" and isinstance(old, dict):
                 source = next((each for each in SOURCES if new.get(each) is not None), None)
                 old = inherited_component(old, source) if source else old
-            return self.merge_objects(path, old if isinstance(old, dict) else {}, new, old_path, new_path)
+            return self.merge_objects(
+                path, old if isinstance(old, dict) else {}, new, old_path, new_path
+            )
         return self._copy(self._document, path, new, new_path)
 
     def _merge_list(self, kind: str, key: str, old: list[Any], new: Mapping[str, Any]) -> list[Any]:
@@ -210,7 +287,11 @@ class _Merger:
         for name, change in new.items():
             if names.count(name) > 1:
                 self._report(
-                    (kind, name), f"the base has {names.count(name)} elements with this name; a list replaces all elements"
+                    (kind, name),
+                    (
+                        f"the base has {names.count(name)} elements with this name; a list "
+                        "replaces all elements"
+                    ),
                 )
             elif name not in names and change is None:
                 self._report((kind, name), f"nothing to remove{did_you_mean(name, names)}")
@@ -218,11 +299,15 @@ class _Merger:
                 self._report_unknown((kind, name), names)
             elif name not in names:
                 path = (kind, len(result))
-                result.append({key: name, **self._merge_element(path, (), (kind, name), {}, change)})
+                result.append(
+                    {key: name, **self._merge_element(path, (), (kind, name), {}, change)}
+                )
                 self.origins[(*path, key)] = Origin(self._document, (kind, name))
         return result
 
-    def _merge_element(self, path: JsonPath, old_path: JsonPath, new_path: JsonPath, old: Any, new: Any) -> dict[str, Any]:
+    def _merge_element(
+        self, path: JsonPath, old_path: JsonPath, new_path: JsonPath, old: Any, new: Any
+    ) -> dict[str, Any]:
         if not isinstance(new, dict):
             self._report(new_path, "expected an object, or null to remove the element")
             new = {}
@@ -233,9 +318,15 @@ class _Merger:
         """Return a copy of a value that one of the documents has at `old_path`."""
         self.origins[path] = document.origin(old_path)
         if isinstance(value, dict):
-            return {key: self._copy(document, (*path, key), each, (*old_path, key)) for key, each in value.items()}
+            return {
+                key: self._copy(document, (*path, key), each, (*old_path, key))
+                for key, each in value.items()
+            }
         if isinstance(value, list):
-            return [self._copy(document, (*path, i), each, (*old_path, i)) for i, each in enumerate(value)]
+            return [
+                self._copy(document, (*path, i), each, (*old_path, i))
+                for i, each in enumerate(value)
+            ]
         return value
 
     def _report_unknown(self, path: JsonPath, names: Collection[str]) -> None:
@@ -243,15 +334,24 @@ class _Merger:
         noun, keys = _NEW_ENTRIES[str(path[0])]
         name = str(path[1])
         near = nearest_name(name, names)
-        hint = f'; did you mean "{near}"?' if near else f"; a new one needs {' or '.join(keys)}{did_you_mean(name, names)}"
-        self._report(path, f'the base "{self._document.value["extends"]}" has no {noun} "{name}"{hint}')
+        hint = (
+            f'; did you mean "{near}"?'
+            if near
+            else f"; a new one needs {' or '.join(keys)}{did_you_mean(name, names)}"
+        )
+        self._report(
+            path, f'the base "{self._document.value["extends"]}" has no {noun} "{name}"{hint}'
+        )
 
     def _report(self, path: JsonPath, text: str) -> None:
         self.problems.append(Problem(text, self._document.where(path)))
 
 
 def inherited_component(component: Mapping[str, Any], source: str) -> dict[str, Any]:
-    """Return what a component with a source of the kind `source` inherits: all of it, unless its source is of another kind."""
+    """Return what a component with a source of the kind `source` inherits.
+
+    All of it, unless its source is of another kind.
+    """
     if source in component or not any(each in component for each in SOURCES):
         return dict(component)
     kept = ("period", "isolation") if source in ("fmu", "modelica") else ("period",)

@@ -27,7 +27,11 @@ def editor_schema(nested: bool = False) -> Schema:
     """Return the JSON Schema (2020-12) of scenario files or of nested-system files, with or without "extends"."""
     full = json_schema(nested)
     version, definitions = full.pop("$schema"), full.pop("$defs")
-    changes = {f"{name}{_SUFFIX}": _change_of_object(each, definitions) for name, each in definitions.items() if _is_object(each)}
+    changes = {
+        f"{name}{_SUFFIX}": _change_of_object(each, definitions)
+        for name, each in definitions.items()
+        if _is_object(each)
+    }
     name = "Nested" if nested else "Scenario"
     roots = {name: full, f"{name}{_SUFFIX}": _change_of_root(full, definitions)}
     return {
@@ -61,7 +65,10 @@ def with_arguments(schema: Schema, file_and_class: str, arguments: Schema) -> Sc
         "if": condition,
         "then": {"properties": {"arguments": {"$ref": f"#/$defs/{name}"}}},
     }
-    return {**schema, "$defs": {**definitions, **arguments["$defs"], name: root, "ComponentSpec": component}}
+    return {
+        **schema,
+        "$defs": {**definitions, **arguments["$defs"], name: root, "ComponentSpec": component},
+    }
 
 
 def _change_of_root(full: Schema, definitions: Mapping[str, Schema]) -> Schema:
@@ -70,11 +77,19 @@ def _change_of_root(full: Schema, definitions: Mapping[str, Schema]) -> Schema:
     for (key,), name in KEYED_LISTS.items():
         if key in properties:
             element = {"$ref": f"{full['properties'][key]['items']['$ref']}{_SUFFIX}"}
-            named = {"type": "object", "additionalProperties": {"anyOf": [element, _NULL]}, "description": f"elements by {name}"}
+            named = {
+                "type": "object",
+                "additionalProperties": {"anyOf": [element, _NULL]},
+                "description": f"elements by {name}",
+            }
             properties[key] = {"anyOf": [*properties[key]["anyOf"], named]}
     own = {key: full["properties"][key] for key in NOT_INHERITED if key in full["properties"]}
     required = [key for key in full.get("required", ()) if key in own]
-    return {**change, "properties": {"extends": _EXTENDS, **properties, **own}, "required": ["extends", *required]}
+    return {
+        **change,
+        "properties": {"extends": _EXTENDS, **properties, **own},
+        "required": ["extends", *required],
+    }
 
 
 def _is_object(schema: Schema) -> bool:
@@ -83,7 +98,10 @@ def _is_object(schema: Schema) -> bool:
 
 def _change_of_object(schema: Schema, definitions: Mapping[str, Schema]) -> Schema:
     """Return the schema of an object that is merged with one of this schema."""
-    properties = {key: {"anyOf": [_change_of_value(each, definitions), _NULL]} for key, each in schema["properties"].items()}
+    properties = {
+        key: {"anyOf": [_change_of_value(each, definitions), _NULL]}
+        for key, each in schema["properties"].items()
+    }
     kept = ("type", "title", "description", "additionalProperties")
     return {"properties": properties, **{key: each for key, each in schema.items() if key in kept}}
 
@@ -94,12 +112,16 @@ def _change_of_value(schema: Schema, definitions: Mapping[str, Schema]) -> Schem
         is_object = _is_object(definitions[schema["$ref"].rpartition("/")[2]])
         return {**schema, "$ref": f"{schema['$ref']}{_SUFFIX}"} if is_object else schema
     if "anyOf" in schema:
-        return {**schema, "anyOf": [_change_of_value(each, definitions) for each in schema["anyOf"]]}
+        return {
+            **schema,
+            "anyOf": [_change_of_value(each, definitions) for each in schema["anyOf"]],
+        }
     changed = dict(schema)
     if isinstance(inner := schema.get("additionalProperties"), dict):
         changed["additionalProperties"] = {"anyOf": [_change_of_value(inner, definitions), _NULL]}
     if inner := schema.get("patternProperties"):
         changed["patternProperties"] = {
-            pattern: {"anyOf": [_change_of_value(each, definitions), _NULL]} for pattern, each in inner.items()
+            pattern: {"anyOf": [_change_of_value(each, definitions), _NULL]}
+            for pattern, each in inner.items()
         }
     return changed

@@ -20,7 +20,11 @@ SHIPPED = "cosim:"
 #: keys of a scenario with lists or objects of entries that name files, and keys with one such entry
 _ENTRIES, _ENTRY = ("components", "inputs", "kpis", "figures"), ("scene", "reference")
 #: keys of an entry that hold a path, and keys that hold a reference such as "file.py:Class"
-_PATH_KEYS, _PATH_LIST_KEYS, _REFERENCE_KEYS = ("fmu", "system", "file"), ("libraries",), ("python", "modelica")
+_PATH_KEYS, _PATH_LIST_KEYS, _REFERENCE_KEYS = (
+    ("fmu", "system", "file"),
+    ("libraries",),
+    ("python", "modelica"),
+)
 
 
 def find_scenario(scenario: str | Path) -> Path:
@@ -31,9 +35,15 @@ def find_scenario(scenario: str | Path) -> Path:
     """
     path = path_in(Path(), str(scenario))
     if path.suffix == ".fmu":
-        raise InputError(f"{scenario} is an FMU, expected a scenario; `cosim simulate {scenario}` simulates a single FMU")
+        raise InputError(
+            f"{scenario} is an FMU, expected a scenario; `cosim simulate {scenario}` simulates a "
+            "single FMU"
+        )
     if path.suffix == ".py":
-        raise InputError(f"{scenario} is a Python file, expected a scenario, which is a JSON file that names its classes")
+        raise InputError(
+            f"{scenario} is a Python file, expected a scenario, which is a JSON file that names "
+            "its classes"
+        )
     if path.suffix == ".json" or paths.is_file(path):
         return path
     names = resources.shipped_names("scenarios/*.json")
@@ -43,12 +53,19 @@ def find_scenario(scenario: str | Path) -> Path:
         return completed
     if str(scenario) and paths.is_folder(path):
         raise InputError(f"{scenario} is a folder, expected a scenario file")
-    raise InputError(f'no scenario file and no shipped scenario "{scenario}"{did_you_mean(path.name, names)}')
+    raise InputError(
+        f'no scenario file and no shipped scenario "{scenario}"{did_you_mean(path.name, names)}'
+    )
 
 
 def path_in(folder: Path, text: str) -> Path:
-    """Return the file that a path in a file of `folder` names; with "cosim:" it starts from the files that cosim ships."""
-    return resources.root() / text.removeprefix(SHIPPED) if text.startswith(SHIPPED) else folder / text
+    """Return the file that a path in a file of `folder` names.
+
+    With "cosim:" it starts from the files that cosim ships.
+    """
+    return (
+        resources.root() / text.removeprefix(SHIPPED) if text.startswith(SHIPPED) else folder / text
+    )
 
 
 def relocating(old_folder: Path, new_folder: Path | None) -> PathChange:
@@ -92,8 +109,16 @@ def _change_entry(entry: Any, change: PathChange) -> Any:
     if not isinstance(entry, Mapping):
         return entry
     paths = {key: change(text) for key in _PATH_KEYS if isinstance(text := entry.get(key), str)}
-    references = {key: change_reference(text, change) for key in _REFERENCE_KEYS if isinstance(text := entry.get(key), str)}
-    lists = {key: list(map(change, each)) for key in _PATH_LIST_KEYS if _is_list_of_texts(each := entry.get(key))}
+    references = {
+        key: change_reference(text, change)
+        for key in _REFERENCE_KEYS
+        if isinstance(text := entry.get(key), str)
+    }
+    lists = {
+        key: list(map(change, each))
+        for key in _PATH_LIST_KEYS
+        if _is_list_of_texts(each := entry.get(key))
+    }
     return {**entry, **paths, **references, **lists}
 
 
@@ -113,6 +138,9 @@ def change_pointed(pointer: str, value: Any, change: PathChange) -> Any:
 
 
 def change_reference(reference: str, change: PathChange) -> str:
-    """Return a reference "file.py:name" or "file.mo:Model" with a changed path; modules stay as they are."""
+    """Return a reference "file.py:name" or "file.mo:Model" with a changed path.
+
+    Modules stay as they are.
+    """
     file, separator, name = reference.rpartition(":")
     return f"{change(file)}{separator}{name}" if file.endswith((".py", ".mo")) else reference

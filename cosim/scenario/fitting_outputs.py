@@ -17,7 +17,10 @@ VariablesByEndpoint = dict[Endpoint, Variable]
 
 
 class Place(NamedTuple):
-    """Scalar as connections name it: the enclosing system, its component or nested system, and the name below that."""
+    """Scalar as connections name it.
+
+    The enclosing system, its component or nested system, and the name below that.
+    """
 
     system: str
     member: str
@@ -88,22 +91,36 @@ class OutputFinder:
                 near = [source for source in sources if places[0].member in source.split(".")]
                 base = _common_variable([str(place)[len(target) :] for place in covered])
                 names = [source + base for source in dict.fromkeys((*near, *sources))]
-                yield MissingConnection(target + base, names, {place: ends[place] for place in covered})
+                yield MissingConnection(
+                    target + base, names, {place: ends[place] for place in covered}
+                )
 
     def _pairs(self, place: Place, variables: Sequence[Variable]) -> set[tuple[str, str]]:
         """Return pairs of prefixes (of inputs, of outputs) whose connection would feed an input.
 
-        The names must be equal without the prefix of the input, and without prefixes of the output. A last part alone ("x") is no
-        name; as whole name of an input it may follow one prefix of outputs. Instead of a nested system a pair has its port.
+        The names must be equal without the prefix of the input, and without prefixes of the output.
+        A last part alone ("x") is no name; as whole name of an input it may follow one prefix of
+        outputs. Instead of a nested system a pair has its port.
         """
         first, _, rest = place.scalar.partition(".")
         pairs = set()
-        for prefix, name in ((place.member_name, place.scalar), (f"{place.member_name}.{first}", rest)):
+        for prefix, name in (
+            (place.member_name, place.scalar),
+            (f"{place.member_name}.{first}", rest),
+        ):
             for source, output, variable in self._outputs_by_end.get((place.system, name), ()):
                 prefixes = source.count(".") - output.member_name.count(".")
                 is_name = "." in name or prefixes <= (name == place.scalar)
-                if is_name and output.member != place.member and not any(incompatibility(variable, each) for each in variables):
-                    port = "." + re.split(r"[.\[]", name)[0] if self._nested_systems & {prefix, source} else ""
+                if (
+                    is_name
+                    and output.member != place.member
+                    and not any(incompatibility(variable, each) for each in variables)
+                ):
+                    port = (
+                        "." + re.split(r"[.\[]", name)[0]
+                        if self._nested_systems & {prefix, source}
+                        else ""
+                    )
                     pairs.add((prefix + port, source + port))
         return pairs
 
@@ -124,7 +141,11 @@ class OutputFinder:
         outputs: dict[Place, Variable] = {}
         for name, slots in self._system.slots.items():
             system, _, member = name.rpartition(".")
-            outputs |= {Place(system, member, slot): v for slot, (v, _) in slots.items() if v.causality == "output"}
+            outputs |= {
+                Place(system, member, slot): v
+                for slot, (v, _) in slots.items()
+                if v.causality == "output"
+            }
         for alias, end in self._system.aliases.items():
             outputs[self._place_of_alias(alias)] = self._system.find_element(end).variable
         return outputs
@@ -151,7 +172,10 @@ class OutputFinder:
 
 
 def _port_of(node: Node, name: str) -> str:
-    """Return the port that publishes an inner input of a nested system, with the rest of the name; "" if there is none."""
+    """Return the port that publishes an inner input of a nested system, with the rest of the name.
+
+    "" if there is none.
+    """
     for port, prefixes in node.ports.inputs.items():
         for prefix in prefixes:
             if name == prefix or name.startswith((f"{prefix}.", f"{prefix}[")):
@@ -159,13 +183,26 @@ def _port_of(node: Node, name: str) -> str:
     return ""
 
 
-def _largest_first(pairs: Mapping[tuple[str, str], Sequence[Place]]) -> Iterator[tuple[str, list[str], list[Place]]]:
+def _largest_first(
+    pairs: Mapping[tuple[str, str], Sequence[Place]],
+) -> Iterator[tuple[str, list[str], list[Place]]]:
     """Yield (prefix of inputs, prefixes of outputs that feed the same inputs, these inputs) until no input is left."""
     left = {pair: list(pairs[pair]) for pair in sorted(pairs)}
     while left:
         (target, _), covered = max(left.items(), key=lambda item: len(item[1]))
-        yield target, [source for (other, source), places in left.items() if (other, places) == (target, covered)], covered
-        rest = {pair: [place for place in places if place not in covered] for pair, places in left.items()}
+        yield (
+            target,
+            [
+                source
+                for (other, source), places in left.items()
+                if (other, places) == (target, covered)
+            ],
+            covered,
+        )
+        rest = {
+            pair: [place for place in places if place not in covered]
+            for pair, places in left.items()
+        }
         left = {pair: places for pair, places in rest.items() if places}
 
 

@@ -18,7 +18,13 @@ from ..core.errors import Problem, did_you_mean
 from .evaluation_schema import CallSpec, FunctionSpec
 from .json_pointer import find_value, missing_value, pointer_keys
 from .name_resolution import Target, UnknownNameError, resolve_name
-from .named_functions import RECORDED_INPUTS, declared_arguments, definition_problem, unknown_signals, wrong_types
+from .named_functions import (
+    RECORDED_INPUTS,
+    declared_arguments,
+    definition_problem,
+    unknown_signals,
+    wrong_types,
+)
 from .nested_systems import Node
 from .schema import ScenarioSpec
 from .schema_types import INVALID, accepted
@@ -49,10 +55,14 @@ class FunctionResolver:
     def resolve(self, spec: ScenarioSpec) -> ScenarioSpec:
         """Return the scenario with the values of all arguments.
 
-        Functions with problems, and optional functions that lack a signal or value, are replaced by placeholders.
+        Functions with problems, and optional functions that lack a signal or value, are replaced by
+        placeholders.
         """
         functions = {
-            kind: [self._resolve_function(kind, i, each) if each is not INVALID else INVALID for i, each in enumerate(specs)]
+            kind: [
+                self._resolve_function(kind, i, each) if each is not INVALID else INVALID
+                for i, each in enumerate(specs)
+            ]
             for kind, specs in (("kpis", spec.kpis), ("figures", spec.figures))
         }
         scene = spec.scene and self._resolve_arguments(spec.scene, self.problems, "scene")
@@ -71,17 +81,23 @@ class FunctionResolver:
             return INVALID if found else resolved
         if self.signals is not None:
             unknown = unknown_signals(resolved, self.root, self.signals)
-            found += [Problem(text, self.root.where(kind, i, "arguments", argument)) for argument, text in unknown]
+            found += [
+                Problem(text, self.root.where(kind, i, "arguments", argument))
+                for argument, text in unknown
+            ]
         if found and found[0].message:
             noun = "KPI" if kind == "kpis" else "figure"
             reason = found[0].message.removesuffix(RECORDED_INPUTS)
-            self.left_out.append(replace(found[0], message=f'{noun} "{spec.name}" is left out: {reason}'))
+            self.left_out.append(
+                replace(found[0], message=f'{noun} "{spec.name}" is left out: {reason}')
+            )
         return INVALID if found else resolved
 
     def _resolve_arguments(self, spec: C, problems: list[Problem], *path: str | int) -> C:
         """Return a function with the values of its arguments.
 
-        Arguments without a value are added to `problems`, without a message if the reason has already been reported.
+        Arguments without a value are added to `problems`, without a message if the reason has
+        already been reported.
         """
         arguments = dict(spec.arguments)
         for name, argument in spec.arguments.items():
@@ -92,11 +108,21 @@ class FunctionResolver:
         if spec.sources:
             for name, is_required in declared_arguments(spec, self.root.folder).items():
                 if name not in arguments:
-                    self._add_argument(arguments, name, spec.sources, is_required, problems, self.root.where(*path, "from"))
+                    self._add_argument(
+                        arguments,
+                        name,
+                        spec.sources,
+                        is_required,
+                        problems,
+                        self.root.where(*path, "from"),
+                    )
         return spec.model_copy(update={"arguments": arguments, "sources": []})
 
     def _type_problems(self, resolved: CallSpec, spec: CallSpec, *path: str | int) -> list[Problem]:
-        """Return the problems of values that do not have the annotated type; `spec` is the function before `resolved`."""
+        """Return the problems of values that do not have the annotated type.
+
+        `spec` is the function before `resolved`.
+        """
         problems = []
         for name, text in wrong_types(resolved, self.root.folder):
             if name in spec.arguments:
@@ -106,13 +132,21 @@ class FunctionResolver:
         return problems
 
     def _add_argument(
-        self, arguments: dict[str, Any], name: str, sources: Sequence[str], is_required: bool, problems: list[Problem], where: str
+        self,
+        arguments: dict[str, Any],
+        name: str,
+        sources: Sequence[str],
+        is_required: bool,
+        problems: list[Problem],
+        where: str,
     ) -> None:
         """Take one argument from the first source that has it."""
         errors = []
         for source in sources:
             try:
-                arguments[name] = self._resolve_name(f"{source}/{name}" if source.startswith("/") else f"{source}.{name}")
+                arguments[name] = self._resolve_name(
+                    f"{source}/{name}" if source.startswith("/") else f"{source}.{name}"
+                )
                 return
             except UnknownNameError as error:
                 errors.append(str(error))
@@ -139,11 +173,18 @@ class FunctionResolver:
         return value
 
     def _value_of(self, name: str) -> Any:
-        """Return the value of a parameter or start value; a port of a nested system has that of its first inner variable."""
-        target = next(iter(resolve_name(self.root, name, ("parameters", "inputs"), include_inner=True)))
+        """Return the value of a parameter or start value.
+
+        A port of a nested system has that of its first inner variable.
+        """
+        target = next(
+            iter(resolve_name(self.root, name, ("parameters", "inputs"), include_inner=True))
+        )
         if target.component not in self.components:
             raise UnknownNameError
-        variables = {variable.name: variable for variable in self.components[target.component].variables}
+        variables = {
+            variable.name: variable for variable in self.components[target.component].variables
+        }
         if target.prefix in variables:
             return self._value_of_variable(target, variables[target.prefix])
         names = (f"{target.prefix}[{i}]" for i in count(1))
@@ -158,7 +199,9 @@ class FunctionResolver:
         value = self.start_values.get(target.component, {}).get(variable.name, variable.start)
         if variable.causality == "output" or value is None:
             reason = "is an output" if variable.causality == "output" else "has no start value"
-            raise UnknownNameError(f'"{target.component}.{variable.name}" {reason}, expected a parameter')
+            raise UnknownNameError(
+                f'"{target.component}.{variable.name}" {reason}, expected a parameter'
+            )
         if variable.shape and not isinstance(value, list | tuple):
             return [value] * len(variable.scalar_names)
         return list(value) if isinstance(value, tuple) else value
@@ -166,4 +209,9 @@ class FunctionResolver:
 
 def without_placeholders(spec: ScenarioSpec) -> ScenarioSpec:
     """Return a resolved scenario without the placeholders of functions."""
-    return spec.model_copy(update={kind: [each for _, each in accepted(getattr(spec, kind))] for kind in ("kpis", "figures")})
+    return spec.model_copy(
+        update={
+            kind: [each for _, each in accepted(getattr(spec, kind))]
+            for kind in ("kpis", "figures")
+        }
+    )

@@ -64,9 +64,19 @@ def function_definitions(path: Path) -> dict[str, ast.FunctionDef]:
 @lru_cache(16)  # a file often has several functions, and sweeps load the same scenario many times
 def _parse(source: bytes) -> _Source:
     body = ast.parse(source).body
-    imports = [node for node in body if isinstance(node, ast.ImportFrom) and node.level <= 1 and node.module]
-    imported = {alias.asname or alias.name: (str(node.module), alias.name) for node in imports for alias in node.names}
-    return _Source({node.name: node for node in body if isinstance(node, ast.FunctionDef)}, imported)
+    imports = [
+        node
+        for node in body
+        if isinstance(node, ast.ImportFrom) and node.level <= 1 and node.module
+    ]
+    imported = {
+        alias.asname or alias.name: (str(node.module), alias.name)
+        for node in imports
+        for alias in node.names
+    }
+    return _Source(
+        {node.name: node for node in body if isinstance(node, ast.FunctionDef)}, imported
+    )
 
 
 @lru_cache(64)  # definitions are cached, so that equal ones are identical
@@ -90,7 +100,10 @@ def _returned_expressions(node: ast.AST) -> Iterator[ast.expr | None]:
 
 
 def _dict_keys(value: ast.expr | None) -> Iterator[str]:
-    """Yield the keys of a dictionary expression: "time" for f"time[{i}]", and "" for a key that is not a literal."""
+    """Yield the keys of a dictionary expression.
+
+    "time" for f"time[{i}]", and "" for a key that is not a literal.
+    """
     match value:
         case ast.Dict(keys, values):
             for key, each in zip(keys, values, strict=True):

@@ -1,8 +1,8 @@
 """Files that the arguments of components name, for example vehicle files and meshes.
 
-A text in "arguments" of a component or of the scene that ends in ".json" stands for the content of this file, and the name of an
-STL, OBJ or GLB file at the key "mesh" for its triangles (`mesh_files.py`). Paths start from the folder of the file that contains
-the text.
+A text in "arguments" of a component or of the scene that ends in ".json" stands for the content of
+this file, and the name of an STL, OBJ or GLB file at the key "mesh" for its triangles
+(`mesh_files.py`). Paths start from the folder of the file that contains the text.
 """
 
 from __future__ import annotations
@@ -30,7 +30,10 @@ def include_files(document: Document) -> Document:
     components, inclusion = value.get("components"), _Inclusion(document)
     included: dict[str, Any] = {}
     if isinstance(components, dict):
-        included["components"] = {name: inclusion.include_in(each, "components", name) for name, each in components.items()}
+        included["components"] = {
+            name: inclusion.include_in(each, "components", name)
+            for name, each in components.items()
+        }
     if "scene" in value:
         included["scene"] = inclusion.include_in(value["scene"], "scene")
     if not (inclusion.files or inclusion.problems):
@@ -45,7 +48,9 @@ def include_files(document: Document) -> Document:
     )
 
 
-def include_in_setting(keys: Sequence[str], value: Any, folder: Path) -> tuple[Any, list[Path], dict[JsonPath, Document]]:
+def include_in_setting(
+    keys: Sequence[str], value: Any, folder: Path
+) -> tuple[Any, list[Path], dict[JsonPath, Document]]:
     """Return the value of a setting in which the contents of files replace their names, these files, and JSON files by path.
 
     Args:
@@ -87,11 +92,16 @@ def _replace_names(value: Any, path: JsonPath, content: Callable[[str, JsonPath]
 
 def _names_file(text: str, path: JsonPath) -> bool:
     """Return whether a text names a file to include."""
-    return text.endswith(SUFFIX) or (path[-1:] == ("mesh",) and text.lower().endswith(mesh_files.SUFFIXES))
+    return text.endswith(SUFFIX) or (
+        path[-1:] == ("mesh",) and text.lower().endswith(mesh_files.SUFFIXES)
+    )
 
 
 class _Inclusion:
-    """Inclusion of files into one document. Results: `files`, `origins`, `problems`, `invalid_paths`."""
+    """Inclusion of files into one document.
+
+    Results: `files`, `origins`, `problems`, `invalid_paths`.
+    """
 
     def __init__(self, document: Document) -> None:
         self._document = document
@@ -104,7 +114,10 @@ class _Inclusion:
         """Return the component or scene at `path` with arguments that contain the included files."""
         if not isinstance(value, dict) or "arguments" not in value:
             return value
-        return {**value, "arguments": _replace_names(value["arguments"], (*path, "arguments"), self._content)}
+        return {
+            **value,
+            "arguments": _replace_names(value["arguments"], (*path, "arguments"), self._content),
+        }
 
     def _content(self, text: str, path: JsonPath) -> Any:
         try:
@@ -114,7 +127,9 @@ class _Inclusion:
             file = read_document(self._document.file.parent / text)
         except InputError as error:
             where = self._document.where(path)
-            self.problems += [Problem(problem.message, problem.where or where) for problem in error.problems]
+            self.problems += [
+                Problem(problem.message, problem.where or where) for problem in error.problems
+            ]
             self.invalid_paths.append(path)
             return {}
         self.files.append(file.file)

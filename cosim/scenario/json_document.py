@@ -1,7 +1,7 @@
 """Strict JSON reader that keeps the line and column of every value.
 
-Duplicate keys, NaN, Infinity and numbers too large for a double are collected as problems with line and column, and reading
-continues. Text that is not JSON at all raises InputError.
+Duplicate keys, NaN, Infinity and numbers too large for a double are collected as problems with line
+and column, and reading continues. Text that is not JSON at all raises InputError.
 """
 
 from __future__ import annotations
@@ -46,7 +46,8 @@ class Document:
     origins: Mapping[JsonPath, Origin] = field(default_factory=dict)
     #: the other files from which the value is merged
     bases: tuple[Path, ...] = ()
-    #: Python classes and objects by the names of the components that they implement; from a dict or from settings
+    #: Python classes and objects by the names of the components that they implement; from a dict or
+    #: from settings
     objects: Mapping[str, Any] = field(default_factory=dict)
     #: paths of the values of other files that are removed
     removed: set[JsonPath] = field(default_factory=set)
@@ -64,7 +65,9 @@ class Document:
         File and JSON path are those in which the value was written. For a value that the caller has set it is its JSON pointer.
         """
         known = path = path if path in self.offsets else self._with_indices(path)
-        if setting := next((path[:n] for n in range(len(path), 0, -1) if path[:n] in self.settings), None):
+        if setting := next(
+            (path[:n] for n in range(len(path), 0, -1) if path[:n] in self.settings), None
+        ):
             return self._where_set(path, setting)
         while known and known not in self.origins and known not in self.offsets:
             known = known[:-1]
@@ -88,15 +91,28 @@ class Document:
         for key in path:
             is_index = isinstance(value, list) and isinstance(key, str) and key.isdecimal()
             keys.append(int(key) if is_index else key)
-            exists = keys[-1] in value if isinstance(value, dict) else isinstance(value, list) and keys[-1] in range(len(value))
+            exists = (
+                keys[-1] in value
+                if isinstance(value, dict)
+                else isinstance(value, list) and keys[-1] in range(len(value))
+            )
             value = value[keys[-1]] if exists else None
         return tuple(keys)
 
     def refuse_objects(self, reason: str, classes: bool) -> None:
         """Raise InputError with this reason if components are Python objects, or (if `classes`) Python classes."""
-        if names := [name for name, target in self.objects.items() if classes or not callable(target)]:
+        if names := [
+            name for name, target in self.objects.items() if classes or not callable(target)
+        ]:
             kind = "class or object" if classes else "object"
-            raise InputError([Problem(f"{reason}: found a Python {kind}", self.where(("components", names[0], "python")))])
+            raise InputError(
+                [
+                    Problem(
+                        f"{reason}: found a Python {kind}",
+                        self.where(("components", names[0], "python")),
+                    )
+                ]
+            )
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -148,9 +164,16 @@ def read_document(file: Path) -> Document:
     except OSError as error:
         raise InputError(f'cannot read "{file}": {error.strerror}{nearest_file(file)}') from None
     except UnicodeDecodeError as error:
-        raise InputError(f'"{file}" is not UTF-8 text: {error.reason} at byte {error.start}') from None
+        raise InputError(
+            f'"{file}" is not UTF-8 text: {error.reason} at byte {error.start}'
+        ) from None
     parsed = _parse_file(file, text)
-    own: dict[str, Any] = {"problems": [*parsed.problems], "removed": set(), "settings": {}, "set_documents": {}}
+    own: dict[str, Any] = {
+        "problems": [*parsed.problems],
+        "removed": set(),
+        "settings": {},
+        "set_documents": {},
+    }
     return replace(parsed, value=copy_json(parsed.value), **own)
 
 
@@ -179,7 +202,10 @@ def _skip_whitespace(text: str, offset: int) -> int:
 
 
 class _JsonParser:
-    """Recursive descent parser of JSON text; the methods for values return (value, offset of the first character after it)."""
+    """Recursive descent parser of JSON text.
+
+    The methods for values return (value, offset of the first character after it).
+    """
 
     def __init__(self, document: Document):
         self.document, self.text = document, document.text
@@ -209,7 +235,9 @@ class _JsonParser:
             if result:
                 offset = self.expect(offset, ",", "}")
             if self.text[offset : offset + 1] != '"':
-                comment = "; JSON has no comments" if self.text.startswith(("//", "/*"), offset) else ""
+                comment = (
+                    "; JSON has no comments" if self.text.startswith(("//", "/*"), offset) else ""
+                )
                 raise self.error(offset, f'expected a key in double quotes or "}}"{comment}')
             begin = offset
             raw_key, offset = self.string(offset)
@@ -240,7 +268,9 @@ class _JsonParser:
 
     def expect(self, offset: int, *symbols: str) -> int:
         if self.text[offset : offset + 1] != symbols[0]:
-            end = len(self.text[:offset].rstrip())  # of the value before, after which a comma is probably missing
+            end = len(
+                self.text[:offset].rstrip()
+            )  # of the value before, after which a comma is probably missing
             place = end if symbols[0] == "," and "\n" in self.text[end:offset] else offset
             raise self.error(place, f"expected {' or '.join(map(repr, symbols))}")
         return _skip_whitespace(self.text, offset + 1)
@@ -253,7 +283,10 @@ class _JsonParser:
         return text, end
 
     def clean(self, text: str, path: JsonPath) -> str:
-        """Return the permitted part of a text; add a problem of the value or key at `path` if another part exists."""
+        """Return the permitted part of a text.
+
+        Add a problem of the value or key at `path` if another part exists.
+        """
         if message := text_problem(text):
             self.problem(path, message)
         return acceptable_text(text)

@@ -45,22 +45,34 @@ def missing_value(document: Any, pointer: str) -> str:
     """
     keys = pointer_keys(pointer)
     value, depth = find_value(document, keys)
-    return f'the scenario has no "/{"/".join(keys[: depth + 1])}"{_present_keys(keys[:depth], keys[depth], value)}'
+    return (
+        "the scenario has no "
+        f'"/{"/".join(keys[: depth + 1])}"{_present_keys(keys[:depth], keys[depth], value)}'
+    )
 
 
 def _present_keys(place: Sequence[str], key: str, value: Any) -> str:
-    """Return a hint for the end of a message: the key at a place that another one probably means, else all keys there."""
+    """Return a hint for the end of a message.
+
+    The key at a place that another one probably means, else all keys there.
+    """
     owner = f'"{shorten(place[-1])}"' if place else "it"
     if isinstance(value, list):
         return f"; {owner} has {count_noun(len(value), 'element')}"
     if not isinstance(value, dict) or not value:
         return ""
     near = nearest_name(key, (*value, *_OPTIONAL_OBJECTS))
-    return f'; did you mean "{near}"?' if near else f"; {owner} has: {abbreviate_names(map(shorten, value), 12)}"
+    return (
+        f'; did you mean "{near}"?'
+        if near
+        else f"; {owner} has: {abbreviate_names(map(shorten, value), 12)}"
+    )
 
 
 def set_value(document: Any, pointer: str, value: Any) -> str:
-    """Set a value in a JSON document; only the last key, and "parameters" or "arguments" before it, may be new.
+    """Set a value in a JSON document.
+
+    Only the last key, and "parameters" or "arguments" before it, may be new.
 
     Returns:
         The problem, or "".

@@ -15,7 +15,10 @@ from .variable_values import check_value, quote_value, start_values
 
 
 class UnknownNameError(Exception):
-    """A name that refers to nothing; its text gives the reason, and is empty if the reason has already been reported."""
+    """A name that refers to nothing.
+
+    Its text gives the reason, and is empty if the reason has already been reported.
+    """
 
 
 class Target(NamedTuple):
@@ -25,13 +28,16 @@ class Target(NamedTuple):
     prefix: str
 
 
-def resolve_name(node: Node, text: str, ports: Sequence[str], include_inner: bool = False) -> list[Target]:
+def resolve_name(
+    node: Node, text: str, ports: Sequence[str], include_inner: bool = False
+) -> list[Target]:
     """Resolve a name in a system to variables of components.
 
     Args:
         node: The system in which the name is used.
         text: A name such as "uav.position"; its first part is a component.
-        ports: The kinds of ports by which a nested system is entered ("inputs", "outputs", "parameters").
+        ports: The kinds of ports by which a nested system is entered ("inputs", "outputs",
+            "parameters").
         include_inner: Accept the names of components inside nested systems as well as ports.
 
     Raises:
@@ -44,16 +50,22 @@ def resolve_name(node: Node, text: str, ports: Sequence[str], include_inner: boo
         if node.has_wrong_names:
             raise UnknownNameError
         is_removed = ("components", component) in node.document.removed
-        hint = ", which was removed" if is_removed else did_you_mean(component, node.spec.components)
+        hint = (
+            ", which was removed" if is_removed else did_you_mean(component, node.spec.components)
+        )
         if component in ScenarioSpec.model_fields:
-            hint = f'; "{component}" is an entry of the scenario, name it by a JSON pointer: "/{component}/..."'
+            hint = (
+                f'; "{component}" is an entry of the scenario, name it by a JSON pointer: '
+                f'"/{component}/..."'
+            )
         raise UnknownNameError(f'unknown component "{component}"{hint}')
     child = node.children.get(component)
     if child is None:
         return [Target(node.full_name(component), rest)]
     if not rest:
         raise UnknownNameError(
-            f'"{text}" names a nested system, expected one of its ports{did_you_mean("", _port_targets(child, ports))}'
+            f'"{text}" names a nested system, expected one of its '
+            f"ports{did_you_mean('', _port_targets(child, ports))}"
         )
     port = re.split(r"[.\[]", rest, maxsplit=1)[0]
     if port in child.invalid_ports and "outputs" in ports:
@@ -61,13 +73,20 @@ def resolve_name(node: Node, text: str, ports: Sequence[str], include_inner: boo
     inner_names = _port_targets(child, ports)
     if port in inner_names:
         suffix = rest[len(port) :]
-        return [target for inner in inner_names[port] for target in resolve_name(child, inner + suffix, ports, include_inner)]
+        return [
+            target
+            for inner in inner_names[port]
+            for target in resolve_name(child, inner + suffix, ports, include_inner)
+        ]
     if include_inner and port in {*child.spec.components, *child.invalid_components}:
         return resolve_name(child, rest, ports, include_inner)
     if "ports" in child.invalid_keys:
         raise UnknownNameError
     valid = [*inner_names, *(child.spec.components if include_inner else ())]
-    raise UnknownNameError(f'nested system "{component}" has no {ports[0].rstrip("s")} port "{port}"{did_you_mean(port, valid)}')
+    raise UnknownNameError(
+        f'nested system "{component}" has no {ports[0].rstrip("s")} port '
+        f'"{port}"{did_you_mean(port, valid)}'
+    )
 
 
 def _port_targets(node: Node, kinds: Sequence[str]) -> Mapping[str, Sequence[str]]:
@@ -87,33 +106,52 @@ class PrefixIndex:
         if not prefix:
             return self._sorted
         begin = bisect_left(self._sorted, prefix)
-        return self._sorted[begin : bisect_left(self._sorted, prefix[:-1] + chr(ord(prefix[-1]) + 1), begin)]
+        return self._sorted[
+            begin : bisect_left(self._sorted, prefix[:-1] + chr(ord(prefix[-1]) + 1), begin)
+        ]
 
 
 class SlotIndex:
     """Scalars of the variables of one causality of a component, searched by prefix."""
 
     def __init__(self, component: Component, causality: str):
-        slots = (slot for variable in component.variables if variable.causality == causality for slot in variable.scalar_names)
+        slots = (
+            slot
+            for variable in component.variables
+            if variable.causality == causality
+            for slot in variable.scalar_names
+        )
         self._positions = {slot: position for position, slot in enumerate(slots)}
         self._names = PrefixIndex(self._positions)
 
     def below(self, prefix: str) -> dict[str, str]:
         """Return the scalars below a prefix, keyed by their names after the prefix.
 
-        The key is "" for the prefix itself, and for example ".position.x" below it. In a pattern such as "pos_*", "*" matches one
-        or more characters, which are the key. The order is that of the variables.
+        The key is "" for the prefix itself, and for example ".position.x" below it. In a pattern
+        such as "pos_*", "*" matches one or more characters, which are the key. The order is that of
+        the variables.
         """
         if not prefix:
             return {f".{slot}": slot for slot in self._positions}
         head, star, tail = prefix.partition("*")
         if star:
             fixed = len(head) + len(tail)
-            found = (slot for slot in self._names.with_prefix(head) if len(slot) > fixed and slot.endswith(tail))
-            return {slot[len(head) : len(slot) - len(tail)]: slot for slot in sorted(found, key=self._positions.__getitem__)}
+            found = (
+                slot
+                for slot in self._names.with_prefix(head)
+                if len(slot) > fixed and slot.endswith(tail)
+            )
+            return {
+                slot[len(head) : len(slot) - len(tail)]: slot
+                for slot in sorted(found, key=self._positions.__getitem__)
+            }
         slots = [prefix] if prefix in self._positions else []
-        slots += [slot for separator in ".[" for slot in self._names.with_prefix(prefix + separator)]
-        return {slot[len(prefix) :]: slot for slot in sorted(slots, key=self._positions.__getitem__)}
+        slots += [
+            slot for separator in ".[" for slot in self._names.with_prefix(prefix + separator)
+        ]
+        return {
+            slot[len(prefix) :]: slot for slot in sorted(slots, key=self._positions.__getitem__)
+        }
 
 
 def check_assignment(
@@ -155,23 +193,40 @@ def check_assignment(
         if names[-1] not in variables:
             size = sum(other.startswith(f"{text}[") for other in variables)
             raise ValueError(f'"{text}" takes at most {size} values, found {len(value)}')
-        return {each: check_value(variables[each], element) for each, element in zip(names, value, strict=True)}
+        return {
+            each: check_value(variables[each], element)
+            for each, element in zip(names, value, strict=True)
+        }
     if isinstance(value, list) and (names := vector_names(variables, text)):
         if len(value) != len(names):
             raise ValueError(f'"{text}" takes {len(names)} values, found {len(value)}')
-        return {each: check_value(variables[each], element) for each, element in zip(names, value, strict=True)}
-    settable = [v.name for causality in ("parameter", "input") for v in variables.values() if v.causality == causality]
+        return {
+            each: check_value(variables[each], element)
+            for each, element in zip(names, value, strict=True)
+        }
+    settable = [
+        v.name
+        for causality in ("parameter", "input")
+        for v in variables.values()
+        if v.causality == causality
+    ]
     valid = abbreviate_names(re.sub(r"\[\d+\]$", "", each) for each in settable)
     hint = did_you_mean(text, settable) or (valid and f"; valid: {valid}")
     raise UnknownNameError(f'component "{name}" has no variable "{text}"{hint}')
 
 
 def _with_element(
-    variable: Variable, element: str, value: Any, current: Callable[[str], Sequence[Any] | None] | None
+    variable: Variable,
+    element: str,
+    value: Any,
+    current: Callable[[str], Sequence[Any] | None] | None,
 ) -> list[Any]:
     """Return the elements of an array of which one is assigned."""
     if current is None:
-        raise ValueError(f'"{element}" is an element, an event sets the whole array: expected a list for "{variable.name}"')
+        raise ValueError(
+            f'"{element}" is an element, an event sets the whole array: expected a list for '
+            f'"{variable.name}"'
+        )
     elements = current(variable.name)
     elements = list(start_values(variable) if elements is None else elements)
     elements[variable.scalar_names.index(element)] = value
@@ -184,6 +239,14 @@ def vector_names(variables: Mapping[str, Variable], prefix: str) -> list[str]:
     They have the same type, unit and causality. The list is empty if the prefix names no vector.
     """
     begin = f"{prefix}."
-    found = [each for name, each in variables.items() if name.startswith(begin) and not re.search(r"[.\[]", name[len(begin) :])]
+    found = [
+        each
+        for name, each in variables.items()
+        if name.startswith(begin) and not re.search(r"[.\[]", name[len(begin) :])
+    ]
     kinds = {(each.type, each.unit, each.causality, each.shape) for each in found}
-    return [each.name for each in found] if len(found) > 1 and len(kinds) == 1 and not found[0].shape else []
+    return (
+        [each.name for each in found]
+        if len(found) > 1 and len(kinds) == 1 and not found[0].shape
+        else []
+    )

@@ -15,7 +15,12 @@ from ..core.paths import is_file
 from ..results.checks import kpi_hint
 from .argument_types import argument_problem
 from .evaluation_schema import CallSpec, FunctionSpec
-from .function_definitions import function_definition, function_definitions, kpi_value_names, source_path
+from .function_definitions import (
+    function_definition,
+    function_definitions,
+    kpi_value_names,
+    source_path,
+)
 from .nested_systems import Node
 from .schema import ScenarioSpec
 from .schema_types import accepted
@@ -43,7 +48,10 @@ def find_function_problems(
         names: set[str] = set()
         for i, function in functions:
             if function.name in names:
-                yield Problem(f'the name "{function.name}" is used more than once', root.where(kind, i, "name"))
+                yield Problem(
+                    f'the name "{function.name}" is used more than once',
+                    root.where(kind, i, "name"),
+                )
             names.add(function.name)
     if spec.scene and (text := function_problem(spec.scene, root.folder)):
         yield Problem(text, root.where("scene"))
@@ -56,10 +64,15 @@ def find_function_problems(
 
 
 def function_problem(spec: CallSpec, folder: Path) -> str:
-    """Return why a function cannot be called with the arguments in the scenario, or "" if it can; see `definition_problem`."""
+    """Return why a function cannot be called with the arguments in the scenario, or "" if it can.
+
+    See `definition_problem`.
+    """
     if text := definition_problem(spec, folder):
         return text
-    return _argument_problem(spec.python.rpartition(":")[2], function_definition(spec, folder).args, spec.arguments)
+    return _argument_problem(
+        spec.python.rpartition(":")[2], function_definition(spec, folder).args, spec.arguments
+    )
 
 
 def definition_problem(spec: CallSpec, folder: Path) -> str:
@@ -72,11 +85,16 @@ def definition_problem(spec: CallSpec, folder: Path) -> str:
         folder: The folder that the path of the file starts from.
     """
     file, _, name = spec.python.rpartition(":")
-    if not name.isidentifier() or not (file.endswith(".py") or all(part.isidentifier() for part in file.split("."))):
+    if not name.isidentifier() or not (
+        file.endswith(".py") or all(part.isidentifier() for part in file.split("."))
+    ):
         return f'expected "file.py:function" or "package.module:function", found "{spec.python}"'
     path = source_path(file, folder)
     if path is None or not is_file(path):
-        return f'{"file" if file.endswith(".py") else "module"} "{file}" does not exist{nearest_file(path) if path else ""}'
+        return (
+            f'{"file" if file.endswith(".py") else "module"} "{file}" does not '
+            f"exist{nearest_file(path) if path else ''}"
+        )
     try:
         functions = function_definitions(path)
     except SyntaxError as error:
@@ -108,7 +126,9 @@ def signal_problems(root: Node, kind: str, signals: Collection[str]) -> Iterator
                 yield Problem(text, root.where(kind, i, "arguments", argument))
 
 
-def unknown_signals(spec: CallSpec, root: Node, signals: Collection[str]) -> Iterator[tuple[str, str]]:
+def unknown_signals(
+    spec: CallSpec, root: Node, signals: Collection[str]
+) -> Iterator[tuple[str, str]]:
     """Yield (parameter, message) of every argument that names no recorded signal."""
     declared = function_definition(spec, root.folder).args
     for parameter in (*declared.posonlyargs, *declared.args, *declared.kwonlyargs):
@@ -117,15 +137,25 @@ def unknown_signals(spec: CallSpec, root: Node, signals: Collection[str]) -> Ite
             continue
         if "Signal" in kinds and value not in signals:
             yield parameter.arg, f'no signal "{value}" is recorded{_reason(value, root, signals)}'
-        if "Prefix" in kinds and not any(name.startswith((f"{value}.", f"{value}[")) for name in signals):
-            yield parameter.arg, f'no signal below "{value}" is recorded{_reason(value, root, _signal_prefixes(signals))}'
+        if "Prefix" in kinds and not any(
+            name.startswith((f"{value}.", f"{value}[")) for name in signals
+        ):
+            yield (
+                parameter.arg,
+                (
+                    f'no signal below "{value}" is '
+                    f"recorded{_reason(value, root, _signal_prefixes(signals))}"
+                ),
+            )
 
 
 def wrong_types(spec: CallSpec, folder: Path) -> Iterator[tuple[str, str]]:
     """Yield (parameter, message) of every argument whose value does not have the annotated type."""
     declared = function_definition(spec, folder).args
     for parameter in (*declared.posonlyargs, *declared.args, *declared.kwonlyargs):
-        if parameter.arg in spec.arguments and (text := argument_problem(parameter.annotation, spec.arguments[parameter.arg])):
+        if parameter.arg in spec.arguments and (
+            text := argument_problem(parameter.annotation, spec.arguments[parameter.arg])
+        ):
             yield parameter.arg, text
 
 
@@ -133,9 +163,15 @@ def _reason(value: str, root: Node, names: Collection[str]) -> str:
     """Return the most probable reason for which a signal is not recorded."""
     component = value.partition(".")[0]
     if ("components", component) in root.document.removed:
-        return f': the component "{component}" is removed; also remove by null what needs it, or mark it as optional'
+        return (
+            f': the component "{component}" is removed; also remove by null what needs it, or mark '
+            "it as optional"
+        )
     if component not in root.spec.components:
-        return f': the scenario has no component "{component}"{did_you_mean(component, root.spec.components)}'
+        return (
+            ": the scenario has no component "
+            f'"{component}"{did_you_mean(component, root.spec.components)}'
+        )
     return f"{did_you_mean(value, names)}{RECORDED_INPUTS}"
 
 
@@ -149,23 +185,39 @@ def kpi_name_problem(kpi: str, kpis: Sequence[FunctionSpec], folder: Path) -> st
     if name in values and (not values[name] or key.partition("[")[0] in values[name]):
         return ""
     own = {name: values[name]} if name in values else values
-    known = (f"{each}.{value}" if value else each for each, names in own.items() for value in names or [""])
+    known = (
+        f"{each}.{value}" if value else each
+        for each, names in own.items()
+        for value in names or [""]
+    )
     return f'no KPI "{kpi}"{kpi_hint(kpi.partition("[")[0], known)}'
 
 
 def _value_names(spec: FunctionSpec, folder: Path) -> list[str]:
-    return [] if definition_problem(spec, folder) else kpi_value_names(function_definition(spec, folder))
+    return (
+        []
+        if definition_problem(spec, folder)
+        else kpi_value_names(function_definition(spec, folder))
+    )
 
 
 def _annotation_names(annotation: ast.expr | None) -> set[str]:
     """Return the names that an annotation contains."""
     nodes = ast.walk(annotation) if annotation else ()
-    return {node.id if isinstance(node, ast.Name) else node.attr for node in nodes if isinstance(node, ast.Name | ast.Attribute)}
+    return {
+        node.id if isinstance(node, ast.Name) else node.attr
+        for node in nodes
+        if isinstance(node, ast.Name | ast.Attribute)
+    }
 
 
 def _signal_prefixes(signals: Collection[str]) -> list[str]:
     """Return all names that are prefixes of signals."""
-    return list(dict.fromkeys(name[: match.start()] for name in signals for match in re.finditer(r"[.\[]", name)))
+    return list(
+        dict.fromkeys(
+            name[: match.start()] for name in signals for match in re.finditer(r"[.\[]", name)
+        )
+    )
 
 
 def load_function(reference: str, folder: Path) -> Callable[..., Any]:
@@ -176,27 +228,42 @@ def load_function(reference: str, folder: Path) -> Callable[..., Any]:
     """
     module, _, name = reference.rpartition(":")
     function: Callable[..., Any] = (
-        load_object(reference, folder) if module.endswith(".py") else getattr(import_module(module), name)
+        load_object(reference, folder)
+        if module.endswith(".py")
+        else getattr(import_module(module), name)
     )
     return function
 
 
 def _argument_problem(name: str, declared: ast.arguments, given: Collection[str]) -> str:
-    """Return the problem of the keyword arguments `given`, or ""; the first argument is the result or the scenario."""
+    """Return the problem of the keyword arguments `given`, or "".
+
+    The first argument is the result or the scenario.
+    """
     known = _declared_arguments(declared)
     for argument in given:
         if argument not in known and declared.kwarg is None:
             return f'"{name}" takes no argument "{argument}"{did_you_mean(argument, known)}'
-    missing = [argument for argument, is_required in known.items() if is_required and argument not in given]
-    return f'"{name}" needs the argument{"s" * (len(missing) > 1)} {", ".join(missing)}' if missing else ""
+    missing = [
+        argument for argument, is_required in known.items() if is_required and argument not in given
+    ]
+    return (
+        f'"{name}" needs the argument{"s" * (len(missing) > 1)} {", ".join(missing)}'
+        if missing
+        else ""
+    )
 
 
 def _declared_arguments(declared: ast.arguments) -> dict[str, bool]:
     """Return the names of all arguments but the first, and whether each is required."""
     positional = [argument.arg for argument in (*declared.posonlyargs, *declared.args)]
     first_default = len(positional) - len(declared.defaults)
-    keywords = zip((argument.arg for argument in declared.kwonlyargs), declared.kw_defaults, strict=True)
+    keywords = zip(
+        (argument.arg for argument in declared.kwonlyargs), declared.kw_defaults, strict=True
+    )
     required = {name: i < first_default for i, name in enumerate(positional)} | {
         name: default is None for name, default in keywords
     }
-    return {name: is_required for name, is_required in required.items() if name not in positional[:1]}
+    return {
+        name: is_required for name, is_required in required.items() if name not in positional[:1]
+    }

@@ -39,7 +39,8 @@ class Node:
     children: dict[str, Node] = field(default_factory=dict)
     #: components whose entries are invalid; problems that only follow from that are not reported
     invalid_components: set[str] = field(default_factory=set)
-    #: keys of the file that are invalid or missing; problems that only follow from that are not reported
+    #: keys of the file that are invalid or missing; problems that only follow from that are not
+    #: reported
     invalid_keys: set[str] = field(default_factory=set)
     #: output ports that name no output; likewise
     invalid_ports: set[str] = field(default_factory=set)
@@ -57,7 +58,9 @@ class Node:
     @property
     def has_wrong_names(self) -> bool:
         """True if names of components are illegal or occur twice, so that an unknown name may mean one of them."""
-        repeated = any(path[:1] == ("components",) and len(path) == 2 for path in self.document.invalid_paths)
+        repeated = any(
+            path[:1] == ("components",) and len(path) == 2 for path in self.document.invalid_paths
+        )
         return repeated or not all(map(_LEGAL_NAME.fullmatch, self.invalid_components))
 
     def full_name(self, component: str) -> str:
@@ -75,7 +78,10 @@ class Node:
         yield self
 
     def find_component(self, full_name: str) -> tuple[Node, str] | None:
-        """Return (system, name) of the component with a full name such as "uav.vtol"; None if there is none."""
+        """Return (system, name) of the component with a full name such as "uav.vtol".
+
+        None if there is none.
+        """
         *systems, name = full_name.split(".")
         node = self
         for system in systems:
@@ -121,13 +127,20 @@ class Scenario:
     def files(self) -> list[Path]:
         """Return all files that the scenario names, whether they exist or not.
 
-        These are the scenario and its nested systems, sources with their packages, input profiles, KPIs and figures.
+        These are the scenario and its nested systems, sources with their packages, input profiles,
+        KPIs and figures.
         """
         files = [file for node in self.root.walk() for file in node.document.files]
         files += [self.root.folder / spec.file for _, spec in accepted(self.spec.inputs)]
-        functions: list[CallSpec] = [spec for _, spec in (*accepted(self.spec.kpis), *accepted(self.spec.figures))]
+        functions: list[CallSpec] = [
+            spec for _, spec in (*accepted(self.spec.kpis), *accepted(self.spec.figures))
+        ]
         functions += [self.spec.scene] if self.spec.scene else []
-        python = [self.root.folder / spec.python.rpartition(":")[0] for spec in functions if ".py:" in spec.python]
+        python = [
+            self.root.folder / spec.python.rpartition(":")[0]
+            for spec in functions
+            if ".py:" in spec.python
+        ]
         for node, name in self.root.leaves():
             spec = node.spec.components[name]
             if spec.python:
@@ -138,26 +151,32 @@ class Scenario:
 
 
 def open_scenario(scenario: str | Path | Mapping[str, Any]) -> Document:
-    """Return the expanded JSON document of a scenario: of a file, of a shipped scenario, or of a dict."""
+    """Return the expanded JSON document of a scenario.
+
+    Of a file, of a shipped scenario, or of a dict.
+    """
     if isinstance(scenario, Mapping):
         return expand_document(document_of_dict(scenario))
     return read_system_document(find_scenario(scenario))
 
 
 def load_scenario(
-    scenario: str | Path | Mapping[str, Any], settings: Mapping[str, Any] | None = None, folder: Path | None = None
+    scenario: str | Path | Mapping[str, Any],
+    settings: Mapping[str, Any] | None = None,
+    folder: Path | None = None,
 ) -> Scenario:
     """Read a scenario and its nested systems.
 
     Args:
         scenario: A path, the name of a shipped scenario, or the content of a scenario file.
-        settings: Values that the caller changes. A name that starts with "/" is a JSON pointer into the scenario file; any
-            other name is that of a variable.
-        folder: The folder that paths in the values of JSON pointers start from; None: the working directory.
+        settings: Values that the caller changes. A name that starts with "/" is a JSON pointer into
+            the scenario file; any other name is that of a variable.
+        folder: The folder that paths in the values of JSON pointers start from; None: the working
+            directory.
 
     Raises:
-        InputError: The file does not exist or is not JSON, or the expanded scenario is too large. Other problems are collected in
-            the result.
+        InputError: The file does not exist or is not JSON, or the expanded scenario is too large.
+            Other problems are collected in the result.
     """
     document = open_scenario(scenario)
     _refuse_study(document)
@@ -172,18 +191,25 @@ def load_scenario(
 def _refuse_study(document: Document) -> None:
     """Raise InputError if a document is a sweep, a tuning or a search for the worst case."""
     value = document.value if isinstance(document.value, dict) else {}
-    for key, command in (("factors", "sweep"), ("minimize", "tune"), ("parameters", "tune --worst")):
+    for key, command in (
+        ("factors", "sweep"),
+        ("minimize", "tune"),
+        ("parameters", "tune --worst"),
+    ):
         if key in value and "scenario" in value and "components" not in value:
             text = f"expected a scenario, found a file for `cosim {command}`"
             raise InputError([Problem(text, document.where(("scenario",)))])
 
 
-def _find_seed_problems(document: Document, spec: SystemSpec, invalid_keys: Set[str]) -> Iterator[Problem]:
+def _find_seed_problems(
+    document: Document, spec: SystemSpec, invalid_keys: Set[str]
+) -> Iterator[Problem]:
     """Yield a problem for each JSON pointer of "seeds" that no value can be set at, except those below invalid keys."""
     for i, pointer in enumerate(spec.seeds if isinstance(spec, ScenarioSpec) else ()):
         if not pointer.startswith("/"):
             yield Problem(
-                f'expected a JSON pointer, which begins with "/"; found "{shorten(pointer)}"', document.where(("seeds", i))
+                f'expected a JSON pointer, which begins with "/"; found "{shorten(pointer)}"',
+                document.where(("seeds", i)),
             )
         elif pointer.split("/")[1] in invalid_keys:
             continue
@@ -192,21 +218,33 @@ def _find_seed_problems(document: Document, spec: SystemSpec, invalid_keys: Set[
 
 
 class _SystemReader:
-    """Reader of a scenario file and the nested systems below it; every file is read once. `problems` collects its problems."""
+    """Reader of a scenario file and the nested systems below it; every file is read once.
+
+    `problems` collects its problems.
+    """
 
     def __init__(self) -> None:
         #: files that have been read, by path; None if a file cannot be used
         self._files: dict[Path, SystemFile | None] = {}
         self.problems: list[Problem] = []
 
-    def read(self, document: Document, kind: type[SystemSpec], ancestors: tuple[Path, ...]) -> SystemFile:
-        """Validate a document and read its nested systems; `ancestors` are the resolved files that it is nested in."""
+    def read(
+        self, document: Document, kind: type[SystemSpec], ancestors: tuple[Path, ...]
+    ) -> SystemFile:
+        """Validate a document and read its nested systems.
+
+        `ancestors` are the resolved files that it is nested in.
+        """
         spec, problems, invalid_keys = validate_document(document, kind)
         self.problems += problems
         raw = document.value.get("components") if isinstance(document.value, dict) else None
         invalid_components = set(raw if isinstance(raw, dict) else {}) - set(spec.components)
         if not spec.components and not invalid_components and "components" not in invalid_keys:
-            self.problems.append(Problem("expected at least one component, found none", document.where(("components",))))
+            self.problems.append(
+                Problem(
+                    "expected at least one component, found none", document.where(("components",))
+                )
+            )
             invalid_keys.add("components")
         file = SystemFile(document, spec, invalid_keys, invalid_components, {})
         ancestors = (*ancestors, paths.resolve_path(document.file))
@@ -218,27 +256,41 @@ class _SystemReader:
                     invalid_components.add(name)
         return file
 
-    def _read_nested(self, parent: SystemFile, name: str, path: str, ancestors: tuple[Path, ...]) -> SystemFile | None:
+    def _read_nested(
+        self, parent: SystemFile, name: str, path: str, ancestors: tuple[Path, ...]
+    ) -> SystemFile | None:
         """Return the file of a nested system, or None if it cannot be used."""
         file = parent.document.file.parent / path
-        key = paths.resolve_path(file.parent) / file.name  # the file's relative paths start from this folder
+        key = (
+            paths.resolve_path(file.parent) / file.name
+        )  # the file's relative paths start from this folder
         try:
             if paths.resolve_path(file) in ancestors:
                 raise InputError(f'the nested system "{path}" contains itself')
             child = self._files.get(key)
             if len(ancestors) + (child.levels if child else 1) > MAX_LEVELS:
-                raise InputError(f'the nested system "{path}" is nested more than {MAX_LEVELS} levels deep')
+                raise InputError(
+                    f'the nested system "{path}" is nested more than {MAX_LEVELS} levels deep'
+                )
             if key not in self._files:
                 self._files[key] = None
-                child = self._files[key] = self.read(read_system_document(file), NestedSpec, ancestors)
+                child = self._files[key] = self.read(
+                    read_system_document(file), NestedSpec, ancestors
+                )
         except InputError as error:
             where = parent.document.where(("components", name, "system"))
-            self.problems += [Problem(problem.message, problem.where or where) for problem in error.problems]
+            self.problems += [
+                Problem(problem.message, problem.where or where) for problem in error.problems
+            ]
             return None
         return child
 
 
 def _make_node(file: SystemFile, prefix: str = "") -> Node:
-    node = Node(file.document, file.spec, prefix, {}, set(file.invalid_components), set(file.invalid_keys))
-    node.children = {name: _make_node(child, node.full_name(name)) for name, child in file.children.items()}
+    node = Node(
+        file.document, file.spec, prefix, {}, set(file.invalid_components), set(file.invalid_keys)
+    )
+    node.children = {
+        name: _make_node(child, node.full_name(name)) for name, child in file.children.items()
+    }
     return node

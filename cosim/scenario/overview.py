@@ -1,4 +1,7 @@
-"""Description of a run as JSON for `run.json` and the report: components, stages, connections and software."""
+"""Description of a run as JSON for `run.json` and the report.
+
+Components, stages, connections and software.
+"""
 
 from __future__ import annotations
 
@@ -18,12 +21,15 @@ _PACKAGES = ("numpy", "scipy", "fmpy", "pybullet", "pybullet-arm64", "pythonfmu"
 
 
 def describe_system(
-    system: System, sources: Mapping[str, str], solvers: Mapping[str, Mapping[str, Any]] = MappingProxyType({})
+    system: System,
+    sources: Mapping[str, str],
+    solvers: Mapping[str, Mapping[str, Any]] = MappingProxyType({}),
 ) -> dict[str, Any]:
     """Return the components, stages and connections of a system as JSON values.
 
-    - `components`: {"name", "origin", "inputs", "outputs", "period", "solver"}: the source in the scenario, the numbers of scalar
-      inputs and outputs, the period (s; None: every macro step), and the solver of a Model Exchange FMU (else no such key)
+    - `components`: {"name", "origin", "inputs", "outputs", "period", "solver"}: the source in the
+      scenario, the numbers of scalar inputs and outputs, the period (s; None: every macro step),
+      and the solver of a Model Exchange FMU (else no such key)
     - `stages`: lists of component names; a nested system is {"name", "stages"}
     - `connections`: [source, target, unit of the source or "", notes on delay and conversion or ""]
 
@@ -34,17 +40,23 @@ def describe_system(
     """
     return {
         "components": [
-            _describe_component(system, name, sources[name]) | ({"solver": solvers[name]} if name in solvers else {})
+            _describe_component(system, name, sources[name])
+            | ({"solver": solvers[name]} if name in solvers else {})
             for name in system.components
         ],
         "stages": _describe_stages(system.stages),
-        "connections": [_describe_connection(system, connection) for connection in system.connections],
+        "connections": [
+            _describe_connection(system, connection) for connection in system.connections
+        ],
     }
 
 
 def describe_software() -> dict[str, Any]:
     """Return the versions of cosim, Python and the installed packages of `_PACKAGES`, and the kind of machine."""
-    return {"versions": dict(_versions()), "machine": {"system": platform.system(), "machine": platform.machine()}}
+    return {
+        "versions": dict(_versions()),
+        "machine": {"system": platform.system(), "machine": platform.machine()},
+    }
 
 
 @cache
@@ -60,7 +72,10 @@ def _versions() -> dict[str, str]:
 
 def _describe_component(system: System, name: str, source: str) -> dict[str, Any]:
     variables = system.components[name].variables
-    inputs, outputs = (sum(len(v.scalar_names) for v in variables if v.causality == kind) for kind in ("input", "output"))
+    inputs, outputs = (
+        sum(len(v.scalar_names) for v in variables if v.causality == kind)
+        for kind in ("input", "output")
+    )
     period = system.periods.get(name)
     return {
         "name": name,
@@ -76,7 +91,11 @@ def _describe_stages(stages: Iterable[Stage]) -> list[list[Any]]:
 
 
 def _describe_member(member: str | Group) -> Any:
-    return {"name": member.name, "stages": _describe_stages(member.stages)} if isinstance(member, Group) else member
+    return (
+        {"name": member.name, "stages": _describe_stages(member.stages)}
+        if isinstance(member, Group)
+        else member
+    )
 
 
 def _describe_connection(system: System, connection: Connection) -> list[str]:
@@ -86,8 +105,14 @@ def _describe_connection(system: System, connection: Connection) -> list[str]:
 
 
 def connection_notes(system: System, connection: Connection) -> str:
-    """Return the delay and all conversions of a connection as text, such as "delay 1, deg to rad"; "" for a plain copy."""
-    source, target = system.find_element(connection.source).variable, system.find_element(connection.target).variable
+    """Return the delay and all conversions of a connection as text, such as "delay 1, deg to rad".
+
+    "" for a plain copy.
+    """
+    source, target = (
+        system.find_element(connection.source).variable,
+        system.find_element(connection.target).variable,
+    )
     notes = [f"delay {connection.delay}"] if connection.delay else []
     notes += [connection.interpolation] if connection.interpolation != "hold" else []
     if source.unit and target.unit and unit_conversion(source, target) != (1.0, 0.0):
@@ -98,6 +123,8 @@ def connection_notes(system: System, connection: Connection) -> str:
         notes.append(f"{source.type} to {target.type}")
     if connection.is_mapped:
         notes += [f"term {connection.term} of a sum"] if connection.term else []
-        notes += [f"gain {connection.gain:g}"] if connection.gain != 1.0 or not connection.term else []
+        notes += (
+            [f"gain {connection.gain:g}"] if connection.gain != 1.0 or not connection.term else []
+        )
         notes += [f"offset {connection.offset:g}"] if connection.offset else []
     return ", ".join(notes)

@@ -22,17 +22,25 @@ from .missing_connections import find_missing_connections
 if TYPE_CHECKING:
     from .prepared_run import PreparedRun
 
-#: ratio of the step of a component to the one that its FMU recommends, from which on results may be wrong
+#: ratio of the step of a component to the one that its FMU recommends, from which on results may be
+#: wrong
 _MAX_STEP_RATIO = 5
 
 
 def find_warnings(prepared: PreparedRun) -> list[Problem]:
     """Return all warnings about a prepared run, each with its location in the scenario file."""
-    return [*find_run_warnings(prepared), *set_excesses(prepared).values(), *_missing_reference(prepared)]
+    return [
+        *find_run_warnings(prepared),
+        *set_excesses(prepared).values(),
+        *_missing_reference(prepared),
+    ]
 
 
 def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
-    """Yield the warnings that concern the results: functions left out, late times, connections, steps, FMUs."""
+    """Yield the warnings that concern the results.
+
+    Functions left out, late times, connections, steps, FMUs.
+    """
     if left_out := prepared.left_out:
         yield replace(left_out[0], message="; ".join(problem.message for problem in left_out))
     yield from _late_events(prepared)
@@ -51,21 +59,34 @@ def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
 
 def _missing_connections(prepared: PreparedRun) -> Iterator[Problem]:
     """Yield a warning for each connection that is probably missing, and for components with other inputs that lack one."""
-    for name, text in find_missing_connections(prepared.root, prepared.system, unconnected_inputs(prepared)):
+    for name, text in find_missing_connections(
+        prepared.root, prepared.system, unconnected_inputs(prepared)
+    ):
         found = prepared.root.find_component(name)
-        yield Problem(text, found[0].where("components", found[1]) if found else prepared.root.where("connections"))
+        yield Problem(
+            text,
+            found[0].where("components", found[1]) if found else prepared.root.where("connections"),
+        )
 
 
 def _double_conversions(prepared: PreparedRun) -> Iterator[Problem]:
     """Yield a warning for each connection whose gain is the factor between the units of its ends, which is applied anyway."""
     system = prepared.system
     for connection in system.connections:
-        source, target = (system.find_element(end).variable for end in (connection.source, connection.target))
+        source, target = (
+            system.find_element(end).variable for end in (connection.source, connection.target)
+        )
         factor, _ = unit_conversion(source, target)
-        if factor != 1.0 and math.isclose(abs(connection.gain), factor, rel_tol=1e-3) and source.unit and target.unit:
+        if (
+            factor != 1.0
+            and math.isclose(abs(connection.gain), factor, rel_tol=1e-3)
+            and source.unit
+            and target.unit
+        ):
             sign = "-1" if connection.gain < 0 else "1"
             text = (
-                f"{connection.source} -> {connection.target}: {source.unit.name} is converted to {target.unit.name}, and then "
+                f"{connection.source} -> {connection.target}: {source.unit.name} is converted to "
+                f"{target.unit.name}, and then "
                 f"multiplied by the gain {connection.gain:g}: is the gain {sign} meant?"
             )
             yield Problem(text, prepared.root.where("connections"))
@@ -76,7 +97,9 @@ def unconnected_inputs(prepared: PreparedRun) -> VariablesByEndpoint:
     system = prepared.system
     connected = {connection.target for connection in system.connections}
     changes = [system.start_values, *(event.values for event in prepared.settings.events)]
-    assigned = {(component, name) for values in changes for component, own in values.items() for name in own}
+    assigned = {
+        (component, name) for values in changes for component, own in values.items() for name in own
+    }
     return {
         end: variable
         for name, component in system.components.items()
@@ -97,7 +120,10 @@ def _large_steps(prepared: PreparedRun) -> Iterator[Problem]:
     for name, component in system.components.items():
         description = getattr(component, "description", None)
         if isinstance(description, FmuDescription) and description.interface != "model-exchange":
-            step, recommended = system.periods.get(name, macro_step), description.default_experiment.step_size
+            step, recommended = (
+                system.periods.get(name, macro_step),
+                description.default_experiment.step_size,
+            )
             if recommended and step >= _MAX_STEP_RATIO * recommended:
                 groups[step][name] = recommended
     for step, sizes in groups.items():
@@ -105,9 +131,13 @@ def _large_steps(prepared: PreparedRun) -> Iterator[Problem]:
         size, source = sizes[names[0]], prepared.sources[names[0]].rpartition("/")[2]
         verb = "step" if len(names) > 1 else "steps"
         fault = (
-            f"{abbreviate_names(names, 3)} {verb} every {float(step):g} s, {float(step / size):.3g} times the {float(size):g} s"
+            f"{abbreviate_names(names, 3)} {verb} every {float(step):g} s, "
+            f"{float(step / size):.3g} times the {float(size):g} s"
         )
-        text = f"{fault} that {source} recommends: the results may be wrong, use about {float(size):g} s"
+        text = (
+            f"{fault} that {source} recommends: the results may be wrong, use about "
+            f"{float(size):g} s"
+        )
         yield Problem(text, _where_step(prepared, names[0]))
 
 
@@ -130,7 +160,10 @@ def _late_events(prepared: PreparedRun) -> Iterator[Problem]:
     stop = prepared.settings.stop_time
     for event in prepared.settings.events:
         if event.time > stop:
-            text = f"this event does not happen: {float(event.time):g} s is after the stop time {float(stop):g} s"
+            text = (
+                f"this event does not happen: {float(event.time):g} s is after the stop time "
+                f"{float(stop):g} s"
+            )
             yield Problem(text, event.where)
 
 
@@ -140,5 +173,11 @@ def _late_kpis(prepared: PreparedRun) -> Iterator[Problem]:
     for kpi in prepared.spec.kpis:
         start = kpi.arguments.get("start")
         if isinstance(start, int | float) and start > stop:
-            text = f'KPI "{kpi.name}" starts at {float(start):g} s, after the stop time {float(stop):g} s, and may have no value'
-            yield Problem(text, prepared.root.where("kpis", prepared.index_of_kpi(kpi.name), "arguments", "start"))
+            text = (
+                f'KPI "{kpi.name}" starts at {float(start):g} s, after the stop time '
+                f"{float(stop):g} s, and may have no value"
+            )
+            yield Problem(
+                text,
+                prepared.root.where("kpis", prepared.index_of_kpi(kpi.name), "arguments", "start"),
+            )

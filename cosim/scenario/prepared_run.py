@@ -52,7 +52,10 @@ NamedCall = tuple[str, Callable[..., Any], Mapping[str, Any]]
 
 @dataclass(frozen=True, repr=False)
 class PreparedRun:
-    """Scenario that is ready to run once. Simulating it frees its components; without a simulation, call `free`."""
+    """Scenario that is ready to run once.
+
+    Simulating it frees its components; without a simulation, call `free`.
+    """
 
     root: Node
     spec: ScenarioSpec
@@ -62,13 +65,20 @@ class PreparedRun:
     left_out: Sequence[Problem]
     #: values of variables that the caller sets, by name
     assignments: Mapping[str, Any]
-    #: wall time (s) of the preparation "load_seconds" and its parts "parse_seconds", "instantiate_seconds", "wiring_seconds"
+    #: wall time (s) of the preparation "load_seconds" and its parts "parse_seconds",
+    #: "instantiate_seconds", "wiring_seconds"
     timing: Mapping[str, float]
 
     def __repr__(self) -> str:
         system, settings = self.system, self.settings
-        times = f"{float(settings.start_time):g} s to {float(settings.stop_time):g} s in steps of {float(settings.step_size):g} s"
-        return f"{self.spec.name}: {', '.join(system.components)}; {count_noun(len(system.connections), 'connection')}; {times}"
+        times = (
+            f"{float(settings.start_time):g} s to {float(settings.stop_time):g} s in steps of "
+            f"{float(settings.step_size):g} s"
+        )
+        return (
+            f"{self.spec.name}: {', '.join(system.components)}; "
+            f"{count_noun(len(system.connections), 'connection')}; {times}"
+        )
 
     @property
     def system(self) -> System:
@@ -120,14 +130,20 @@ class PreparedRun:
         return list(signal_problems(self.root, "figures", self.settings.columns))
 
     @cached_property
-    @exclusive_process_state()  # paths may be relative, and a component of another thread may change the working directory
+    # paths may be relative, and a component of another thread may change the working directory
+    @exclusive_process_state()
     def metadata(self) -> dict[str, Any]:
-        """Metadata of the run that are known before it: scenario, system, versions, hashes of all files."""
+        """Metadata of the run that are known before it.
+
+        Scenario, system, versions, hashes of all files.
+        """
         return {
             **self.origin,
             "system": describe_system(self.system, self.sources, self.component_factory.solvers),
             **describe_software(),
-            "sha256": {name: sha256(file.read_bytes()).hexdigest() for name, file in self.files().items()},
+            "sha256": {
+                name: sha256(file.read_bytes()).hexdigest() for name, file in self.files().items()
+            },
         }
 
     @property
@@ -142,7 +158,9 @@ class PreparedRun:
 
     def _resolved_document(self) -> dict[str, Any]:
         """Return the expanded scenario with the values of all arguments, without the functions that are left out."""
-        functions = self.spec.model_dump(include={"kpis", "figures", "scene"}, exclude_defaults=True, by_alias=True)
+        functions = self.spec.model_dump(
+            include={"kpis", "figures", "scene"}, exclude_defaults=True, by_alias=True
+        )
         value: dict[str, Any] = self.document.value
         return {key: functions.get(key, item) for key, item in value.items()}
 
@@ -155,29 +173,45 @@ class PreparedRun:
         """
         own = [file for node in self.root.walk() for file in node.document.files]
         own += [self.root.folder / spec.file for spec in self.spec.inputs]
-        calls = (*self.spec.kpis, *self.spec.figures, *([self.spec.scene] if self.spec.scene else []))
+        calls = (
+            *self.spec.kpis,
+            *self.spec.figures,
+            *([self.spec.scene] if self.spec.scene else []),
+        )
         modules = (spec.python.rpartition(":")[0] for spec in calls)
         functions = (self.root.folder / module for module in modules if module.endswith(".py"))
         factory, folder = self.component_factory, self.root.folder.resolve()
         fmus = (path for path, _ in factory.fmus if path not in factory.cached_fmus)
         data = {file.resolve() for file in (*own, *fmus, *_modelica_files(factory))}
         files = data | package_files((*functions, *factory.python_files))
-        return {_name_of_file(str(file), str(folder), _shipped()): file for file in sorted(files, key=str)}
+        return {
+            _name_of_file(str(file), str(folder), _shipped()): file
+            for file in sorted(files, key=str)
+        }
 
     @property
     def sources(self) -> dict[str, str]:
-        """Source of each component as the scenario names it: an FMU, a Python class, a Modelica model or a CSV file.
+        """Source of each component as the scenario names it.
 
-        One that cosim ships has a name such as "cosim:fmus/mixer.fmu", except for those of shipped scenarios.
+        An FMU, a Python class, a Modelica model or a CSV file.
+
+        One that cosim ships has a name such as "cosim:fmus/mixer.fmu", except for those of shipped
+        scenarios.
         """
         profiles = {f"{PROFILE_PREFIX}.{i}": spec.file for i, spec in enumerate(self.spec.inputs)}
-        return {node.full_name(name): self._source_of(node, name) for node, name in self.root.leaves()} | profiles
+        return {
+            node.full_name(name): self._source_of(node, name) for node, name in self.root.leaves()
+        } | profiles
 
     def _source_of(self, node: Node, name: str) -> str:
         spec = node.spec.components[name]
         text = spec.fmu or spec.python or spec.modelica or ""
         file, colon, member = ("", "", "") if spec.fmu else text.rpartition(":")
-        known = _name_of_file(str(resolve_path(node.folder / (file or text))), str(self.root.folder.resolve()), _shipped())
+        known = _name_of_file(
+            str(resolve_path(node.folder / (file or text))),
+            str(self.root.folder.resolve()),
+            _shipped(),
+        )
         return f"{known}{colon}{member}" if text and known.startswith(SHIPPED) else text
 
     def free(self) -> None:
@@ -225,17 +259,23 @@ def load(
     """Read, connect and check a scenario.
 
     Args:
-        scenario: Path of a scenario file, the name of a shipped scenario, or the content of a scenario file.
-        parameters: Values that replace those of the file. A key is the name of a variable ("uav.vtol.landing_time") or the JSON
-            pointer of any entry ("/components/plant/arguments/environment/seed").
-        stop_time: End of the simulation (s), a number or a fraction, also as text ("1/3"); None: as in the file.
-        step_size: Macro step (s), a number or a fraction, also as text ("1/60"); None: as in the file.
+        scenario: Path of a scenario file, the name of a shipped scenario, or the content of a
+            scenario file.
+        parameters: Values that replace those of the file. A key is the name of a variable
+            ("uav.vtol.landing_time") or the JSON pointer of any entry
+            ("/components/plant/arguments/environment/seed").
+        stop_time: End of the simulation (s), a number or a fraction, also as text ("1/3"); None: as
+            in the file.
+        step_size: Macro step (s), a number or a fraction, also as text ("1/60"); None: as in the
+            file.
         real_time: Simulated seconds per second of wall time; None: as fast as possible.
-        late: Reaction to a real-time run that falls more than one step behind: "warn", or "fail" for a LateError.
-        isolation: "fmu" runs every FMU in a separate process; "none" does so only where the scenario sets `isolation`, or where
-            an FMU that allows one instance per process is used again.
-        sandbox: Run every FMU in a separate process that reads and writes only its own files, has no network and starts no
-            programs.
+        late: Reaction to a real-time run that falls more than one step behind: "warn", or "fail"
+            for a LateError.
+        isolation: "fmu" runs every FMU in a separate process; "none" does so only where the
+            scenario sets `isolation`, or where an FMU that allows one instance per process is used
+            again.
+        sandbox: Run every FMU in a separate process that reads and writes only its own files, has
+            no network and starts no programs.
         settings_folder: Folder that paths in `parameters` start from; None: the working directory.
         loaded_fmus: FMU files that have already been read, by resolved path.
 
@@ -243,19 +283,29 @@ def load(
         A prepared run, which can be executed once.
 
     Raises:
-        InputError: The scenario cannot be run; `problems` lists all reasons, each with file, line and JSON path.
+        InputError: The scenario cannot be run; `problems` lists all reasons, each with file, line
+            and JSON path.
     """
     _check_choices(isolation=(isolation, IsolationMode), late=(late, LatePolicy))
     if not isinstance(sandbox, bool):
-        raise InputError(f"sandbox: expected True or False, found {sandbox!r}; only the command line has the strict sandbox")
+        raise InputError(
+            f"sandbox: expected True or False, found {sandbox!r}; only the command line has the "
+            "strict sandbox"
+        )
     times = {"/stop_time": stop_time, "/step_size": step_size}
-    settings = {**{key: _json_time(value) for key, value in times.items() if value is not None}, **(parameters or {})}
+    settings = {
+        **{key: _json_time(value) for key, value in times.items() if value is not None},
+        **(parameters or {}),
+    }
     watch = Stopwatch()
     with watch.measure("load_seconds"):
         with watch.measure("parse_seconds"):
             loaded = load_scenario(scenario, settings, settings_folder)
         if isolation == "fmu" or sandbox:
-            reason = 'expected a file, because Python objects exist in this process only; set "isolation" of single FMUs instead'
+            reason = (
+                "expected a file, because Python objects exist in this process only; set "
+                '"isolation" of single FMUs instead'
+            )
             loaded.root.document.refuse_objects(reason, classes=True)
         builder = SystemBuilder(loaded, isolation == "fmu", sandbox, loaded_fmus)
         try:
@@ -267,7 +317,13 @@ def load(
             free_components(builder.components)
             raise
     return PreparedRun(
-        loaded.root, builder.spec, plan, builder.component_factory, builder.left_out, loaded.assignments, watch.seconds
+        loaded.root,
+        builder.spec,
+        plan,
+        builder.component_factory,
+        builder.left_out,
+        loaded.assignments,
+        watch.seconds,
     )
 
 
@@ -275,11 +331,16 @@ def _check_choices(**options: tuple[object, Any]) -> None:
     """Check that each option, given with the Literal of its values, has one of them."""
     for name, (value, kind) in options.items():
         if value not in get_args(kind):
-            raise InputError(f"{name}: expected one of {', '.join(map(repr, get_args(kind)))}; found {value!r}")
+            raise InputError(
+                f"{name}: expected one of {', '.join(map(repr, get_args(kind)))}; found {value!r}"
+            )
 
 
 def _json_time(value: TimeValue) -> float | str:
-    """Return a time as JSON has it: a number, or a fraction as text if no number is exact; what is no time stays as it is."""
+    """Return a time as JSON has it: a number, or a fraction as text if no number is exact.
+
+    What is no time stays as it is.
+    """
     plain = value.item() if isinstance(value, np.generic) else value
     if not isinstance(plain, str | Fraction | Decimal) or (isinstance(plain, str) and "/" in plain):
         return plain
@@ -291,7 +352,9 @@ def _json_time(value: TimeValue) -> float | str:
         return str(plain)
 
 
-def import_figures(scenario: str | Path, parameters: Mapping[str, Any] | None = None) -> list[NamedCall]:
+def import_figures(
+    scenario: str | Path, parameters: Mapping[str, Any] | None = None
+) -> list[NamedCall]:
     """Import the figure functions of a scenario without loading its components.
 
     Args:

@@ -19,13 +19,18 @@ def located_problems(root: Node, problems: Iterable[Problem]) -> Iterator[Proble
         root: The scenario.
         problems: Problems that `check_run` found.
     """
-    return (_with_location(root, problem) for problem in problems if not _is_consequence(root, problem))
+    return (
+        _with_location(root, problem) for problem in problems if not _is_consequence(root, problem)
+    )
 
 
 def _is_consequence(root: Node, problem: Problem) -> bool:
     """Return True if a problem with times only follows from an invalid start time, stop time or step size."""
     times = {"stop_time", "step_size", "start_time"} & root.invalid_keys
-    return bool(times) and (problem.subject[:1] in _TIMED_SETTINGS or problem.subject[-1:] in (("period",), ("step_size",)))
+    return bool(times) and (
+        problem.subject[:1] in _TIMED_SETTINGS
+        or problem.subject[-1:] in (("period",), ("step_size",))
+    )
 
 
 def _with_location(root: Node, problem: Problem) -> Problem:

@@ -14,20 +14,38 @@ from .name_resolution import PrefixIndex
 class SignalSelector:
     """Selector of signals by patterns in which "*" matches any characters, including dots.
 
-    A pattern selects outputs. A pattern that matches no output may select local variables and parameters.
+    A pattern selects outputs. A pattern that matches no output may select local variables and
+    parameters.
 
     Args:
         components: The components by full name.
         aliases: Outputs of nested systems by the names of their ports.
-        invalid: Names of invalid components; a pattern that may refer to one of them is not reported as a problem.
+        invalid: Names of invalid components; a pattern that may refer to one of them is not
+            reported as a problem.
     """
 
-    def __init__(self, components: Mapping[str, Component], aliases: Mapping[str, Endpoint], invalid: Sequence[str]):
+    def __init__(
+        self,
+        components: Mapping[str, Component],
+        aliases: Mapping[str, Endpoint],
+        invalid: Sequence[str],
+    ):
         self._outputs = {**_signal_endpoints(components, ("output",)), **aliases}
         self._others = _signal_endpoints(
-            components, ("input", "local", "parameter", "calculatedParameter", "structuralParameter", "independent")
+            components,
+            (
+                "input",
+                "local",
+                "parameter",
+                "calculatedParameter",
+                "structuralParameter",
+                "independent",
+            ),
         )
-        self._output_index, self._other_index = PrefixIndex(self._outputs), PrefixIndex(self._others)
+        self._output_index, self._other_index = (
+            PrefixIndex(self._outputs),
+            PrefixIndex(self._others),
+        )
         self._invalid = invalid
         self.problems: list[Problem] = []
 
@@ -35,19 +53,27 @@ class SignalSelector:
         """Return the signals that match (pattern, location in the file) pairs, in the order of components and variables."""
         selected: set[str] = set()
         for pattern, where in patterns:
-            matches = _matching_names(pattern, self._output_index) or _matching_names(pattern, self._other_index)
+            matches = _matching_names(pattern, self._output_index) or _matching_names(
+                pattern, self._other_index
+            )
             if not matches and not self._may_match_invalid(pattern):
                 names = {**self._outputs, **self._others}
-                self.problems.append(Problem(f'no variable matches "{pattern}"{pattern_hint(pattern, names)}', where))
+                self.problems.append(
+                    Problem(f'no variable matches "{pattern}"{pattern_hint(pattern, names)}', where)
+                )
             selected.update(matches)
-        return {name: end for name, end in {**self._outputs, **self._others}.items() if name in selected}
+        return {
+            name: end for name, end in {**self._outputs, **self._others}.items() if name in selected
+        }
 
     def _may_match_invalid(self, pattern: str) -> bool:
         prefix = pattern.partition("*")[0]
         return any(prefix.startswith(name) or name.startswith(prefix) for name in self._invalid)
 
 
-def _signal_endpoints(components: Mapping[str, Component], causalities: Sequence[str]) -> dict[str, Endpoint]:
+def _signal_endpoints(
+    components: Mapping[str, Component], causalities: Sequence[str]
+) -> dict[str, Endpoint]:
     return {
         f"{name}.{slot}": Endpoint(name, slot)
         for name, component in components.items()
@@ -63,7 +89,8 @@ def _matching_names(pattern: str, names: PrefixIndex) -> list[str]:
     if pattern.find("*") == len(pattern) - 1:
         return list(names.with_prefix(pattern[:-1]))
     first, *middle, last = map(re.escape, pattern.split("*"))
-    # atomic groups prevent backtracking: the time is at most proportional to the lengths of pattern and name multiplied
+    # atomic groups prevent backtracking: the time is at most proportional to the lengths of pattern
+    # and name multiplied
     parts = "".join(f"(?>.*?{part})" for part in middle if part)
     matches = re.compile(f"{first}{parts}.*{last}").fullmatch
     return [name for name in names.with_prefix(pattern.partition("*")[0]) if matches(name)]

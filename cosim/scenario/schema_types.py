@@ -43,7 +43,11 @@ class PlacedError(ValueError):
 
 
 def _parse_time(value: Any) -> Fraction:
-    is_time = re.fullmatch(_TIME_PATTERN, value) if isinstance(value, str) else isinstance(value, int | float)
+    is_time = (
+        re.fullmatch(_TIME_PATTERN, value)
+        if isinstance(value, str)
+        else isinstance(value, int | float)
+    )
     if isinstance(value, bool) or not is_time:
         raise ValueError(_EXPECTED_TIME)
     try:
@@ -58,7 +62,11 @@ def hint_at_quotes(value: Any, accepts: Callable[[Any], bool]) -> str:
         content = json.loads(value) if isinstance(value, str) else None
     except ValueError:
         return ""
-    return f"; write {value.strip()} without quotes" if content is not None and accepts(content) else ""
+    return (
+        f"; write {value.strip()} without quotes"
+        if content is not None and accepts(content)
+        else ""
+    )
 
 
 def _check_positive(value: Fraction) -> Fraction:
@@ -114,7 +122,12 @@ Seconds = Annotated[
     Fraction,
     BeforeValidator(_parse_time),
     WithJsonSchema(
-        {"anyOf": [{"type": "number", "minimum": -MAX_TIME, "maximum": MAX_TIME}, {"type": "string", "pattern": _TIME_PATTERN}]}
+        {
+            "anyOf": [
+                {"type": "number", "minimum": -MAX_TIME, "maximum": MAX_TIME},
+                {"type": "string", "pattern": _TIME_PATTERN},
+            ]
+        }
     ),
 ]
 Period = Annotated[
@@ -148,7 +161,9 @@ Gain = Annotated[
 ]
 Integer = Annotated[int, BeforeValidator(_as_integer)]
 BoolOrNumber = Annotated[
-    bool | int | float, BeforeValidator(_check_bool_or_number), WithJsonSchema({"type": ["number", "boolean"]})
+    bool | int | float,
+    BeforeValidator(_check_bool_or_number),
+    WithJsonSchema({"type": ["number", "boolean"]}),
 ]
 
 
@@ -160,10 +175,14 @@ _SCALAR_SCHEMAS: list[dict[str, Any]] = [{"type": kind} for kind in ("number", "
 Value = Annotated[
     Any,
     BeforeValidator(_check_value),
-    WithJsonSchema({"anyOf": [*_SCALAR_SCHEMAS, _list_of([*_SCALAR_SCHEMAS, _list_of(_SCALAR_SCHEMAS)])]}),
+    WithJsonSchema(
+        {"anyOf": [*_SCALAR_SCHEMAS, _list_of([*_SCALAR_SCHEMAS, _list_of(_SCALAR_SCHEMAS)])]}
+    ),
 ]
 AutoOrBool = Annotated[
-    Literal["auto"] | bool, BeforeValidator(_check_auto_or_bool), WithJsonSchema({"enum": ["auto", True, False]})
+    Literal["auto"] | bool,
+    BeforeValidator(_check_auto_or_bool),
+    WithJsonSchema({"enum": ["auto", True, False]}),
 ]
 NameList = Annotated[
     list[str],
@@ -188,13 +207,20 @@ def key(description: str, example: Any, *, unit: str = "", **rules: Any) -> Any:
         unit: Unit of the value.
         **rules: Default, alias and limits, as of `pydantic.Field`.
     """
-    return Field(description=description, examples=[example], json_schema_extra={"unit": unit} if unit else None, **rules)
+    return Field(
+        description=description,
+        examples=[example],
+        json_schema_extra={"unit": unit} if unit else None,
+        **rules,
+    )
 
 
 class Spec(BaseModel):
     """Base of all parts of a scenario; unknown keys and implicit type conversions are errors."""
 
-    model_config = ConfigDict(extra="forbid", strict=True, frozen=True, arbitrary_types_allowed=True)
+    model_config = ConfigDict(
+        extra="forbid", strict=True, frozen=True, arbitrary_types_allowed=True
+    )
 
     @model_validator(mode="wrap")
     @classmethod
@@ -208,7 +234,10 @@ def accepted(specs: Iterable[S]) -> Iterator[tuple[int, S]]:
 
 
 def schema_of(model: type[BaseModel]) -> dict[str, Any]:
-    """Return the JSON Schema (2020-12) of a model: entries in the order of the code, names only as their patterns allow."""
+    """Return the JSON Schema (2020-12) of a model.
+
+    Entries in the order of the code, names only as their patterns allow.
+    """
     from pydantic.json_schema import GenerateJsonSchema
 
     class InOrder(GenerateJsonSchema):

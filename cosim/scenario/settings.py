@@ -19,13 +19,18 @@ from .included_files import include_in_setting
 from .json_document import Document
 
 
-def apply_settings(document: Document, settings: Mapping[str, Any], folder: Path | None) -> tuple[dict[str, Any], list[Problem]]:
-    """Set the values of JSON pointers in a document; sources of components first, since another kind replaces the component.
+def apply_settings(
+    document: Document, settings: Mapping[str, Any], folder: Path | None
+) -> tuple[dict[str, Any], list[Problem]]:
+    """Set the values of JSON pointers in a document.
+
+    Sources of components first, since another kind replaces the component.
 
     Args:
         document: The expanded scenario, which is changed.
         settings: Values by JSON pointer or by the name of a variable.
-        folder: The folder that paths in the values of JSON pointers start from; None: the working directory.
+        folder: The folder that paths in the values of JSON pointers start from; None: the working
+            directory.
 
     Returns:
         The values of variables by name, and the problems of the settings.
@@ -36,13 +41,22 @@ def apply_settings(document: Document, settings: Mapping[str, Any], folder: Path
         if text := next(_text_problems([name, value]), ""):
             problems.append(Problem(text, f'setting "{shorten(acceptable_text(name))}"'))
         elif name.startswith("/"):
-            change = relocating(Path(), None) if folder is None else relocating(folder, document.file.parent)
+            change = (
+                relocating(Path(), None)
+                if folder is None
+                else relocating(folder, document.file.parent)
+            )
             try:
                 keys = json_pointer.pointer_keys(name)
-                value, files, documents = include_in_setting(keys, move_objects(document, keys, value), folder or Path())
+                value, files, documents = include_in_setting(
+                    keys, move_objects(document, keys, value), folder or Path()
+                )
                 value = change_pointed(name, value, change)
             except InputError as error:
-                problems += [Problem(problem.message, problem.where or f'setting "{name}"') for problem in error.problems]
+                problems += [
+                    Problem(problem.message, problem.where or f'setting "{name}"')
+                    for problem in error.problems
+                ]
                 continue
             document.bases += tuple(files)
             if text := _set_value(document, name, value):

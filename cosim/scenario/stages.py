@@ -13,7 +13,10 @@ from .schema import SystemSpec
 
 
 class _Link(NamedTuple):
-    """Connection without delay between two components; `is_direct`: an output of the target depends directly on the input."""
+    """Connection without delay between two components.
+
+    `is_direct`: an output of the target depends directly on the input.
+    """
 
     source: str
     target: str
@@ -23,9 +26,10 @@ class _Link(NamedTuple):
 class StagePlanner:
     """Planner of the stages of a scenario.
 
-    A system without stages in its file gets one stage for each component. Its order follows the connections without delay: a
-    component steps after those that feed it. In a loop of components only inputs count on which an output of their component
-    depends directly. The order of the file decides everything else.
+    A system without stages in its file gets one stage for each component. Its order follows the
+    connections without delay: a component steps after those that feed it. In a loop of components
+    only inputs count on which an output of their component depends directly. The order of the file
+    decides everything else.
 
     Args:
         components: The components by full name.
@@ -37,11 +41,15 @@ class StagePlanner:
         for end in {connection.target: None for connection in connections}:
             if end.component not in variables:
                 own = components[end.component].variables
-                variables[end.component] = {scalar: variable.name for variable in own for scalar in variable.scalar_names}
+                variables[end.component] = {
+                    scalar: variable.name for variable in own for scalar in variable.scalar_names
+                }
         direct = {name: _direct_inputs(components[name]) for name in variables}
         self._links = {
             _Link(
-                c.source.component, c.target.component, inputs is None or variables[c.target.component][c.target.scalar] in inputs
+                c.source.component,
+                c.target.component,
+                inputs is None or variables[c.target.component][c.target.scalar] in inputs,
             )
             for c in connections
             if not c.delay and c.target.scalar in variables[c.target.component]
@@ -49,18 +57,32 @@ class StagePlanner:
         }
 
     def root_stages(self, root: Node, spec: SystemSpec) -> tuple[Stage, ...]:
-        """Return the root's stages; with iteration they form one group, which excludes the input profiles."""
+        """Return the root's stages.
+
+        With iteration they form one group, which excludes the input profiles.
+        """
         stages, iteration = self._stages(root), _iteration_settings(spec)
-        return ((Group(spec.name, stages, parallel_mode(spec), iteration),),) if iteration else stages
+        return (
+            ((Group(spec.name, stages, parallel_mode(spec), iteration),),) if iteration else stages
+        )
 
     def _stages(self, node: Node) -> tuple[Stage, ...]:
-        """Return the stages of a system. Unknown, repeated and missing names are reported by `System.problems`."""
+        """Return the stages of a system.
+
+        Unknown, repeated and missing names are reported by `System.problems`.
+        """
         if "components" in node.invalid_keys:
             return ()
-        listed = node.spec.algorithm.stages if node.spec.algorithm and not node.has_wrong_names else None
+        listed = (
+            node.spec.algorithm.stages if node.spec.algorithm and not node.has_wrong_names else None
+        )
         stages = [[name] for name in self._automatic_order(node)] if listed is None else listed
         return tuple(
-            tuple(self._stage_member(node, name) for name in stage if name not in node.invalid_components)
+            tuple(
+                self._stage_member(node, name)
+                for name in stage
+                if name not in node.invalid_components
+            )
             for stage in stages
             if stage
         )
@@ -87,7 +109,12 @@ class StagePlanner:
     def _stage_member(self, node: Node, name: str) -> str | Group:
         if name in node.children:
             child = node.children[name]
-            return Group(node.full_name(name), self._stages(child), parallel_mode(child.spec), _iteration_settings(child.spec))
+            return Group(
+                node.full_name(name),
+                self._stages(child),
+                parallel_mode(child.spec),
+                _iteration_settings(child.spec),
+            )
         return node.full_name(name)
 
 

@@ -43,13 +43,21 @@ PROFILE_PREFIX = "inputs"
 class SystemBuilder:
     """Builder of a system: call `make_components`, then `build_plan`; each adds to `problems`."""
 
-    def __init__(self, scenario: Scenario, isolate_fmus: bool, sandbox: bool, loaded_fmus: Mapping[Path, FmuFile]) -> None:
+    def __init__(
+        self,
+        scenario: Scenario,
+        isolate_fmus: bool,
+        sandbox: bool,
+        loaded_fmus: Mapping[Path, FmuFile],
+    ) -> None:
         self.root, self.spec, self.assignments = scenario.root, scenario.spec, scenario.assignments
         self.problems: list[Problem] = list(scenario.problems)
         deadlines = Deadlines(**self.spec.deadlines.model_dump())
         if journal := current_journal():
             journal.deadlines = deadlines
-        self.component_factory = ComponentFactory(Isolation(deadlines, sandbox), isolate_fmus or sandbox, loaded_fmus)
+        self.component_factory = ComponentFactory(
+            Isolation(deadlines, sandbox), isolate_fmus or sandbox, loaded_fmus
+        )
         self.components: dict[str, Component] = {}
         self._variables_by_component: dict[str, Mapping[str, Variable]] = {}
         #: names with values that were refused, and the systems in which they are used
@@ -93,15 +101,22 @@ class SystemBuilder:
         signals = None if self._has_missing_signals else settings.columns
         resolver = FunctionResolver(self.root, self.components, self.start_values, signals)
         resolved = resolver.resolve(self.spec)
-        self.problems += [*resolver.problems, *find_function_problems(self.root, self.spec, resolved, signals)]
+        self.problems += [
+            *resolver.problems,
+            *find_function_problems(self.root, self.spec, resolved, signals),
+        ]
         self.spec, self.left_out = without_placeholders(resolved), resolver.left_out
         if self.problems:
             raise InputError(merge_problems(self.problems, "unknown component"))
         return plan
 
-    def _settings(self, aliases: Mapping[str, Endpoint], real_time: float | None, late: LatePolicy) -> Settings:
+    def _settings(
+        self, aliases: Mapping[str, Endpoint], real_time: float | None, late: LatePolicy
+    ) -> Settings:
         columns = self._columns(aliases)
-        stops = StopConditionReader(self.root, self.spec, self.components, columns, not self._has_missing_signals)
+        stops = StopConditionReader(
+            self.root, self.spec, self.components, columns, not self._has_missing_signals
+        )
         self.problems += stops.problems
         return Settings(
             self.spec.start_time,
@@ -130,7 +145,9 @@ class SystemBuilder:
                 self.components[full_name] = component
                 for warning in component.warnings:
                     place = node.where("components", name, *warning.subject)
-                    logging.getLogger(component_log.LOGGER_NAME).warning("%s", Problem(warning.message, place))
+                    logging.getLogger(component_log.LOGGER_NAME).warning(
+                        "%s", Problem(warning.message, place)
+                    )
                 scalars += count_scalars(component.variables)
             except InputError as error:
                 node.invalid_components.add(name)
@@ -140,29 +157,46 @@ class SystemBuilder:
         self.profiles = [f"{PROFILE_PREFIX}.{i}" for i, _ in accepted(self.spec.inputs)]
         for i, spec in accepted(self.spec.inputs):
             try:
-                table = read_input_table(self.root.folder / spec.file, self._targets(spec.to), spec.interpolation)
+                table = read_input_table(
+                    self.root.folder / spec.file, self._targets(spec.to), spec.interpolation
+                )
                 self.components[f"{PROFILE_PREFIX}.{i}"] = table
             except InputError as error:
                 self.profiles.remove(f"{PROFILE_PREFIX}.{i}")
                 self._add_problems(error, self.root, "inputs", i)
 
     def _targets(self, columns: Mapping[str, Sequence[str]]) -> dict[str, Variable | None]:
-        """Return the first input that each column of a profile feeds; None if it is unknown, which the wiring reports."""
+        """Return the first input that each column of a profile feeds.
+
+        None if it is unknown, which the wiring reports.
+        """
         return {column: next(self._inputs_of(names), None) for column, names in columns.items()}
 
     def _inputs_of(self, names: Sequence[str]) -> Iterator[Variable]:
         for name in names:
             with suppress(UnknownNameError):
-                for target in (each for each in resolve_name(self.root, name, ("inputs",)) if each.component in self.components):
+                for target in (
+                    each
+                    for each in resolve_name(self.root, name, ("inputs",))
+                    if each.component in self.components
+                ):
                     variables = self._variables(target.component)
-                    yield from filter(None, map(variables.get, (target.prefix, target.prefix.rpartition("[")[0])))
+                    yield from filter(
+                        None, map(variables.get, (target.prefix, target.prefix.rpartition("[")[0]))
+                    )
 
     def _set_start_values(self) -> None:
         for node, name, value, where in iterate_assignments(self.root, self.assignments):
             self._assign(self.start_values, node, name, value, where)
 
     def _assign(
-        self, values: dict[str, dict[str, Any]], node: Node, name: str, value: Any, where: str, all_elements: bool = False
+        self,
+        values: dict[str, dict[str, Any]],
+        node: Node,
+        name: str,
+        value: Any,
+        where: str,
+        all_elements: bool = False,
     ) -> None:
         try:
             for target in resolve_name(node, name, ("parameters", "inputs"), include_inner=True):
@@ -170,7 +204,12 @@ class SystemBuilder:
                     variables = self._variables(target.component)
                     known = values[target.component]
                     known |= check_assignment(
-                        target.component, variables, target.prefix, value, all_elements, None if all_elements else known.get
+                        target.component,
+                        variables,
+                        target.prefix,
+                        value,
+                        all_elements,
+                        None if all_elements else known.get,
                     )
         except (UnknownNameError, ValueError) as error:
             self._refused_values.append((node, name))
@@ -179,7 +218,9 @@ class SystemBuilder:
 
     def _variables(self, name: str) -> Mapping[str, Variable]:
         if name not in self._variables_by_component:
-            self._variables_by_component[name] = {variable.name: variable for variable in self.components[name].variables}
+            self._variables_by_component[name] = {
+                variable.name: variable for variable in self.components[name].variables
+            }
         return self._variables_by_component[name]
 
     def _connections(self) -> Iterator[Connection]:
@@ -199,7 +240,10 @@ class SystemBuilder:
                 for name in names:
                     if profile in self.components:
                         wiring.connect_output(
-                            self.root, Endpoint(profile, column), name, self.root.where("inputs", i, "to", column)
+                            self.root,
+                            Endpoint(profile, column),
+                            name,
+                            self.root.where("inputs", i, "to", column),
                         )
                     else:
                         wiring.excuse(self.root, name)
@@ -208,7 +252,9 @@ class SystemBuilder:
         yield from wiring.connections()
         self.problems += wiring.problems
 
-    def _periods(self, node: Node, inherited: Fraction | None = None) -> Iterator[tuple[str, Fraction]]:
+    def _periods(
+        self, node: Node, inherited: Fraction | None = None
+    ) -> Iterator[tuple[str, Fraction]]:
         """Yield (full name, period in s) of all components that have a period themselves or through an enclosing system."""
         for name, spec in node.spec.components.items():
             period = spec.period or inherited
@@ -223,22 +269,33 @@ class SystemBuilder:
         for node in self.root.walk():
             for name, child in node.children.items():
                 for port, inner in child.ports.outputs.items():
-                    where, alias = child.where("ports", "outputs", port), f"{node.full_name(name)}.{port}"
+                    where, alias = (
+                        child.where("ports", "outputs", port),
+                        f"{node.full_name(name)}.{port}",
+                    )
                     if port in child.spec.components:
-                        text = f'"{port}" is already the name of a component here, so an output port cannot have it'
+                        text = (
+                            f'"{port}" is already the name of a component here, so an output port '
+                            "cannot have it"
+                        )
                         self.problems.append(Problem(text, where))
                     ends = self._port_outputs(child, inner, where)
                     if ends is None:
                         child.invalid_ports.add(port)
                         continue
                     aliases |= {alias + rest: end for rest, end in ends.items()}
-                    require_at_most(MAX_SCALARS, len(aliases), f"signals of output ports up to {alias}", where)
+                    require_at_most(
+                        MAX_SCALARS, len(aliases), f"signals of output ports up to {alias}", where
+                    )
         return aliases
 
     def _port_outputs(self, node: Node, inner: str, where: str) -> dict[str, Endpoint] | None:
-        """Return the outputs of an output port by their names after the prefix; None if its component is invalid.
+        """Return the outputs of an output port by their names after the prefix.
 
-        A port without outputs is a problem only where it is used. Thus a component with fewer outputs can replace another one.
+        None if its component is invalid.
+
+        A port without outputs is a problem only where it is used. Thus a component with fewer
+        outputs can replace another one.
         """
         try:
             (target,) = resolve_name(node, inner, ("outputs",))
@@ -252,23 +309,37 @@ class SystemBuilder:
         return {rest: Endpoint(target.component, slot) for rest, slot in slots.items()}
 
     def _columns(self, aliases: Mapping[str, Endpoint]) -> dict[str, Endpoint]:
-        invalid = [node.full_name(name) for node in self.root.walk() for name in node.invalid_components]
+        invalid = [
+            node.full_name(name) for node in self.root.walk() for name in node.invalid_components
+        ]
         for node in self.root.walk():
             invalid += [f"{node.prefix}.{port}" for port in node.invalid_ports]
             if node.invalid_keys & {"components", "ports"} or node.has_wrong_names:
                 invalid.append(node.prefix)
         selector = SignalSelector(self.components, aliases, invalid)
-        patterns = [(text, self.root.where("record", "signals", i)) for i, text in enumerate(self.spec.record.signals)]
+        patterns = [
+            (text, self.root.where("record", "signals", i))
+            for i, text in enumerate(self.spec.record.signals)
+        ]
         columns = selector.select(patterns)
         self.problems += selector.problems
-        self._has_missing_signals = bool(invalid or selector.problems or "record" in self.root.invalid_keys)
+        self._has_missing_signals = bool(
+            invalid or selector.problems or "record" in self.root.invalid_keys
+        )
         return columns
 
     def _events(self) -> Iterator[Event]:
         for i, spec in accepted(self.spec.events):
             values: dict[str, dict[str, Any]] = defaultdict(dict)
             for name, value in spec.values.items():
-                self._assign(values, self.root, name, value, self.root.where("events", i, "set", name), all_elements=True)
+                self._assign(
+                    values,
+                    self.root,
+                    name,
+                    value,
+                    self.root.where("events", i, "set", name),
+                    all_elements=True,
+                )
             yield Event(spec.time, values, self.root.where("events", i))
 
     def _add_problems(self, error: InputError, node: Node, *path: str | int) -> None:
@@ -281,9 +352,17 @@ class SystemBuilder:
         ]
 
     def _add_source_problems(self, error: InputError, node: Node, name: str) -> None:
-        """Add the problems of a component; those without a subject belong to its source if the caller has set the source."""
-        source = next(each for each in SOURCES if getattr(node.spec.components[name], each) is not None)
+        """Add the problems of a component.
+
+        Those without a subject belong to its source if the caller has set the source.
+        """
+        source = next(
+            each for each in SOURCES if getattr(node.spec.components[name], each) is not None
+        )
         path = ("components", name, source)
         where = node.where(*path) if path in node.document.settings else ""
-        problems = [each if each.subject else replace(each, where=each.where or where) for each in error.problems]
+        problems = [
+            each if each.subject else replace(each, where=each.where or where)
+            for each in error.problems
+        ]
         self._add_problems(InputError(problems), node, "components", name)

@@ -24,7 +24,12 @@ from .schema_types import INVALID, PlacedError, hint_at_quotes
 S = TypeVar("S", bound=SystemSpec)
 
 #: values that replace missing or invalid required keys of the root
-_PLACEHOLDERS: dict[str, Any] = {"name": "unnamed", "stop_time": 1, "step_size": 1, "components": {}}
+_PLACEHOLDERS: dict[str, Any] = {
+    "name": "unnamed",
+    "stop_time": 1,
+    "step_size": 1,
+    "components": {},
+}
 #: number of passes that remove only invalid parts; later ones remove whole keys of the root
 _MAX_ATTEMPTS = 10
 #: keys of the root with names that other parts refer to
@@ -41,11 +46,16 @@ class Validated(NamedTuple, Generic[S]):
 
 
 def validate_document(document: Document, kind: type[S]) -> Validated[S]:
-    """Convert a document to a specification of the class `kind`; parts that are invalid are reported and removed."""
+    """Convert a document to a specification of the class `kind`.
+
+    Parts that are invalid are reported and removed.
+    """
     value, problems = copy_json(document.value), list(document.problems)
     if not isinstance(value, dict):
         if () not in document.invalid_paths:
-            problems.append(Problem(f"expected an object, found {_shorten_json(value)}", document.where(())))
+            problems.append(
+                Problem(f"expected an object, found {_shorten_json(value)}", document.where(()))
+            )
         required = {key: each for key, each in _PLACEHOLDERS.items() if key in kind.model_fields}
         return Validated(kind.model_validate(required), problems, set(kind.model_fields))
     result = _validate(kind, value)
@@ -64,7 +74,9 @@ def validate_document(document: Document, kind: type[S]) -> Validated[S]:
                 invalid_keys |= {key for key in _meant_keys(kind, path) if len(path) == 1}
             else:
                 part = path[:-1] if detail["type"] == "missing" and len(path) > 1 else path
-                invalid_keys |= _remove_invalid(kind, value, [part if attempt < _MAX_ATTEMPTS else part[:1]])
+                invalid_keys |= _remove_invalid(
+                    kind, value, [part if attempt < _MAX_ATTEMPTS else part[:1]]
+                )
         result = _validate(kind, value)
     raise AssertionError
 
@@ -76,8 +88,13 @@ def _validate(kind: type[S], value: Any) -> S | ValidationError:
         return error
 
 
-def _remove_invalid(kind: type[BaseModel], value: Any, paths: Iterable[tuple[str | int, ...]]) -> set[str]:
-    """Remove the invalid parts at these paths; return the keys of the root that are invalid or incomplete now."""
+def _remove_invalid(
+    kind: type[BaseModel], value: Any, paths: Iterable[tuple[str | int, ...]]
+) -> set[str]:
+    """Remove the invalid parts at these paths.
+
+    Return the keys of the root that are invalid or incomplete now.
+    """
     keys = set()
     for path in paths:
         part = _smallest_meaningful_part(path)
@@ -88,14 +105,19 @@ def _remove_invalid(kind: type[BaseModel], value: Any, paths: Iterable[tuple[str
 
 
 def _smallest_meaningful_part(path: tuple[str | int, ...]) -> tuple[str | int, ...]:
-    """Return the path of the part that must be removed with the value at `path`: `algorithm`, or the owner of an argument."""
+    """Return the path of the part that must be removed with the value at `path`.
+
+    `algorithm`, or the owner of an argument.
+    """
     if path[0] == "algorithm":
         return path[:1]
     owner = 1 if path[0] == "scene" else 2
     return path[:owner] if path[owner : owner + 1] == ("arguments",) else path
 
 
-def schema_problems(kind: type[BaseModel], document: Document, error: ValidationError) -> list[Problem]:
+def schema_problems(
+    kind: type[BaseModel], document: Document, error: ValidationError
+) -> list[Problem]:
     """Return a problem with its location in the document for every error that pydantic found.
 
     Errors that only follow from another one, or from a problem of the document, are left out.
@@ -104,7 +126,9 @@ def schema_problems(kind: type[BaseModel], document: Document, error: Validation
     invalid = set(document.invalid_paths)
     above_invalid = {path[:n] for path in invalid for n in range(len(path))}
     unknown_keys = {path: detail for path, detail in details if detail["type"] == "extra_forbidden"}
-    illegal_names = {detail["input"] for _, detail in details if detail["loc"][::2] == ("components", "[key]")}
+    illegal_names = {
+        detail["input"] for _, detail in details if detail["loc"][::2] == ("components", "[key]")
+    }
 
     def is_consequence(path: tuple[str | int, ...], detail: Any) -> bool:
         if any(path[:n] in invalid for n in range(len(path) + 1)):
@@ -128,11 +152,15 @@ def schema_problems(kind: type[BaseModel], document: Document, error: Validation
 
 def _common_cause(path: tuple[str | int, ...], detail: Any) -> Any:
     """Return a key that is equal for missing keys of one object, and for elements of one list that have the same wrong type."""
-    is_shared = detail["type"] == "missing" or (detail["type"].endswith("_type") and isinstance(path[-1], int))
+    is_shared = detail["type"] == "missing" or (
+        detail["type"].endswith("_type") and isinstance(path[-1], int)
+    )
     return (path[:-1] if is_shared else path, detail["type"])
 
 
-def _group_problem(kind: type[BaseModel], document: Document, group: Sequence[tuple[tuple[str | int, ...], Any]]) -> Problem:
+def _group_problem(
+    kind: type[BaseModel], document: Document, group: Sequence[tuple[tuple[str | int, ...], Any]]
+) -> Problem:
     """Return one problem for errors with a common cause."""
     (path, detail), *others = group
     if not others:
@@ -141,11 +169,16 @@ def _group_problem(kind: type[BaseModel], document: Document, group: Sequence[tu
         names = ", ".join(f'"{each[-1]}"' for each, _ in group)
         return Problem(f"the keys {names} are missing", document.where(path[:-1]))
     count = count_noun(len(others), "more element")
-    return Problem(f"{_error_message(kind, path, detail)}, and {count} likewise", document.where(path))
+    return Problem(
+        f"{_error_message(kind, path, detail)}, and {count} likewise", document.where(path)
+    )
 
 
 def _meant_keys(kind: type[BaseModel], path: Sequence[str | int]) -> list[str]:
-    """Return the keys that the unknown key at `path` may mean: the most similar one, or all if it is unreadable."""
+    """Return the keys that the unknown key at `path` may mean.
+
+    The most similar one, or all if it is unreadable.
+    """
     key, known = str(path[-1]), _known_keys(kind, path[:-1])
     return known if REPLACEMENT in key else list(filter(None, [nearest_name(key, known)]))
 
@@ -165,17 +198,31 @@ def _error_message(kind: type[BaseModel], path: Sequence[str | int], detail: Any
         case "value_error":
             error = detail["ctx"]["error"]
             hint = hint_at_quotes(detail["input"], _is_number) if "number" in str(error) else ""
-            return str(error) if not path or isinstance(error, PlacedError) else f"{error}; found {found}{hint}"
+            return (
+                str(error)
+                if not path or isinstance(error, PlacedError)
+                else f"{error}; found {found}{hint}"
+            )
         case "dict_type" | "model_type":
             is_removal = detail["input"] is None and len(path) == 2 and path[0] == "components"
-            hint = '; a scenario that "extends" this one removes a component by null' if is_removal else ""
+            hint = (
+                '; a scenario that "extends" this one removes a component by null'
+                if is_removal
+                else ""
+            )
             return f"expected an object; found {found}{hint}"
         case "string_pattern_mismatch":
             characters = (
-                'letters, digits, "_", ".", "-" and spaces' if tuple(path) == ("name",) else "letters, digits and underscores"
+                'letters, digits, "_", ".", "-" and spaces'
+                if tuple(path) == ("name",)
+                else "letters, digits and underscores"
             )
             return f"expected a name of {characters}; found {found}"
-    hint = hint_at_quotes(detail["input"], _is_number) if detail["type"] in ("float_type", "int_type") else ""
+    hint = (
+        hint_at_quotes(detail["input"], _is_number)
+        if detail["type"] in ("float_type", "int_type")
+        else ""
+    )
     return f"{detail['msg'].replace('Input should be', 'expected')}; found {found}{hint}"
 
 
@@ -191,7 +238,9 @@ def _shorten_json(value: Any) -> str:
 def _remove_key(value: Any, path: Sequence[str | int]) -> None:
     """Remove an unknown key, unless the object that contained it has already been removed."""
     for key in path[:-1]:
-        if value is INVALID or not (key in value if isinstance(value, dict) else key in range(len(value))):
+        if value is INVALID or not (
+            key in value if isinstance(value, dict) else key in range(len(value))
+        ):
             return
         value = value[key]
     if isinstance(value, dict):
@@ -199,10 +248,15 @@ def _remove_key(value: Any, path: Sequence[str | int]) -> None:
 
 
 def _replace_invalid(kind: Any, value: Any, path: Sequence[str | int]) -> None:
-    """Remove the element at `path`; required keys of the root and elements of lists get a placeholder."""
+    """Remove the element at `path`.
+
+    Required keys of the root and elements of lists get a placeholder.
+    """
     root = value
     for key in path[:-1]:
-        if value is INVALID or not (key in value if isinstance(value, dict) else key in range(len(value))):
+        if value is INVALID or not (
+            key in value if isinstance(value, dict) else key in range(len(value))
+        ):
             return
         value, kind = value[key], _child_type(kind, key)
     last = path[-1]
@@ -226,9 +280,14 @@ def _known_keys(kind: Any, path: Sequence[str | int]) -> list[str]:
 
 
 def _child_type(kind: Any, key: str | int) -> Any:
-    """Return the annotation of the value at a key or index of a value of type `kind`; None if it is unknown."""
+    """Return the annotation of the value at a key or index of a value of type `kind`.
+
+    None if it is unknown.
+    """
     if model := _model_type(kind):
-        return next((f.annotation for n, f in model.model_fields.items() if key in (n, f.alias)), None)
+        return next(
+            (f.annotation for n, f in model.model_fields.items() if key in (n, f.alias)), None
+        )
     for option in _union_members(kind):
         if typing.get_origin(option) in (dict, list):
             return typing.get_args(option)[-1]
@@ -237,7 +296,9 @@ def _child_type(kind: Any, key: str | int) -> Any:
 
 def _model_type(kind: Any) -> type[BaseModel] | None:
     """Return the pydantic model in an annotation, if there is one."""
-    return next((o for o in _union_members(kind) if isinstance(o, type) and issubclass(o, BaseModel)), None)
+    return next(
+        (o for o in _union_members(kind) if isinstance(o, type) and issubclass(o, BaseModel)), None
+    )
 
 
 def _union_members(kind: Any) -> list[Any]:

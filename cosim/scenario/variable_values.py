@@ -20,44 +20,67 @@ _REALS = ("Float64", "Float32")
 
 
 def check_value(variable: Variable, value: Any, all_elements: bool = False) -> Any:
-    """Return a value, in the type of the variable, that can be assigned to it; of an array the elements in row-major order.
+    """Return a value, in the type of the variable, that can be assigned to it.
+
+    Of an array the elements in row-major order.
 
     Args:
         variable: The variable.
         value: The value from the scenario or from a Python caller.
-        all_elements: Refuse a list that is shorter than the array. By default the other elements keep their start values.
+        all_elements: Refuse a list that is shorter than the array. By default the other elements
+            keep their start values.
 
     Raises:
         ValueError: The variable does not accept the value.
     """
-    if variable.causality not in ("parameter", "structuralParameter", "input") and variable.start is None:
-        raise ValueError(f'"{variable.name}" is of causality {variable.causality} and cannot be set')
+    if (
+        variable.causality not in ("parameter", "structuralParameter", "input")
+        and variable.start is None
+    ):
+        raise ValueError(
+            f'"{variable.name}" is of causality {variable.causality} and cannot be set'
+        )
     if variable.variability == "constant":
         description = variable.description and f": {variable.description}"
         raise ValueError(f'"{variable.name}" is a constant and cannot be set{description}')
     if variable.causality == "structuralParameter" and value != variable.start:
         raise ValueError(
-            f'"{variable.name}" is a structural parameter, which is set before the start to a positive integer: it stays '
+            f'"{variable.name}" is a structural parameter, which is set before the start to a '
+            "positive integer: it stays "
             f"{json.dumps(variable.start)}, found {quote_value(value)}"
         )
     if not variable.shape:
         return _scalar_value(variable, value)
     size = len(variable.scalar_names)
     if not isinstance(value, list):
-        raise ValueError(f'"{variable.name}" is an array of {size} values, expected a list, found {quote_value(value)}')
+        raise ValueError(
+            f'"{variable.name}" is an array of {size} values, expected a list, found '
+            f"{quote_value(value)}"
+        )
     elements = _flatten(variable, value)
     if len(elements) > size or (all_elements and len(elements) < size):
-        raise ValueError(f'"{variable.name}" takes {"" if all_elements else "at most "}{size} values, found {len(elements)}')
-    return [*(_scalar_value(variable, element) for element in elements), *start_values(variable)[len(elements) :]]
+        raise ValueError(
+            f'"{variable.name}" takes {"" if all_elements else "at most "}{size} values, found '
+            f"{len(elements)}"
+        )
+    return [
+        *(_scalar_value(variable, element) for element in elements),
+        *start_values(variable)[len(elements) :],
+    ]
 
 
 def _flatten(variable: Variable, value: list[Any]) -> list[Any]:
-    """Return the elements of a list in row-major order; nested lists must have the shape of the array."""
+    """Return the elements of a list in row-major order.
+
+    Nested lists must have the shape of the array.
+    """
     if not any(isinstance(row, list) for row in value):
         return value
     if _nested_shape(value) != variable.shape:
         text = " x ".join(map(str, variable.shape))
-        raise ValueError(f'"{variable.name}" is an array of {text} values, found {quote_value(value)}')
+        raise ValueError(
+            f'"{variable.name}" is an array of {text} values, found {quote_value(value)}'
+        )
     rows = value
     for _ in variable.shape[1:]:
         rows = [element for row in rows for element in row]
@@ -76,7 +99,11 @@ def start_values(variable: Variable) -> Sequence[Any]:
     """Return the start values of all elements of an array."""
     start, size = variable.start, len(variable.scalar_names)
     if variable.type == "Binary":
-        start = tuple(map(parse_binary, start)) if isinstance(start, tuple) else parse_binary(start or "")
+        start = (
+            tuple(map(parse_binary, start))
+            if isinstance(start, tuple)
+            else parse_binary(start or "")
+        )
     if start is None:
         start = {"String": "", "Binary": b""}.get(variable.type, 0)
     return start if isinstance(start, tuple) else (start,) * size
@@ -95,7 +122,10 @@ def _enumeration_value(variable: Variable, value: Any) -> Any:
 
 
 def _scalar_value(variable: Variable, value: Any) -> Any:
-    """Return a scalar in the type of the variable; raise ValueError if its type does not fit or it is out of range."""
+    """Return a scalar in the type of the variable.
+
+    Raise ValueError if its type does not fit or it is out of range.
+    """
     if isinstance(value, str) and (problem := text_problem(value)):
         raise ValueError(f'"{variable.name}": {problem}')
     if variable.items:
@@ -107,7 +137,9 @@ def _scalar_value(variable: Variable, value: Any) -> Any:
             raise ValueError(f'"{variable.name}" is of type Binary: {error}') from None
     if not _type_accepts(variable.type, value):
         hint = hint_at_quotes(value, partial(_type_accepts, variable.type))
-        raise ValueError(f'"{variable.name}" is of type {variable.type}, found {quote_value(value)}{hint}')
+        raise ValueError(
+            f'"{variable.name}" is of type {variable.type}, found {quote_value(value)}{hint}'
+        )
     low, high = _limits(variable)
     if (low is not None and value < low) or (high is not None and value > high):
         span = f"{'-inf' if low is None else low} ... {'inf' if high is None else high}"
@@ -131,7 +163,9 @@ def _limits(variable: Variable) -> tuple[float | None, float | None]:
         smallest, largest = float(np.finfo(np.float32).min), float(np.finfo(np.float32).max)
     else:
         return low, high
-    return smallest if low is None else max(low, smallest), largest if high is None else min(high, largest)
+    return smallest if low is None else max(low, smallest), largest if high is None else min(
+        high, largest
+    )
 
 
 def _type_accepts(kind: str, value: Any) -> bool:
@@ -139,4 +173,8 @@ def _type_accepts(kind: str, value: Any) -> bool:
         return kind == "Boolean" and isinstance(value, bool)
     if kind in ("String", "Binary"):
         return isinstance(value, str if kind == "String" else bytes)
-    return isinstance(value, int | float) and abs(value) <= sys.float_info.max if kind in _REALS else isinstance(value, int)
+    return (
+        isinstance(value, int | float) and abs(value) <= sys.float_info.max
+        if kind in _REALS
+        else isinstance(value, int)
+    )

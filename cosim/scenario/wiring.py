@@ -52,22 +52,29 @@ def _kind_of_names(names: Iterable[str]) -> str:
     """Return "array" for the elements of an array ("[1]"), "vector" for components of a vector (".x"), else ""."""
     kinds = {"array": re.compile(r"\[\d+\]"), "vector": re.compile(r"\.\w+")}
     names = list(names)
-    return next((kind for kind, form in kinds.items() if names and all(map(form.fullmatch, names))), "")
+    return next(
+        (kind for kind, form in kinds.items() if names and all(map(form.fullmatch, names))), ""
+    )
 
 
 class Wiring:
-    """Expander of the connections of a scenario and its nested systems; `problems` collects those that are invalid.
+    """Expander of the connections of a scenario and its nested systems.
 
-    A prefix connects every input below it to the output with the same name after the prefix. Two patterns with "*" connect every
-    input to the output with the same text at the "*". An input without such an output is a problem unless it has a value or
-    another connection. A connection of single variables overrides those of prefixes and patterns.
+    `problems` collects those that are invalid.
+
+    A prefix connects every input below it to the output with the same name after the prefix. Two
+    patterns with "*" connect every input to the output with the same text at the "*". An input
+    without such an output is a problem unless it has a value or another connection. A connection of
+    single variables overrides those of prefixes and patterns.
 
     Args:
         components: The components by full name.
         inputs_with_values: Scalar inputs that the scenario sets to a value.
     """
 
-    def __init__(self, components: Mapping[str, Component], inputs_with_values: set[Endpoint]) -> None:
+    def __init__(
+        self, components: Mapping[str, Component], inputs_with_values: set[Endpoint]
+    ) -> None:
         self._components = components
         self._inputs_with_values = inputs_with_values
         self._slots: dict[tuple[str, str], SlotIndex] = {}
@@ -75,7 +82,8 @@ class Wiring:
         self._unmatched_inputs: dict[Endpoint, Problem] = {}
         #: connections so far, including those that are overridden or invalid
         self._count = 0
-        #: inputs whose missing connection another problem explains, and whether an invalid connection may explain any
+        #: inputs whose missing connection another problem explains, and whether an invalid
+        #: connection may explain any
         self._excused: set[Endpoint] = set()
         self._has_invalid_connections = False
         self.problems: list[Problem] = []
@@ -87,7 +95,10 @@ class Wiring:
             self._expand(node, i, spec)
 
     def connect_output(self, node: Node, output: Endpoint, name: str, where: str) -> None:
-        """Connect one output to the inputs that a name refers to; `where` is its location in the scenario file."""
+        """Connect one output to the inputs that a name refers to.
+
+        `where` is its location in the scenario file.
+        """
         for target in self._resolve(node, name, "inputs", where):
             self._add(_Candidate([Connection(output, Endpoint(*target), 0, where)], True))
 
@@ -103,15 +114,26 @@ class Wiring:
         """Return all connections, and add the inputs that have no output to the problems."""
         if not self._has_invalid_connections:
             explained = self._by_input.keys() | self._excused
-            unmatched = (problem for end, problem in self._unmatched_inputs.items() if end not in explained)
+            unmatched = (
+                problem for end, problem in self._unmatched_inputs.items() if end not in explained
+            )
             self.problems += dict.fromkeys(unmatched)
-        return (connection for candidate in self._by_input.values() for connection in candidate.connections)
+        return (
+            connection
+            for candidate in self._by_input.values()
+            for connection in candidate.connections
+        )
 
     def _expand(self, node: Node, i: int, spec: ConnectionSpec) -> None:
         path, where_to = ("connections", i, "from"), node.where("connections", i, "to")
         indices = [(k,) if len(spec.sources) > 1 else () for k in range(len(spec.sources))]
-        sources = [self._find_source(node, name, node.where(*path, *k)) for name, k in zip(spec.sources, indices, strict=True)]
-        inputs = self._slots_of_targets(self._resolve(node, spec.target, "inputs", where_to), "input", where_to)
+        sources = [
+            self._find_source(node, name, node.where(*path, *k))
+            for name, k in zip(spec.sources, indices, strict=True)
+        ]
+        inputs = self._slots_of_targets(
+            self._resolve(node, spec.target, "inputs", where_to), "input", where_to
+        )
         found = [source for source in sources if source]
         if len(found) < len(sources):
             self.excuse(node, spec.target)
@@ -128,11 +150,15 @@ class Wiring:
         found = self._slots_of_targets(self._resolve(node, name, "outputs", where), "output", where)
         return _Source(*found[0]) if found else None
 
-    def _match(self, sources: Sequence[_Source], end: Endpoint, rest: str, spec: ConnectionSpec, where: str) -> None:
+    def _match(
+        self, sources: Sequence[_Source], end: Endpoint, rest: str, spec: ConnectionSpec, where: str
+    ) -> None:
         """Connect an input to the output of each source with the same name after the prefix, or at the "*" of a pattern."""
         unmatched = [source for source in sources if rest not in source.outputs]
         if unmatched and end not in self._inputs_with_values:
-            self._unmatched_inputs[end] = _unmatched(end, unmatched[0], rest, self._output_hint(unmatched[0], end, rest), where)
+            self._unmatched_inputs[end] = _unmatched(
+                end, unmatched[0], rest, self._output_hint(unmatched[0], end, rest), where
+            )
         if unmatched:
             return
         connections = [
@@ -151,7 +177,9 @@ class Wiring:
         ]
         self._add(_Candidate(connections, is_variable=rest == ""))
 
-    def _join_problems_of_elements(self, source: _Source, ends: Mapping[str, Endpoint], where: str) -> None:
+    def _join_problems_of_elements(
+        self, source: _Source, ends: Mapping[str, Endpoint], where: str
+    ) -> None:
         """Report inputs once, with the connections to write, if they and the outputs are an array and components of a vector."""
         outputs = [Endpoint(source.target.component, slot) for slot in source.outputs.values()]
         kinds = {_kind_of_names(source.outputs), _kind_of_names(ends)}
@@ -166,8 +194,13 @@ class Wiring:
             self._unmatched_inputs.update(dict.fromkeys(unmatched.values(), problem))
 
     def _output_hint(self, source: _Source, end: Endpoint, rest: str) -> str:
-        """Return a hint at outputs that fit an input: of a similar name below the prefix, or of other components."""
-        outputs = {name: Endpoint(source.target.component, slot) for name, slot in source.outputs.items()}
+        """Return a hint at outputs that fit an input.
+
+        Of a similar name below the prefix, or of other components.
+        """
+        outputs = {
+            name: Endpoint(source.target.component, slot) for name, slot in source.outputs.items()
+        }
         outputs = {name: output for name, output in outputs.items() if self._fits(output, end)}
         if not rest.startswith("."):
             return did_you_mean(source.expected_name(rest), map(str, outputs.values()))
@@ -191,17 +224,27 @@ class Wiring:
     @cached_property
     def _variables(self) -> Mapping[Endpoint, Variable]:
         """Variables of all components by their scalars."""
-        variables = ((name, variable) for name, c in self._components.items() for variable in c.variables)
-        return {Endpoint(name, slot): variable for name, variable in variables for slot in variable.scalar_names}
+        variables = (
+            (name, variable) for name, c in self._components.items() for variable in c.variables
+        )
+        return {
+            Endpoint(name, slot): variable
+            for name, variable in variables
+            for slot in variable.scalar_names
+        }
 
     def _add(self, new: _Candidate) -> None:
         first = new.connections[0]
         self._count += len(new.connections)
-        require_at_most(MAX_CONNECTIONS, self._count, "connections of scalars up to here", first.where)
+        require_at_most(
+            MAX_CONNECTIONS, self._count, "connections of scalars up to here", first.where
+        )
         end = first.target
         old = self._by_input.get(end)
         if old and old.is_variable == new.is_variable:
-            text = f"input {end} is connected twice: it is already fed by {old.connections[0].source}"
+            text = (
+                f"input {end} is connected twice: it is already fed by {old.connections[0].source}"
+            )
             self.problems.append(Problem(text, first.where))
         elif old is None or new.is_variable:
             self._by_input[end] = new
@@ -214,8 +257,13 @@ class Wiring:
                 self.problems.append(Problem(str(error), where))
             return []
 
-    def _slots_of_targets(self, targets: Sequence[Target], causality: str, where: str) -> list[tuple[Target, dict[str, str]]]:
-        """Return the scalars of a causality below each prefix; add a problem if there are none at all."""
+    def _slots_of_targets(
+        self, targets: Sequence[Target], causality: str, where: str
+    ) -> list[tuple[Target, dict[str, str]]]:
+        """Return the scalars of a causality below each prefix.
+
+        Add a problem if there are none at all.
+        """
         slots_by_target = [(target, self._slots_of_target(target, causality)) for target in targets]
         if targets and not any(slots for _, slots in slots_by_target):
             self.problems.append(Problem(self._no_slots_message(targets[0], causality), where))
@@ -233,4 +281,7 @@ class Wiring:
             if other != causality and self._slots_of_target(target, other):
                 return f"{target.component}.{target.prefix} is an {other}, expected an {causality}"
         valid = (v.name for v in component.variables if v.causality == causality)
-        return f'component "{target.component}" has no {causality} "{target.prefix}"{did_you_mean(target.prefix, valid)}'
+        return (
+            f'component "{target.component}" has no {causality} '
+            f'"{target.prefix}"{did_you_mean(target.prefix, valid)}'
+        )

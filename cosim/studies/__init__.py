@@ -1,1 +1,4 @@
-"""Many runs of one scenario: parameter studies, Monte Carlo and tuning, on this machine or a cluster."""
+"""Many runs of one scenario.
+
+Parameter studies, Monte Carlo and tuning, on this machine or a cluster.
+"""

@@ -1,6 +1,7 @@
 """Runner of jobs on a Dask cluster (extra `cluster`).
 
-No shared file system is needed: files are sent to the workers that lack them. Workers may join, leave and be killed.
+No shared file system is needed: files are sent to the workers that lack them. Workers may join,
+leave and be killed.
 """
 
 from __future__ import annotations
@@ -35,7 +36,9 @@ def require_cluster() -> None:
     try:
         import distributed  # noqa: F401
     except ImportError:
-        raise InputError('--scheduler needs the package distributed: pip install "fmi-cosim[cluster]"') from None
+        raise InputError(
+            '--scheduler needs the package distributed: pip install "fmi-cosim[cluster]"'
+        ) from None
 
 
 class ClusterRunner:
@@ -49,8 +52,8 @@ class ClusterRunner:
             scheduler: its address, such as "tcp://host:8786".
 
         Raises:
-            InputError: if no scheduler answers or if files cannot be shipped; on entering the context, if a worker has
-                another cosim.
+            InputError: if no scheduler answers or if files cannot be shipped; on entering the
+                context, if a worker has another cosim.
         """
         require_cluster()
         _refuse_absolute_paths(study)
@@ -82,8 +85,13 @@ class ClusterRunner:
         return [Problem(message, where) for message, where in answer["problems"]]
 
     def run_jobs(self, jobs: Iterable[Job]) -> Iterator[Record]:
-        """Run the jobs and yield their records in the order in which the runs end; few jobs are submitted in advance."""
-        return (Record.from_json(answer["record"]) for answer in self._submit_all(jobs, check=False))
+        """Run the jobs and yield their records in the order in which the runs end.
+
+        Few jobs are submitted in advance.
+        """
+        return (
+            Record.from_json(answer["record"]) for answer in self._submit_all(jobs, check=False)
+        )
 
     def _submit_all(self, jobs: Iterable[Job], check: bool) -> Iterator[dict[str, Any]]:
         window = _JOBS_PER_THREAD * max(1, sum(self._client.nthreads().values()))
@@ -100,11 +108,15 @@ class ClusterRunner:
             raise self._connection_lost() from None
 
     def _submit(self, job: Job, check: bool, waiting: dict[str, Job]) -> None:
-        future = self._client.submit(cluster_worker.run_job, self._package, job.key, dict(job.settings), check, pure=False)
+        future = self._client.submit(
+            cluster_worker.run_job, self._package, job.key, dict(job.settings), check, pure=False
+        )
         waiting[future.key] = job
         future.add_done_callback(self._finished.put)
 
-    def _next_answers(self, check: bool, waiting: dict[str, Job], kills: Counter[str]) -> Iterator[dict[str, Any]]:
+    def _next_answers(
+        self, check: bool, waiting: dict[str, Job], kills: Counter[str]
+    ) -> Iterator[dict[str, Any]]:
         """Wait for a job to end, and yield its answer unless it must be submitted again."""
         future = self._wait_for_future()
         job = waiting.pop(future.key)
@@ -139,24 +151,42 @@ class ClusterRunner:
         error = future.exception() if future.status == "error" else None
         if isinstance(error, KilledWorker):
             return {"killed": True}
-        raise ClusterError(f"a worker failed: {type(error).__name__}: {error}") if error else self._connection_lost()
+        raise (
+            ClusterError(f"a worker failed: {type(error).__name__}: {error}")
+            if error
+            else self._connection_lost()
+        )
 
     def _connection_lost(self) -> ClusterError:
-        return ClusterError(f'the connection to the scheduler "{self._scheduler}" was lost; the same command continues the study')
+        return ClusterError(
+            f'the connection to the scheduler "{self._scheduler}" was lost; the same command '
+            "continues the study"
+        )
 
     def _check_versions(self, fingerprints: dict[str, str]) -> None:
         own = self._package.identity
         if others := [
-            f'worker "{address}" has cosim {other}, expected {own}' for address, other in fingerprints.items() if other != own
+            f'worker "{address}" has cosim {other}, expected {own}'
+            for address, other in fingerprints.items()
+            if other != own
         ]:
             raise InputError(others)
 
     def _send_files(self, address: str) -> None:
-        """Send a worker the files that it lacks; errors of a worker that has left the cluster are ignored."""
+        """Send a worker the files that it lacks.
+
+        Errors of a worker that has left the cluster are ignored.
+        """
         try:
-            missing = self._client.run(cluster_worker.missing_hashes, self._package.files, workers=[address])
+            missing = self._client.run(
+                cluster_worker.missing_hashes, self._package.files, workers=[address]
+            )
             for hashes in missing.values():
-                self._client.run(cluster_worker.store_contents, self._bundle.read_contents(hashes), workers=[address])
+                self._client.run(
+                    cluster_worker.store_contents,
+                    self._bundle.read_contents(hashes),
+                    workers=[address],
+                )
         except (OSError, ValueError, KeyError) as error:
             if address in self._client.scheduler_info(n_workers=-1)["workers"]:
                 raise ClusterError(f'files cannot be sent to worker "{address}": {error}') from None
@@ -167,14 +197,18 @@ def _refuse_absolute_paths(study: Study) -> None:
     if problems := [
         problem
         for settings in study.all_setting_variants
-        for problem in study_file.locate_problems(absolute_paths(study_file.scenario, settings), settings)
+        for problem in study_file.locate_problems(
+            absolute_paths(study_file.scenario, settings), settings
+        )
     ]:
         raise InputError(dict.fromkeys(problems))
 
 
 def _killed_answer(job: Job, check: bool) -> dict[str, Any]:
     text = f"the worker was killed {MAX_ATTEMPTS} times"
-    return {"problems": [(text, "")]} if check else {"record": Record(job.key, failure=text).to_json()}
+    return (
+        {"problems": [(text, "")]} if check else {"record": Record(job.key, failure=text).to_json()}
+    )
 
 
 def _connect_client(scheduler: str) -> Any:
@@ -182,7 +216,9 @@ def _connect_client(scheduler: str) -> Any:
     import distributed
 
     connect: Any = distributed.Client
-    logging.getLogger("distributed").setLevel(logging.CRITICAL)  # this module reports the errors that matter
+    logging.getLogger("distributed").setLevel(
+        logging.CRITICAL
+    )  # this module reports the errors that matter
     try:
         client = connect(scheduler, timeout=_CONNECT_TIMEOUT, set_as_default=False)
     except (OSError, ValueError, TimeoutError) as error:

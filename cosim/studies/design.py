@@ -1,7 +1,7 @@
 """Designs of sweeps: the points that result from factors and seeds.
 
-Samples are drawn by `scipy.stats.qmc` in the unit cube. Every factor maps a coordinate in [0, 1) to a level, by the inverse of
-its distribution function.
+Samples are drawn by `scipy.stats.qmc` in the unit cube. Every factor maps a coordinate in [0, 1) to
+a level, by the inverse of its distribution function.
 """
 
 from __future__ import annotations
@@ -53,7 +53,9 @@ def level_of_value(paths: Sequence[str], value: Any) -> Level:
 def build_factor(spec: FactorSpec, gridded: bool) -> Factor:
     """Return the factor that a sweep file describes, with the levels of a full factorial design if it is `gridded`."""
     if spec.levels is not None:
-        return _listed_factor(spec.name, [Level(label, settings) for label, settings in spec.levels.items()])
+        return _listed_factor(
+            spec.name, [Level(label, settings) for label, settings in spec.levels.items()]
+        )
     paths = spec.set or []
     if spec.values is not None:
         return _listed_factor(spec.name, [level_of_value(paths, value) for value in spec.values])
@@ -78,11 +80,16 @@ def _range_coordinates(count: int) -> list[float]:
 
 
 def _median_coordinates(count: int) -> list[float]:
-    """Return coordinates of the grid levels of a distribution: the medians of `count` equally likely parts."""
+    """Return coordinates of the grid levels of a distribution.
+
+    The medians of `count` equally likely parts.
+    """
     return [(i + 0.5) / count for i in range(count)]
 
 
-def _rounded_quantile(quantile: Callable[[float], float], integer: bool) -> Callable[[float], float]:
+def _rounded_quantile(
+    quantile: Callable[[float], float], integer: bool
+) -> Callable[[float], float]:
     return (lambda coordinate: round(quantile(coordinate))) if integer else quantile
 
 
@@ -92,7 +99,11 @@ def _range_quantile(spec: RangeSpec) -> Callable[[float], float]:
 
 def interpolate(position: float, low: float, high: float, logarithmic: bool) -> float:
     """Interpolate between two bounds at a position in [0, 1]; 0 and 1 give the bounds exactly."""
-    value = low * math.exp(position * math.log(high / low)) if logarithmic else low + position * (high - low)
+    value = (
+        low * math.exp(position * math.log(high / low))
+        if logarithmic
+        else low + position * (high - low)
+    )
     return low if position == 0 else high if position == 1 else min(max(value, low), high)
 
 
@@ -100,10 +111,14 @@ def _distribution_quantile(spec: DistributionSpec) -> Callable[[float], float]:
     from scipy import stats
 
     distribution = _DISTRIBUTIONS[spec.kind](stats, **spec.arguments)
-    return lambda coordinate: float(distribution.ppf(min(max(coordinate, 1 - _LARGEST_BELOW_ONE), _LARGEST_BELOW_ONE)))
+    return lambda coordinate: float(
+        distribution.ppf(min(max(coordinate, 1 - _LARGEST_BELOW_ONE), _LARGEST_BELOW_ONE))
+    )
 
 
-def _truncated_normal(stats: Any, mean: float, std: float, min: float = -math.inf, max: float = math.inf) -> Any:
+def _truncated_normal(
+    stats: Any, mean: float, std: float, min: float = -math.inf, max: float = math.inf
+) -> Any:
     return stats.truncnorm((min - mean) / std, (max - mean) / std, mean, std)
 
 
@@ -112,7 +127,9 @@ _DISTRIBUTIONS: Mapping[str, Callable[..., Any]] = {
     "normal": lambda stats, mean, std: stats.norm(mean, std),
     "truncated_normal": _truncated_normal,
     "lognormal": lambda stats, median, sigma: stats.lognorm(sigma, scale=median),
-    "triangular": lambda stats, min, mode, max: stats.triang((mode - min) / (max - min), min, max - min),
+    "triangular": lambda stats, min, mode, max: stats.triang(
+        (mode - min) / (max - min), min, max - min
+    ),
     "exponential": lambda stats, mean: stats.expon(scale=mean),
     "weibull": lambda stats, shape, scale: stats.weibull_min(shape, scale=scale),
 }
@@ -142,7 +159,9 @@ class Design:
 
     def __len__(self) -> int:
         points = (
-            math.prod(len(factor.grid_levels) for factor in self.factors) if self.unit_samples is None else len(self.unit_samples)
+            math.prod(len(factor.grid_levels) for factor in self.factors)
+            if self.unit_samples is None
+            else len(self.unit_samples)
         )
         return points * max(1, len(self.seeds))
 
@@ -155,11 +174,16 @@ class Design:
         index, seed = divmod(run, max(1, len(self.seeds)))
         levels = [*self._levels(index), *(self.seeds[seed : seed + 1])]
         labels = {name: level.label for name, level in zip(self.columns, levels, strict=True)}
-        return Point(labels, {path: value for level in levels for path, value in level.settings.items()})
+        return Point(
+            labels, {path: value for level in levels for path, value in level.settings.items()}
+        )
 
     def _levels(self, index: int) -> list[Level]:
         if self.unit_samples is not None:
-            return [factor.level_at(x) for factor, x in zip(self.factors, self.unit_samples[index].tolist(), strict=True)]
+            return [
+                factor.level_at(x)
+                for factor, x in zip(self.factors, self.unit_samples[index].tolist(), strict=True)
+            ]
         levels = []
         for factor in reversed(self.factors):
             index, level = divmod(index, len(factor.grid_levels))
@@ -168,7 +192,11 @@ class Design:
 
     def labels(self, name: str) -> list[Any]:
         """Return the labels of all grid levels of a factor, or of the seeds."""
-        levels = self.seeds if name == "seed" else next(factor.grid_levels for factor in self.factors if factor.name == name)
+        levels = (
+            self.seeds
+            if name == "seed"
+            else next(factor.grid_levels for factor in self.factors if factor.name == name)
+        )
         return [level.label for level in levels]
 
     def level_settings(self) -> Iterator[Mapping[str, Any]]:
@@ -180,7 +208,9 @@ def build_design(spec: SweepSpec) -> Design:
     """Build the design of a sweep; equal files give equal points."""
     factors = [build_factor(each, gridded=spec.design.runs is None) for each in spec.factors]
     seeds = spec.seeds
-    replications = [level_of_value(seeds.set, seeds.first + i) for i in range(seeds.count)] if seeds else []
+    replications = (
+        [level_of_value(seeds.set, seeds.first + i) for i in range(seeds.count)] if seeds else []
+    )
     return Design(factors, replications, _draw_samples(spec.design, len(factors)))
 
 

@@ -40,9 +40,19 @@ class StudyFile(Generic[S]):
         near = self.document.file.parent / self.spec.scenario
         return near if paths.is_file(near) else find_scenario(self.spec.scenario)
 
-    def locate_problems(self, problems: Iterable[Problem], settings: Mapping[str, Any]) -> list[Problem]:
-        """Return the problems of a run with these settings; those caused by a setting get its position in this file."""
-        return list(dict.fromkeys(replace(problem, where=self._locate(problem.where, settings)) for problem in problems))
+    def locate_problems(
+        self, problems: Iterable[Problem], settings: Mapping[str, Any]
+    ) -> list[Problem]:
+        """Return the problems of a run with these settings.
+
+        Those caused by a setting get its position in this file.
+        """
+        return list(
+            dict.fromkeys(
+                replace(problem, where=self._locate(problem.where, settings))
+                for problem in problems
+            )
+        )
 
     def _locate(self, where: str, settings: Mapping[str, Any]) -> str:
         if where.startswith('setting "'):
@@ -61,11 +71,20 @@ class StudyFile(Generic[S]):
         return f"{below[0]}, in {where}" if len(below) == 1 else where
 
     def _setting_location(self, name: str, settings: Mapping[str, Any], part: str = "") -> str:
-        """Return the position of a setting in this file, or of a part of its value; "" if it is not in this file."""
-        paths = [path for path in self._setting_paths() if self._is_setting(path, name, settings)]
-        return self.document.where(paths[-1]) + (part if paths[-1][-1] == name else "") if paths else ""
+        """Return the position of a setting in this file, or of a part of its value.
 
-    def _is_setting(self, path: tuple[str | int, ...], name: str, settings: Mapping[str, Any]) -> bool:
+        "" if it is not in this file.
+        """
+        paths = [path for path in self._setting_paths() if self._is_setting(path, name, settings)]
+        return (
+            self.document.where(paths[-1]) + (part if paths[-1][-1] == name else "")
+            if paths
+            else ""
+        )
+
+    def _is_setting(
+        self, path: tuple[str | int, ...], name: str, settings: Mapping[str, Any]
+    ) -> bool:
         """Return whether a path in this file defines a setting, as a key with its value or as a string of "set"."""
         value = _value_at(self.document.value, path)
         return value == name or (path[-1] == name and value == settings.get(name))
@@ -73,7 +92,9 @@ class StudyFile(Generic[S]):
     def _setting_paths(self) -> Iterable[tuple[str | int, ...]]:
         """Yield the paths in this file that may define settings, in file order."""
         for path in sorted(self.document.offsets, key=lambda path: self.document.offsets[path]):
-            if path and ("set" in path or "settings" in path or "levels" in path or "cases" in path):
+            if path and (
+                "set" in path or "settings" in path or "levels" in path or "cases" in path
+            ):
                 yield path
 
 
@@ -92,7 +113,9 @@ def _value_at(value: Any, path: tuple[str | int, ...]) -> object:
     return value
 
 
-def read_study(file: str | Path | Mapping[str, Any], kind: type[S], max_runs: int = MAX_RUNS) -> StudyFile[S]:
+def read_study(
+    file: str | Path | Mapping[str, Any], kind: type[S], max_runs: int = MAX_RUNS
+) -> StudyFile[S]:
     """Read a sweep or tuning from a file, or a shipped one by its name.
 
     Args:
@@ -103,9 +126,18 @@ def read_study(file: str | Path | Mapping[str, Any], kind: type[S], max_runs: in
     Raises:
         InputError: with all problems of the file.
     """
-    document = _document_of_dict(file) if isinstance(file, Mapping) else read_document(_find_study(file))
-    if isinstance(document.value, dict) and "components" in document.value and "scenario" not in document.value:
-        raise InputError(f'"{document.file}" is a scenario, expected a study; `cosim run {document.file}` runs it')
+    document = (
+        _document_of_dict(file) if isinstance(file, Mapping) else read_document(_find_study(file))
+    )
+    if (
+        isinstance(document.value, dict)
+        and "components" in document.value
+        and "scenario" not in document.value
+    ):
+        raise InputError(
+            f'"{document.file}" is a scenario, expected a study; `cosim run {document.file}` runs '
+            "it"
+        )
     try:
         spec = kind.model_validate(document.value)
     except ValidationError as error:
@@ -119,22 +151,36 @@ def read_study(file: str | Path | Mapping[str, Any], kind: type[S], max_runs: in
             hint = nearest_file(study_file.scenario)
             raise InputError(f'scenario "{study_file.spec.scenario}" does not exist{hint}')
     except InputError as error:
-        raise InputError([replace(problem, where=document.where(("scenario",))) for problem in error.problems]) from None
+        raise InputError(
+            [replace(problem, where=document.where(("scenario",))) for problem in error.problems]
+        ) from None
     if (seeds := document.value.get("seeds")) and "set" not in seeds:
-        return StudyFile(kind.model_validate({**document.value, "seeds": {**seeds, "set": _seed_pointers(study_file)}}), document)
+        return StudyFile(
+            kind.model_validate(
+                {**document.value, "seeds": {**seeds, "set": _seed_pointers(study_file)}}
+            ),
+            document,
+        )
     return study_file
 
 
 def _document_of_dict(study: Mapping[str, Any]) -> Document:
     if isinstance(study.get("scenario"), Mapping):
         text = "a study runs in other processes, in which Python objects do not exist"
-        raise InputError(Problem(f"{text}; expected a scenario file or the name of a shipped scenario, found a dict", "scenario"))
+        raise InputError(
+            Problem(
+                f"{text}; expected a scenario file or the name of a shipped scenario, found a dict",
+                "scenario",
+            )
+        )
     return document_of_dict(study)
 
 
 def _seed_pointers(study_file: StudyFile[Any]) -> list[str]:
     """Return the JSON pointers that the scenario lists as its seeds."""
-    pointers = {name: value for name, value in study_file.spec.settings.items() if name.startswith("/")}
+    pointers = {
+        name: value for name, value in study_file.spec.settings.items() if name.startswith("/")
+    }
     if not (seeds := load_scenario(study_file.scenario, pointers).spec.seeds):
         text = 'the key "set" is missing, and the scenario has no "seeds"'
         raise InputError(Problem(text, study_file.document.where(("seeds",))))
@@ -142,7 +188,10 @@ def _seed_pointers(study_file: StudyFile[Any]) -> list[str]:
 
 
 def _check_counts(spec: StudySpec, document: Document, max_runs: int) -> None:
-    """Raise InputError if there are more than `max_runs` runs or cells of a map; the location is that of the largest factor."""
+    """Raise InputError if there are more than `max_runs` runs or cells of a map.
+
+    The location is that of the largest factor.
+    """
     hint = "; --max-runs raises this limit"
     largest, _ = max(spec.run_counts().items(), key=itemgetter(1))
     require_at_most(max_runs, spec.max_runs, "runs", document.where(largest), hint)

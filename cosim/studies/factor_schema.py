@@ -25,7 +25,15 @@ _POSITIVE_ARGUMENTS = ("std", "sigma", "median", "shape", "scale")
 #: keys of a factor that define its levels
 _LEVEL_SOURCES = ("values", "range", "distribution", "levels")
 #: quantiles in aggregates.csv
-QUANTILES = {"min": 0.0, "q05": 0.05, "q25": 0.25, "median": 0.5, "q75": 0.75, "q95": 0.95, "max": 1.0}
+QUANTILES = {
+    "min": 0.0,
+    "q05": 0.05,
+    "q25": 0.25,
+    "median": 0.5,
+    "q75": 0.75,
+    "q95": 0.95,
+    "max": 1.0,
+}
 #: columns of the output files beside those of factors or parameters
 TABLE_COLUMNS = ("run", "seed", "status", "passed", "missed", "failure", "output", "command")
 AGGREGATE_COLUMNS = ("kpi", "count", "mean", "std", *QUANTILES)
@@ -38,7 +46,9 @@ def reject_column_names(*names: str) -> AfterValidator:
 
     def check(value: str) -> str:
         if value in names:
-            raise ValueError(f"expected a name other than those of columns: {', '.join(dict.fromkeys(names))}")
+            raise ValueError(
+                f"expected a name other than those of columns: {', '.join(dict.fromkeys(names))}"
+            )
         return value
 
     return AfterValidator(check)
@@ -70,7 +80,9 @@ class RangeSpec(Spec):
 
     min: float = key("first value", 0.5)
     max: float = key("last value", 1.5)
-    count: Integer | None = key("number of values; required in a full factorial design", 5, default=None, ge=2)
+    count: Integer | None = key(
+        "number of values; required in a full factorial design", 5, default=None, ge=2
+    )
     scale: Scale = key("spacing of the values", "log", default="linear")
 
     @model_validator(mode="after")
@@ -81,28 +93,47 @@ class RangeSpec(Spec):
 
 
 class DistributionSpec(Spec):
-    """A probability distribution; a full factorial design takes the medians of `count` equally likely parts."""
+    """A probability distribution.
 
-    kind: Literal["uniform", "normal", "truncated_normal", "lognormal", "triangular", "exponential", "weibull"] = key(
-        "family of distributions", "normal"
+    A full factorial design takes the medians of `count` equally likely parts.
+    """
+
+    kind: Literal[
+        "uniform", "normal", "truncated_normal", "lognormal", "triangular", "exponential", "weibull"
+    ] = key("family of distributions", "normal")
+    min: float | None = key(
+        "lower bound (uniform, truncated_normal, triangular)", 0.0, default=None
     )
-    min: float | None = key("lower bound (uniform, truncated_normal, triangular)", 0.0, default=None)
-    max: float | None = key("upper bound (uniform, truncated_normal, triangular)", 2.0, default=None)
-    mean: float | None = key("mean (normal, truncated_normal: before truncation; exponential)", 1.0, default=None)
-    std: float | None = key("standard deviation (normal, truncated_normal: before truncation)", 0.1, default=None)
+    max: float | None = key(
+        "upper bound (uniform, truncated_normal, triangular)", 2.0, default=None
+    )
+    mean: float | None = key(
+        "mean (normal, truncated_normal: before truncation; exponential)", 1.0, default=None
+    )
+    std: float | None = key(
+        "standard deviation (normal, truncated_normal: before truncation)", 0.1, default=None
+    )
     median: float | None = key("median (lognormal)", 1.0, default=None)
     sigma: float | None = key("standard deviation of the logarithm (lognormal)", 0.2, default=None)
     mode: float | None = key("most probable value (triangular)", 1.0, default=None)
     shape: float | None = key("shape parameter k (weibull)", 2.0, default=None)
     scale: float | None = key("scale parameter lambda (weibull)", 5.0, default=None)
-    count: Integer | None = key("number of values; required in a full factorial design", 5, default=None, ge=1)
+    count: Integer | None = key(
+        "number of values; required in a full factorial design", 5, default=None, ge=1
+    )
 
     @model_validator(mode="after")
     def _complete(self) -> DistributionSpec:
         known, given = DISTRIBUTIONS[self.kind], self.arguments
         if unknown := [name for name in given if name not in known]:
-            raise ValueError(f'"{self.kind}" has no "{unknown[0]}"{did_you_mean(unknown[0], known)}')
-        if missing := [name for name in known if name not in given and name not in _OPTIONAL_ARGUMENTS.get(self.kind, ())]:
+            raise ValueError(
+                f'"{self.kind}" has no "{unknown[0]}"{did_you_mean(unknown[0], known)}'
+            )
+        if missing := [
+            name
+            for name in known
+            if name not in given and name not in _OPTIONAL_ARGUMENTS.get(self.kind, ())
+        ]:
             raise ValueError(f'"{self.kind}" needs {", ".join(missing)}')
         if small := [name for name in _POSITIVE_ARGUMENTS if given.get(name, 1.0) <= 0]:
             raise ValueError(f'expected a positive "{small[0]}"')
@@ -116,25 +147,42 @@ class DistributionSpec(Spec):
     @property
     def arguments(self) -> dict[str, float]:
         """Arguments of the distribution that the file gives."""
-        return {name: value for name, value in self.model_dump(exclude={"kind", "count"}).items() if value is not None}
+        return {
+            name: value
+            for name, value in self.model_dump(exclude={"kind", "count"}).items()
+            if value is not None
+        }
 
 
 class FactorSpec(Spec):
-    """A factor that varies: variables or JSON pointers with their values, or named levels with several settings each."""
+    """A factor that varies.
+
+    Variables or JSON pointers with their values, or named levels with several settings each.
+    """
 
     name: FactorName = key(
-        "name of the factor and of its column in the tables; names of other columns (`run`, `seed`, `mean` and so on) are "
+        "name of the factor and of its column in the tables; names of other columns (`run`, "
+        "`seed`, `mean` and so on) are "
         "reserved",
         "speed",
     )
     set: SettingPaths | None = key(
-        "variable or JSON pointer; of several, all get the same value", "usv.speed_command", default=None
+        "variable or JSON pointer; of several, all get the same value",
+        "usv.speed_command",
+        default=None,
     )
     values: list[Any] | None = key("listed values", [0.4, 0.8, 1.2], default=None, min_length=1)
-    range: RangeSpec | None = key("evenly spaced values", {"min": 0.5, "max": 1.5, "count": 5}, default=None)
-    distribution: DistributionSpec | None = key("random values", {"kind": "normal", "mean": 1.0, "std": 0.1}, default=None)
+    range: RangeSpec | None = key(
+        "evenly spaced values", {"min": 0.5, "max": 1.5, "count": 5}, default=None
+    )
+    distribution: DistributionSpec | None = key(
+        "random values", {"kind": "normal", "mean": 1.0, "std": 0.1}, default=None
+    )
     levels: dict[str, dict[str, Any]] | None = key(
-        "settings by the label of a level", {"calm": {"uav.gain": 1.0}, "rough": {"uav.gain": 2.0}}, default=None, min_length=1
+        "settings by the label of a level",
+        {"calm": {"uav.gain": 1.0}, "rough": {"uav.gain": 2.0}},
+        default=None,
+        min_length=1,
     )
     integer: bool = key("round the values of a range or distribution", True, default=False)
 
@@ -142,9 +190,15 @@ class FactorSpec(Spec):
     def _one_source(self) -> FactorSpec:
         given = [name for name in _LEVEL_SOURCES if getattr(self, name) is not None]
         if len(given) != 1:
-            raise ValueError(f"expected exactly one of {', '.join(_LEVEL_SOURCES)}; found {' and '.join(given) or 'none'}")
+            raise ValueError(
+                f"expected exactly one of {', '.join(_LEVEL_SOURCES)}; found "
+                f"{' and '.join(given) or 'none'}"
+            )
         if (self.levels is None) == (self.set is None):
-            raise ValueError('expected "set" together with values, range or distribution, and not together with levels')
+            raise ValueError(
+                'expected "set" together with values, range or distribution, and not together with '
+                "levels"
+            )
         return self
 
     @property
@@ -164,7 +218,10 @@ class FactorSpec(Spec):
         yield from ((path, value) for path in self.set or () for value in self.values or (None,))
 
     def has_labels(self, sampled: bool) -> bool:
-        """Return whether the factor has levels that can be shown along an axis; `sampled`: the design is not full factorial."""
+        """Return whether the factor has levels that can be shown along an axis.
+
+        `sampled`: the design is not full factorial.
+        """
         if self.values is not None:
             return not any(isinstance(value, list | dict) for value in self.values)
         return self.levels is not None or not sampled

@@ -1,4 +1,7 @@
-"""Functions that run studies from Python: `cosim.sweep`, `cosim.tune`, `cosim.worst_case` and `cosim.regress`."""
+"""Functions that run studies from Python.
+
+`cosim.sweep`, `cosim.tune`, `cosim.worst_case` and `cosim.regress`.
+"""
 
 from __future__ import annotations
 
@@ -32,8 +35,8 @@ class SweepResult:
     """Finished sweep.
 
     Attributes:
-        rows: The runs in the order of the design, each with `point` (labels and settings), `record` (KPIs or failure) and
-            `passed`.
+        rows: The runs in the order of the design, each with `point` (labels and settings), `record`
+            (KPIs or failure) and `passed`.
         summary: Statistics of the KPIs and success rates, by groups of runs.
         folder: Folder of the files that `cosim sweep` writes.
     """
@@ -48,14 +51,24 @@ class SweepResult:
         return sum(row.passed for row in self.rows) / len(self.rows)
 
     def to_dataframe(self) -> Any:
-        """Return a pandas DataFrame with a row for each run: labels of the factors, `passed`, `failure` and all KPIs.
+        """Return a pandas DataFrame with a row for each run.
+
+        Labels of the factors, `passed`, `failure` and all KPIs.
 
         Raises:
             InputError: The package pandas is not installed.
         """
         from ..results.data_frame import require_pandas
 
-        rows = [{**row.point.labels, "passed": row.passed, "failure": row.record.failure, **row.record.kpis} for row in self.rows]
+        rows = [
+            {
+                **row.point.labels,
+                "passed": row.passed,
+                "failure": row.record.failure,
+                **row.record.kpis,
+            }
+            for row in self.rows
+        ]
         return require_pandas().DataFrame(rows)
 
 
@@ -102,7 +115,8 @@ def sweep(
     Runs that an earlier call has finished in the same folder are not repeated.
 
     Args:
-        study: Path of a sweep file, name of a shipped sweep, or the content of a sweep file as a dict.
+        study: Path of a sweep file, name of a shipped sweep, or the content of a sweep file as a
+            dict.
         output_dir: Folder of the results; None: runs/NAME.
         workers: Number of runs at a time; None: one for each processor.
         max_runs: Largest accepted number of runs.
@@ -123,7 +137,11 @@ def sweep(
             with LocalRunner(loaded.study.context, workers or available_processors()) as runner:
                 loaded.run(run_store, runner, lambda _: None)
         loaded.check_names(run_store)
-        return SweepResult(list(loaded.rows(run_store)), write_sweep_files(loaded, run_store, folder, parquet=False), folder)
+        return SweepResult(
+            list(loaded.rows(run_store)),
+            write_sweep_files(loaded, run_store, folder, parquet=False),
+            folder,
+        )
 
 
 def tune(
@@ -137,7 +155,8 @@ def tune(
     """Find the parameters that minimise a KPI, as `cosim tune`.
 
     Args:
-        study: Path of a tuning file, name of a shipped tuning, or the content of a tuning file as a dict.
+        study: Path of a tuning file, name of a shipped tuning, or the content of a tuning file as a
+            dict.
         output_dir: Folder of the results; None: runs/NAME.
         workers: Number of runs at a time; None: one for each processor.
         max_runs: Largest accepted number of runs.
@@ -171,7 +190,8 @@ def worst_case(
     """Search for the run that breaks a controller, as `cosim tune --worst`.
 
     Args:
-        study: Path of the file of a search, name of a shipped search, or the content of such a file as a dict.
+        study: Path of the file of a search, name of a shipped search, or the content of such a file
+            as a dict.
         output_dir: Folder of the results; None: runs/NAME.
         workers: Number of runs at a time; None: one for each processor.
         max_runs: Largest accepted number of runs.
@@ -215,8 +235,15 @@ def regress(
         InputError: There is no such scenario, two files have the same name, or an argument is of a wrong type.
     """
     given = [scenarios] if isinstance(scenarios, str | os.PathLike) else scenarios
-    accepted = isinstance(given, Sequence) and all(isinstance(each, str | os.PathLike) for each in given)
-    expect("scenarios", scenarios, accepted, "a path, the name of a shipped scenario, or a list of them")
+    accepted = isinstance(given, Sequence) and all(
+        isinstance(each, str | os.PathLike) for each in given
+    )
+    expect(
+        "scenarios",
+        scenarios,
+        accepted,
+        "a path, the name of a shipped scenario, or a list of them",
+    )
     expect("output_dir", output_dir, isinstance(output_dir, str | os.PathLike), "a path")
     _check_count("jobs", jobs)
     paths = [Path(each) for each in given] or [default_folder()]
@@ -225,8 +252,15 @@ def regress(
 
 def _check_arguments(study: Any, output_dir: Any, workers: Any, max_runs: Any) -> None:
     accepted = isinstance(study, str | os.PathLike | Mapping)
-    expect("study", study, accepted, "the path of a study file, the name of a shipped study, or a dict")
-    expect("output_dir", output_dir, output_dir is None or isinstance(output_dir, str | os.PathLike), "a path")
+    expect(
+        "study", study, accepted, "the path of a study file, the name of a shipped study, or a dict"
+    )
+    expect(
+        "output_dir",
+        output_dir,
+        output_dir is None or isinstance(output_dir, str | os.PathLike),
+        "a path",
+    )
     _check_count("workers", workers)
     _check_count("max_runs", max_runs)
 

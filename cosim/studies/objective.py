@@ -23,7 +23,10 @@ class Constraint:
         return [*self.left.names, *self.right.names]
 
     def violation(self, values: Mapping[str, float]) -> float:
-        """Return by how much the constraint is violated: 0 if it is met, infinity if a side is NaN."""
+        """Return by how much the constraint is violated.
+
+        0 if it is met, infinity if a side is NaN.
+        """
         excess = self.left(values) - self.right(values)
         return math.inf if math.isnan(excess) else max(0.0, excess)
 
@@ -31,7 +34,11 @@ class Constraint:
 def parse_constraint(text: str) -> Constraint:
     """Parse `a <= b` or `a >= b`; raise ValueError if it is invalid."""
     tree = parse_syntax(text)
-    if not (isinstance(tree, ast.Compare) and len(tree.ops) == 1 and isinstance(tree.ops[0], ast.LtE | ast.GtE)):
+    if not (
+        isinstance(tree, ast.Compare)
+        and len(tree.ops) == 1
+        and isinstance(tree.ops[0], ast.LtE | ast.GtE)
+    ):
         raise ValueError(f'expected a comparison with <= or >=, found "{text}"')
     sides = [Expression(ast.unparse(side), side) for side in (tree.left, tree.comparators[0])]
     for side in sides:

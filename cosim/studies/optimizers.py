@@ -11,7 +11,8 @@ from .schema import MethodSpec
 
 #: smallest rank of a point that violates a constraint
 INFEASIBLE_RANK = 1e100
-#: differential evolution has converged when the standard deviation of the values is this fraction of their mean
+#: differential evolution has converged when the standard deviation of the values is this fraction
+#: of their mean
 _CONVERGENCE_TOLERANCE = 1e-6
 
 #: returns the ranks of points in the unit cube
@@ -33,7 +34,10 @@ def _differential_evolution(evaluate: Evaluator, start: Sequence[float], spec: M
     def converged(intermediate_result: Any) -> bool:
         """Return whether SciPy's criterion of convergence is met and all points are feasible."""
         ranks = intermediate_result.population_energies
-        return bool(ranks.max() < INFEASIBLE_RANK and np.std(ranks) <= _CONVERGENCE_TOLERANCE * abs(np.mean(ranks)))
+        return bool(
+            ranks.max() < INFEASIBLE_RANK
+            and np.std(ranks) <= _CONVERGENCE_TOLERANCE * abs(np.mean(ranks))
+        )
 
     differential_evolution(
         lambda points: np.array(evaluate(points.T.tolist())),
@@ -56,7 +60,13 @@ def _scipy_minimizer(method: str) -> Callable[[Evaluator, Sequence[float], Metho
 
         options = {"maxfev": spec.evaluations}
         bounds = [(0.0, 1.0)] * len(start)
-        minimize(lambda point: evaluate([point.tolist()])[0], start, method=method, bounds=bounds, options=options)
+        minimize(
+            lambda point: evaluate([point.tolist()])[0],
+            start,
+            method=method,
+            bounds=bounds,
+            options=options,
+        )
 
     return search
 

@@ -43,7 +43,9 @@ def has_keys(file: Path, *groups: Sequence[str]) -> bool:
             content = read_system_document(file).value
     except (OSError, ValueError, RecursionError, InputError):
         return True
-    return isinstance(content, dict) and all(any(content.get(key) for key in group) for group in groups)
+    return isinstance(content, dict) and all(
+        any(content.get(key) for key in group) for group in groups
+    )
 
 
 @dataclass(frozen=True)
@@ -67,14 +69,17 @@ class RegressionOutcome:
     accept: str = ""
 
 
-#: runs a `cosim` command, given by its words, in a separate process and returns the exit code and standard error
+#: runs a `cosim` command, given by its words, in a separate process and returns the exit code and
+#: standard error
 CommandRunner = Callable[[Sequence[str]], subprocess.CompletedProcess[str]]
 
 
 def run_in_new_process(words: Sequence[str]) -> subprocess.CompletedProcess[str]:
     """Run a `cosim` command in a new process."""
     command = [sys.executable, "-m", "cosim", *words]
-    return subprocess.run(command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False)  # noqa: S603
+    return subprocess.run(  # noqa: S603
+        command, stdin=subprocess.DEVNULL, capture_output=True, text=True, check=False
+    )
 
 
 @dataclass(frozen=True)
@@ -99,13 +104,22 @@ class Regression:
         return replace(self._run(), seconds=time.perf_counter() - began)
 
     def _run(self) -> RegressionOutcome:
-        done = self.run_command(["run", str(self.file), "--no-report", "--output-dir", str(self.directory)])
+        done = self.run_command(
+            ["run", str(self.file), "--no-report", "--output-dir", str(self.directory)]
+        )
         if done.returncode < 0:
             return RegressionOutcome(
-                self.file.stem, 1, "did not run to its end", (f"cosim run: ended by signal {-done.returncode}",)
+                self.file.stem,
+                1,
+                "did not run to its end",
+                (f"cosim run: ended by signal {-done.returncode}",),
             )
         if done.returncode not in (0, 3):
-            report = self._write_report() if done.returncode == 1 and (self.directory / "result.csv").is_file() else []
+            report = (
+                self._write_report()
+                if done.returncode == 1 and (self.directory / "result.csv").is_file()
+                else []
+            )
             details = (*done.stderr.splitlines(), *report)
             summary = "was refused" if done.returncode == 2 else "did not run to its end"
             return RegressionOutcome(self.file.stem, done.returncode, summary, details)
@@ -113,8 +127,15 @@ class Regression:
             run = _FinishedRun.read(self.file, self.directory)
             outcome = self._update_reference(run) if self.update else self._compare(run)
         except CosimError as error:
-            return RegressionOutcome(self.file.stem, error.exit_code, "cannot be compared", tuple(str(error).splitlines()))
-        ending = "" if run.result.crashed else run.result.termination  # a crash is one of the details
+            return RegressionOutcome(
+                self.file.stem,
+                error.exit_code,
+                "cannot be compared",
+                tuple(str(error).splitlines()),
+            )
+        ending = (
+            "" if run.result.crashed else run.result.termination
+        )  # a crash is one of the details
         outdated = [line for line in done.stderr.splitlines() if OTHER_VERSION in line]
         summary = "; ".join(filter(None, (outcome.summary, ending)))
         return replace(outcome, summary=summary, details=(*outdated, *outcome.details))
@@ -135,29 +156,48 @@ class Regression:
                 accept = "" if failed else str(self.file)
                 failed += [
                     *str(comparison).splitlines(),
-                    'tube: the reference plus and minus its tolerances (key "reference" of the scenario)',
+                    (
+                        'tube: the reference plus and minus its tolerances (key "reference" of the '
+                        "scenario)"
+                    ),
                     *([f"reason of the tolerances: {reason}"] if reason else []),
                     *filter(None, [reference_changes(run.result, run.reference_path, run.folder)]),
                     f"see {run.draw_tubes(comparison, self.directory / 'tubes.png')}",
                 ]
         if failed:
-            failed += self._write_report(*(["--reference", str(self.file)] if run.scenario.get("reference") else []))
-        return RegressionOutcome(self.file.stem, 3 if failed else 0, _summarize(counts, notes), tuple(failed), accept=accept)
+            failed += self._write_report(
+                *(["--reference", str(self.file)] if run.scenario.get("reference") else [])
+            )
+        return RegressionOutcome(
+            self.file.stem,
+            3 if failed else 0,
+            _summarize(counts, notes),
+            tuple(failed),
+            accept=accept,
+        )
 
     def _write_report(self, *options: str) -> list[str]:
         """Write the report of the run by `cosim report` in a separate process, and return a line that names it."""
         done = self.run_command(["report", str(self.directory), *options])
-        return [f"see {self.directory / 'report.html'}"] if done.returncode == 0 else [f"no report: {done.stderr.strip()}"]
+        return (
+            [f"see {self.directory / 'report.html'}"]
+            if done.returncode == 0
+            else [f"no report: {done.stderr.strip()}"]
+        )
 
     def _update_reference(self, run: _FinishedRun) -> RegressionOutcome:
         from ..results.comparison.reference import write_reference
 
         if failed := run.failed_checks():
-            return RegressionOutcome(self.file.stem, 3, "a failed run becomes no reference", tuple(failed))
+            return RegressionOutcome(
+                self.file.stem, 3, "a failed run becomes no reference", tuple(failed)
+            )
         written = write_reference(run.result, run.reference_path, run.tolerances)
         size = run.reference_path.stat().st_size / 1000
         amount = f"{count_noun(len(written), 'signal')}, {count_noun(len(written.time), 'row')}"
-        return RegressionOutcome(self.file.stem, 0, f"{amount}, {size:.0f} kB in {run.reference_path}")
+        return RegressionOutcome(
+            self.file.stem, 0, f"{amount}, {size:.0f} kB in {run.reference_path}"
+        )
 
 
 def _summarize(counts: Collection[tuple[int, int, str]], notes: Sequence[str]) -> str:
@@ -166,7 +206,9 @@ def _summarize(counts: Collection[tuple[int, int, str]], notes: Sequence[str]) -
     if not any(failed for failed, _, _ in counts):
         return ", ".join(count_noun(number, noun) for _, number, noun in counts) + ending
     parts = (
-        f"{failed} of {count_noun(number, noun)} failed" if failed else f"{count_noun(number, noun)} passed"
+        f"{failed} of {count_noun(number, noun)} failed"
+        if failed
+        else f"{count_noun(number, noun)} passed"
         for failed, number, noun in counts
     )
     return ", ".join(parts) + ending
@@ -203,10 +245,16 @@ class _FinishedRun:
         """Return the failed checks, after the crash that ended the run early (unless `checks_only`)."""
         from ..results.checks import evaluate_all_checks
 
-        kpis = {name: math.nan if value is None else value for name, value in self.result.kpis.items()}
+        kpis = {
+            name: math.nan if value is None else value for name, value in self.result.kpis.items()
+        }
         crash = [self.result.termination] if self.result.crashed and not checks_only else []
         units = self.result.metadata.get("kpi_units") or {}
-        return crash + [outcome.text(units) for outcome in evaluate_all_checks(kpis, self.checks) if not outcome.passed]
+        return crash + [
+            outcome.text(units)
+            for outcome in evaluate_all_checks(kpis, self.checks)
+            if not outcome.passed
+        ]
 
     @property
     def reference_path(self) -> Path:
@@ -216,14 +264,20 @@ class _FinishedRun:
     def tolerances(self) -> dict[str, Tolerance]:
         from ..results.comparison import Tolerance
 
-        return {pattern: Tolerance(**tolerance) for pattern, tolerance in self.scenario["reference"]["tolerances"].items()}
+        return {
+            pattern: Tolerance(**tolerance)
+            for pattern, tolerance in self.scenario["reference"]["tolerances"].items()
+        }
 
     @cached_property
     def reference(self) -> Result:
         from ..results import Result
 
         if not self.reference_path.is_file():
-            raise InputError(f'the reference "{self.reference_path}" does not exist: `cosim regress --update` writes it')
+            raise InputError(
+                f'the reference "{self.reference_path}" does not exist: `cosim regress --update` '
+                "writes it"
+            )
         return Result.from_csv(self.reference_path)
 
     def compare(self) -> Comparison:
@@ -251,6 +305,10 @@ class _FinishedRun:
         from ..report.comparison_figure import draw_tubes
         from ..report.figures import draw_figure, save_figure
 
-        arguments = {"reference": self.reference, "tolerances": self.tolerances, "comparison": comparison}
+        arguments = {
+            "reference": self.reference,
+            "tolerances": self.tolerances,
+            "comparison": comparison,
+        }
         save_figure(draw_figure(self.result, "tubes", draw_tubes, arguments), path)
         return path

@@ -11,7 +11,14 @@ from typing import TypeVar
 from ..core import resources
 from ..core.errors import InputError
 from ..scenario import find_scenario
-from .regression import EXPECTATION_KEYS, CommandRunner, Regression, RegressionOutcome, has_keys, run_in_new_process
+from .regression import (
+    EXPECTATION_KEYS,
+    CommandRunner,
+    Regression,
+    RegressionOutcome,
+    has_keys,
+    run_in_new_process,
+)
 
 T = TypeVar("T")
 
@@ -25,7 +32,11 @@ def new_processes(_threads: int) -> AbstractContextManager[CommandRunner]:
 
 
 def run_regressions(
-    paths: Iterable[Path], update: bool, output_dir: Path, jobs: int, commands: CommandContext = new_processes
+    paths: Iterable[Path],
+    update: bool,
+    output_dir: Path,
+    jobs: int,
+    commands: CommandContext = new_processes,
 ) -> Iterator[RegressionOutcome]:
     """Run all scenarios that have checks or a reference, and yield their outcomes in order.
 
@@ -42,7 +53,9 @@ def run_regressions(
     expected = ("reference",) if update else EXPECTATION_KEYS
     files = [file for file in find_scenario_files(paths) if has_keys(file, expected)]
     if not files:
-        raise InputError('found no scenario with a "reference" (or, without --update, with "checks")')
+        raise InputError(
+            'found no scenario with a "reference" (or, without --update, with "checks")'
+        )
     check_unique_names(files)
     with commands(min(jobs, len(files))) as run_command:
         work = [Regression(file, output_dir / file.stem, update, run_command).run for file in files]
@@ -59,14 +72,18 @@ def find_scenario_files(paths: Iterable[Path]) -> Iterator[Path]:
     """Yield the scenario files for files, names of shipped scenarios and folders.
 
     Raises:
-        InputError: if a file does not exist, a folder has no scenarios, or a name is that of a folder and of a shipped scenario.
+        InputError: if a file does not exist, a folder has no scenarios, or a name is that of a
+            folder and of a shipped scenario.
     """
     for path in paths:
         if not path.is_dir():
             yield find_scenario(path)
         elif str(path) in resources.shipped_names("scenarios/*.json"):
             shipped = resources.root() / "scenarios" / f"{path}.json"
-            raise InputError(f'"{path}" is a folder here and a shipped scenario: write {path.absolute()} or {shipped}')
+            raise InputError(
+                f'"{path}" is a folder here and a shipped scenario: write {path.absolute()} or '
+                f"{shipped}"
+            )
         elif files := sorted(path.glob("*.json")):
             yield from files
         else:
@@ -74,11 +91,20 @@ def find_scenario_files(paths: Iterable[Path]) -> Iterator[Path]:
 
 
 def check_unique_names(files: Iterable[Path]) -> None:
-    """Raise InputError if two files have the same name: the results of both would have the same folder."""
+    """Raise InputError if two files have the same name.
+
+    The results of both would have the same folder.
+    """
     counts = Counter(file.stem for file in files)
     if repeated := [name for name, count in counts.items() if count > 1]:
         raise InputError(
-            [f'{counts[name]} scenarios are called "{name}.json": their results would go to one folder' for name in repeated]
+            [
+                (
+                    f'{counts[name]} scenarios are called "{name}.json": their results would go to '
+                    "one folder"
+                )
+                for name in repeated
+            ]
         )
 
 

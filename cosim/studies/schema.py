@@ -1,4 +1,7 @@
-"""Schemas of sweep and tuning files; `cosim schema --sweep` and `--tune` print them as JSON Schema."""
+"""Schemas of sweep and tuning files.
+
+`cosim schema --sweep` and `--tune` print them as JSON Schema.
+"""
 
 from __future__ import annotations
 
@@ -37,13 +40,20 @@ class SeedsSpec(Spec):
 
 
 class MapSpec(Spec):
-    """A map of the success rate over two factors; two more factors may select the columns and rows of panels."""
+    """A map of the success rate over two factors.
+
+    Two more factors may select the columns and rows of panels.
+    """
 
     x: str = key("factor along the horizontal axis", "wind")
     y: str = key("factor along the vertical axis", "wave_height")
-    columns: str | None = key("factor whose levels have a column of panels each", "controller", default=None)
+    columns: str | None = key(
+        "factor whose levels have a column of panels each", "controller", default=None
+    )
     rows: str | None = key("factor whose levels have a row of panels each", "speed", default=None)
-    titles: dict[str, str] = key("title by factor; empty: no title", {"wind": "wind (m/s)"}, default={})
+    titles: dict[str, str] = key(
+        "title by factor; empty: no title", {"wind": "wind (m/s)"}, default={}
+    )
 
     @property
     def factors(self) -> list[str]:
@@ -63,16 +73,23 @@ class DesignSpec(Spec):
     kind: Literal["full_factorial", "latin_hypercube", "sobol"] = key(
         "all combinations of levels, or samples", "sobol", default="full_factorial"
     )
-    runs: Integer | None = key("number of samples; for sobol a power of two", 256, default=None, ge=1)
+    runs: Integer | None = key(
+        "number of samples; for sobol a power of two", 256, default=None, ge=1
+    )
     seed: Integer = key("seed of the samples", 7, default=1, ge=0)
 
     @model_validator(mode="after")
     def _sized(self) -> DesignSpec:
         if (self.kind == "full_factorial") != (self.runs is None):
-            raise ValueError('expected "runs" with latin_hypercube and sobol, and not with full_factorial')
+            raise ValueError(
+                'expected "runs" with latin_hypercube and sobol, and not with full_factorial'
+            )
         if self.kind == "sobol" and self.runs and self.runs & (self.runs - 1):
             near = 2 ** round(math.log2(self.runs))
-            raise ValueError(f'a Sobol sequence is balanced only for powers of two; expected for example "runs": {near}')
+            raise ValueError(
+                "a Sobol sequence is balanced only for powers of two; expected for example "
+                f'"runs": {near}'
+            )
         return self
 
 
@@ -81,19 +98,31 @@ CountPath = tuple["str | int", ...]
 
 
 class StudySpec(Spec):
-    """Common part of sweeps and tunings: a scenario, settings that all runs share, and the deadline of a run."""
+    """Common part of sweeps and tunings.
 
-    schema_: str | None = key("path of the JSON Schema, for editors", "sweep.schema.json", default=None, alias="$schema")
+    A scenario, settings that all runs share, and the deadline of a run.
+    """
+
+    schema_: str | None = key(
+        "path of the JSON Schema, for editors", "sweep.schema.json", default=None, alias="$schema"
+    )
     name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z0-9_][A-Za-z0-9_. -]*$")] = key(
         "name of the study and of its results folder", "landing_speeds"
     )
     description: str = key("text for reports and people", "Landings at three speeds.", default="")
     scenario: str = key(
-        'path relative to this file or of a file that cosim ships ("cosim:scenarios/..."), or the name of a shipped scenario',
+        (
+            'path relative to this file or of a file that cosim ships ("cosim:scenarios/..."), or '
+            "the name of a shipped scenario"
+        ),
         "demo1_box",
     )
-    settings: dict[str, Any] = key("settings of all runs, as of `--set`", {"uav.vtol.landing_time": 8.0}, default={})
-    deadline: float | None = key("wall time that a run may take", 60.0, unit="s", default=None, gt=0)
+    settings: dict[str, Any] = key(
+        "settings of all runs, as of `--set`", {"uav.vtol.landing_time": 8.0}, default={}
+    )
+    deadline: float | None = key(
+        "wall time that a run may take", 60.0, unit="s", default=None, gt=0
+    )
 
     def run_counts(self) -> dict[CountPath, int]:
         """Return the factors of the largest number of runs, by the paths of the entries that determine them."""
@@ -113,35 +142,56 @@ class SweepSpec(StudySpec):
     """A sweep: factors, a design, seeds and criteria of success."""
 
     factors: list[FactorSpec] = key(
-        "what varies", [{"name": "speed", "set": "usv.speed_command", "values": [0.4, 0.8, 1.2]}], default=[]
+        "what varies",
+        [{"name": "speed", "set": "usv.speed_command", "values": [0.4, 0.8, 1.2]}],
+        default=[],
     )
     design: DesignSpec = key(
-        "choice of the points", {"kind": "sobol", "runs": 256}, default=DesignSpec(kind="full_factorial", runs=None, seed=1)
+        "choice of the points",
+        {"kind": "sobol", "runs": 256},
+        default=DesignSpec(kind="full_factorial", runs=None, seed=1),
     )
     seeds: SeedsSpec | None = key(
-        "replications of every point", {"set": "/components/plant/arguments/environment/seed", "count": 20}, default=None
+        "replications of every point",
+        {"set": "/components/plant/arguments/environment/seed", "count": 20},
+        default=None,
     )
     success: list[CheckSpec] | None = key(
-        "limits on KPIs; default: the checks of the scenario", [{"kpi": "landing.lateral_error", "max": 0.2}], default=None
+        "limits on KPIs; default: the checks of the scenario",
+        [{"kpi": "landing.lateral_error", "max": 0.2}],
+        default=None,
     )
     by: list[NameList] = key(
-        "factors, or lists of factors, by whose levels the runs are grouped in the aggregates", ["speed"], default=[]
+        "factors, or lists of factors, by whose levels the runs are grouped in the aggregates",
+        ["speed"],
+        default=[],
     )
     maps: list[MapSpec] = key(
-        "maps of the success rate, as figures and in sweep.html", [{"x": "wind", "y": "wave_height"}], default=[]
+        "maps of the success rate, as figures and in sweep.html",
+        [{"x": "wind", "y": "wave_height"}],
+        default=[],
     )
 
     @model_validator(mode="after")
     def _consistent(self) -> SweepSpec:
         names = _unique_names("factors", self.factors)
-        seeds = [Setter("seed", ("seeds",), [(path, None) for path in self.seeds.set])] if self.seeds else []
-        factors = (Setter(factor.name, ("factors", i), factor.settings()) for i, factor in enumerate(self.factors))
+        seeds = (
+            [Setter("seed", ("seeds",), [(path, None) for path in self.seeds.set])]
+            if self.seeds
+            else []
+        )
+        factors = (
+            Setter(factor.name, ("factors", i), factor.settings())
+            for i, factor in enumerate(self.factors)
+        )
         check_conflicts(self.settings, [*factors, *seeds])
         if not names and self.seeds is None:
             raise ValueError('expected "factors", "seeds" or both')
         for i, name in ((i, name) for i, group in enumerate(self.by) for name in group):
             if name not in (*names, "seed"):
-                raise PlacedError(f'"by" names no factor "{name}"{did_you_mean(name, [*names, "seed"])}', "by", i)
+                raise PlacedError(
+                    f'"by" names no factor "{name}"{did_you_mean(name, [*names, "seed"])}', "by", i
+                )
         for i, each in enumerate(self.maps):
             _check_map(i, each, self)
         if self.design.kind == "full_factorial":
@@ -150,7 +200,9 @@ class SweepSpec(StudySpec):
 
     def run_counts(self) -> dict[CountPath, int]:
         """Return the numbers of samples or levels, and of seeds."""
-        counts: dict[CountPath, int] = {("factors", i): factor.level_count for i, factor in enumerate(self.factors)}
+        counts: dict[CountPath, int] = {
+            ("factors", i): factor.level_count for i, factor in enumerate(self.factors)
+        }
         if self.design.runs is not None and self.factors:
             counts = {("design", "runs"): self.design.runs}
         return counts | ({("seeds", "count"): self.seeds.count} if self.seeds else {})
@@ -159,23 +211,33 @@ class SweepSpec(StudySpec):
         """Return the product of the numbers of levels of each map's factors."""
         levels = {factor.name: factor.level_count for factor in self.factors}
         levels["seed"] = self.seeds.count if self.seeds else 0
-        return {("maps", i): math.prod(levels[name] for name in each.factors) for i, each in enumerate(self.maps)}
+        return {
+            ("maps", i): math.prod(levels[name] for name in each.factors)
+            for i, each in enumerate(self.maps)
+        }
 
 
 class ParameterSpec(Spec):
     """A parameter of a tuning, with its bounds."""
 
-    name: Annotated[str, StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$"), reject_column_names(*TRIAL_COLUMNS)] = key(
-        "name in expressions and tables", "gain"
+    name: Annotated[
+        str,
+        StringConstraints(pattern=r"^[A-Za-z_][A-Za-z0-9_]*$"),
+        reject_column_names(*TRIAL_COLUMNS),
+    ] = key("name in expressions and tables", "gain")
+    set: SettingPaths = key(
+        "variable or JSON pointer; of several, all get the same value", "usv.heading.gain"
     )
-    set: SettingPaths = key("variable or JSON pointer; of several, all get the same value", "usv.heading.gain")
     min: float = key("lower bound", 0.1)
     max: float = key("upper bound", 10.0)
     start: float | None = key("first value; default: the middle of the bounds", 1.5, default=None)
     scale: Scale = key("scale on which the method searches", "log", default="linear")
     whole: bool = key("only whole numbers, for example for a seed", True, default=False)
     multiple_of: float | None = key(
-        "only multiples of this number, for example of the step size for the time of an event", 0.01, default=None, gt=0
+        "only multiples of this number, for example of the step size for the time of an event",
+        0.01,
+        default=None,
+        gt=0,
     )
 
     @model_validator(mode="after")
@@ -188,7 +250,9 @@ class ParameterSpec(Spec):
             raise ValueError('expected a whole number between "min" and "max"')
         if self.multiple_of and self.whole:
             raise ValueError('expected "whole" or "multiple_of", found both')
-        if self.multiple_of and math.ceil(self.min / self.multiple_of) > math.floor(self.max / self.multiple_of):
+        if self.multiple_of and math.ceil(self.min / self.multiple_of) > math.floor(
+            self.max / self.multiple_of
+        ):
             raise ValueError('expected a multiple of "multiple_of" between "min" and "max"')
         return self
 
@@ -199,15 +263,22 @@ class MethodSpec(Spec):
     kind: Literal["differential_evolution", "nelder_mead", "powell"] = key(
         "optimization method", "nelder_mead", default="differential_evolution"
     )
-    population: Integer = key("points per generation (differential_evolution)", 24, default=16, ge=5)
-    generations: Integer = key("generations after the first (differential_evolution)", 40, default=20, ge=1)
+    population: Integer = key(
+        "points per generation (differential_evolution)", 24, default=16, ge=5
+    )
+    generations: Integer = key(
+        "generations after the first (differential_evolution)", 40, default=20, ge=1
+    )
     evaluations: Integer = key("points at most (nelder_mead, powell)", 100, default=200, ge=1)
     seed: Integer = key("seed of the method", 7, default=1, ge=0)
 
     def run_counts(self) -> dict[CountPath, int]:
         """Return the factors of the largest number of points."""
         if self.kind == "differential_evolution":
-            return {("method", "population"): self.population, ("method", "generations"): self.generations + 1}
+            return {
+                ("method", "population"): self.population,
+                ("method", "generations"): self.generations + 1,
+            }
         return {("method", "evaluations"): self.evaluations}
 
 
@@ -215,10 +286,14 @@ class TuneSpec(StudySpec):
     """A tuning: the expression of KPIs to be minimised, the parameters and the constraints."""
 
     parameters: list[ParameterSpec] = key(
-        "what is tuned", [{"name": "gain", "set": "usv.heading.gain", "min": 0.1, "max": 10.0}], min_length=1
+        "what is tuned",
+        [{"name": "gain", "set": "usv.heading.gain", "min": 0.1, "max": 10.0}],
+        min_length=1,
     )
     minimize: str = key("arithmetic over KPIs and parameters", "landing.lateral_error + 0.1 * gain")
-    constraints: list[str] = key("comparisons of such expressions", ["heading.overshoot <= 0.1"], default=[])
+    constraints: list[str] = key(
+        "comparisons of such expressions", ["heading.overshoot <= 0.1"], default=[]
+    )
     cases: list[dict[str, Any]] = key(
         "each point is run with each of these settings",
         [{"usv.speed_command": 0.5}, {"usv.speed_command": 1.0}],
@@ -234,7 +309,9 @@ class TuneSpec(StudySpec):
 
     @model_validator(mode="after")
     def _consistent(self) -> TuneSpec:
-        cases = Setter("cases", ("cases",), [setting for case in self.cases for setting in case.items()])
+        cases = Setter(
+            "cases", ("cases",), [setting for case in self.cases for setting in case.items()]
+        )
         check_conflicts(self.settings, [cases, *_parameter_setters(self.parameters)])
         return self
 
@@ -244,17 +321,31 @@ class TuneSpec(StudySpec):
 
 
 class WorstCaseSpec(StudySpec):
-    """A search for the run that breaks a controller: the disturbances, and the limits that a run must meet."""
+    """A search for the run that breaks a controller.
+
+    The disturbances, and the limits that a run must meet.
+    """
 
     parameters: list[ParameterSpec] = key(
         "what is searched: wind, waves, times of faults, seeds",
-        [{"name": "wind", "set": "/components/plant/arguments/environment/wind/speed", "min": 0.5, "max": 8.0}],
+        [
+            {
+                "name": "wind",
+                "set": "/components/plant/arguments/environment/wind/speed",
+                "min": 0.5,
+                "max": 8.0,
+            }
+        ],
         min_length=1,
     )
     success: list[CheckSpec] | None = key(
-        "limits on KPIs; default: the checks of the scenario", [{"kpi": "landing.lateral_error", "max": 0.2}], default=None
+        "limits on KPIs; default: the checks of the scenario",
+        [{"kpi": "landing.lateral_error", "max": 0.2}],
+        default=None,
     )
-    keep: Integer = key("largest number of counterexamples that are written, the worst ones", 5, default=3, ge=1)
+    keep: Integer = key(
+        "largest number of counterexamples that are written, the worst ones", 5, default=3, ge=1
+    )
     method: MethodSpec = key(
         "optimization method and its limits",
         {"kind": "differential_evolution", "population": 16, "generations": 5},
@@ -274,14 +365,22 @@ class WorstCaseSpec(StudySpec):
 def _parameter_setters(parameters: Sequence[ParameterSpec]) -> list[Setter]:
     """Return the settings of parameters, whose names must differ."""
     _unique_names("parameters", parameters)
-    return [Setter(each.name, ("parameters", i), [(path, None) for path in each.set]) for i, each in enumerate(parameters)]
+    return [
+        Setter(each.name, ("parameters", i), [(path, None) for path in each.set])
+        for i, each in enumerate(parameters)
+    ]
 
 
 def _unique_names(kind: str, entries: Sequence[FactorSpec | ParameterSpec]) -> list[str]:
     """Return the names of factors or parameters; raise PlacedError if two are equal."""
     names = [each.name for each in entries]
     if repeated := _first_repeated(names):
-        raise PlacedError(f'two {kind} are called "{repeated}"', kind, len(names) - 1 - names[::-1].index(repeated), "name")
+        raise PlacedError(
+            f'two {kind} are called "{repeated}"',
+            kind,
+            len(names) - 1 - names[::-1].index(repeated),
+            "name",
+        )
     return names
 
 
@@ -291,11 +390,19 @@ def _first_repeated(names: Sequence[str]) -> str | None:
 
 def _check_map(index: int, map_: MapSpec, sweep: SweepSpec) -> None:
     """Raise PlacedError if a factor of a map does not exist or has no levels."""
-    known = [each.name for each in sweep.factors if each.has_labels(sweep.design.kind != "full_factorial")]
+    known = [
+        each.name
+        for each in sweep.factors
+        if each.has_labels(sweep.design.kind != "full_factorial")
+    ]
     known += ["seed"] if sweep.seeds else []
     for name in map_.factors:
         if name not in known:
-            raise PlacedError(f'"maps" names no factor with levels "{name}"{did_you_mean(name, known)}', "maps", index)
+            raise PlacedError(
+                f'"maps" names no factor with levels "{name}"{did_you_mean(name, known)}',
+                "maps",
+                index,
+            )
 
 
 def study_json_schema(kind: type[BaseModel]) -> dict[str, Any]:

@@ -10,7 +10,10 @@ from ..scenario.schema_types import PlacedError
 
 
 class _Setting(NamedTuple):
-    """Setting of a factor, parameter or case: its owner, its name, and its path of keys in the scenario."""
+    """Setting of a factor, parameter or case.
+
+    Its owner, its name, and its path of keys in the scenario.
+    """
 
     owner: str
     name: str
@@ -18,7 +21,10 @@ class _Setting(NamedTuple):
 
     @property
     def is_pointer(self) -> bool:
-        """True if the setting changes the scenario's JSON; variables are set after all JSON changes."""
+        """True if the setting changes the scenario's JSON.
+
+        Variables are set after all JSON changes.
+        """
         return self.name.startswith("/")
 
     @property
@@ -30,18 +36,28 @@ class _Setting(NamedTuple):
         """Return the message about an `other` setting of the same path."""
         if self.name == other.name:
             return f'both {other.owner} and {self.owner} set "{self.name}"'
-        return f'both {other.owner} and {self.owner} set the same value, as "{other.name}" and as "{self.name}"'
+        return (
+            f'both {other.owner} and {self.owner} set the same value, as "{other.name}" and as '
+            f'"{self.name}"'
+        )
 
 
 def _expand_settings(owner: str, pairs: Iterable[tuple[str, Any]]) -> list[_Setting]:
     """Return the settings, including one for each part of an object."""
     return list(
-        dict.fromkeys(_Setting(owner, text, path) for text, value in pairs for path in _nested_paths(_setting_path(text), value))
+        dict.fromkeys(
+            _Setting(owner, text, path)
+            for text, value in pairs
+            for path in _nested_paths(_setting_path(text), value)
+        )
     )
 
 
 def _setting_path(text: str) -> tuple[str, ...]:
-    """Return the path of keys that a setting changes; a variable is a parameter of its component."""
+    """Return the path of keys that a setting changes.
+
+    A variable is a parameter of its component.
+    """
     if text.startswith("/"):
         return (*pointer_keys(text),)
     component, dot, variable = text.partition(".")
@@ -66,8 +82,8 @@ def check_conflicts(common: Mapping[str, Any], setters: Iterable[Setter]) -> Non
     """Raise PlacedError if one of two settings would have no effect.
 
     Args:
-        common: settings of all runs. Setters may override them; variables among them may change parts of objects that setters
-            set.
+        common: settings of all runs. Setters may override them; variables among them may change
+            parts of objects that setters set.
         setters: factors, seeds, cases or parameters, in the order in which they are applied.
     """
     defaults = _expand_settings("the settings", common.items())
@@ -80,7 +96,9 @@ def check_conflicts(common: Mapping[str, Any], setters: Iterable[Setter]) -> Non
             if other and (other not in defaults or not (each.is_nested or each.name == other.name)):
                 raise PlacedError(each.conflict_message(other), *path)
             if each.is_pointer and (other := pointers_by_path.get(each.path)):
-                raise PlacedError(f'"{each.name}" of {each.owner} replaces "{other.name}" of {other.owner}', *path)
+                raise PlacedError(
+                    f'"{each.name}" of {each.owner} replaces "{other.name}" of {other.owner}', *path
+                )
         known |= {each.path: each for each in settings}
         pointers_by_path |= _pointers_by_ancestor(settings)
 

@@ -29,7 +29,10 @@ _ENOUGH_RUNS = 10
 
 @dataclass(frozen=True)
 class Study:
-    """Scenario with settings that all runs share; `setting_variants` are further settings whose strings may name files."""
+    """Scenario with settings that all runs share.
+
+    `setting_variants` are further settings whose strings may name files.
+    """
 
     study_file: StudyFile[Any]
     setting_variants: tuple[Mapping[str, Any], ...] = ()
@@ -53,7 +56,12 @@ class Study:
     @property
     def context(self) -> StudyContext:
         """Properties that all runs share, as a runner needs them."""
-        return StudyContext(self.study_file.scenario, self.bundle.root, self.spec.deadline, fmu_paths(self.bundle.files))
+        return StudyContext(
+            self.study_file.scenario,
+            self.bundle.root,
+            self.spec.deadline,
+            fmu_paths(self.bundle.files),
+        )
 
     def job(self, settings: Mapping[str, Any]) -> Job:
         """Return the run with these settings in addition to the common ones."""
@@ -69,7 +77,9 @@ class Study:
     def _scenario(self) -> Scenario:
         """Scenario with the common settings of its file."""
         file = self.study_file.scenario
-        return load_scenario(file, {k: v for k, v in self.spec.settings.items() if k.startswith("/")}, file.parent)
+        return load_scenario(
+            file, {k: v for k, v in self.spec.settings.items() if k.startswith("/")}, file.parent
+        )
 
     def unknown_criteria(self, names: Iterable[str]) -> list[Problem]:
         """Return the problems of criteria of success whose KPIs cannot result from the functions of the scenario.
@@ -77,23 +87,35 @@ class Study:
         Args:
             names: names of the KPIs, in the order of "success".
         """
-        kpis, folder = [kpi for _, kpi in accepted(self._scenario.spec.kpis)], self._scenario.root.folder
+        kpis, folder = (
+            [kpi for _, kpi in accepted(self._scenario.spec.kpis)],
+            self._scenario.root.folder,
+        )
         return [
             Problem(text, self.study_file.document.where(("success", i, "kpi")))
             for i, name in enumerate(names)
             if (text := kpi_name_problem(name, kpis, folder))
         ]
 
-    def check_jobs(self, runner: CheckingRunner, jobs: Iterable[Job], problems: Iterable[Problem] = ()) -> None:
+    def check_jobs(
+        self, runner: CheckingRunner, jobs: Iterable[Job], problems: Iterable[Problem] = ()
+    ) -> None:
         """Raise InputError with `problems` and, with positions in the study's file, those for which these jobs cannot be run."""
-        found = [problem for job in jobs for problem in self.study_file.locate_problems(runner.check(job), job.settings)]
+        found = [
+            problem
+            for job in jobs
+            for problem in self.study_file.locate_problems(runner.check(job), job.settings)
+        ]
         if found := [*found, *problems]:
             raise InputError(dict.fromkeys(found))
 
 
 @dataclass
 class ObservedKpis:
-    """KPIs of the successful runs so far; their names are unknown before a run, and runs may differ in them."""
+    """KPIs of the successful runs so far.
+
+    Their names are unknown before a run, and runs may differ in them.
+    """
 
     runs: int = 0
     kpis: dict[str, Number] = field(default_factory=dict)
@@ -118,8 +140,13 @@ class CheckingRunner(Runner, AbstractContextManager["CheckingRunner"], Protocol)
         ...
 
 
-def run_pending(jobs: Iterable[Job], run_store: RunStore, runner: Runner, observe: RecordObserver) -> None:
-    """Run the jobs that are not finished; store each record and call `observe` with it as soon as its run has ended."""
+def run_pending(
+    jobs: Iterable[Job], run_store: RunStore, runner: Runner, observe: RecordObserver
+) -> None:
+    """Run the jobs that are not finished.
+
+    Store each record and call `observe` with it as soon as its run has ended.
+    """
     for record in runner.run_jobs(run_store.claim_jobs(jobs)):
         run_store.add(record)
         observe(record)

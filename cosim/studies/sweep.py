@@ -90,17 +90,30 @@ class Sweep:
     def criteria(self) -> list[dict[str, Any]]:
         """Checks that a run must meet to be a success."""
         success = self.study_file.spec.success
-        return self.study.checks if success is None else [check.model_dump(exclude_none=True) for check in success]
+        return (
+            self.study.checks
+            if success is None
+            else [check.model_dump(exclude_none=True) for check in success]
+        )
 
     def missed(self, kpis: Mapping[str, Number]) -> list[CheckOutcome]:
-        """Return the criteria that these KPIs do not meet; a missing KPI has the value NaN and meets none."""
-        return [outcome for outcome in evaluate_all_checks(kpis, self.criteria) if not outcome.passed]
+        """Return the criteria that these KPIs do not meet.
+
+        A missing KPI has the value NaN and meets none.
+        """
+        return [
+            outcome for outcome in evaluate_all_checks(kpis, self.criteria) if not outcome.passed
+        ]
 
     def check(self, runner: CheckingRunner) -> None:
         """Raise InputError with all problems of the levels of the factors and of the names of the criteria."""
         points = islice(self._representatives(), _MAX_CHECKED_POINTS)
         jobs = (self.study.job(point.settings) for point in points)
-        self.study.check_jobs(runner, jobs, () if self._varies_kpis else self.study.unknown_criteria(self._own_criteria))
+        self.study.check_jobs(
+            runner,
+            jobs,
+            () if self._varies_kpis else self.study.unknown_criteria(self._own_criteria),
+        )
 
     @property
     def _own_criteria(self) -> list[str]:
@@ -119,7 +132,9 @@ class Sweep:
         listed = {factor.name for factor in self.design.factors if factor.listed_levels}
         complete = 1 + sum(len(factor.listed_levels) for factor in self.design.factors)
         for point in self.design:
-            new = {(name, repr(label)) for name, label in point.labels.items() if name in listed} - seen
+            new = {
+                (name, repr(label)) for name, label in point.labels.items() if name in listed
+            } - seen
             if new or not seen:
                 seen |= new | {("", "")}
                 yield point
@@ -135,8 +150,9 @@ class Sweep:
             observe: called after every run.
 
         Raises:
-            InputError: before the first run for a level that cannot be set and for unknown KPIs in criteria; after the first runs
-                for KPIs in criteria whose function gives names that its source does not show.
+            InputError: before the first run for a level that cannot be set and for unknown KPIs in
+                criteria; after the first runs for KPIs in criteria whose function gives names that
+                its source does not show.
         """
         observed_kpis = ObservedKpis()
 
@@ -162,7 +178,10 @@ class Sweep:
         names = [factor.name for factor in self.study_file.spec.factors]
         where = self.study_file.document.where
         if problems := [
-            Problem(f'expected a name other than that of the KPI "{name}"', where(("factors", i, "name")))
+            Problem(
+                f'expected a name other than that of the KPI "{name}"',
+                where(("factors", i, "name")),
+            )
             for i, name in enumerate(names)
             if name in kpis
         ]:

@@ -35,7 +35,8 @@ from .schema import TuneSpec
 from .search_space import parameter_settings, parameter_values, start_coordinates
 from .study import CheckingRunner, ObservedKpis, RecordObserver, Study, run_pending
 
-#: ranks of points worse than any feasible value, beside INFEASIBLE_RANK; small enough for optimizers to square and add them
+#: ranks of points worse than any feasible value, beside INFEASIBLE_RANK; small enough for
+#: optimizers to square and add them
 _MAX_VALUE, _NO_VALUE_RANK, _FAILED_RANK = 1e99, 1e149, 1e150
 
 
@@ -62,7 +63,11 @@ class Trial:
             return _FAILED_RANK
         if not self.value < math.inf:
             return _NO_VALUE_RANK
-        return min(INFEASIBLE_RANK * (1 + self.violation), _NO_VALUE_RANK) if self.violation else min(self.value, _MAX_VALUE)
+        return (
+            min(INFEASIBLE_RANK * (1 + self.violation), _NO_VALUE_RANK)
+            if self.violation
+            else min(self.value, _MAX_VALUE)
+        )
 
     @property
     def feasible(self) -> bool:
@@ -103,7 +108,10 @@ class Tuning:
                 return None
 
         objective = parse(parse_expression, study_file.spec.minimize, "minimize")
-        constraints = [parse(parse_constraint, text, "constraints", i) for i, text in enumerate(study_file.spec.constraints)]
+        constraints = [
+            parse(parse_constraint, text, "constraints", i)
+            for i, text in enumerate(study_file.spec.constraints)
+        ]
         if problems:
             raise InputError(problems)
         return cls(study_file, objective, constraints)
@@ -127,15 +135,20 @@ class Tuning:
             observe: called after every run.
 
         Raises:
-            InputError: before the first run for a parameter or case that cannot be set; after the first runs for unknown names
-                in the objective or a constraint.
+            InputError: before the first run for a parameter or case that cannot be set; after the
+                first runs for unknown names in the objective or a constraint.
         """
         start = start_coordinates(self.spec.parameters)
         self.study.check_jobs(runner, self._jobs([parameter_values(self.spec.parameters, start)]))
 
         def evaluate(points: Sequence[Sequence[float]]) -> list[float]:
             parameters = [parameter_values(self.spec.parameters, point) for point in points]
-            run_pending((job for each in parameters for job in self._jobs([each])), run_store, runner, observe)
+            run_pending(
+                (job for each in parameters for job in self._jobs([each])),
+                run_store,
+                runner,
+                observe,
+            )
             trials = [self._trial(each, run_store) for each in parameters]
             self.trials += trials
             if self.observed_kpis.has_enough_runs:
@@ -151,7 +164,11 @@ class Tuning:
         return parameter_settings(self.spec.parameters, parameters)
 
     def _jobs(self, points: Iterable[Mapping[str, float]]) -> list[Job]:
-        return [self.study.job({**case, **self.settings(point)}) for point in points for case in self.spec.cases]
+        return [
+            self.study.job({**case, **self.settings(point)})
+            for point in points
+            for case in self.spec.cases
+        ]
 
     def _trial(self, parameters: Mapping[str, float], run_store: RunStore) -> Trial:
         records = [run_store[job.key] for job in self._jobs([parameters])]
@@ -161,15 +178,32 @@ class Tuning:
             return Trial(parameters, math.nan, math.inf, failures[0])
         operands = [{**record.kpis, **parameters} for record in records]
         values = [self.objective(each) for each in operands]
-        violation = sum(constraint.violation(each) for constraint in self.constraints for each in operands)
-        return Trial(parameters, float(np.max(values)) if self.spec.over_cases == "max" else fmean(values), violation)
+        violation = sum(
+            constraint.violation(each) for constraint in self.constraints for each in operands
+        )
+        return Trial(
+            parameters,
+            float(np.max(values)) if self.spec.over_cases == "max" else fmean(values),
+            violation,
+        )
 
     def _check_names(self) -> None:
-        """Raise InputError for names that are neither a parameter nor a KPI of any run; pass if no run has succeeded."""
-        known = {**self.observed_kpis.kpis, **dict.fromkeys(each.name for each in self.spec.parameters)}
-        expressions: list[tuple[Expression, tuple[str | int, ...]]] = [(self.objective, ("minimize",))]
+        """Raise InputError for names that are neither a parameter nor a KPI of any run.
+
+        Pass if no run has succeeded.
+        """
+        known = {
+            **self.observed_kpis.kpis,
+            **dict.fromkeys(each.name for each in self.spec.parameters),
+        }
+        expressions: list[tuple[Expression, tuple[str | int, ...]]] = [
+            (self.objective, ("minimize",))
+        ]
         for i, constraint in enumerate(self.constraints):
-            expressions += [(constraint.left, ("constraints", i)), (constraint.right, ("constraints", i))]
+            expressions += [
+                (constraint.left, ("constraints", i)),
+                (constraint.right, ("constraints", i)),
+            ]
         problems = [
             Problem(text, self.study_file.document.where(path))
             for expression, path in expressions

@@ -1,4 +1,7 @@
-"""Search for the run that breaks a controller: wind, waves, faults and seeds with which a run misses its checks the most."""
+"""Search for the run that breaks a controller.
+
+Wind, waves, faults and seeds with which a run misses its checks the most.
+"""
 
 from __future__ import annotations
 
@@ -30,8 +33,10 @@ class Attempt:
 
     Attributes:
         parameters: Values of the parameters by name.
-        severity: Largest excess of a KPI over its limit, as a fraction of the limit; negative: all checks passed.
-        reason: The check that is missed by most or is closest to its limit, or the failure of the run.
+        severity: Largest excess of a KPI over its limit, as a fraction of the limit; negative: all
+            checks passed.
+        reason: The check that is missed by most or is closest to its limit, or the failure of the
+            run.
         passed: All checks of the run passed.
     """
 
@@ -62,7 +67,10 @@ class WorstCase:
         """
         search = cls(read_study(file, WorstCaseSpec, max_runs))
         if not search.criteria:
-            raise InputError(f'{search.spec.name}: nothing can break, expected "success" or checks of the scenario')
+            raise InputError(
+                f'{search.spec.name}: nothing can break, expected "success" or checks of the '
+                "scenario"
+            )
         return search
 
     @property
@@ -79,12 +87,18 @@ class WorstCase:
     def criteria(self) -> list[dict[str, Any]]:
         """Checks that a run must meet."""
         success = self.spec.success
-        return self.study.checks if success is None else [check.model_dump(exclude_none=True) for check in success]
+        return (
+            self.study.checks
+            if success is None
+            else [check.model_dump(exclude_none=True) for check in success]
+        )
 
     @property
     def counterexamples(self) -> list[Attempt]:
         """The worst runs that miss a check, without repetitions, at most `keep`."""
-        broken = {tuple(each.parameters.values()): each for each in self.attempts if not each.passed}
+        broken = {
+            tuple(each.parameters.values()): each for each in self.attempts if not each.passed
+        }
         return sorted(broken.values(), key=lambda each: -each.severity)[: self.spec.keep]
 
     @property
@@ -105,12 +119,19 @@ class WorstCase:
         """
         start = start_coordinates(self.spec.parameters)
         jobs = [self._job(parameter_values(self.spec.parameters, start))]
-        self.study.check_jobs(runner, jobs, self.study.unknown_criteria(check.kpi for check in self.spec.success or ()))
+        self.study.check_jobs(
+            runner,
+            jobs,
+            self.study.unknown_criteria(check.kpi for check in self.spec.success or ()),
+        )
 
         def evaluate(points: Sequence[Sequence[float]]) -> list[float]:
             values = [parameter_values(self.spec.parameters, point) for point in points]
             run_pending(map(self._job, values), run_store, runner, observe)
-            attempts = [self._attempt(each, run_store[self._job(each).key], run_store.units) for each in values]
+            attempts = [
+                self._attempt(each, run_store[self._job(each).key], run_store.units)
+                for each in values
+            ]
             self.attempts += attempts
             return [-each.severity for each in attempts]
 
@@ -121,22 +142,36 @@ class WorstCase:
     def settings(self, attempt: Attempt) -> dict[str, Any]:
         """Return all settings of the scenario for a run, with the checks that it must meet."""
         checks = {} if self.spec.success is None else {"/checks": self.criteria}
-        return {**self.spec.settings, **checks, **parameter_settings(self.spec.parameters, attempt.parameters)}
+        return {
+            **self.spec.settings,
+            **checks,
+            **parameter_settings(self.spec.parameters, attempt.parameters),
+        }
 
     def _job(self, values: Mapping[str, float]) -> Job:
         return self.study.job(parameter_settings(self.spec.parameters, values))
 
-    def _attempt(self, values: Mapping[str, float], record: Record, units: Mapping[str, str]) -> Attempt:
+    def _attempt(
+        self, values: Mapping[str, float], record: Record, units: Mapping[str, str]
+    ) -> Attempt:
         self.observed_kpis.add(record)
         if record.failure:
             return Attempt(values, _FAILED, record.failure, False)
         outcomes = evaluate_all_checks(record.kpis, self.criteria)
         closest = max(outcomes, key=severity)
-        return Attempt(values, severity(closest), closest.text(units), all(outcome.passed for outcome in outcomes))
+        return Attempt(
+            values,
+            severity(closest),
+            closest.text(units),
+            all(outcome.passed for outcome in outcomes),
+        )
 
 
 def severity(outcome: CheckOutcome) -> float:
-    """Return the excess of a KPI over its limit as a fraction of the limit, or of 1 if it is 0; negative: within the limit."""
+    """Return the excess of a KPI over its limit as a fraction of the limit, or of 1 if it is 0.
+
+    Negative: within the limit.
+    """
     value, check = outcome.value, outcome.check
     if math.isnan(value) or ("equals" in check and not outcome.passed):
         return _WRONG

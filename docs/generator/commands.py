@@ -26,12 +26,17 @@ def _sections(context: click.Context) -> Iterator[str]:
     """Yield heading, usage, text and options of a command and of its subcommands."""
     command = context.command
     yield f"## {context.command_path}"
-    yield f"```text\n{' '.join((context.command_path, *command.collect_usage_pieces(context)))}\n```"
+    yield (
+        f"```text\n{' '.join((context.command_path, *command.collect_usage_pieces(context)))}\n```"
+    )
     yield plain(inspect.cleandoc(command.help or ""))
     yield _options(context)
     if isinstance(command, click.Group):
         for name, child in command.commands.items():
-            yield from (section.replace("## ", "### ", 1) for section in _sections(click.Context(child, context, name)))
+            yield from (
+                section.replace("## ", "### ", 1)
+                for section in _sections(click.Context(child, context, name))
+            )
 
 
 def _options(context: click.Context) -> str:
@@ -40,4 +45,7 @@ def _options(context: click.Context) -> str:
         for option in context.command.get_params(context)
         if isinstance(option, click.Option) and "--help" not in option.opts
     ]
-    return table(("option", "purpose"), ((code(record[0]), plain(record[1])) for _, record in records if record))
+    return table(
+        ("option", "purpose"),
+        ((code(record[0]), plain(record[1])) for _, record in records if record),
+    )

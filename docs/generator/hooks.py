@@ -1,4 +1,7 @@
-"""Hooks of MkDocs: the pages of the repository in their places, and the generated pages of the reference."""
+"""Hooks of MkDocs.
+
+The pages of the repository in their places, and the generated pages of the reference.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,10 @@ ROOT = Path(__file__).parents[2]
 #: documents outside of docs/ that the navigation contains; others are found by links
 STARTS = ("README.md", "CONTRIBUTING.md", "SECURITY.md", "CHANGELOG.md", "plant_src/README.md")
 #: files that the theme loads
-ASSETS = tuple(f"docs/generator/assets/{name}" for name in ("iframe-worker.js", "site.css", "names_and_tables.js"))
+ASSETS = tuple(
+    f"docs/generator/assets/{name}"
+    for name in ("iframe-worker.js", "site.css", "names_and_tables.js")
+)
 #: generated pages
 REFERENCE = {
     "commands": commands_page,
@@ -58,7 +64,10 @@ def on_page_markdown(markdown: str, **_: object) -> str:
 
 
 def on_post_template(output_content: str, template_name: str, **_: object) -> str:
-    """Make the links of the page "404" relative, so that it is readable as a file; a server shows it at any address."""
+    """Make the links of the page "404" relative, so that it is readable as a file.
+
+    A server shows it at any address.
+    """
     if template_name != "404.html":
         return output_content
     relative = re.sub(r'((?:href|src)=")/', r"\1", output_content)
@@ -74,7 +83,12 @@ def repository_files(generated: Mapping[str, str]) -> list[str]:
     Raises:
         FileNotFoundError: A document links to another document that does not exist.
     """
-    pending = [*generated, *STARTS, *ASSETS, *(str(path.relative_to(ROOT)) for path in (ROOT / "docs").rglob("*.md"))]
+    pending = [
+        *generated,
+        *STARTS,
+        *ASSETS,
+        *(str(path.relative_to(ROOT)) for path in (ROOT / "docs").rglob("*.md")),
+    ]
     found: set[str] = set()
     while pending:
         name = pending.pop()
@@ -82,6 +96,8 @@ def repository_files(generated: Mapping[str, str]) -> list[str]:
             continue
         found.add(name)
         if name.endswith(".md"):
-            text = generated[name] if name in generated else (ROOT / name).read_text(encoding="utf-8")
+            text = (
+                generated[name] if name in generated else (ROOT / name).read_text(encoding="utf-8")
+            )
             pending += [normpath(Path(name).parent / target) for target in _LINK.findall(text)]
     return sorted(found.difference(generated))

@@ -21,7 +21,10 @@ def scenario_keys_page() -> str:
     scenario, nested = json_schema(), json_schema(nested=True)
     return page(
         "Scenario keys",
-        "`cosim schema` prints the schema of this page. [Scenarios](../scenarios.md) explains how the keys work together.",
+        (
+            "`cosim schema` prints the schema of this page. [Scenarios](../scenarios.md) explains "
+            "how the keys work together."
+        ),
         *_sections("Scenario", scenario),
         *_sections("Nested system", nested, scenario["$defs"]),
     )
@@ -31,24 +34,33 @@ def world_keys_page() -> str:
     """Return the page with the arguments of the shipped plant, and the functions of its 3-D scenes."""
     return page(
         "Arguments of the plant",
-        'A scenario gives these arguments to the component `{"python": "cosim:plant_src/world.py:World", "arguments": {...}}`. '
+        'A scenario gives these arguments to the component `{"python": '
+        '"cosim:plant_src/world.py:World", "arguments": {...}}`. '
         "[The plant](../../plant_src/README.md) explains the models, and "
         "[Put the shipped plant into your scenario](../how_to/use_the_plant.md) shows an example. "
-        "An editor completes these keys with the schema of `cosim schema`. SI units; the world frame is east-north-up.",
+        "An editor completes these keys with the schema of `cosim schema`. SI units; the world "
+        "frame is east-north-up.",
         *_sections("World", world_schema()),
         "## Scenes",
-        'The key `"scene"` of a scenario names one of these functions for the 3-D replay, for example '
-        '`{"python": "cosim:plant_src/scene/replay.py:world_scene", "arguments": {"name": "plant"}}`. cosim passes `scenario`.',
+        'The key `"scene"` of a scenario names one of these functions for the 3-D replay, for '
+        "example "
+        '`{"python": "cosim:plant_src/scene/replay.py:world_scene", "arguments": {"name": '
+        '"plant"}}`. cosim passes `scenario`.',
         *(f"::: plant_src.scene.replay.{name}" for name in ("world_scene", "free")),
     )
 
 
 def study_keys_page() -> str:
     """Return the page with the keys of sweeps and tunings."""
-    sweep, tuning, worst = study_json_schema(SweepSpec), study_json_schema(TuneSpec), study_json_schema(WorstCaseSpec)
+    sweep, tuning, worst = (
+        study_json_schema(SweepSpec),
+        study_json_schema(TuneSpec),
+        study_json_schema(WorstCaseSpec),
+    )
     return page(
         "Sweep and tuning keys",
-        "`cosim schema --sweep`, `--tune` and `--worst` print the schemas of this page. [Sweeps and tuning](../sweeps.md) "
+        "`cosim schema --sweep`, `--tune` and `--worst` print the schemas of this page. [Sweeps "
+        "and tuning](../sweeps.md) "
         "explains how the keys work together.",
         *_sections("Sweep", sweep),
         *_sections("Tuning", tuning, sweep["$defs"]),
@@ -66,7 +78,9 @@ def _sections(title: str, schema: Schema, known: Collection[str] = ()) -> Iterat
 
 def _section(title: str, part: Schema) -> str:
     required = part.get("required", ())
-    rows = ((code(key), *_cells(about, key in required)) for key, about in part["properties"].items())
+    rows = (
+        (code(key), *_cells(about, key in required)) for key, about in part["properties"].items()
+    )
     header = ("key", "type", "default", "unit", "meaning", "example")
     return f"## {title}\n\n{plain(part.get('description', ''))}\n\n{table(header, rows)}"
 
@@ -82,7 +96,11 @@ def _cells(about: Schema, required: bool) -> Iterator[str]:
 def _default(value: Any) -> str:
     if isinstance(value, dict):
         value = {name: item for name, item in value.items() if item is not None}
-    return "" if value in (None, "", [], {}) else code(value if isinstance(value, str) else json.dumps(value))
+    return (
+        ""
+        if value in (None, "", [], {})
+        else code(value if isinstance(value, str) else json.dumps(value))
+    )
 
 
 def _type(schema: Schema) -> str:
@@ -91,7 +109,9 @@ def _type(schema: Schema) -> str:
         title = _title(schema["$ref"].rpartition("/")[2])
         return f"[{title.lower()}](#{title.lower().replace(' ', '-')})"
     if "anyOf" in schema:
-        return " or ".join(dict.fromkeys(_type(part) for part in schema["anyOf"] if part.get("type") != "null"))
+        return " or ".join(
+            dict.fromkeys(_type(part) for part in schema["anyOf"] if part.get("type") != "null")
+        )
     if values := schema.get("enum", [schema["const"]] if "const" in schema else None):
         return " or ".join(code(json.dumps(value)) for value in values)
     match schema.get("type"):
@@ -99,7 +119,10 @@ def _type(schema: Schema) -> str:
             items = _type(schema.get("items", {}))
             return f"list of ({items})" if " or " in items else f"list of {items}"
         case "object":
-            inner = next(iter(schema.get("patternProperties", {}).values()), schema.get("additionalProperties"))
+            inner = next(
+                iter(schema.get("patternProperties", {}).values()),
+                schema.get("additionalProperties"),
+            )
             return f"object of {_type(inner)}" if isinstance(inner, dict) and inner else "object"
         case list() as kinds:
             return " or ".join(kinds)

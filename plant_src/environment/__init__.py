@@ -18,8 +18,8 @@ def sea(environment: Any) -> Sea:
         environment: Argument "environment" of the world, a JSON object.
 
     Returns:
-        Components whose time (s) counts from the start of the run; arrays of length 0 without waves. The world's input
-        `environment.wave_gain` multiplies all amplitudes.
+        Components whose time (s) counts from the start of the run; arrays of length 0 without
+        waves. The world's input `environment.wave_gain` multiplies all amplitudes.
 
     Raises:
         InputError: With all problems.

@@ -1,11 +1,13 @@
 """Coloured noise on a fixed time grid, as a pure function of seed, name and grid index.
 
-A channel is white noise filtered by (1 + b T s) / (1 + T s)^2, or 1 / (1 + T s), discretised exactly: on the grid it has the
-variance, autocorrelation and joint distribution of the continuous process, for any T. With
+A channel is white noise filtered by (1 + b T s) / (1 + T s)^2, or 1 / (1 + T s), discretised
+exactly: on the grid it has the variance, autocorrelation and joint distribution of the continuous
+process, for any T. With
 
     T x1' = -x1 + white,  T x2' = -x2 + x1,  y = b x1 + (1 - b) x2      (b = 1: first order)
 
-the covariances are P11 = p, P12 = P22 = p / 2, and the variance of y is b^2 p + (1 - b)^2 p / 2 + b (1 - b) p.
+the covariances are P11 = p, P12 = P22 = p / 2, and the variance of y is b^2 p + (1 - b)^2 p / 2 + b
+(1 - b) p.
 """
 
 from __future__ import annotations
@@ -26,7 +28,10 @@ BLOCK_LENGTH = 256
 
 @dataclass(frozen=True)
 class Channel:
-    """Noise with a standard deviation, a time constant T (s) and a lead b; b = 1 gives a first-order filter."""
+    """Noise with a standard deviation, a time constant T (s) and a lead b.
+
+    B = 1 gives a first-order filter.
+    """
 
     deviation: float
     time_constant: float
@@ -34,9 +39,12 @@ class Channel:
 
 
 class ColouredNoise:
-    """Several channels of noise for each of several names; `noise[k]` holds the values from k GRID_STEP to (k + 1) GRID_STEP.
+    """Several channels of noise for each of several names.
 
-    A step of the grid is x1 <- a x1 + n1, x2 <- a (x2 + g x1) + n2, with correlated white noises n1 and n2.
+    `noise[k]` holds the values from k GRID_STEP to (k + 1) GRID_STEP.
+
+    A step of the grid is x1 <- a x1 + n1, x2 <- a (x2 + g x1) + n2, with correlated white noises n1
+    and n2.
 
     Args:
         seed: Seed of all random numbers of the world.
@@ -52,7 +60,9 @@ class ColouredNoise:
         self._g = g = GRID_STEP / time_constant
         self._a = a = np.exp(-g)
         self._lead = lead
-        propagated = a**2 * np.array([p, p * (g + 1 / 2), p * (g**2 + g + 1 / 2)])  # P11, P12, P22 after a step without noise
+        propagated = a**2 * np.array(
+            [p, p * (g + 1 / 2), p * (g**2 + g + 1 / 2)]
+        )  # P11, P12, P22 after a step without noise
         self._noise_root = _covariance_root(*(np.array([p, p / 2, p / 2]) - propagated))
         white = self._white_noise((), 1)
         #: x1 and x2 at the start of each block computed so far
@@ -80,15 +90,24 @@ class ColouredNoise:
         if number + 1 == len(self._block_start_states):
             self._block_start_states.append(np.array([x1[:, -1:], x2[:, -1:]]))
         values = self._lead * x1[:, :-1] + (1 - self._lead) * x2[:, :-1]
-        self._block_number, self._values = number, list(zip(*self._map_channels(values).tolist(), strict=True))
+        self._block_number, self._values = (
+            number,
+            list(zip(*self._map_channels(values).tolist(), strict=True)),
+        )
 
     def _white_noise(self, part: Sequence[str], count: int) -> np.ndarray:
         """Return two white noises of all names and channels, shape (2, names x channels, count)."""
         shape = (2, self._channel_count, count)
-        return np.concatenate([generator(self._seed, name, *part).standard_normal(shape) for name in self._names], axis=1)
+        return np.concatenate(
+            [generator(self._seed, name, *part).standard_normal(shape) for name in self._names],
+            axis=1,
+        )
 
     def _map_channels(self, values: np.ndarray) -> np.ndarray:
-        """Map channel values, shape (names x channels, BLOCK_LENGTH), to the published values; a hook for subclasses."""
+        """Map channel values, shape (names x channels, BLOCK_LENGTH), to the published values.
+
+        A hook for subclasses.
+        """
         return values
 
 

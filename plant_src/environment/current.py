@@ -29,14 +29,19 @@ class Ramp:
 
 @dataclass(frozen=True)
 class Variation:
-    """Independent first-order Gauss-Markov processes in x and y: standard deviation (m/s) and time constant (s)."""
+    """Independent first-order Gauss-Markov processes in x and y.
+
+    Standard deviation (m/s) and time constant (s).
+    """
 
     standard_deviation: float
     time_constant: float
 
     def create_noise(self, seed: int) -> ColouredNoise:
         """Return the variation of the current, which is the same for all vessels."""
-        return ColouredNoise(seed, ["current"], [Channel(self.standard_deviation, self.time_constant)] * 2)
+        return ColouredNoise(
+            seed, ["current"], [Channel(self.standard_deviation, self.time_constant)] * 2
+        )
 
 
 @dataclass(frozen=True)

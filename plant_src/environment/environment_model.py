@@ -1,4 +1,8 @@
-"""Environment model: computes wind, current, waves and the surfaces below and writes the environment inputs of all vehicles."""
+"""Environment model.
+
+Computes wind, current, waves and the surfaces below and writes the environment inputs of all
+vehicles.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +15,12 @@ import numpy as np
 from cosim.core.component import Variable
 
 from ..physics.vessel_bodies import FloatingBody
-from ..vehicles.common.interface import CURRENT_INPUTS, WAVE_GAIN_INPUT, WIND_INPUTS, scalar_variable
+from ..vehicles.common.interface import (
+    CURRENT_INPUTS,
+    WAVE_GAIN_INPUT,
+    WIND_INPUTS,
+    scalar_variable,
+)
 from .sea import Sea
 from .settings import EnvironmentSettings
 from .surfaces import SurfaceTable
@@ -40,14 +49,18 @@ class EnvironmentModel:
         bodies: Contact body of each vehicle.
 
     Attributes:
-        values: Inputs and outputs, which are the whole state: everything else is a function of time and seed.
-        inputs: View of `values`: mean wind (m/s), mean current (m/s) and wave gain (1), as far as the environment has them.
+        values: Inputs and outputs, which are the whole state: everything else is a function of time
+            and seed.
+        inputs: View of `values`: mean wind (m/s), mean current (m/s) and wave gain (1), as far as
+            the environment has them.
         outputs: View of `values`: wind (m/s) and wave elevation (m) at the vehicles.
         input_variables: Variables of `inputs`.
         output_variables: Variables of `outputs`.
-        update_functions: Functions that write the environment inputs, empty without wind, waves, current and ground effect.
+        update_functions: Functions that write the environment inputs, empty without wind, waves,
+            current and ground effect.
         vessels_without_wave_motion: Names of planar vessels in waves.
-        wind_is_without_effect: There is wind, and all coefficients of air drag of all vehicles are 0.
+        wind_is_without_effect: There is wind, and all coefficients of air drag of all vehicles are
+            0.
     """
 
     def __init__(
@@ -59,7 +72,9 @@ class EnvironmentModel:
         bodies: Sequence[ContactBody],
     ):
         self._wind_vehicles = _bodies_with_input(bodies, "wind.x") if environment.wind else []
-        self._wave_vessels = [body for body in bodies if isinstance(body, FloatingBody)] if environment.waves else []
+        self._wave_vessels = (
+            [body for body in bodies if isinstance(body, FloatingBody)] if environment.waves else []
+        )
         self.input_variables, self.output_variables = (
             _input_variables(environment),
             _output_variables(self._wind_vehicles, self._wave_vessels),
@@ -68,11 +83,17 @@ class EnvironmentModel:
         self.inputs, self.outputs = np.split(self.values, [len(self.input_variables)])
         self.inputs[:] = [variable.start for variable in self.input_variables]
         self.vessels_without_wave_motion = [
-            body.name for body in bodies if environment.waves and body.model.is_vessel and body not in self._wave_vessels
+            body.name
+            for body in bodies
+            if environment.waves and body.model.is_vessel and body not in self._wave_vessels
         ]
         has_wind = environment.wind is not None and any(environment.wind.velocity)
-        self.wind_is_without_effect = has_wind and not any(any(_air_drag(vehicle)) for vehicle in vehicles)
-        self._wave_gain: Any = self._input_view("wave_gain") if environment.waves else np.ones(1).data
+        self.wind_is_without_effect = has_wind and not any(
+            any(_air_drag(vehicle)) for vehicle in vehicles
+        )
+        self._wave_gain: Any = (
+            self._input_view("wave_gain") if environment.waves else np.ones(1).data
+        )
         self._elevation = sea.elevation_function()
         self._highest_elevation = sea.highest_elevation
         #: height that no crest exceeds (m)
@@ -81,9 +102,15 @@ class EnvironmentModel:
             input_data(body, "water_level")[0] = 0.0
         self.update_functions = list(self._create_updates(environment, bodies))
         all_multirotors = _bodies_with_input(bodies, "ground_distance")
-        if multirotors := all_multirotors if environment.waves else _multirotors_in_ground_effect(vehicles, bodies):
+        if (
+            multirotors := all_multirotors
+            if environment.waves
+            else _multirotors_in_ground_effect(vehicles, bodies)
+        ):
             surfaces = SurfaceTable([body for body in bodies if body.model.is_vessel], platforms)
-            update = SurroundingsUpdate(multirotors, surfaces, sea, self._wave_gain, self._highest_water)
+            update = SurroundingsUpdate(
+                multirotors, surfaces, sea, self._wave_gain, self._highest_water
+            )
             self.update_functions.append(update.update)
         first = 3 * len(self._wind_vehicles)
         self._elevations = [
@@ -97,15 +124,26 @@ class EnvironmentModel:
         names = [variable.name for variable in self.input_variables]
         return self.inputs[names.index(f"environment.{name}") :].data
 
-    def _create_updates(self, environment: EnvironmentSettings, bodies: Sequence[ContactBody]) -> Iterator[UpdateFunction]:
+    def _create_updates(
+        self, environment: EnvironmentSettings, bodies: Sequence[ContactBody]
+    ) -> Iterator[UpdateFunction]:
         seed, wind, current = environment.seed, environment.wind, environment.current
         if wind:
-            yield WindUpdate(wind, seed, self._input_view("wind.x"), self._wind_vehicles, self.outputs.data).update
+            yield WindUpdate(
+                wind, seed, self._input_view("wind.x"), self._wind_vehicles, self.outputs.data
+            ).update
         if current:
-            yield CurrentUpdate(current, seed, self._input_view("current.x"), _bodies_with_input(bodies, "current.x")).update
+            yield CurrentUpdate(
+                current,
+                seed,
+                self._input_view("current.x"),
+                _bodies_with_input(bodies, "current.x"),
+            ).update
         if environment.waves:
             yield self._update_highest_water
-            if submerged := [body for body in _bodies_with_input(bodies, "water_level") if body.model.craft]:
+            if submerged := [
+                body for body in _bodies_with_input(bodies, "water_level") if body.model.craft
+            ]:
                 yield WaterLevelUpdate(submerged, self.water_level, self._highest_water).update
         if self._wave_vessels:
             gains = [input_data(body, "wave_gain") for body in self._wave_vessels]
@@ -131,7 +169,11 @@ class EnvironmentModel:
 
 def _bodies_with_input(bodies: Sequence[ContactBody], name: str) -> list[ContactBody]:
     """Return the vehicles that have an environment input."""
-    return [body for body in bodies if any(variable.name == name for variable in body.model.environment_inputs)]
+    return [
+        body
+        for body in bodies
+        if any(variable.name == name for variable in body.model.environment_inputs)
+    ]
 
 
 def _air_drag(vehicle: VehiclePlacement) -> list[float]:
@@ -153,25 +195,42 @@ def _input_variables(environment: EnvironmentSettings) -> list[Variable]:
         pairs += zip(CURRENT_INPUTS, environment.current.velocity, strict=True)
     if environment.waves:
         pairs += zip(WAVE_GAIN_INPUT, (1.0,), strict=True)
-    return [replace(variable, name=f"environment.{variable.name}", start=start) for variable, start in pairs]
+    return [
+        replace(variable, name=f"environment.{variable.name}", start=start)
+        for variable, start in pairs
+    ]
 
 
-def _output_variables(wind_vehicles: Sequence[ContactBody], wave_vessels: Sequence[ContactBody]) -> list[Variable]:
+def _output_variables(
+    wind_vehicles: Sequence[ContactBody], wave_vessels: Sequence[ContactBody]
+) -> list[Variable]:
     elevation = scalar_variable(
-        "wave.elevation", "m", "elevation of the water at the centre of mass above the still water", "output"
+        "wave.elevation",
+        "m",
+        "elevation of the water at the centre of mass above the still water",
+        "output",
     )
     winds = [
         replace(wind, name=f"{body.name}.{wind.name}", causality="output", start=None)
         for body in wind_vehicles
         for wind in WIND_INPUTS
     ]
-    return [*winds, *(replace(elevation, name=f"{body.name}.{elevation.name}", start=None) for body in wave_vessels)]
+    return [
+        *winds,
+        *(
+            replace(elevation, name=f"{body.name}.{elevation.name}", start=None)
+            for body in wave_vessels
+        ),
+    ]
 
 
-def _multirotors_in_ground_effect(vehicles: Sequence[VehiclePlacement], bodies: Sequence[ContactBody]) -> list[ContactBody]:
+def _multirotors_in_ground_effect(
+    vehicles: Sequence[VehiclePlacement], bodies: Sequence[ContactBody]
+) -> list[ContactBody]:
     """Return the multirotors with the ground effect switched on."""
     return [
         body
         for vehicle, body in zip(vehicles, bodies, strict=True)
-        if body in _bodies_with_input(bodies, "ground_distance") and vehicle.parameter("ground_effect")
+        if body in _bodies_with_input(bodies, "ground_distance")
+        and vehicle.parameter("ground_effect")
     ]

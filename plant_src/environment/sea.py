@@ -2,12 +2,13 @@
 
     elevation(x, y, t) = sum a cos(k (x cos d + y sin d) - w t + phase)
 
-The spectrum between MIN_FREQUENCY_RATIO and MAX_FREQUENCY_RATIO times the peak frequency (99.5 % of the energy of a
-Pierson-Moskowitz sea) is divided into bins of equal energy. Each bin gives one component. All components have the same amplitude
-with sum a^2 / 2 = m0 of this part. The frequency is drawn from the bin with the density of the spectrum, so the frequencies have
-no common divisor and the sea does not repeat itself. Directions are drawn in the same way from bins of equal energy of the
-spreading function D(d) ~ cos^n(d - mean), |d - mean| < pi/2 (DNV-RP-C205, 3.5.8), and assigned in random order. Without
-spreading all components have the mean direction.
+The spectrum between MIN_FREQUENCY_RATIO and MAX_FREQUENCY_RATIO times the peak frequency (99.5 % of
+the energy of a Pierson-Moskowitz sea) is divided into bins of equal energy. Each bin gives one
+component. All components have the same amplitude with sum a^2 / 2 = m0 of this part. The frequency
+is drawn from the bin with the density of the spectrum, so the frequencies have no common divisor
+and the sea does not repeat itself. Directions are drawn in the same way from bins of equal energy
+of the spreading function D(d) ~ cos^n(d - mean), |d - mean| < pi/2 (DNV-RP-C205, 3.5.8), and
+assigned in random order. Without spreading all components have the mean direction.
 """
 
 from __future__ import annotations
@@ -61,14 +62,20 @@ class Sea(NamedTuple):
 
     def component_table(self) -> np.ndarray:
         """Return amplitude, wave number along x and y, frequency and phase, shape (5, MAX_COMPONENTS), padded with zeros."""
-        east, north = self.wave_number * np.cos(self.direction), self.wave_number * np.sin(self.direction)
+        east, north = (
+            self.wave_number * np.cos(self.direction),
+            self.wave_number * np.sin(self.direction),
+        )
         rows = np.zeros((5, MAX_COMPONENTS))
         rows[:, : len(self.phase)] = self.amplitude, east, north, self.frequency, self.phase
         return rows
 
     def elevation_function(self) -> Callable[[float, float, float], float]:
         """Return a function equal to `elevation` that reuses its arrays and thus takes half the time."""
-        east, north = self.wave_number * np.cos(self.direction), self.wave_number * np.sin(self.direction)
+        east, north = (
+            self.wave_number * np.cos(self.direction),
+            self.wave_number * np.sin(self.direction),
+        )
         rates = np.array([east, north, -self.frequency, self.phase])
         arguments, angles = np.array([0.0, 0.0, 0.0, 1.0]), np.empty(len(self.phase))
         arguments_data = arguments.data
@@ -114,21 +121,33 @@ def realise_sea(waves: Waves, seed: int) -> Sea:
     random, count = generator(seed, "waves"), waves.components
     peak = 2 * math.pi / waves.peak_period
     grid = np.linspace(MIN_FREQUENCY_RATIO * peak, MAX_FREQUENCY_RATIO * peak, _FREQUENCY_COUNT)
-    density = SPECTRA[waves.spectrum](grid, waves.significant_height, waves.peak_period, waves.gamma)
+    density = SPECTRA[waves.spectrum](
+        grid, waves.significant_height, waves.peak_period, waves.gamma
+    )
     frequency, energy = _stratified_samples(grid, density, random, count)
     direction = np.full(count, waves.direction)
     if waves.spreading is not None:
         angles = np.linspace(-math.pi / 2, math.pi / 2, _DIRECTION_COUNT)
-        spread, _ = _stratified_samples(angles, np.maximum(np.cos(angles), 0) ** waves.spreading, random, count)
+        spread, _ = _stratified_samples(
+            angles, np.maximum(np.cos(angles), 0) ** waves.spreading, random, count
+        )
         direction += random.permutation(spread)
     amplitude = np.full(count, math.sqrt(2 * energy / count))
-    return Sea(amplitude, frequency, frequency**2 / GRAVITY, direction, random.uniform(0, 2 * math.pi, count))
+    return Sea(
+        amplitude,
+        frequency,
+        frequency**2 / GRAVITY,
+        direction,
+        random.uniform(0, 2 * math.pi, count),
+    )
 
 
 def _stratified_samples(
     grid: np.ndarray, density: np.ndarray, random: np.random.Generator, count: int
 ) -> tuple[np.ndarray, float]:
     """Return one sample from each of `count` bins with equal area under a density, in ascending order, and the total area."""
-    cumulative = np.concatenate([[0.0], np.cumsum((density[1:] + density[:-1]) / 2 * np.diff(grid))])
+    cumulative = np.concatenate(
+        [[0.0], np.cumsum((density[1:] + density[:-1]) / 2 * np.diff(grid))]
+    )
     quantiles = (np.arange(count) + random.uniform(size=count)) / count
     return np.interp(quantiles * cumulative[-1], cumulative, grid), float(cumulative[-1])

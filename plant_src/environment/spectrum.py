@@ -19,7 +19,8 @@ import numpy as np
 
 GRAVITY = 9.81  # m/s2
 
-#: Hs (m) of the sea states of WMO code table 3700 (Douglas sea scale): middle of each range, for "phenomenal" (9) its lower end
+#: Hs (m) of the sea states of WMO code table 3700 (Douglas sea scale): middle of each range, for
+#: "phenomenal" (9) its lower end
 SIGNIFICANT_HEIGHTS = (0.0, 0.05, 0.3, 0.875, 1.875, 3.25, 5.0, 7.5, 11.5, 14.0)
 
 #: peak enhancement factor: mean JONSWAP sea, and range in which the normalising factor is valid
@@ -29,7 +30,9 @@ GAMMA, MIN_GAMMA, MAX_GAMMA = 3.3, 1.0, 7.0
 Spectrum = Callable[[np.ndarray, float, float, float], np.ndarray]
 
 
-def pierson_moskowitz(frequency: np.ndarray, significant_height: float, peak_period: float, _gamma: float = 1.0) -> np.ndarray:
+def pierson_moskowitz(
+    frequency: np.ndarray, significant_height: float, peak_period: float, _gamma: float = 1.0
+) -> np.ndarray:
     """Return the Pierson-Moskowitz spectrum.
 
     Args:
@@ -42,11 +45,15 @@ def pierson_moskowitz(frequency: np.ndarray, significant_height: float, peak_per
         S (m2 s), with the shape of `frequency`.
     """
     ratio = (2 * math.pi / peak_period / frequency) ** 4
-    spectrum: np.ndarray = 5 / 16 * significant_height**2 * ratio / frequency * np.exp(-5 / 4 * ratio)
+    spectrum: np.ndarray = (
+        5 / 16 * significant_height**2 * ratio / frequency * np.exp(-5 / 4 * ratio)
+    )
     return spectrum
 
 
-def jonswap(frequency: np.ndarray, significant_height: float, peak_period: float, gamma: float = GAMMA) -> np.ndarray:
+def jonswap(
+    frequency: np.ndarray, significant_height: float, peak_period: float, gamma: float = GAMMA
+) -> np.ndarray:
     """Return the JONSWAP spectrum.
 
     Args:
@@ -69,5 +76,8 @@ SPECTRA: Mapping[str, Spectrum] = {"pierson_moskowitz": pierson_moskowitz, "jons
 
 
 def fully_developed_period(significant_height: float) -> float:
-    """Return the peak period (s) of a fully developed sea with a height Hs (m): wp = 0.4 sqrt(g / Hs) (Fossen 2021, 10.2.1)."""
+    """Return the peak period (s) of a fully developed sea with a height Hs (m).
+
+    Wp = 0.4 sqrt(g / Hs) (Fossen 2021, 10.2.1).
+    """
     return 2 * math.pi / 0.4 * math.sqrt(significant_height / GRAVITY)

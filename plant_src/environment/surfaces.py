@@ -1,4 +1,7 @@
-"""Surfaces above which multirotors fly: decks of vessels and tops of platforms, as a table for the compiled equations."""
+"""Surfaces above which multirotors fly.
+
+Decks of vessels and tops of platforms, as a table for the compiled equations.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,8 @@ class SurfaceTable:
     The deck of a vessel is the top of its highest box, centred at the output `deck.position`.
 
     Attributes:
-        rows: Rectangles, shape (n, SURFACE_COLUMNS), at least one row; those without edges are below nothing.
+        rows: Rectangles, shape (n, SURFACE_COLUMNS), at least one row; those without edges are
+            below nothing.
         count: Number of rows, shape (1,).
     """
 
@@ -31,7 +35,9 @@ class SurfaceTable:
         self.rows = np.zeros((max(len(vessels) + len(platforms), 1), SURFACE_COLUMNS))
         self._decks: list[tuple[Any, Any, Any, Any]] = []
         for row, vessel in zip(self.rows, vessels, strict=False):
-            deck = max(vessel.model.body.boxes, key=lambda box: box.position[2] + box.half_extents[2])
+            deck = max(
+                vessel.model.body.boxes, key=lambda box: box.position[2] + box.half_extents[2]
+            )
             row[:2] = deck.half_extents[:2]
             self._decks.append((row[_CENTRE].data, row[_ORIENTATION].data, *_deck_pose(vessel)))
         for row, platform in zip(self.rows[len(vessels) :], platforms, strict=False):
@@ -50,4 +56,6 @@ def _deck_pose(vessel: ContactBody) -> tuple[Any, Any]:
     """Return views of the outputs with the position and the orientation of the deck."""
     slots = vessel.model.slots("output")
     position, orientation = slots.index("deck.position.x"), slots.index("orientation.w")
-    return vessel.outputs[position : position + 3].data, vessel.outputs[orientation : orientation + 4].data
+    return vessel.outputs[position : position + 3].data, vessel.outputs[
+        orientation : orientation + 4
+    ].data

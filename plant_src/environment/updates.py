@@ -1,4 +1,7 @@
-"""Updates of the environment inputs of vehicles: functions of the time that write wind, current, water level and surfaces."""
+"""Updates of the environment inputs of vehicles.
+
+Functions of the time that write wind, current, water level and surfaces.
+"""
 
 from __future__ import annotations
 
@@ -26,12 +29,16 @@ _pack_pair, _unpack_pair = struct.Struct("2d").pack_into, struct.Struct("2d").un
 #: function of x, y (m) and the time since the start (s) to the height of the water surface (m)
 WaterLevel = Callable[[float, float, float], float]
 
-#: distance (m) above all crests within which a vehicle needs the water level; more than the way of a step
+#: distance (m) above all crests within which a vehicle needs the water level; more than the way of
+#: a step
 WATER_MARGIN = 1.0
 
 
 def input_data(body: ContactBody, name: str) -> Any:
-    """Return a memoryview of a vehicle's environment inputs from the named one on; it is faster than NumPy for few numbers."""
+    """Return a memoryview of a vehicle's environment inputs from the named one on.
+
+    It is faster than NumPy for few numbers.
+    """
     return body.environment_inputs[_input_index(body, name) :].data
 
 
@@ -41,17 +48,28 @@ def _input_index(body: ContactBody, name: str) -> int:
 
 
 class WindUpdate:
-    """Update of the wind at all vehicles: mean wind at their height and gusts; it is also published."""
+    """Update of the wind at all vehicles: mean wind at their height and gusts.
 
-    def __init__(self, wind: Wind, seed: int, mean: Any, vehicles: Sequence[ContactBody], published: Any):
+    It is also published.
+    """
+
+    def __init__(
+        self, wind: Wind, seed: int, mean: Any, vehicles: Sequence[ContactBody], published: Any
+    ):
         self._profile, self._mean, self._published = wind.profile, mean, published
         turbulence = wind.turbulence
-        self._gusts = DrydenGusts(wind, turbulence, seed, [body.name for body in vehicles]) if turbulence and vehicles else None
+        self._gusts = (
+            DrydenGusts(wind, turbulence, seed, [body.name for body in vehicles])
+            if turbulence and vehicles
+            else None
+        )
         self._vehicles = [
-            (input_data(body, "wind.x"), 3 * _DOUBLE_SIZE * k, body.outputs[2:].data) for k, body in enumerate(vehicles)
+            (input_data(body, "wind.x"), 3 * _DOUBLE_SIZE * k, body.outputs[2:].data)
+            for k, body in enumerate(vehicles)
         ]
         self._block_number = -1
-        #: x, y and z of the gusts at all vehicles, for each grid point of the current block of noise
+        #: x, y and z of the gusts at all vehicles, for each grid point of the current block of
+        #: noise
         self._gust_block: Sequence[tuple[float, ...]] = [(0.0,) * 3 * len(vehicles)] * BLOCK_LENGTH
 
     def update(self, time: float) -> None:
@@ -63,7 +81,11 @@ class WindUpdate:
         profile, published, gusts = self._profile, self._published, iter(self._gust_block[row])
         for wind, offset, height in self._vehicles:
             fraction = profile(height[0]) if profile else 1.0
-            x, y, z = fraction * mean_x + next(gusts), fraction * mean_y + next(gusts), fraction * mean_z + next(gusts)
+            x, y, z = (
+                fraction * mean_x + next(gusts),
+                fraction * mean_y + next(gusts),
+                fraction * mean_z + next(gusts),
+            )
             _pack_vector(wind, 0, x, y, z)
             _pack_vector(published, offset, x, y, z)
 
@@ -94,17 +116,28 @@ class CurrentUpdate:
 
 
 class WaterLevelUpdate:
-    """Update of the height of the water surface at submerged vehicles; those above all crests need none."""
+    """Update of the height of the water surface at submerged vehicles.
 
-    def __init__(self, vehicles: Sequence[ContactBody], water_level: WaterLevel, highest_water: Any):
+    Those above all crests need none.
+    """
+
+    def __init__(
+        self, vehicles: Sequence[ContactBody], water_level: WaterLevel, highest_water: Any
+    ):
         self._water_level, self._highest_water = water_level, highest_water
-        self._vehicles = [(input_data(body, "water_level"), body.outputs.data, _reach(body)) for body in vehicles]
+        self._vehicles = [
+            (input_data(body, "water_level"), body.outputs.data, _reach(body)) for body in vehicles
+        ]
 
     def update(self, time: float) -> None:
         """Write the water levels at a time (s)."""
         highest = self._highest_water[0]
         for level, outputs, reach in self._vehicles:
-            level[0] = self._water_level(outputs[0], outputs[1], time) if outputs[2] - reach < highest else -highest
+            level[0] = (
+                self._water_level(outputs[0], outputs[1], time)
+                if outputs[2] - reach < highest
+                else -highest
+            )
 
 
 def _reach(body: ContactBody) -> float:
@@ -131,7 +164,11 @@ class SurroundingsUpdate:
         wave_gain: Any,
         highest_water: Any,
     ):
-        self._gain, self._highest_water, self._update_surfaces = wave_gain, highest_water, surfaces.update
+        self._gain, self._highest_water, self._update_surfaces = (
+            wave_gain,
+            highest_water,
+            surfaces.update,
+        )
         sea_values, waves = np.array([0.0, 1.0, len(sea.phase), 0.0]), sea.component_table()
         self._sea: Any = sea_values.data
         self._calls = [

@@ -1,16 +1,16 @@
 """Wind: mean velocity, profile over the height, and Dryden turbulence.
 
-The turbulence is the low-altitude model of MIL-F-8785C, 3.7.3, with the height h (ft), the wind speed W20 at 20 ft and the speed
-V at which the frozen turbulence field passes:
+The turbulence is the low-altitude model of MIL-F-8785C, 3.7.3, with the height h (ft), the wind
+speed W20 at 20 ft and the speed V at which the frozen turbulence field passes:
 
     intensities w: 0.1 W20;  u, v: 0.1 W20 / (0.177 + 0.000823 h)^0.4
     scales      Lw = h;  Lu = Lv = h / (0.177 + 0.000823 h)^1.2
     spectra     u: 2 su^2 Lu / (pi V) / (1 + (Lu w / V)^2)
                 v, w: s^2 L / (pi V) (1 + 3 (L w / V)^2) / (1 + (L w / V)^2)^2
 
-u is along the mean wind, v to its left, w up. V and h are constants of the scenario, not those of the vehicle, because
-multirotors and vessels are slow compared with the wind. Gusts are therefore functions of time alone. Those of different
-vehicles are independent.
+u is along the mean wind, v to its left, w up. V and h are constants of the scenario, not those of
+the vehicle, because multirotors and vessels are slow compared with the wind. Gusts are therefore
+functions of time alone. Those of different vehicles are independent.
 """
 
 from __future__ import annotations
@@ -51,7 +51,8 @@ class Turbulence:
         along, upwards = turbulence_scale_lengths(self.height)
         lengths, leads = (along, along, upwards), (1.0, math.sqrt(3), math.sqrt(3))
         return [
-            Channel(s, length / self.airspeed, lead) for s, length, lead in zip(self.intensities, lengths, leads, strict=True)
+            Channel(s, length / self.airspeed, lead)
+            for s, length, lead in zip(self.intensities, lengths, leads, strict=True)
         ]
 
 

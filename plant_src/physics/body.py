@@ -34,7 +34,8 @@ if TYPE_CHECKING:
     from ..placement import Platform, VehiclePlacement
     from ..vehicles.model import Model
 
-#: first x coordinate of inactive bodies (m), beyond the reach of any vehicle, and distance between them (m)
+#: first x coordinate of inactive bodies (m), beyond the reach of any vehicle, and distance between
+#: them (m)
 INACTIVE_POSITION, INACTIVE_SPACING = 2 * MAX_STATE_NORM, 100.0
 IDENTITY_QUATERNION = (0.0, 0.0, 0.0, 1.0)
 
@@ -44,16 +45,29 @@ _MAX_VELOCITY = 1e6  # m/s, rad/s; Bullet silently limits velocities to 100 by d
 ArrayNames = tuple[Sequence[str], Sequence[str]]
 
 #: arguments and results that all vehicles' `contact_predict` have in common
-PREDICT_ARGUMENTS = ("state", "inputs", "environment_inputs", "constants", "step_size", "reference_position", "safe_distance")
+PREDICT_ARGUMENTS = (
+    "state",
+    "inputs",
+    "environment_inputs",
+    "constants",
+    "step_size",
+    "reference_position",
+    "safe_distance",
+)
 PREDICT_RESULTS = ("start_state", "predicted_state", "commanded_twist", "bullet_twist")
 
 
 class InvalidStateError(Exception):
-    """An input or the motion of a vehicle is not finite or too large; the text names the variable."""
+    """An input or the motion of a vehicle is not finite or too large.
+
+    The text names the variable.
+    """
 
 
 class ContactBody:
-    """One vehicle in a world: its body in Bullet and its compiled equations (`vehicles/common/contact_maps.py`).
+    """One vehicle in a world.
+
+    Its body in Bullet and its compiled equations (`vehicles/common/contact_maps.py`).
 
     Twists are (velocity, angular velocity) in m/s and rad/s, world frame.
 
@@ -62,16 +76,23 @@ class ContactBody:
         model: Model of the vehicle.
         body_id: Number of the body in Bullet.
         inputs: Real inputs of the model in order, in one or several parts.
-        outputs: Real outputs in order; `correct` writes the motion, `contacts.py` the contact force.
+        outputs: Real outputs in order; `correct` writes the motion, `contacts.py` the contact
+            force.
         environment_inputs: Inputs that the environment writes, in order.
         commanded_twist: Twist to set in Bullet before its step, shape (6,).
-        bullet_twist: Twist that Bullet computed, shape (6,). `predict` writes the one expected without contact.
-        compensating_torque: Torque (N m, world frame) that cancels Bullet's gyroscopic torque, or None.
+        bullet_twist: Twist that Bullet computed, shape (6,). `predict` writes the one expected
+            without contact.
+        compensating_torque: Torque (N m, world frame) that cancels Bullet's gyroscopic torque, or
+            None.
         predict: Function without arguments: integrate the equations over the step without contact.
         correct: Function without arguments: apply Bullet's twist and publish the outputs.
     """
 
-    ARRAY_SIZES: ClassVar[Mapping[str, int]] = {"commanded_twist": 6, "bullet_twist": 6, "bullet_pose": 7}
+    ARRAY_SIZES: ClassVar[Mapping[str, int]] = {
+        "commanded_twist": 6,
+        "bullet_twist": 6,
+        "bullet_pose": 7,
+    }
     INITIALIZE_ARRAYS: ClassVar[ArrayNames] = (
         ("parameters",),
         ("constants", "predicted_state", "commanded_twist", "bullet_twist", "bullet_pose"),
@@ -81,7 +102,8 @@ class ContactBody:
         (*PREDICT_RESULTS, "constants", "step_size"),
         ("state", "impulse_magnitude", "outputs"),
     )
-    #: maximal coordinates halve Bullet's time, but its saved states lack the inertia of such a body in world axes
+    #: maximal coordinates halve Bullet's time, but its saved states lack the inertia of such a body
+    #: in world axes
     USE_MAXIMAL_COORDINATES = False
 
     def __init__(self, client: int, vehicle: VehiclePlacement, arrays: Mapping[str, np.ndarray]):
@@ -90,22 +112,31 @@ class ContactBody:
         Args:
             client: Number of the Bullet client.
             vehicle: Vehicle to create.
-            arrays: Arrays of the sizes that `array_sizes` returns, and "step_size" (s), which all vehicles share.
+            arrays: Arrays of the sizes that `array_sizes` returns, and "step_size" (s), which all
+                vehicles share.
         """
         self.name, self.model, self._client = vehicle.name, vehicle.model, client
         parameters = np.array(vehicle.model.equation_parameters(vehicle.parameters))
-        constants = vehicle.model.constant_count if vehicle.model.constant_count is not None else len(parameters)
+        constants = (
+            vehicle.model.constant_count
+            if vehicle.model.constant_count is not None
+            else len(parameters)
+        )
         fixed = {"parameters": parameters, "principal_axes": np.array(vehicle.body.axes)}
         self._arrays = arrays = {**arrays, **fixed, "constants": np.zeros(constants)}
         self.inputs = [arrays["inputs"][place] for place in vehicle.model.input_places]
         self.outputs = arrays["outputs"]
         self.parameters = np.array(vehicle.parameters)
         self.environment_inputs = arrays["environment_inputs"]
-        self.environment_inputs[:] = [variable.start for variable in vehicle.model.environment_inputs]
+        self.environment_inputs[:] = [
+            variable.start for variable in vehicle.model.environment_inputs
+        ]
         # memoryviews: access to a few numbers is faster than with NumPy
         self.bullet_twist: Any = arrays["bullet_twist"].data
         self.commanded_twist: Any = arrays["commanded_twist"].data
-        self.compensating_torque: Any = arrays["compensating_torque"].data if "compensating_torque" in arrays else None
+        self.compensating_torque: Any = (
+            arrays["compensating_torque"].data if "compensating_torque" in arrays else None
+        )
         library = load_library(vehicle.model.binary)
         self.predict = self._bind(library.contact_predict, self.PREDICT_ARRAYS)
         self.correct = self._bind(library.contact_correct, self.CORRECT_ARRAYS)
@@ -121,7 +152,14 @@ class ContactBody:
         states = dict.fromkeys(("state", "start_state", "predicted_state"), len(model.states))
         clearance = {"endpoints": 6, "reference_position": 3, "safe_distance": 3}
         scalars = {"step_status": 1, "impulse_magnitude": 1}
-        return {**states, **cls.ARRAY_SIZES, **inputs, "outputs": len(model.slots("output")), **clearance, **scalars}
+        return {
+            **states,
+            **cls.ARRAY_SIZES,
+            **inputs,
+            "outputs": len(model.slots("output")),
+            **clearance,
+            **scalars,
+        }
 
     def _bind(self, function: _NamedFuncPointer, names: ArrayNames) -> Callable[[], None]:
         arguments, results = ([self._arrays[name] for name in side] for side in names)
@@ -130,8 +168,13 @@ class ContactBody:
     def _create_body(self, vehicle: VehiclePlacement) -> int:
         """Create the body in Bullet and return its number."""
         body = vehicle.body
-        shape, maximal = create_compound_shape(body.boxes, self._client), self.USE_MAXIMAL_COORDINATES
-        number = pybullet.createMultiBody(body.mass, shape, -1, useMaximalCoordinates=maximal, physicsClientId=self._client)
+        shape, maximal = (
+            create_compound_shape(body.boxes, self._client),
+            self.USE_MAXIMAL_COORDINATES,
+        )
+        number = pybullet.createMultiBody(
+            body.mass, shape, -1, useMaximalCoordinates=maximal, physicsClientId=self._client
+        )
         set_dynamics(self._client, number, -1, vehicle.surface, body)
         return int(number)
 
@@ -152,24 +195,40 @@ class ContactBody:
             self.reset_pose()
         else:
             position = [INACTIVE_POSITION + INACTIVE_SPACING * self.body_id, 0.0, 0.0]
-            pybullet.resetBasePositionAndOrientation(self.body_id, position, IDENTITY_QUATERNION, self._client)
+            pybullet.resetBasePositionAndOrientation(
+                self.body_id, position, IDENTITY_QUATERNION, self._client
+            )
 
     def describe_invalid_state(self) -> str:
         """Return a message that names the first input that is not finite, or the predicted state with the largest value."""
-        names = [*self.model.slots("input"), *(variable.name for variable in self.model.environment_inputs)]
-        for name, value in zip(names, np.concatenate([*self.inputs, self.environment_inputs]), strict=True):
+        names = [
+            *self.model.slots("input"),
+            *(variable.name for variable in self.model.environment_inputs),
+        ]
+        for name, value in zip(
+            names, np.concatenate([*self.inputs, self.environment_inputs]), strict=True
+        ):
             if not math.isfinite(value):
                 return f"{self.name}.{name} is {value}, expected a finite number"
         predicted = self._arrays["predicted_state"]
         worst = int(np.argmax(np.nan_to_num(np.abs(predicted), nan=np.inf)))
-        return f"{self.name}.{self.model.states[worst]} became {predicted[worst]:g}: the motion has diverged"
+        return (
+            f"{self.name}.{self.model.states[worst]} became {predicted[worst]:g}: the motion has "
+            "diverged"
+        )
 
 
 class FreeBody(ContactBody):
-    """A vehicle in six degrees of freedom; its frame in Bullet has the principal axes of inertia."""
+    """A vehicle in six degrees of freedom.
+
+    Its frame in Bullet has the principal axes of inertia.
+    """
 
     ARRAY_SIZES = {**ContactBody.ARRAY_SIZES, "compensating_torque": 3}
-    INITIALIZE_ARRAYS: ClassVar[ArrayNames] = (("parameters", "principal_axes"), ContactBody.INITIALIZE_ARRAYS[1])
+    INITIALIZE_ARRAYS: ClassVar[ArrayNames] = (
+        ("parameters", "principal_axes"),
+        ContactBody.INITIALIZE_ARRAYS[1],
+    )
     PREDICT_ARRAYS: ClassVar[ArrayNames] = (
         (*PREDICT_ARGUMENTS, "principal_axes"),
         (*PREDICT_RESULTS, "compensating_torque", "bullet_pose", "endpoints", "step_status"),
@@ -179,7 +238,10 @@ class FreeBody(ContactBody):
 def create_compound_shape(boxes: Sequence[Shape], client: int) -> int:
     """Create a collision shape of boxes and convex pieces in Bullet and return its number."""
     is_piece = [isinstance(box, ConvexPiece) for box in boxes]
-    centred = [(0.0, 0.0, 0.0) if piece else box.position for box, piece in zip(boxes, is_piece, strict=True)]
+    centred = [
+        (0.0, 0.0, 0.0) if piece else box.position
+        for box, piece in zip(boxes, is_piece, strict=True)
+    ]
     names = [mesh_file(box) if isinstance(box, ConvexPiece) else "" for box in boxes]
     number = pybullet.createCollisionShapeArray(
         [pybullet.GEOM_MESH if piece else pybullet.GEOM_BOX for piece in is_piece],
@@ -201,7 +263,9 @@ def create_platform(client: int, platform: Platform) -> int:
     return int(number)
 
 
-def set_dynamics(client: int, number: int, link: int, surface: ContactSurface = DRY, body: Body | None = None) -> None:
+def set_dynamics(
+    client: int, number: int, link: int, surface: ContactSurface = DRY, body: Body | None = None
+) -> None:
     """Set mass and inertia of `body`, friction and restitution, no damping and no sleeping for a Bullet body."""
     pybullet.changeDynamics(
         number,
@@ -216,4 +280,6 @@ def set_dynamics(client: int, number: int, link: int, surface: ContactSurface = 
     )
     if body:  # in two calls: setting the mass overwrites the inertia
         pybullet.changeDynamics(number, link, mass=body.mass, physicsClientId=client)
-        pybullet.changeDynamics(number, link, localInertiaDiagonal=body.inertia, physicsClientId=client)
+        pybullet.changeDynamics(
+            number, link, localInertiaDiagonal=body.inertia, physicsClientId=client
+        )

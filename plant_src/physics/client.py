@@ -10,7 +10,8 @@ from typing import NamedTuple
 _STANDARD_ERROR = 2
 
 _MISSING = (
-    "PyBullet is not installed, and the world needs it; use Python 3.11 to 3.13, for which wheels exist, "
+    "PyBullet is not installed, and the world needs it; use Python 3.11 to 3.13, for which wheels "
+    "exist, "
     'build it with `pip install pybullet`, or replace the world by a plant FMU ("fmu" for "python")'
 )
 
@@ -37,8 +38,13 @@ def _import_without_stderr() -> ModuleType:
 
 pybullet = _import_without_stderr()
 
-#: parameters of a new client, some of which a reset keeps; the order of pairs must not depend on their history
-_ENGINE_PARAMETERS = {"fixedTimeStep": 1 / 240, "numSubSteps": 0, "deterministicOverlappingPairs": 1}
+#: parameters of a new client, some of which a reset keeps; the order of pairs must not depend on
+#: their history
+_ENGINE_PARAMETERS = {
+    "fixedTimeStep": 1 / 240,
+    "numSubSteps": 0,
+    "deterministicOverlappingPairs": 1,
+}
 
 
 #: largest number of bodies for the exact broad phase, whose time grows with its square
@@ -59,14 +65,16 @@ _spare_clients: list[_SpareClient] = []
 def connect(owner: object, body_count: int = 0) -> tuple[int, weakref.finalize[[int], object]]:
     """Connect a Bullet client, or take the spare one.
 
-    The client holds 60 MB that Python's garbage collector does not count, so it is also released when `owner` is collected.
+    The client holds 60 MB that Python's garbage collector does not count, so it is also released
+    when `owner` is collected.
 
     Args:
         owner: Object for which the client is connected.
         body_count: Number of bodies that it will get.
 
     Returns:
-        Number of the client, which has no bodies, and a function without arguments that releases it once.
+        Number of the client, which has no bodies, and a function without arguments that releases it
+        once.
     """
     client = _take_client(_broad_phase(body_count))
     release = weakref.finalize(owner, _release, client)
@@ -77,14 +85,19 @@ def connect(owner: object, body_count: int = 0) -> tuple[int, weakref.finalize[[
 def _broad_phase(body_count: int) -> int:
     """Return the flags of a reset for a number of bodies.
 
-    Bullet's default keeps pairs of bodies that are apart for some steps. They join islands, and saved states do not contain them.
+    Bullet's default keeps pairs of bodies that are apart for some steps. They join islands, and
+    saved states do not contain them.
     """
     return int(pybullet.RESET_USE_SIMPLE_BROADPHASE) if body_count <= MAX_EXACT_BODIES else 0
 
 
 def _take_client(flags: int) -> int:
     """Return an empty client: a reset takes 1 ms, a connection 5 to 10 ms."""
-    client, present = _spare_clients.pop() if _spare_clients else _SpareClient(int(pybullet.connect(pybullet.DIRECT)), None)
+    client, present = (
+        _spare_clients.pop()
+        if _spare_clients
+        else _SpareClient(int(pybullet.connect(pybullet.DIRECT)), None)
+    )
     if present != flags:
         pybullet.resetSimulation(flags, physicsClientId=client)
         pybullet.setPhysicsEngineParameter(**_ENGINE_PARAMETERS, physicsClientId=client)
@@ -92,7 +105,10 @@ def _take_client(flags: int) -> int:
 
 
 def _release(client: int) -> None:
-    """Keep one client for the next owner, who resets it, because most processes end before; disconnect the others."""
+    """Keep one client for the next owner, who resets it, because most processes end before.
+
+    Disconnect the others.
+    """
     if _spare_clients:
         pybullet.disconnect(client)
     else:

@@ -1,4 +1,7 @@
-"""Compiled equations of a vehicle model, loaded from the binary of its plant FMU; no compiler is needed to run a world."""
+"""Compiled equations of a vehicle model, loaded from the binary of its plant FMU.
+
+No compiler is needed to run a world.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,11 @@ if TYPE_CHECKING:
     from ctypes import _NamedFuncPointer
 
 #: sys.platform -> folder of FMI 2.0 binaries, suffix of shared libraries
-_PLATFORMS = {"linux": ("linux64", ".so"), "darwin": ("darwin64", ".dylib"), "win32": ("win64", ".dll")}
+_PLATFORMS = {
+    "linux": ("linux64", ".so"),
+    "darwin": ("darwin64", ".dylib"),
+    "win32": ("win64", ".dll"),
+}
 
 
 def load_library(model: str) -> ctypes.PyDLL:
@@ -48,11 +55,17 @@ def library_path(model: str) -> Path:
         raise _unreadable_fmu_error(model, fmu, error) from None
     folder = resources.cache_directory() / "plant"
     path = _cached_library_path(model, fmu, modification_time, folder)
-    return path if path.exists() else _cached_library_path.__wrapped__(model, fmu, modification_time, folder)
+    return (
+        path
+        if path.exists()
+        else _cached_library_path.__wrapped__(model, fmu, modification_time, folder)
+    )
 
 
 @cache
-def _cached_library_path(model: str, fmu: Path, _modification_time: int, cache_folder: Path) -> Path:
+def _cached_library_path(
+    model: str, fmu: Path, _modification_time: int, cache_folder: Path
+) -> Path:
     folder, suffix = _PLATFORMS.get(sys.platform, (sys.platform, ".so"))
     member = f"binaries/{folder}/{model}{suffix}"
     try:
@@ -61,16 +74,23 @@ def _cached_library_path(model: str, fmu: Path, _modification_time: int, cache_f
     except (OSError, BadZipFile) as error:
         raise _unreadable_fmu_error(model, fmu, error) from None
     except KeyError:
-        raise InputError(f'"{fmu}" has no "{member}"; build it on this platform with `cosim build`') from None
+        raise InputError(
+            f'"{fmu}" has no "{member}"; build it on this platform with `cosim build`'
+        ) from None
     return _extract_to_cache(content, cache_folder, f"{model}{suffix}")
 
 
 def _unreadable_fmu_error(model: str, fmu: Path, error: Exception) -> InputError:
-    return InputError(f'the equations of the vehicle model "{model}" cannot be read from "{fmu}": {error}')
+    return InputError(
+        f'the equations of the vehicle model "{model}" cannot be read from "{fmu}": {error}'
+    )
 
 
 def _extract_to_cache(content: bytes, cache_folder: Path, name: str) -> Path:
-    """Write a file to the cache; its name contains a hash of its content, and a damaged file is replaced."""
+    """Write a file to the cache.
+
+    Its name contains a hash of its content, and a damaged file is replaced.
+    """
     path = cache_folder / f"{sha256(content).hexdigest()[:20]}-{name}"
     if not _has_content(path, content):
         with writing_atomically(path) as temporary:
@@ -105,7 +125,10 @@ def bind_arrays(
     if not all(array.dtype == np.float64 and array.flags.c_contiguous for array in arrays):
         raise TypeError("found an array that is not contiguous or not of type float64")
     function.restype = None
-    tables = [(ctypes.c_void_p * len(side))(*(array.ctypes.data for array in side)) for side in (arguments, results)]
+    tables = [
+        (ctypes.c_void_p * len(side))(*(array.ctypes.data for array in side))
+        for side in (arguments, results)
+    ]
     call = partial(function, *map(ctypes.byref, tables))
     vars(call)["arrays"] = arrays
     return call

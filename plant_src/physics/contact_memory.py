@@ -1,10 +1,12 @@
 """Contact points that Bullet must forget, so that saved states are restored bit for bit.
 
-Bullet keeps contact points from one step to the next, and starts its solution with their last impulses. Its saved states hold the
-points of one pair of shapes for each pair of bodies. While several shapes of a vehicle can touch one other body, for example both
-hulls a wall, Bullet therefore computes all points afresh in each step, from poses and velocities alone.
+Bullet keeps contact points from one step to the next, and starts its solution with their last
+impulses. Its saved states hold the points of one pair of shapes for each pair of bodies. While
+several shapes of a vehicle can touch one other body, for example both hulls a wall, Bullet
+therefore computes all points afresh in each step, from poses and velocities alone.
 
-A vehicle of one shape on a vehicle of several shapes, for example a multirotor on a deck, does not cause this.
+A vehicle of one shape on a vehicle of several shapes, for example a multirotor on a deck, does not
+cause this.
 """
 
 from __future__ import annotations
@@ -49,7 +51,9 @@ class ContactMemory:
         """
         several = self._has_several_shapes
         count = len(several)
-        self.watched_pairs = [(a, b) for a, b in near_pairs if several[a] and (b >= count or several[b])]
+        self.watched_pairs = [
+            (a, b) for a, b in near_pairs if several[a] and (b >= count or several[b])
+        ]
 
     def is_unsafe(self) -> bool:
         """Return whether several shapes of a vehicle can touch one other body at the start of the step."""
@@ -57,7 +61,9 @@ class ContactMemory:
 
     def _is_near(self, one: int, other: int) -> bool:
         (low, high), (other_low, other_high) = self._box(one), self._box(other)
-        gaps = (max(c - b, a - d) for a, b, c, d in zip(low, high, other_low, other_high, strict=True))
+        gaps = (
+            max(c - b, a - d) for a, b, c, d in zip(low, high, other_low, other_high, strict=True)
+        )
         return max(gaps) < NEAR_DISTANCE
 
     def _box(self, index: int) -> BoundingBox:

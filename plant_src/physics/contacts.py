@@ -33,7 +33,9 @@ def overlap_depths(client: int) -> dict[tuple[int, int], float]:
 
 def touching_pairs(client: int) -> frozenset[tuple[int, int]]:
     """Return the pairs of bodies between which Bullet keeps contact points."""
-    return frozenset(point[_BODY_A:_BODY_END] for point in pybullet.getContactPoints(*_ALL_BODIES, client))
+    return frozenset(
+        point[_BODY_A:_BODY_END] for point in pybullet.getContactPoints(*_ALL_BODIES, client)
+    )
 
 
 class _Pair(NamedTuple):
@@ -44,7 +46,8 @@ class _Pair(NamedTuple):
         flags: Indices of the flags.
         velocity_a: Velocity of one body before the contact (m/s).
         velocity_b: Velocity of the other one.
-        vertical_a: Factor on the vertical velocity of one body; 0 for a planar vessel, whose lift is no motion.
+        vertical_a: Factor on the vertical velocity of one body; 0 for a planar vessel, whose lift
+            is no motion.
         vertical_b: Factor on the vertical velocity of the other one.
         squared_limit: Square of the relative speed above which a collision is a crash.
     """
@@ -64,7 +67,8 @@ class Contacts:
     Args:
         client: Number of the Bullet client.
         bodies: All vehicles.
-        outputs: Real outputs of all vehicles in order; the last one of each vehicle is the contact force.
+        outputs: Real outputs of all vehicles in order; the last one of each vehicle is the contact
+            force.
         flags: Flags of each vehicle (`failures.py`), shape (vehicles, FLAG_COUNT).
         failures: Failures, to which crashes are added.
 
@@ -72,13 +76,23 @@ class Contacts:
         has_contacts: Whether the outputs may contain contacts that `clear` would remove.
     """
 
-    def __init__(self, client: int, bodies: Sequence[ContactBody], outputs: np.ndarray, flags: np.ndarray, failures: Failures):
+    def __init__(
+        self,
+        client: int,
+        bodies: Sequence[ContactBody],
+        outputs: np.ndarray,
+        flags: np.ndarray,
+        failures: Failures,
+    ):
         self._query, self._failures = (*_ALL_BODIES, client), failures
         self.has_contacts = False
         # memoryviews: setting an element takes half as long as with NumPy
         self._outputs: Any = outputs.data
         self._flags: Any = flags.reshape(-1).data
-        self._permanent_flags, self._touching = failures.permanent_flags.reshape(-1).data, flags[:, TOUCHING].data
+        self._permanent_flags, self._touching = (
+            failures.permanent_flags.reshape(-1).data,
+            flags[:, TOUCHING].data,
+        )
         self._force_indices = [end - 1 for end in accumulate(len(body.outputs) for body in bodies)]
         self._bodies = {body.body_id: body for body in bodies}
         self._vehicle_indices = {body.body_id: k for k, body in enumerate(bodies)}
@@ -108,8 +122,8 @@ class Contacts:
             forces[pair] = forces.get(pair, 0.0) + point[_NORMAL_FORCE]
         for pair, force in forces.items():
             if force:
-                outputs, flags, velocity_a, velocity_b, vertical_a, vertical_b, limit = self._pairs.get(pair) or self._find_pair(
-                    pair
+                outputs, flags, velocity_a, velocity_b, vertical_a, vertical_b, limit = (
+                    self._pairs.get(pair) or self._find_pair(pair)
                 )
                 for index in outputs:
                     self._outputs[index] += force * step_fraction
@@ -123,9 +137,13 @@ class Contacts:
         return sum(self._touching)
 
     def _find_pair(self, pair: tuple[int, int]) -> _Pair:
-        vehicles = [self._vehicle_indices[body] for body in pair if body in self._vehicle_indices]  # platforms have no outputs
+        vehicles = [
+            self._vehicle_indices[body] for body in pair if body in self._vehicle_indices
+        ]  # platforms have no outputs
         on_vessels = [
-            self._vehicle_indices[a] for a, b in (pair, pair[::-1]) if a in self._vehicle_indices and b in self._vessels
+            self._vehicle_indices[a]
+            for a, b in (pair, pair[::-1])
+            if a in self._vehicle_indices and b in self._vessels
         ]
         flags = [FLAG_COUNT * vehicle + TOUCHING for vehicle in vehicles]
         flags += [FLAG_COUNT * vehicle + ON_VESSEL for vehicle in on_vessels]

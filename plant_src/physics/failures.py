@@ -1,10 +1,11 @@
 """Failures of vehicles, which stay true: crashed and ditched.
 
-A collision is a crash if it can change the velocity of the vehicle by more than its crash speed. The change is that of a
-perfectly inelastic collision of the two centres of mass: the relative velocity before the step, times the mass of the other body
-over the mass of both. At a platform it is the whole velocity. A vehicle that slides over a platform at speed has crashed, too.
-A multirotor that touches something upside down, and a vessel that is upside down, have crashed. A multirotor is ditched
-if its centre of mass is below the water and no vessel carries it.
+A collision is a crash if it can change the velocity of the vehicle by more than its crash speed.
+The change is that of a perfectly inelastic collision of the two centres of mass: the relative
+velocity before the step, times the mass of the other body over the mass of both. At a platform it
+is the whole velocity. A vehicle that slides over a platform at speed has crashed, too. A multirotor
+that touches something upside down, and a vessel that is upside down, have crashed. A multirotor is
+ditched if its centre of mass is below the water and no vessel carries it.
 """
 
 from __future__ import annotations
@@ -62,13 +63,19 @@ class Failures:
         self.alarm = False
         self._names = {**platform_names, **{body.body_id: body.name for body in bodies}}
         self._indices = {body.body_id: k for k, body in enumerate(bodies)}
-        self._masses = {body.body_id: vehicle.body.mass for body, vehicle in zip(bodies, vehicles, strict=True)}
+        self._masses = {
+            body.body_id: vehicle.body.mass for body, vehicle in zip(bodies, vehicles, strict=True)
+        }
         self._crash_speeds = [vehicle.crash_speed for vehicle in vehicles]
         self._messages: list[str] = []
 
     def largest_harmless_speed(self, pair: tuple[int, int]) -> float:
         """Return the relative speed (m/s) above which one of two colliding bodies has crashed."""
-        limits = [self._crash_speeds[self._indices[body]] / share for body, share in self._shares(pair) if body in self._indices]
+        limits = [
+            self._crash_speeds[self._indices[body]] / share
+            for body, share in self._shares(pair)
+            if body in self._indices
+        ]
         return min(limits)
 
     def _shares(self, pair: tuple[int, int]) -> list[tuple[int, float]]:
@@ -79,18 +86,24 @@ class Failures:
 
     def add_collision(self, pair: tuple[int, int], speed: float) -> None:
         """Record the crashes in a collision of two bodies with a relative speed (m/s)."""
-        for (body, share), (other, _) in zip(self._shares(pair), self._shares(pair)[::-1], strict=True):
+        for (body, share), (other, _) in zip(
+            self._shares(pair), self._shares(pair)[::-1], strict=True
+        ):
             vehicle = self._indices.get(body)
             if vehicle is not None and share * speed > self._crash_speeds[vehicle]:
                 text = (
-                    f"collision with {self._names[other]} at {speed:.2f} m/s, limit {self._crash_speeds[vehicle] / share:.2f} m/s"
+                    f"collision with {self._names[other]} at {speed:.2f} m/s, limit "
+                    f"{self._crash_speeds[vehicle] / share:.2f} m/s"
                 )
                 self._record(vehicle, CRASHED, text)
 
     def _record(self, vehicle: int, failure: int, text: str) -> None:
         if not self.permanent_flags[vehicle, failure]:
             self.permanent_flags[vehicle, failure] = self._flags[vehicle, failure] = True
-            self._messages.append(f"{self._bodies[vehicle].name} {'crashed' if failure == CRASHED else 'ditched'}: {text}")
+            self._messages.append(
+                f"{self._bodies[vehicle].name} {'crashed' if failure == CRASHED else 'ditched'}: "
+                f"{text}"
+            )
             self.alarm = True
 
     def examine(self, water_level: WaterLevel) -> list[str]:
@@ -102,7 +115,9 @@ class Failures:
         return messages
 
     def _examine(self, vehicle: int, water_level: WaterLevel) -> None:
-        is_touching, is_on_vessel, _, is_ditched = self._flag_data[FLAG_COUNT * vehicle : FLAG_COUNT * (vehicle + 1)]
+        is_touching, is_on_vessel, _, is_ditched = self._flag_data[
+            FLAG_COUNT * vehicle : FLAG_COUNT * (vehicle + 1)
+        ]
         x, y, z, _, qx, qy, _ = _unpack_pose(self._outputs[vehicle])
         is_vessel = self._bodies[vehicle].model.is_vessel
         if qx * qx + qy * qy > 0.5 and (is_vessel or is_touching):

@@ -20,7 +20,8 @@ class FixedBodies(NamedTuple):
     """Fixed bodies.
 
     Attributes:
-        paths: Path in the arguments of the world by the number in Bullet, for example "platforms.start".
+        paths: Path in the arguments of the world by the number in Bullet, for example
+            "platforms.start".
         names: Name by the number in Bullet.
         boxes: Bounding boxes of platforms and of the parts of obstacles.
     """
@@ -30,9 +31,13 @@ class FixedBodies(NamedTuple):
     boxes: Sequence[BoundingBox]
 
 
-def create_fixed_bodies(client: int, platforms: Sequence[Platform], obstacles: Sequence[Obstacle]) -> FixedBodies:
+def create_fixed_bodies(
+    client: int, platforms: Sequence[Platform], obstacles: Sequence[Obstacle]
+) -> FixedBodies:
     """Create all platforms and obstacles in Bullet."""
-    bodies = {create_platform(client, platform): f"platforms.{platform.name}" for platform in platforms}
+    bodies = {
+        create_platform(client, platform): f"platforms.{platform.name}" for platform in platforms
+    }
     for obstacle in obstacles:
         for shape in _shapes(client, obstacle):
             number = pybullet.createMultiBody(0, shape, -1, physicsClientId=client)
@@ -43,7 +48,10 @@ def create_fixed_bodies(client: int, platforms: Sequence[Platform], obstacles: S
 
 
 def _shapes(client: int, obstacle: Obstacle) -> Iterator[int]:
-    """Create the collision shapes of an obstacle: a convex hull for each part, or one of all triangles."""
+    """Create the collision shapes of an obstacle.
+
+    A convex hull for each part, or one of all triangles.
+    """
     if obstacle.is_convex:
         for part in obstacle.parts:
             points = outermost_points(np.unique(part.reshape(-1, 3), axis=0))
@@ -61,10 +69,15 @@ def _shapes(client: int, obstacle: Obstacle) -> Iterator[int]:
     )
 
 
-def _bounding_boxes(platforms: Sequence[Platform], obstacles: Sequence[Obstacle]) -> list[BoundingBox]:
+def _bounding_boxes(
+    platforms: Sequence[Platform], obstacles: Sequence[Obstacle]
+) -> list[BoundingBox]:
     boxes = [_platform_bounding_box(platform) for platform in platforms]
     parts = [part.reshape(-1, 3) for obstacle in obstacles for part in obstacle.parts]
-    return boxes + [BoundingBox(tuple(part.min(axis=0).tolist()), tuple(part.max(axis=0).tolist())) for part in parts]
+    return boxes + [
+        BoundingBox(tuple(part.min(axis=0).tolist()), tuple(part.max(axis=0).tolist()))
+        for part in parts
+    ]
 
 
 def _platform_bounding_box(platform: Platform) -> BoundingBox:

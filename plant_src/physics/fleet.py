@@ -78,19 +78,35 @@ class Fleet:
         fixed_names: Mapping[int, str],
     ):
         self._client, self._flags = client, flags
-        self._memory = memory = VehicleArrays([body_class(vehicle.model).array_sizes(vehicle.model) for vehicle in vehicles])
+        self._memory = memory = VehicleArrays(
+            [body_class(vehicle.model).array_sizes(vehicle.model) for vehicle in vehicles]
+        )
         self.bodies: list[ContactBody] = [
             body_class(vehicle.model)(client, vehicle, {**arrays, "step_size": step_size})
             for vehicle, arrays in zip(vehicles, memory.of_vehicle, strict=True)
         ]
-        self.inputs, self.outputs = memory.of_all_vehicles["inputs"], memory.of_all_vehicles["outputs"]
-        self.failures = Failures(self.bodies, vehicles, flags, memory.of_all_vehicles["step_status"], fixed_names)
+        self.inputs, self.outputs = (
+            memory.of_all_vehicles["inputs"],
+            memory.of_all_vehicles["outputs"],
+        )
+        self.failures = Failures(
+            self.bodies, vehicles, flags, memory.of_all_vehicles["step_status"], fixed_names
+        )
         self.contacts = Contacts(client, self.bodies, self.outputs, flags, self.failures)
         self._contact_memory = ContactMemory(client, self.bodies, vehicles, fixed)
-        movable = [body.bounding_box(vehicle.body) for body, vehicle in zip(self.bodies, vehicles, strict=True)]
-        distances = (memory.of_all_vehicles[name] for name in ("endpoints", "reference_position", "safe_distance"))
+        movable = [
+            body.bounding_box(vehicle.body)
+            for body, vehicle in zip(self.bodies, vehicles, strict=True)
+        ]
+        distances = (
+            memory.of_all_vehicles[name]
+            for name in ("endpoints", "reference_position", "safe_distance")
+        )
         self.clearance = Clearance(movable, fixed, *distances)
-        self._predict, self._correct = [body.predict for body in self.bodies], [body.correct for body in self.bodies]
+        self._predict, self._correct = (
+            [body.predict for body in self.bodies],
+            [body.correct for body in self.bodies],
+        )
         # memoryviews: access to a few numbers is faster than with NumPy
         self._step_status: Any = memory.of_all_vehicles["step_status"].data
         self._impulse_magnitudes: Any = memory.of_all_vehicles["impulse_magnitude"].data
@@ -114,7 +130,8 @@ class Fleet:
             step_fraction: Duration of the step over that of the component's step.
 
         Raises:
-            InvalidStateError: If an input or a state is not finite or too large. If `predict` finds it, nothing has moved.
+            InvalidStateError: If an input or a state is not finite or too large. If `predict` finds
+                it, nothing has moved.
         """
         for predict in self._predict:
             predict()
@@ -133,7 +150,9 @@ class Fleet:
         """Refuse an invalid state, report possible failures, and find the vehicles that are near something if necessary."""
         statuses = self._step_status.tolist()
         if INVALID_STATE in statuses:
-            raise InvalidStateError(self.bodies[statuses.index(INVALID_STATE)].describe_invalid_state())
+            raise InvalidStateError(
+                self.bodies[statuses.index(INVALID_STATE)].describe_invalid_state()
+            )
         if max(statuses) >= MAY_FAIL:
             self.failures.alarm = True
         leaves_safe_box = LEAVES_SAFE_BOX in statuses or LEAVES_SAFE_BOX + MAY_FAIL in statuses
@@ -154,8 +173,12 @@ class Fleet:
     def _set_active_bodies(self, near: Sequence[bool]) -> None:
         """Prepare Bullet steps with these bodies."""
         self._is_near = near
-        self._active_bodies = active = [body for body, is_near in zip(self.bodies, near, strict=True) if is_near]
-        self._velocity_commands = [(body.body_id, body.commanded_twist, body.compensating_torque) for body in active]
+        self._active_bodies = active = [
+            body for body, is_near in zip(self.bodies, near, strict=True) if is_near
+        ]
+        self._velocity_commands = [
+            (body.body_id, body.commanded_twist, body.compensating_torque) for body in active
+        ]
         self._velocity_results = [(body.body_id, body.bullet_twist) for body in active]
         self._active_planar_bodies = [body for body in active if isinstance(body, PlanarBody)]
 
@@ -182,9 +205,13 @@ class Fleet:
     def _step_bullet(self) -> None:
         client = self._client
         for body, twist, torque in self._velocity_commands:
-            pybullet.resetBaseVelocity(body, _unpack_vector(twist), _unpack_vector(twist, _ANGULAR_OFFSET), client)
+            pybullet.resetBaseVelocity(
+                body, _unpack_vector(twist), _unpack_vector(twist, _ANGULAR_OFFSET), client
+            )
             if torque is not None:
-                pybullet.applyExternalTorque(body, -1, _unpack_vector(torque), pybullet.WORLD_FRAME, client)
+                pybullet.applyExternalTorque(
+                    body, -1, _unpack_vector(torque), pybullet.WORLD_FRAME, client
+                )
         pybullet.stepSimulation(client)
         for body, twist in self._velocity_results:
             linear, angular = pybullet.getBaseVelocity(body, client)
@@ -203,7 +230,13 @@ class Fleet:
     def get_state(self) -> FleetState:
         """Return a copy of the state, which also takes memory in Bullet until `free_state`."""
         pairs = touching_pairs(self._client)
-        return FleetState(pybullet.saveState(self._client), self._memory.buffer.copy(), self._flags.copy(), self._is_near, pairs)
+        return FleetState(
+            pybullet.saveState(self._client),
+            self._memory.buffer.copy(),
+            self._flags.copy(),
+            self._is_near,
+            pairs,
+        )
 
     def set_state(self, state: FleetState) -> None:
         """Restore a state."""

@@ -11,7 +11,9 @@ _Key = TypeVar("_Key", bound=Hashable)
 
 
 class VehicleArrays:
-    """Named arrays of all vehicles; those with the same name lie side by side, in the order of the vehicles.
+    """Named arrays of all vehicles.
+
+    Those with the same name lie side by side, in the order of the vehicles.
 
     Args:
         sizes: For each vehicle its arrays, as name to size.
@@ -28,7 +30,10 @@ class VehicleArrays:
         self.buffer = np.zeros(sum(totals.values()))
         self.of_all_vehicles = _split(self.buffer, totals)
         views = {
-            name: _split(self.of_all_vehicles[name], {k: size.get(name, 0) for k, size in enumerate(sizes)}) for name in names
+            name: _split(
+                self.of_all_vehicles[name], {k: size.get(name, 0) for k, size in enumerate(sizes)}
+            )
+            for name in names
         }
         self.of_vehicle = [{name: views[name][k] for name in size} for k, size in enumerate(sizes)]
 
@@ -36,4 +41,6 @@ class VehicleArrays:
 def _split(array: np.ndarray, sizes: Mapping[_Key, int]) -> dict[_Key, np.ndarray]:
     """Return consecutive views of an array."""
     ends = np.cumsum(list(sizes.values())).tolist()
-    return {key: array[end - size : end] for (key, size), end in zip(sizes.items(), ends, strict=True)}
+    return {
+        key: array[end - size : end] for (key, size), end in zip(sizes.items(), ends, strict=True)
+    }

@@ -19,7 +19,8 @@ if TYPE_CHECKING:
     from ..placement import VehiclePlacement
     from ..vehicles.model import Model
 
-#: tolerated vertical speed of a planar vessel in Bullet (m/s), and tolerated change of its height before a reset (m)
+#: tolerated vertical speed of a planar vessel in Bullet (m/s), and tolerated change of its height
+#: before a reset (m)
 MAX_SINK_RATE, MAX_HEAVE = 1e-4, 1e-9
 
 _VERTICAL_VELOCITY = 2  # index in a twist
@@ -28,12 +29,27 @@ _pack_vector = struct.Struct("3d").pack_into
 
 
 class FloatingBody(ContactBody):
-    """A vessel in six degrees of freedom; its equations predict with the contact impulse of the previous step."""
+    """A vessel in six degrees of freedom.
 
-    ARRAY_SIZES = {**ContactBody.ARRAY_SIZES, "compensating_torque": 3, "contact_impulse": 6, "previous_contact_impulse": 6}
+    Its equations predict with the contact impulse of the previous step.
+    """
+
+    ARRAY_SIZES = {
+        **ContactBody.ARRAY_SIZES,
+        "compensating_torque": 3,
+        "contact_impulse": 6,
+        "previous_contact_impulse": 6,
+    }
     PREDICT_ARRAYS = (
         (*PREDICT_ARGUMENTS, "contact_impulse"),
-        (*PREDICT_RESULTS, "compensating_torque", "bullet_pose", "previous_contact_impulse", "endpoints", "step_status"),
+        (
+            *PREDICT_RESULTS,
+            "compensating_torque",
+            "bullet_pose",
+            "previous_contact_impulse",
+            "endpoints",
+            "step_status",
+        ),
     )
     CORRECT_ARRAYS = (
         (*ContactBody.CORRECT_ARRAYS[0], "previous_contact_impulse"),
@@ -49,7 +65,11 @@ class FloatingBody(ContactBody):
         """
         place_and_time, result = np.zeros(3), np.zeros(1)
         count = np.full(1, float(wave_count))
-        call = bind_arrays(load_library(self.model.binary).water_elevation, [place_and_time, count, waves], [result])
+        call = bind_arrays(
+            load_library(self.model.binary).water_elevation,
+            [place_and_time, count, waves],
+            [result],
+        )
         arguments, elevations, outputs = place_and_time.data, result.data, self.outputs.data
 
         def elevation(time: float) -> float:
@@ -61,7 +81,10 @@ class FloatingBody(ContactBody):
 
 
 class SubmergedBody(ContactBody):
-    """A submerged vehicle; its frame in Bullet has the principal axes, and it predicts with the previous contact impulse."""
+    """A submerged vehicle.
+
+    Its frame in Bullet has the principal axes, and it predicts with the previous contact impulse.
+    """
 
     ARRAY_SIZES = FloatingBody.ARRAY_SIZES
     INITIALIZE_ARRAYS = FreeBody.INITIALIZE_ARRAYS
@@ -78,9 +101,10 @@ class SubmergedBody(ContactBody):
 class PlanarBody(ContactBody):
     """A vessel in the horizontal plane: heave, roll and pitch are zero under any load.
 
-    Infinite moments of inertia lock roll and pitch in Bullet. Heave cannot be locked: the body receives a lift velocity that
-    cancels the sink rate due to the load on the deck. The lift is predicted from the previous steps. If Bullet's body still
-    sinks, the step is repeated with a lift improved by the secant method.
+    Infinite moments of inertia lock roll and pitch in Bullet. Heave cannot be locked: the body
+    receives a lift velocity that cancels the sink rate due to the load on the deck. The lift is
+    predicted from the previous steps. If Bullet's body still sinks, the step is repeated with a
+    lift improved by the secant method.
     """
 
     ARRAY_SIZES = {**ContactBody.ARRAY_SIZES, "vertical_load": 3, "previous_vertical_load": 2}
@@ -111,17 +135,28 @@ class PlanarBody(ContactBody):
         return super()._create_body(replace(vehicle, body=body))
 
     def height_converged(self, repeats: int) -> bool:
-        """Return whether the vessel keeps its height in Bullet's step; if not, improve the lift for the next attempt.
+        """Return whether the vessel keeps its height in Bullet's step.
+
+        If not, improve the lift for the next attempt.
 
         Args:
             repeats: Number of attempts before this one.
         """
-        lift, sink_rate = self.commanded_twist[_VERTICAL_VELOCITY], -self.bullet_twist[_VERTICAL_VELOCITY]
+        lift, sink_rate = (
+            self.commanded_twist[_VERTICAL_VELOCITY],
+            -self.bullet_twist[_VERTICAL_VELOCITY],
+        )
         (last_lift, last_sink_rate), self._last_attempt = self._last_attempt, (lift, sink_rate)
         if not MAX_SINK_RATE < abs(sink_rate) < math.inf:
             return True
-        slope = (last_sink_rate - sink_rate) / (lift - last_lift) if repeats and lift != last_lift else 1.0
-        self.commanded_twist[_VERTICAL_VELOCITY] = lift + sink_rate / min(max(slope, _MIN_SLOPE), 1.0)
+        slope = (
+            (last_sink_rate - sink_rate) / (lift - last_lift)
+            if repeats and lift != last_lift
+            else 1.0
+        )
+        self.commanded_twist[_VERTICAL_VELOCITY] = lift + sink_rate / min(
+            max(slope, _MIN_SLOPE), 1.0
+        )
         return False
 
     def reset_height(self) -> None:

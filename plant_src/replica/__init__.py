@@ -1,1 +1,4 @@
-"""Replica of the published simulator with its conventions: signal interface, plant, force models and controllers."""
+"""Replica of the published simulator with its conventions.
+
+Signal interface, plant, force models and controllers.
+"""

@@ -1,4 +1,7 @@
-"""Quadcopter and vessel as bodies that Bullet integrates; loads are constant in the world frame over a step."""
+"""Quadcopter and vessel as bodies that Bullet integrates.
+
+Loads are constant in the world frame over a step.
+"""
 
 from __future__ import annotations
 
@@ -33,20 +36,24 @@ _PRINCIPAL_AXES = principal_axes(_QUADCOPTER.airframe.inertia)[1]
 #: centre of mass in the body frame of the published model (m)
 CENTRE_OF_MASS = np.array([-0.003329, 0.001981, -0.000577])
 
-#: maps four thrusts (N) and four propeller torques (N m) to the torque about the centre of mass, forward-left-up, (3, 8)
+#: maps four thrusts (N) and four propeller torques (N m) to the torque about the centre of mass,
+#: forward-left-up, (3, 8)
 _TORQUE_MATRIX = np.hstack((np.cross(_ROTORS, _UP).T, np.outer(_UP, _TORQUE_SIGNS)))
 
-#: maps the angular velocity to the velocity of the centre of mass relative to the origin of the model frame, (3, 3)
+#: maps the angular velocity to the velocity of the centre of mass relative to the origin of the
+#: model frame, (3, 3)
 _LEVER_MATRIX = np.cross(np.eye(3), CENTRE_OF_MASS).T
 
 
 class Quadcopter:
-    """Rigid body under rotor thrusts and propeller torques; its frame in Bullet has the principal axes of inertia.
+    """Rigid body under rotor thrusts and propeller torques.
+
+    Its frame in Bullet has the principal axes of inertia.
 
     Args:
         client: Bullet client.
-        initial: Position (m, 3) of the origin of the model frame, yaw (rad), velocity (m/s, 3) and rates (rad/s, 3) in
-            forward-left-up body axes.
+        initial: Position (m, 3) of the origin of the model frame, yaw (rad), velocity (m/s, 3) and
+            rates (rad/s, 3) in forward-left-up body axes.
     """
 
     def __init__(self, client: int, initial: Numbers):
@@ -54,7 +61,9 @@ class Quadcopter:
         rotation = _rotation_about_z(initial[3])
         centre = np.array(initial[0:3]) + rotation @ CENTRE_OF_MASS
         yaw = pybullet.getQuaternionFromEuler([0.0, 0.0, initial[3]])
-        _, orientation = pybullet.multiplyTransforms([0, 0, 0], yaw, [0, 0, 0], quaternion_from_matrix(self._axes))
+        _, orientation = pybullet.multiplyTransforms(
+            [0, 0, 0], yaw, [0, 0, 0], quaternion_from_matrix(self._axes)
+        )
         self.body = pybullet.createMultiBody(
             _QUADCOPTER.body.mass,
             create_compound_shape(_QUADCOPTER.body.boxes, client),
@@ -64,8 +73,13 @@ class Quadcopter:
             physicsClientId=client,
         )
         set_dynamics(client, self.body, -1, body=_QUADCOPTER.body)
-        linear, angular = rotation @ (initial[4:7] + _LEVER_MATRIX @ initial[7:10]), rotation @ initial[7:10]
-        pybullet.resetBaseVelocity(self.body, linear.tolist(), angular.tolist(), physicsClientId=client)
+        linear, angular = (
+            rotation @ (initial[4:7] + _LEVER_MATRIX @ initial[7:10]),
+            rotation @ initial[7:10],
+        )
+        pybullet.resetBaseVelocity(
+            self.body, linear.tolist(), angular.tolist(), physicsClientId=client
+        )
 
     def apply(self, loads: np.ndarray) -> None:
         """Apply four thrusts (N) and four propeller torques (N m) in the next step of Bullet, fixed in the world frame."""
@@ -79,14 +93,16 @@ class Quadcopter:
         """Return the published quantities.
 
         Returns:
-            Position (m), attitude phi, theta, psi (rad) and velocity (m/s), shape (9,); and R v + position, shape (3,), whose
-            difference quotient was published as acceleration.
+            Position (m), attitude phi, theta, psi (rad) and velocity (m/s), shape (9,); and R v +
+            position, shape (3,), whose difference quotient was published as acceleration.
         """
         centre, to_world = self._pose()
         linear, angular = pybullet.getBaseVelocity(self.body, self._client)
         position, from_original = centre - to_world @ CENTRE_OF_MASS, to_world @ _FRD_TO_FLU
         velocity = linear - to_world @ (_LEVER_MATRIX @ (to_world.T @ angular))
-        return np.concatenate((position, attitude(from_original), velocity)), from_original @ velocity + position
+        return np.concatenate(
+            (position, attitude(from_original), velocity)
+        ), from_original @ velocity + position
 
     def _pose(self) -> tuple[np.ndarray, np.ndarray]:
         """Return the centre of mass (m) and the rotation matrix from the forward-left-up body frame to the world."""
@@ -109,7 +125,9 @@ class Vessel:
         self._client, self.body = client, _create_jointed_hull(client)
         velocity = (_rotation_about_z(initial[2])[:2, :2] @ np.array(initial[3:5])).tolist()
         for joint, rate in zip(self._JOINTS, (*velocity, initial[5]), strict=True):
-            pybullet.setJointMotorControl2(self.body, joint, pybullet.VELOCITY_CONTROL, force=0, physicsClientId=client)
+            pybullet.setJointMotorControl2(
+                self.body, joint, pybullet.VELOCITY_CONTROL, force=0, physicsClientId=client
+            )
             pybullet.resetJointState(self.body, joint, initial[joint], rate, physicsClientId=client)
             pybullet.changeDynamics(self.body, joint, jointDamping=0, physicsClientId=client)
         for link in (-1, 0, 1):
@@ -123,7 +141,11 @@ class Vessel:
         force = _rotation_about_z(yaw)[:2, :2] @ [thrust + rudder_x + water_x, rudder_y + water_y]
         efforts = [*force.tolist(), float(moment - RUDDER_ARM * rudder_y)]
         pybullet.setJointMotorControlArray(
-            self.body, self._JOINTS, pybullet.TORQUE_CONTROL, forces=efforts, physicsClientId=self._client
+            self.body,
+            self._JOINTS,
+            pybullet.TORQUE_CONTROL,
+            forces=efforts,
+            physicsClientId=self._client,
         )
 
     def measure(self) -> np.ndarray:
@@ -154,7 +176,11 @@ def _create_jointed_hull(client: int) -> int:
         linkInertialFramePositions=[origin] * 3,
         linkInertialFrameOrientations=[upright] * 3,
         linkParentIndices=[0, 1, 2],
-        linkJointTypes=[pybullet.JOINT_PRISMATIC, pybullet.JOINT_PRISMATIC, pybullet.JOINT_REVOLUTE],
+        linkJointTypes=[
+            pybullet.JOINT_PRISMATIC,
+            pybullet.JOINT_PRISMATIC,
+            pybullet.JOINT_REVOLUTE,
+        ],
         linkJointAxis=[[1, 0, 0], [0, 1, 0], [0, 0, 1]],
         physicsClientId=client,
     )

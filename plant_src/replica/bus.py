@@ -9,10 +9,12 @@ from .interface import OUTPUTS
 
 
 class Bus(ReplicaFmu):
-    """Delay of one sample for all 22 signals; the first outputs are zero, as in the published handshake.
+    """Delay of one sample for all 22 signals.
 
-    It is stepped before the controllers, which therefore receive the plant's signals of 10 ms ago. A connection with "delay": 1
-    differs only in the first sample.
+    The first outputs are zero, as in the published handshake.
+
+    It is stepped before the controllers, which therefore receive the plant's signals of 10 ms ago.
+    A connection with "delay": 1 differs only in the first sample.
     """
 
     description = "Delay of one sample that starts at zero"

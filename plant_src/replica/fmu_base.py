@@ -1,4 +1,7 @@
-"""Base class of the replica's PythonFMU classes: variables by name, and PID loops whose gains and states are variables."""
+"""Base class of the replica's PythonFMU classes.
+
+Variables by name, and PID loops whose gains and states are variables.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +13,10 @@ from pythonfmu import Fmi2Causality, Fmi2Slave, Fmi2Variability, Real
 
 from .pid import Pid
 
-_PARAMETER: dict[str, Any] = {"causality": Fmi2Causality.parameter, "variability": Fmi2Variability.tunable}
+_PARAMETER: dict[str, Any] = {
+    "causality": Fmi2Causality.parameter,
+    "variability": Fmi2Variability.tunable,
+}
 _STATE: dict[str, Any] = {"causality": Fmi2Causality.local}
 
 
@@ -43,12 +49,18 @@ class ReplicaFmu(Fmi2Slave):
         """Declare gains and states of a loop as variables below `name` and return the loop."""
         for field in ("P", "I", "D", "N", "integral", "filtered"):
             kind = _PARAMETER if field.isupper() else _STATE
-            access = {"getter": partial(getattr, loop, field), "setter": partial(setattr, loop, field)}
+            access = {
+                "getter": partial(getattr, loop, field),
+                "setter": partial(setattr, loop, field),
+            }
             self.register_variable(Real(f"{name}.{field}", **access, **kind))
         return loop
 
     def _register(self, names: Iterable[str], **kind: Any) -> None:
         for name in names:
             self.values[name] = 0.0
-            access = {"getter": partial(self.values.__getitem__, name), "setter": partial(self.values.__setitem__, name)}
+            access = {
+                "getter": partial(self.values.__getitem__, name),
+                "setter": partial(self.values.__setitem__, name),
+            }
             self.register_variable(Real(name, **access, **kind))

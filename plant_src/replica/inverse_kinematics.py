@@ -1,7 +1,7 @@
 """Published controller by inverse kinematics, and the acceleration profiles of its demo.
 
-Equations 14 to 20 of the paper as in the published code: accelerations are along the body's forward and right axes for every
-psi, although the paper calls them inertial.
+Equations 14 to 20 of the paper as in the published code: accelerations are along the body's forward
+and right axes for every psi, although the paper calls them inertial.
 """
 
 from __future__ import annotations
@@ -34,12 +34,20 @@ class InverseKinematics(ReplicaFmu):
 
     def __init__(self, **arguments: Any):
         super().__init__(**arguments)
-        self.declare_inputs("altitude_command", "vehicle.position.z", "forward_acceleration", "right_acceleration")
+        self.declare_inputs(
+            "altitude_command", "vehicle.position.z", "forward_acceleration", "right_acceleration"
+        )
         self.declare_parameters(initial_force=0.0)
         self.declare_states(**dict.fromkeys(_FILTER_STATES, 0.0))
         self.declare_outputs("phi_command", "theta_command", "throttle", "vertical_force")
-        self._altitude = self.register_pid("altitude", Pid(10.0, 10.0, 3.0, 40.0, lower=2.0, upper=7.0, clamping=True))
-        self._step_size, self._filter_matrix, self._filter_gain = math.nan, np.eye(FILTER_ORDER), np.zeros(FILTER_ORDER)
+        self._altitude = self.register_pid(
+            "altitude", Pid(10.0, 10.0, 3.0, 40.0, lower=2.0, upper=7.0, clamping=True)
+        )
+        self._step_size, self._filter_matrix, self._filter_gain = (
+            math.nan,
+            np.eye(FILTER_ORDER),
+            np.zeros(FILTER_ORDER),
+        )
 
     def exit_initialization_mode(self) -> None:
         """Start altitude loop and low-pass in the steady state of `initial_force`."""
@@ -49,20 +57,36 @@ class InverseKinematics(ReplicaFmu):
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Compute the commands of this sample (equations 14 to 20 of the paper)."""
         value = self.values
-        unfiltered = self._altitude.step(value["altitude_command"] - value["vehicle.position.z"], step_size)
+        unfiltered = self._altitude.step(
+            value["altitude_command"] - value["vehicle.position.z"], step_size
+        )
         z = value["vertical_force"] = self._low_pass_step(unfiltered, step_size)
         x, y = MASS * value["forward_acceleration"], MASS * value["right_acceleration"]
         force = math.hypot(x, y, z)
-        value["phi_command"], value["theta_command"] = math.atan2(y, z), -math.asin(x / force) if force else 0.0
-        value["throttle"] = 100 * 60 / (MAX_SPEED * 2 * math.pi) * math.sqrt(force / (4 * THRUST_COEFFICIENT))
+        value["phi_command"], value["theta_command"] = (
+            math.atan2(y, z),
+            -math.asin(x / force) if force else 0.0,
+        )
+        value["throttle"] = (
+            100 * 60 / (MAX_SPEED * 2 * math.pi) * math.sqrt(force / (4 * THRUST_COEFFICIENT))
+        )
         return True
 
     def _low_pass_step(self, force: float, step_size: float) -> float:
         """Return the output of the low-pass at this sample, then advance its states."""
         if step_size != self._step_size:
-            self._step_size, (self._filter_matrix, self._filter_gain) = step_size, low_pass_matrices(step_size)
+            self._step_size, (self._filter_matrix, self._filter_gain) = (
+                step_size,
+                low_pass_matrices(step_size),
+            )
         state = np.array([self.values[name] for name in _FILTER_STATES])
-        self.values |= dict(zip(_FILTER_STATES, (self._filter_matrix @ state + self._filter_gain * force).tolist(), strict=True))
+        self.values |= dict(
+            zip(
+                _FILTER_STATES,
+                (self._filter_matrix @ state + self._filter_gain * force).tolist(),
+                strict=True,
+            )
+        )
         return float(state[-1])
 
 
@@ -81,7 +105,11 @@ def low_pass_matrices(step_size: float) -> tuple[np.ndarray, np.ndarray]:
     a[0, 0], b[0] = -CUT_OFF_FREQUENCY, CUT_OFF_FREQUENCY
     for k, row in enumerate(range(1, FILTER_ORDER, 2), start=1):
         damping = 2 * math.cos(k * math.pi / FILTER_ORDER)
-        a[row, [row - 1, row, row + 1]] = CUT_OFF_FREQUENCY**2, -damping * CUT_OFF_FREQUENCY, -(CUT_OFF_FREQUENCY**2)
+        a[row, [row - 1, row, row + 1]] = (
+            CUT_OFF_FREQUENCY**2,
+            -damping * CUT_OFF_FREQUENCY,
+            -(CUT_OFF_FREQUENCY**2),
+        )
         a[row + 1, row] = 1.0
     first = step_size * np.eye(FILTER_ORDER) + step_size**2 / 2 * a + step_size**3 / 6 * a @ a
     return np.eye(FILTER_ORDER) + first @ a, first @ b
@@ -93,7 +121,10 @@ def low_pass_steady_state(value: float) -> np.ndarray:
 
 
 class AccelerationProfiles(ReplicaFmu):
-    """Acceleration profiles of the demo (m/s2): 5 m forth and back along `forward`, 25 m along `right`, in 20 s; then zero."""
+    """Acceleration profiles of the demo (m/s2).
+
+    5 m forth and back along `forward`, 25 m along `right`, in 20 s; then zero.
+    """
 
     description = "Acceleration profiles of the published demo"
 

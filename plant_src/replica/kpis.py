@@ -27,7 +27,8 @@ def overshoots(
 ) -> dict[str, Number]:
     """Evaluate the largest distance from each leg between waypoints.
 
-    The first leg starts at the position in the first row. A leg ends when its circle of acceptance is entered.
+    The first leg starts at the position in the first row. A leg ends when its circle of acceptance
+    is entered.
 
     Args:
         result: Recorded mission.
@@ -38,19 +39,26 @@ def overshoots(
         waypoint_count: Number of waypoints that are used; None: all.
 
     Returns:
-        `leg[1]`, `leg[2]`, ...: largest distance from the straight line to each waypoint (m); NaN for unfinished legs.
+        `leg[1]`, `leg[2]`, ...: largest distance from the straight line to each waypoint (m); NaN
+        for unfinished legs.
     """
     switches = [
         result.time[0],
-        *_reached_times(waypoints(result, vehicle, waypoint_x, waypoint_y, acceptance_radius, waypoint_count)),
+        *_reached_times(
+            waypoints(result, vehicle, waypoint_x, waypoint_y, acceptance_radius, waypoint_count)
+        ),
     ]
     position = np.column_stack([result[f"{vehicle}.position.{axis}"] for axis in "xy"])
     corners = [position[0], *np.array(used_waypoints(waypoint_x, waypoint_y, waypoint_count))]
     legs = dict.fromkeys((f"leg[{i}]" for i in range(1, len(corners))), math.nan)
-    for i, ((begin, end), (a, b)) in enumerate(zip(pairwise(switches), pairwise(corners), strict=False), start=1):
+    for i, ((begin, end), (a, b)) in enumerate(
+        zip(pairwise(switches), pairwise(corners), strict=False), start=1
+    ):
         direction = (b - a) / np.hypot(*(b - a))
         offset = position[(result.time >= begin) & (result.time <= end)] - a
-        legs[f"leg[{i}]"] = float(np.abs(offset[:, 0] * direction[1] - offset[:, 1] * direction[0]).max())
+        legs[f"leg[{i}]"] = float(
+            np.abs(offset[:, 0] * direction[1] - offset[:, 1] * direction[0]).max()
+        )
     return legs
 
 
@@ -84,7 +92,9 @@ def turns(
         - `turn`: largest of the peaks within `settling` after each waypoint (m)
         - `least_turn`: smallest of these peaks (m)
     """
-    switches = _reached_times(waypoints(result, target, waypoint_x, waypoint_y, acceptance_radius, waypoint_count))
+    switches = _reached_times(
+        waypoints(result, target, waypoint_x, waypoint_y, acceptance_radius, waypoint_count)
+    )
     distance, time = horizontal_distance(result, vehicle, target), result.time
     windows = [(time >= switch) & (time < switch + settling) for switch in (time[0], *switches)]
     peaks = [float(distance[window].max()) for window in windows[1:]]
@@ -103,7 +113,12 @@ def _reached_times(values: Mapping[str, Number]) -> list[float]:
 
 @units(time="s", error="m", speed="m/s", lowest="m")
 def touchdown(
-    result: Result, vehicle: Prefix, target: Prefix, rest_height: float, start: float, margin: float = 0.005
+    result: Result,
+    vehicle: Prefix,
+    target: Prefix,
+    rest_height: float,
+    start: float,
+    margin: float = 0.005,
 ) -> dict[str, Number]:
     """Evaluate the first touchdown after `start`, found by the altitude.
 
@@ -121,7 +136,8 @@ def touchdown(
         - `time`: time of the touchdown (s)
         - `error`: horizontal distance to the target at touchdown (m)
         - `speed`: downward speed one row earlier (m/s)
-        - `lowest`: lowest altitude between `start` and 0.5 s before touchdown, the undershoot of the approach (m)
+        - `lowest`: lowest altitude between `start` and 0.5 s before touchdown, the undershoot of
+          the approach (m)
     """
     z = result[f"{vehicle}.position.z"]
     rows = np.flatnonzero((z <= rest_height + margin) & (result.time >= start))

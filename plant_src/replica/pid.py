@@ -10,8 +10,9 @@ from dataclasses import dataclass
 class Pid:
     """Parallel PID controller u = P e + I int(e) + D N/(1 + N/s) e with output limits; N in rad/s.
 
-    The error e is constant between samples. The derivative filter is integrated by the third-order Runge-Kutta method of the
-    published simulator. With `clamping` the integral stops while the output is limited and e would drive it further.
+    The error e is constant between samples. The derivative filter is integrated by the third-order
+    Runge-Kutta method of the published simulator. With `clamping` the integral stops while the
+    output is limited and e would drive it further.
     """
 
     P: float

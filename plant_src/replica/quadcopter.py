@@ -1,8 +1,8 @@
 """Published cascaded controller of the quadcopter, one class per block.
 
-Signals have the conventions of `interface.py`. Angles between blocks are in rad and throttles in %; inside the loops angles are
-in degrees, as the published gains require. Two published errors are kept: world velocities are used as forward and left
-velocities, and the yaw error is not wrapped.
+Signals have the conventions of `interface.py`. Angles between blocks are in rad and throttles in %;
+inside the loops angles are in degrees, as the published gains require. Two published errors are
+kept: world velocities are used as forward and left velocities, and the yaw error is not wrapped.
 """
 
 from __future__ import annotations
@@ -21,9 +21,9 @@ TARGET_INPUTS = ("target.position.x", "target.position.y")
 class Vtol(ReplicaFmu):
     """Altitude reference (m, world) of take-off, approach and landing.
 
-    The reference is `altitude_command` before `landing_time`, then `approach_altitude`, and 0 while the quadcopter is low and
-    within `landing_error` (m) of the target. The logic has no state: a larger error ends the descent, and the motors never
-    stop.
+    The reference is `altitude_command` before `landing_time`, then `approach_altitude`, and 0 while
+    the quadcopter is low and within `landing_error` (m) of the target. The logic has no state: a
+    larger error ends the descent, and the motors never stop.
     """
 
     description = "Switching logic of take-off, approach and landing"
@@ -31,13 +31,21 @@ class Vtol(ReplicaFmu):
     def __init__(self, **arguments: Any):
         super().__init__(**arguments)
         self.declare_inputs(*POSITION_INPUTS, "vehicle.position.z", *TARGET_INPUTS)
-        self.declare_parameters(altitude_command=1.0, landing_time=5.0, enabled=1.0, approach_altitude=1.0, landing_error=0.1)
+        self.declare_parameters(
+            altitude_command=1.0,
+            landing_time=5.0,
+            enabled=1.0,
+            approach_altitude=1.0,
+            landing_error=0.1,
+        )
         self.declare_outputs("altitude_reference", "horizontal_error")
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Compute horizontal error and altitude reference."""
         value = self.values
-        position, target = ([value[name] for name in names] for names in (POSITION_INPUTS, TARGET_INPUTS))
+        position, target = (
+            [value[name] for name in names] for names in (POSITION_INPUTS, TARGET_INPUTS)
+        )
         value["horizontal_error"] = math.dist(position, target)
         value["altitude_reference"] = self._reference(current_time)
         return True
@@ -47,7 +55,11 @@ class Vtol(ReplicaFmu):
         if not value["enabled"] or time < value["landing_time"]:
             return value["altitude_command"]
         high = value["vehicle.position.z"] >= value["approach_altitude"] + 0.1
-        return value["approach_altitude"] if high or value["horizontal_error"] > value["landing_error"] else 0.0
+        return (
+            value["approach_altitude"]
+            if high or value["horizontal_error"] > value["landing_error"]
+            else 0.0
+        )
 
 
 class PositionController(ReplicaFmu):
@@ -57,9 +69,17 @@ class PositionController(ReplicaFmu):
 
     def __init__(self, **arguments: Any):
         super().__init__(**arguments)
-        self.declare_inputs(*POSITION_INPUTS, "vehicle.velocity.x", "vehicle.velocity.y", "vehicle.attitude.psi", *TARGET_INPUTS)
+        self.declare_inputs(
+            *POSITION_INPUTS,
+            "vehicle.velocity.x",
+            "vehicle.velocity.y",
+            "vehicle.attitude.psi",
+            *TARGET_INPUTS,
+        )
         self.declare_outputs("phi_command", "theta_command")
-        self._x = self.register_pid("position_x", Pid(2.0, 1.1, lower=-2.0, upper=2.0, clamping=True))
+        self._x = self.register_pid(
+            "position_x", Pid(2.0, 1.1, lower=-2.0, upper=2.0, clamping=True)
+        )
         self._y = self.register_pid("position_y", Pid(2.0, 1.1, lower=-2.0, upper=2.0))
         self._u, self._v = (
             self.register_pid("velocity_x", _create_tilt_pid()),
@@ -78,8 +98,14 @@ class PositionController(ReplicaFmu):
 
     def _error(self) -> tuple[float, float]:
         """Return the distance to the target forward and to the left (m)."""
-        x, y = (self.values[target] - self.values[own] for target, own in zip(TARGET_INPUTS, POSITION_INPUTS, strict=True))
-        cos, sin = math.cos(-self.values["vehicle.attitude.psi"]), math.sin(-self.values["vehicle.attitude.psi"])
+        x, y = (
+            self.values[target] - self.values[own]
+            for target, own in zip(TARGET_INPUTS, POSITION_INPUTS, strict=True)
+        )
+        cos, sin = (
+            math.cos(-self.values["vehicle.attitude.psi"]),
+            math.sin(-self.values["vehicle.attitude.psi"]),
+        )
         return x * cos + y * sin, y * cos - x * sin
 
 
@@ -97,7 +123,9 @@ class AltitudeController(ReplicaFmu):
         super().__init__(**arguments)
         self.declare_inputs("altitude_reference", "vehicle.position.z")
         self.declare_outputs("throttle")
-        loop = Pid(170.242040782586, 28.86184465251, 50.0, 50.0, lower=35.0, upper=90.0, clamping=True)
+        loop = Pid(
+            170.242040782586, 28.86184465251, 50.0, 50.0, lower=35.0, upper=90.0, clamping=True
+        )
         self._loop = self.register_pid("altitude", loop)
 
     def do_step(self, current_time: float, step_size: float) -> bool:
@@ -115,7 +143,10 @@ class AttitudeController(ReplicaFmu):
     def __init__(self, **arguments: Any):
         super().__init__(**arguments)
         angles = ("phi", "theta", "psi")
-        self.declare_inputs(*(f"{angle}_command" for angle in angles), *(f"vehicle.attitude.{angle}" for angle in angles))
+        self.declare_inputs(
+            *(f"{angle}_command" for angle in angles),
+            *(f"vehicle.attitude.{angle}" for angle in angles),
+        )
         self.declare_outputs("roll", "pitch", "yaw")
         yaw_gains = (0.665668467901894, 0.340149010656045, 0.313800354221384, 96.4244783671056)
         loops = (
@@ -124,7 +155,10 @@ class AttitudeController(ReplicaFmu):
             Pid(*yaw_gains, lower=-10.0, upper=10.0, clamping=True),
         )
         names = ("roll", "pitch", "yaw")
-        self._loops = [(a, n, self.register_pid(f"{n}_loop", loop)) for a, n, loop in zip(angles, names, loops, strict=True)]
+        self._loops = [
+            (a, n, self.register_pid(f"{n}_loop", loop))
+            for a, n, loop in zip(angles, names, loops, strict=True)
+        ]
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Compute the throttle differences."""
@@ -146,8 +180,15 @@ class Mixer(ReplicaFmu):
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Compute the throttles."""
-        collective, roll, pitch, yaw = (self.values[name] for name in ("collective", "roll", "pitch", "yaw"))
-        sums = (collective - yaw + pitch, collective + yaw + roll, collective - yaw - pitch, collective + yaw - roll)
+        collective, roll, pitch, yaw = (
+            self.values[name] for name in ("collective", "roll", "pitch", "yaw")
+        )
+        sums = (
+            collective - yaw + pitch,
+            collective + yaw + roll,
+            collective - yaw - pitch,
+            collective + yaw - roll,
+        )
         for i, throttle in zip(ROTORS, sums, strict=True):
             self.values[f"throttle[{i}]"] = min(100.0, max(0.0, throttle))
         return True

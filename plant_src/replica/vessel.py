@@ -14,8 +14,9 @@ MAX_WAYPOINTS = 32
 class Waypoints(ReplicaFmu):
     """Line-of-sight guidance: course (rad, in [0, 2 pi)) to the current waypoint.
 
-    The next waypoint follows one sample after the vessel enters `acceptance_radius` (m), as published. The last waypoint stays
-    current; in the published simulator its index becomes invalid.
+    The next waypoint follows one sample after the vessel enters `acceptance_radius` (m), as
+    published. The last waypoint stays current; in the published simulator its index becomes
+    invalid.
     """
 
     description = "Line of sight to waypoints"
@@ -24,7 +25,9 @@ class Waypoints(ReplicaFmu):
         super().__init__(**arguments)
         self.declare_inputs("vehicle.position.x", "vehicle.position.y")
         self.declare_parameters(acceptance_radius=0.5, waypoint_count=1.0)
-        self.declare_parameters(**{f"waypoint_{axis}[{i}]": 0.0 for axis in "xy" for i in range(1, MAX_WAYPOINTS + 1)})
+        self.declare_parameters(
+            **{f"waypoint_{axis}[{i}]": 0.0 for axis in "xy" for i in range(1, MAX_WAYPOINTS + 1)}
+        )
         self.declare_states(was_inside=1.0, old_distance=0.0)
         self.declare_outputs("course_command", "waypoint")
         self.values["waypoint"] = 1.0
@@ -49,17 +52,23 @@ class Autopilot(ReplicaFmu):
 
     def __init__(self, **arguments: Any):
         super().__init__(**arguments)
-        self.declare_inputs("vehicle.velocity.x", "vehicle.velocity.y", "vehicle.attitude.yaw", "course_command")
+        self.declare_inputs(
+            "vehicle.velocity.x", "vehicle.velocity.y", "vehicle.attitude.yaw", "course_command"
+        )
         self.declare_parameters(speed_command=0.0)
         self.declare_outputs("thrust", "rudder_angle")
         largest = math.radians(35)
         self._speed = self.register_pid("speed", Pid(82.65, lower=-3.0, upper=3.0))
-        self._heading = self.register_pid("heading", Pid(0.5, 0.0, 0.6, 21.4165136740303, lower=-largest, upper=largest))
+        self._heading = self.register_pid(
+            "heading", Pid(0.5, 0.0, 0.6, 21.4165136740303, lower=-largest, upper=largest)
+        )
 
     def do_step(self, current_time: float, step_size: float) -> bool:
         """Compute thrust and rudder angle."""
         value = self.values
-        error = (value["vehicle.attitude.yaw"] - value["course_command"] + math.pi) % (2 * math.pi) - math.pi
+        error = (value["vehicle.attitude.yaw"] - value["course_command"] + math.pi) % (
+            2 * math.pi
+        ) - math.pi
         value["rudder_angle"] = self._heading.step(error, step_size)
         value["thrust"] = self._speed.step(value["speed_command"] - self._surge(), step_size)
         return True
@@ -67,4 +76,7 @@ class Autopilot(ReplicaFmu):
     def _surge(self) -> float:
         """Return the velocity along the heading (m/s)."""
         yaw = self.values["vehicle.attitude.yaw"]
-        return math.cos(yaw) * self.values["vehicle.velocity.x"] + math.sin(yaw) * self.values["vehicle.velocity.y"]
+        return (
+            math.cos(yaw) * self.values["vehicle.velocity.x"]
+            + math.sin(yaw) * self.values["vehicle.velocity.y"]
+        )

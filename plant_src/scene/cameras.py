@@ -35,7 +35,9 @@ class View:
 
     def matrix(self) -> list[float]:
         """Return the view matrix (world to camera) as OpenGL and Bullet define it, 16 numbers column by column."""
-        return list(pybullet.computeViewMatrix(self.eye.tolist(), self.target.tolist(), UP.tolist()))
+        return list(
+            pybullet.computeViewMatrix(self.eye.tolist(), self.target.tolist(), UP.tolist())
+        )
 
     def projection(self, width: int, height: int, window: Window) -> list[float]:
         """Return the projection matrix of a window of a picture of `width` by `height` pixels, 16 numbers column by column."""
@@ -55,9 +57,13 @@ class View:
         """Project points (m, world), shape (n, 3), in front of the camera to pixels from the left and the top, shape (n, 2)."""
         right, up, forward = ((points - self.eye) @ self.axes().T).T
         scale = height / (2 * math.tan(self.field_of_view / 2))
-        return np.stack([width / 2 + scale * right / forward, height / 2 - scale * up / forward], axis=1)
+        return np.stack(
+            [width / 2 + scale * right / forward, height / 2 - scale * up / forward], axis=1
+        )
 
-    def bounding_window(self, centres: np.ndarray, radii: np.ndarray, width: int, height: int) -> Window:
+    def bounding_window(
+        self, centres: np.ndarray, radii: np.ndarray, width: int, height: int
+    ) -> Window:
         """Return the smallest window that contains the visible parts of spheres.
 
         Args:
@@ -83,14 +89,20 @@ class View:
     def _in_frustum(self, positions: np.ndarray, radii: np.ndarray, aspect: float) -> np.ndarray:
         """Return a mask (n,) of the spheres at `positions` (n, 3), camera axes, that intersect the viewing frustum."""
         right, up, forward = positions.T
-        upwards, sideways = self.field_of_view / 2, math.atan(aspect * math.tan(self.field_of_view / 2))
+        upwards, sideways = (
+            self.field_of_view / 2,
+            math.atan(aspect * math.tan(self.field_of_view / 2)),
+        )
         visible: np.ndarray = forward + radii > NEAR
         for distance, angle in ((np.abs(right), sideways), (np.abs(up), upwards)):
             visible &= distance * math.cos(angle) - forward * math.sin(angle) < radii
         return visible
 
     def mirrored(self) -> View:
-        """Return the view mirrored at the water; its picture, upside down, is the reflection in the water."""
+        """Return the view mirrored at the water.
+
+        Its picture, upside down, is the reflection in the water.
+        """
         flip = np.array([1.0, 1.0, -1.0])
         return View(self.eye * flip, self.target * flip, self.field_of_view)
 
@@ -104,7 +116,9 @@ def _tangent_range(sideways: np.ndarray, radii: np.ndarray, forward: np.ndarray)
 
 def _pixel_range(spread: np.ndarray, count: int) -> list[int]:
     """Return the pixels (first, end) out of `count` that contain a `spread` of pixels relative to the middle."""
-    low, high = np.clip([math.floor(spread[0] + count / 2) - 1, math.ceil(spread[1] + count / 2) + 1], 0, count).tolist()
+    low, high = np.clip(
+        [math.floor(spread[0] + count / 2) - 1, math.ceil(spread[1] + count / 2) + 1], 0, count
+    ).tolist()
     return [low, high]
 
 
@@ -141,7 +155,9 @@ def landing(mission: Mission, _row: int) -> View:
     return _framing_view(positions, side + 0.24 * UP, 0.45)
 
 
-def _framing_view(positions: np.ndarray, direction: np.ndarray, margin: float, angle: float = 0.6) -> View:
+def _framing_view(
+    positions: np.ndarray, direction: np.ndarray, margin: float, angle: float = 0.6
+) -> View:
     """Return a view from `direction` that shows all positions (n, 3) plus `margin` (m) in a picture with aspect ratio 2."""
     centre = (positions.min(axis=0) + positions.max(axis=0)) / 2
     away = direction / np.linalg.norm(direction)

@@ -51,7 +51,9 @@ def ghosts(
     rows = _ghost_rows(mission, start, stop, interval)
     width, height = pixels
     with Scene(mission) as scene:
-        picture = scene.render(camera, rows, np.linspace(MIN_OPACITY, 1.0, len(rows) + 1)[1:].tolist(), width, height)
+        picture = scene.render(
+            camera, rows, np.linspace(MIN_OPACITY, 1.0, len(rows) + 1)[1:].tolist(), width, height
+        )
     figure = Figure(figsize=(PAGE_WIDTH, PAGE_WIDTH * height / width))
     axes = figure.add_axes((0.0, 0.0, 1.0, 1.0))
     axes.imshow(picture, aspect="auto", interpolation="none")
@@ -60,22 +62,36 @@ def ghosts(
     return figure
 
 
-def _ghost_rows(mission: Mission, start: float | None, stop: float | None, interval: float) -> list[int]:
+def _ghost_rows(
+    mission: Mission, start: float | None, stop: float | None, interval: float
+) -> list[int]:
     """Return rows every `interval` (s), counted back from the last time shown."""
     time, landing = mission.result.time, mission.landing_rows()
     last = time[landing[-1]] if stop is None else min(stop, time[-1])
     first = time[landing[0]] if start is None else start
     if not interval > 0 or last < first:
-        raise InputError(f"nothing to show from {first:g} s to {last:g} s in steps of {interval:g} s")
+        raise InputError(
+            f"nothing to show from {first:g} s to {last:g} s in steps of {interval:g} s"
+        )
     times = last - interval * np.arange(int((last - first) / interval + 1e-9) + 1)
     return [int(row) for row in np.searchsorted(time, times[::-1] - 1e-9)]
 
 
-def _write_times(axes: Axes, mission: Mission, rows: Sequence[int], camera: str, width: int, height: int) -> None:
+def _write_times(
+    axes: Axes, mission: Mission, rows: Sequence[int], camera: str, width: int, height: int
+) -> None:
     """Write the time (s) above each position of the first vehicle."""
     view = find_camera(camera)(mission, rows[-1])
     vehicle = next(iter(mission.vehicles))
     above = np.array([mission.position(vehicle, row) for row in rows]) + 0.22 * UP
     for row, (x, y) in zip(rows, view.pixels(above, width, height).tolist(), strict=True):
-        text = axes.text(x, y, f"{mission.result.time[row]:.1f} s", fontsize=7, color="#222222", ha="center", va="bottom")
+        text = axes.text(
+            x,
+            y,
+            f"{mission.result.time[row]:.1f} s",
+            fontsize=7,
+            color="#222222",
+            ha="center",
+            va="bottom",
+        )
         text.set(path_effects=[withStroke(linewidth=2, foreground="#FFFFFFB0")], clip_on=True)

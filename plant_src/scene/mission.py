@@ -45,7 +45,11 @@ class Mission:
         return np.stack([self._path(vehicle) for vehicle in self.vehicles])
 
     def _first_vehicle(self, is_vessel: bool) -> str:
-        names = [name for name, model in self.vehicles.items() if next(iter(models_of(model).values())).is_vessel == is_vessel]
+        names = [
+            name
+            for name, model in self.vehicles.items()
+            if next(iter(models_of(model).values())).is_vessel == is_vessel
+        ]
         return names[0] if names else next(iter(self.vehicles))
 
     def vessel_positions(self) -> np.ndarray:
@@ -65,7 +69,10 @@ class Mission:
 
 
 def mission_of_result(result: Result) -> Mission:
-    """Return the mission of a result. Raises InputError if its scenario has no plant with vehicles."""
+    """Return the mission of a result.
+
+    Raises InputError if its scenario has no plant with vehicles.
+    """
     components: Mapping[str, Any] = result.metadata.get("scenario", {}).get("components", {})
     for name, component in components.items():
         arguments = component.get("arguments", {})

@@ -1,6 +1,7 @@
 """Visual shapes of vehicles, take-off platforms and trees, made from boxes, cylinders and spheres.
 
-The shapes have no influence on the dynamics. Dimensions come from the geometry of the vehicles where it defines them.
+The shapes have no influence on the dynamics. Dimensions come from the geometry of the vehicles
+where it defines them.
 """
 
 from __future__ import annotations
@@ -15,13 +16,40 @@ from ..obstacles import Obstacle
 from ..vehicles.common.shapes import Quaternion, Vector
 from ..vehicles.model import Model
 from ..vehicles.strider import geometry as strider_geometry
-from ..vehicles.strider.parameters import DECK_TOP, DECK_X, DECK_Y, HULL_BOTTOM, HULL_LENGTH, HULL_OFFSET
+from ..vehicles.strider.parameters import (
+    DECK_TOP,
+    DECK_X,
+    DECK_Y,
+    HULL_BOTTOM,
+    HULL_LENGTH,
+    HULL_OFFSET,
+)
 
 IDENTITY_QUATERNION: Quaternion = (0.0, 0.0, 0.0, 1.0)
-ALONG_X: Quaternion = (0.0, math.sqrt(0.5), 0.0, math.sqrt(0.5))  # turns a cylinder's axis from z to x
-BETWEEN_ARMS: Quaternion = (0.0, 0.0, -math.sin(math.pi / 8), math.cos(math.pi / 8))  # x turned by -45 degrees about z
-WHITE, BLACK, GREY, SILVER = (0.95, 0.95, 0.95), (0.09, 0.09, 0.10), (0.35, 0.36, 0.38), (0.70, 0.72, 0.75)
-ORANGE, RED, YELLOW, BLUE = (0.96, 0.48, 0.08), (0.84, 0.18, 0.12), (0.98, 0.80, 0.18), (0.10, 0.32, 0.58)
+ALONG_X: Quaternion = (
+    0.0,
+    math.sqrt(0.5),
+    0.0,
+    math.sqrt(0.5),
+)  # turns a cylinder's axis from z to x
+BETWEEN_ARMS: Quaternion = (
+    0.0,
+    0.0,
+    -math.sin(math.pi / 8),
+    math.cos(math.pi / 8),
+)  # x turned by -45 degrees about z
+WHITE, BLACK, GREY, SILVER = (
+    (0.95, 0.95, 0.95),
+    (0.09, 0.09, 0.10),
+    (0.35, 0.36, 0.38),
+    (0.70, 0.72, 0.75),
+)
+ORANGE, RED, YELLOW, BLUE = (
+    (0.96, 0.48, 0.08),
+    (0.84, 0.18, 0.12),
+    (0.98, 0.80, 0.18),
+    (0.10, 0.32, 0.58),
+)
 PLANKS = ((0.64, 0.47, 0.30), (0.58, 0.42, 0.26), (0.68, 0.51, 0.33))
 BARK = (0.36, 0.26, 0.17)
 LEAVES = ((0.22, 0.42, 0.17), (0.28, 0.48, 0.19), (0.18, 0.36, 0.18), (0.36, 0.50, 0.20))
@@ -30,9 +58,10 @@ LEAVES = ((0.22, 0.42, 0.17), (0.28, 0.48, 0.19), (0.18, 0.36, 0.18), (0.36, 0.5
 class Part(NamedTuple):
     """Coloured solid in the frame of its object.
 
-    `size` (m) is: box: three edges; cylinder: radius and length along z; sphere: radius; mesh: corners of all triangles, nine
-    numbers each. `position` (m) is the centre, `orientation` a unit quaternion (x, y, z, w), `colour` red, green, blue in
-    0 ... 1. Only the 3-D replay draws an `opacity` below 1.
+    `size` (m) is: box: three edges; cylinder: radius and length along z; sphere: radius; mesh:
+    corners of all triangles, nine numbers each. `position` (m) is the centre, `orientation` a unit
+    quaternion (x, y, z, w), `colour` red, green, blue in 0 ... 1. Only the 3-D replay draws an
+    `opacity` below 1.
     """
 
     shape: Literal["box", "cylinder", "sphere", "mesh"]
@@ -60,7 +89,10 @@ _FOOT_DISTANCE, _LEG = 0.1612, 0.0566
 
 
 def ar_drone_parts(model: Model) -> list[Part]:
-    """Return the parts of the AR.Drone relative to its centre of mass: arms along the body axes, hull between two arms."""
+    """Return the parts of the AR.Drone relative to its centre of mass.
+
+    Arms along the body axes, hull between two arms.
+    """
     assert model.airframe is not None
     rotors = [rotor.position for rotor in model.airframe.rotors]
     arm = rotors[0][0]
@@ -86,14 +118,22 @@ def _rotor_parts(x: float, y: float, z: float, colour: Vector, ratio: float) -> 
 
 
 def strider_parts(_model: Model) -> list[Part]:
-    """Return the parts of the Strider relative to its centre of mass: hulls, struts and landing deck."""
+    """Return the parts of the Strider relative to its centre of mass.
+
+    Hulls, struts and landing deck.
+    """
     x, y, _ = strider_geometry.DECK_CENTRE
     length, width = DECK_X[1] - DECK_X[0], DECK_Y[1] - DECK_Y[0]
     plate = strider_geometry.PLATE_THICKNESS
     top = DECK_TOP - plate / 2
     parts = [
         Part("box", (length, width, plate), (x, y, top), GREY),
-        Part("box", strider_geometry.HOUSING_SIZE, (x, y, top - plate / 2 - strider_geometry.HOUSING_SIZE[2] / 2), BLUE),
+        Part(
+            "box",
+            strider_geometry.HOUSING_SIZE,
+            (x, y, top - plate / 2 - strider_geometry.HOUSING_SIZE[2] / 2),
+            BLUE,
+        ),
         Part("box", (0.004, 0.06, 0.09), (-0.46, 0.0, -0.11), BLACK),
         Part("cylinder", (0.008, 0.2), (-0.46, 0.0, 0.0), BLACK),
         Part("box", (0.16, 0.012, 0.012), (-0.40, 0.0, 0.09), BLACK),
@@ -107,8 +147,14 @@ def strider_parts(_model: Model) -> list[Part]:
 
 def landing_mark(x: float, y: float, z: float) -> list[Part]:
     """Return the landing mark: a white ring and a white H around (x, y) at the height z (m)."""
-    disc = [Part("cylinder", (radius, 0.002), (x, y, z + rise), colour) for radius, rise, colour in _RINGS]
-    bars = [Part("box", (0.20, 0.03, 0.002), (x, y + side * 0.06, z + 0.004), WHITE) for side in (-1.0, 1.0)]
+    disc = [
+        Part("cylinder", (radius, 0.002), (x, y, z + rise), colour)
+        for radius, rise, colour in _RINGS
+    ]
+    bars = [
+        Part("box", (0.20, 0.03, 0.002), (x, y + side * 0.06, z + 0.004), WHITE)
+        for side in (-1.0, 1.0)
+    ]
     return [*disc, *bars, Part("box", (0.03, 0.12, 0.002), (x, y, z + 0.004), WHITE)]
 
 
@@ -130,10 +176,18 @@ def _strut(x: float, side: float, deck_edge: float) -> Part:
     run, rise = inner - outer, high - low
     angle = side * math.atan2(-run, rise)  # about x, from z towards the middle
     turn = (math.sin(angle / 2), 0.0, 0.0, math.cos(angle / 2))
-    return Part("cylinder", (0.013, math.hypot(run, rise)), (x, side * (outer + inner) / 2, (low + high) / 2), SILVER, turn)
+    return Part(
+        "cylinder",
+        (0.013, math.hypot(run, rise)),
+        (x, side * (outer + inner) / 2, (low + high) / 2),
+        SILVER,
+        turn,
+    )
 
 
-def platform_parts(size: Sequence[float], position: Sequence[float], plank: float = 0.25) -> Iterator[Part]:
+def platform_parts(
+    size: Sequence[float], position: Sequence[float], plank: float = 0.25
+) -> Iterator[Part]:
     """Yield the parts of a take-off platform: planks on posts.
 
     Args:
@@ -153,16 +207,22 @@ def platform_parts(size: Sequence[float], position: Sequence[float], plank: floa
     post = z - thickness / 2
     for east in (-0.46, 0.0, 0.46):
         for north in (-0.46, 0.46):
-            yield Part("cylinder", (0.09, post), (x + east * length, y + north * width, post / 2), BARK)
+            yield Part(
+                "cylinder", (0.09, post), (x + east * length, y + north * width, post / 2), BARK
+            )
 
 
 def tree_parts(seed: int = 4) -> Iterator[Part]:
     """Yield the parts of the trees on the banks north and west of the lake."""
     random = np.random.default_rng(seed)
     for x in np.arange(-44.0, 90.0, 3.4):
-        yield from single_tree_parts(x + random.uniform(-1.2, 1.2), 37.5 + random.uniform(0.0, 9.0), random)
+        yield from single_tree_parts(
+            x + random.uniform(-1.2, 1.2), 37.5 + random.uniform(0.0, 9.0), random
+        )
     for y in np.arange(-34.0, 34.0, 3.6):
-        yield from single_tree_parts(-23.0 - random.uniform(0.0, 9.0), y + random.uniform(-1.2, 1.2), random)
+        yield from single_tree_parts(
+            -23.0 - random.uniform(0.0, 9.0), y + random.uniform(-1.2, 1.2), random
+        )
 
 
 def single_tree_parts(x: float, y: float, random: np.random.Generator) -> Iterator[Part]:
@@ -185,5 +245,9 @@ def obstacle_part(obstacle: Obstacle) -> Part:
 
 def static_parts(platforms: Mapping[str, Any], obstacles: Sequence[Obstacle]) -> list[Part]:
     """Return the parts of platforms and obstacles (JSON objects by name, obstacles)."""
-    decks = [part for platform in platforms.values() for part in platform_parts(platform["size"], platform["position"])]
+    decks = [
+        part
+        for platform in platforms.values()
+        for part in platform_parts(platform["size"], platform["position"])
+    ]
     return [*decks, *map(obstacle_part, obstacles)]

@@ -66,7 +66,9 @@ class Layer:
         """
         pixels = np.flatnonzero(picture.depth < self.depth)
         colour, alpha = self.colour.reshape(-1, 3), self.alpha.reshape(-1)
-        colour[pixels] += opacity * (picture.colour.reshape(-1, 3)[pixels].astype(np.float32) / 255 - colour[pixels])
+        colour[pixels] += opacity * (
+            picture.colour.reshape(-1, 3)[pixels].astype(np.float32) / 255 - colour[pixels]
+        )
         alpha[pixels] += opacity * (1 - alpha[pixels])
         return pixels
 
@@ -88,25 +90,37 @@ class Background:
         light = pixel_rays(view, *size)
         solids, depth = _static_solids(static, view, light), water_distance(view, light)
         self.water_mask, self.horizon = depth < solids.depth, horizon_row(light)
-        self.mirrored = Layer.from_solids(_static_solids(static, mirrored, pixel_rays(mirrored, *half)))
+        self.mirrored = Layer.from_solids(
+            _static_solids(static, mirrored, pixel_rays(mirrored, *half))
+        )
         self.surface = water_pixels(view, pixel_rays(view, *half), self.horizon // 2)
         solids.depth[self.water_mask] = np.inf
-        self.picture = self._composite(Layer.from_solids(solids), light, np.minimum(solids.depth, depth))
+        self.picture = self._composite(
+            Layer.from_solids(solids), light, np.minimum(solids.depth, depth)
+        )
 
     def _composite(self, solids: Layer, light: Rays, depth: np.ndarray) -> Layer:
         """Return solids in front of water and sky."""
         width, height = self.size
         colour = np.empty((height, width, 3), np.float32)
-        water = self.surface.colour(self.mirrored.colour, self.mirrored.alpha).reshape(3, -1, 1, width // 2, 1)
-        colour.reshape(height // 2, 2, width // 2, 2, 3)[self.horizon // 2 :] = water.transpose(1, 2, 3, 4, 0)
-        colour[: self.horizon] = sky_colour(light.direction[:, : self.horizon].reshape(3, -1)).T.reshape(-1, width, 3)
+        water = self.surface.colour(self.mirrored.colour, self.mirrored.alpha).reshape(
+            3, -1, 1, width // 2, 1
+        )
+        colour.reshape(height // 2, 2, width // 2, 2, 3)[self.horizon // 2 :] = water.transpose(
+            1, 2, 3, 4, 0
+        )
+        colour[: self.horizon] = sky_colour(
+            light.direction[:, : self.horizon].reshape(3, -1)
+        ).T.reshape(-1, width, 3)
         hidden = np.flatnonzero(solids.alpha)
         colour.reshape(-1, 3)[hidden] = solids.colour.reshape(-1, 3)[hidden]
         return Layer(colour, np.ones_like(depth), depth)
 
     def fits(self, view: View, size: tuple[int, int]) -> bool:
         """Return True if the background belongs to this view and size."""
-        same = np.array_equal(view.eye, self.view.eye) and np.array_equal(view.target, self.view.target)
+        same = np.array_equal(view.eye, self.view.eye) and np.array_equal(
+            view.target, self.view.target
+        )
         return same and view.field_of_view == self.view.field_of_view and size == self.size
 
     def with_reflections(self, below: Layer, changed: np.ndarray) -> Layer:
@@ -114,7 +128,8 @@ class Background:
 
         Args:
             below: Mirrored picture that the water reflects, at half the resolution.
-            changed: Mask of its pixels that differ from the background, shape (height / 2, width / 2).
+            changed: Mask of its pixels that differ from the background, shape (height / 2, width /
+                2).
 
         Returns:
             The picture with the reflections of the changed pixels.
@@ -131,12 +146,19 @@ class Background:
 
 
 class Scene:
-    """Lake with the vehicles of a mission; a context manager that disconnects its Bullet clients at the end."""
+    """Lake with the vehicles of a mission.
+
+    A context manager that disconnects its Bullet clients at the end.
+    """
 
     def __init__(self, mission: Mission):
         self.mission = mission
-        self.static = SolidRenderer([*tree_parts(), *static_parts(mission.platforms, mission.obstacles)])
-        self.vehicles = SolidRenderer(*(vehicle_parts(model) for model in mission.vehicles.values()))
+        self.static = SolidRenderer(
+            [*tree_parts(), *static_parts(mission.platforms, mission.obstacles)]
+        )
+        self.vehicles = SolidRenderer(
+            *(vehicle_parts(model) for model in mission.vehicles.values())
+        )
         self._last_background: Background | None = None
 
     def __enter__(self) -> Self:
@@ -147,7 +169,13 @@ class Scene:
         self.vehicles.close()
 
     def render(
-        self, camera: str, rows: Sequence[int], opacities: Sequence[float], width: int, height: int, supersampling: int = 2
+        self,
+        camera: str,
+        rows: Sequence[int],
+        opacities: Sequence[float],
+        width: int,
+        height: int,
+        supersampling: int = 2,
     ) -> np.ndarray:
         """Render the mission at one or more rows in one picture.
 
@@ -165,7 +193,10 @@ class Scene:
         Raises:
             InputError: `camera` is unknown.
         """
-        view, size = find_camera(camera)(self.mission, rows[-1]), (supersampling * width, supersampling * height)
+        view, size = (
+            find_camera(camera)(self.mission, rows[-1]),
+            (supersampling * width, supersampling * height),
+        )
         background = self._background(view, size)
         below = background.mirrored.copy()
         reflected = self._blend_vehicles(below, view.mirrored(), rows, opacities)
@@ -179,18 +210,27 @@ class Scene:
             self._last_background = Background(self.static, view, size)
         return self._last_background
 
-    def _blend_vehicles(self, layer: Layer, view: View, rows: Sequence[int], opacities: Sequence[float]) -> np.ndarray:
-        """Blend the vehicles of each row, with their shadows on each other; return the mask of changed pixels."""
+    def _blend_vehicles(
+        self, layer: Layer, view: View, rows: Sequence[int], opacities: Sequence[float]
+    ) -> np.ndarray:
+        """Blend the vehicles of each row, with their shadows on each other.
+
+        Return the mask of changed pixels.
+        """
         height, width = layer.depth.shape
         changed = np.zeros((height, width), bool)
         for row, opacity in zip(rows, opacities, strict=True):
             self._set_poses(row)
-            changed.reshape(-1)[layer.blend(self.vehicles.render(view, width, height, shadow=True), opacity)] = True
+            changed.reshape(-1)[
+                layer.blend(self.vehicles.render(view, width, height, shadow=True), opacity)
+            ] = True
         return changed
 
     def _set_poses(self, row: int) -> None:
         for index, vehicle in enumerate(self.mission.vehicles):
-            self.vehicles.set_pose(index, self.mission.position(vehicle, row), self.mission.orientation(vehicle, row))
+            self.vehicles.set_pose(
+                index, self.mission.position(vehicle, row), self.mission.orientation(vehicle, row)
+            )
 
 
 def find_camera(name: str) -> Callable[[Mission, int], View]:

@@ -1,6 +1,7 @@
 """Scene description for the 3-D replay: bodies, static parts, water, waypoints and plots.
 
-The description follows from the scenario alone. World frame, z up, m; colours of parts are red, green, blue in 0 ... 1.
+The description follows from the scenario alone. World frame, z up, m; colours of parts are red,
+green, blue in 0 ... 1.
 """
 
 from __future__ import annotations
@@ -21,7 +22,10 @@ from .vehicle_parts import vehicle_parts
 Scene = dict[str, Any]
 
 #: colours of the paths of multirotors and vessels; the first of each is that of the figures
-MULTIROTOR_COLOURS, VESSEL_COLOURS = ("#0072b2", "#56b4e9", "#cc79a7", "#7a5fb5"), ("#d55e00", "#e69f00", "#009e73", "#b8860b")
+MULTIROTOR_COLOURS, VESSEL_COLOURS = (
+    ("#0072b2", "#56b4e9", "#cc79a7", "#7a5fb5"),
+    ("#d55e00", "#e69f00", "#009e73", "#b8860b"),
+)
 
 #: colour of crashes and ditchings
 FAILURE_COLOUR = "#c62828"
@@ -33,7 +37,9 @@ MAX_VIEWS = 3
 ONBOARD_CAMERA = {"eye": (-2.6, 0.0, 1.5), "target": (0.2, 0.0, 0.45)}
 
 
-def world_scene(name: str, scenario: Mapping[str, Any], models: Mapping[str, Any] | None = None) -> Scene:
+def world_scene(
+    name: str, scenario: Mapping[str, Any], models: Mapping[str, Any] | None = None
+) -> Scene:
     """Return the scene of a world.
 
     Args:
@@ -61,7 +67,8 @@ def free(scenario: Mapping[str, Any], vehicles: Mapping[str, Any]) -> Scene:
 
     Args:
         scenario: Scenario as a JSON object.
-        vehicles: Vehicle of the catalogue, or data of a vehicle, by component ({"quadcopter": "ar_drone"}).
+        vehicles: Vehicle of the catalogue, or data of a vehicle, by component ({"quadcopter":
+            "ar_drone"}).
 
     Returns:
         Scene description.
@@ -73,7 +80,10 @@ def published_simulator_scene(name: str, scenario: Mapping[str, Any]) -> Scene:
     """Return the scene of the replica's world, with its attitude angles converted to the conventions of the plant."""
     scene = world_scene(name, scenario, {"uav": "ar_drone", "usv": "strider"})
     uav, usv = (f"{name}.{vehicle}.attitude" for vehicle in ("uav", "usv"))
-    attitudes: list[list[Any]] = [[f"{uav}.phi", f"-{uav}.theta", f"-{uav}.psi"], [0, 0, f"{usv}.yaw"]]
+    attitudes: list[list[Any]] = [
+        [f"{uav}.phi", f"-{uav}.theta", f"-{uav}.psi"],
+        [0, 0, f"{usv}.yaw"],
+    ]
     for body, attitude in zip(scene["bodies"], attitudes, strict=True):
         body["attitude"] = attitude
         del body["orientation"]
@@ -87,17 +97,29 @@ def _waves(components: Sea) -> list[Scene]:
 
 def _scene(vehicles: Mapping[str, Any], scenario: Mapping[str, Any]) -> Scene:
     colours = {False: cycle(MULTIROTOR_COLOURS), True: cycle(VESSEL_COLOURS)}
-    has_landings = any(next(iter(models_of(vehicle).values())).airframe for vehicle in vehicles.values())
-    bodies = [_body_scene(name, vehicle, next(colours[_is_vessel(vehicle)]), has_landings) for name, vehicle in vehicles.items()]
+    has_landings = any(
+        next(iter(models_of(vehicle).values())).airframe for vehicle in vehicles.values()
+    )
+    bodies = [
+        _body_scene(name, vehicle, next(colours[_is_vessel(vehicle)]), has_landings)
+        for name, vehicle in vehicles.items()
+    ]
     vessels = [name for name, vehicle in vehicles.items() if _is_vessel(vehicle)]
     flying = [name for name in vehicles if name not in vessels]
     colour_of = {body["name"]: body["colour"] for body in bodies}
     return {
         "bodies": bodies,
-        "views": [{"name": _view_name(vessel, vessels), "on": vessel, **ONBOARD_CAMERA} for vessel in vessels[:MAX_VIEWS]],
+        "views": [
+            {"name": _view_name(vessel, vessels), "on": vessel, **ONBOARD_CAMERA}
+            for vessel in vessels[:MAX_VIEWS]
+        ],
         "markers": list(_waypoint_markers(scenario)),
         "spans": [
-            {"signal": f"{name}.contact.touching", "label": f"{_short_name(name)} touches", "colour": colour_of[name]}
+            {
+                "signal": f"{name}.contact.touching",
+                "label": f"{_short_name(name)} touches",
+                "colour": colour_of[name],
+            }
             for name in flying
         ],
         "marks": [mark for name in vehicles for mark in _failure_marks(name)],
@@ -107,7 +129,12 @@ def _scene(vehicles: Mapping[str, Any], scenario: Mapping[str, Any]) -> Scene:
 
 def _failure_marks(name: str) -> Iterator[Scene]:
     for failure in ("crashed", "ditched"):
-        yield {"signal": f"{name}.{failure}", "label": f"{_short_name(name)} {failure}", "colour": FAILURE_COLOUR, "on": name}
+        yield {
+            "signal": f"{name}.{failure}",
+            "label": f"{_short_name(name)} {failure}",
+            "colour": FAILURE_COLOUR,
+            "on": name,
+        }
 
 
 def _is_vessel(vehicle: Any) -> bool:

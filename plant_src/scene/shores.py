@@ -1,6 +1,7 @@
 """Banks of the lake, drawn by intersecting viewing rays with boxes of land.
 
-This is several times faster than drawing them as triangles with TinyRenderer. World frame, z up, the water at z = 0.
+This is several times faster than drawing them as triangles with TinyRenderer. World frame, z up,
+the water at z = 0.
 """
 
 from __future__ import annotations
@@ -37,7 +38,10 @@ BANKS = (bank(-700.0, 34.0, 700.0, 634.0), bank(-720.0, -700.0, -20.0, 700.0))
 
 
 def add_land(picture: Picture, view: View, light: Rays) -> None:
-    """Draw the banks into `picture` where they are nearer than its depth; `light` are the rays through its pixels."""
+    """Draw the banks into `picture` where they are nearer than its depth.
+
+    `light` are the rays through its pixels.
+    """
     for steps in BANKS:
         pixels = _candidate_pixels(view.eye, light.direction, steps[0])
         for step in steps:
@@ -54,12 +58,23 @@ def _candidate_pixels(eye: np.ndarray, direction: np.ndarray, step: LandBox) -> 
         with np.errstate(divide="ignore", invalid="ignore"):
             reach = (level - float(eye[2])) / direction[2]
             x, y = (float(eye[i]) + reach * direction[i] for i in (0, 1))
-        candidates |= (reach > 0) & (x > step.low[0]) & (x < step.high[0]) & (y > step.low[1]) & (y < step.high[1])
+        candidates |= (
+            (reach > 0)
+            & (x > step.low[0])
+            & (x < step.high[0])
+            & (y > step.low[1])
+            & (y < step.high[1])
+        )
     return np.flatnonzero(candidates)
 
 
-def _draw_box(picture: Picture, step: LandBox, eye: np.ndarray, light: Rays, pixels: np.ndarray) -> None:
-    """Draw `step` into the `pixels` where it is nearest; a ray enters a box at the last of the three planes on its near side."""
+def _draw_box(
+    picture: Picture, step: LandBox, eye: np.ndarray, light: Rays, pixels: np.ndarray
+) -> None:
+    """Draw `step` into the `pixels` where it is nearest.
+
+    A ray enters a box at the last of the three planes on its near side.
+    """
     direction = light.direction.reshape(3, -1)[:, pixels]
     low, high = (np.asarray(corner - eye, np.float32)[:, None] for corner in (step.low, step.high))
     with np.errstate(divide="ignore"):
@@ -67,9 +82,13 @@ def _draw_box(picture: Picture, step: LandBox, eye: np.ndarray, light: Rays, pix
         ends = np.where(direction > 0, high, low) / direction
     entry = planes.max(axis=0)
     depth = entry * light.along_axis.ravel()[pixels]
-    nearest = np.flatnonzero((entry < ends.min(axis=0)) & (entry > 0) & (depth < picture.depth.ravel()[pixels]))
+    nearest = np.flatnonzero(
+        (entry < ends.min(axis=0)) & (entry > 0) & (depth < picture.depth.ravel()[pixels])
+    )
     side = planes[:, nearest].argmax(axis=0)
     facing = -np.sign(direction[side, nearest]) * np.asarray(SUN, np.float32)[side]
     shade = AMBIENT + DIFFUSE * np.maximum(0, facing)
     picture.depth.reshape(-1)[pixels[nearest]] = depth[nearest]
-    picture.colour.reshape(-1, 3)[pixels[nearest]] = np.rint(255 * np.minimum(shade[:, None] * np.asarray(step.colour), 1))
+    picture.colour.reshape(-1, 3)[pixels[nearest]] = np.rint(
+        255 * np.minimum(shade[:, None] * np.asarray(step.colour), 1)
+    )

@@ -1,8 +1,8 @@
 """Sky, far hills and water, computed per pixel from the viewing rays.
 
-Water reflects the sky and the solids, disturbed by small ripples that fade with distance. Colours are red, green and blue in
-0 ... 1. World frame, z up, the water at z = 0. Arrays of colours and directions of n pixels have the shape (3, n), on which
-NumPy is several times faster than on (n, 3).
+Water reflects the sky and the solids, disturbed by small ripples that fade with distance. Colours
+are red, green and blue in 0 ... 1. World frame, z up, the water at z = 0. Arrays of colours and
+directions of n pixels have the shape (3, n), on which NumPy is several times faster than on (n, 3).
 """
 
 from __future__ import annotations
@@ -49,8 +49,12 @@ def sky_colour(direction: np.ndarray) -> np.ndarray:
     """Return the colours (3, n) of the sky and two ranges of hills in the directions (3, n)."""
     x, y, z = direction
     elevation = np.maximum(z, 0)
-    colour: np.ndarray = HORIZON_COLOUR + (ZENITH_COLOUR - HORIZON_COLOUR) * np.sqrt(np.minimum(elevation * 1.4, 1))
-    index = (np.arctan2(y, x) * (AZIMUTHS.size / (2 * math.pi))).astype(np.int32)  # negative indices count from the end
+    colour: np.ndarray = HORIZON_COLOUR + (ZENITH_COLOUR - HORIZON_COLOUR) * np.sqrt(
+        np.minimum(elevation * 1.4, 1)
+    )
+    index = (np.arctan2(y, x) * (AZIMUTHS.size / (2 * math.pi))).astype(
+        np.int32
+    )  # negative indices count from the end
     for ridge, tint in HILL_RANGES:
         colour += (tint - colour) * np.clip((ridge[index] - elevation) * 700 + 0.5, 0, 1)
     return colour
@@ -58,13 +62,22 @@ def sky_colour(direction: np.ndarray) -> np.ndarray:
 
 def _ridge(azimuth: np.ndarray, phase: float, height: float) -> np.ndarray:
     """Return the sine of the elevation of a range of hills at each azimuth (rad)."""
-    waves = np.sin(2 * azimuth + phase) + 0.5 * np.sin(5 * azimuth + 2 * phase) + 0.2 * np.sin(13 * azimuth + 3 * phase)
+    waves = (
+        np.sin(2 * azimuth + phase)
+        + 0.5 * np.sin(5 * azimuth + 2 * phase)
+        + 0.2 * np.sin(13 * azimuth + 3 * phase)
+    )
     elevation: np.ndarray = height * (0.75 + 0.25 * waves)
     return elevation
 
 
-AZIMUTHS = np.linspace(0, 2 * math.pi, 8192, endpoint=False, dtype=np.float32)  # finer than the pixels
-HILL_RANGES = ((_ridge(AZIMUTHS, 3.0, 0.075), FAR_HILLS_COLOUR), (_ridge(AZIMUTHS, 7.0, 0.045), NEAR_HILLS_COLOUR))
+AZIMUTHS = np.linspace(
+    0, 2 * math.pi, 8192, endpoint=False, dtype=np.float32
+)  # finer than the pixels
+HILL_RANGES = (
+    (_ridge(AZIMUTHS, 3.0, 0.075), FAR_HILLS_COLOUR),
+    (_ridge(AZIMUTHS, 7.0, 0.045), NEAR_HILLS_COLOUR),
+)
 
 
 def horizon_row(light: Rays) -> int:
@@ -73,7 +86,10 @@ def horizon_row(light: Rays) -> int:
 
 
 def water_distance(view: View, light: Rays) -> np.ndarray:
-    """Return the depth of the water along the axis of the view per pixel (m); infinite above the horizon."""
+    """Return the depth of the water along the axis of the view per pixel (m).
+
+    Infinite above the horizon.
+    """
     down = light.direction[2]
     with np.errstate(divide="ignore"):
         distance = np.where(down < 0, -np.float32(view.eye[2]) / down, np.float32(np.inf))
@@ -84,10 +100,12 @@ def water_distance(view: View, light: Rays) -> np.ndarray:
 class WaterPixels(NamedTuple):
     """The n pixels of a picture that show water.
 
-    The mirrored picture shows the solids from below the water surface; it gives the colours of their reflections.
+    The mirrored picture shows the solids from below the water surface; it gives the colours of
+    their reflections.
 
     Attributes:
-        sources: For each pixel the flat index of the pixel of the mirrored picture that it reflects, shape (n,).
+        sources: For each pixel the flat index of the pixel of the mirrored picture that it
+            reflects, shape (n,).
         sky: Colour of the reflected sky, shape (3, n).
         reflectance: Fraction of light that the water reflects, shape (n,).
     """
@@ -104,14 +122,17 @@ class WaterPixels(NamedTuple):
         """Return the colours (3, n) with the reflections of a mirrored picture.
 
         Args:
-            mirrored: Colour of the mirrored solids, premultiplied by alpha, shape (height, width, 3).
+            mirrored: Colour of the mirrored solids, premultiplied by alpha, shape (height, width,
+                3).
             alpha: Opacity of the mirrored solids, shape (height, width).
 
         Returns:
             Colours, shape (3, n).
         """
         solids, hidden = mirrored.reshape(-1, 3)[self.sources].T, alpha.ravel()[self.sources]
-        colour: np.ndarray = WATER_COLOUR + (solids + self.sky * (1 - hidden) - WATER_COLOUR) * self.reflectance
+        colour: np.ndarray = (
+            WATER_COLOUR + (solids + self.sky * (1 - hidden) - WATER_COLOUR) * self.reflectance
+        )
         return colour
 
 
@@ -120,11 +141,15 @@ def water_pixels(view: View, light: Rays, horizon: int) -> WaterPixels:
     height, width = light.along_axis.shape
     x, y, z = light.direction[:, horizon:].reshape(3, -1)
     reach = -float(view.eye[2]) / np.minimum(z, -1e-4)
-    slope_x, slope_y = _ripples(float(view.eye[0]) + reach * x, float(view.eye[1]) + reach * y, reach)
+    slope_x, slope_y = _ripples(
+        float(view.eye[0]) + reach * x, float(view.eye[1]) + reach * y, reach
+    )
     tilt = x * slope_x + y * slope_y
     reflected = np.stack([x - 2 * slope_x * z, y - 2 * slope_y * z, -z - 2 * tilt])
     share = 0.06 + 0.94 * (1 - np.clip(tilt - z, 0, 1)) ** 5
-    return WaterPixels(_reflected_pixels(tilt.reshape(-1, width), height), sky_colour(reflected), share)
+    return WaterPixels(
+        _reflected_pixels(tilt.reshape(-1, width), height), sky_colour(reflected), share
+    )
 
 
 def _reflected_pixels(tilt: np.ndarray, height: int) -> np.ndarray:
@@ -133,16 +158,27 @@ def _reflected_pixels(tilt: np.ndarray, height: int) -> np.ndarray:
     `tilt` belongs to the lowest rows of the picture, shape (rows, width).
     """
     count, width = tilt.shape
-    rows = np.arange(height - count, height, dtype=np.int32)[:, None] + np.rint(tilt * (1.2 * height)).astype(np.int32)
-    indices: np.ndarray = (height - 1 - np.clip(rows, 0, height - 1)) * width + np.arange(width, dtype=np.int32)
+    rows = np.arange(height - count, height, dtype=np.int32)[:, None] + np.rint(
+        tilt * (1.2 * height)
+    ).astype(np.int32)
+    indices: np.ndarray = (height - 1 - np.clip(rows, 0, height - 1)) * width + np.arange(
+        width, dtype=np.int32
+    )
     return indices.ravel()
 
 
 def _ripples(x: np.ndarray, y: np.ndarray, distance: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return the slopes of the surface along x and y at positions (m); ripples too short for the pixels fade out."""
+    """Return the slopes of the surface along x and y at positions (m).
+
+    Ripples too short for the pixels fade out.
+    """
     slope_x, slope_y = np.zeros_like(x), np.zeros_like(x)
     for angle, number, slope in RIPPLES:
-        wave = slope * np.exp(-((distance * number / 120) ** 2)) * np.cos(number * (x * math.cos(angle) + y * math.sin(angle)))
+        wave = (
+            slope
+            * np.exp(-((distance * number / 120) ** 2))
+            * np.cos(number * (x * math.cos(angle) + y * math.sin(angle)))
+        )
         slope_x += wave * math.cos(angle)
         slope_y += wave * math.sin(angle)
     return slope_x, slope_y

@@ -1,4 +1,7 @@
-"""Visual parts of each vehicle: detailed models, or parts derived from the rotors or from the collision boxes."""
+"""Visual parts of each vehicle.
+
+Detailed models, or parts derived from the rotors or from the collision boxes.
+"""
 
 from __future__ import annotations
 
@@ -14,10 +17,26 @@ from ..vehicles.model import Model
 from ..vehicles.multirotor.airframe import Airframe, Rotor
 from ..vehicles.submerged.craft import Craft
 from ..vehicles.surface_vessel.surface_vessel import SurfaceVessel
-from .parts import ALONG_X, BLACK, BLUE, GREY, ORANGE, RED, SILVER, YELLOW, Part, ar_drone_parts, landing_mark, strider_parts
+from .parts import (
+    ALONG_X,
+    BLACK,
+    BLUE,
+    GREY,
+    ORANGE,
+    RED,
+    SILVER,
+    YELLOW,
+    Part,
+    ar_drone_parts,
+    landing_mark,
+    strider_parts,
+)
 
 #: model -> function that draws it in detail
-DETAILED_MODELS: Mapping[str, Callable[[Model], list[Part]]] = {"ar_drone": ar_drone_parts, "strider": strider_parts}
+DETAILED_MODELS: Mapping[str, Callable[[Model], list[Part]]] = {
+    "ar_drone": ar_drone_parts,
+    "strider": strider_parts,
+}
 
 
 def vehicle_parts(vehicle: Any, has_landings: bool = True) -> list[Part]:
@@ -36,14 +55,24 @@ def vehicle_parts(vehicle: Any, has_landings: bool = True) -> list[Part]:
         return list(multirotor_parts(model.airframe, model.body))
     if model.craft:
         return list(submerged_parts(model.craft, model.body))
-    parts = list(catamaran_parts(model.body, has_landings) if model.is_vessel else box_parts(model.body))
-    return [part._replace(position=_difference(part.position, _origin_of_boxes(model))) for part in parts]
+    parts = list(
+        catamaran_parts(model.body, has_landings) if model.is_vessel else box_parts(model.body)
+    )
+    return [
+        part._replace(position=_difference(part.position, _origin_of_boxes(model)))
+        for part in parts
+    ]
 
 
 def _mesh_part(model: Model, triangles: np.ndarray) -> Part:
     """Return the triangles of a vehicle file, whose positions start from the origin of the file."""
     centre = model.boat.centre_of_mass if model.boat else (0.0, 0.0, 0.0)
-    return Part("mesh", tuple(triangles.ravel().tolist()), _difference((0.0, 0.0, 0.0), centre), YELLOW if model.boat else ORANGE)
+    return Part(
+        "mesh",
+        tuple(triangles.ravel().tolist()),
+        _difference((0.0, 0.0, 0.0), centre),
+        YELLOW if model.boat else ORANGE,
+    )
 
 
 def _origin_of_boxes(model: Model) -> Vector:
@@ -70,8 +99,13 @@ def catamaran_parts(body: Body, has_landings: bool) -> Iterator[Part]:
     yield Part("box", (2 * length - aft, 2 * width, 2 * thickness), (x - aft / 2, y, z), GREY)
     yield from landing_mark(x, y, z + thickness) if has_landings else ()
     if len(body.boxes) == 1:  # a single hull: the turned box below the deck is its bow
-        bow, turn = (x + length - width, y, z), (0.0, 0.0, math.sin(math.pi / 8), math.cos(math.pi / 8))
-        yield Part("box", (math.sqrt(2) * width, math.sqrt(2) * width, 1.99 * thickness), bow, YELLOW, turn)
+        bow, turn = (
+            (x + length - width, y, z),
+            (0.0, 0.0, math.sin(math.pi / 8), math.cos(math.pi / 8)),
+        )
+        yield Part(
+            "box", (math.sqrt(2) * width, math.sqrt(2) * width, 1.99 * thickness), bow, YELLOW, turn
+        )
         return
     for hull in body.boxes:
         if hull is not deck:
@@ -88,7 +122,10 @@ def _hull_parts(hull: Shape, aft: float, fore: float, deck: float) -> Iterator[P
 
 
 def multirotor_parts(airframe: Airframe, body: Body) -> Iterator[Part]:
-    """Yield a hull, legs, and for each rotor an arm, a motor and a propeller disc; discs in front are red."""
+    """Yield a hull, legs, and for each rotor an arm, a motor and a propeller disc.
+
+    Discs in front are red.
+    """
     (_, _, height), _ = airframe.rotor_disc
     arm = max(math.hypot(*rotor.position[:2]) for rotor in airframe.rotors)
     hull = 0.42 * arm
@@ -104,7 +141,9 @@ def _arm_parts(rotor: Rotor, radius: float, arm: float) -> Iterator[Part]:
     x, y, z = rotor.position
     thickness, turn = 0.06 * arm, math.atan2(y, x) / 2
     along: Quaternion = (0.0, 0.0, math.sin(turn), math.cos(turn))
-    yield Part("box", (math.hypot(x, y), thickness, thickness), (x / 2, y / 2, z - 0.12 * arm), GREY, along)
+    yield Part(
+        "box", (math.hypot(x, y), thickness, thickness), (x / 2, y / 2, z - 0.12 * arm), GREY, along
+    )
     yield Part("cylinder", (0.07 * arm, 0.16 * arm), (x, y, z - 0.06 * arm), BLACK)
     colour: Vector = RED if x > 1e-6 else SILVER
     yield Part("cylinder", (0.98 * radius, 0.012 * arm), (x, y, z + 0.02 * arm), BLACK, opacity=0.5)
@@ -115,11 +154,24 @@ def submerged_parts(craft: Craft, body: Body) -> Iterator[Part]:
     """Yield the skids and the float of each collision box, an electronics tube, and the thrusters with their ducts."""
     for box in body.boxes:
         (x, y, z), (length, width, height) = box.position, box.half_extents
-        yield Part("box", (1.8 * length, 1.4 * width, 0.7 * height), (x, y, z + 0.6 * height), BLUE, box.orientation)
-        yield Part("cylinder", (0.4 * height, 1.6 * length), (x, y, z - 0.2 * height), BLACK, ALONG_X)
+        yield Part(
+            "box",
+            (1.8 * length, 1.4 * width, 0.7 * height),
+            (x, y, z + 0.6 * height),
+            BLUE,
+            box.orientation,
+        )
+        yield Part(
+            "cylinder", (0.4 * height, 1.6 * length), (x, y, z - 0.2 * height), BLACK, ALONG_X
+        )
         yield Part("sphere", (0.38 * height,), (x + 0.8 * length, y, z - 0.2 * height), SILVER)
         for side in (-0.9, 0.9):
-            yield Part("box", (2 * length, 0.06 * width, 1.6 * height), (x, y + side * width, z - 0.2 * height), BLACK)
+            yield Part(
+                "box",
+                (2 * length, 0.06 * width, 1.6 * height),
+                (x, y + side * width, z - 0.2 * height),
+                BLACK,
+            )
     radius = craft.thruster_radius
     for thruster in craft.thrusters:
         turn = rotation_from_z(thruster.axis)

@@ -12,7 +12,9 @@ from .mission import mission_of_result
 from .render import Scene
 
 
-def frames(result: Result, camera: str, moments: np.ndarray, size: tuple[int, int]) -> Iterator[np.ndarray]:
+def frames(
+    result: Result, camera: str, moments: np.ndarray, size: tuple[int, int]
+) -> Iterator[np.ndarray]:
     """Yield the frames of a video.
 
     Args:

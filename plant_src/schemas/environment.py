@@ -1,9 +1,17 @@
-"""JSON Schema of a world's argument "environment"; `environment/settings.py` checks the values and explains the keys."""
+"""JSON Schema of a world's argument "environment".
+
+`environment/settings.py` checks the values and explains the keys.
+"""
 
 from __future__ import annotations
 
 from ..environment.sea import MAX_COMPONENTS
-from ..environment.settings import MAX_SIGNIFICANT_HEIGHT, MAX_SPREADING, REFERENCE_HEIGHT, TURBULENCE_HEIGHT
+from ..environment.settings import (
+    MAX_SIGNIFICANT_HEIGHT,
+    MAX_SPREADING,
+    REFERENCE_HEIGHT,
+    TURBULENCE_HEIGHT,
+)
 from ..environment.spectrum import GAMMA, MAX_GAMMA, MIN_GAMMA, SIGNIFICANT_HEIGHTS, SPECTRA
 from ..environment.wind import MAX_HEIGHT, MIN_HEIGHT
 from .parts import (
@@ -36,23 +44,37 @@ def environment_schemas() -> dict[str, Schema]:
 
 def _environment() -> Schema:
     return documented_object(
-        "Waves, wind and current of a world. Directions are those towards which waves, wind and current move.",
+        (
+            "Waves, wind and current of a world. Directions are those towards which waves, wind "
+            "and current move."
+        ),
         {
             "seed": documented_value(
-                {"type": "integer", "minimum": 0}, "seed of waves and gusts; equal seeds give equal runs", "", 7, 0
+                {"type": "integer", "minimum": 0},
+                "seed of waves and gusts; equal seeds give equal runs",
+                "",
+                7,
+                0,
             ),
             "sea_state": documented_value(
                 {"type": "integer", "minimum": 0, "maximum": len(SIGNIFICANT_HEIGHTS) - 1},
                 "sea state of the WMO, which stands for a significant height of "
-                f"{', '.join(f'{height:g}' for height in SIGNIFICANT_HEIGHTS)} m; default: no waves",
+                f"{', '.join(f'{height:g}' for height in SIGNIFICANT_HEIGHTS)} m; default: no "
+                "waves",
                 "",
                 3,
             ),
             "waves": documented_part(
-                "WorldWaves", "properties of the waves; default: no waves", {"significant_height": 0.5, "peak_period": 3}
+                "WorldWaves",
+                "properties of the waves; default: no waves",
+                {"significant_height": 0.5, "peak_period": 3},
             ),
-            "wind": documented_part("WorldWind", "wind; default: none", {"speed": 5, "direction": 1}),
-            "current": documented_part("WorldCurrent", "current of the water; default: none", {"velocity": [0.3, 0.1]}),
+            "wind": documented_part(
+                "WorldWind", "wind; default: none", {"speed": 5, "direction": 1}
+            ),
+            "current": documented_part(
+                "WorldCurrent", "current of the water; default: none", {"velocity": [0.3, 0.1]}
+            ),
         },
         (),
     )
@@ -63,9 +85,14 @@ def _waves() -> Schema:
     return documented_object(
         "Irregular waves. The significant height is required unless `sea_state` gives it.",
         {
-            "significant_height": documented_value(height, "significant height Hs, in place of `sea_state`", "m", 0.5),
+            "significant_height": documented_value(
+                height, "significant height Hs, in place of `sea_state`", "m", 0.5
+            ),
             "peak_period": documented_value(
-                POSITIVE, "peak period; default: that of the fully developed sea, 5.0 sqrt(Hs)", "s", 3.0
+                POSITIVE,
+                "peak period; default: that of the fully developed sea, 5.0 sqrt(Hs)",
+                "s",
+                3.0,
             ),
             "spectrum": {
                 "enum": list(SPECTRA),
@@ -74,9 +101,15 @@ def _waves() -> Schema:
                 "examples": ["jonswap"],
             },
             "gamma": documented_value(
-                {"type": "number", "minimum": MIN_GAMMA, "maximum": MAX_GAMMA}, "peak enhancement of `jonswap`", "1", 2.0, GAMMA
+                {"type": "number", "minimum": MIN_GAMMA, "maximum": MAX_GAMMA},
+                "peak enhancement of `jonswap`",
+                "1",
+                2.0,
+                GAMMA,
             ),
-            "direction": documented_value(NUMBER, f"mean direction {_COUNTER_CLOCKWISE}", "rad", 0.5, 0.0),
+            "direction": documented_value(
+                NUMBER, f"mean direction {_COUNTER_CLOCKWISE}", "rad", 0.5, 0.0
+            ),
             "spreading": documented_value(
                 {"type": ["number", "null"], "minimum": 0, "maximum": MAX_SPREADING},
                 "power n of the spreading function cos^n; default: long-crested waves",
@@ -99,9 +132,13 @@ def _flow(axes: str) -> dict[str, Schema]:
     """Return the keys of a mean velocity: speed and direction, or a vector with these axes."""
     zeros = [0.3, 0.1, 0][: len(axes)]
     return {
-        "speed": documented_value(AT_LEAST_0, "mean speed; required unless `velocity` is given", "m/s", 5),
+        "speed": documented_value(
+            AT_LEAST_0, "mean speed; required unless `velocity` is given", "m/s", 5
+        ),
         "direction": documented_value(NUMBER, f"direction {_COUNTER_CLOCKWISE}", "rad", 1.0, 0.0),
-        "velocity": documented_vector(f"mean velocity [{', '.join(axes)}], in place of `speed` and `direction`", "m/s", zeros),
+        "velocity": documented_vector(
+            f"mean velocity [{', '.join(axes)}], in place of `speed` and `direction`", "m/s", zeros
+        ),
     }
 
 
@@ -112,11 +149,16 @@ def _wind() -> Schema:
             **_flow("xyz"),
             "turbulence": documented_part(
                 "WorldTurbulence",
-                "Dryden gusts (MIL-F-8785C); `{}` derives all values from the mean wind; default: none",
+                (
+                    "Dryden gusts (MIL-F-8785C); `{}` derives all values from the mean wind; "
+                    "default: none"
+                ),
                 {"height": 10},
             ),
             "profile": documented_part(
-                "WorldWindProfile", "mean wind over the height; default: the same at all heights", {"exponent": 0.14}
+                "WorldWindProfile",
+                "mean wind over the height; default: the same at all heights",
+                {"exponent": 0.14},
             ),
         },
         (),
@@ -128,10 +170,23 @@ def _turbulence() -> Schema:
     return documented_object(
         "Gusts.",
         {
-            "speed_20ft": documented_value(AT_LEAST_0, "wind speed at 6.1 m; default: the mean wind", "m/s", 5),
-            "intensity": documented_vector("standard deviations along u, v, w, in place of `speed_20ft`", "m/s", [0.5, 0.5, 0.3]),
-            "height": documented_value(height, "height above ground of the turbulence model", "m", 10, TURBULENCE_HEIGHT),
-            "airspeed": documented_value(POSITIVE, "speed at which the gusts pass the vehicle; default: the mean wind", "m/s", 5),
+            "speed_20ft": documented_value(
+                AT_LEAST_0, "wind speed at 6.1 m; default: the mean wind", "m/s", 5
+            ),
+            "intensity": documented_vector(
+                "standard deviations along u, v, w, in place of `speed_20ft`",
+                "m/s",
+                [0.5, 0.5, 0.3],
+            ),
+            "height": documented_value(
+                height, "height above ground of the turbulence model", "m", 10, TURBULENCE_HEIGHT
+            ),
+            "airspeed": documented_value(
+                POSITIVE,
+                "speed at which the gusts pass the vehicle; default: the mean wind",
+                "m/s",
+                5,
+            ),
         },
         (),
     )
@@ -144,10 +199,17 @@ def _profile() -> Schema:
         {
             "exponent": documented_value(exponent, "exponent of the power law", "1", 0.14),
             "roughness": documented_value(
-                POSITIVE, "roughness length of the logarithmic profile, in place of `exponent`", "m", 0.0002
+                POSITIVE,
+                "roughness length of the logarithmic profile, in place of `exponent`",
+                "m",
+                0.0002,
             ),
             "reference_height": documented_value(
-                POSITIVE, "height at which the profile equals the mean wind", "m", 5, REFERENCE_HEIGHT
+                POSITIVE,
+                "height at which the profile equals the mean wind",
+                "m",
+                5,
+                REFERENCE_HEIGHT,
             ),
         },
         (),
@@ -160,10 +222,14 @@ def _current() -> Schema:
         {
             **_flow("xy"),
             "ramp": documented_part(
-                "WorldCurrentRamp", "change of the mean current; default: none", {"change": [0.1, 0], "duration": 20}
+                "WorldCurrentRamp",
+                "change of the mean current; default: none",
+                {"change": [0.1, 0], "duration": 20},
             ),
             "variation": documented_part(
-                "WorldCurrentVariation", "random variation; default: none", {"standard_deviation": 0.05, "time_constant": 60}
+                "WorldCurrentVariation",
+                "random variation; default: none",
+                {"standard_deviation": 0.05, "time_constant": 60},
             ),
         },
         (),

@@ -27,19 +27,37 @@ def family_schema(name: str, properties: Mapping[str, Schema], required: tuple[s
         },
         ("size",),
     )
-    rows: Schema = {"type": "array", "items": {**_MATRIX_ROW, "minItems": 3, "maxItems": 3}, "minItems": 1}
-    points = {**rows, "minItems": 4, "description": "points whose convex hull the piece is, body frame [m]"}
+    rows: Schema = {
+        "type": "array",
+        "items": {**_MATRIX_ROW, "minItems": 3, "maxItems": 3},
+        "minItems": 1,
+    }
+    points = {
+        **rows,
+        "minItems": 4,
+        "description": "points whose convex hull the piece is, body frame [m]",
+    }
     piece = object_schema({"points": points}, ("points",))
     common = {
         **dict.fromkeys(COMMON_KEYS, TEXT),
         "family": {"const": name},
-        "sources": {"type": "object", "additionalProperties": TEXT, "description": "name of a source to its description"},
+        "sources": {
+            "type": "object",
+            "additionalProperties": TEXT,
+            "description": "name of a source to its description",
+        },
         "mass": quantity_schema("kg", "total mass", positive=True),
-        "inertia": matrix_schema("inertia about the centre of mass: [xx, yy, zz], or three rows", 3, "kg.m2"),
-        "crash_speed": quantity_schema(
-            "m/s", "change of velocity by a collision above which the vehicle has crashed", positive=True
+        "inertia": matrix_schema(
+            "inertia about the centre of mass: [xx, yy, zz], or three rows", 3, "kg.m2"
         ),
-        "boxes": list_schema({"anyOf": [box, piece]}, "collision shape: boxes and convex pieces", None),
+        "crash_speed": quantity_schema(
+            "m/s",
+            "change of velocity by a collision above which the vehicle has crashed",
+            positive=True,
+        ),
+        "boxes": list_schema(
+            {"anyOf": [box, piece]}, "collision shape: boxes and convex pieces", None
+        ),
         "visual": object_schema({"vertices": rows, "faces": rows}, ("vertices", "faces")),
     }
     return {"title": name, **object_schema({**common, **properties}, ("family", *required))}
@@ -62,7 +80,9 @@ def list_schema(items: Schema, description: str, longest: int | None) -> Schema:
     return {"type": "array", "items": items, "minItems": 1, **limit, "description": description}
 
 
-def placed_schema(hub: str, thrust: str, properties: Mapping[str, Schema], required: tuple[str, ...]) -> Schema:
+def placed_schema(
+    hub: str, thrust: str, properties: Mapping[str, Schema], required: tuple[str, ...]
+) -> Schema:
     """Return the schema of a rotor, thruster or propeller with a place, or with a link of a URDF file in place of it.
 
     Args:
@@ -76,14 +96,21 @@ def placed_schema(hub: str, thrust: str, properties: Mapping[str, Schema], requi
         "axis": vector_schema("1", f"direction of the {thrust}, body frame", 3),
         "label": {**TEXT, "description": "place in words"},
     }
-    link = {**TEXT, "description": "link of the URDF file in place of position and axis, for `cosim new vehicle --urdf`"}
+    link = {
+        **TEXT,
+        "description": (
+            "link of the URDF file in place of position and axis, for `cosim new vehicle --urdf`"
+        ),
+    }
     schema = object_schema({**place, "link": link, **properties}, ())
     others = [key for key in required if key not in ("position", "axis")]
     del schema["required"]
     return {**schema, "anyOf": [{"required": list(required)}, {"required": ["link", *others]}]}
 
 
-def quantity_schema(unit: str, description: str, *, positive: bool = False, signed: bool = False) -> Schema:
+def quantity_schema(
+    unit: str, description: str, *, positive: bool = False, signed: bool = False
+) -> Schema:
     """Return the schema of a number, or of an object with value, unit and source."""
     number: Schema = {"type": "number"}
     if not signed:
@@ -93,23 +120,33 @@ def quantity_schema(unit: str, description: str, *, positive: bool = False, sign
 
 def vector_schema(unit: str, description: str, size: int) -> Schema:
     """Return the schema of a list of numbers."""
-    return with_unit({"type": "array", "items": {"type": "number"}, "minItems": size, "maxItems": size}, unit, description)
+    return with_unit(
+        {"type": "array", "items": {"type": "number"}, "minItems": size, "maxItems": size},
+        unit,
+        description,
+    )
 
 
 def matrix_schema(description: str, size: int, unit: str = "SI units") -> Schema:
     """Return the schema of the diagonal of a matrix, or of its rows."""
     rows = {"minItems": size, "maxItems": size}
     diagonal: Schema = {**_MATRIX_ROW, **rows}
-    return with_unit({"anyOf": [diagonal, {"type": "array", "items": diagonal, **rows}]}, unit, description)
+    return with_unit(
+        {"anyOf": [diagonal, {"type": "array", "items": diagonal, **rows}]}, unit, description
+    )
 
 
 def with_unit(value: Schema, unit: str, description: str) -> Schema:
     """Return the schema of a value, or of an object with value, unit and source."""
-    given = object_schema({"value": {**value, "description": "in `unit`"}, "unit": TEXT}, ("value",))
+    given = object_schema(
+        {"value": {**value, "description": "in `unit`"}, "unit": TEXT}, ("value",)
+    )
     return {"anyOf": [value, given], "description": f"{description} [{unit}]"}
 
 
-def documented_object(description: str, properties: dict[str, Schema], required: tuple[str, ...]) -> Schema:
+def documented_object(
+    description: str, properties: dict[str, Schema], required: tuple[str, ...]
+) -> Schema:
     """Return the schema of an object with exactly these keys, for the reference and editors."""
     return {
         "type": "object",
@@ -130,7 +167,9 @@ def documented_part(kind: str, description: str, example: Schema) -> Schema:
     return {**reference(kind), "description": description, "examples": [example]}
 
 
-def documented_value(kind: Schema, description: str, unit: str, example: float, default: float | None = None) -> Schema:
+def documented_value(
+    kind: Schema, description: str, unit: str, example: float, default: float | None = None
+) -> Schema:
     """Return the schema of a value with what the reference shows of it; no default: None."""
     shown: Schema = {} if default is None else {"default": default}
     return {**kind, "description": description, "unit": unit, "examples": [example], **shown}
@@ -148,4 +187,12 @@ def documented_vector(
     """Return the schema of a list of numbers, as long as the example or from `least` to `most`."""
     size = {"minItems": least or len(example), "maxItems": most or len(example)}
     shown: Schema = {} if default is None else {"default": default}
-    return {"type": "array", "items": NUMBER, **size, "description": description, "unit": unit, "examples": [example], **shown}
+    return {
+        "type": "array",
+        "items": NUMBER,
+        **size,
+        "description": description,
+        "unit": unit,
+        "examples": [example],
+        **shown,
+    }

@@ -26,7 +26,12 @@ def vehicle_schema() -> Schema:
         "type": "object",
         "required": ["family"],
         "properties": {"family": {"enum": list(FAMILIES)}},
-        "oneOf": [_multirotor_schema(), _submerged_schema(), surface_vessel_schema(), planar_vessel_schema()],
+        "oneOf": [
+            _multirotor_schema(),
+            _submerged_schema(),
+            surface_vessel_schema(),
+            planar_vessel_schema(),
+        ],
     }
 
 
@@ -39,11 +44,15 @@ def _multirotor_schema() -> Schema:
             "time_constant": quantity_schema("s", "first-order lag of the rotor speeds"),
             "inertia": quantity_schema("kg.m2", "moment of inertia of a rotor with its motor"),
             "drag": vector_schema("kg/rad", "force per rotor speed and air speed along x, y, z", 3),
-            "translational_lift": quantity_schema("kg/m", "thrust over the squared air speed in the plane of the rotor"),
+            "translational_lift": quantity_schema(
+                "kg/m", "thrust over the squared air speed in the plane of the rotor"
+            ),
         },
         multirotor.ROTOR_KEYS,
     )
-    each = placed_schema("hub", "thrust", {**_turns(), **_rotor_coefficients()}, ("position", "turns"))
+    each = placed_schema(
+        "hub", "thrust", {**_turns(), **_rotor_coefficients()}, ("position", "turns")
+    )
     return family_schema(
         "multirotor",
         {
@@ -52,8 +61,12 @@ def _multirotor_schema() -> Schema:
             "gravity": _gravity(),
             "body_drag": vector_schema("kg/m", "force per squared air speed along x, y, z", 3),
             "ground_effect": quantity_schema("1", "fraction of the ground effect, 0 to 1"),
-            "displaced_volume": quantity_schema("m3", "volume of water that the submerged vehicle displaces"),
-            "water_drag_coefficient": quantity_schema("1", "drag coefficient in water of the box around all boxes"),
+            "displaced_volume": quantity_schema(
+                "m3", "volume of water that the submerged vehicle displaces"
+            ),
+            "water_drag_coefficient": quantity_schema(
+                "1", "drag coefficient in water of the box around all boxes"
+            ),
         },
         multirotor.KEYS,
     )
@@ -62,7 +75,9 @@ def _multirotor_schema() -> Schema:
 def _submerged_schema() -> Schema:
     coefficients = {
         **_rotor_coefficients(),
-        "reverse_thrust_coefficient": quantity_schema("N.s2/rad2", "thrust over squared speed at negative speeds"),
+        "reverse_thrust_coefficient": quantity_schema(
+            "N.s2/rad2", "thrust over squared speed at negative speeds"
+        ),
     }
     thruster = object_schema(
         {
@@ -70,16 +85,23 @@ def _submerged_schema() -> Schema:
             "radius": quantity_schema("m", "radius of the propellers", positive=True),
             "max_speed": quantity_schema("rad/s", "largest magnitude of the speeds", positive=True),
             "time_constant": quantity_schema("s", "first-order lag of the speeds"),
-            "advance_coefficient": quantity_schema("kg/rad", "loss of thrust over speed and axial velocity of the water"),
+            "advance_coefficient": quantity_schema(
+                "kg/rad", "loss of thrust over speed and axial velocity of the water"
+            ),
         },
         submerged.THRUSTER_KEYS,
     )
     keys = {**_turns(), **coefficients}
-    each = placed_schema("centre of the propeller", "thrust at a positive speed", keys, ("position", "axis"))
+    each = placed_schema(
+        "centre of the propeller", "thrust at a positive speed", keys, ("position", "axis")
+    )
     matrices = {
         name: matrix_schema(text, 6)
         for name, text in (
-            ("added_mass", "added mass about the centre of mass for u, v, w, p, q, r: diagonal or six rows"),
+            (
+                "added_mass",
+                "added mass about the centre of mass for u, v, w, p, q, r: diagonal or six rows",
+            ),
             ("linear_damping", "load over velocity: diagonal or six rows"),
             ("quadratic_damping", "load over squared velocity: diagonal or six rows"),
         )
@@ -89,12 +111,16 @@ def _submerged_schema() -> Schema:
         {
             **matrices,
             "gravity": _gravity(),
-            "displaced_volume": quantity_schema("m3", "volume of water that the submerged vehicle displaces", positive=True),
+            "displaced_volume": quantity_schema(
+                "m3", "volume of water that the submerged vehicle displaces", positive=True
+            ),
             "centre_of_buoyancy": vector_schema("m", "centre of this volume", 3),
             "size": vector_schema("m", "edges of the box over which this volume is distributed", 3),
             "water_density": quantity_schema("kg/m3", "density of the water", positive=True),
             "thruster": {**thruster, "description": "what all thrusters have in common"},
-            "thrusters": list_schema(each, "thrusters in the order of the input thruster_speed", 16),
+            "thrusters": list_schema(
+                each, "thrusters in the order of the input thruster_speed", 16
+            ),
         },
         submerged.KEYS,
     )

@@ -1,4 +1,6 @@
-"""JSON Schema of the arguments of a world, for editors and the reference; `world_settings` checks the values.
+"""JSON Schema of the arguments of a world, for editors and the reference.
+
+`world_settings` checks the values.
 
 Defaults, limits and lists of names are those of the readers.
 """
@@ -32,7 +34,9 @@ def world_schema() -> Schema:
                 {"uav": {"model": "ar_drone", "position": [0, 0, 2]}},
             ),
             "platforms": _named(
-                "WorldPlatform", "fixed boxes by name", {"start": {"size": [5, 5, 0.05], "position": [-7, 3, 0.45]}}
+                "WorldPlatform",
+                "fixed boxes by name",
+                {"start": {"size": [5, 5, 0.05], "position": [-7, 3, 0.45]}},
             ),
             "environment": documented_part(
                 "WorldEnvironment",
@@ -40,7 +44,9 @@ def world_schema() -> Schema:
                 {"seed": 1, "sea_state": 2, "wind": {"speed": 4}},
             ),
             "obstacles": _named(
-                "WorldObstacle", "fixed meshes by name", {"harbour": {"mesh": "cosim:scenarios/meshes/harbour.json"}}
+                "WorldObstacle",
+                "fixed meshes by name",
+                {"harbour": {"mesh": "cosim:scenarios/meshes/harbour.json"}},
             ),
         },
         ("vehicles",),
@@ -55,37 +61,61 @@ def _vehicle() -> Schema:
         {
             "model": {
                 "type": ["string", "object"],
-                "description": "vehicle of the library (`cosim list models`), path of a vehicle file, or its content",
+                "description": (
+                    "vehicle of the library (`cosim list models`), path of a vehicle file, or its "
+                    "content"
+                ),
                 "examples": ["ar_drone"],
             },
             "position": documented_vector(
-                "start of the centre of mass: [x, y, z], of a vessel [x, y]", "m", [0, 0, 2], least=2, most=3
+                "start of the centre of mass: [x, y, z], of a vessel [x, y]",
+                "m",
+                [0, 0, 2],
+                least=2,
+                most=3,
             ),
-            "yaw": documented_value(NUMBER, "start heading, counter-clockwise from x", "rad", 1.57, 0.0),
+            "yaw": documented_value(
+                NUMBER, "start heading, counter-clockwise from x", "rad", 1.57, 0.0
+            ),
             "velocity_body": documented_vector(
-                "start velocity along the body axes forward, left, up, to which that of the waves is added; default: at rest",
+                (
+                    "start velocity along the body axes forward, left, up, to which that of the "
+                    "waves is added; default: at rest"
+                ),
                 "m/s",
                 [1, 0, 0],
             ),
-            "rates": documented_vector("start angular velocity in body axes; default: 0", "rad/s", [0, 0, 0.1]),
+            "rates": documented_vector(
+                "start angular velocity in body axes; default: 0", "rad/s", [0, 0, 0.1]
+            ),
             "motion": {
                 "enum": ["planar", "6dof"],
-                "description": "degrees of freedom of a vessel with both; default: the first one of the model",
+                "description": (
+                    "degrees of freedom of a vessel with both; default: the first one of the model"
+                ),
                 "examples": ["6dof"],
             },
             "hull": {
                 "type": "string",
-                "description": "name of one of the hulls of a model with several; default: its first one",
+                "description": (
+                    "name of one of the hulls of a model with several; default: its first one"
+                ),
                 "examples": ["paper"],
             },
             "parameters": {
                 "type": "object",
-                "description": "parameters of the model by name, arrays as lists; `cosim info MODEL` lists them with units",
+                "description": (
+                    "parameters of the model by name, arrays as lists; `cosim info MODEL` lists "
+                    "them with units"
+                ),
                 "examples": [{"mass": 0.5}],
             },
             "crash_speed": documented_value(
                 AT_LEAST_0,
-                "change of velocity by a collision above which the vehicle has crashed; default: that of the model",
+                (
+                    "change of velocity by a collision above which the vehicle has crashed; "
+                    "default: that of the model"
+                ),
                 "m/s",
                 2.0,
             ),
@@ -99,10 +129,18 @@ def _surface() -> dict[str, Schema]:
     ratio: Schema = {"type": "number", "minimum": 0, "maximum": 1}
     return {
         "friction": documented_value(
-            AT_LEAST_0, "friction coefficient; the values of two bodies in contact are multiplied", "1", 0.8, DRY.friction
+            AT_LEAST_0,
+            "friction coefficient; the values of two bodies in contact are multiplied",
+            "1",
+            0.8,
+            DRY.friction,
         ),
         "restitution": documented_value(
-            ratio, "coefficient of restitution; the values of two bodies are multiplied", "1", 0.1, DRY.restitution
+            ratio,
+            "coefficient of restitution; the values of two bodies are multiplied",
+            "1",
+            0.1,
+            DRY.restitution,
         ),
     }
 
@@ -130,14 +168,21 @@ def _obstacle() -> Schema:
             },
             "position": documented_vector("place of the mesh's origin", "m", [10, 0, 0], [0, 0, 0]),
             "yaw": documented_value(NUMBER, "rotation about z, counter-clockwise", "rad", 0.5, 0.0),
-            "scale": documented_value(POSITIVE, "factor on all lengths of the mesh", "1", 0.001, 1.0),
+            "scale": documented_value(
+                POSITIVE, "factor on all lengths of the mesh", "1", 0.001, 1.0
+            ),
             "collision": {
                 "enum": ["convex", "concave"],
-                "description": "`convex`: each connected part collides as its convex hull; `concave`: the triangles collide",
+                "description": (
+                    "`convex`: each connected part collides as its convex hull; `concave`: the "
+                    "triangles collide"
+                ),
                 "default": "convex",
                 "examples": ["concave"],
             },
-            "colour": documented_vector("red, green, blue from 0 to 1", "1", [0.4, 0.4, 0.4], list(CONCRETE)),
+            "colour": documented_vector(
+                "red, green, blue from 0 to 1", "1", [0.4, 0.4, 0.4], list(CONCRETE)
+            ),
             **_surface(),
         },
         ("mesh",),
@@ -145,5 +190,9 @@ def _obstacle() -> Schema:
 
 
 def _named(kind: str, description: str, example: Schema) -> Schema:
-    names = {"type": "object", "patternProperties": {r"^[A-Za-z_]\w*$": reference(kind)}, "additionalProperties": False}
+    names = {
+        "type": "object",
+        "patternProperties": {r"^[A-Za-z_]\w*$": reference(kind)},
+        "additionalProperties": False,
+    }
     return {**names, "description": description, "examples": [example]}

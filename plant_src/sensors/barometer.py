@@ -6,7 +6,8 @@ from .counter_based_noise import gauss_markov_factors
 from .sampled_sensor import Measurement, SampledSensor, timing_variables
 from .variable_declarations import real_parameter, real_variable, seed_parameter
 
-#: p = p0 (1 - L z / T0)^EXPONENT with the lapse rate L and the temperature T0 at sea level (ISO 2533)
+#: p = p0 (1 - L z / T0)^EXPONENT with the lapse rate L and the temperature T0 at sea level (ISO
+#: 2533)
 STANDARD_PRESSURE = 101325.0  # Pa
 _LAPSE_PER_METRE = 0.0065 / 288.15  # 1/m
 _EXPONENT = 9.80665 * 0.0289644 / (8.31446 * 0.0065)
@@ -25,12 +26,13 @@ def altitude_at(pressure: float, at_zero: float = STANDARD_PRESSURE) -> float:
 class Barometer(SampledSensor):
     """Barometer with white noise and a slow drift.
 
-    Error model: pressure = pressure of the true altitude + first-order Gauss-Markov drift + white noise. The drift has the
-    relative accuracy of a Bosch BMP388, 8 Pa (data sheet BST-BMP388-DS001). Its correlation time and the noise of 1.2 Pa
-    (0.1 m) are typical values. The parameter `pressure_at_zero` (Pa) models the weather; events may change it.
+    Error model: pressure = pressure of the true altitude + first-order Gauss-Markov drift + white
+    noise. The drift has the relative accuracy of a Bosch BMP388, 8 Pa (data sheet
+    BST-BMP388-DS001). Its correlation time and the noise of 1.2 Pa (0.1 m) are typical values. The
+    parameter `pressure_at_zero` (Pa) models the weather; events may change it.
 
-    Inputs: `vehicle.position.z` (m, world). Outputs: `pressure` (Pa), `altitude` (m, from the pressure with 101325 Pa at
-    z = 0), `time` of the sample (s).
+    Inputs: `vehicle.position.z` (m, world). Outputs: `pressure` (Pa), `altitude` (m, from the
+    pressure with 101325 Pa at z = 0), `time` of the sample (s).
 
     Args:
         instance_name: Name of the component.
@@ -52,10 +54,17 @@ class Barometer(SampledSensor):
                 real_parameter("noise", "Pa", 1.2, "standard deviation of the white noise"),
                 real_parameter("drift", "Pa", 8.0, "standard deviation of the slow error"),
                 real_parameter("correlation_time", "s", 300.0, "of the slow error", 1e-3),
-                real_parameter("pressure_at_zero", "Pa", STANDARD_PRESSURE, "true pressure at z = 0", 5e4, 2e5),
+                real_parameter(
+                    "pressure_at_zero", "Pa", STANDARD_PRESSURE, "true pressure at z = 0", 5e4, 2e5
+                ),
                 seed_parameter(seed),
                 real_variable("pressure", "Pa", "output"),
-                real_variable("altitude", "m", "output", description="of the centre of mass, from the pressure"),
+                real_variable(
+                    "altitude",
+                    "m",
+                    "output",
+                    description="of the centre of mass, from the pressure",
+                ),
                 *timing_variables(50.0),
             ],
         )
@@ -68,5 +77,7 @@ class Barometer(SampledSensor):
             self._drift = keep * self._drift + drive * slow
         else:
             self._drift = p["drift"] * slow
-        pressure = pressure_at(self.inputs[0], p["pressure_at_zero"]) + self._drift + p["noise"] * white
+        pressure = (
+            pressure_at(self.inputs[0], p["pressure_at_zero"]) + self._drift + p["noise"] * white
+        )
         return (pressure, altitude_at(pressure)), ()

@@ -15,7 +15,13 @@ from ..json_reader import JsonReader
 from ..physics.client import pybullet
 from ..scene.cameras import UP, View
 from ..scene.parts import Part, platform_parts
-from ..scene.sky_and_water import HAZE_DISTANCE, HORIZON_COLOUR, WATER_COLOUR, pixel_rays, sky_colour
+from ..scene.sky_and_water import (
+    HAZE_DISTANCE,
+    HORIZON_COLOUR,
+    WATER_COLOUR,
+    pixel_rays,
+    sky_colour,
+)
 from ..scene.solid_renderer import SolidRenderer
 from ..scene.vehicle_parts import vehicle_parts
 from .pinhole_camera import camera_attitude
@@ -34,7 +40,9 @@ class OrientedView(View):
 
     def matrix(self) -> list[float]:
         """Return the view matrix, see `View.matrix`."""
-        return list(pybullet.computeViewMatrix(self.eye.tolist(), self.target.tolist(), self.up.tolist()))
+        return list(
+            pybullet.computeViewMatrix(self.eye.tolist(), self.target.tolist(), self.up.tolist())
+        )
 
     def axes(self) -> np.ndarray:
         """Return the axes of the camera, see `View.axes`."""
@@ -45,14 +53,18 @@ class OrientedView(View):
 
 
 class Camera(SampledSensor):
-    """Ideal pinhole camera on a vehicle; writes `folder`/NAME_0000.png, NAME_0001.png, ... at its rate.
+    """Ideal pinhole camera on a vehicle.
 
-    Vehicles and platforms are drawn as solids (`plant_src/scene`), water and sky as plain colours. Objects nearer than 0.4 m
-    are not drawn. A picture of 320 by 240 pixels takes about 16 ms, so the default rate is 1 Hz.
+    Writes `folder`/NAME_0000.png, NAME_0001.png, ... at its rate.
 
-    Inputs: `NAME.position` (m, world) and `NAME.orientation` (unit quaternion, body to world) of each vehicle. Outputs:
-    `frames` (pictures written so far), `time` of the last one (s). Parameters: `mounting` (m, body axes), `tilt` (rad, from
-    straight down to ahead), `angle` (rad, vertical field of view).
+    Vehicles and platforms are drawn as solids (`plant_src/scene`), water and sky as plain colours.
+    Objects nearer than 0.4 m are not drawn. A picture of 320 by 240 pixels takes about 16 ms, so
+    the default rate is 1 Hz.
+
+    Inputs: `NAME.position` (m, world) and `NAME.orientation` (unit quaternion, body to world) of
+    each vehicle. Outputs: `frames` (pictures written so far), `time` of the last one (s).
+    Parameters: `mounting` (m, body axes), `tilt` (rad, from straight down to ahead), `angle` (rad,
+    vertical field of view).
 
     Args:
         instance_name: Name of the component and of the files.
@@ -82,7 +94,12 @@ class Camera(SampledSensor):
         }
         reader.choice(carrier, ("carrier",), list(kinds) or ["uav"])
         for i in (0, 1):
-            reader.integer(size[i] if isinstance(size, list | tuple) and len(size) == 2 else size, ("size",), 8, 4096)
+            reader.integer(
+                size[i] if isinstance(size, list | tuple) and len(size) == 2 else size,
+                ("size",),
+                8,
+                4096,
+            )
         decks = [
             _platform_parts(reader, name, spec)
             for name, spec in reader.read_named_objects(platforms or {}, ("platforms",)).items()
@@ -92,15 +109,35 @@ class Camera(SampledSensor):
             instance_name,
             [
                 *(variable for name in kinds for variable in pose_inputs(name)),
-                real_parameter("tilt", "rad", 0.0, "of the camera, from straight down to ahead", -math.pi, math.pi),
+                real_parameter(
+                    "tilt",
+                    "rad",
+                    0.0,
+                    "of the camera, from straight down to ahead",
+                    -math.pi,
+                    math.pi,
+                ),
                 real_parameter("angle", "rad", 0.8, "opening from top to bottom", 0.05, 2.5),
-                real_variable("mounting", "m", "parameter", (0.0, 0.0, 0.0), "place of the camera, body axes", shape=(3,)),
+                real_variable(
+                    "mounting",
+                    "m",
+                    "parameter",
+                    (0.0, 0.0, 0.0),
+                    "place of the camera, body axes",
+                    shape=(3,),
+                ),
                 real_variable("frames", "1", "output", description="pictures written so far"),
                 *timing_variables(1.0),
             ],
         )
-        self._folder, self._size, self._carrier = Path(folder), (int(size[0]), int(size[1])), list(kinds).index(carrier)
-        visible_parts = [vehicle_parts(kind) if name != carrier else [] for name, kind in kinds.items()]
+        self._folder, self._size, self._carrier = (
+            Path(folder),
+            (int(size[0]), int(size[1])),
+            list(kinds).index(carrier),
+        )
+        visible_parts = [
+            vehicle_parts(kind) if name != carrier else [] for name, kind in kinds.items()
+        ]
         self._renderer = SolidRenderer(*visible_parts, [part for deck in decks for part in deck])
 
     def measure(self, number: int, elapsed: float) -> Measurement:
@@ -117,14 +154,19 @@ class Camera(SampledSensor):
             x, y, z, qw, qx, qy, qz = self.inputs[_POSE_SIZE * index : _POSE_SIZE * (index + 1)]
             self._renderer.set_pose(index, (x, y, z), (qx, qy, qz, qw))
         view = self._view()
-        solids, background = self._renderer.render(view, *self._size, shadow=True), _render_background(view, *self._size)
+        solids, background = (
+            self._renderer.render(view, *self._size, shadow=True),
+            _render_background(view, *self._size),
+        )
         return np.where(np.isfinite(solids.depth)[..., None], solids.colour, background)
 
     def _view(self) -> View:
         pose = self.inputs[_POSE_SIZE * self._carrier : _POSE_SIZE * (self._carrier + 1)]
         camera = quaternion_product(pose[3:], camera_attitude(self.parameters["tilt"]))
         eye = np.array(pose[:3]) + to_world(pose[3:], self.parameters["mounting"])
-        ahead, up = (np.array(to_world(camera, axis)) for axis in ((0.0, 0.0, 1.0), (0.0, -1.0, 0.0)))
+        ahead, up = (
+            np.array(to_world(camera, axis)) for axis in ((0.0, 0.0, 1.0), (0.0, -1.0, 0.0))
+        )
         return OrientedView(eye, eye + ahead, self.parameters["angle"], up)
 
     def free(self) -> None:
@@ -138,13 +180,19 @@ def _render_background(view: View, width: int, height: int) -> np.ndarray:
     below = direction[2] < 0
     reach = np.where(below, float(view.eye[2]) / np.maximum(-direction[2], 1e-6), np.inf)
     clear = np.exp(-reach / HAZE_DISTANCE)
-    colour = np.where(below, HORIZON_COLOUR + (WATER_COLOUR - HORIZON_COLOUR) * clear, sky_colour(direction))
-    picture: np.ndarray = np.rint(255 * np.clip(colour, 0, 1)).astype(np.uint8).T.reshape(height, width, 3)
+    colour = np.where(
+        below, HORIZON_COLOUR + (WATER_COLOUR - HORIZON_COLOUR) * clear, sky_colour(direction)
+    )
+    picture: np.ndarray = (
+        np.rint(255 * np.clip(colour, 0, 1)).astype(np.uint8).T.reshape(height, width, 3)
+    )
     return picture
 
 
 def _platform_parts(reader: JsonReader, name: str, spec: Any) -> list[Part]:
     path = ("platforms", name)
     spec = reader.read_object(spec, path, ("size", "position"), ())
-    size, position = (reader.vector(spec.get(key, [1.0] * 3), (*path, key), "xyz") for key in ("size", "position"))
+    size, position = (
+        reader.vector(spec.get(key, [1.0] * 3), (*path, key), "xyz") for key in ("size", "position")
+    )
     return list(platform_parts(size, position))

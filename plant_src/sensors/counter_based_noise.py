@@ -14,9 +14,9 @@ _BLOCK_LENGTH = 256  # rows drawn at a time
 class CounterBasedNoise:
     """Rows of independent standard normal numbers; row n depends on the key and n only.
 
-    The generator is Philox (Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", 2011), a function of a key and a
-    counter. The key is hashed, so that neighbouring seeds, and equal seeds of sensors with different names, give independent
-    numbers.
+    The generator is Philox (Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", 2011), a
+    function of a key and a counter. The key is hashed, so that neighbouring seeds, and equal seeds
+    of sensors with different names, give independent numbers.
 
     Args:
         width: Numbers per row.
@@ -32,21 +32,28 @@ class CounterBasedNoise:
         block, row = divmod(number, _BLOCK_LENGTH)
         if block != self._block:
             bits = np.random.Philox(key=self._key, counter=block << 64)
-            self._rows = np.random.Generator(bits).standard_normal((_BLOCK_LENGTH, self._width)).tolist()
+            self._rows = (
+                np.random.Generator(bits).standard_normal((_BLOCK_LENGTH, self._width)).tolist()
+            )
             self._block = block
         return self._rows[row]
 
 
 def normal_to_uniform(normal: float) -> float:
-    """Return the standard normal distribution function at `normal`: maps normal numbers to uniform ones in (0, 1)."""
+    """Return the standard normal distribution function at `normal`.
+
+    Maps normal numbers to uniform ones in (0, 1).
+    """
     return 0.5 * math.erfc(-normal / math.sqrt(2))
 
 
-def gauss_markov_factors(sigma: float, correlation_time: float, elapsed: float) -> tuple[float, float]:
+def gauss_markov_factors(
+    sigma: float, correlation_time: float, elapsed: float
+) -> tuple[float, float]:
     """Return the factors of an exactly sampled first-order Gauss-Markov process.
 
-    The process is x <- keep x + drive n with standard normal n. Its stationary standard deviation is `sigma`, its
-    autocorrelation exp(-t / correlation_time).
+    The process is x <- keep x + drive n with standard normal n. Its stationary standard deviation
+    is `sigma`, its autocorrelation exp(-t / correlation_time).
 
     Args:
         sigma: Standard deviation.

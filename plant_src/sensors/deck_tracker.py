@@ -10,10 +10,20 @@ from .signal_component import SignalComponent
 from .variable_declarations import pose_inputs, real_parameter, real_variable, vector_variables
 
 #: inputs by quantity
-_VEHICLE_POSE, _FIX_POSITION, _FIX_VELOCITY, _FIX_TIME = slice(0, 7), slice(7, 10), slice(10, 13), 13
+_VEHICLE_POSE, _FIX_POSITION, _FIX_VELOCITY, _FIX_TIME = (
+    slice(0, 7),
+    slice(7, 10),
+    slice(10, 13),
+    13,
+)
 _SIGHT_POSITION, _SIGHT_TIME = slice(14, 17), 17
 #: entries of the history by quantity
-_POSITION, _VELOCITY, _VEHICLE_POSITION, _VEHICLE_ORIENTATION = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 13)
+_POSITION, _VELOCITY, _VEHICLE_POSITION, _VEHICLE_ORIENTATION = (
+    slice(0, 3),
+    slice(3, 6),
+    slice(6, 9),
+    slice(9, 13),
+)
 
 
 class DeckTracker(SignalComponent):
@@ -46,9 +56,30 @@ class DeckTracker(SignalComponent):
                 real_variable("gnss.time", "s", "input"),
                 *vector_variables("marker.position", "xyz", "m", "input"),
                 real_variable("marker.time", "s", "input"),
-                real_parameter("fix_gain", "1", 0.2, "share of the position error that a fix takes away", 0.0, 1.0),
-                real_parameter("velocity_gain", "1", 0.6, "share of the velocity error that a fix takes away", 0.0, 1.0),
-                real_parameter("sight_gain", "1", 0.2, "share of the position error that a sight takes away", 0.0, 1.0),
+                real_parameter(
+                    "fix_gain",
+                    "1",
+                    0.2,
+                    "share of the position error that a fix takes away",
+                    0.0,
+                    1.0,
+                ),
+                real_parameter(
+                    "velocity_gain",
+                    "1",
+                    0.6,
+                    "share of the velocity error that a fix takes away",
+                    0.0,
+                    1.0,
+                ),
+                real_parameter(
+                    "sight_gain",
+                    "1",
+                    0.2,
+                    "share of the position error that a sight takes away",
+                    0.0,
+                    1.0,
+                ),
                 *vector_variables("position", "xyz", "m", "output"),
                 *vector_variables("velocity", "xyz", "m/s", "output"),
             ],
@@ -70,19 +101,30 @@ class DeckTracker(SignalComponent):
             past = self._history.at(time)
             if time == i[_FIX_TIME]:
                 self._correct_position(i[_FIX_POSITION], past, self.parameters["fix_gain"])
-                self._velocity = _corrected(self._velocity, i[_FIX_VELOCITY], past[_VELOCITY], self.parameters["velocity_gain"])
+                self._velocity = _corrected(
+                    self._velocity,
+                    i[_FIX_VELOCITY],
+                    past[_VELOCITY],
+                    self.parameters["velocity_gain"],
+                )
             if time == i[_SIGHT_TIME]:
                 offset = to_world(past[_VEHICLE_ORIENTATION], i[_SIGHT_POSITION])
-                position = [own + part for own, part in zip(past[_VEHICLE_POSITION], offset, strict=True)]
+                position = [
+                    own + part for own, part in zip(past[_VEHICLE_POSITION], offset, strict=True)
+                ]
                 self._correct_position(position, past, self.parameters["sight_gain"])
         self._fix_time, self._sight_time = i[_FIX_TIME], i[_SIGHT_TIME]
         self.outputs = (*self._position, *self._velocity)
 
-    def _correct_position(self, measured: Sequence[float], past: Sequence[float], gain: float) -> None:
+    def _correct_position(
+        self, measured: Sequence[float], past: Sequence[float], gain: float
+    ) -> None:
         self._position = _corrected(self._position, measured, past[_POSITION], gain)
 
 
-def _corrected(present: Sequence[float], measured: Sequence[float], past: Sequence[float], gain: float) -> Vector:
+def _corrected(
+    present: Sequence[float], measured: Sequence[float], past: Sequence[float], gain: float
+) -> Vector:
     """Return the present estimate plus `gain` times the error of the past estimate at the time of the measurement."""
     x, y, z = (a + gain * (b - c) for a, b, c in zip(present, measured, past, strict=True))
     return x, y, z

@@ -1,8 +1,9 @@
 """Parameters of commercial sensors in SI units, each with its source.
 
 - [BMI088] Bosch Sensortec BMI088, data sheet BST-BMI088-DS001
-- [ADIS] Analog Devices ADIS16448 as in the RotorS simulator (Furrer et al., "RotorS - A modular Gazebo MAV simulator
-  framework", 2016; gazebo_imu_plugin.h), which doubles the densities of the data sheet
+- [ADIS] Analog Devices ADIS16448 as in the RotorS simulator (Furrer et al., "RotorS - A modular
+  Gazebo MAV simulator framework", 2016; gazebo_imu_plugin.h), which doubles the densities of the
+  data sheet
 - [F9P] u-blox ZED-F9P, data sheet UBX-17051259, RTK fixed, short base line
 - [M8N] u-blox NEO-M8N, data sheet UBX-15031086
 - [typical] common value, not in a data sheet
@@ -19,12 +20,14 @@ _DEGREE, _MILLI_G, _HOUR = math.radians(1.0), 9.81e-3, 3600.0
 
 Numbers = Mapping[str, float]
 
-#: noise_density (unit/sqrt(Hz)), bias_walk (unit/s/sqrt(Hz)), correlation_time (s), turn_on_bias and range (unit); rad/s and m/s2
+#: noise_density (unit/sqrt(Hz)), bias_walk (unit/s/sqrt(Hz)), correlation_time (s), turn_on_bias
+#: and range (unit); rad/s and m/s2
 IMU_DEVICES: Mapping[str, Mapping[str, Numbers]] = {
     "bmi088": {
         "gyroscope": {
             "noise_density": 0.014 * _DEGREE,  # [BMI088]
-            # sigma sqrt(2 / correlation_time) of a Gauss-Markov process with the bias stability of 2 deg/h [BMI088]
+            # sigma sqrt(2 / correlation_time) of a Gauss-Markov process with the bias stability of
+            # 2 deg/h [BMI088]
             "bias_walk": 2.0 * _DEGREE / _HOUR * math.sqrt(2 / 1000.0),
             "correlation_time": 1000.0,  # [ADIS]
             "turn_on_bias": 1.0 * _DEGREE,  # zero-rate offset [BMI088]
@@ -59,7 +62,8 @@ IMU_DEVICES: Mapping[str, Mapping[str, Numbers]] = {
 #: standard deviation along each of two axes per CEP radius: 1 / 1.1774
 _CEP = 1 / math.sqrt(2 * math.log(2))
 
-#: white noise and slow error of the position (m), white noise of the velocity (m/s), correlation time (s), rate (Hz), latency (s)
+#: white noise and slow error of the position (m), white noise of the velocity (m/s), correlation
+#: time (s), rate (Hz), latency (s)
 GNSS_RECEIVERS: Mapping[str, Numbers] = {
     "standard": {
         "horizontal_noise": 0.1,  # [typical]
@@ -72,8 +76,12 @@ GNSS_RECEIVERS: Mapping[str, Numbers] = {
         "latency": 0.1,  # [typical]
     },
     "rtk": {
-        "horizontal_noise": 0.01 * _CEP / math.sqrt(2),  # half of the variance each in noise and drift
-        "vertical_noise": 0.01 * 1.4826 / math.sqrt(2),  # 0.01 m is the median of the absolute error [F9P]
+        "horizontal_noise": 0.01
+        * _CEP
+        / math.sqrt(2),  # half of the variance each in noise and drift
+        "vertical_noise": 0.01
+        * 1.4826
+        / math.sqrt(2),  # 0.01 m is the median of the absolute error [F9P]
         "horizontal_drift": 0.01 * _CEP / math.sqrt(2),  # [F9P]
         "vertical_drift": 0.01 * 1.4826 / math.sqrt(2),
         "velocity_noise": 0.05,  # [F9P]

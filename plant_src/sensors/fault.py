@@ -14,12 +14,20 @@ from cosim.core.units import parse_unit
 
 from ..json_reader import JsonReader
 from .signal_component import SignalComponent
-from .variable_declarations import boolean_variable, check_seed, raise_problems, real_parameter, real_variable, seed_parameter
+from .variable_declarations import (
+    boolean_variable,
+    check_seed,
+    raise_problems,
+    real_parameter,
+    real_variable,
+    seed_parameter,
+)
 
 #: values of the parameter `mode`
 FAULT_MODES = ("normal", "frozen", "stuck", "missing")
 
-#: factor of a signal from its gain, by the quantity that the gain multiplies: the signal itself or its square
+#: factor of a signal from its gain, by the quantity that the gain multiplies: the signal itself or
+#: its square
 GAIN_FUNCTIONS: Mapping[str, Callable[[float], float]] = {
     "signal": lambda gain: gain,
     "square": lambda gain: math.copysign(math.sqrt(abs(gain)), gain),
@@ -56,13 +64,28 @@ class SignalFault(SignalComponent):
 
     state_attributes = ("_step", "_history")
 
-    def __init__(self, instance_name: str, signals: Mapping[str, str], gain_of: str = "signal", seed: int = 0):
+    def __init__(
+        self, instance_name: str, signals: Mapping[str, str], gain_of: str = "signal", seed: int = 0
+    ):
         shapes = _read_signals(signals, gain_of, seed)
-        mode = Variable("mode", "String", "parameter", "tunable", "normal", description=", ".join(FAULT_MODES))
-        variables = [variable for name, (unit, shape) in shapes.items() for variable in _signal_variables(name, unit, shape)]
+        mode = Variable(
+            "mode", "String", "parameter", "tunable", "normal", description=", ".join(FAULT_MODES)
+        )
+        variables = [
+            variable
+            for name, (unit, shape) in shapes.items()
+            for variable in _signal_variables(name, unit, shape)
+        ]
         valid = boolean_variable("valid", "output", "false while the mode is missing")
         super().__init__(
-            instance_name, [*variables, mode, real_parameter("delay", "s", 0.0, "of all signals"), seed_parameter(seed), valid]
+            instance_name,
+            [
+                *variables,
+                mode,
+                real_parameter("delay", "s", 0.0, "of all signals"),
+                seed_parameter(seed),
+                valid,
+            ],
         )
         self._names, self._factor = list(shapes), GAIN_FUNCTIONS[gain_of]
         self.random_number_count = len(self.inputs)
@@ -77,7 +100,12 @@ class SignalFault(SignalComponent):
         self._stuck = self._parameters_of("value") if mode == "stuck" else None
         self._factors = [self._factor(gain) for gain in self._parameters_of("gain")]
         self._biases, self._sigmas = self._parameters_of("bias"), self._parameters_of("noise")
-        changed = any(self._is_held) or any(self._biases) or any(self._sigmas) or any(f != 1 for f in self._factors)
+        changed = (
+            any(self._is_held)
+            or any(self._biases)
+            or any(self._sigmas)
+            or any(f != 1 for f in self._factors)
+        )
         self._delay = self.parameters["delay"]
         self._is_inactive = not changed and not self._delay
         self.flags = (not (mode == "missing" and any(affected)),)
@@ -115,7 +143,9 @@ class SignalFault(SignalComponent):
         changes = zip(inputs, self._factors, self._biases, self._sigmas, row, strict=True)
         faulty = [x * factor + bias + sigma * n for x, factor, bias, sigma, n in changes]
         held = self.outputs if self._stuck is None else self._stuck
-        self.outputs = [old if hold else new for new, old, hold in zip(faulty, held, self._is_held, strict=True)]
+        self.outputs = [
+            old if hold else new for new, old, hold in zip(faulty, held, self._is_held, strict=True)
+        ]
 
 
 def _signal_variables(name: str, unit: str, shape: tuple[int, ...]) -> list[Variable]:
@@ -125,7 +155,9 @@ def _signal_variables(name: str, unit: str, shape: tuple[int, ...]) -> list[Vari
     def settable(kind: str, text: str, start: float = 0.0, of: str = unit) -> Variable:
         return real_variable(f"{kind}.{name}", of, "parameter", constant(start), text, shape=shape)
 
-    affected = Variable(f"affected.{name}", "Boolean", "parameter", "tunable", constant(True), shape=shape)
+    affected = Variable(
+        f"affected.{name}", "Boolean", "parameter", "tunable", constant(True), shape=shape
+    )
     return [
         real_variable(f"input.{name}", unit, "input", shape=shape),
         settable("gain", "factor of the signal, or of its square", 1.0, "1"),
@@ -137,7 +169,9 @@ def _signal_variables(name: str, unit: str, shape: tuple[int, ...]) -> list[Vari
     ]
 
 
-def _read_signals(signals: Mapping[str, str], gain_of: str, seed: int) -> dict[str, tuple[str, tuple[int, ...]]]:
+def _read_signals(
+    signals: Mapping[str, str], gain_of: str, seed: int
+) -> dict[str, tuple[str, tuple[int, ...]]]:
     """Return unit and shape of each signal. Raises InputError with all problems."""
     reader = JsonReader()
     shapes: dict[str, tuple[str, tuple[int, ...]]] = {}
@@ -146,7 +180,9 @@ def _read_signals(signals: Mapping[str, str], gain_of: str, seed: int) -> dict[s
         if match := _SIGNAL.fullmatch(text):
             shapes[match[1]] = (unit, (int(match[2]),) if match[2] else ())
         else:
-            reader.add_problem(path, f'found "{text}", expected a name such as "rudder_angle" or "rotor_speed[4]"')
+            reader.add_problem(
+                path, f'found "{text}", expected a name such as "rudder_angle" or "rotor_speed[4]"'
+            )
         try:
             parse_unit(str(unit) or "1")
         except ValueError as error:

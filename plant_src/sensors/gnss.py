@@ -8,18 +8,26 @@ from ..json_reader import JsonReader
 from .counter_based_noise import gauss_markov_factors
 from .device_data import GNSS_RECEIVERS
 from .sampled_sensor import Measurement, SampledSensor, timing_variables
-from .variable_declarations import boolean_variable, check_seed, raise_problems, real_parameter, seed_parameter, vector_variables
+from .variable_declarations import (
+    boolean_variable,
+    check_seed,
+    raise_problems,
+    real_parameter,
+    seed_parameter,
+    vector_variables,
+)
 
 
 class Gnss(SampledSensor):
     """GNSS receiver with white noise and a slow position drift.
 
-    Error model: position = true position + first-order Gauss-Markov drift + white noise; velocity = true velocity + white
-    noise. Default values are those of a data sheet (`device_data.py`); each is a parameter. While the parameter `available`
-    is false, `valid` is false and the outputs keep the last fix.
+    Error model: position = true position + first-order Gauss-Markov drift + white noise; velocity =
+    true velocity + white noise. Default values are those of a data sheet (`device_data.py`); each
+    is a parameter. While the parameter `available` is false, `valid` is false and the outputs keep
+    the last fix.
 
-    Inputs: `vehicle.position` (m, world), `vehicle.velocity` (m/s, world), of a vehicle or a deck. Outputs: `position.x|y|z`
-    (m), `velocity.x|y|z` (m/s), `time` of the sample (s), `valid`.
+    Inputs: `vehicle.position` (m, world), `vehicle.velocity` (m/s, world), of a vehicle or a deck.
+    Outputs: `position.x|y|z` (m), `velocity.x|y|z` (m/s), `time` of the sample (s), `valid`.
 
     Args:
         instance_name: Name of the component.
@@ -46,10 +54,14 @@ class Gnss(SampledSensor):
                 *vector_variables("vehicle.position", "xyz", "m", "input"),
                 *vector_variables("vehicle.velocity", "xyz", "m/s", "input"),
                 *(
-                    real_parameter(name, "m/s" if name[0:4] == "velo" else "m", value, "standard deviation")
+                    real_parameter(
+                        name, "m/s" if name[0:4] == "velo" else "m", value, "standard deviation"
+                    )
                     for name, value in noise
                 ),
-                real_parameter("correlation_time", "s", numbers["correlation_time"], "of the drift", 1e-3),
+                real_parameter(
+                    "correlation_time", "s", numbers["correlation_time"], "of the drift", 1e-3
+                ),
                 seed_parameter(seed),
                 boolean_variable("available", "parameter", "satellites are seen", True),
                 *vector_variables("position", "xyz", "m", "output"),
@@ -79,4 +91,7 @@ class Gnss(SampledSensor):
             self._drift = [sigma * n for sigma, n in zip(sigmas, row, strict=True)]
             return
         factors = [gauss_markov_factors(sigma, time, elapsed) for sigma in sigmas]
-        self._drift = [keep * x + drive * n for x, (keep, drive), n in zip(self._drift, factors, row, strict=True)]
+        self._drift = [
+            keep * x + drive * n
+            for x, (keep, drive), n in zip(self._drift, factors, row, strict=True)
+        ]

@@ -21,7 +21,10 @@ class History:
             self._entries.popleft()
 
     def at(self, time: float) -> Sequence[float]:
-        """Return the oldest values stored at or after `time` (s); the newest ones if all are older."""
+        """Return the oldest values stored at or after `time` (s).
+
+        The newest ones if all are older.
+        """
         result = self._entries[-1]
         for entry in reversed(self._entries):
             if entry[0] < time - _TIME_TOLERANCE:

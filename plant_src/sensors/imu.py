@@ -1,13 +1,16 @@
-"""Inertial measurement unit: three gyroscopes and three accelerometers in body axes, one sample per step.
+"""Inertial measurement unit.
+
+Three gyroscopes and three accelerometers in body axes, one sample per step.
 
 Error model of each triad (IEEE Std 952-1997; also used by the kalibr and RotorS projects):
 
     y = clip(M x + c + b_0 + b + N / sqrt(h) n, -range, range)
 
-with the true value x, the matrix M of scale and misalignment, the constant bias c, the turn-on bias b_0 (normal), the bias b (a
-first-order Gauss-Markov process driven by white noise of density K, the bias walk), the noise density N, the step size h and a
-standard normal n. The Allan deviation is N / sqrt(tau) for short averaging times and K sqrt(tau / 3) for long ones that are
-well below the correlation time.
+with the true value x, the matrix M of scale and misalignment, the constant bias c, the turn-on bias
+b_0 (normal), the bias b (a first-order Gauss-Markov process driven by white noise of density K, the
+bias walk), the noise density N, the step size h and a standard normal n. The Allan deviation is N /
+sqrt(tau) for short averaging times and K sqrt(tau / 3) for long ones that are well below the
+correlation time.
 """
 
 from __future__ import annotations
@@ -23,14 +26,24 @@ from .counter_based_noise import CounterBasedNoise, gauss_markov_factors
 from .device_data import IMU_DEVICES, Numbers
 from .rotations import Vector, midpoint_attitude, to_body
 from .signal_component import SignalComponent
-from .variable_declarations import check_seed, raise_problems, real_parameter, real_variable, seed_parameter, vector_variables
+from .variable_declarations import (
+    check_seed,
+    raise_problems,
+    real_parameter,
+    real_variable,
+    seed_parameter,
+    vector_variables,
+)
 
 GRAVITY = 9.81  # m/s2, as in the equations of the vehicles
 _IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
 
 
 class _TriadCoefficients(NamedTuple):
-    """Coefficients of the error model of three equal axes; `keep` and `drive` as in `gauss_markov_factors`."""
+    """Coefficients of the error model of three equal axes.
+
+    `keep` and `drive` as in `gauss_markov_factors`.
+    """
 
     matrix: Sequence[float] | None
     offset: Vector
@@ -43,17 +56,19 @@ class _TriadCoefficients(NamedTuple):
 class Imu(SignalComponent):
     """Inertial measurement unit with the error model of IEEE Std 952 (see the module).
 
-    The specific force is the mean over the step: the change of velocity minus that by gravity, divided by the step size, in
-    the attitude halfway. A contact therefore appears as it does in the published velocity.
+    The specific force is the mean over the step: the change of velocity minus that by gravity,
+    divided by the step size, in the attitude halfway. A contact therefore appears as it does in the
+    published velocity.
 
-    Inputs: `vehicle.velocity` (m/s, world), `vehicle.orientation` (unit quaternion, body to world), `vehicle.rates` (rad/s,
-    body). Outputs: `acceleration.x|y|z` (specific force, m/s2, body; +g upwards at rest, 0 in free fall), `rates.p|q|r` (rad/s,
-    body).
+    Inputs: `vehicle.velocity` (m/s, world), `vehicle.orientation` (unit quaternion, body to world),
+    `vehicle.rates` (rad/s, body). Outputs: `acceleration.x|y|z` (specific force, m/s2, body; +g
+    upwards at rest, 0 in free fall), `rates.p|q|r` (rad/s, body).
 
     Args:
         instance_name: Name of the component.
         seed: Seed of all random numbers, together with the name of the component.
-        device: Set of default values (`device_data.py`): "bmi088" or "adis16448". Each value is a parameter.
+        device: Set of default values (`device_data.py`): "bmi088" or "adis16448". Each value is a
+            parameter.
 
     Raises:
         InputError: `device` is unknown or `seed` is not an integer of at least 0.
@@ -71,7 +86,10 @@ class Imu(SignalComponent):
             instance_name,
             [
                 *vector_variables("vehicle.velocity", "xyz", "m/s", "input"),
-                *(real_variable(f"vehicle.orientation.{part}", "1", "input", float(part == "w")) for part in "wxyz"),
+                *(
+                    real_variable(f"vehicle.orientation.{part}", "1", "input", float(part == "w"))
+                    for part in "wxyz"
+                ),
                 *vector_variables("vehicle.rates", "pqr", "rad/s", "input"),
                 *_triad_parameters("gyroscope", "rad/s", IMU_DEVICES[device]["gyroscope"]),
                 *_triad_parameters("accelerometer", "m/s2", IMU_DEVICES[device]["accelerometer"]),
@@ -89,13 +107,25 @@ class Imu(SignalComponent):
         self._gyroscope = self._coefficients("gyroscope", turn_on[3:])
 
     def _coefficients(self, kind: str, turn_on: Sequence[float]) -> _TriadCoefficients:
-        p = {name.partition(".")[2]: value for name, value in self.parameters.items() if name.startswith(kind)}
-        matrix, offset = p["matrix"], [c + p["turn_on_bias"] * n for c, n in zip(p["bias"], turn_on, strict=True)]
+        p = {
+            name.partition(".")[2]: value
+            for name, value in self.parameters.items()
+            if name.startswith(kind)
+        }
+        matrix, offset = (
+            p["matrix"],
+            [c + p["turn_on_bias"] * n for c, n in zip(p["bias"], turn_on, strict=True)],
+        )
         sigma = p["bias_walk"] * math.sqrt(p["correlation_time"] / 2)
         keep, drive = gauss_markov_factors(sigma, p["correlation_time"], self._step_size)
         white = p["noise_density"] / math.sqrt(self._step_size)
         return _TriadCoefficients(
-            None if tuple(matrix) == _IDENTITY else matrix, (offset[0], offset[1], offset[2]), white, keep, drive, p["range"]
+            None if tuple(matrix) == _IDENTITY else matrix,
+            (offset[0], offset[1], offset[2]),
+            white,
+            keep,
+            drive,
+            p["range"],
         )
 
     def initialise(self) -> None:
@@ -123,15 +153,31 @@ class Imu(SignalComponent):
         x, y, z, p, q, r = self._biases
         x, y, z = keep * x + drive * row[6], keep * y + drive * row[7], keep * z + drive * row[8]
         _, _, _, keep, drive, _ = self._gyroscope
-        self._biases = x, y, z, keep * p + drive * row[9], keep * q + drive * row[10], keep * r + drive * row[11]
+        self._biases = (
+            x,
+            y,
+            z,
+            keep * p + drive * row[9],
+            keep * q + drive * row[10],
+            keep * r + drive * row[11],
+        )
 
     def _set_outputs(self, force: Vector, attitude: Sequence[float], row: Sequence[float]) -> None:
         """Set the outputs from the specific force (m/s2, world axes) and the attitude (quaternion, body to world)."""
-        x, y, z = _measured_axes(self._accelerometer, to_body(attitude, force), self._biases[:3], row)
-        self.outputs = (x, y, z, *_measured_axes(self._gyroscope, self.inputs[7:10], self._biases[3:], row[3:]))
+        x, y, z = _measured_axes(
+            self._accelerometer, to_body(attitude, force), self._biases[:3], row
+        )
+        self.outputs = (
+            x,
+            y,
+            z,
+            *_measured_axes(self._gyroscope, self.inputs[7:10], self._biases[3:], row[3:]),
+        )
 
 
-def _measured_axes(triad: _TriadCoefficients, true: Sequence[float], bias: Sequence[float], row: Sequence[float]) -> Vector:
+def _measured_axes(
+    triad: _TriadCoefficients, true: Sequence[float], bias: Sequence[float], row: Sequence[float]
+) -> Vector:
     """Apply the error model to the true values of three axes."""
     matrix, (offset_x, offset_y, offset_z), sigma, _, _, limit = triad
     x, y, z = true
@@ -149,11 +195,39 @@ def _measured_axes(triad: _TriadCoefficients, true: Sequence[float], bias: Seque
 def _triad_parameters(kind: str, unit: str, numbers: Numbers) -> list[Variable]:
     # densities have no declared unit: FMI units have integer exponents, unit/sqrt(Hz) does not
     return [
-        real_parameter(f"{kind}.noise_density", "", numbers["noise_density"], f"of white noise, {unit}/sqrt(Hz)"),
-        real_parameter(f"{kind}.bias_walk", "", numbers["bias_walk"], f"density that drives the bias, {unit}/s/sqrt(Hz)"),
-        real_parameter(f"{kind}.correlation_time", "s", numbers["correlation_time"], "of the wandering bias", 1e-3),
-        real_parameter(f"{kind}.turn_on_bias", unit, numbers["turn_on_bias"], "standard deviation of the bias at turn-on"),
+        real_parameter(
+            f"{kind}.noise_density",
+            "",
+            numbers["noise_density"],
+            f"of white noise, {unit}/sqrt(Hz)",
+        ),
+        real_parameter(
+            f"{kind}.bias_walk",
+            "",
+            numbers["bias_walk"],
+            f"density that drives the bias, {unit}/s/sqrt(Hz)",
+        ),
+        real_parameter(
+            f"{kind}.correlation_time",
+            "s",
+            numbers["correlation_time"],
+            "of the wandering bias",
+            1e-3,
+        ),
+        real_parameter(
+            f"{kind}.turn_on_bias",
+            unit,
+            numbers["turn_on_bias"],
+            "standard deviation of the bias at turn-on",
+        ),
         real_parameter(f"{kind}.range", unit, numbers["range"], "largest value that is measured"),
         real_variable(f"{kind}.bias", unit, "parameter", (0.0,) * 3, "constant bias", shape=(3,)),
-        real_variable(f"{kind}.matrix", "1", "parameter", _IDENTITY, "scale and misalignment, row by row", shape=(9,)),
+        real_variable(
+            f"{kind}.matrix",
+            "1",
+            "parameter",
+            _IDENTITY,
+            "scale and misalignment, row by row",
+            shape=(9,),
+        ),
     ]

@@ -8,20 +8,22 @@ from .rotations import euler_angles, to_body
 from .sampled_sensor import Measurement, SampledSensor, timing_variables
 from .variable_declarations import real_parameter, real_variable, seed_parameter, vector_variables
 
-#: field of the Earth, east, north, up (T): rounded value of the World Magnetic Model 2025 at about 40 degrees north in Europe
+#: field of the Earth, east, north, up (T): rounded value of the World Magnetic Model 2025 at about
+#: 40 degrees north in Europe
 EARTH_FIELD = (0.5e-6, 25.5e-6, -37.0e-6)
 
 
 class Magnetometer(SampledSensor):
     """Magnetometer with hard iron, soft iron and white noise.
 
-    Error model: field = S R^T B + h + white noise, with the field of the Earth B (parameter `earth`), the rotation R from body
-    to world, the soft-iron matrix S and the hard-iron field h, both fixed to the body. The noise of 0.3 uT is typical of
-    small sensors. `yaw` is levelled with the true roll and pitch and corrected for the true declination, like the heading of
-    a compass module with a perfect level.
+    Error model: field = S R^T B + h + white noise, with the field of the Earth B (parameter
+    `earth`), the rotation R from body to world, the soft-iron matrix S and the hard-iron field h,
+    both fixed to the body. The noise of 0.3 uT is typical of small sensors. `yaw` is levelled with
+    the true roll and pitch and corrected for the true declination, like the heading of a compass
+    module with a perfect level.
 
-    Inputs: `vehicle.orientation` (unit quaternion, body to world). Outputs: `field.x|y|z` (T, body axes), `yaw` (rad,
-    counter-clockwise from east), `time` of the sample (s).
+    Inputs: `vehicle.orientation` (unit quaternion, body to world). Outputs: `field.x|y|z` (T, body
+    axes), `yaw` (rad, counter-clockwise from east), `time` of the sample (s).
 
     Args:
         instance_name: Name of the component.
@@ -38,10 +40,34 @@ class Magnetometer(SampledSensor):
         super().__init__(
             instance_name,
             [
-                *(real_variable(f"vehicle.orientation.{part}", "1", "input", float(part == "w")) for part in "wxyz"),
-                real_variable("earth", "T", "parameter", EARTH_FIELD, "field of the Earth: east, north, up", shape=(3,)),
-                real_variable("hard_iron", "T", "parameter", (0.0,) * 3, "field of the vehicle itself, body axes", shape=(3,)),
-                real_variable("soft_iron", "1", "parameter", identity, "distortion by the vehicle, row by row", shape=(9,)),
+                *(
+                    real_variable(f"vehicle.orientation.{part}", "1", "input", float(part == "w"))
+                    for part in "wxyz"
+                ),
+                real_variable(
+                    "earth",
+                    "T",
+                    "parameter",
+                    EARTH_FIELD,
+                    "field of the Earth: east, north, up",
+                    shape=(3,),
+                ),
+                real_variable(
+                    "hard_iron",
+                    "T",
+                    "parameter",
+                    (0.0,) * 3,
+                    "field of the vehicle itself, body axes",
+                    shape=(3,),
+                ),
+                real_variable(
+                    "soft_iron",
+                    "1",
+                    "parameter",
+                    identity,
+                    "distortion by the vehicle, row by row",
+                    shape=(9,),
+                ),
                 real_parameter("noise", "T", 0.3e-6, "standard deviation of the white noise"),
                 seed_parameter(seed),
                 *vector_variables("field", "xyz", "T", "output", text="measured field"),
@@ -56,7 +82,10 @@ class Magnetometer(SampledSensor):
         x, y, z = to_body(self.inputs, p["earth"])
         a, b, c, d, e, f, g, h, i = p["soft_iron"]
         distorted = (a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z)
-        field = [soft + hard + p["noise"] * n for soft, hard, n in zip(distorted, p["hard_iron"], row, strict=True)]
+        field = [
+            soft + hard + p["noise"] * n
+            for soft, hard, n in zip(distorted, p["hard_iron"], row, strict=True)
+        ]
         return (*field, self._heading(field)), ()
 
     def _heading(self, field: list[float]) -> float:

@@ -7,9 +7,23 @@ from collections.abc import Sequence
 
 from .counter_based_noise import normal_to_uniform
 from .pinhole_camera import camera_attitude, project, to_camera_axes
-from .rotations import Vector, euler_angles, inverse_quaternion, quaternion_product, to_body, to_world
+from .rotations import (
+    Vector,
+    euler_angles,
+    inverse_quaternion,
+    quaternion_product,
+    to_body,
+    to_world,
+)
 from .sampled_sensor import Measurement, SampledSensor, timing_variables
-from .variable_declarations import boolean_variable, pose_inputs, real_parameter, real_variable, seed_parameter, vector_variables
+from .variable_declarations import (
+    boolean_variable,
+    pose_inputs,
+    real_parameter,
+    real_variable,
+    seed_parameter,
+    vector_variables,
+)
 
 #: inputs by quantity
 _VEHICLE_ORIENTATION, _DECK_POSITION, _DECK_ORIENTATION = slice(3, 7), slice(7, 10), slice(10, 14)
@@ -58,16 +72,56 @@ class MarkerCamera(SampledSensor):
                 real_parameter("focal_length", "1", 320.0, "pixels", 1.0),
                 real_parameter("width", "1", 320.0, "pixels of a picture from left to right", 1.0),
                 real_parameter("height", "1", 240.0, "pixels of a picture from top to bottom", 1.0),
-                real_parameter("smallest", "1", 12.0, "pixels along an edge of the marker that can still be read"),
-                real_parameter("incidence", "rad", 1.2, "largest angle between view and normal of the marker", 0.0, math.pi / 2),
-                real_parameter("drop_out", "1", 0.02, "share of pictures in which the marker is overlooked", 0.0, 1.0),
+                real_parameter(
+                    "smallest",
+                    "1",
+                    12.0,
+                    "pixels along an edge of the marker that can still be read",
+                ),
+                real_parameter(
+                    "incidence",
+                    "rad",
+                    1.2,
+                    "largest angle between view and normal of the marker",
+                    0.0,
+                    math.pi / 2,
+                ),
+                real_parameter(
+                    "drop_out",
+                    "1",
+                    0.02,
+                    "share of pictures in which the marker is overlooked",
+                    0.0,
+                    1.0,
+                ),
                 real_parameter("pixel_noise", "1", 0.3, "standard deviation of a corner, pixels"),
-                real_parameter("tilt_ratio", "1", 3.0, "how much worse roll and pitch are seen than yaw"),
-                real_parameter("tilt", "rad", 0.0, "of the camera, from straight down to ahead", -math.pi, math.pi),
-                real_variable("mounting", "m", "parameter", (0.0, 0.0, 0.0), "place of the camera, body axes", shape=(3,)),
+                real_parameter(
+                    "tilt_ratio", "1", 3.0, "how much worse roll and pitch are seen than yaw"
+                ),
+                real_parameter(
+                    "tilt",
+                    "rad",
+                    0.0,
+                    "of the camera, from straight down to ahead",
+                    -math.pi,
+                    math.pi,
+                ),
+                real_variable(
+                    "mounting",
+                    "m",
+                    "parameter",
+                    (0.0, 0.0, 0.0),
+                    "place of the camera, body axes",
+                    shape=(3,),
+                ),
                 seed_parameter(seed),
-                *vector_variables("position", "xyz", "m", "output", text="centre of the deck, body axes"),
-                *(real_variable(f"attitude.{angle}", "rad", "output") for angle in ("roll", "pitch", "yaw")),
+                *vector_variables(
+                    "position", "xyz", "m", "output", text="centre of the deck, body axes"
+                ),
+                *(
+                    real_variable(f"attitude.{angle}", "rad", "output")
+                    for angle in ("roll", "pitch", "yaw")
+                ),
                 *timing_variables(30.0, 0.05),
                 boolean_variable("valid", "output", "the marker was found"),
             ],
@@ -78,19 +132,28 @@ class MarkerCamera(SampledSensor):
         self._camera = camera_attitude(self.parameters["tilt"])
 
     def measure(self, number: int, elapsed: float) -> Measurement:
-        """Return the pose of the deck, or no values if the marker is not found; see `SampledSensor.measure`."""
+        """Return the pose of the deck, or no values if the marker is not found.
+
+        See `SampledSensor.measure`.
+        """
         row, attitude = self.noise[number], self.inputs[_VEHICLE_ORIENTATION]
         a, b, c = to_world(attitude, self.parameters["mounting"])
         eye = (self.inputs[0] + a, self.inputs[1] + b, self.inputs[2] + c)
         camera = quaternion_product(attitude, self._camera)
-        if normal_to_uniform(row[6]) < self.parameters["drop_out"] or not self._marker_visible(eye, camera):
+        if normal_to_uniform(row[6]) < self.parameters["drop_out"] or not self._marker_visible(
+            eye, camera
+        ):
             return (), (False,)
         deck = to_camera_axes(eye, camera, self.inputs[_DECK_POSITION])
         return (*self._position(deck, row), *self._attitude(deck[2], row[3:])), (True,)
 
     def _marker_visible(self, eye: Vector, camera: Sequence[float]) -> bool:
         """Return True if a camera at `eye` (m, world) with the attitude `camera` can find the marker."""
-        p, deck, attitude = self.parameters, self.inputs[_DECK_POSITION], self.inputs[_DECK_ORIENTATION]
+        p, deck, attitude = (
+            self.parameters,
+            self.inputs[_DECK_POSITION],
+            self.inputs[_DECK_ORIENTATION],
+        )
         x, y, z = to_body(attitude, (eye[0] - deck[0], eye[1] - deck[1], eye[2] - deck[2]))
         if z <= 0 or z < math.cos(p["incidence"]) * math.sqrt(x * x + y * y + z * z):
             return False
@@ -104,14 +167,19 @@ class MarkerCamera(SampledSensor):
         return bool(p["focal_length"] * p["marker_size"] >= p["smallest"] * depth)
 
     def _in_picture(self, right: float, down: float) -> bool:
-        return bool(abs(right) <= self.parameters["width"] / 2 and abs(down) <= self.parameters["height"] / 2)
+        return bool(
+            abs(right) <= self.parameters["width"] / 2
+            and abs(down) <= self.parameters["height"] / 2
+        )
 
     def _position(self, deck: Vector, row: Sequence[float]) -> Vector:
         """Return the measured position (m, body axes) from the true one in camera axes."""
         p, (x, y, z), mounting = self.parameters, deck, self.parameters["mounting"]
         across = p["pixel_noise"] * z / p["focal_length"]
         along = across * z / p["marker_size"]
-        a, b, c = to_world(self._camera, (x + across * row[0], y + across * row[1], z + along * row[2]))
+        a, b, c = to_world(
+            self._camera, (x + across * row[0], y + across * row[1], z + along * row[2])
+        )
         return a + mounting[0], b + mounting[1], c + mounting[2]
 
     def _attitude(self, depth: float, row: Sequence[float]) -> Vector:
@@ -119,7 +187,10 @@ class MarkerCamera(SampledSensor):
         p = self.parameters
         sigma = p["pixel_noise"] * depth / (p["focal_length"] * p["marker_size"])
         roll, pitch, yaw = euler_angles(
-            quaternion_product(inverse_quaternion(self.inputs[_VEHICLE_ORIENTATION]), self.inputs[_DECK_ORIENTATION])
+            quaternion_product(
+                inverse_quaternion(self.inputs[_VEHICLE_ORIENTATION]),
+                self.inputs[_DECK_ORIENTATION],
+            )
         )
         tilted = p["tilt_ratio"] * sigma
         return roll + tilted * row[0], pitch + tilted * row[1], yaw + sigma * row[2]

@@ -30,16 +30,18 @@ _HIT_BODY, _HIT_FRACTION = 0, 2  # fields of a result of pybullet.rayTest
 class Rangefinder(SampledSensor):
     """Laser rangefinder with noise that grows with the distance.
 
-    Error model: distance = true + max(noise_floor, noise_share * true) * n with a standard normal n. Without an object between
-    `nearest` and `farthest`, `distance` is `farthest` and `valid` is false. Default values: Benewake TFmini-S data sheet, 0.1
-    to 12 m, 100 Hz; its accuracy of 6 cm, 1 % beyond 6 m, is taken as three standard deviations.
+    Error model: distance = true + max(noise_floor, noise_share * true) * n with a standard normal
+    n. Without an object between `nearest` and `farthest`, `distance` is `farthest` and `valid` is
+    false. Default values: Benewake TFmini-S data sheet, 0.1 to 12 m, 100 Hz; its accuracy of 6 cm,
+    1 % beyond 6 m, is taken as three standard deviations.
 
-    Vessels and platforms are copies in a separate Bullet client, because the bodies of the world are parked while nothing is
-    near them. The water is the plane z = 0 without waves.
+    Vessels and platforms are copies in a separate Bullet client, because the bodies of the world
+    are parked while nothing is near them. The water is the plane z = 0 without waves.
 
-    Inputs: `vehicle.position` (m, world) and `vehicle.orientation` (unit quaternion, body to world); `NAME.deck.position` and
-    `NAME.orientation` of each vessel. Outputs: `distance` (m, from the sensor along its beam), `time` of the sample (s),
-    `valid`. Parameters: `mounting` (m, body axes, from the centre of mass), `direction` of the beam (body axes).
+    Inputs: `vehicle.position` (m, world) and `vehicle.orientation` (unit quaternion, body to
+    world); `NAME.deck.position` and `NAME.orientation` of each vessel. Outputs: `distance` (m, from
+    the sensor along its beam), `time` of the sample (s), `valid`. Parameters: `mounting` (m, body
+    axes, from the centre of mass), `direction` of the beam (body axes).
 
     Args:
         instance_name: Name of the component.
@@ -73,11 +75,27 @@ class Rangefinder(SampledSensor):
                 *pose_inputs("vehicle"),
                 *(variable for name in bodies for variable in pose_inputs(name, "deck.position")),
                 real_parameter("noise_floor", "m", 0.02, "standard deviation close by"),
-                real_parameter("noise_share", "1", 0.01 / 3, "standard deviation per distance far away"),
+                real_parameter(
+                    "noise_share", "1", 0.01 / 3, "standard deviation per distance far away"
+                ),
                 real_parameter("nearest", "m", 0.1, "smallest distance that is measured"),
                 real_parameter("farthest", "m", 12.0, "largest distance that is measured"),
-                real_variable("mounting", "m", "parameter", (0.0, 0.0, 0.0), "place on the vehicle, body axes", shape=(3,)),
-                real_variable("direction", "1", "parameter", (0.0, 0.0, -1.0), "of the beam, body axes", shape=(3,)),
+                real_variable(
+                    "mounting",
+                    "m",
+                    "parameter",
+                    (0.0, 0.0, 0.0),
+                    "place on the vehicle, body axes",
+                    shape=(3,),
+                ),
+                real_variable(
+                    "direction",
+                    "1",
+                    "parameter",
+                    (0.0, 0.0, -1.0),
+                    "of the beam, body axes",
+                    shape=(3,),
+                ),
                 seed_parameter(seed),
                 real_variable("distance", "m", "output"),
                 *timing_variables(100.0),
@@ -87,7 +105,9 @@ class Rangefinder(SampledSensor):
         self._water = water
         self._client = pybullet.connect(pybullet.DIRECT)
         for size, position in boxes:
-            self._add_body([Box((size[0] / 2, size[1] / 2, size[2] / 2), (0.0, 0.0, 0.0))], position)
+            self._add_body(
+                [Box((size[0] / 2, size[1] / 2, size[2] / 2), (0.0, 0.0, 0.0))], position
+            )
         self._bodies = [self._add_body(body, (0.0, 0.0, 0.0)) for body in bodies.values()]
 
     def _add_body(self, boxes: Sequence[Shape], position: Sequence[float]) -> int:
@@ -106,7 +126,9 @@ class Rangefinder(SampledSensor):
         p, true = self.parameters, self._distance()
         if not p["nearest"] <= true <= p["farthest"]:
             return (p["farthest"],), (False,)
-        return (true + max(p["noise_floor"], p["noise_share"] * true) * self.noise[number][0],), (True,)
+        return (true + max(p["noise_floor"], p["noise_share"] * true) * self.noise[number][0],), (
+            True,
+        )
 
     def _distance(self) -> float:
         """Return the true distance (m) along the beam; infinite without an object in reach."""
@@ -120,7 +142,9 @@ class Rangefinder(SampledSensor):
         """Return the distance (m) from `start` (m, world) along the unit vector `beam` to vessels and platforms."""
         for number, body in enumerate(self._bodies, 1):
             x, y, z, qw, qx, qy, qz = self.inputs[_POSE_SIZE * number : _POSE_SIZE * (number + 1)]
-            pybullet.resetBasePositionAndOrientation(body, (x, y, z), (qx, qy, qz, qw), physicsClientId=self._client)
+            pybullet.resetBasePositionAndOrientation(
+                body, (x, y, z), (qx, qy, qz, qw), physicsClientId=self._client
+            )
         reach = self.parameters["farthest"] * 1.01
         end = [origin + reach * part for origin, part in zip(start, beam, strict=True)]
         (hit,) = pybullet.rayTest(start, end, physicsClientId=self._client)
@@ -141,7 +165,10 @@ def _read_vessels(reader: JsonReader, vessels: Any) -> dict[str, Sequence[Shape]
     models = {kind: next(iter(variants.values())) for kind, variants in VEHICLE_MODELS.items()}
     valid = [kind for kind, model in models.items() if model.is_vessel]
     named = reader.read_named_objects(vessels, ("vessels",)).items()
-    return {name: _relative_to_deck(models[reader.choice(kind, ("vessels", name), valid)].body.boxes) for name, kind in named}
+    return {
+        name: _relative_to_deck(models[reader.choice(kind, ("vessels", name), valid)].body.boxes)
+        for name, kind in named
+    }
 
 
 def _relative_to_deck(boxes: Sequence[Shape]) -> Sequence[Shape]:
@@ -154,12 +181,17 @@ def _relative_to_deck(boxes: Sequence[Shape]) -> Sequence[Shape]:
     return [box.moved((-a, -b, -top)) for box in boxes]
 
 
-def _read_platforms(reader: JsonReader, platforms: Any) -> Sequence[tuple[Sequence[float], Sequence[float]]]:
+def _read_platforms(
+    reader: JsonReader, platforms: Any
+) -> Sequence[tuple[Sequence[float], Sequence[float]]]:
     """Return edges and centre of each platform (m)."""
     boxes = []
     for name, spec in reader.read_named_objects(platforms, ("platforms",)).items():
         path = ("platforms", name)
         spec = reader.read_object(spec, path, ("size", "position"), ())
-        vectors = [reader.vector(spec.get(key, [1.0] * 3), (*path, key), "xyz") for key in ("size", "position")]
+        vectors = [
+            reader.vector(spec.get(key, [1.0] * 3), (*path, key), "xyz")
+            for key in ("size", "position")
+        ]
         boxes.append((vectors[0], vectors[1]))
     return boxes

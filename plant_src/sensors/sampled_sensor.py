@@ -18,10 +18,12 @@ Measurement = tuple[Sequence[float], Sequence[bool]]
 
 
 class SampledSensor(SignalComponent):
-    """Sensor with a sample rate and a latency; the last real output is the `time` (s) of the sample.
+    """Sensor with a sample rate and a latency.
 
-    Sample n is taken at the end of the first step that reaches start + n / `rate` and is published `latency` (s) later.
-    Sample 0 is published at the start.
+    The last real output is the `time` (s) of the sample.
+
+    Sample n is taken at the end of the first step that reaches start + n / `rate` and is published
+    `latency` (s) later. Sample 0 is published at the start.
     """
 
     state_attributes: tuple[str, ...] = ("_number", "_sample_time", "_pending")
@@ -34,13 +36,18 @@ class SampledSensor(SignalComponent):
             elapsed: Time since the last sample (s), 0 for the first one.
 
         Returns:
-            Real outputs without `time`, and Boolean outputs. Empty real outputs leave the last values and their time.
+            Real outputs without `time`, and Boolean outputs. Empty real outputs leave the last
+            values and their time.
         """
         raise NotImplementedError
 
     def initialise(self) -> None:
         """Take and publish sample 0."""
-        self._number, self._sample_time, self._pending = 0, self.start_time, deque[tuple[float, float, Measurement]]()
+        self._number, self._sample_time, self._pending = (
+            0,
+            self.start_time,
+            deque[tuple[float, float, Measurement]](),
+        )
         self.outputs = (0.0,) * len(self.outputs)
         self._publish(self.start_time, self.measure(0, 0.0))
 
@@ -50,7 +57,9 @@ class SampledSensor(SignalComponent):
         if number > self._number:
             measurement = self.measure(number, now - self._sample_time)
             self._number, self._sample_time = number, now
-            self._pending.append((now + self.parameters["latency"] - _TIME_TOLERANCE, now, measurement))
+            self._pending.append(
+                (now + self.parameters["latency"] - _TIME_TOLERANCE, now, measurement)
+            )
         while self._pending and self._pending[0][0] <= now:
             _, taken, measurement = self._pending.popleft()
             self._publish(taken, measurement)
@@ -64,7 +73,9 @@ class SampledSensor(SignalComponent):
 def timing_variables(rate: float, latency: float = 0.0) -> list[Variable]:
     """Declare the parameters `rate` (Hz) and `latency` (s) and the output `time`, which must be the last real output."""
     return [
-        real_variable("rate", "Hz", "parameter", rate, "samples per second", minimum=1e-3, variability="fixed"),
+        real_variable(
+            "rate", "Hz", "parameter", rate, "samples per second", minimum=1e-3, variability="fixed"
+        ),
         real_parameter("latency", "s", latency, "from the sample to its output"),
         real_variable("time", "s", "output", description="when the sample was taken"),
     ]

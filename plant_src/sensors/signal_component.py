@@ -23,12 +23,13 @@ _FLOAT, _FLAG = DTYPES["Float64"], DTYPES["Boolean"]
 class SignalComponent(Component):
     """Component that computes real and Boolean outputs from real inputs, once per step.
 
-    A subclass declares its variables, names its internal state in `state_attributes` and implements `initialise` and
-    `advance`. These read `inputs` and set `outputs` (floats) and `flags` (Booleans), each in the order of the variables. It
-    is not a PythonFMU class because a step takes a few microseconds only.
+    A subclass declares its variables, names its internal state in `state_attributes` and implements
+    `initialise` and `advance`. These read `inputs` and set `outputs` (floats) and `flags`
+    (Booleans), each in the order of the variables. It is not a PythonFMU class because a step takes
+    a few microseconds only.
 
-    In a scenario the component belongs to a stage after the components that it is connected to: the outputs of a step that
-    ends at time t then belong to the inputs at t.
+    In a scenario the component belongs to a stage after the components that it is connected to: the
+    outputs of a step that ends at time t then belong to the inputs at t.
 
     Args:
         instance_name: Name of the component.
@@ -39,7 +40,8 @@ class SignalComponent(Component):
     has_state = True
     #: attributes that belong to the state, besides inputs, outputs, flags and parameters
     state_attributes: tuple[str, ...] = ()
-    #: random numbers per sample; they depend on the class, the name of the instance, the parameter `seed` and the sample number
+    #: random numbers per sample; they depend on the class, the name of the instance, the parameter
+    #: `seed` and the sample number
     random_number_count = 0
     noise: CounterBasedNoise
 
@@ -47,13 +49,21 @@ class SignalComponent(Component):
         self.name, self.variables = instance_name, list(variables)
         self._by_name = {variable.name: variable for variable in variables}
         #: parameters by name; arrays are flat lists
-        self.parameters = {v.name: _flat_value(v, v.start) for v in variables if v.causality == "parameter"}
+        self.parameters = {
+            v.name: _flat_value(v, v.start) for v in variables if v.causality == "parameter"
+        }
         inputs = [v for v in variables if v.causality == "input"]
         outputs = [v for v in variables if v.causality == "output"]
         self._ranges = {"input": _variable_ranges(inputs), "output": _variable_ranges(outputs)}
-        self.inputs: Sequence[float] = tuple(x for v in inputs for x in np.ravel(_flat_value(v, v.start)).tolist())
-        self.outputs: Sequence[float] = (0.0,) * sum(len(v.scalar_names) for v in outputs if v.dtype == _FLOAT)
-        self.flags: Sequence[bool] = (False,) * sum(len(v.scalar_names) for v in outputs if v.dtype == _FLAG)
+        self.inputs: Sequence[float] = tuple(
+            x for v in inputs for x in np.ravel(_flat_value(v, v.start)).tolist()
+        )
+        self.outputs: Sequence[float] = (0.0,) * sum(
+            len(v.scalar_names) for v in outputs if v.dtype == _FLOAT
+        )
+        self.flags: Sequence[bool] = (False,) * sum(
+            len(v.scalar_names) for v in outputs if v.dtype == _FLAG
+        )
         self._input_data: Any = np.array(self.inputs).data
         self._output_data: Any = np.array(self.outputs).data
         self._flag_data: Any = np.array(self.flags, _FLAG).data
@@ -62,25 +72,35 @@ class SignalComponent(Component):
         self._write_flags = struct.Struct(f"{len(self.flags)}?").pack_into
         self._initializing, self.start_time = False, 0.0
 
-    # -- for subclasses ------------------------------------------------------------------------------------------------
+    # -- for subclasses
+    # ------------------------------------------------------------------------------------------------
 
     def apply_parameters(self) -> None:
-        """Compute values that depend on parameters; called after every change. Raises ValueError for an invalid parameter."""
+        """Compute values that depend on parameters; called after every change.
+
+        Raises ValueError for an invalid parameter.
+        """
 
     def initialise(self) -> None:
-        """Set outputs and state at `start_time`; called again when inputs change in initialization mode."""
+        """Set outputs and state at `start_time`.
+
+        Called again when inputs change in initialization mode.
+        """
         raise NotImplementedError
 
     def advance(self, now: float, step_size: float) -> None:
         """Set outputs and state at `now` (s), the end of a step of `step_size` (s)."""
         raise NotImplementedError
 
-    # -- variables -----------------------------------------------------------------------------------------------------
+    # -- variables
+    # -----------------------------------------------------------------------------------------------------
 
     def _variable(self, name: str, function: str) -> Variable:
         """Return the variable `name`. Raises ComponentError if it does not exist."""
         if name not in self._by_name:
-            raise ComponentError(self.name, function, f'no variable "{name}"{did_you_mean(name, self._by_name)}')
+            raise ComponentError(
+                self.name, function, f'no variable "{name}"{did_you_mean(name, self._by_name)}'
+            )
         return self._by_name[name]
 
     def set(self, name: str, value: Any) -> None:
@@ -109,11 +129,18 @@ class SignalComponent(Component):
         if variable.causality == "parameter":
             return deepcopy(self.parameters[name])
         first, end = self._ranges[variable.causality][name]
-        values = self.inputs if variable.causality == "input" else self.flags if variable.dtype == _FLAG else self.outputs
+        values = (
+            self.inputs
+            if variable.causality == "input"
+            else self.flags
+            if variable.dtype == _FLAG
+            else self.outputs
+        )
         scalars = list(values[first:end])
         return scalars if variable.shape else scalars[0]
 
-    # -- life cycle ----------------------------------------------------------------------------------------------------
+    # -- life cycle
+    # ----------------------------------------------------------------------------------------------------
 
     def bind(self, inputs: Ports, outputs: Ports) -> None:
         """Take the arrays of the engine."""
@@ -126,7 +153,9 @@ class SignalComponent(Component):
         """Set the initial state and outputs."""
         self.start_time, self._initializing = start_time, True
         if self.random_number_count:
-            self.noise = CounterBasedNoise(self.random_number_count, type(self).__name__, self.name, self.parameters["seed"])
+            self.noise = CounterBasedNoise(
+                self.random_number_count, type(self).__name__, self.name, self.parameters["seed"]
+            )
         self.apply_parameters()
         self.initialise()
 
@@ -145,7 +174,9 @@ class SignalComponent(Component):
         try:
             self.advance(time + step_size, step_size)
         except (ArithmeticError, ValueError, OSError) as error:
-            raise ComponentError(self.name, "do_step", f"{type(error).__name__}: {error}", time) from error
+            raise ComponentError(
+                self.name, "do_step", f"{type(error).__name__}: {error}", time
+            ) from error
 
     def get_outputs(self) -> None:
         """Write the outputs."""
@@ -154,7 +185,9 @@ class SignalComponent(Component):
         for name, recorded in self._recorded_others:
             recorded[:] = self.get(name)
 
-    def prepare_step_calls(self, current_time: ctypes.c_double, step_size: float) -> Sequence[PreparedCall]:
+    def prepare_step_calls(
+        self, current_time: ctypes.c_double, step_size: float
+    ) -> Sequence[PreparedCall]:
         """Return one call that reads the inputs, does a step and writes the outputs."""
         return [PreparedCall(self._exchange_and_step, (current_time, step_size), "do_step")]
 
@@ -166,7 +199,15 @@ class SignalComponent(Component):
 
     def get_state(self) -> Any:
         """Return a copy of the state."""
-        names = ("inputs", "outputs", "flags", "parameters", "start_time", "_initializing", *self.state_attributes)
+        names = (
+            "inputs",
+            "outputs",
+            "flags",
+            "parameters",
+            "start_time",
+            "_initializing",
+            *self.state_attributes,
+        )
         return {name: deepcopy(getattr(self, name)) for name in names}
 
     def set_state(self, state: Any) -> None:
@@ -197,7 +238,10 @@ def _variable_ranges(variables: Sequence[Variable]) -> dict[str, tuple[int, int]
 
 
 def _flat_value(variable: Variable, value: Any) -> Any:
-    """Return `value` as a scalar or flat list of the variable's type. Raises ComponentError if it is not such a value."""
+    """Return `value` as a scalar or flat list of the variable's type.
+
+    Raises ComponentError if it is not such a value.
+    """
     kind: type = {"Float64": float, "Boolean": bool, "String": str, "Int32": int}[variable.type]
     flat = np.ravel(value).tolist() if variable.shape else [value]
     try:

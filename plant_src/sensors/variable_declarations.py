@@ -55,32 +55,65 @@ def real_variable(
     if start is None and causality == "input":
         start = (0.0,) * math.prod(shape) if shape else 0.0
     parsed = parse_unit(unit) if unit else None
-    return Variable(name, "Float64", causality, variability or default, start, parsed, shape, description, minimum, maximum)
+    return Variable(
+        name,
+        "Float64",
+        causality,
+        variability or default,
+        start,
+        parsed,
+        shape,
+        description,
+        minimum,
+        maximum,
+    )
 
 
 def vector_variables(
-    name: str, axes: str, unit: str, causality: Causality, start: float | None = None, text: str = ""
+    name: str,
+    axes: str,
+    unit: str,
+    causality: Causality,
+    start: float | None = None,
+    text: str = "",
 ) -> list[Variable]:
     """Declare the real variables `name.AXIS`, one for each letter of `axes`."""
-    return [real_variable(f"{name}.{axis}", unit, causality, start, f"{text}: {axis}" if text else "") for axis in axes]
+    return [
+        real_variable(f"{name}.{axis}", unit, causality, start, f"{text}: {axis}" if text else "")
+        for axis in axes
+    ]
 
 
 def real_parameter(
-    name: str, unit: str, start: Any, description: str, minimum: float | None = 0.0, maximum: float | None = None
+    name: str,
+    unit: str,
+    start: Any,
+    description: str,
+    minimum: float | None = 0.0,
+    maximum: float | None = None,
 ) -> Variable:
     """Declare a tunable real parameter; its default minimum is 0."""
-    return real_variable(name, unit, "parameter", start, description, minimum=minimum, maximum=maximum)
+    return real_variable(
+        name, unit, "parameter", start, description, minimum=minimum, maximum=maximum
+    )
 
 
 def seed_parameter(seed: int) -> Variable:
-    """Declare the parameter `seed`. Raises InputError if `seed` is not an integer from 0 to 2^31 - 1."""
+    """Declare the parameter `seed`.
+
+    Raises InputError if `seed` is not an integer from 0 to 2^31 - 1.
+    """
     reader = JsonReader()
     check_seed(reader, seed)
     raise_problems(reader)
-    return Variable("seed", "Int32", "parameter", "fixed", seed, description="of all random numbers", minimum=0)
+    return Variable(
+        "seed", "Int32", "parameter", "fixed", seed, description="of all random numbers", minimum=0
+    )
 
 
-def boolean_variable(name: str, causality: Causality, description: str, start: bool | None = None) -> Variable:
+def boolean_variable(
+    name: str, causality: Causality, description: str, start: bool | None = None
+) -> Variable:
     """Declare a Boolean variable: a tunable parameter or a discrete output."""
     kind: Variability = "tunable" if causality == "parameter" else "discrete"
     return Variable(name, "Boolean", causality, kind, start, description=description)
@@ -94,7 +127,11 @@ def pose_inputs(name: str, position: str = "position") -> list[Variable]:
         position: Name of the position below the prefix.
 
     Returns:
-        `name.position.x|y|z` (m, world) and `name.orientation.w|x|y|z` (unit quaternion, body to world), 7 scalars.
+        `name.position.x|y|z` (m, world) and `name.orientation.w|x|y|z` (unit quaternion, body to
+        world), 7 scalars.
     """
-    orientation = [real_variable(f"{name}.orientation.{part}", "1", "input", float(part == "w")) for part in "wxyz"]
+    orientation = [
+        real_variable(f"{name}.orientation.{part}", "1", "input", float(part == "w"))
+        for part in "wxyz"
+    ]
     return [*vector_variables(f"{name}.{position}", "xyz", "m", "input"), *orientation]

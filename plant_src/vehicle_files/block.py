@@ -30,12 +30,21 @@ def vehicle_block(path: Path) -> Block:
         raise InputError(Problem(f"cannot be read: {error}", str(path))) from None
     if not isinstance(data, dict) or "family" not in data:
         raise InputError(
-            Problem(f'is no vehicle file; expected an object with "family", one of: {", ".join(FAMILIES)}', str(path))
+            Problem(
+                (
+                    'is no vehicle file; expected an object with "family", one of: '
+                    f"{', '.join(FAMILIES)}"
+                ),
+                str(path),
+            )
         )
     try:
         model = model_from_data(data, path.stem)
     except InputError as error:
-        problems = (Problem(each.message, f"{path}: {'.'.join(each.subject[1:])}") for each in error.problems)
+        problems = (
+            Problem(each.message, f"{path}: {'.'.join(each.subject[1:])}")
+            for each in error.problems
+        )
         raise InputError(list(problems)) from None
     description = str(data.get("description", model.name))
     if model.airframe:

@@ -28,7 +28,10 @@ def boat_properties(boat: Boat) -> Iterator[tuple[str, str]]:
 
 
 def _turning_levers(boat: Boat) -> Iterator[tuple[str, float]]:
-    """Yield name and lever (m) of each input that turns the vessel; a positive rudder angle pushes the hull there to port."""
+    """Yield name and lever (m) of each input that turns the vessel.
+
+    A positive rudder angle pushes the hull there to port.
+    """
     for i, propeller in enumerate(boat.propellers, 1):
         yield f"propeller_speed[{i}] ({propeller.label})", turning_lever(boat, propeller)
     for i, rudder in enumerate(boat.rudders, 1):
@@ -39,7 +42,8 @@ def _turning_levers(boat: Boat) -> Iterator[tuple[str, float]]:
 def top_speed(boat: Boat) -> float:
     """Return the speed ahead (m/s) at which thrust and resistance balance; 0 if there is none.
 
-    All propellers are immersed and have their largest speed, the vessel is level and keeps its course:
+    All propellers are immersed and have their largest speed, the vessel is level and keeps its
+    course:
 
         sum a_i (c_i n_i^2 - k_i n_i a_i u) = d_1 u + d_2 u^2 + d_3 u^3
 
@@ -54,6 +58,9 @@ def top_speed(boat: Boat) -> float:
 
 
 def turning_lever(boat: Boat, propeller: Propeller) -> float:
-    """Return the yaw moment about the centre of mass over the thrust (m) at the azimuth angle 0; positive: to port."""
+    """Return the yaw moment about the centre of mass over the thrust (m) at the azimuth angle 0.
+
+    Positive: to port.
+    """
     x, y = (propeller.position[k] - boat.centre_of_mass[k] for k in (0, 1))
     return x * propeller.axis[1] - y * propeller.axis[0]

@@ -1,7 +1,9 @@
-"""Import of meshes (STL, OBJ, GLB) into vehicle files: mass properties, convex pieces of the collision shape, triangles to show.
+"""Import of meshes (STL, OBJ, GLB) into vehicle files.
 
-trimesh (extra "mesh") reads the files. Only the import needs it: the vehicle file contains all results. Coordinates are taken as
-they are: x forward, y left, z up.
+Mass properties, convex pieces of the collision shape, triangles to show.
+
+trimesh (extra "mesh") reads the files. Only the import needs it: the vehicle file contains all
+results. Coordinates are taken as they are: x forward, y left, z up.
 """
 
 from __future__ import annotations
@@ -39,7 +41,8 @@ def load_mesh(path: Path, scale: Sequence[float] = (1.0, 1.0, 1.0)) -> Any:
         scale: Factors along x, y and z, for example 0.001 for coordinates in mm.
 
     Raises:
-        InputError: trimesh is not installed, or the file cannot be read, has another format or no triangles.
+        InputError: trimesh is not installed, or the file cannot be read, has another format or no
+            triangles.
     """
     try:
         import trimesh
@@ -48,13 +51,20 @@ def load_mesh(path: Path, scale: Sequence[float] = (1.0, 1.0, 1.0)) -> Any:
     if not path.is_file():
         raise InputError(Problem(f"the file does not exist{nearest_file(path)}", str(path)))
     if path.suffix[1:].lower() not in trimesh.available_formats():
-        raise InputError(Problem(f'the format "{path.suffix}" is not read; convert the file to one of {FORMATS}', str(path)))
+        raise InputError(
+            Problem(
+                f'the format "{path.suffix}" is not read; convert the file to one of {FORMATS}',
+                str(path),
+            )
+        )
     try:
         mesh: Any = trimesh.load(path, force="mesh")
     except Exception as error:
         raise InputError(Problem(f"cannot be read: {error}", str(path))) from None
     if not 0 < len(mesh.faces) <= MAX_TRIANGLES:
-        raise InputError(Problem(f"found {len(mesh.faces)} triangles, expected 1 to {MAX_TRIANGLES}", str(path)))
+        raise InputError(
+            Problem(f"found {len(mesh.faces)} triangles, expected 1 to {MAX_TRIANGLES}", str(path))
+        )
     mesh.apply_scale(scale)
     return mesh
 
@@ -62,7 +72,10 @@ def load_mesh(path: Path, scale: Sequence[float] = (1.0, 1.0, 1.0)) -> Any:
 def convex_pieces(mesh: Any) -> list[np.ndarray]:
     """Return the points (m) of the convex hull of each connected part, at most MAX_POINTS each."""
     parts = mesh.split(only_watertight=False)
-    return [outermost_points(np.asarray(part.convex_hull.vertices)) for part in (parts if len(parts) else [mesh])]
+    return [
+        outermost_points(np.asarray(part.convex_hull.vertices))
+        for part in (parts if len(parts) else [mesh])
+    ]
 
 
 def piece_data(points: np.ndarray, source: str) -> dict[str, Any]:
@@ -72,7 +85,9 @@ def piece_data(points: np.ndarray, source: str) -> dict[str, Any]:
 
 def visual_data(triangles: np.ndarray, source: str) -> dict[str, Any]:
     """Return "visual" of a vehicle file for triangles (m, body frame), shape (n, 3, 3)."""
-    vertices, faces = np.unique(np.round(triangles.reshape(-1, 3), _DIGITS), axis=0, return_inverse=True)
+    vertices, faces = np.unique(
+        np.round(triangles.reshape(-1, 3), _DIGITS), axis=0, return_inverse=True
+    )
     return {"vertices": vertices.tolist(), "faces": faces.reshape(-1, 3).tolist(), "source": source}
 
 
@@ -81,8 +96,9 @@ def vehicle_from_mesh(path: Path, data: Mapping[str, Any], scale: float = 1.0) -
 
     Args:
         path: Mesh file.
-        data: Further data of the vehicle with its "mass". The mass is distributed evenly over the volume of the mesh. The origin
-            of multirotors and submerged vehicles becomes the centre of mass; that of vessels remains the origin of the mesh.
+        data: Further data of the vehicle with its "mass". The mass is distributed evenly over the
+            volume of the mesh. The origin of multirotors and submerged vehicles becomes the centre
+            of mass; that of vessels remains the origin of the mesh.
         scale: Factor on all coordinates.
 
     Raises:
@@ -90,11 +106,17 @@ def vehicle_from_mesh(path: Path, data: Mapping[str, Any], scale: float = 1.0) -
     """
     mesh, source = load_mesh(path, (scale,) * 3), f"mesh file {path.name}"
     if not mesh.is_volume:
-        raise InputError(Problem("encloses no volume: its surface has holes, or its faces point inwards", str(path)))
+        raise InputError(
+            Problem(
+                "encloses no volume: its surface has holes, or its faces point inwards", str(path)
+            )
+        )
     mass = data.get("mass")
     value = mass.get("value") if isinstance(mass, Mapping) else mass
     if not isinstance(value, int | float):
-        raise InputError('"mass" is missing in the accompanying file; the mesh gives its distribution only')
+        raise InputError(
+            '"mass" is missing in the accompanying file; the mesh gives its distribution only'
+        )
     inertia = np.asarray(mesh.moment_inertia) * value / float(mesh.volume)
     uniform = f"{source}, even density"
     is_vessel = data.get("family") in ("surface_vessel", "planar_vessel")
@@ -102,13 +124,22 @@ def vehicle_from_mesh(path: Path, data: Mapping[str, Any], scale: float = 1.0) -
     origin = np.zeros(3) if is_vessel else centre
     result = {
         **data,
-        "boxes": data.get("boxes", [piece_data(points - origin, source) for points in convex_pieces(mesh)]),
+        "boxes": data.get(
+            "boxes", [piece_data(points - origin, source) for points in convex_pieces(mesh)]
+        ),
         "visual": data.get("visual", visual_data(np.asarray(mesh.triangles) - origin, source)),
     }
     if data.get("family") == "planar_vessel":
-        result.setdefault("yaw_inertia", {"value": float(inertia[2, 2]), "unit": "kg.m2", "source": uniform})
+        result.setdefault(
+            "yaw_inertia", {"value": float(inertia[2, 2]), "unit": "kg.m2", "source": uniform}
+        )
     else:
-        result.setdefault("inertia", {"value": ((inertia + inertia.T) / 2).tolist(), "unit": "kg.m2", "source": uniform})
+        result.setdefault(
+            "inertia",
+            {"value": ((inertia + inertia.T) / 2).tolist(), "unit": "kg.m2", "source": uniform},
+        )
     if is_vessel:
-        result.setdefault("centre_of_mass", {"value": centre.tolist(), "unit": "m", "source": uniform})
+        result.setdefault(
+            "centre_of_mass", {"value": centre.tolist(), "unit": "m", "source": uniform}
+        )
     return ImportedVehicle(result, centre.tolist(), [])

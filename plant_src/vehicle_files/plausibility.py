@@ -19,20 +19,24 @@ from ..vehicles.surface_vessel.surface_vessel import SurfaceVessel
 from ..vehicles.vessel.actuators import Propeller
 from .vessel_plausibility import boat_warnings, craft_warnings, warning
 
-#: largest distance of a rotor from the centre of mass over the median of all rotors, and over the farthest corner of the boxes
+#: largest distance of a rotor from the centre of mass over the median of all rotors, and over the
+#: farthest corner of the boxes
 MAX_ROTOR_DISTANCE = 5.0
-#: smallest and largest ratio of thrust to weight; the shipped multirotors have 1.7 to 3.2, racing drones reach about 15
+#: smallest and largest ratio of thrust to weight; the shipped multirotors have 1.7 to 3.2, racing
+#: drones reach about 15
 MIN_THRUST_RATIO, MAX_THRUST_RATIO = 1.3, 30.0
 #: largest speed of the tips of rotors (m/s), the speed of sound
 MAX_TIP_SPEED = 340.0
-#: largest thrust coefficient, thrust over air density, disc area and squared tip speed; the shipped rotors have about 0.01
+#: largest thrust coefficient, thrust over air density, disc area and squared tip speed; the shipped
+#: rotors have about 0.01
 MAX_THRUST_COEFFICIENT = 0.1
 _AIR_DENSITY = 1.225
 #: largest extent of a vessel and of other vehicles (m); the longest ships have 460 m
 MAX_EXTENT = {True: 500.0, False: 100.0}
 #: largest ratio of mass and displaced mass, in either direction; 1 kg is 2.2 lb
 MAX_MASS_RATIO = 1.5
-#: largest ratio of the lengths of the hull that floats and of a shape that collides or is drawn, in either direction
+#: largest ratio of the lengths of the hull that floats and of a shape that collides or is drawn, in
+#: either direction
 MAX_LENGTH_RATIO = 3.0
 #: z component of the axis of a rotor that pushes downwards
 _DOWNWARDS = -0.1
@@ -44,11 +48,17 @@ def placement_warnings(vehicle: VehiclePlacement) -> Iterator[Problem]:
     for each in vehicle_warnings(vehicle.model):
         yield replace(each, subject=(*path, "model", *each.subject[1:]))
     if abs(yaw := vehicle.parameter("initial.yaw")) > 2 * math.pi:
-        yield Problem(f"found {yaw:g}, radians expected; in degrees? A right angle is 1.5708", subject=(*path, "yaw"))
+        yield Problem(
+            f"found {yaw:g}, radians expected; in degrees? A right angle is 1.5708",
+            subject=(*path, "yaw"),
+        )
 
 
 def vehicle_warnings(model: Model) -> Iterator[Problem]:
-    """Yield a warning for each quantity that is probably wrong; its subject is "arguments" and the path in the vehicle file."""
+    """Yield a warning for each quantity that is probably wrong.
+
+    Its subject is "arguments" and the path in the vehicle file.
+    """
     if model.airframe or model.craft or model.boat:
         yield from _size_warnings(model)
     if model.airframe:
@@ -63,15 +73,24 @@ def vehicle_warnings(model: Model) -> Iterator[Problem]:
     if model.craft:
         yield from craft_warnings(model.craft, _reach(model))
         displaced = model.craft.water_density * model.craft.displaced_volume
-        yield from _mass_warnings(model.craft.mass, displaced, f"displaced_volume of {model.craft.displaced_volume:.4g} m3")
+        yield from _mass_warnings(
+            model.craft.mass,
+            displaced,
+            f"displaced_volume of {model.craft.displaced_volume:.4g} m3",
+        )
 
 
 def box_corners(model: Model) -> np.ndarray:
-    """Return the corners of all boxes (m, body frame), shape (n, 3): of a vessel from O, else from the centre of mass."""
+    """Return the corners of all boxes (m, body frame), shape (n, 3).
+
+    Of a vessel from O, else from the centre of mass.
+    """
     corners: np.ndarray = np.concatenate([box.corners() for box in model.body.boxes])
     axis, w = np.array(model.body.axes[:3]), model.body.axes[3]
     corners = corners + 2 * np.cross(axis, w * corners + np.cross(axis, corners))
-    return corners + model.boat.centre_of_mass if model.boat and model.motion == "planar" else corners
+    return (
+        corners + model.boat.centre_of_mass if model.boat and model.motion == "planar" else corners
+    )
 
 
 def _reach(model: Model) -> float:
@@ -89,13 +108,20 @@ def _actuators(model: Model) -> Sequence[Rotor | Thruster | Propeller]:
 def _size_warnings(model: Model) -> Iterator[Problem]:
     reach = _reach(model)
     if reach > (limit := MAX_EXTENT[model.is_vessel]) / 2:
-        yield warning(f"a corner is {reach:.4g} m from the centre of mass, expected less than {limit / 2:g} m", "boxes")
+        yield warning(
+            (
+                f"a corner is {reach:.4g} m from the centre of mass, expected less than "
+                f"{limit / 2:g} m"
+            ),
+            "boxes",
+        )
     farthest = max(reach, *(float(np.linalg.norm(part.position)) for part in _actuators(model)))
     radius = math.sqrt(max(model.body.inertia) / model.body.mass)
     if radius > farthest:
         key = "yaw_inertia" if model.motion == "planar" else "inertia"
         text = (
-            f"the radius of gyration, the square root of inertia over mass, is {radius:.3g} m, but the farthest point of "
+            f"the radius of gyration, the square root of inertia over mass, is {radius:.3g} m, "
+            "but the farthest point of "
             f"the vehicle is {farthest:.3g} m from the centre of mass"
         )
         yield warning(text, key)
@@ -105,9 +131,15 @@ def _thrust_warnings(airframe: Airframe) -> Iterator[Problem]:
     ratio = airframe.lift / (airframe.mass * airframe.gravity)
     if ratio > MAX_THRUST_RATIO:
         text, *path = _cause_of_thrust(airframe)
-        yield warning(f"thrust over weight is {ratio:.3g}, expected less than {MAX_THRUST_RATIO:g}{text}", *path)
+        yield warning(
+            f"thrust over weight is {ratio:.3g}, expected less than {MAX_THRUST_RATIO:g}{text}",
+            *path,
+        )
     elif ratio < MIN_THRUST_RATIO:
-        text = f"thrust over weight is {ratio:.3g}, expected more than {MIN_THRUST_RATIO:g}: it can hardly climb"
+        text = (
+            f"thrust over weight is {ratio:.3g}, expected more than {MIN_THRUST_RATIO:g}: it can "
+            "hardly climb"
+        )
         yield warning(text, "mass")
 
 
@@ -115,42 +147,66 @@ def _cause_of_thrust(airframe: Airframe) -> tuple[str, ...]:
     """Return the probable cause of a thrust that is too large, and the path of its key."""
     tip_speed = airframe.max_rotor_speed * airframe.rotor_radius
     if tip_speed > MAX_TIP_SPEED:
-        found = f"{airframe.max_rotor_speed:.4g} rad/s make {tip_speed:.4g} m/s at the tips of the rotors"
+        found = (
+            f"{airframe.max_rotor_speed:.4g} rad/s make {tip_speed:.4g} m/s at the tips of the "
+            "rotors"
+        )
         return f"; {found}: is max_speed in rpm?", "rotor", "max_speed"
-    area, thrust = math.pi * airframe.rotor_radius**2, max(rotor.thrust_coefficient for rotor in airframe.rotors)
+    area, thrust = (
+        math.pi * airframe.rotor_radius**2,
+        max(rotor.thrust_coefficient for rotor in airframe.rotors),
+    )
     coefficient = thrust / (_AIR_DENSITY * area * airframe.rotor_radius**2)
     if coefficient > MAX_THRUST_COEFFICIENT:
-        text = f"; the thrust is {coefficient:.3g} times air density, disc area and squared tip speed, about 0.01 is usual"
+        text = (
+            f"; the thrust is {coefficient:.3g} times air density, disc area and squared tip "
+            "speed, about 0.01 is usual"
+        )
         return text, "rotor", "thrust_coefficient"
     return "", "mass"
 
 
 def _rotor_warnings(airframe: Airframe, reach: float) -> Iterator[Problem]:
     distances = [float(np.linalg.norm(rotor.position)) for rotor in airframe.rotors]
-    limit = MAX_ROTOR_DISTANCE * max(airframe.rotor_radius, min(float(np.median(distances)), 2 * reach))
+    limit = MAX_ROTOR_DISTANCE * max(
+        airframe.rotor_radius, min(float(np.median(distances)), 2 * reach)
+    )
     for i, (rotor, distance) in enumerate(zip(airframe.rotors, distances, strict=True)):
         if distance > limit:
             text = f"{distance:.4g} m from the centre of mass, expected less than {limit:.3g} m"
             yield warning(text, "rotors", str(i), "position")
         if rotor.axis[2] < _DOWNWARDS:
             axis = ", ".join(f"{round(each, 3):g}" for each in rotor.axis)
-            yield warning(f"the rotor pushes downwards, its thrust points along [{axis}]", "rotors", str(i), "axis")
+            yield warning(
+                f"the rotor pushes downwards, its thrust points along [{axis}]",
+                "rotors",
+                str(i),
+                "axis",
+            )
     torques = [
         rotor.thrust_coefficient * np.cross(rotor.position, rotor.axis)[2]
         + rotor.torque_sign * rotor.torque_coefficient * rotor.axis[2]
         for rotor in airframe.rotors
     ]
     if min(torques) > 0 or max(torques) < 0:
-        text = "all turn the vehicle about z in the same direction, it cannot hold its yaw angle: change turns of some"
+        text = (
+            "all turn the vehicle about z in the same direction, it cannot hold its yaw angle: "
+            "change turns of some"
+        )
         yield warning(text, "rotors")
 
 
 def _hull_warnings(vessel: SurfaceVessel) -> Iterator[Problem]:
     hull, draught = vessel.hull, vessel.draught
     if hull.length > MAX_EXTENT[True]:
-        yield warning(f"found {hull.length:g} m, expected less than {MAX_EXTENT[True]:g} m", "hull", "length")
+        yield warning(
+            f"found {hull.length:g} m, expected less than {MAX_EXTENT[True]:g} m", "hull", "length"
+        )
     if hull.bottom > 0:
-        text = f"found {hull.bottom:g}: the origin is below the hull, minus the draught ({-draught:.3g}) is usual"
+        text = (
+            f"found {hull.bottom:g}: the origin is below the hull, minus the draught "
+            f"({-draught:.3g}) is usual"
+        )
         yield warning(text, "hull", "bottom")
     surface = hull.bottom + draught
     for i, propeller in enumerate(vessel.propellers):
@@ -168,14 +224,22 @@ def _shape_warnings(model: Model, length: float) -> Iterator[Problem]:
     for key, points in shapes.items():
         extent = float(np.ptp(points[:, 0]))
         if max(extent, length) > MAX_LENGTH_RATIO * min(extent, length):
-            yield warning(f"{extent:.4g} m long, but the vessel floats by hull.length = {length:.4g} m, whatever is drawn", key)
+            yield warning(
+                (
+                    f"{extent:.4g} m long, but the vessel floats by hull.length = {length:.4g} m, "
+                    "whatever is drawn"
+                ),
+                key,
+            )
 
 
 def _draught_warnings(vessel: SurfaceVessel) -> Iterator[Problem]:
     if vessel.hull.bottom < 0:
         displaced = vessel.water_density * vessel.hull.area * -vessel.hull.bottom
         yield from _mass_warnings(
-            vessel.mass, displaced, f"draught of {-vessel.hull.bottom:.4g} m (hull.bottom with a minus sign)"
+            vessel.mass,
+            displaced,
+            f"draught of {-vessel.hull.bottom:.4g} m (hull.bottom with a minus sign)",
         )
 
 
@@ -185,4 +249,7 @@ def _mass_warnings(mass: float, displaced: float, source: str) -> Iterator[Probl
     if ratio > MAX_MASS_RATIO:
         is_pound = math.isclose(mass / displaced, 1 / KNOWN_UNITS["lb"].factor, rel_tol=0.05)
         hint = ": is the mass in lb?" if is_pound else ""
-        yield warning(f"found {mass:.4g} kg, but the {source} displaces {displaced:.4g} kg of water{hint}", "mass")
+        yield warning(
+            f"found {mass:.4g} kg, but the {source} displaces {displaced:.4g} kg of water{hint}",
+            "mass",
+        )

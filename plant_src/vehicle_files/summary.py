@@ -1,4 +1,7 @@
-"""Summary and description of a vehicle file: mass, inertia, dimensions, actuators, parameters of a controller, mistakes."""
+"""Summary and description of a vehicle file.
+
+Mass, inertia, dimensions, actuators, parameters of a controller, mistakes.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,8 @@ from ..vehicles.surface_vessel.surface_vessel import SurfaceVessel
 from .boat_performance import boat_properties
 from .plausibility import box_corners, vehicle_warnings
 
-#: length of the arrays of `multirotor_controller`, and smallest z component of the axes of rotors that it controls
+#: length of the arrays of `multirotor_controller`, and smallest z component of the axes of rotors
+#: that it controls
 _CONTROLLED_ROTORS, _UPWARDS = 8, 0.95
 
 
@@ -26,9 +30,12 @@ class VehicleSummary(NamedTuple):
 
     Attributes:
         mass: Mass (kg).
-        inertia: Moments of inertia about x, y and z or the rows of the tensor; of a planar vessel the yaw inertia (kg m2).
-        parameters: Parameters of `multirotor_controller` for a multirotor that it can fly; empty for other vehicles.
-        warnings: Probable mistakes; the subject of each is "arguments" and the path in the vehicle file.
+        inertia: Moments of inertia about x, y and z or the rows of the tensor; of a planar vessel
+            the yaw inertia (kg m2).
+        parameters: Parameters of `multirotor_controller` for a multirotor that it can fly; empty
+            for other vehicles.
+        warnings: Probable mistakes; the subject of each is "arguments" and the path in the vehicle
+            file.
         performance: Draught, top speed and sense of turning of a vessel in words, by name.
     """
 
@@ -43,15 +50,20 @@ def examine_vehicle(data: Mapping[str, Any], name: str) -> VehicleSummary:
     """Return the summary of a vehicle that is given by its data.
 
     Raises:
-        InputError: With all problems of the data; the subject of each begins with "arguments" and continues with the path.
+        InputError: With all problems of the data; the subject of each begins with "arguments" and
+            continues with the path.
     """
     model = model_from_data(data, name)
     parameters = controller_parameters(model.airframe) if model.airframe else {}
     performance = dict(boat_properties(model.boat)) if model.boat else {}
-    return VehicleSummary(model.body.mass, _inertia(model), parameters, list(vehicle_warnings(model)), performance)
+    return VehicleSummary(
+        model.body.mass, _inertia(model), parameters, list(vehicle_warnings(model)), performance
+    )
 
 
-def describe_vehicle(data: Mapping[str, Any], name: str) -> tuple[Mapping[str, str], Sequence[Variable]]:
+def describe_vehicle(
+    data: Mapping[str, Any], name: str
+) -> tuple[Mapping[str, str], Sequence[Variable]]:
     """Return the properties of a vehicle that is given by its data, and its variables in a world.
 
     Raises:
@@ -83,10 +95,17 @@ def _edges(lengths: Sequence[float]) -> str:
 
 
 def controller_parameters(airframe: Airframe) -> Mapping[str, Any]:
-    """Return the parameters of `multirotor_controller` for a multirotor; empty if it cannot control these rotors."""
+    """Return the parameters of `multirotor_controller` for a multirotor.
+
+    Empty if it cannot control these rotors.
+    """
     rotors = airframe.rotors
     coefficients = {(rotor.thrust_coefficient, rotor.torque_coefficient) for rotor in rotors}
-    if not 3 <= len(rotors) <= _CONTROLLED_ROTORS or len(coefficients) > 1 or min(rotor.axis[2] for rotor in rotors) < _UPWARDS:
+    if (
+        not 3 <= len(rotors) <= _CONTROLLED_ROTORS
+        or len(coefficients) > 1
+        or min(rotor.axis[2] for rotor in rotors) < _UPWARDS
+    ):
         return {}
     rest = [0] * (_CONTROLLED_ROTORS - len(rotors))
     return {
@@ -112,8 +131,14 @@ def _inertia(model: Model) -> Any:
 
 
 def _rounded(values: Any) -> Any:
-    """Return a number, or nested lists of numbers, to six digits; elements below 1e-9 of the largest one become 0."""
+    """Return a number, or nested lists of numbers, to six digits.
+
+    Elements below 1e-9 of the largest one become 0.
+    """
     numbers = np.asarray(values, float)
     if not numbers.ndim:
         return float(f"{numbers:.6g}")
-    return [_rounded(each) for each in np.where(np.abs(numbers) < 1e-9 * np.abs(numbers).max(), 0.0, numbers)]
+    return [
+        _rounded(each)
+        for each in np.where(np.abs(numbers) < 1e-9 * np.abs(numbers).max(), 0.0, numbers)
+    ]

@@ -1,6 +1,9 @@
-"""Import of a vehicle from URDF (Unified Robot Description Format): mass, inertia, collision shape, appearance, places of rotors.
+"""Import of a vehicle from URDF (Unified Robot Description Format).
 
-All links are one rigid body in the zero position of the joints. Frames of URDF are x forward, y left, z up, in m, kg and rad.
+Mass, inertia, collision shape, appearance, places of rotors.
+
+All links are one rigid body in the zero position of the joints. Frames of URDF are x forward, y
+left, z up, in m, kg and rad.
 """
 
 from __future__ import annotations
@@ -42,7 +45,10 @@ class Pose(NamedTuple):
 
 
 class RigidLinks(NamedTuple):
-    """Rigid body of all links: mass (kg), centre of mass (m, root frame) and inertia about it (kg m2)."""
+    """Rigid body of all links.
+
+    Mass (kg), centre of mass (m, root frame) and inertia about it (kg m2).
+    """
 
     mass: float
     centre: np.ndarray
@@ -54,14 +60,17 @@ def vehicle_from_urdf(path: Path, data: Mapping[str, Any]) -> ImportedVehicle:
 
     Args:
         path: URDF file.
-        data: Further data of the vehicle. Mass, inertia and boxes are those of the URDF unless `data` have them. A rotor or
-            thruster or propeller may have the key "link" in place of position and axis: it is at the origin of this link, and its
-            thrust points along the z axis of the link (rotor) or the x axis (thruster, propeller). Given positions are in the
-            root frame of the URDF and become relative to the centre of mass. The origin of a vessel is the root frame.
+        data: Further data of the vehicle. Mass, inertia and boxes are those of the URDF unless
+            `data` have them. A rotor or thruster or propeller may have the key "link" in place of
+            position and axis: it is at the origin of this link, and its thrust points along the z
+            axis of the link (rotor) or the x axis (thruster, propeller). Given positions are in the
+            root frame of the URDF and become relative to the centre of mass. The origin of a vessel
+            is the root frame.
 
     Raises:
-        InputError: The URDF cannot be read or does not describe a rigid body: with file, line and link. Or `data` name a link
-            that does not exist: the subject begins with "arguments" and continues with the path in `data`.
+        InputError: The URDF cannot be read or does not describe a rigid body: with file, line and
+            link. Or `data` name a link that does not exist: the subject begins with "arguments" and
+            continues with the path in `data`.
     """
     urdf = UrdfFile(path)
     poses = link_poses(urdf)
@@ -69,28 +78,46 @@ def vehicle_from_urdf(path: Path, data: Mapping[str, Any]) -> ImportedVehicle:
     source = f"URDF file {path.name}"
     is_vessel = data.get("family") in ("surface_vessel", "planar_vessel")
     origin = np.zeros(3) if is_vessel else body.centre
-    frames = [(link, Pose(poses[name].rotation, poses[name].position - origin)) for name, link in urdf.links.items()]
+    frames = [
+        (link, Pose(poses[name].rotation, poses[name].position - origin))
+        for name, link in urdf.links.items()
+    ]
     boxes = [box for link, pose in frames for box in _collision_shape(urdf, link, pose)]
     if not boxes and "boxes" not in data:
-        raise InputError(Problem('no link has a collision shape; expected one, or "boxes" in the accompanying file', str(path)))
+        raise InputError(
+            Problem(
+                'no link has a collision shape; expected one, or "boxes" in the accompanying file',
+                str(path),
+            )
+        )
     result: dict[str, Any] = {
         **data,
         "mass": data.get("mass", {"value": body.mass, "unit": "kg", "source": source}),
         "boxes": data.get("boxes", [{**box, "source": source} for box in boxes]),
     }
     if data.get("family") == "planar_vessel":
-        result.setdefault("yaw_inertia", {"value": float(body.inertia[2, 2]), "unit": "kg.m2", "source": source})
+        result.setdefault(
+            "yaw_inertia", {"value": float(body.inertia[2, 2]), "unit": "kg.m2", "source": source}
+        )
     else:
-        result.setdefault("inertia", {"value": body.inertia.tolist(), "unit": "kg.m2", "source": source})
+        result.setdefault(
+            "inertia", {"value": body.inertia.tolist(), "unit": "kg.m2", "source": source}
+        )
     if is_vessel:
-        result.setdefault("centre_of_mass", {"value": body.centre.tolist(), "unit": "m", "source": source})
-    if "visual" not in data and any(link.find("visual") is not None for link in urdf.links.values()):
+        result.setdefault(
+            "centre_of_mass", {"value": body.centre.tolist(), "unit": "m", "source": source}
+        )
+    if "visual" not in data and any(
+        link.find("visual") is not None for link in urdf.links.values()
+    ):
         triangles = [mesh for link, pose in frames for mesh in _drawn_shapes(urdf, link, pose)]
         result["visual"] = mesh_import.visual_data(np.concatenate(triangles), source)
     for key in NAMED_LISTS:
         if isinstance(elements := data.get(key), list):
             result[key] = _placed_elements(elements, poses, origin, key)
-    return ImportedVehicle(result, body.centre.tolist(), [*_link_warnings(urdf), *_angle_warnings(urdf)])
+    return ImportedVehicle(
+        result, body.centre.tolist(), [*_link_warnings(urdf), *_angle_warnings(urdf)]
+    )
 
 
 def link_poses(urdf: UrdfFile) -> dict[str, Pose]:
@@ -99,20 +126,36 @@ def link_poses(urdf: UrdfFile) -> dict[str, Pose]:
     Raises:
         InputError: The joints do not connect all links to one tree.
     """
-    joints = [(_link_of(urdf, joint, "parent"), _link_of(urdf, joint, "child"), joint) for joint in urdf.root.findall("joint")]
+    joints = [
+        (_link_of(urdf, joint, "parent"), _link_of(urdf, joint, "child"), joint)
+        for joint in urdf.root.findall("joint")
+    ]
     children: dict[str, str] = {}
     for _, child, joint in joints:
         if child in children:
-            raise urdf.error(joint, f'the link "{child}" is the child of the joint "{children[child]}" too')
+            raise urdf.error(
+                joint, f'the link "{child}" is the child of the joint "{children[child]}" too'
+            )
         children[child] = joint.get("name", "")
     roots = [link for link in urdf.links if link not in children]
     if len(roots) != 1:
-        raise InputError(Problem(f"found the root links {roots}, expected one that is the child of no joint", str(urdf.path)))
+        raise InputError(
+            Problem(
+                f"found the root links {roots}, expected one that is the child of no joint",
+                str(urdf.path),
+            )
+        )
     poses = {roots[0]: Pose(_AXES, np.zeros(3))}
     for _ in joints:
-        poses |= {child: poses[parent] @ _origin(urdf, joint) for parent, child, joint in joints if parent in poses}
+        poses |= {
+            child: poses[parent] @ _origin(urdf, joint)
+            for parent, child, joint in joints
+            if parent in poses
+        }
     if missing := [link for link in urdf.links if link not in poses]:
-        raise urdf.error(urdf.links[missing[0]], f"no joints connect it to the root link {roots[0]}")
+        raise urdf.error(
+            urdf.links[missing[0]], f"no joints connect it to the root link {roots[0]}"
+        )
     return poses
 
 
@@ -137,7 +180,12 @@ def _rigid_body(urdf: UrdfFile, poses: Mapping[str, Pose]) -> RigidLinks:
             tensors.append(frame.rotation @ tensor @ frame.rotation.T)
     total = sum(masses)
     if not total > 0:
-        raise InputError(Problem(f"found the mass {total:g}, expected links with <inertial> and a mass above 0", str(urdf.path)))
+        raise InputError(
+            Problem(
+                f"found the mass {total:g}, expected links with <inertial> and a mass above 0",
+                str(urdf.path),
+            )
+        )
     centre = np.average(centres, axis=0, weights=masses)
     composed = np.zeros((3, 3))
     for weight, place, tensor in zip(masses, centres, tensors, strict=True):
@@ -150,7 +198,10 @@ def _rigid_body(urdf: UrdfFile, poses: Mapping[str, Pose]) -> RigidLinks:
 
 
 def _inertia(urdf: UrdfFile, inertial: ET.Element) -> np.ndarray:
-    """Return the inertia tensor (kg m2) of <inertial>, shape (3, 3); missing products of inertia are 0."""
+    """Return the inertia tensor (kg m2) of <inertial>, shape (3, 3).
+
+    Missing products of inertia are 0.
+    """
     element = urdf.child(inertial, "inertia")
     moments = {axes: urdf.number(element, f"i{axes}") for axes in ("xx", "yy", "zz")}
     values = moments | {axes: urdf.number(element, f"i{axes}", "0") for axes in ("xy", "xz", "yz")}
@@ -160,16 +211,30 @@ def _inertia(urdf: UrdfFile, inertial: ET.Element) -> np.ndarray:
 def _link_warnings(urdf: UrdfFile) -> Iterator[str]:
     """Yield a warning for each link with a shape and no mass, or with a mass and no inertia."""
     for name, link in urdf.links.items():
-        inertial, has_shape = link.find("inertial"), link.find("visual") is not None or link.find("collision") is not None
+        inertial, has_shape = (
+            link.find("inertial"),
+            link.find("visual") is not None or link.find("collision") is not None,
+        )
         if inertial is None and has_shape:
             yield f'{urdf.where(link)}: link "{name}" has a shape but no <inertial>: its mass is 0'
-        if inertial is not None and urdf.number(urdf.child(inertial, "mass"), "value") and not _inertia(urdf, inertial).any():
-            yield f'{urdf.where(inertial)}: link "{name}" has a mass but the inertia 0: it is a point'
+        if (
+            inertial is not None
+            and urdf.number(urdf.child(inertial, "mass"), "value")
+            and not _inertia(urdf, inertial).any()
+        ):
+            yield (
+                f'{urdf.where(inertial)}: link "{name}" has a mass but the inertia 0: it is a point'
+            )
 
 
 def _angle_warnings(urdf: UrdfFile) -> Iterator[str]:
     """Yield a warning about the first angles of more than a turn, with the number of the others."""
-    origins = [origin for part in urdf.root if part.tag in ("link", "joint") for origin in part.iter("origin")]
+    origins = [
+        origin
+        for part in urdf.root
+        if part.tag in ("link", "joint")
+        for origin in part.iter("origin")
+    ]
     angles = [(origin, urdf.numbers(origin, "rpy", 3, "0 0 0")) for origin in origins]
     large = [(origin, numbers) for origin, numbers in angles if max(abs(numbers)) > 2 * np.pi]
     if large:
@@ -181,7 +246,10 @@ def _angle_warnings(urdf: UrdfFile) -> Iterator[str]:
 
 
 def _collision_shape(urdf: UrdfFile, link: ET.Element, pose: Pose) -> Iterator[dict[str, Any]]:
-    """Yield the collision shapes of a link; what is not an upright box or a mesh becomes the level box around it."""
+    """Yield the collision shapes of a link.
+
+    What is not an upright box or a mesh becomes the level box around it.
+    """
     for collision in link.findall("collision"):
         frame, shape = pose @ _origin(urdf, collision), urdf.child(collision, "geometry/*")
         if shape.tag == "mesh":
@@ -205,13 +273,17 @@ def _edges(urdf: UrdfFile, shape: ET.Element) -> np.ndarray:
             return urdf.edges(shape, (diameter, diameter, urdf.number(shape, "length")))
         case "sphere":
             return urdf.edges(shape, (2 * urdf.number(shape, "radius"),) * 3)
-    raise urdf.error(shape, f"found the geometry {shape.tag}, expected box, cylinder, sphere or mesh")
+    raise urdf.error(
+        shape, f"found the geometry {shape.tag}, expected box, cylinder, sphere or mesh"
+    )
 
 
 def _drawn_shapes(urdf: UrdfFile, link: ET.Element, pose: Pose) -> Iterator[np.ndarray]:
     """Yield the triangles of the visual shapes of a link, or else of its collision shapes, each of shape (n, 3, 3)."""
     for element in link.findall("visual") or link.findall("collision"):
-        yield (pose @ _origin(urdf, element)).transformed(_triangles(urdf, urdf.child(element, "geometry/*")))
+        yield (pose @ _origin(urdf, element)).transformed(
+            _triangles(urdf, urdf.child(element, "geometry/*"))
+        )
 
 
 def _triangles(urdf: UrdfFile, shape: ET.Element) -> np.ndarray:
@@ -227,12 +299,17 @@ def _triangles(urdf: UrdfFile, shape: ET.Element) -> np.ndarray:
 
 
 def _mesh(urdf: UrdfFile, shape: ET.Element) -> Any:
-    """Return the mesh of <mesh>; the path of "package://NAME/path" starts from a folder NAME above the URDF file."""
+    """Return the mesh of <mesh>.
+
+    The path of "package://NAME/path" starts from a folder NAME above the URDF file.
+    """
     name = shape.get("filename", "")
     folders = [urdf.path.parent]
     if name.startswith("package://"):
         package, _, name = name.removeprefix("package://").partition("/")
-        folders = [folder for folder in urdf.path.resolve().parents if folder.name == package] or folders
+        folders = [
+            folder for folder in urdf.path.resolve().parents if folder.name == package
+        ] or folders
     scale = urdf.numbers(shape, "scale", 3, "1 1 1").tolist()
     try:
         return mesh_import.load_mesh(folders[0] / name.removeprefix("file://"), scale)
@@ -240,24 +317,38 @@ def _mesh(urdf: UrdfFile, shape: ET.Element) -> Any:
         raise urdf.error(shape, str(error)) from None
 
 
-def _placed_elements(elements: list[Any], poses: Mapping[str, Pose], origin: np.ndarray, key: str) -> list[Any]:
+def _placed_elements(
+    elements: list[Any], poses: Mapping[str, Pose], origin: np.ndarray, key: str
+) -> list[Any]:
     """Return rotors, thrusters or propellers with their positions relative to the origin of the vehicle file."""
     used: dict[str, int] = {}
     for i, element in enumerate(elements):
         if isinstance(element, Mapping) and "link" in element:
             path, name = ("arguments", key, str(i)), str(element["link"])
             if name not in poses:
-                raise InputError(Problem(f'no link "{name}"{did_you_mean(name, poses)}', "", (*path, "link")))
+                raise InputError(
+                    Problem(f'no link "{name}"{did_you_mean(name, poses)}', "", (*path, "link"))
+                )
             if name in used:
-                raise InputError(Problem(f'found the link "{name}" of {key}[{used[name]}] again', "", (*path, "link")))
+                raise InputError(
+                    Problem(
+                        f'found the link "{name}" of {key}[{used[name]}] again', "", (*path, "link")
+                    )
+                )
             if "position" in element:
-                raise InputError(Problem('found "link" and "position", expected one of them', "", (*path, "position")))
+                raise InputError(
+                    Problem(
+                        'found "link" and "position", expected one of them', "", (*path, "position")
+                    )
+                )
             used[name] = i
     reader = QuantityReader()
     placed = [_placed(element, poses, key) for element in elements]
     for i, element in enumerate(placed):
         if isinstance(element, dict) and "position" in element:
-            position = reader.vector_quantity(element["position"], (key, str(i), "position"), "m", "xyz")
+            position = reader.vector_quantity(
+                element["position"], (key, str(i), "position"), "m", "xyz"
+            )
             element["position"] = (position - origin).tolist()
     if reader.problems:
         raise InputError(reader.problems)
@@ -269,7 +360,11 @@ def _placed(element: Any, poses: Mapping[str, Pose], key: str) -> Any:
     if not isinstance(element, Mapping) or "link" not in element:
         return dict(element) if isinstance(element, Mapping) else element
     pose, column = poses[name := str(element["link"])], 2 if key == "rotors" else 0
-    place = {"position": pose.position.tolist(), "axis": pose.rotation[:, column].tolist(), "label": name}
+    place = {
+        "position": pose.position.tolist(),
+        "axis": pose.rotation[:, column].tolist(),
+        "label": name,
+    }
     return {**place, **{other: value for other, value in element.items() if other != "link"}}
 
 

@@ -56,7 +56,12 @@ class UrdfFile:
             raise self.error(self.root, f"found <{self.root.tag}>, expected <robot>")
         for element in self.root.iter():
             if element.tag.startswith("xacro:"):
-                raise InputError(Problem(f"found <{element.tag}>; expand the file with xacro first", self.where(element)))
+                raise InputError(
+                    Problem(
+                        f"found <{element.tag}>; expand the file with xacro first",
+                        self.where(element),
+                    )
+                )
 
     def _by_name(self, tag: str) -> dict[str, ET.Element]:
         """Return the elements with this tag by name."""
@@ -64,7 +69,9 @@ class UrdfFile:
         for element in self.root.findall(tag):
             name = element.get("name", "")
             if name in found:
-                raise self.error(element, f"the name is used twice, first in line {self._lines[found[name]]}")
+                raise self.error(
+                    element, f"the name is used twice, first in line {self._lines[found[name]]}"
+                )
             found[name] = element
         return found
 
@@ -73,7 +80,9 @@ class UrdfFile:
         owner = self._owners.get(element)
         parts = [] if owner is None else [f'{owner.tag} "{owner.get("name", "")}"']
         parts += [element.tag] if owner is not None and element is not owner else []
-        return InputError(Problem(": ".join([", ".join(parts), text] if parts else [text]), self.where(element)))
+        return InputError(
+            Problem(": ".join([", ".join(parts), text] if parts else [text]), self.where(element))
+        )
 
     def where(self, element: ET.Element) -> str:
         """Return "file:line" of an element."""
@@ -85,15 +94,22 @@ class UrdfFile:
             raise self.error(element, f"<{path.partition('/')[0]}> is missing")
         return found
 
-    def number(self, element: ET.Element, name: str, default: str | None = None, low: float = -math.inf) -> float:
+    def number(
+        self, element: ET.Element, name: str, default: str | None = None, low: float = -math.inf
+    ) -> float:
         """Return the number in an attribute; without `default` the attribute is required."""
         (number,) = self.numbers(element, name, 1, default)
         if number < low:
             raise self.error(element, f"{_prefix(name)}found {number:g}, expected at least {low:g}")
         return float(number)
 
-    def numbers(self, element: ET.Element, name: str, count: int, default: str | None = None) -> np.ndarray:
-        """Return the numbers in an attribute, shape (count,); without `default` the attribute is required."""
+    def numbers(
+        self, element: ET.Element, name: str, count: int, default: str | None = None
+    ) -> np.ndarray:
+        """Return the numbers in an attribute, shape (count,).
+
+        Without `default` the attribute is required.
+        """
         if (text := element.get(name, default)) is None:
             raise self.error(element, f'"{name}" is missing')
         try:
@@ -109,7 +125,13 @@ class UrdfFile:
     def edges(self, element: ET.Element, lengths: Sequence[float]) -> np.ndarray:
         """Return the edges (m) of the box around a shape with these lengths, shape (3,)."""
         if not min(lengths) > 0:
-            raise self.error(element, f"found the edges {[float(length) for length in lengths]} m, expected all greater than 0")
+            raise self.error(
+                element,
+                (
+                    f"found the edges {[float(length) for length in lengths]} m, expected all "
+                    "greater than 0"
+                ),
+            )
         return np.array(lengths)
 
 

@@ -1,4 +1,7 @@
-"""Probable mistakes in the data of vessels and submerged vehicles: thrust, resistance, places and angles of propellers."""
+"""Probable mistakes in the data of vessels and submerged vehicles.
+
+Thrust, resistance, places and angles of propellers.
+"""
 
 from __future__ import annotations
 
@@ -16,12 +19,13 @@ from ..vehicles.surface_vessel.surface_vessel import SurfaceVessel
 from ..vehicles.vessel.actuators import Propeller
 from ..vehicles.vessel.boat import Boat
 
-#: largest ratio of the thrust of all propellers to the weight: shipped vessels have at most 0.42, planing boats about 0.5, the
-#: shipped ROV 1.8
+#: largest ratio of the thrust of all propellers to the weight: shipped vessels have at most 0.42,
+#: planing boats about 0.5, the shipped ROV 1.8
 MAX_VESSEL_THRUST, MAX_SUBMERGED_THRUST = 1.0, 5.0
 #: largest speed of the tips of propellers (m/s)
 MAX_TIP_SPEED = 100.0
-#: distance outside of the box around hull and boxes at which a propeller or rudder is implausible, over the length
+#: distance outside of the box around hull and boxes at which a propeller or rudder is implausible,
+#: over the length
 POSITION_MARGIN = 0.25
 #: largest distance of a thruster from the centre of mass over that of the farthest corner
 MAX_THRUSTER_DISTANCE = 2.0
@@ -38,9 +42,13 @@ def boat_warnings(boat: Boat, corners: np.ndarray) -> Iterator[Problem]:
     thrusts = [each.thrust_coefficient * each.max_speed**2 for each in boat.propellers]
     largest = int(np.argmax(thrusts))
     propeller, path = boat.propellers[largest], ("propellers", str(largest))
-    cause = _cause(propeller.max_speed, propeller.radius, (*path, "thrust_coefficient"), (*path, "max_speed"))
+    cause = _cause(
+        propeller.max_speed, propeller.radius, (*path, "thrust_coefficient"), (*path, "max_speed")
+    )
     yield from _thrust_warnings(sum(thrusts), boat.mass * _GRAVITY, MAX_VESSEL_THRUST, cause)
-    yield from _resistance_warnings(*surge_damping(boat), *(each.advance_coefficient for each in boat.propellers))
+    yield from _resistance_warnings(
+        *surge_damping(boat), *(each.advance_coefficient for each in boat.propellers)
+    )
     yield from _azimuth_warnings(boat.propellers)
     low, high = _bounds(boat, corners)
     yield from _position_warnings(boat, low, high)
@@ -52,8 +60,12 @@ def craft_warnings(craft: Craft, reach: float) -> Iterator[Problem]:
     thrusts = [each.thrust_coefficient * craft.max_thruster_speed**2 for each in craft.thrusters]
     path = ("thrusters", str(int(np.argmax(thrusts))), "thrust_coefficient")
     cause = _cause(craft.max_thruster_speed, craft.thruster_radius, path, ("thruster", "max_speed"))
-    yield from _thrust_warnings(sum(thrusts), craft.mass * craft.gravity, MAX_SUBMERGED_THRUST, cause)
-    yield from _resistance_warnings(craft.linear_damping[0, 0], craft.quadratic_damping[0, 0], craft.advance_coefficient)
+    yield from _thrust_warnings(
+        sum(thrusts), craft.mass * craft.gravity, MAX_SUBMERGED_THRUST, cause
+    )
+    yield from _resistance_warnings(
+        craft.linear_damping[0, 0], craft.quadratic_damping[0, 0], craft.advance_coefficient
+    )
     for i, thruster in enumerate(craft.thrusters):
         distance, limit = math.hypot(*thruster.position), MAX_THRUSTER_DISTANCE * reach
         if distance > limit:
@@ -61,20 +73,31 @@ def craft_warnings(craft: Craft, reach: float) -> Iterator[Problem]:
             yield warning(text, "thrusters", str(i), "position")
 
 
-def _cause(speed: float, radius: float, coefficient: tuple[str, ...], max_speed: tuple[str, ...]) -> tuple[str, tuple[str, ...]]:
-    """Return a hint and the path of the key that is probably wrong: the largest speed, or else the thrust coefficient."""
+def _cause(
+    speed: float, radius: float, coefficient: tuple[str, ...], max_speed: tuple[str, ...]
+) -> tuple[str, tuple[str, ...]]:
+    """Return a hint and the path of the key that is probably wrong.
+
+    The largest speed, or else the thrust coefficient.
+    """
     if speed * radius > MAX_TIP_SPEED:
-        hint = f"; {speed:.4g} rad/s make {speed * radius:.4g} m/s at the tips of the propellers: is max_speed in rpm?"
+        hint = (
+            f"; {speed:.4g} rad/s make {speed * radius:.4g} m/s at the tips of the propellers: is "
+            "max_speed in rpm?"
+        )
         return hint, max_speed
     return "", coefficient
 
 
-def _thrust_warnings(thrust: float, weight: float, limit: float, cause: tuple[str, Sequence[str]]) -> Iterator[Problem]:
+def _thrust_warnings(
+    thrust: float, weight: float, limit: float, cause: tuple[str, Sequence[str]]
+) -> Iterator[Problem]:
     """Yield a warning if the thrust (N) is more than `limit` times the weight (N)."""
     hint, path = cause
     if thrust > limit * weight:
         text = (
-            f"the thrust of all propellers at full speed is {thrust:.4g} N, {thrust / weight:.3g} times the weight of "
+            f"the thrust of all propellers at full speed is {thrust:.4g} N, {thrust / weight:.3g} "
+            "times the weight of "
             f"{weight:.4g} N, expected less than {limit:g} times"
         )
         yield warning(text + hint, *path)
@@ -92,12 +115,18 @@ def surge_damping(boat: Boat) -> tuple[float, float, float]:
 def _resistance_warnings(*coefficients: float) -> Iterator[Problem]:
     """Yield a warning if all coefficients of forces of the water that limit the speed ahead are 0."""
     if not any(coefficients):
-        text = "the water has no resistance ahead: the elements for u are 0, here and in quadratic_damping"
+        text = (
+            "the water has no resistance ahead: the elements for u are 0, here and in "
+            "quadratic_damping"
+        )
         yield warning(text, "linear_damping")
 
 
 def _azimuth_warnings(propellers: Sequence[Propeller]) -> Iterator[Problem]:
-    """Yield a warning for each largest azimuth angle of more than a turn and at most 360 rad; larger ones mean "no limit"."""
+    """Yield a warning for each largest azimuth angle of more than a turn and at most 360 rad.
+
+    Larger ones mean "no limit".
+    """
     for i, propeller in enumerate(propellers):
         if 2 * math.pi < propeller.max_azimuth <= 360:
             text = f"found {propeller.max_azimuth:g}, {RADIANS_EXPECTED}"
@@ -118,7 +147,10 @@ def _bounds(boat: Boat, corners: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 def _position_warnings(boat: Boat, low: np.ndarray, high: np.ndarray) -> Iterator[Problem]:
     """Yield a warning for each propeller and rudder far outside of hull and boxes."""
     margin = POSITION_MARGIN * (high[0] - low[0])
-    positions = {"propellers": [each.position for each in boat.propellers], "rudders": [each.position for each in boat.rudders]}
+    positions = {
+        "propellers": [each.position for each in boat.propellers],
+        "rudders": [each.position for each in boat.rudders],
+    }
     for key, places in positions.items():
         for i, position in enumerate(places):
             for axis, place in enumerate(position):
@@ -132,9 +164,13 @@ def _position_warnings(boat: Boat, low: np.ndarray, high: np.ndarray) -> Iterato
 
 def _height_warnings(boat: Boat, top: float) -> Iterator[Problem]:
     """Yield a warning if the centre of mass is above hull and boxes by more than the depth of the hull."""
-    if isinstance(boat, SurfaceVessel) and (height := boat.centre_of_mass[2] - top) > boat.hull.depth:
+    if (
+        isinstance(boat, SurfaceVessel)
+        and (height := boat.centre_of_mass[2] - top) > boat.hull.depth
+    ):
         text = (
-            f"z = {boat.centre_of_mass[2]:.4g} m is {height:.3g} m above hull and boxes, expected at most the depth of the hull, "
+            f"z = {boat.centre_of_mass[2]:.4g} m is {height:.3g} m above hull and boxes, expected "
+            "at most the depth of the hull, "
             f"{boat.hull.depth:.3g} m"
         )
         yield warning(text, "centre_of_mass")

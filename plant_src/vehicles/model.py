@@ -27,18 +27,23 @@ class Model:
         interface: Variables of the FMU, in the order of the equations.
         states: Names of the states, in the order of the equations.
         body: Rigid body in Bullet for the start values of the parameters.
-        crash_speed: Change of velocity (m/s) by a collision above which the vehicle has crashed; a scenario may replace it.
+        crash_speed: Change of velocity (m/s) by a collision above which the vehicle has crashed; a
+            scenario may replace it.
         is_vessel: Whether the vehicle floats and has a landing deck.
         vehicle: Name of the vehicle in scenarios if it differs from `name`.
         motion: "planar" or "6dof"; distinguishes models of the same vehicle.
-        constant_count: Number of constants that the equations derive from the parameters, or None if they use the parameters.
+        constant_count: Number of constants that the equations derive from the parameters, or None
+            if they use the parameters.
         airframe: Data of a multirotor.
         craft: Data of a submerged vehicle.
         boat: Data of a vessel that is given by a file.
-        visual: Triangles that pictures show in place of shapes derived from the data (m, body frame), shape (n, 3, 3).
-        body_of: Function from the parameters to the rigid body, if it depends on them. Raises InputError.
+        visual: Triangles that pictures show in place of shapes derived from the data (m, body
+            frame), shape (n, 3, 3).
+        body_of: Function from the parameters to the rigid body, if it depends on them. Raises
+            InputError.
         equations: Name of the FMU whose binary has the equations, if it is not `name`.
-        layout: Parameters and inputs of these equations, if they have longer arrays or more variables than `interface`.
+        layout: Parameters and inputs of these equations, if they have longer arrays or more
+            variables than `interface`.
         hulls: Name of each further hull of a vessel -> its parameters.
     """
 
@@ -74,23 +79,31 @@ class Model:
         """Return the rigid body of a vehicle with these parameters.
 
         Raises:
-            InputError: If mass and inertia are physically impossible; a problem's subject begins with the name of a parameter.
+            InputError: If mass and inertia are physically impossible; a problem's subject begins
+                with the name of a parameter.
         """
         return self.body_of(parameters) if self.body_of else self.body
 
     @cached_property
     def variables(self) -> tuple[Variable, ...]:
         """Variables of a vehicle in a world: all but the environment inputs."""
-        return tuple(variable for variable in self.interface if variable.name not in ENVIRONMENT_INPUTS)
+        return tuple(
+            variable for variable in self.interface if variable.name not in ENVIRONMENT_INPUTS
+        )
 
     @cached_property
     def _variables_by_vehicle(self) -> dict[str, Sequence[Variable]]:
         return {}
 
     def variables_of(self, vehicle: str) -> Sequence[Variable]:
-        """Return the variables of a vehicle with its name as prefix; they are kept for the next world."""
+        """Return the variables of a vehicle with its name as prefix.
+
+        They are kept for the next world.
+        """
         if vehicle not in self._variables_by_vehicle:
-            self._variables_by_vehicle[vehicle] = [replace(each, name=f"{vehicle}.{each.name}") for each in self.variables]
+            self._variables_by_vehicle[vehicle] = [
+                replace(each, name=f"{vehicle}.{each.name}") for each in self.variables
+            ]
         return self._variables_by_vehicle[vehicle]
 
     @cached_property
@@ -101,13 +114,23 @@ class Model:
     @cached_property
     def input_count(self) -> int:
         """Number of inputs of the equations, without those that the environment writes."""
-        inputs = [variable for variable in self.layout or self.interface if variable.causality == "input"]
-        return sum(len(variable.scalar_names) for variable in inputs if variable.name not in ENVIRONMENT_INPUTS)
+        inputs = [
+            variable for variable in self.layout or self.interface if variable.causality == "input"
+        ]
+        return sum(
+            len(variable.scalar_names)
+            for variable in inputs
+            if variable.name not in ENVIRONMENT_INPUTS
+        )
 
     @cached_property
     def input_places(self) -> list[slice]:
         """Consecutive parts of the inputs of the equations that belong to the inputs of the interface, in order."""
-        counts = {variable.name: len(variable.scalar_names) for variable in self.variables if variable.causality == "input"}
+        counts = {
+            variable.name: len(variable.scalar_names)
+            for variable in self.variables
+            if variable.causality == "input"
+        }
         places, end = list[slice](), 0
         for variable in self.layout or self.variables:
             if variable.causality == "input" and variable.name not in ENVIRONMENT_INPUTS:
@@ -120,7 +143,10 @@ class Model:
         return places
 
     def equation_parameters(self, values: Sequence[float]) -> list[float]:
-        """Return the parameters of the equations for the parameters of the interface: arrays are filled up with zeros."""
+        """Return the parameters of the equations for the parameters of the interface.
+
+        Arrays are filled up with zeros.
+        """
         remaining, result = iter(values), list[float]()
         counts = {variable.name: len(variable.scalar_names) for variable in self.interface}
         for variable in self.layout or self.interface:
@@ -131,12 +157,22 @@ class Model:
 
     def real_variables(self, causality: Causality) -> list[Variable]:
         """Return the real variables of a causality, in order."""
-        return [variable for variable in self.variables if variable.causality == causality and variable.type == "Float64"]
+        return [
+            variable
+            for variable in self.variables
+            if variable.causality == causality and variable.type == "Float64"
+        ]
 
     def slots(self, causality: Causality) -> list[str]:
         """Return the names of the real scalars of a causality, in order."""
-        return [slot for variable in self.real_variables(causality) for slot in variable.scalar_names]
+        return [
+            slot for variable in self.real_variables(causality) for slot in variable.scalar_names
+        ]
 
     def start_values(self, causality: Causality) -> list[float]:
         """Return the start values of the real scalars of a causality, in order."""
-        return [float(start) for variable in self.real_variables(causality) for start in np.ravel(variable.start)]
+        return [
+            float(start)
+            for variable in self.real_variables(causality)
+            for start in np.ravel(variable.start)
+        ]

@@ -1,4 +1,7 @@
-"""Vessel autopilot with names and units of its own: north-east-down axes, degrees, knots and kilonewtons, no declared units."""
+"""Vessel autopilot with names and units of its own.
+
+North-east-down axes, degrees, knots and kilonewtons, no declared units.
+"""
 
 from __future__ import annotations
 
@@ -12,13 +15,21 @@ class NedAutopilot(Fmi2Slave):
 
     def __init__(self, **arguments: object):
         super().__init__(**arguments)
-        self.pos_north, self.pos_east, self.vel_u_kn, self.psi_deg, self.r_deg_s = 0.0, 0.0, 0.0, 0.0, 0.0
+        self.pos_north, self.pos_east, self.vel_u_kn, self.psi_deg, self.r_deg_s = (
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+            0.0,
+        )
         self.speed_kn, self.lookahead = 2.0, 6.0
         self.tau_kN, self.delta_deg = 0.0, 0.0
         for name in ("pos_north", "pos_east", "vel_u_kn", "psi_deg", "r_deg_s"):
             self.register_variable(Real(name, causality=Fmi2Causality.input))
         for name in ("speed_kn", "lookahead"):
-            self.register_variable(Real(name, causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable))
+            self.register_variable(
+                Real(name, causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable)
+            )
         for name in ("tau_kN", "delta_deg"):
             self.register_variable(Real(name, causality=Fmi2Causality.output))
 

@@ -29,7 +29,12 @@ FLIGHT = {
     ],
 }
 LOOP = {"components": "uav", "at": 5, "loops": ["quadcopter.attitude.yaw"]}
-CLOSED = {"inputs": ["uav.altitude_command"], "outputs": ["quadcopter.position.z"], "at": 5, "duration": 3}
+CLOSED = {
+    "inputs": ["uav.altitude_command"],
+    "outputs": ["quadcopter.position.z"],
+    "at": 5,
+    "duration": 3,
+}
 
 
 def figure(name, arguments):
@@ -46,7 +51,9 @@ def test_a_check_of_the_phase_margin_and_a_diagram_in_the_report(tmp_path):
     assert all(check["passed"] for check in about["checks"])
     assert (tmp_path / "runs/flight/bode.png").stat().st_size > 10_000
     assert "figure" not in done.stderr
-    assert json.loads((tmp_path / "runs/flight/run.json").read_text())["parameters"] == {"uav.altitude_command": 2.5}
+    assert json.loads((tmp_path / "runs/flight/run.json").read_text())["parameters"] == {
+        "uav.altitude_command": 2.5
+    }
 
 
 def test_the_figures_of_a_result_show_its_loops_and_poles():
@@ -63,15 +70,35 @@ def test_the_figures_of_a_result_show_its_loops_and_poles():
 
 def test_a_phase_margin_that_is_too_small_fails_the_run(tmp_path):
     file = tmp_path / "flight.json"
-    file.write_text(json.dumps({**FLIGHT, "checks": [{"kpi": "yaw.phase_margin", "min": 80}], "figures": []}))
+    file.write_text(
+        json.dumps({**FLIGHT, "checks": [{"kpi": "yaw.phase_margin", "min": 80}], "figures": []})
+    )
     done = run_cosim("run", file, "--no-report", cwd=tmp_path)
     assert done.returncode == 3
     assert "yaw.phase_margin" in done.stdout
 
 
 def test_the_margins_command_prints_a_table_and_the_estimated_response(tmp_path):
-    arguments = ["--component", "uav", "--at", 5, "--loop", "quadcopter.attitude.yaw", "--figures", "figures"]
-    done = run_cosim("margins", "free_flight", *arguments, "--estimate", "chirp", "--amplitude", 0.002, cwd=tmp_path)
+    arguments = [
+        "--component",
+        "uav",
+        "--at",
+        5,
+        "--loop",
+        "quadcopter.attitude.yaw",
+        "--figures",
+        "figures",
+    ]
+    done = run_cosim(
+        "margins",
+        "free_flight",
+        *arguments,
+        "--estimate",
+        "chirp",
+        "--amplitude",
+        0.002,
+        cwd=tmp_path,
+    )
     assert done.returncode == 0, done.stderr
     header, _, row, *_ = done.stdout.splitlines()
     assert header.split()[:3] == ["loop", "gain", "up"]
@@ -91,19 +118,41 @@ def test_the_margins_command_gives_json_and_refuses_an_estimate_without_loop(tmp
     about = json.loads(done.stdout)
     assert (about["time"], about["step"]) == (5, 0.01)
     assert about["loops"][0]["phase"] == pytest.approx(1.22, abs=0.1)
-    refused = run_cosim(*words, "--loop", "quadcopter.attitude", "--estimate", "sines", cwd=tmp_path)
+    refused = run_cosim(
+        *words, "--loop", "quadcopter.attitude", "--estimate", "sines", cwd=tmp_path
+    )
     assert refused.returncode == 2
     assert "--estimate: expected one --loop and an --amplitude" in refused.stderr
 
 
 def test_the_linearize_command_prints_poles_and_writes_files(tmp_path):
-    names = ["--inputs", "uav.altitude_command", "--outputs", "quadcopter.position.z,quadcopter.velocity.z"]
+    names = [
+        "--inputs",
+        "uav.altitude_command",
+        "--outputs",
+        "quadcopter.position.z,quadcopter.velocity.z",
+    ]
     done = run_cosim(
-        "linearize", "free_flight", *names, "--at", 12, "--duration", 4, "--output", "m.json", "--figures", "f", cwd=tmp_path
+        "linearize",
+        "free_flight",
+        *names,
+        "--at",
+        12,
+        "--duration",
+        4,
+        "--output",
+        "m.json",
+        "--figures",
+        "f",
+        cwd=tmp_path,
     )
     assert done.returncode == 0, done.stderr
     assert done.stdout.startswith("t = 12 s, step 0.01 s:")
     model = json.loads((tmp_path / "m.json").read_text())
     assert model["inputs"] == ["uav.altitude_command"]
     assert max(abs(complex(*pole)) for pole in model["poles"]) < 1
-    assert sorted(path.name for path in (tmp_path / "f").glob("*.png")) == ["bode.png", "poles.png", "steps.png"]
+    assert sorted(path.name for path in (tmp_path / "f").glob("*.png")) == [
+        "bode.png",
+        "poles.png",
+        "steps.png",
+    ]

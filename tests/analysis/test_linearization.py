@@ -23,19 +23,26 @@ QUADCOPTER_STATES = ["position", "velocity", "attitude", "rates"]
 def hover():
     """Rotor speeds (rad/s) of the hovering quadcopter."""
     equal = {"quadcopter.rotor_speed": [340.0] * 4}
-    found = cosim.trim(HOVER, list(equal), ["quadcopter.velocity", "quadcopter.rates"], parameters=equal)
+    found = cosim.trim(
+        HOVER, list(equal), ["quadcopter.velocity", "quadcopter.rates"], parameters=equal
+    )
     assert found.is_found
     return found.parameters
 
 
 def test_the_hovering_quadcopter_has_the_jacobian_of_its_closed_form(hover):
-    """Linear Newton-Euler equations about hover, from masses and arms of the original system's fact sheet."""
+    """Linear Newton-Euler equations about hover, from masses and arms of the original system's fact
+    sheet.
+    """
     outputs = [f"quadcopter.{name}" for name in QUADCOPTER_STATES]
     model = linearize(HOVER, ["quadcopter.rotor_speed"], outputs, parameters=hover, continuous=True)
     assert list(model.states) == list(model.outputs)
     speeds = np.array(hover["quadcopter.rotor_speed"])
     slope = 2 * reference.THRUST_COEFFICIENT * speeds  # N.s/rad
-    arms, inertia = reference._ROTORS @ reference.FLIP, reference.FLIP @ reference._INERTIA @ reference.FLIP
+    arms, inertia = (
+        reference._ROTORS @ reference.FLIP,
+        reference.FLIP @ reference._INERTIA @ reference.FLIP,
+    )
     senses = np.array(reference._UP_TORQUE) * 2.38e-7 / reference.THRUST_COEFFICIENT
     torques = np.array([arms[:, 1], -arms[:, 0], senses]) * slope
     a, b = np.zeros((12, 12)), np.zeros((12, 4))
@@ -53,13 +60,31 @@ def test_the_hovering_quadcopter_has_the_jacobian_of_its_closed_form(hover):
 def test_the_sailing_vessel_has_the_jacobian_of_its_equations():
     """Differences of the original system's equations at 1 m/s, with the thrust that a trim finds."""
     fmu = str(resources.root() / "fmus/strider.fmu")
-    scenario = {"name": "vessel", "stop_time": 1, "step_size": 0.01, "components": {"vessel": {"fmu": fmu}}}
-    start = {"vessel.initial.velocity_body.u": 1.0, "vessel.resistance": 0.0, "vessel.propeller_diameter": 0.0}
+    scenario = {
+        "name": "vessel",
+        "stop_time": 1,
+        "step_size": 0.01,
+        "components": {"vessel": {"fmu": fmu}},
+    }
+    start = {
+        "vessel.initial.velocity_body.u": 1.0,
+        "vessel.resistance": 0.0,
+        "vessel.propeller_diameter": 0.0,
+    }
     thrust = cosim.trim(scenario, ["vessel.thrust"], ["vessel.velocity_body.u"], parameters=start)
     assert thrust.is_found
-    names = ["position.x", "position.y", "attitude.yaw", "velocity_body.u", "velocity_body.v", "rates.r"]
+    names = [
+        "position.x",
+        "position.y",
+        "attitude.yaw",
+        "velocity_body.u",
+        "velocity_body.v",
+        "rates.r",
+    ]
     inputs, outputs = ["vessel.thrust", "vessel.rudder_angle"], [f"vessel.{name}" for name in names]
-    model = linearize(scenario, inputs, outputs, parameters={**start, **thrust.parameters}, continuous=True)
+    model = linearize(
+        scenario, inputs, outputs, parameters={**start, **thrust.parameters}, continuous=True
+    )
     expected = vessel_jacobian([0, 0, 0, 1, 0, 0], thrust.parameters["vessel.thrust"])
     assert list(model.states) == outputs
     found = np.hstack([model.a, model.b])
@@ -67,13 +92,17 @@ def test_the_sailing_vessel_has_the_jacobian_of_its_equations():
 
 
 def vessel_jacobian(state, thrust):
-    """Return [A B] of the vessel's equations, inputs thrust (N) and rudder angle (rad), by differences of fourth order."""
+    """Return [A B] of the vessel's equations, inputs thrust (N) and rudder angle (rad), by
+    differences of fourth order.
+    """
     point = np.array([*state, thrust, 0, 0, 0, 0, 0, 0, 0], float)
 
     def difference(i, size):
         change = np.zeros(len(point))
         change[i] = size
-        plus, minus = (reference.vessel_rate(each[:6], each[6:]) for each in (point + change, point - change))
+        plus, minus = (
+            reference.vessel_rate(each[:6], each[6:]) for each in (point + change, point - change)
+        )
         return (plus - minus) / (2 * size)
 
     return np.array([(4 * difference(i, 1e-4) - difference(i, 2e-4)) / 3 for i in range(8)]).T
@@ -81,9 +110,15 @@ def vessel_jacobian(state, thrust):
 
 @pytest.mark.parametrize("version", [2, 3])
 def test_an_fmu_with_directional_derivatives_gives_the_exact_model(version, balls, tmp_path):
-    """x' = u - x, h' = v, v' = g, integrated by Euler: without the derivatives, the model has the pole of Euler's method."""
+    """x' = u - x, h' = v, v' = g, integrated by Euler: without the derivatives, the model has the
+    pole of Euler's method.
+    """
     file = offering_derivatives(balls[version], tmp_path / "ball.fmu")
-    ball = {"fmu": str(file), "solver": {"method": "euler", "step_size": 0.01}, "parameters": {"h": 5.0}}
+    ball = {
+        "fmu": str(file),
+        "solver": {"method": "euler", "step_size": 0.01},
+        "parameters": {"h": 5.0},
+    }
     scenario = {"name": "ball", "stop_time": 1, "step_size": 0.01, "components": {"ball": ball}}
     exact = linearize(scenario, ["ball.u"], ["ball.x", "ball.h"], 0.1, continuous=True)
     assert list(exact.states) == ["ball.x", "ball.h", "ball.v"]
@@ -102,7 +137,9 @@ def offering_derivatives(source, target):
         for name in old.namelist():
             content = old.read(name)
             if name == "modelDescription.xml":
-                flag = b'providesDirectionalDerivative%s="true" modelIdentifier' % (b"s" if b'"3.0"' in content else b"")
+                flag = b'providesDirectionalDerivative%s="true" modelIdentifier' % (
+                    b"s" if b'"3.0"' in content else b""
+                )
                 content = content.replace(b"modelIdentifier", flag, 1)
             new.writestr(name, content)
     return target
@@ -116,7 +153,12 @@ def test_a_closed_loop_has_its_poles_and_the_outputs_as_states():
     assert model.a == pytest.approx(a - 0.5 * b @ c[:1], abs=1e-9)
     assert model.b == pytest.approx(b, abs=1e-9)
     assert model.step == 0.1
-    alone = linearize(loop(0.5, block(a.tolist(), b.tolist(), c.tolist())), ["plant.u0"], ["plant"], components=["plant"])
+    alone = linearize(
+        loop(0.5, block(a.tolist(), b.tolist(), c.tolist())),
+        ["plant.u0"],
+        ["plant"],
+        components=["plant"],
+    )
     assert alone.a == pytest.approx(a, abs=1e-9)
 
 
@@ -147,7 +189,12 @@ def test_wrong_names_and_times_are_refused():
     scenario = loop(0.5, block([[1]], [[1]], [[1]]))
     for inputs, outputs, at, message in (
         (["plant.u1"], ["plant.y0"], None, 'inputs: "plant.u1"'),
-        (["plant.u0"], ["plant.y1"], None, r'outputs: no floating-point output "plant.y1".*"plant.y0"'),
+        (
+            ["plant.u0"],
+            ["plant.y1"],
+            None,
+            r'outputs: no floating-point output "plant.y1".*"plant.y0"',
+        ),
         (["plant.u0"], ["plant.y0"], 0.05, "at: time"),
         (["plant.u0"], ["plant.y0"], "soon", "at: expected a number"),
     ):
@@ -157,14 +204,20 @@ def test_wrong_names_and_times_are_refused():
 
 def test_a_delay_has_no_continuous_model():
     scenario = loop(0.5, block([[0]], [[1]], [[1]]))
-    with pytest.raises(cosim.InputError, match="no continuous model: the discrete model has a pole at"):
+    with pytest.raises(
+        cosim.InputError, match="no continuous model: the discrete model has a pole at"
+    ):
         linearize(scenario, ["plant.u0"], ["plant.y0"], continuous=True)
 
 
 def test_a_point_that_is_no_equilibrium_gives_a_hint():
-    """Equal rotor speeds turn the quadcopter, whose arms are not equal, so that its response changes while it is measured."""
+    """Equal rotor speeds turn the quadcopter, whose arms are not equal, so that its response
+    changes while it is measured.
+    """
     equal = {"quadcopter.rotor_speed": [360.0] * 4}
-    model = linearize(HOVER, ["quadcopter.rotor_speed"], ["quadcopter.position"], parameters=equal, duration=4)
+    model = linearize(
+        HOVER, ["quadcopter.rotor_speed"], ["quadcopter.position"], parameters=equal, duration=4
+    )
     assert any("no equilibrium" in note for note in model.notes)
 
 
@@ -174,22 +227,33 @@ class Tanks(StateSpace):
     def do_step(self, _time, step_size):
         """Advance the levels by Euler's method."""
         first, second = np.sqrt(self.x)
-        self.x = self.x + step_size * (self.u + np.array([-0.5 * first, 0.5 * first - 0.4 * second]))
+        self.x = self.x + step_size * (
+            self.u + np.array([-0.5 * first, 0.5 * first - 0.4 * second])
+        )
 
 
 def test_a_moving_operating_point_adds_no_states():
-    """The response differs from a linear one by products of the motion and the perturbation, which are no modes."""
+    """The response differs from a linear one by products of the motion and the perturbation, which
+    are no modes.
+    """
     unit = np.eye(2).tolist()
     tanks = {"python": Tanks, "arguments": {"a": unit, "b": unit, "c": unit, "x0": [1.0, 1.5625]}}
     scenario = {"name": "s", "stop_time": 1, "step_size": 0.1, "components": {"plant": tanks}}
-    moving = linearize(scenario, ["plant.u0", "plant.u1"], ["plant"], parameters={"plant.u0": 0.4999})
+    moving = linearize(
+        scenario, ["plant.u0", "plant.u1"], ["plant"], parameters={"plant.u0": 0.4999}
+    )
     assert list(moving.states) == ["plant.y0", "plant.y1"]
     assert moving.a == pytest.approx(np.array([[0.975, 0], [0.025, 0.984]]), abs=1e-4)
 
 
 def test_files_hold_the_matrices(tmp_path):
     a, b = [[0.5, 0.1], [0, 0.25]], [[0], [1]]
-    scenario = {"name": "s", "stop_time": 1, "step_size": 0.5, "components": {"plant": block(a, b, [[1, 0], [0, 1]])}}
+    scenario = {
+        "name": "s",
+        "stop_time": 1,
+        "step_size": 0.5,
+        "components": {"plant": block(a, b, [[1, 0], [0, 1]])},
+    }
     model = linearize(scenario, ["plant.u0"], ["plant"])
     for suffix in ("json", "csv", "mat"):
         model.write(tmp_path / f"model.{suffix}")
@@ -202,7 +266,14 @@ def test_files_hold_the_matrices(tmp_path):
     assert [each.item() for each in mat["states"].ravel()] == written["states"]
     rows = list(csv.reader((tmp_path / "model.csv").open()))
     assert rows[0] == ["", "plant.y0", "plant.y1", "plant.u0"]
-    assert [row[0] for row in rows[1:]] == ["plant.y0[k+1]", "plant.y1[k+1]", "plant.y0", "plant.y1"]
-    assert np.array(rows[1:], object)[:2, 1:].astype(float) == pytest.approx(np.hstack([model.a, model.b]))
+    assert [row[0] for row in rows[1:]] == [
+        "plant.y0[k+1]",
+        "plant.y1[k+1]",
+        "plant.y0",
+        "plant.y1",
+    ]
+    assert np.array(rows[1:], object)[:2, 1:].astype(float) == pytest.approx(
+        np.hstack([model.a, model.b])
+    )
     with pytest.raises(cosim.InputError, match=r"expected a file name with \.json, \.csv, \.mat"):
         model.write(tmp_path / "model.txt")

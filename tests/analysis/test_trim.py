@@ -24,7 +24,9 @@ def plant(**more):
 
 
 def test_the_input_that_holds_a_state_is_found():
-    """At x = 1, 0.5 = u0 + 2 u1 keeps the state, and the point with the smallest change of the inputs is not required."""
+    """At x = 1, 0.5 = u0 + 2 u1 keeps the state, and the point with the smallest change of the
+    inputs is not required.
+    """
     found = cosim.trim(plant(), ["plant.u0"], ["plant.y0"], parameters={"plant.u1": 0.1})
     assert found.is_found
     assert found.parameters["plant.u0"] == pytest.approx(0.3)
@@ -46,7 +48,9 @@ def test_contradictory_requirements_are_no_equilibrium():
 
 def test_a_climb_at_constant_speed_is_trimmed_by_initial_speed_and_rotors():
     free = ["quadcopter.rotor_speed", "quadcopter.initial.velocity_body.w"]
-    found = cosim.trim(HOVER, free, ["quadcopter.velocity", "quadcopter.rates"], {"quadcopter.velocity.z": 0.5})
+    found = cosim.trim(
+        HOVER, free, ["quadcopter.velocity", "quadcopter.rates"], {"quadcopter.velocity.z": 0.5}
+    )
     assert found.is_found
     assert found.parameters["quadcopter.initial.velocity_body.w"] == pytest.approx(0.5)
     with cosim.load(HOVER, found.parameters, stop_time=2) as simulation:
@@ -64,7 +68,10 @@ def test_the_shipped_example_hovers():
 def test_wrong_names_are_refused():
     for arguments, message in (
         ((["plant.u7"], ["plant.y0"]), 'no variable "u7"'),
-        ((["/components/plant/arguments/x1"], ["plant.y0"]), 'the scenario has no "/components/plant/arguments/x1"'),
+        (
+            (["/components/plant/arguments/x1"], ["plant.y0"]),
+            'the scenario has no "/components/plant/arguments/x1"',
+        ),
         (([], ["plant.y0"]), "expected at least one free value"),
     ):
         with pytest.raises(cosim.InputError, match=message):
@@ -74,7 +81,8 @@ def test_wrong_names_are_refused():
 def test_an_input_that_a_connection_feeds_is_refused():
     scenario = loop(0.5, block([[0.5]], [[1]], [[1]], x0=[1.0]))
     with pytest.raises(
-        cosim.InputError, match=r'free: "plant.u0" is fed by "controller.y0", expected an input without connection'
+        cosim.InputError,
+        match=r'free: "plant.u0" is fed by "controller.y0", expected an input without connection',
     ):
         cosim.trim(scenario, ["plant.u0"], ["plant.y0"])
 
@@ -90,7 +98,12 @@ def test_a_free_value_that_changes_no_residual_is_named():
 def test_the_command_writes_a_scenario_that_extends_the_given_one(tmp_path):
     file = tmp_path / "trimmed.json"
     equal = ["--set", "quadcopter.rotor_speed=[340, 340, 340, 340]"]
-    arguments = ["--free", "quadcopter.rotor_speed", "--steady", "quadcopter.velocity,quadcopter.rates"]
+    arguments = [
+        "--free",
+        "quadcopter.rotor_speed",
+        "--steady",
+        "quadcopter.velocity,quadcopter.rates",
+    ]
     done = run_cosim("trim", str(HOVER), *equal, *arguments, "--output", str(file), "--json")
     about = json.loads(done.stdout)
     assert about["found"] is True

@@ -16,7 +16,9 @@ def test_a_loop_of_ones_own_writes_a_folder_with_a_report(tmp_path: Path) -> Non
         while simulation.step():
             pass
         simulation.result.write(tmp_path / "run")
-    assert {"result.csv", "kpis.json", "run.json", "report.html"} <= {path.name for path in (tmp_path / "run").iterdir()}
+    assert {"result.csv", "kpis.json", "run.json", "report.html"} <= {
+        path.name for path in (tmp_path / "run").iterdir()
+    }
     written = cosim.Result.from_csv(tmp_path / "run/result.csv")
     assert written.signals() == simulation.result.signals()
     assert json.loads((tmp_path / "run/run.json").read_text())["name"] == "free_flight"

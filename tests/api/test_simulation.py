@@ -78,23 +78,33 @@ def test_what_is_set_acts_in_the_next_step(simulation):
 
 def test_arrays_and_ports_are_read_by_their_names(demo):
     assert len(demo.get("plant.uav.rotor_speed")) == 4
-    assert demo.get("uav.rotor_speed") == [demo.get(f"uav.mixer.rotor_speed[{i}]") for i in range(1, 5)]
+    assert demo.get("uav.rotor_speed") == [
+        demo.get(f"uav.mixer.rotor_speed[{i}]") for i in range(1, 5)
+    ]
     assert demo.get("usv.waypoint_x")[:2] == [pytest.approx(10 / 3)] * 2
     assert demo.get("plant.uav.contact.touching") is False
 
 
 def test_vectors_are_read_and_set_by_their_names(demo):
-    assert demo.get("plant.uav.position") == [demo.get(f"plant.uav.position.{axis}") for axis in "xyz"]
+    assert demo.get("plant.uav.position") == [
+        demo.get(f"plant.uav.position.{axis}") for axis in "xyz"
+    ]
     demo.set("plant.uav.external_force", np.array([0.5, 0.0, 0.25]))
     assert demo.get("plant.uav.external_force") == [0.5, 0.0, 0.25]
     assert 'has no variable "uav.deck"' in refusal(demo.get, "plant.uav.deck")
-    assert '"uav.external_force" takes 3 values, found 2' in refusal(demo.set, "plant.uav.external_force", [1.0, 2.0])
+    assert '"uav.external_force" takes 3 values, found 2' in refusal(
+        demo.set, "plant.uav.external_force", [1.0, 2.0]
+    )
 
 
 @pytest.mark.parametrize(
     ("name", "value", "reason"),
     [
-        ("plant.uav.rotor_speed", [1, 2, 3, 4], "is fed by a connection, it cannot be set during the simulation"),
+        (
+            "plant.uav.rotor_speed",
+            [1, 2, 3, 4],
+            "is fed by a connection, it cannot be set during the simulation",
+        ),
         ("plant.usv.external_force.y", "a", 'is of type Float64, found "a"'),
         ("plant.usv.external_force.w", 1.0, 'has no variable "usv.external_force.w"; did you mean'),
         ("plant.uav.position.z", 1.0, "is of causality output and cannot be set"),
@@ -111,7 +121,12 @@ def test_an_element_of_an_array_is_set_alone():
         "name": "route",
         "stop_time": 1,
         "step_size": 0.1,
-        "components": {"a": {"fmu": f"{ROOT}/fmus/fmi3/strider_autopilot.fmu", "parameters": {"waypoint_x[2]": 7.0}}},
+        "components": {
+            "a": {
+                "fmu": f"{ROOT}/fmus/fmi3/strider_autopilot.fmu",
+                "parameters": {"waypoint_x[2]": 7.0},
+            }
+        },
     }
     with cosim.load(route, {"a.waypoint_x[3]": 8.0}) as simulation:
         assert simulation.get("a.waypoint_x")[:4] == [0.0, 7.0, 8.0, 0.0]
@@ -120,7 +135,9 @@ def test_an_element_of_an_array_is_set_alone():
         assert "expected" not in refusal(simulation.set, "a.waypoint_x[33]", 1.0)
         assert "Float64" in refusal(simulation.set, "a.waypoint_x[1]", "far")
     event = {"time": 0.5, "set": {"a.waypoint_x[1]": 1.0}}
-    assert 'an event sets the whole array: expected a list for "waypoint_x"' in refusal(cosim.load, {**route, "events": [event]})
+    assert 'an event sets the whole array: expected a list for "waypoint_x"' in refusal(
+        cosim.load, {**route, "events": [event]}
+    )
 
 
 def test_fixed_parameters_belong_to_load_and_reset(simulation):
@@ -151,7 +168,9 @@ def test_a_saved_state_is_restored_as_often_as_needed(demo):
 
 def test_delays_belong_to_the_state():
     connection = {"from": "a.y", "to": "b.u", "delay": 3}
-    document = scenario(components={"a": {"python": Gain}, "b": {"python": Gain}}, connections=[connection])
+    document = scenario(
+        components={"a": {"python": Gain}, "b": {"python": Gain}}, connections=[connection]
+    )
     with cosim.load(document) as simulation:
         simulation.set("a.u", 1.0)
         simulation.step(5)
@@ -196,7 +215,10 @@ def test_the_process_stays_as_the_caller_left_it(simulation, caplog, tmp_path, m
     monkeypatch.chdir(tmp_path)
     simulation.step()
     assert Path.cwd() == tmp_path
-    assert caplog.text.count("g: changed the working directory of the process; it was changed back") == 2
+    assert (
+        caplog.text.count("g: changed the working directory of the process; it was changed back")
+        == 2
+    )
 
 
 def test_after_a_failure_only_the_rows_are_left(simulation):
@@ -243,7 +265,9 @@ def test_components_of_a_forgotten_simulation_are_freed():
 def test_an_observer_cannot_step(simulation):
     lines = []
     simulation.run([lambda *_: lines.append(refusal(simulation.step))])
-    assert set(lines) == {"the simulation is stepping; a component or an observer cannot step or change it meanwhile"}
+    assert set(lines) == {
+        "the simulation is stepping; a component or an observer cannot step or change it meanwhile"
+    }
 
 
 def test_several_simulations_in_several_threads_do_not_disturb_each_other():
@@ -258,7 +282,9 @@ def test_several_simulations_in_several_threads_do_not_disturb_each_other():
         thread.start()
     for thread in threads:
         thread.join()
-    first, *others = (simulation.result["plant.uav.position.z"].tobytes() for simulation in simulations)
+    first, *others = (
+        simulation.result["plant.uav.position.z"].tobytes() for simulation in simulations
+    )
     assert all(other == first for other in others)
     for simulation in simulations:
         simulation.close()
@@ -279,9 +305,13 @@ def test_a_fork_leaves_the_simulation_to_its_parent(tmp_path):
         "if os.fork() == 0:\n    del simulation; sys.exit(0)\n"
         "os.wait(); print(len(simulation.run().time)); simulation.close()\n"
     )
-    done = subprocess.run([sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=tmp_path, capture_output=True, text=True, check=False
+    )
     assert (done.stdout.strip(), done.returncode) == ("101", 0), done.stderr
 
 
 def test_a_prefix_is_named_as_such(demo):
-    assert '"plant.uav" is a prefix, expected a variable such as "plant.uav.' in refusal(demo.get, "plant.uav")
+    assert '"plant.uav" is a prefix, expected a variable such as "plant.uav.' in refusal(
+        demo.get, "plant.uav"
+    )

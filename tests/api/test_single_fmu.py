@@ -13,7 +13,9 @@ START = {"waypoint_count": 1, "waypoint_x": [10.0], "waypoint_y": [0.0], "speed_
 
 
 def simulate(**options):
-    return cosim.simulate(AUTOPILOT, **{"stop_time": 2, "step_size": "1/10", "start_values": START, **options})
+    return cosim.simulate(
+        AUTOPILOT, **{"stop_time": 2, "step_size": "1/10", "start_values": START, **options}
+    )
 
 
 def test_outputs_are_recorded_by_their_names():
@@ -29,9 +31,13 @@ def test_inputs_come_from_a_file_a_dict_or_an_array(tmp_path):
     table["time"], table["vehicle.position.y"] = INPUT.values()
     (tmp_path / "input.csv").write_text("time,vehicle.position.y\n0,0\n2,4\n")
     given = [INPUT, table, tmp_path / "input.csv"]
-    results = [simulate(input=each, output=["rudder_angle", "vehicle.position.y"]) for each in given]
+    results = [
+        simulate(input=each, output=["rudder_angle", "vehicle.position.y"]) for each in given
+    ]
     assert results[0]["rudder_angle"][-1] != simulate()["rudder_angle"][-1]
-    assert results[0]["vehicle.position.y"][-2] == pytest.approx(3.6)  # of the step that ended there
+    assert results[0]["vehicle.position.y"][-2] == pytest.approx(
+        3.6
+    )  # of the step that ended there
     assert len({result["rudder_angle"].tobytes() for result in results}) == 1
 
 
@@ -44,8 +50,14 @@ def test_isolation_gives_the_same_bytes():
     [
         ({"output": ["trust"]}, 'output: the FMU has no variable "trust"; did you mean "thrust"?'),
         ({"output": 3}, "output: expected a list of names; found 3 (int)"),
-        ({"input": 3}, 'input: expected a CSV file, or columns by name with a column "time"; found 3 (int)'),
-        ({"input": {"time": [0], "vehicle.position.w": [0]}}, 'input: the FMU has no input "vehicle.position.w"; did you mean'),
+        (
+            {"input": 3},
+            'input: expected a CSV file, or columns by name with a column "time"; found 3 (int)',
+        ),
+        (
+            {"input": {"time": [0], "vehicle.position.w": [0]}},
+            'input: the FMU has no input "vehicle.position.w"; did you mean',
+        ),
         (
             {"input": {**INPUT, "time": [1, 0]}},
             "input: expected columns of equal length with finite numbers",

@@ -14,7 +14,13 @@ SWEEP = {
     "name": "speeds",
     "scenario": "free_flight",
     "settings": {"/stop_time": 0.5},
-    "factors": [{"name": "speed", "set": "/components/vessel_control/parameters/speed_command", "values": [0.5, 1.0]}],
+    "factors": [
+        {
+            "name": "speed",
+            "set": "/components/vessel_control/parameters/speed_command",
+            "values": [0.5, 1.0],
+        }
+    ],
 }
 BLOCKS = Path(__file__).parents[1] / "support/python_blocks.py"
 END = {"name": "end", "python": "cosim.kpis:final", "arguments": {"signal": "g.y"}}
@@ -41,7 +47,9 @@ def test_a_result_is_compared_with_the_reference_of_a_scenario(short):
 
 
 def test_a_scenario_is_regressed(tmp_path):
-    document = json.loads((SCENARIOS / "free_flight.json").read_text().replace('"../', f'"{SCENARIOS.parent}/'))
+    document = json.loads(
+        (SCENARIOS / "free_flight.json").read_text().replace('"../', f'"{SCENARIOS.parent}/')
+    )
     short = {
         **document,
         "stop_time": 0.5,
@@ -50,7 +58,9 @@ def test_a_scenario_is_regressed(tmp_path):
     }
     (tmp_path / "regressed.json").write_text(json.dumps({**short, "name": "short"}))
     for update in (True, False):
-        (outcome,) = cosim.regress(tmp_path / "regressed.json", update=update, output_dir=tmp_path / "runs")
+        (outcome,) = cosim.regress(
+            tmp_path / "regressed.json", update=update, output_dir=tmp_path / "runs"
+        )
         assert (outcome.code, outcome.name) == (0, "regressed"), outcome.details
 
 
@@ -60,7 +70,11 @@ def test_a_sweep_and_a_tuning_run(tmp_path):
     (tmp_path / "base.json").write_text(json.dumps(base))
     common = {"name": "gains", "scenario": str(tmp_path / "base.json"), "settings": {"g.u": 1.0}}
     success = [{"kpi": "end.value", "max": 5}]
-    swept = {**common, "factors": [{"name": "k", "set": "g.k", "values": [1.0, 3.0]}], "success": success}
+    swept = {
+        **common,
+        "factors": [{"name": "k", "set": "g.k", "values": [1.0, 3.0]}],
+        "success": success,
+    }
     for _ in range(2):
         found = cosim.sweep(swept, output_dir=tmp_path / "sweep", workers=1)
         assert found.success_rate == 0.5
@@ -72,7 +86,9 @@ def test_a_sweep_and_a_tuning_run(tmp_path):
         "minimize": "abs(end.value - 4)",
         "method": {"kind": "powell", "evaluations": 15},
     }
-    assert cosim.tune(tuned, output_dir=tmp_path / "tune", workers=1).best.parameters["k"] == pytest.approx(2, rel=0.01)
+    assert cosim.tune(tuned, output_dir=tmp_path / "tune", workers=1).best.parameters[
+        "k"
+    ] == pytest.approx(2, rel=0.01)
 
 
 @pytest.mark.parametrize("function", [cosim.sweep, cosim.tune, cosim.worst_case])
@@ -84,7 +100,9 @@ def test_a_study_of_a_wrong_type_is_refused(function):
 
 
 def test_seeds_of_a_sweep_default_to_those_of_the_scenario(tmp_path):
-    text = json.dumps({**scenario(str(tmp_path / "gain.py") + ":Gain"), "seeds": ["/components/g/arguments"]})
+    text = json.dumps(
+        {**scenario(str(tmp_path / "gain.py") + ":Gain"), "seeds": ["/components/g/arguments"]}
+    )
     (tmp_path / "base.json").write_text(text)
     (tmp_path / "gain.py").write_text("from python_blocks import Gain\n")
     sweep = {"name": "seeds", "scenario": str(tmp_path / "base.json"), "seeds": {"count": 2}}
@@ -92,5 +110,7 @@ def test_seeds_of_a_sweep_default_to_those_of_the_scenario(tmp_path):
 
     assert Sweep.from_file(sweep).study_file.spec.seeds.set == ["/components/g/arguments"]
     without = {**sweep, "scenario": "free_flight"}
-    with pytest.raises(cosim.InputError, match='the key "set" is missing, and the scenario has no "seeds"'):
+    with pytest.raises(
+        cosim.InputError, match='the key "set" is missing, and the scenario has no "seeds"'
+    ):
         Sweep.from_file(without)

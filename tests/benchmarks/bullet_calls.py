@@ -1,4 +1,6 @@
-"""The PyBullet calls of a mission: recorded during a run, replayed without plant, controllers and importer."""
+"""The PyBullet calls of a mission: recorded during a run, replayed without plant, controllers and
+importer.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +27,9 @@ class BulletCall(NamedTuple):
 
 @dataclass(frozen=True)
 class BulletCalls:
-    """All calls of a mission; calls `first` to `last` belong to the stepping loop, which has `steps` macro steps."""
+    """All calls of a mission; calls `first` to `last` belong to the stepping loop, which has
+    `steps` macro steps.
+    """
 
     calls: Sequence[BulletCall]
     first: int
@@ -33,8 +37,14 @@ class BulletCalls:
     steps: int
 
     def replay(self) -> float:
-        """Repeat all calls, check that the results are equal, and return the CPU time (us) of the loop per macro step."""
-        begin, loop, end = self.calls[: self.first], self.calls[self.first : self.last], self.calls[self.last :]
+        """Repeat all calls, check that the results are equal, and return the CPU time (us) of the
+        loop per macro step.
+        """
+        begin, loop, end = (
+            self.calls[: self.first],
+            self.calls[self.first : self.last],
+            self.calls[self.last :],
+        )
         _execute(begin)
         start = process_time()
         results = _execute(loop)

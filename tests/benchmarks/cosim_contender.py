@@ -18,13 +18,23 @@ STEP = Fraction(1, 100)
 
 
 def ring_system(fmu: Path, size: int) -> System:
-    """Return a ring of `size` instances in one stage (Jacobi): the outputs of each feed the inputs of the next."""
+    """Return a ring of `size` instances in one stage (Jacobi): the outputs of each feed the inputs
+    of the next.
+    """
     file = FmuFile(fmu)
     names = [f"s{i}" for i in range(size)]
-    inputs = [variable.name for variable in file.description.variables if variable.causality == "input"]
+    inputs = [
+        variable.name for variable in file.description.variables if variable.causality == "input"
+    ]
     pairs = zip(names, [*names[1:], *names[:1]], strict=True)
-    connections = [Connection(Endpoint(a, f"y{name[1:]}"), Endpoint(b, name)) for a, b in pairs for name in inputs]
-    return System({name: create_component(file, name) for name in names}, connections, (tuple(names),))
+    connections = [
+        Connection(Endpoint(a, f"y{name[1:]}"), Endpoint(b, name))
+        for a, b in pairs
+        for name in inputs
+    ]
+    return System(
+        {name: create_component(file, name) for name in names}, connections, (tuple(names),)
+    )
 
 
 def single_fmu_system(fmu: Path) -> System:
@@ -32,19 +42,27 @@ def single_fmu_system(fmu: Path) -> System:
     return System({"s0": create_component(FmuFile(fmu), "s0")}, (), (("s0",),))
 
 
-def cpu_per_step(system: System, steps: int, recorded: Sequence[str], executor: ExecutorKind) -> float:
+def cpu_per_step(
+    system: System, steps: int, recorded: Sequence[str], executor: ExecutorKind
+) -> float:
     """Return the CPU time (us) per macro step."""
     return measure_run(system, steps, recorded, executor).cpu
 
 
-def measure_run(system: System, steps: int, recorded: Sequence[str], executor: ExecutorKind) -> Stopwatch:
+def measure_run(
+    system: System, steps: int, recorded: Sequence[str], executor: ExecutorKind
+) -> Stopwatch:
     """Simulate once and return the times; a ring of lags must stay at 1 exactly."""
     columns = {name: Endpoint(*name.split(".")) for name in recorded}
     watch = Stopwatch()
-    run = simulate(system, Settings(Fraction(0), steps * STEP, STEP, columns, executor=executor), [watch])
+    run = simulate(
+        system, Settings(Fraction(0), steps * STEP, STEP, columns, executor=executor), [watch]
+    )
     if run.failure:
         raise run.failure
-    assert not system.connections or all(values[-1] == 1.0 for values in run.recording.columns.values())
+    assert not system.connections or all(
+        values[-1] == 1.0 for values in run.recording.columns.values()
+    )
     return watch
 
 

@@ -1,4 +1,6 @@
-"""Costs of contenders, measured alternately, so that other load of the machine affects all of them equally."""
+"""Costs of contenders, measured alternately, so that other load of the machine affects all of them
+equally.
+"""
 
 from __future__ import annotations
 
@@ -28,13 +30,19 @@ def measure_rounds(contenders: Mapping[str, Cost], rounds: int = ROUNDS) -> list
     costs = [{name: cost() for name, cost in contenders.items()} for _ in range(rounds)]
     first = next(iter(contenders))
     return [
-        MedianCost(name, median(row[name] for row in costs), median(row[name] / row[first] for row in costs))
+        MedianCost(
+            name,
+            median(row[name] for row in costs),
+            median(row[name] / row[first] for row in costs),
+        )
         for name in contenders
     ]
 
 
 def print_heading(title: str, unit: str = "CPU us per step") -> None:
-    print(f"\n{title}: median of {ROUNDS} alternating rounds, load average {os.getloadavg()[0]:.2f}")
+    print(
+        f"\n{title}: median of {ROUNDS} alternating rounds, load average {os.getloadavg()[0]:.2f}"
+    )
     print(f"  {'workload':24}{'contender':28}{unit:>16}{'ratio':>9}")
 
 
@@ -46,7 +54,9 @@ def print_rows(workload: str, rows: list[MedianCost]) -> dict[str, float]:
 
 
 class Stopwatch:
-    """Observer of a run that measures CPU time (of all threads) and wall time of the stepping loop (us per step)."""
+    """Observer of a run that measures CPU time (of all threads) and wall time of the stepping loop
+    (us per step).
+    """
 
     def __init__(self) -> None:
         self._samples: list[tuple[int, float, float]] = []

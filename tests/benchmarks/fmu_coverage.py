@@ -1,12 +1,14 @@
 """Table of the FMUs in a folder that cosim and other importers simulate with all defaults.
 
-    python tests/benchmarks/fmu_coverage.py FOLDER [--environments DIR] [--only NAME ...] [--time-limit SECONDS]
+    python tests/benchmarks/fmu_coverage.py FOLDER [--environments DIR] [--only NAME ...]
+    [--time-limit SECONDS]
         [--document FILE] [--json FILE]
 
-Tries each *.fmu below FOLDER in a process of its own with each importer, from the start to the stop time of its default
-experiment. An importer counts as successful if it reaches the stop time. Creates a virtual environment for each other importer
-below DIR, unless it exists. `--document` replaces the table between the marks `fmus` of that file (docs/interoperability.md).
-The FMUs contain foreign code, which runs with the rights of this process.
+Tries each *.fmu below FOLDER in a process of its own with each importer, from the start to the stop
+time of its default experiment. An importer counts as successful if it reaches the stop time.
+Creates a virtual environment for each other importer below DIR, unless it exists. `--document`
+replaces the table between the marks `fmus` of that file (docs/interoperability.md). The FMUs
+contain foreign code, which runs with the rights of this process.
 """
 
 from __future__ import annotations
@@ -38,7 +40,12 @@ PEERS: Mapping[str, tuple[str, Sequence[str]]] = {
     "Ecos": ("try_ecos.py", ["ecospy", "tbb"]),
     "libcosim": ("try_libcosim.py", ["libcosimpy"]),
 }
-_PLATFORMS = {"linux64": "linux64", "x86_64-linux": "linux64", "win64": "win64", "x86_64-windows": "win64"}
+_PLATFORMS = {
+    "linux64": "linux64",
+    "x86_64-linux": "linux64",
+    "win64": "win64",
+    "x86_64-windows": "win64",
+}
 
 
 @dataclass(frozen=True)
@@ -80,14 +87,18 @@ def read_subject(path: Path, folder: Path) -> Subject:
     version = root.get("fmiVersion", "?")
     tool = root.get("generationTool", "-").split(" (")[0][:32]
     kinds = _kinds(root, version)
-    return Subject(path, str(path.relative_to(folder)), version, kinds, tool, _binary(names), start, stop, step)
+    return Subject(
+        path, str(path.relative_to(folder)), version, kinds, tool, _binary(names), start, stop, step
+    )
 
 
 def _kinds(root: ElementTree.Element, version: str) -> str:
     if version.startswith("1"):
         implementation = root.find("Implementation")
         return (
-            "ME" if implementation is None else ("CS" if implementation.find("CoSimulation_StandAlone") is not None else "tool")
+            "ME"
+            if implementation is None
+            else ("CS" if implementation.find("CoSimulation_StandAlone") is not None else "tool")
         )
     kinds = {"CoSimulation": "CS", "ModelExchange": "ME", "ScheduledExecution": "SE"}
     return "+".join(short for name, short in kinds.items() if root.find(name) is not None)
@@ -104,7 +115,9 @@ def _binary(names: Sequence[str]) -> str:
 
 
 def attempt(command: Sequence[str | Path], time_limit: float) -> Attempt:
-    """Run an importer in a process group and a temporary folder of its own; it fails after `time_limit` (s, wall time)."""
+    """Run an importer in a process group and a temporary folder of its own; it fails after
+    `time_limit` (s, wall time).
+    """
     with tempfile.TemporaryDirectory() as folder:
         process = subprocess.Popen(
             [*map(str, command)],
@@ -126,20 +139,30 @@ def attempt(command: Sequence[str | Path], time_limit: float) -> Attempt:
     return Attempt(process.returncode == 0, last_line(messages))
 
 
-def importer_commands(subject: Subject, interpreters: Mapping[str, Path]) -> dict[str, list[str | Path]]:
+def importer_commands(
+    subject: Subject, interpreters: Mapping[str, Path]
+) -> dict[str, list[str | Path]]:
     """Return the command of each importer for an FMU."""
     times = [repr(subject.start), repr(subject.stop), repr(subject.step)]
     own: list[str | Path] = [sys.executable, "-m", "cosim", "simulate", subject.path]
-    return {"cosim": own} | {n: [python, DRIVERS / PEERS[n][0], subject.path, *times] for n, python in interpreters.items()}
+    return {"cosim": own} | {
+        n: [python, DRIVERS / PEERS[n][0], subject.path, *times]
+        for n, python in interpreters.items()
+    }
 
 
 def table(rows: Sequence[tuple[Subject, Mapping[str, Attempt]]]) -> list[str]:
     """Return the lines of a Markdown table with a row per FMU."""
     names = list(rows[0][1])
-    lines = ["| FMU | tool | FMI | kinds | binary | " + " | ".join(names) + " |", "|---" * (5 + len(names)) + "|"]
+    lines = [
+        "| FMU | tool | FMI | kinds | binary | " + " | ".join(names) + " |",
+        "|---" * (5 + len(names)) + "|",
+    ]
     for subject, attempts in rows:
         cells = ["yes" if a.reached_end else "no" for a in attempts.values()]
-        lines.append(f"| {' | '.join([subject.label, subject.tool, subject.version, subject.kinds, subject.binary, *cells])} |")
+        lines.append(
+            f"| {' | '.join([subject.label, subject.tool, subject.version, subject.kinds, subject.binary, *cells])} |"
+        )
     return lines
 
 
@@ -147,35 +170,74 @@ def summary(rows: Sequence[tuple[Subject, Mapping[str, Attempt]]]) -> list[str]:
     """Return the lines of a Markdown table with the number of successes by FMI version and kinds."""
     names = list(rows[0][1])
     totals = Counter((s.version[:1], s.kinds, s.binary) for s, _ in rows)
-    reached = Counter((s.version[:1], s.kinds, s.binary, n) for s, attempts in rows for n, a in attempts.items() if a.reached_end)
-    lines = ["| FMI | kinds | binary | FMUs | " + " | ".join(names) + " |", "|---" * (4 + len(names)) + "|"]
+    reached = Counter(
+        (s.version[:1], s.kinds, s.binary, n)
+        for s, attempts in rows
+        for n, a in attempts.items()
+        if a.reached_end
+    )
+    lines = [
+        "| FMI | kinds | binary | FMUs | " + " | ".join(names) + " |",
+        "|---" * (4 + len(names)) + "|",
+    ]
     for key, total in sorted(totals.items()):
-        lines.append(f"| {' | '.join([*key, str(total), *(str(reached[*key, name]) for name in names)])} |")
+        lines.append(
+            f"| {' | '.join([*key, str(total), *(str(reached[*key, name]) for name in names)])} |"
+        )
     return lines
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("folder", type=Path)
     parser.add_argument("--environments", type=Path, default=Path.home() / ".cache/cosim-peers")
-    parser.add_argument("--only", nargs="*", default=list(PEERS), metavar="NAME", help=f"of {', '.join(PEERS)}")
-    parser.add_argument("--time-limit", type=float, default=60.0, metavar="SECONDS", help="for one FMU and one importer")
+    parser.add_argument(
+        "--only", nargs="*", default=list(PEERS), metavar="NAME", help=f"of {', '.join(PEERS)}"
+    )
+    parser.add_argument(
+        "--time-limit",
+        type=float,
+        default=60.0,
+        metavar="SECONDS",
+        help="for one FMU and one importer",
+    )
     parser.add_argument("--document", type=Path)
-    parser.add_argument("--json", type=Path, help="file for all outcomes; if it exists, those of the other importers are kept")
+    parser.add_argument(
+        "--json",
+        type=Path,
+        help="file for all outcomes; if it exists, those of the other importers are kept",
+    )
     arguments = parser.parse_args()
-    pythons = {name: environment(arguments.environments / PEERS[name][1][0], PEERS[name][1]) for name in arguments.only}
-    known = json.loads(arguments.json.read_text()) if arguments.json and arguments.json.exists() else {}
+    pythons = {
+        name: environment(arguments.environments / PEERS[name][1][0], PEERS[name][1])
+        for name in arguments.only
+    }
+    known = (
+        json.loads(arguments.json.read_text()) if arguments.json and arguments.json.exists() else {}
+    )
     rows: list[tuple[Subject, dict[str, Attempt]]] = []
     if find_wine():
         prepare_wine()  # the first use takes a minute or two
     for path in sorted(arguments.folder.rglob("*.fmu")):
         subject = read_subject(path.resolve(), arguments.folder.resolve())
-        earlier = {name: Attempt(*known[subject.label][name]) for name in pythons if name in known.get(subject.label, {})}
+        earlier = {
+            name: Attempt(*known[subject.label][name])
+            for name in pythons
+            if name in known.get(subject.label, {})
+        }
         commands = importer_commands(subject, pythons)
-        attempts = {name: earlier.get(name) or attempt(command, arguments.time_limit) for name, command in commands.items()}
+        attempts = {
+            name: earlier.get(name) or attempt(command, arguments.time_limit)
+            for name, command in commands.items()
+        }
         rows.append((subject, attempts))
         print(
-            subject.label, *("+" if a.reached_end else "-" for a in attempts.values()), attempts["cosim"].reason[:150], flush=True
+            subject.label,
+            *("+" if a.reached_end else "-" for a in attempts.values()),
+            attempts["cosim"].reason[:150],
+            flush=True,
         )
         if arguments.json:
             known[subject.label] = _as_json(subject, attempts)

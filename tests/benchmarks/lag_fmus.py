@@ -1,4 +1,6 @@
-"""The FMUs of the benchmarks: near-empty first-order lags (programs/lag.h), the same for every importer and the C limit."""
+"""The FMUs of the benchmarks: near-empty first-order lags (programs/lag.h), the same for every
+importer and the C limit.
+"""
 
 from __future__ import annotations
 
@@ -21,13 +23,22 @@ def lag_fmu(folder: Path, fmi_version: int = 2, width: int = 1) -> Path:
     """
     identifier = f"Lag{width}"
     source = f"lag{fmi_version}.c"
-    sources = fmi_headers(fmi_version) | {name: (PROGRAMS / name).read_bytes() for name in (source, "lag.h")}
+    sources = fmi_headers(fmi_version) | {
+        name: (PROGRAMS / name).read_bytes() for name in (source, "lag.h")
+    }
     sources["width.c"] = f'#define WIDTH {width}\n#include "{source}"\n'.encode()
     numbers = range(1, width + 1)
-    variables = [*(_variable(f"u{i}", "input") for i in numbers), *(_variable(f"y{i}", "output") for i in numbers)]
+    variables = [
+        *(_variable(f"u{i}", "input") for i in numbers),
+        *(_variable(f"y{i}", "output") for i in numbers),
+    ]
     block = Block(identifier, "a benchmark", variables, 0.01, {})
     token = content_token(sources[name] for name in sorted(sources))
-    files = {"modelDescription.xml": _without_dependencies(model_description_xml(block, fmi_version, token, ["width.c"]))}
+    files = {
+        "modelDescription.xml": _without_dependencies(
+            model_description_xml(block, fmi_version, token, ["width.c"])
+        )
+    }
     files |= compile_binary(identifier, fmi_version, sources, ["width.c"])
     return write_archive(files, folder / f"{identifier}_fmi{fmi_version}.fmu")
 

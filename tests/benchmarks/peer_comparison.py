@@ -1,10 +1,12 @@
-"""Comparison of cosim, its peers and the C limit: one ring of near-empty FMUs, measured alternately, in one table.
+"""Comparison of cosim, its peers and the C limit: one ring of near-empty FMUs, measured
+alternately, in one table.
 
-    python tests/benchmarks/peer_comparison.py FOLDER [--sizes 2 8 32 128] [--rounds 5] [--only NAME ...] [--document FILE]
+    python tests/benchmarks/peer_comparison.py FOLDER [--sizes 2 8 32 128] [--rounds 5] [--only NAME
+    ...] [--document FILE]
 
-Creates a virtual environment for each peer below FOLDER; this happens once and needs pip, a C compiler and a minute or two. A
-peer that cannot be installed or fails is omitted, with the reason. `--document` replaces the table between the marks of that
-file (docs/performance.md).
+Creates a virtual environment for each peer below FOLDER; this happens once and needs pip, a C
+compiler and a minute or two. A peer that cannot be installed or fails is omitted, with the reason.
+`--document` replaces the table between the marks of that file (docs/performance.md).
 """
 
 from __future__ import annotations
@@ -38,7 +40,9 @@ LIMIT = "C limit"
 
 @dataclass(frozen=True)
 class Peer:
-    """A driver in peers/ and its requirements; it makes `budget` / instances steps, but at least `fewest`."""
+    """A driver in peers/ and its requirements; it makes `budget` / instances steps, but at least
+    `fewest`.
+    """
 
     driver: str
     requirements: Sequence[str]
@@ -80,7 +84,9 @@ Contender = Callable[[int], Cost]
 
 
 def run_c_limit(limit: CLimit, ring: bool = True) -> Contender:
-    """Return a contender that steps with the program of the C limit; without `ring` the FMU contains the whole ring."""
+    """Return a contender that steps with the program of the C limit; without `ring` the FMU
+    contains the whole ring.
+    """
 
     def run(size: int) -> Cost:
         cpu, last = limit.run(size if ring else 1, max(500, 1_000_000 // size), ring=ring)
@@ -111,9 +117,13 @@ def run_packed(python: Path, peer: Peer, fmu: Path, folder: Path) -> Contender:
 
 
 def driver_output(python: Path, peer: Peer, *arguments: object) -> str:
-    """Return the last line of a driver's output. Raises SubprocessError if it fails or exceeds the time limit."""
+    """Return the last line of a driver's output. Raises SubprocessError if it fails or exceeds the
+    time limit.
+    """
     command = [python, DRIVERS / peer.driver, *arguments]
-    done = subprocess.run([*map(str, command)], capture_output=True, text=True, timeout=TIME_LIMIT, check=True)
+    done = subprocess.run(
+        [*map(str, command)], capture_output=True, text=True, timeout=TIME_LIMIT, check=True
+    )
     return last_line(done.stdout)
 
 
@@ -158,7 +168,10 @@ class Comparison:
                 if not costs or not isnan(costs[-1].cpu):
                     costs.append(self._cost(name, size))
         print(f"ring {size}: done", file=sys.stderr, flush=True)
-        return {name: costs[-1] if isnan(costs[-1].cpu) else median_cost(costs) for name, costs in found.items()}
+        return {
+            name: costs[-1] if isnan(costs[-1].cpu) else median_cost(costs)
+            for name, costs in found.items()
+        }
 
     def _cost(self, name: str, size: int) -> Cost:
         try:
@@ -169,7 +182,9 @@ class Comparison:
 
 
 def median_cost(costs: Sequence[Cost]) -> Cost:
-    return Cost(*(median(getattr(cost, field) for cost in costs) for field in ("cpu", "wall", "last")))
+    return Cost(
+        *(median(getattr(cost, field) for cost in costs) for field in ("cpu", "wall", "last"))
+    )
 
 
 def failure_reason(error: subprocess.SubprocessError) -> str:
@@ -179,14 +194,20 @@ def failure_reason(error: subprocess.SubprocessError) -> str:
 
 
 def table(medians: Mapping[int, Mapping[str, Cost]], versions: Mapping[str, str]) -> list[str]:
-    """Return the lines of a Markdown table: CPU time (us) per step and, in brackets, the ratio to the C limit."""
-    lines = ["| contender | " + " | ".join(f"ring {size}" for size in medians) + " | y after the run |"]
+    """Return the lines of a Markdown table: CPU time (us) per step and, in brackets, the ratio to
+    the C limit.
+    """
+    lines = [
+        "| contender | " + " | ".join(f"ring {size}" for size in medians) + " | y after the run |"
+    ]
     lines.append("|---" * (len(medians) + 2) + "|")
     smallest = medians[min(medians)]
     for name, cost in smallest.items():
         label = f"{name} ({versions[name]})" if name in versions else name
         cells = [_cell(costs[name], costs[LIMIT]) for costs in medians.values()]
-        lines.append(f"| {label} | {' | '.join(cells)} | {'-' if isnan(cost.last) else f'{cost.last:.6g}'} |")
+        lines.append(
+            f"| {label} | {' | '.join(cells)} | {'-' if isnan(cost.last) else f'{cost.last:.6g}'} |"
+        )
     return lines
 
 
@@ -205,30 +226,50 @@ def report(comparison: Comparison, sizes: Sequence[int], rounds: int) -> str:
     """Return the table with a description of machine and load."""
     load = os.getloadavg()[0]
     lines = table({size: comparison.measure(size, rounds) for size in sizes}, comparison.versions)
-    lines += ["", "Each cell contains CPU microseconds per macro step, and in parentheses the ratio to the C limit "]
+    lines += [
+        "",
+        (
+            "Each cell contains CPU microseconds per macro step, and in parentheses the ratio to "
+            "the C limit "
+        ),
+    ]
     lines[-1] += f"(median of {rounds} alternating rounds)."
     machine = f"CPython {platform.python_version()} on {os.cpu_count()} processors"
-    lines += [f"{machine}; load average {load:.2f} at the start, {os.getloadavg()[0]:.2f} at the end."]
+    lines += [
+        f"{machine}; load average {load:.2f} at the start, {os.getloadavg()[0]:.2f} at the end."
+    ]
     if comparison.absent:
-        lines += ["", *(f"* Not measured: {name}: {why}." for name, why in comparison.absent.items())]
+        lines += [
+            "",
+            *(f"* Not measured: {name}: {why}." for name, why in comparison.absent.items()),
+        ]
     return "\n".join(lines)
 
 
 def write_into(document: Path, text: str, mark: str = "peers") -> None:
     """Replace the text between `<!-- MARK -->` and `<!-- /MARK -->`."""
     old = document.read_text()
-    new, count = re.subn(rf"(<!-- {mark} -->\n).*?(<!-- /{mark} -->)", lambda m: f"{m[1]}{text}\n{m[2]}", old, flags=re.DOTALL)
+    new, count = re.subn(
+        rf"(<!-- {mark} -->\n).*?(<!-- /{mark} -->)",
+        lambda m: f"{m[1]}{text}\n{m[2]}",
+        old,
+        flags=re.DOTALL,
+    )
     if not count:
         raise SystemExit(f"{document} has no <!-- {mark} --> and <!-- /{mark} -->")
     document.write_text(new)
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("folder", type=Path)
     parser.add_argument("--sizes", type=int, nargs="+", default=[2, 8, 32, 128])
     parser.add_argument("--rounds", type=int, default=5)
-    parser.add_argument("--only", nargs="*", default=list(PEERS), metavar="NAME", help=f"of {', '.join(PEERS)}")
+    parser.add_argument(
+        "--only", nargs="*", default=list(PEERS), metavar="NAME", help=f"of {', '.join(PEERS)}"
+    )
     parser.add_argument("--document", type=Path)
     arguments = parser.parse_args()
     with tempfile.TemporaryDirectory() as folder:

@@ -22,7 +22,9 @@ _CLASSES = {
 }
 
 
-def plain_loop(path: Path, interface: str, times: Sequence[float], step: float, names: Sequence[str]) -> dict[str, np.ndarray]:
+def plain_loop(
+    path: Path, interface: str, times: Sequence[float], step: float, names: Sequence[str]
+) -> dict[str, np.ndarray]:
     """Simulate an FMU by Co-Simulation, or by Model Exchange with Euler's method.
 
     Args:
@@ -40,7 +42,10 @@ def plain_loop(path: Path, interface: str, times: Sequence[float], step: float, 
     kind = description.coSimulation if interface == "co-simulation" else description.modelExchange
     version = description.fmiVersion[0]
     fmu = _CLASSES[version, interface](
-        guid=description.guid, unzipDirectory=folder, modelIdentifier=kind.modelIdentifier, instanceName="plain"
+        guid=description.guid,
+        unzipDirectory=folder,
+        modelIdentifier=kind.modelIdentifier,
+        instanceName="plain",
     )
     variables = {v.name: v for v in description.modelVariables}
     fmu.instantiate()
@@ -55,7 +60,9 @@ def plain_loop(path: Path, interface: str, times: Sequence[float], step: float, 
         record()
         for time in times[:-1]:
             try:
-                fmu.doStep(currentCommunicationPoint=time, communicationStepSize=round(distance, 12))
+                fmu.doStep(
+                    currentCommunicationPoint=time, communicationStepSize=round(distance, 12)
+                )
             except fmi1.FMICallException as error:
                 if error.status != 2:  # discard: the FMU ends the simulation
                     raise
@@ -77,11 +84,19 @@ def plain_loop(path: Path, interface: str, times: Sequence[float], step: float, 
     fmu.terminate()
     fmu.freeInstance()
     shutil.rmtree(folder, ignore_errors=True)
-    return {name: np.array(column) for name, column in zip(names, zip(*rows, strict=True), strict=True)}
+    return {
+        name: np.array(column) for name, column in zip(names, zip(*rows, strict=True), strict=True)
+    }
 
 
 def _get(fmu: Any, version: str, variable: Any) -> Any:
-    kind = variable.type if variable.type != "Enumeration" else "Int64" if version == "3" else "Integer"
+    kind = (
+        variable.type
+        if variable.type != "Enumeration"
+        else "Int64"
+        if version == "3"
+        else "Integer"
+    )
     value = getattr(fmu, f"get{kind}")([variable.valueReference])[0]
     return value.decode() if isinstance(value, bytes) and kind == "String" else value
 
@@ -111,7 +126,10 @@ class _Model:
         self.states = description.numberOfContinuousStates
         self.indicators = description.numberOfEventIndicators
         if version == "3":
-            self.states, self.indicators = fmu.getNumberOfContinuousStates(), fmu.getNumberOfEventIndicators()
+            self.states, self.indicators = (
+                fmu.getNumberOfContinuousStates(),
+                fmu.getNumberOfEventIndicators(),
+            )
         self._update()
         self.signs = self._signs()
 
@@ -122,7 +140,11 @@ class _Model:
                 converged, _, _, self.has_ended, has_next, time = self.fmu.eventUpdate()
                 again = not converged
             else:
-                update = self.fmu.newDiscreteStates if self.version == "2" else self.fmu.updateDiscreteStates
+                update = (
+                    self.fmu.newDiscreteStates
+                    if self.version == "2"
+                    else self.fmu.updateDiscreteStates
+                )
                 again, self.has_ended, _, _, has_next, time = update()
             self.next_event = time if has_next else math.inf
         if self.version != "1" and not self.has_ended:
@@ -139,7 +161,10 @@ class _Model:
 
     def step(self, size: float, end: float) -> bool:
         """Make one step to `end` (s); return whether the simulation goes on."""
-        derivatives = self._vector("getContinuousStateDerivatives" if self.version == "3" else "getDerivatives", self.states)
+        derivatives = self._vector(
+            "getContinuousStateDerivatives" if self.version == "3" else "getDerivatives",
+            self.states,
+        )
         states = self._vector("getContinuousStates", self.states)
         self.fmu.setTime(end)
         if self.states:

@@ -2,9 +2,9 @@
 
     python tests/benchmarks/reference_fmus.py FOLDER RESULTS
 
-FOLDER contains FMUs, in any subfolders; RESULTS contains NAME_out.csv as published by the FMI project. Each FMU is simulated from
-the first to the last time of its results by each of its interfaces: Co-Simulation, and Model Exchange with Euler and with CVODE.
-The largest differences are
+FOLDER contains FMUs, in any subfolders; RESULTS contains NAME_out.csv as published by the FMI
+project. Each FMU is simulated from the first to the last time of its results by each of its
+interfaces: Co-Simulation, and Model Exchange with Euler and with CVODE. The largest differences are
 
     published   to the results, including the times of the rows,
     plain       to a loop of calls through FMPy with the same steps (Co-Simulation and Euler),
@@ -30,22 +30,38 @@ from cosim.components.fmi import FmuFile
 from cosim.core.errors import ComponentError, InputError
 from cosim.results.csv_files import read_csv
 
-#: internal steps (s) of the published results, where those of the FMU's default experiment are missing or differ
+#: internal steps (s) of the published results, where those of the FMU's default experiment are
+#: missing or differ
 INTERNAL_STEPS = {"BouncingBall": 1e-3, "StateSpace": 1e-3}
 #: names of the signals, and their exact solution at increasing times (s)
 EXACT: Mapping[str, tuple[Sequence[str], Callable[[np.ndarray], np.ndarray]]] = {
     "Dahlquist": (["x"], lambda time: np.exp(-time)[None]),
-    "VanDerPol": (["x0", "x1"], lambda time: _integrate(lambda _, x: [x[1], (1 - x[0] ** 2) * x[1] - x[0]], [2.0, 0.0], time)),
-    "StateSpace": (["y[1]", "y[2]", "y[3]"], lambda time: np.exp(time) * np.array([[1.0], [2.0], [3.0]])),
+    "VanDerPol": (
+        ["x0", "x1"],
+        lambda time: _integrate(
+            lambda _, x: [x[1], (1 - x[0] ** 2) * x[1] - x[0]], [2.0, 0.0], time
+        ),
+    ),
+    "StateSpace": (
+        ["y[1]", "y[2]", "y[3]"],
+        lambda time: np.exp(time) * np.array([[1.0], [2.0], [3.0]]),
+    ),
     "BouncingBall": (["h"], lambda time: np.array([_ball_height(float(t)) for t in time])[None]),
 }
 #: methods by interface; None: Co-Simulation
-METHODS: Mapping[str, tuple[Any, ...]] = {"co-simulation": (None,), "model-exchange": ("euler", "cvode")}
+METHODS: Mapping[str, tuple[Any, ...]] = {
+    "co-simulation": (None,),
+    "model-exchange": ("euler", "cvode"),
+}
 
 
-def _integrate(derivatives: Callable[[float, Any], Any], start: Sequence[float], time: np.ndarray) -> np.ndarray:
+def _integrate(
+    derivatives: Callable[[float, Any], Any], start: Sequence[float], time: np.ndarray
+) -> np.ndarray:
     """Return a reference solution with tight tolerance."""
-    solution = solve_ivp(derivatives, (time[0], time[-1]), start, "DOP853", time, rtol=1e-12, atol=1e-12)
+    solution = solve_ivp(
+        derivatives, (time[0], time[-1]), start, "DOP853", time, rtol=1e-12, atol=1e-12
+    )
     return np.asarray(solution.y)
 
 
@@ -63,14 +79,18 @@ def _ball_height(time: float, gravity: float = 9.81, restitution: float = 0.7) -
 
 
 def subjects(folder: Path, results: Path) -> Iterator[tuple[Path, Path]]:
-    """Yield the FMUs that have published results, with these results; those of Roberts are a copy of BouncingBall's."""
+    """Yield the FMUs that have published results, with these results; those of Roberts are a copy
+    of BouncingBall's.
+    """
     for path in sorted(folder.rglob("*.fmu")):
         if path.stem != "Roberts" and (results / f"{path.stem}_out.csv").exists():
             yield path, results / f"{path.stem}_out.csv"
 
 
 def read_published(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
-    """Return the times and the columns of published results; the elements of an array are separated by spaces."""
+    """Return the times and the columns of published results; the elements of an array are separated
+    by spaces.
+    """
     recording = read_csv(path)
     columns = {}
     for name, values in recording.columns.items():
@@ -83,18 +103,29 @@ def read_published(path: Path) -> tuple[np.ndarray, dict[str, np.ndarray]]:
 
 
 def largest_difference(found: Mapping[str, Any], expected: Mapping[str, np.ndarray]) -> float:
-    """Return the largest difference of the columns that both have; infinite if texts differ or rows are missing."""
+    """Return the largest difference of the columns that both have; infinite if texts differ or rows
+    are missing.
+    """
     largest = 0.0
     for name in (name for name in expected if name in found):
         values, others = np.asarray(found[name]), np.asarray(expected[name])
         if len(values) != len(others):
             return np.inf
         if values.dtype.kind not in "biuf":
-            texts, other_texts = ([v.hex() if isinstance(v, bytes) else str(v) for v in column] for column in (values, others))
+            texts, other_texts = (
+                [v.hex() if isinstance(v, bytes) else str(v) for v in column]
+                for column in (values, others)
+            )
             largest = largest if texts == other_texts else np.inf
         else:
-            words = [str(v).lower() in ("true", "1") for v in others] if others.dtype == object else others
-            largest = max(largest, float(np.max(np.abs(np.asarray(words, float) - values.astype(float)))))
+            words = (
+                [str(v).lower() in ("true", "1") for v in others]
+                if others.dtype == object
+                else others
+            )
+            largest = max(
+                largest, float(np.max(np.abs(np.asarray(words, float) - values.astype(float))))
+            )
     return largest
 
 
@@ -117,14 +148,18 @@ def compare(path: Path, published: Path, interface: str, method: Any) -> str:
     except (InputError, ComponentError) as error:
         return f"failed: {error}"
     found = {name: result[name] for name in result}
-    cells = [f"{largest_difference(found | {'time': result.time.round(12)}, expected | {'time': time.round(12)}):.2g}"]
+    cells = [
+        f"{largest_difference(found | {'time': result.time.round(12)}, expected | {'time': time.round(12)}):.2g}"
+    ]
     if method != "cvode" and not any("[" in name for name in found):  # the plain loop has no arrays
         plain = plain_loop(path, interface, [float(t) for t in result.time], internal, list(found))
         cells.append(f"{largest_difference(found, plain):.2g}")
     cells += ["-"] * (2 - len(cells))
     signals, solution = EXACT.get(path.stem, ([], None))
     if method == "cvode" and solution:
-        cells.append(f"{largest_difference(found, dict(zip(signals, solution(result.time), strict=True))):.2g}")
+        cells.append(
+            f"{largest_difference(found, dict(zip(signals, solution(result.time), strict=True))):.2g}"
+        )
     return " | ".join([*cells, *["-"] * (3 - len(cells))])
 
 
@@ -133,7 +168,9 @@ def _scalars(path: Path) -> set[str]:
 
 
 def main() -> None:
-    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
     parser.add_argument("folder", type=Path)
     parser.add_argument("results", type=Path)
     arguments = parser.parse_args()
@@ -144,7 +181,10 @@ def main() -> None:
             for method in METHODS[interface]:
                 cells = compare(path, published, interface, method)
                 print(
-                    f"| {path.relative_to(arguments.folder)} | {description.fmi_version} | {method or 'CS'} | {cells} |",
+                    (
+                        f"| {path.relative_to(arguments.folder)} | {description.fmi_version} | "
+                        f"{method or 'CS'} | {cells} |"
+                    ),
                     flush=True,
                 )
 

@@ -31,14 +31,25 @@ def test_importer_and_c_limit_step_the_same_ring(version, tmp_path):
     fmu = lag_fmu(tmp_path, version, width=3)
     assert CLimit(fmu, tmp_path)(4, 100, width=3, recorded=12) > 0
     for executor in executors():
-        assert cpu_per_step(ring_system(fmu, 4), 100, [f"s{i}.y{j}" for i in range(4) for j in (1, 2, 3)], executor) > 0
+        assert (
+            cpu_per_step(
+                ring_system(fmu, 4),
+                100,
+                [f"s{i}.y{j}" for i in range(4) for j in (1, 2, 3)],
+                executor,
+            )
+            > 0
+        )
 
 
 def test_recorded_bullet_calls_can_be_replayed():
     """The replay checks that every call returns the same result."""
     calls = record_calls(lambda: load("demo1_box", stop_time=2.0))
     assert calls.steps == 200
-    assert {call.function.__name__ for call in calls.calls[calls.first : calls.last]} >= {"stepSimulation", "resetBaseVelocity"}
+    assert {call.function.__name__ for call in calls.calls[calls.first : calls.last]} >= {
+        "stepSimulation",
+        "resetBaseVelocity",
+    }
     assert calls.replay() > 0
 
 

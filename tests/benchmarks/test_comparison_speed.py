@@ -18,7 +18,9 @@ pytestmark = pytest.mark.benchmark
 def waves(signals, rows, delay=0.0, noise=0.0):
     time, rng = np.arange(rows) / 100, np.random.default_rng(1)
     columns = {
-        f"s{i}": np.sin((1 + i / 10) * np.maximum(time - delay - 1, 0)) + noise * rng.uniform(-1, 1, rows) for i in range(signals)
+        f"s{i}": np.sin((1 + i / 10) * np.maximum(time - delay - 1, 0))
+        + noise * rng.uniform(-1, 1, rows)
+        for i in range(signals)
     }
     return Result(Recording(time, columns, dict.fromkeys(columns, "")))
 

@@ -1,4 +1,5 @@
-"""Ring of N near-empty FMUs, Jacobi: 3 N FMI calls per macro step, whose cost is mostly the importer's.
+"""Ring of N near-empty FMUs, Jacobi: 3 N FMI calls per macro step, whose cost is mostly the
+importer's.
 
 Run with: pytest -m benchmark -n 0 -s tests/benchmarks/test_fmu_ring.py
 """
@@ -28,11 +29,15 @@ def test_ring(version, recorded, tmp_path):
     print_heading(f"ring of FMI {version}.0 FMUs, {recorded} recorded")
     for size in SIZES:
         names = [f"s{i}.y1" for i in range(1 if recorded == "one signal" else size)]
-        contenders = {"C limit": lambda size=size, names=names: limit(size, BUDGETS["native"] // size, recorded=len(names))}
+        contenders = {
+            "C limit": lambda size=size, names=names: limit(
+                size, BUDGETS["native"] // size, recorded=len(names)
+            )
+        }
         for executor in choices:
             steps = max(200, BUDGETS[executor] // size)
-            contenders[executor_label(executor)] = lambda s=size, n=steps, r=names, e=executor: cpu_per_step(
-                ring_system(fmu, s), n, r, e
+            contenders[executor_label(executor)] = lambda s=size, n=steps, r=names, e=executor: (
+                cpu_per_step(ring_system(fmu, s), n, r, e)
             )
         ratios = print_rows(f"ring {size}", measure_rounds(contenders))
         assert all(ratio < LARGEST_RATIO[name] for name, ratio in ratios.items())

@@ -38,11 +38,18 @@ def lags(fmu: Path, size: int, isolation: Isolation | None) -> System:
     """Return a system of `size` unconnected FMUs with 16 inputs and 16 outputs each."""
     file = FmuFile(fmu)
     names = [f"s{i}" for i in range(size)]
-    return System({name: create_component(file, name, isolation=isolation) for name in names}, (), (tuple(names),))
+    return System(
+        {name: create_component(file, name, isolation=isolation) for name in names},
+        (),
+        (tuple(names),),
+    )
 
 
 def run(
-    system: System, steps: int, executor: ExecutorKind, observer: Callable[[int, int], None] | None = None
+    system: System,
+    steps: int,
+    executor: ExecutorKind,
+    observer: Callable[[int, int], None] | None = None,
 ) -> SimulationOutcome:
     columns = {"y": Endpoint("s0", "y1")}
     settings = Settings(Fraction(0), steps * STEP, STEP, columns, executor=executor)
@@ -52,7 +59,9 @@ def run(
 
 
 def microseconds(run_to: Callable[[int], object]) -> float:
-    """Return the wall time (us) of one step: the median over batches; `run_to(n)` runs until step n."""
+    """Return the wall time (us) of one step: the median over batches; `run_to(n)` runs until step
+    n.
+    """
     durations = []
     for n in range(BATCH, STEPS + 1, BATCH):
         start = perf_counter()
@@ -64,7 +73,9 @@ def microseconds(run_to: Callable[[int], object]) -> float:
 def per_step(fmu: Path, isolation: Isolation | None, kind: ExecutorKind) -> float:
     """Return the wall time (us) of a macro step of one FMU."""
     system = lags(fmu, 1, isolation)
-    plan = compile_plan(system, Settings(Fraction(0), STEPS * STEP, STEP, {"y": Endpoint("s0", "y1")}))
+    plan = compile_plan(
+        system, Settings(Fraction(0), STEPS * STEP, STEP, {"y": Endpoint("s0", "y1")})
+    )
     executor = executor_class(kind)(plan, Recorder(plan))
     try:
         instantiate_components(plan)
@@ -75,7 +86,9 @@ def per_step(fmu: Path, isolation: Isolation | None, kind: ExecutorKind) -> floa
 
 
 def round_trip() -> float:
-    """Return the wall time (us) of one line to a bare child process and back, which is the lower bound."""
+    """Return the wall time (us) of one line to a bare child process and back, which is the lower
+    bound.
+    """
     requests, answers = os.pipe(), os.pipe()
     child = os.fork()
     if child == 0:
@@ -83,7 +96,9 @@ def round_trip() -> float:
         while line := os.read(requests[0], 100):
             os.write(answers[1], line)
         os._exit(0)
-    cost = microseconds(lambda _n: [(os.write(requests[1], b"\n"), os.read(answers[0], 100)) for _ in range(BATCH)])
+    cost = microseconds(
+        lambda _n: [(os.write(requests[1], b"\n"), os.read(answers[0], 100)) for _ in range(BATCH)]
+    )
     for descriptor in (*requests, *answers):
         os.close(descriptor)
     os.waitpid(child, 0)
@@ -93,16 +108,25 @@ def round_trip() -> float:
 @pytest.mark.parametrize("version", [2, 3], ids=["fmi2", "fmi3"])
 def test_steps(version, tmp_path):
     fmu = lag_fmu(tmp_path, version, WIDTH)
-    print_heading(f"one FMI {version}.0 FMU, {WIDTH} inputs and outputs, {STEPS} steps", "median us per step")
+    print_heading(
+        f"one FMI {version}.0 FMU, {WIDTH} inputs and outputs, {STEPS} steps", "median us per step"
+    )
     for executor in executors():
-        rounds = [(per_step(fmu, None, executor), per_step(fmu, Isolation(), executor), round_trip()) for _ in range(ROUNDS)]
+        rounds = [
+            (per_step(fmu, None, executor), per_step(fmu, Isolation(), executor), round_trip())
+            for _ in range(ROUNDS)
+        ]
         in_process, isolated, bare = (median(column) for column in zip(*rounds, strict=True))
         additional = median(isolated - in_process for in_process, isolated, _ in rounds)
         print(
             f"  {executor:12} in process {in_process:.2f}, isolated {isolated:.2f},"
-            f" additional {additional:.2f} (documented {DOCUMENTED_STEP}); two bare processes {bare:.2f}"
+            f" additional {additional:.2f} (documented {DOCUMENTED_STEP}); two bare processes "
+            f"{bare:.2f}"
         )
-        assert median((isolated - in_process) / bare for in_process, isolated, bare in rounds) < LARGEST_RATIO
+        assert (
+            median((isolated - in_process) / bare for in_process, isolated, bare in rounds)
+            < LARGEST_RATIO
+        )
 
 
 def test_starts(tmp_path):
@@ -110,8 +134,15 @@ def test_starts(tmp_path):
     print_heading(f"to extract, load and instantiate {STARTS} instances of one FMU", "ms each")
     run(lags(fmu, 1, Isolation()), 1, "auto")  # imports
     costs = {}
-    for name, isolation in (("in process", None), ("isolated", Isolation()), ("sandbox", Isolation(sandbox=True))):
-        rounds = [run(lags(fmu, STARTS, isolation), 1, "auto").timing["instantiate_seconds"] for _ in range(ROUNDS)]
+    for name, isolation in (
+        ("in process", None),
+        ("isolated", Isolation()),
+        ("sandbox", Isolation(sandbox=True)),
+    ):
+        rounds = [
+            run(lags(fmu, STARTS, isolation), 1, "auto").timing["instantiate_seconds"]
+            for _ in range(ROUNDS)
+        ]
         costs[name] = median(rounds) / STARTS * 1e3
         print(f"  {name:12} {costs[name]:.2f} (documented {DOCUMENTED_START})")
     assert costs["sandbox"] < LOAD_FACTOR * DOCUMENTED_START
@@ -120,7 +151,9 @@ def test_starts(tmp_path):
 def own_memory(process: str) -> int:
     """Return the private memory of a process (bytes)."""
     text = Path(f"/proc/{process}/smaps_rollup").read_text()
-    return sum(1024 * int(size) for size in re.findall(r"^Private_\w+: +(\d+) kB", text, re.MULTILINE))
+    return sum(
+        1024 * int(size) for size in re.findall(r"^Private_\w+: +(\d+) kB", text, re.MULTILINE)
+    )
 
 
 def test_memory(tmp_path):

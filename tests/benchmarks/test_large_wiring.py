@@ -16,14 +16,22 @@ from lag_fmus import lag_fmu
 import cosim
 
 FMUS, CONNECTIONS = 1000, 10_000
-PARTS = ("parse_seconds", "instantiate_seconds", "wiring_seconds", "initialize_seconds", "loop_seconds")
+PARTS = (
+    "parse_seconds",
+    "instantiate_seconds",
+    "wiring_seconds",
+    "initialize_seconds",
+    "loop_seconds",
+)
 #: required limit (s) for wiring; parsing, extraction and instantiation are only reported
 LONGEST_WIRING = 5.0
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(1800)]
 
 
 def ring(fmu: Path, size: int, stages: list[list[str]], width: int) -> dict[str, Any]:
-    """Return a scenario in which each of `size` instances feeds `width` inputs of the next one by single connections."""
+    """Return a scenario in which each of `size` instances feeds `width` inputs of the next one by
+    single connections.
+    """
     names = [f"s{i}" for i in range(size)]
     return {
         "name": "large",
@@ -45,9 +53,13 @@ def test_wiring(size, order, tmp_path):
     width = CONNECTIONS // size
     stages = [[f"s{i}"] for i in range(size)] if order == "a stage each" else []
     scenario = tmp_path / "large.json"
-    scenario.write_text(json.dumps(ring(lag_fmu(tmp_path, width=width), size, stages, width), indent=1))
+    scenario.write_text(
+        json.dumps(ring(lag_fmu(tmp_path, width=width), size, stages, width), indent=1)
+    )
     timing = cosim.run(scenario).timing
-    print(f"\n{size} FMUs, {CONNECTIONS} connections, {order}, load average {os.getloadavg()[0]:.2f}")
+    print(
+        f"\n{size} FMUs, {CONNECTIONS} connections, {order}, load average {os.getloadavg()[0]:.2f}"
+    )
     for part in PARTS:
         print(f"  {part:24}{timing[part]:8.3f} s")
     assert timing["wiring_seconds"] < LONGEST_WIRING

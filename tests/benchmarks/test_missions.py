@@ -1,4 +1,5 @@
-"""Missions: Demo 1 compared with its PyBullet calls, a flight of FMUs only, several pairs of vehicles.
+"""Missions: Demo 1 compared with its PyBullet calls, a flight of FMUs only, several pairs of
+vehicles.
 
 Run with: pytest -m benchmark -n 0 -s tests/benchmarks/test_missions.py
 """
@@ -33,7 +34,9 @@ def step_cost(scenario: str | Path, executor: ExecutorKind, **changes: Any) -> f
     """Return the CPU time (us) per macro step of the stepping loop of one run."""
     prepared = load(scenario)
     watch = Stopwatch()
-    run = simulate(prepared.system, replace(prepared.settings, executor=executor, **changes), [watch])
+    run = simulate(
+        prepared.system, replace(prepared.settings, executor=executor, **changes), [watch]
+    )
     if run.failure:
         raise run.failure
     return watch.cpu
@@ -41,19 +44,33 @@ def step_cost(scenario: str | Path, executor: ExecutorKind, **changes: Any) -> f
 
 def contenders_of(scenario: str | Path) -> dict[str, Callable[[], float]]:
     """Return the contenders of a mission: every executor, and the first one without recording."""
-    contenders = {executor_label(executor): lambda e=executor: step_cost(scenario, e) for executor in executors()}
-    return contenders | {"cosim, nothing recorded": lambda: step_cost(scenario, executors()[0], columns={})}
+    contenders = {
+        executor_label(executor): lambda e=executor: step_cost(scenario, e)
+        for executor in executors()
+    }
+    return contenders | {
+        "cosim, nothing recorded": lambda: step_cost(scenario, executors()[0], columns={})
+    }
 
 
 def test_demo1_compared_with_its_pybullet_calls(monkeypatch):
-    """The reference steps Bullet in every step; the second row contains only the calls that the plant makes."""
+    """The reference steps Bullet in every step; the second row contains only the calls that the
+    plant makes.
+    """
     actual = record_calls(lambda: load("demo1_box"))
-    (clearance,) = (module for name, module in sys.modules.items() if name.endswith("plant_src.physics.clearance"))
+    (clearance,) = (
+        module
+        for name, module in sys.modules.items()
+        if name.endswith("plant_src.physics.clearance")
+    )
     monkeypatch.setattr(clearance, "NEAR_DISTANCE", 1e9)
     in_every_step = record_calls(lambda: load("demo1_box"))
     monkeypatch.undo()
     print_heading("demo1_box, 40 s")
-    references = {"PyBullet in every step": in_every_step.replay, "actual PyBullet calls": actual.replay}
+    references = {
+        "PyBullet in every step": in_every_step.replay,
+        "actual PyBullet calls": actual.replay,
+    }
     ratios = print_rows("demo1_box", measure_rounds({**references, **contenders_of("demo1_box")}))
     assert max(ratios.values()) < LARGEST_RATIO
 
@@ -71,14 +88,21 @@ def test_pairs_of_vehicles(tmp_path):
         scenario.write_text(json.dumps(with_pairs(pairs)))
         calls = record_calls(lambda scenario=scenario: load(scenario))
         contenders = {"PyBullet calls only": calls.replay}
-        contenders |= {executor_label(executor): lambda s=scenario, e=executor: step_cost(s, e) for executor in executors()}
-        assert max(print_rows(f"pairs: {pairs}", measure_rounds(contenders)).values()) < LARGEST_RATIO
+        contenders |= {
+            executor_label(executor): lambda s=scenario, e=executor: step_cost(s, e)
+            for executor in executors()
+        }
+        assert (
+            max(print_rows(f"pairs: {pairs}", measure_rounds(contenders)).values()) < LARGEST_RATIO
+        )
 
 
 def with_pairs(count: int) -> dict[str, Any]:
     """Return Demo 1 with `count` pairs of vehicles, each with its own box."""
     text = (SCENARIOS / "demo1_box.json").read_text()
-    demo = json.loads(text.replace('"../', f'"{SCENARIOS.parent}/').replace('"systems/', f'"{SCENARIOS}/systems/'))
+    demo = json.loads(
+        text.replace('"../', f'"{SCENARIOS.parent}/').replace('"systems/', f'"{SCENARIOS}/systems/')
+    )
     plant, uav, usv = (demo["components"][name] for name in ("plant", "uav", "usv"))
     vehicles, platforms = plant["arguments"]["vehicles"], plant["arguments"]["platforms"]
     components: dict[str, Any] = {"plant": plant}
@@ -86,16 +110,29 @@ def with_pairs(count: int) -> dict[str, Any]:
     plant["arguments"] |= {"vehicles": {}, "platforms": {}}
     for i in range(count):
         east = i * DISTANCE
-        plant["arguments"]["vehicles"] |= {f"{name}{i}": _moved(spec, east) for name, spec in vehicles.items()}
-        plant["arguments"]["platforms"] |= {f"{name}{i}": _moved(spec, east) for name, spec in platforms.items()}
+        plant["arguments"]["vehicles"] |= {
+            f"{name}{i}": _moved(spec, east) for name, spec in vehicles.items()
+        }
+        plant["arguments"]["platforms"] |= {
+            f"{name}{i}": _moved(spec, east) for name, spec in platforms.items()
+        }
         waypoints = [x + east for x in usv["parameters"]["waypoint_x"]]
         components[f"uav{i}"] = uav
         components[f"usv{i}"] = usv | {"parameters": usv["parameters"] | {"waypoint_x": waypoints}}
-        connections += [{end: _renamed(name, i) for end, name in connection.items()} for connection in demo["connections"]]
+        connections += [
+            {end: _renamed(name, i) for end, name in connection.items()}
+            for connection in demo["connections"]
+        ]
     stages = [[name for name in components if name != "plant"], ["plant"]]
     times = {key: demo[key] for key in ("start_time", "stop_time", "step_size")}
     algorithm = {"kind": "staged", "stages": stages}
-    return {"name": "pairs", **times, "components": components, "connections": connections, "algorithm": algorithm}
+    return {
+        "name": "pairs",
+        **times,
+        "components": components,
+        "connections": connections,
+        "algorithm": algorithm,
+    }
 
 
 def _moved(spec: dict[str, Any], east: float) -> dict[str, Any]:

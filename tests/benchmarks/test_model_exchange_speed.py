@@ -33,7 +33,10 @@ DESCRIPTION = """<?xml version="1.0" encoding="UTF-8"?>
 </ModelVariables>
 <ModelStructure><Outputs><Unknown index="2"/></Outputs><Derivatives><Unknown index="3"/></Derivatives></ModelStructure>
 </fmiModelDescription>"""
-pytestmark = [pytest.mark.benchmark, pytest.mark.skipif(not native_available(), reason="the native executor was not built")]
+pytestmark = [
+    pytest.mark.benchmark,
+    pytest.mark.skipif(not native_available(), reason="the native executor was not built"),
+]
 
 
 def build(folder):
@@ -54,11 +57,15 @@ def test_an_fmu_at_fixed_step_size(tmp_path):
     fmu, library, program = build(tmp_path)
 
     def loop():
-        done = subprocess.run([program, library, str(STEPS)], capture_output=True, text=True, check=True)
+        done = subprocess.run(
+            [program, library, str(STEPS)], capture_output=True, text=True, check=True
+        )
         return float(done.stdout.split()[0])
 
     def cosim():
-        component = create_component(FmuFile(fmu), "s0", InstanceSettings(solver=SolverSettings("euler")))
+        component = create_component(
+            FmuFile(fmu), "s0", InstanceSettings(solver=SolverSettings("euler"))
+        )
         return cpu_per_step(System({"s0": component}, (), (("s0",),)), STEPS, ["s0.y1"], "native")
 
     print_heading(f"one Model Exchange FMU, Euler's method, {STEPS} steps, one signal recorded")

@@ -24,7 +24,9 @@ def test_one_fmu(version, tmp_path):
     limit = CLimit(fmu, tmp_path)
     contenders = {"C limit": lambda: limit(1, STEPS, ring=False)}
     for executor in executors():
-        contenders[executor_label(executor)] = lambda e=executor: cpu_per_step(single_fmu_system(fmu), STEPS, ["s0.y1"], e)
+        contenders[executor_label(executor)] = lambda e=executor: cpu_per_step(
+            single_fmu_system(fmu), STEPS, ["s0.y1"], e
+        )
     print_heading(f"one FMI {version}.0 FMU, {STEPS} steps, one signal recorded")
     assert max(print_rows("one FMU", measure_rounds(contenders)).values()) < LARGEST_RATIO
 
@@ -32,8 +34,15 @@ def test_one_fmu(version, tmp_path):
 def test_wide_fmus(tmp_path):
     fmu = lag_fmu(tmp_path, width=WIDTH)
     limit = CLimit(fmu, tmp_path)
-    print_heading(f"ring of 2 FMUs, {WIDTH} connections from each to the other, one signal recorded")
+    print_heading(
+        f"ring of 2 FMUs, {WIDTH} connections from each to the other, one signal recorded"
+    )
     contenders = {"C limit": lambda: limit(2, 20_000, width=WIDTH)}
     for executor in executors():
-        contenders[executor_label(executor)] = lambda e=executor: cpu_per_step(ring_system(fmu, 2), 5_000, ["s0.y1"], e)
-    assert max(print_rows(f"{WIDTH} inputs, outputs", measure_rounds(contenders)).values()) < LARGEST_RATIO
+        contenders[executor_label(executor)] = lambda e=executor: cpu_per_step(
+            ring_system(fmu, 2), 5_000, ["s0.y1"], e
+        )
+    assert (
+        max(print_rows(f"{WIDTH} inputs, outputs", measure_rounds(contenders)).values())
+        < LARGEST_RATIO
+    )

@@ -1,4 +1,5 @@
-"""Cost of the plant per step of 10 ms: one pair in calm and in weather, in flight and landed, and many pairs.
+"""Cost of the plant per step of 10 ms: one pair in calm and in weather, in flight and landed, and
+many pairs.
 
 Run with: pytest -m benchmark -n 0 -s tests/benchmarks/test_plant_speed.py
 """
@@ -29,7 +30,11 @@ HOVER = 364.0  # rad/s
 FLYING, LANDED = 5.0, 0.3249  # height of the quadcopter (m)
 ABOVE_WAVES = 0.55  # from which it drops onto a deck in waves (m)
 WEATHER = {"seed": 7, "sea_state": 3, "wind": {"speed": 5.0, "turbulence": {}}}
-DRAG = {f"{part}_drag.{axis}": value for part, value in (("rotor", 5e-5), ("body", 0.02)) for axis in "xyz"}
+DRAG = {
+    f"{part}_drag.{axis}": value
+    for part, value in (("rotor", 5e-5), ("body", 0.02))
+    for axis in "xyz"
+}
 #: largest cost of one pair per step (us) on an idle machine
 LIMITS = {
     "planar, in flight": 20.0,
@@ -53,7 +58,12 @@ def pairs(count: int, height: float, **vessel: Any) -> dict[str, Any]:
 class BoundWorld:
     """A world that is bound to arrays and stepped like by the engine."""
 
-    def __init__(self, vehicles: Mapping[str, Any], environment: Mapping[str, Any] | None = None, speed: float = 0.0):
+    def __init__(
+        self,
+        vehicles: Mapping[str, Any],
+        environment: Mapping[str, Any] | None = None,
+        speed: float = 0.0,
+    ):
         self.world = World("plant", vehicles, {}, environment)
         ports = [self._ports(causality) for causality in ("input", "output")]
         self.world.bind(*ports)
@@ -67,16 +77,27 @@ class BoundWorld:
         (self.call,) = self.world.prepare_step_calls(self.current_time, STEP)
 
     def _ports(self, causality: str) -> Ports:
-        variables = [variable for variable in self.world.variables if variable.causality == causality]
+        variables = [
+            variable for variable in self.world.variables if variable.causality == causality
+        ]
         dtypes = dict.fromkeys(variable.dtype for variable in variables)
         return Ports(
             variables,
-            {dtype: np.zeros(sum(len(v.scalar_names) for v in variables if v.dtype == dtype), dtype) for dtype in dtypes},
+            {
+                dtype: np.zeros(
+                    sum(len(v.scalar_names) for v in variables if v.dtype == dtype), dtype
+                )
+                for dtype in dtypes
+            },
         )
 
     def run(self, steps: int) -> float:
         """Return the CPU time (us) per step."""
-        function, arguments, current_time = self.call.function, self.call.arguments, self.current_time
+        function, arguments, current_time = (
+            self.call.function,
+            self.call.arguments,
+            self.current_time,
+        )
         start = process_time()
         for _ in range(steps):
             function(*arguments)
@@ -119,7 +140,9 @@ def test_one_pair() -> None:
     print_rows("one pair", rows)
     for row in rows:
         if row.name in LIMITS:
-            print(f"  {row.name}: {row.cost:.1f} us, limit on an idle machine {LIMITS[row.name]:g} us")
+            print(
+                f"  {row.name}: {row.cost:.1f} us, limit on an idle machine {LIMITS[row.name]:g} us"
+            )
     ratios = {row.name: row.cost / rows[1].cost for row in rows}
     assert ratios["planar, in flight"] < 1
     assert ratios["planar, landed"] < 2.5
@@ -127,7 +150,9 @@ def test_one_pair() -> None:
 
 
 def raw(count: int, height: float) -> Callable[[], float]:
-    """Return the cost of PyBullet with the same bodies: read and push every vehicle, step, get contacts."""
+    """Return the cost of PyBullet with the same bodies: read and push every vehicle, step, get
+    contacts.
+    """
     world = World("plant", pairs(count, height))
     client, bodies = world._client, world._fleet.bodies
     pybullet.setPhysicsEngineParameter(fixedTimeStep=STEP, physicsClientId=client)
@@ -138,7 +163,9 @@ def raw(count: int, height: float) -> Callable[[], float]:
         for body, force in upward_forces.items():
             position, _ = pybullet.getBasePositionAndOrientation(body, client)
             pybullet.getBaseVelocity(body, client)
-            pybullet.applyExternalForce(body, -1, (0, 0, force), position, pybullet.WORLD_FRAME, client)
+            pybullet.applyExternalForce(
+                body, -1, (0, 0, force), position, pybullet.WORLD_FRAME, client
+            )
             pybullet.applyExternalTorque(body, -1, (0, 0, 0), pybullet.WORLD_FRAME, client)
         pybullet.stepSimulation(client)
         pybullet.getContactPoints(physicsClientId=client)
@@ -165,7 +192,9 @@ def test_many_pairs(height: float) -> None:
     print_heading(f"N planar pairs, {'in flight' if height == FLYING else 'landed'}")
     costs: dict[int, MedianCost] = {}
     for count in PAIRS:
-        rows = measure_rounds({"PyBullet alone": raw(count, height), "plant": many(count, height)}, rounds=3)
+        rows = measure_rounds(
+            {"PyBullet alone": raw(count, height), "plant": many(count, height)}, rounds=3
+        )
         print_rows(f"pairs: {count}", rows)
         costs[count] = rows[1]
     per_pair = {count: row.cost / count for count, row in costs.items()}
@@ -180,7 +209,9 @@ def test_many_pairs_in_weather() -> None:
     for count in (1, 4, 16, 64):
         bound = BoundWorld(pairs(count, FLYING, motion="6dof"), WEATHER, HOVER)
         bound.run(20)
-        (row,) = measure_rounds({"plant": lambda b=bound, n=count: b.run(max(20, 400 // n))}, rounds=3)
+        (row,) = measure_rounds(
+            {"plant": lambda b=bound, n=count: b.run(max(20, 400 // n))}, rounds=3
+        )
         print_rows(f"pairs: {count}", [row])
         per_pair[count] = row.cost / count
     print("  us per pair: " + ", ".join(f"{count}: {cost:.1f}" for count, cost in per_pair.items()))
@@ -199,7 +230,13 @@ def test_fifty_vehicles() -> None:
     }
     for name, bound in worlds.items():
         bound.run(250 if "landed" in name else 20)
-    assert sum(worlds["6 DOF in weather, landed"].world.get(f"uav{k}.contact.vessel") for k in range(25)) > 20
+    assert (
+        sum(
+            worlds["6 DOF in weather, landed"].world.get(f"uav{k}.contact.vessel")
+            for k in range(25)
+        )
+        > 20
+    )
     rows = measure_rounds({name: lambda b=bound: b.run(40) for name, bound in worlds.items()})
     print_rows("25 pairs", rows)
     for row in rows:

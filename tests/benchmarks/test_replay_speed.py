@@ -33,9 +33,14 @@ def page(tmp_path_factory):
     return file.as_uri()
 
 
-@pytest.mark.parametrize(("drawn", "flags"), [("3-D only", ()), ("all of the page", SOFTWARE_RENDERING_FLAGS)])
+@pytest.mark.parametrize(
+    ("drawn", "flags"), [("3-D only", ()), ("all of the page", SOFTWARE_RENDERING_FLAGS)]
+)
 def test_frames_per_second(page, drawn, flags):
-    print(f"\nreplay of Demo 1, {drawn} by SwiftShader, median of {ROUNDS} rounds, load average {os.getloadavg()[0]:.2f}")
+    print(
+        f"\nreplay of Demo 1, {drawn} by SwiftShader, median of {ROUNDS} rounds, load average "
+        f"{os.getloadavg()[0]:.2f}"
+    )
     with open_browser(flags) as opened:
         tab = opened.new_page(viewport=WINDOW)
         tab.goto(page)
@@ -44,7 +49,13 @@ def test_frames_per_second(page, drawn, flags):
             tab.get_by_role("button", name=camera, exact=True).click()
             rates = [frames_per_second(tab) for _ in range(ROUNDS)]
             ratio = tab.evaluate("cosimReplay.view.renderer.getPixelRatio()")
-            print(f"  {camera:8}{median(rates):8.1f} frames/s at {ratio:.2g} pixels per pixel of the page", flush=True)
+            print(
+                (
+                    f"  {camera:8}{median(rates):8.1f} frames/s at {ratio:.2g} pixels per pixel of "
+                    "the page"
+                ),
+                flush=True,
+            )
             assert median(rates) > SMALLEST_RATE
 
 

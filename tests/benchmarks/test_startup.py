@@ -27,7 +27,8 @@ pytestmark = pytest.mark.benchmark
 def test_startup(tmp_path):
     print_heading("whole processes", "CPU ms")
     contenders: dict[str, Callable[[], float]] = {
-        name: lambda words=words: cpu_milliseconds([sys.executable, *words], tmp_path) for name, words in COMMANDS.items()
+        name: lambda words=words: cpu_milliseconds([sys.executable, *words], tmp_path)
+        for name, words in COMMANDS.items()
     }
     ratios = print_rows("process", measure_rounds(contenders))
     assert all(ratios[name] < largest for name, largest in LARGEST_RATIO.items())
@@ -38,4 +39,7 @@ def cpu_milliseconds(command, folder):
     before = os.times()
     subprocess.run(command, cwd=folder, capture_output=True, check=True)
     after = os.times()
-    return 1e3 * sum(getattr(after, kind) - getattr(before, kind) for kind in ("children_user", "children_system"))
+    return 1e3 * sum(
+        getattr(after, kind) - getattr(before, kind)
+        for kind in ("children_user", "children_system")
+    )

@@ -1,4 +1,6 @@
-"""Cost of supervision: the stepping loop of Demo 1 in a supervised child process and in this process."""
+"""Cost of supervision: the stepping loop of Demo 1 in a supervised child process and in this
+process.
+"""
 
 import json
 import subprocess
@@ -11,7 +13,18 @@ pytestmark = pytest.mark.benchmark
 
 
 def loop_milliseconds(isolation, folder):
-    command = [sys.executable, "-m", "cosim", "run", "demo1_box", "--no-report", "--isolation", isolation, "--output-dir", folder]
+    command = [
+        sys.executable,
+        "-m",
+        "cosim",
+        "run",
+        "demo1_box",
+        "--no-report",
+        "--isolation",
+        isolation,
+        "--output-dir",
+        folder,
+    ]
     subprocess.run(command, check=True, capture_output=True)
     return json.loads((folder / "run.json").read_text())["timing"]["loop_seconds"] * 1000
 
@@ -19,7 +32,9 @@ def loop_milliseconds(isolation, folder):
 def test_supervision(tmp_path):
     print_heading("stepping loop of Demo 1", "wall ms")
     contenders = {
-        f"--isolation {isolation}": lambda isolation=isolation: loop_milliseconds(isolation, tmp_path / isolation)
+        f"--isolation {isolation}": lambda isolation=isolation: loop_milliseconds(
+            isolation, tmp_path / isolation
+        )
         for isolation in ("none", "run")
     }
     ratios = print_rows("demo1_box", measure_rounds(contenders, rounds=9))

@@ -48,7 +48,11 @@ def job(number):
 
 def prepared_files(scenario):
     root = load_scenario(scenario).root
-    paths = {node.folder / node.spec.components[name].fmu for node, name in root.leaves() if node.spec.components[name].fmu}
+    paths = {
+        node.folder / node.spec.components[name].fmu
+        for node, name in root.leaves()
+        if node.spec.components[name].fmu
+    }
     files = {path.resolve(): FmuFile(path) for path in paths}
     for file in files.values():
         file.acquire()
@@ -57,7 +61,9 @@ def prepared_files(scenario):
 
 def run_in_process(job, scenario, files):
     """Run in this process, with FMUs that are already extracted."""
-    prepared = load(scenario, job.settings, loaded_fmus={path: file.share() for path, file in files.items()})
+    prepared = load(
+        scenario, job.settings, loaded_fmus={path: file.share() for path, file in files.items()}
+    )
     with simulating(prepared.plan) as run:
         evaluate_kpis(Result(run.recording), prepared.kpis())
 
@@ -79,12 +85,19 @@ def test_overhead_of_a_run():
     scenario = find_scenario("demo1_box")
     files = prepared_files(scenario)
     times = {"in process, FMUs extracted": [], "cosim.run": [], "a run of a sweep": []}
-    with LocalRunner(StudyContext(scenario, scenario.parent, fmus=tuple(map(str, files))), 1) as runner:
+    with LocalRunner(
+        StudyContext(scenario, scenario.parent, fmus=tuple(map(str, files))), 1
+    ) as runner:
         for number in range(RUNS):
-            times["in process, FMUs extracted"].append(milliseconds(run_in_process, job(number), scenario, files))
+            times["in process, FMUs extracted"].append(
+                milliseconds(run_in_process, job(number), scenario, files)
+            )
             times["cosim.run"].append(milliseconds(cosim.run, scenario, job(number).settings))
             times["a run of a sweep"].append(milliseconds(run_in_sweep, job(number), runner))
-    print(f"\n  Demo 1, 35 s with landing, {RUNS} runs, load average {os.getloadavg()[0]:.1f}: wall ms, least and median")
+    print(
+        f"\n  Demo 1, 35 s with landing, {RUNS} runs, load average {os.getloadavg()[0]:.1f}: wall "
+        "ms, least and median"
+    )
     for name, values in times.items():
         print(f"  {name:28}{min(values):8.1f}{median(values):8.1f}")
     least = {name: min(values) for name, values in times.items()}
@@ -94,22 +107,37 @@ def test_overhead_of_a_run():
 def wall_time(context, workers, busy, count=8):
     """Return the wall time (s) of `count` runs of 1.2 s each."""
     with LocalRunner(context, workers) as runner:
-        list(runner.run_jobs([Job("first", {"sleeper.number": -1.0, "/stop_time": 0.01})] * workers))
+        list(
+            runner.run_jobs([Job("first", {"sleeper.number": -1.0, "/stop_time": 0.01})] * workers)
+        )
         start = perf_counter()
-        jobs = [Job(str(number), {"sleeper.number": number, "sleeper.busy": busy}) for number in range(count)]
+        jobs = [
+            Job(str(number), {"sleeper.number": number, "sleeper.busy": busy})
+            for number in range(count)
+        ]
         assert not any(record.failure for record in runner.run_jobs(jobs))
         return perf_counter() - start
 
 
 @pytest.mark.parametrize("busy", [0.0, 1.0], ids=["waiting", "computing"])
 def test_efficiency_of_two_workers(tmp_path, busy):
-    """Waiting runs show the overhead of the runner; computing runs also show the influence of the machine."""
+    """Waiting runs show the overhead of the runner; computing runs also show the influence of the
+    machine.
+    """
     (tmp_path / "sleeper.py").write_text(SLEEPER)
-    content = {"name": "s", "stop_time": 1.0, "step_size": 0.01, "components": {"sleeper": {"python": "sleeper.py:Sleeper"}}}
+    content = {
+        "name": "s",
+        "stop_time": 1.0,
+        "step_size": 0.01,
+        "components": {"sleeper": {"python": "sleeper.py:Sleeper"}},
+    }
     (tmp_path / "s.json").write_text(json.dumps(content))
     context = StudyContext(tmp_path / "s.json", tmp_path)
-    found = sorted(wall_time(context, 1, busy) / (2 * wall_time(context, 2, busy)) for _ in range(3))
+    found = sorted(
+        wall_time(context, 1, busy) / (2 * wall_time(context, 2, busy)) for _ in range(3)
+    )
     print(
-        f"\n  efficiency of two workers, {'computing' if busy else 'waiting'}: {found[1]:.3f} ({found[0]:.3f} ... {found[2]:.3f})"
+        f"\n  efficiency of two workers, {'computing' if busy else 'waiting'}: {found[1]:.3f} "
+        f"({found[0]:.3f} ... {found[2]:.3f})"
     )
     assert busy or found[-1] > 0.9

@@ -11,7 +11,9 @@ _INSTALLED = "installed.txt"
 
 
 def environment(folder: Path, requirements: Sequence[str]) -> Path:
-    """Return the interpreter of an environment with these packages. Raises CalledProcessError if they cannot be installed."""
+    """Return the interpreter of an environment with these packages. Raises CalledProcessError if
+    they cannot be installed.
+    """
     python = folder / ("Scripts/python.exe" if sys.platform == "win32" else "bin/python")
     marker = folder / _INSTALLED
     if marker.is_file() and marker.read_text().split() == list(requirements):
@@ -24,7 +26,10 @@ def environment(folder: Path, requirements: Sequence[str]) -> Path:
 
 def versions(python: Path, packages: Sequence[str]) -> str:
     """Return name and version of each package in the environment."""
-    code = "import sys; from importlib.metadata import version; print(*(f'{p} {version(p)}' for p in sys.argv[1:]), sep=', ')"
+    code = (
+        "import sys; from importlib.metadata import version; print(*(f'{p} {version(p)}' for p in "
+        "sys.argv[1:]), sep=', ')"
+    )
     return _run([python, "-c", code, *packages]).strip()
 
 

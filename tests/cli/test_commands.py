@@ -81,7 +81,17 @@ def test_run_writes_results_that_can_be_read_back(tmp_path):
 
 
 def test_options_change_the_output_folder_and_the_times(tmp_path):
-    done = cosim("run", scenario(tmp_path), "--output-dir", "there", "--stop-time", "1", "--step-size", "1/4", cwd=tmp_path)
+    done = cosim(
+        "run",
+        scenario(tmp_path),
+        "--output-dir",
+        "there",
+        "--stop-time",
+        "1",
+        "--step-size",
+        "1/4",
+        cwd=tmp_path,
+    )
     assert done.returncode == 0
     assert len((tmp_path / "there/result.csv").read_text().splitlines()) == 6
 
@@ -107,14 +117,18 @@ def test_checks_decide_the_exit_code(tmp_path):
 
 @pytest.mark.parametrize("isolation", ["run", "none"])
 def test_a_closed_pipe_does_not_end_the_run(tmp_path, isolation):
-    """The reader closes the pipe as `| head` does: all results are written, and the exit code is that of a failed check."""
+    """The reader closes the pipe as `| head` does: all results are written, and the exit code is
+    that of a failed check.
+    """
     (tmp_path / "kpis.py").write_text(KPIS)
     kpi = {"name": "end", "python": "kpis.py:last", "arguments": {"signal": "a.y"}}
     file = scenario(tmp_path, kpis=[kpi], checks=[{"kpi": "end.value", "min": 1}])
     reader, writer = os.pipe()
     os.close(reader)
     command = [sys.executable, "-m", "cosim", "run", file, "--isolation", isolation]
-    done = subprocess.run(command, cwd=tmp_path, stdout=writer, stderr=subprocess.PIPE, text=True, check=False)
+    done = subprocess.run(
+        command, cwd=tmp_path, stdout=writer, stderr=subprocess.PIPE, text=True, check=False
+    )
     os.close(writer)
     assert (done.returncode, done.stderr) == (3, "")
     assert (tmp_path / "runs/small/report.html").exists()
@@ -127,7 +141,9 @@ def test_a_failing_component_gives_exit_code_1_and_keeps_the_rows(tmp_path):
     assert "a: do_step failed at t = 2 s: ValueError: tilt beyond limit" in done.stderr
     assert "Traceback" not in done.stderr
     assert len((tmp_path / "runs/small/result.csv").read_text().splitlines()) == 4
-    assert "tilt beyond limit" in json.loads((tmp_path / "runs/small/run.json").read_text())["failure"]
+    assert (
+        "tilt beyond limit" in json.loads((tmp_path / "runs/small/run.json").read_text())["failure"]
+    )
 
 
 def test_a_failing_kpi_keeps_the_result_and_the_other_kpis(tmp_path):
@@ -192,7 +208,13 @@ def test_a_refused_scenario_gives_exit_code_2_and_one_line_per_problem(tmp_path)
 
 @pytest.mark.parametrize(
     "arguments",
-    [["run"], ["fly"], ["run", "x.json", "--sett", "a=1"], ["run", "x.json", "--set", "a"], ["run", "x.json", "--set", "a=NaN"]],
+    [
+        ["run"],
+        ["fly"],
+        ["run", "x.json", "--sett", "a=1"],
+        ["run", "x.json", "--set", "a"],
+        ["run", "x.json", "--set", "a=NaN"],
+    ],
 )
 def test_wrong_usage_gives_exit_code_2(arguments, tmp_path):
     done = cosim(*arguments, cwd=tmp_path)
@@ -207,8 +229,14 @@ def test_an_unknown_command_is_refused_with_the_nearest_one(tmp_path):
 def test_a_signal_with_a_unit_into_an_input_without_is_marked(tmp_path):
     (tmp_path / "own.py").write_text(OWN_CONTROLLER)
     components = {"own": {"python": "own.py:Own"}, "ship": {"fmu": str(ROOT / "fmus/strider.fmu")}}
-    file = scenario(tmp_path, components=components, connections=[{"from": "ship.attitude.yaw", "to": "own.yaw"}])
-    assert "ship.attitude.yaw -> own.yaw  (rad, the input has no unit)" in cosim("check", file).stdout
+    file = scenario(
+        tmp_path,
+        components=components,
+        connections=[{"from": "ship.attitude.yaw", "to": "own.yaw"}],
+    )
+    assert (
+        "ship.attitude.yaw -> own.yaw  (rad, the input has no unit)" in cosim("check", file).stdout
+    )
     (tmp_path / "own.py").write_text(OWN_CONTROLLER.replace("self.yaw = 0.0", "pass"))
     done = cosim("run", file, cwd=tmp_path)
     assert 'the variable "yaw" is registered, but has no value: ' in done.stderr
@@ -216,8 +244,14 @@ def test_a_signal_with_a_unit_into_an_input_without_is_marked(tmp_path):
 
 def test_a_check_of_an_unknown_kpi_value_is_reported_with_its_position(tmp_path):
     """The values of this KPI are unknown before the run."""
-    (tmp_path / "kpis.py").write_text("def last(result):\n    values = {'value': 1.0}\n    return values\n")
-    file = scenario(tmp_path, kpis=[{"name": "end", "python": "kpis.py:last"}], checks=[{"kpi": "end.valu", "max": 1}])
+    (tmp_path / "kpis.py").write_text(
+        "def last(result):\n    values = {'value': 1.0}\n    return values\n"
+    )
+    file = scenario(
+        tmp_path,
+        kpis=[{"name": "end", "python": "kpis.py:last"}],
+        checks=[{"kpi": "end.valu", "max": 1}],
+    )
     done = cosim("run", file, cwd=tmp_path)
     assert done.returncode == 2
     assert '$.checks[0]: check of "end.valu": no such KPI; did you mean "end.value"?' in done.stderr
@@ -225,13 +259,20 @@ def test_a_check_of_an_unknown_kpi_value_is_reported_with_its_position(tmp_path)
 
 def test_a_figure_of_unrecorded_signals_is_refused_only_with_a_report(tmp_path):
     """A run without figures may record fewer signals, as those of sweeps do."""
-    figure = {"name": "f", "python": str(ROOT / "plant_src/figures.py:paths"), "arguments": {"vehicle": "a.y", "deck": "b"}}
+    figure = {
+        "name": "f",
+        "python": str(ROOT / "plant_src/figures.py:paths"),
+        "arguments": {"vehicle": "a.y", "deck": "b"},
+    }
     file = scenario(tmp_path, figures=[figure])
     for command in ("check", "run"):
         done = cosim(command, file, cwd=tmp_path)
         assert done.returncode == 2
         assert [line.split("$.figures[0].arguments.")[1] for line in done.stderr.splitlines()] == [
-            'vehicle: no signal below "a.y" is recorded; valid: a (inputs are recorded if "record" names them)',
+            (
+                'vehicle: no signal below "a.y" is recorded; valid: a (inputs are recorded if '
+                '"record" names them)'
+            ),
             'deck: no signal below "b" is recorded: the scenario has no component "b"; valid: a',
         ]
     assert cosim("run", file, "--no-report", cwd=tmp_path).returncode == 0
@@ -240,13 +281,18 @@ def test_a_figure_of_unrecorded_signals_is_refused_only_with_a_report(tmp_path):
 def test_check_and_run_warn_about_a_forgotten_connection(tmp_path):
     pilot = {"python": f"{BLOCKS}:Controller", "parameters": {"offset": 0.0}}
     components = {"plant": {"python": f"{BLOCKS}:Plant"}, "pilot": pilot}
-    file = scenario(tmp_path, components=components, connections=[{"from": "plant.ship", "to": "pilot.vehicle"}])
+    file = scenario(
+        tmp_path, components=components, connections=[{"from": "plant.ship", "to": "pilot.vehicle"}]
+    )
     checked, ran = cosim("check", file), cosim("run", file, cwd=tmp_path)
     for done in (checked, ran):
         assert done.returncode == 0
         (warning,) = done.stderr.splitlines()
         assert warning.startswith(f"WARNING {file}:1:")
-        assert "plant.ship.motor[2]: is a connection from pilot.motor to plant.ship.motor missing?" in warning
+        assert (
+            "plant.ship.motor[2]: is a connection from pilot.motor to plant.ship.motor missing?"
+            in warning
+        )
     assert "1 warning." in checked.stdout
     assert "No warnings" not in checked.stdout
     assert warning in json.loads((tmp_path / "runs/small/run.json").read_text())["warnings"]
@@ -264,11 +310,24 @@ def test_check_prints_the_expanded_system(tmp_path):
 
 
 def test_simulate_runs_one_fmu(probe, tmp_path):
-    done = cosim("simulate", probe, "--output-file", tmp_path / "y.csv", "--start-value", "y_start=2", "--stop-time", "0.02")
+    done = cosim(
+        "simulate",
+        probe,
+        "--output-file",
+        tmp_path / "y.csv",
+        "--start-value",
+        "y_start=2",
+        "--stop-time",
+        "0.02",
+    )
     assert done.returncode == 0, done.stderr
     header, *rows = (tmp_path / "y.csv").read_text().splitlines()
     y = header.split(",").index('"y"')
-    assert [float(row.split(",")[y]) for row in rows] == [2.0, 2.0 * 0.98, pytest.approx(2.0 * 0.98**2)]
+    assert [float(row.split(",")[y]) for row in rows] == [
+        2.0,
+        2.0 * 0.98,
+        pytest.approx(2.0 * 0.98**2),
+    ]
 
 
 def test_simulate_reads_inputs_from_a_file(probe, tmp_path):
@@ -281,7 +340,10 @@ def test_simulate_reads_inputs_from_a_file(probe, tmp_path):
 def test_simulate_refuses_unknown_names(probe, tmp_path):
     (tmp_path / "u.csv").write_text("time,uu\n0,5\n")
     done = cosim("simulate", probe, "--input-file", tmp_path / "u.csv")
-    assert (done.returncode, 'the FMU has no input "uu"; did you mean "u"?' in done.stderr) == (2, True)
+    assert (done.returncode, 'the FMU has no input "uu"; did you mean "u"?' in done.stderr) == (
+        2,
+        True,
+    )
     done = cosim("simulate", probe, "--start-value", "y_strt=1")
     assert (done.returncode, 'did you mean "y_start"?' in done.stderr) == (2, True)
 
@@ -289,7 +351,10 @@ def test_simulate_refuses_unknown_names(probe, tmp_path):
 @pytest.mark.parametrize(
     ("content", "message"),
     [
-        (b"time,u\n0," + b"1" * (1 << 21), "u.csv:2: cannot read the row: field larger than field limit (1048576)"),
+        (
+            b"time,u\n0," + b"1" * (1 << 21),
+            "u.csv:2: cannot read the row: field larger than field limit (1048576)",
+        ),
         (b"time,\xe9\n0,1\n", "u.csv: it is not UTF-8 text"),
         (b"", "u.csv: the file is empty, expected a header"),
         (None, "u.csv: No such file or directory"),
@@ -304,7 +369,9 @@ def test_simulate_refuses_an_unreadable_input_file(probe, tmp_path, content, mes
 
 
 def test_a_failing_fmu_gives_exit_code_1_and_keeps_its_rows(probe, tmp_path):
-    done = cosim("simulate", probe, "--start-value", "fail_time=0.025", "--output-file", tmp_path / "y.csv")
+    done = cosim(
+        "simulate", probe, "--start-value", "fail_time=0.025", "--output-file", tmp_path / "y.csv"
+    )
     assert done.returncode == 1
     assert "status 3 (error): told to fail" in done.stderr
     assert len((tmp_path / "y.csv").read_text().splitlines()) == 4
@@ -312,15 +379,24 @@ def test_a_failing_fmu_gives_exit_code_1_and_keeps_its_rows(probe, tmp_path):
 
 def test_info_prints_which_capabilities_are_used(tmp_path):
     flags = 'maxOutputDerivativeOrder="2" canRunAsynchronuously="true"'
-    lines = cosim("info", build_probe_fmu(2, tmp_path, name="mass", flags=flags)).stdout.splitlines()
+    lines = cosim(
+        "info", build_probe_fmu(2, tmp_path, name="mass", flags=flags)
+    ).stdout.splitlines()
     capabilities = next(line for line in lines if line.startswith("capabilities"))
     assert "inputs can be linear within a step, derivatives of outputs" in capabilities
-    assert next(line for line in lines if line.startswith("not used")).split() == ["not", "used", "canRunAsynchronuously"]
+    assert next(line for line in lines if line.startswith("not used")).split() == [
+        "not",
+        "used",
+        "canRunAsynchronuously",
+    ]
 
 
 def test_info_names_the_source_of_an_fmu():
     """The FMU of a Modelica model has a name in lower case."""
-    names = {"fmus/ar_drone_lqr.fmu": ("ar_drone_lqr", "ArDroneLqr.mo"), "fmus/python/mixer.fmu": ("Mixer", "mixer.py")}
+    names = {
+        "fmus/ar_drone_lqr.fmu": ("ar_drone_lqr", "ArDroneLqr.mo"),
+        "fmus/python/mixer.fmu": ("Mixer", "mixer.py"),
+    }
     for fmu, (model, source) in names.items():
         lines = cosim("info", resources.root() / fmu).stdout.splitlines()
         assert [line.split() for line in lines[:2]] == [["model", model], ["source", source]]
@@ -336,18 +412,27 @@ def test_info_describes_python_classes_and_modelica_models(tmp_path):
     described = cosim("info", f"{BLOCKS}:Gain")
     assert described.stdout.splitlines()[0] == f"class         {BLOCKS}:Gain", described.stderr
     assert "inputs (1)" in described.stdout
-    (tmp_path / "Twice.mo").write_text("model Twice\n  input Real u;\n  output Real y;\nequation\n  y = 2*u;\nend Twice;")
+    (tmp_path / "Twice.mo").write_text(
+        "model Twice\n  input Real u;\n  output Real y;\nequation\n  y = 2*u;\nend Twice;"
+    )
     model = cosim("info", tmp_path / "Twice.mo:Twice").stdout
     assert "model         twice" in model
     assert "inputs (1)" in model
-    assert cosim("info", BLOCKS).stderr == f"{BLOCKS}: expected the name of a class, as in {BLOCKS}:Class\n"
+    assert (
+        cosim("info", BLOCKS).stderr
+        == f"{BLOCKS}: expected the name of a class, as in {BLOCKS}:Class\n"
+    )
     assert 'did you mean "Gain"?' in cosim("info", f"{BLOCKS}:Gian").stderr
 
 
 def test_info_describes_a_vehicle_file(tmp_path):
     done = cosim("info", "cosim:plant_src/vehicles/data/blueboat.json")
     assert done.stderr == ""
-    for line in ("family        surface_vessel", "mass          18 kg", "propellers    2: port, starboard"):
+    for line in (
+        "family        surface_vessel",
+        "mass          18 kg",
+        "propellers    2: port, starboard",
+    ):
         assert f"{line}\n" in done.stdout
     assert "hulls         2 of 1.04 x 0.12 x 0.29 m (length, beam, depth)\n" in done.stdout
     assert "draught       0.09745 m\n" in done.stdout
@@ -355,14 +440,20 @@ def test_info_describes_a_vehicle_file(tmp_path):
     assert "\n  propeller_speed   Float64[2]   rad/s" in done.stdout
     (tmp_path / "boat.json").write_text('{"family": "surface_vessl"}')
     refused = cosim("info", tmp_path / "boat.json").stderr
-    assert "boat.json:1:2: $.family: found 'surface_vessl'; did you mean \"surface_vessel\"" in refused
-    assert "is a scenario or a study, expected a vehicle file" in cosim("info", "cosim:scenarios/demo1_box.json").stderr
+    assert (
+        "boat.json:1:2: $.family: found 'surface_vessl'; did you mean \"surface_vessel\"" in refused
+    )
+    assert (
+        "is a scenario or a study, expected a vehicle file"
+        in cosim("info", "cosim:scenarios/demo1_box.json").stderr
+    )
 
 
 def test_an_unknown_variable_of_a_component_with_many_is_refused_with_some_valid_names():
     done = cosim("run", "free_flight", "--set", "usv.kp=3")
     assert done.stderr.startswith(
-        'setting "usv.kp": component "usv" has no variable "kp"; valid: speed_command, acceptance_radius'
+        'setting "usv.kp": component "usv" has no variable "kp"; valid: speed_command, '
+        "acceptance_radius"
     )
     assert " more\n" in done.stderr
 
@@ -384,7 +475,15 @@ def test_openmodelica_requires_a_source_and_a_target(tmp_path):
     without_target = cosim("build", tmp_path / "M.mo", "--modelica-compiler", "omc")
     assert (without_target.returncode, "requires --output" in without_target.stderr) == (2, True)
     environment = {**os.environ, "PATH": str(tmp_path)}
-    missing = cosim("build", tmp_path / "M.mo", "--output", tmp_path / "m.fmu", "--modelica-compiler", "omc", env=environment)
+    missing = cosim(
+        "build",
+        tmp_path / "M.mo",
+        "--output",
+        tmp_path / "m.fmu",
+        "--modelica-compiler",
+        "omc",
+        env=environment,
+    )
     assert (missing.returncode, "OpenModelica is not installed" in missing.stderr) == (2, True)
 
 
@@ -420,7 +519,12 @@ class Slow(Fmi2Slave):
 def test_an_interrupt_gives_exit_code_130_and_keeps_the_rows(tmp_path):
     (tmp_path / "slow.py").write_text(SLOW)
     file = scenario(tmp_path, components={"a": {"python": "slow.py:Slow"}}, stop_time=1000)
-    process = subprocess.Popen([sys.executable, "-m", "cosim", "run", file], cwd=tmp_path, stderr=subprocess.PIPE, text=True)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "cosim", "run", file],
+        cwd=tmp_path,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
     until = time.monotonic() + 30
     while not (tmp_path / "started").exists() and time.monotonic() < until:
         time.sleep(0.05)

@@ -12,8 +12,14 @@ import pytest
 pytestmark = pytest.mark.slow
 
 SETUPS = {
-    "bash": (["bash", "--norc", "--noprofile", "-i"], 'eval "$(_COSIM_COMPLETE=bash_source cosim)"'),
-    "zsh": (["zsh", "-f", "-i"], 'autoload -Uz compinit; compinit -D -u; eval "$(_COSIM_COMPLETE=zsh_source cosim)"'),
+    "bash": (
+        ["bash", "--norc", "--noprofile", "-i"],
+        'eval "$(_COSIM_COMPLETE=bash_source cosim)"',
+    ),
+    "zsh": (
+        ["zsh", "-f", "-i"],
+        'autoload -Uz compinit; compinit -D -u; eval "$(_COSIM_COMPLETE=zsh_source cosim)"',
+    ),
 }
 
 
@@ -29,7 +35,12 @@ class Terminal:
         process, self._descriptor = pty.fork()
         if process == 0:
             os.chdir(folder)
-            os.environ |= {"PATH": f"{program.parent}:{os.environ['PATH']}", "TERM": "dumb", "PS1": "> ", "HISTFILE": ""}
+            os.environ |= {
+                "PATH": f"{program.parent}:{os.environ['PATH']}",
+                "TERM": "dumb",
+                "PS1": "> ",
+                "HISTFILE": "",
+            }
             os.execvp(words[0], words)  # noqa: S606
         self._process = process
         self.send(f"{setup}; echo rea''dy\n")

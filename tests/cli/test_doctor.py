@@ -29,7 +29,14 @@ def doctor(*options, **environment):
     if "PYTHONPATH" not in environment:
         return run_cosim("doctor", *options, cwd="/", env=environment)
     command = [sys.executable, "-m", "cosim", "doctor", *options]
-    return subprocess.run(command, capture_output=True, text=True, check=False, cwd="/", env={**os.environ, **environment})
+    return subprocess.run(
+        command,
+        capture_output=True,
+        text=True,
+        check=False,
+        cwd="/",
+        env={**os.environ, **environment},
+    )
 
 
 def findings(**environment):
@@ -67,7 +74,10 @@ def test_text_and_json_agree():
 
 @pytest.mark.parametrize(
     ("required", "words"),
-    [("no-such-package>=1", "not installed"), ("numpy>=1000", f"{metadata.version('numpy')}, required is >=1000")],
+    [
+        ("no-such-package>=1", "not installed"),
+        ("numpy>=1000", f"{metadata.version('numpy')}, required is >=1000"),
+    ],
 )
 def test_a_required_package_that_is_missing_or_too_old_is_broken(requiring, required, words):
     environment = requiring(required)
@@ -79,18 +89,29 @@ def test_a_required_package_that_is_missing_or_too_old_is_broken(requiring, requ
 def test_a_missing_extra_does_not_fail(requiring):
     code, found = findings(**requiring("numpy>=1"))
     assert (code, found["wings"]["state"]) == (0, "missing")
-    assert found["wings"]["found"] == "no-such-feathers: not installed (pip install 'fmi-cosim[wings]')"
+    assert (
+        found["wings"]["found"]
+        == "no-such-feathers: not installed (pip install 'fmi-cosim[wings]')"
+    )
 
 
 def test_tools_are_looked_for_on_the_path(tmp_path):
     code, found = findings(PATH=str(tmp_path), CC="")
     assert code == 0
     compiler = "ok" if find_spec("ziglang") else "missing"  # a package, not a program on the path
-    assert [found[name]["state"] for name in ("C compiler", "OpenModelica", "bubblewrap")] == [compiler, "missing", "missing"]
+    assert [found[name]["state"] for name in ("C compiler", "OpenModelica", "bubblewrap")] == [
+        compiler,
+        "missing",
+        "missing",
+    ]
 
 
 def test_a_program_that_does_not_work_is_missing(tmp_path):
-    for name, text in {"omc": "echo OpenModelica 1.26.0", "bwrap": "exit 1", "cc": "exit 0"}.items():
+    for name, text in {
+        "omc": "echo OpenModelica 1.26.0",
+        "bwrap": "exit 1",
+        "cc": "exit 0",
+    }.items():
         (tmp_path / name).write_text(f"#!/bin/sh\n{text}\n")
         (tmp_path / name).chmod(0o755)
     _, found = findings(PATH=f"{tmp_path}:/bin", CC="")

@@ -43,11 +43,25 @@ class Block:
 @pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 def test_codes_and_messages_are_those_of_new_processes(tmp_path):
     (tmp_path / "block.py").write_text(BLOCK)
-    scenario = {"name": "s", "stop_time": 1, "step_size": 0.5, "components": {"a": {"python": "block.py:Block"}}}
+    scenario = {
+        "name": "s",
+        "stop_time": 1,
+        "step_size": 0.5,
+        "components": {"a": {"python": "block.py:Block"}},
+    }
     (tmp_path / "s.json").write_text(json.dumps(scenario))
-    commands = [["run", "s.json", "--no-report", "--output-dir", "out"], ["run", "t.json"], ["runn"], ["list", "roles"]]
+    commands = [
+        ["run", "s.json", "--no-report", "--output-dir", "out"],
+        ["run", "t.json"],
+        ["runn"],
+        ["list", "roles"],
+    ]
     done = subprocess.run(
-        [sys.executable, "-c", PROGRAM, json.dumps(commands)], cwd=tmp_path, capture_output=True, text=True, check=True
+        [sys.executable, "-c", PROGRAM, json.dumps(commands)],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
     )
     forked, new, replaced, children = json.loads(done.stdout)
     assert forked == new

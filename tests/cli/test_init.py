@@ -20,8 +20,14 @@ pytestmark = pytest.mark.slow
 
 def run(*command, cwd):
     """Run a command of this environment as from a user's shell."""
-    environment = {**os.environ, "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}", "PYTEST_ADDOPTS": ""}
-    return subprocess.run([*map(str, command)], cwd=cwd, capture_output=True, text=True, check=False, env=environment)
+    environment = {
+        **os.environ,
+        "PATH": f"{Path(sys.executable).parent}{os.pathsep}{os.environ['PATH']}",
+        "PYTEST_ADDOPTS": "",
+    }
+    return subprocess.run(
+        [*map(str, command)], cwd=cwd, capture_output=True, text=True, check=False, env=environment
+    )
 
 
 @pytest.fixture(scope="module")
@@ -40,9 +46,17 @@ def made(folder):
 @pytest.fixture(scope="module")
 def project(folder, made):
     assert made.returncode == 0, made.stderr
-    listed = {Path(line).relative_to("my controllers").as_posix() for line in made.stdout.splitlines() if line.startswith("my ")}
+    listed = {
+        Path(line).relative_to("my controllers").as_posix()
+        for line in made.stdout.splitlines()
+        if line.startswith("my ")
+    }
     root = folder / "my controllers"
-    files = {path.relative_to(root).as_posix() for path in root.rglob("*") if path.is_file() and "runs" not in path.parts}
+    files = {
+        path.relative_to(root).as_posix()
+        for path in root.rglob("*")
+        if path.is_file() and "runs" not in path.parts
+    }
     assert files - listed <= {"scenarios/references/course.json", "notes.txt", "tests/own.py"}
     assert "\nleft as they are: notes.txt, tests/own.py\n" in made.stdout
     assert "__pycache__" not in str(files)
@@ -92,8 +106,14 @@ def test_a_run_writes_the_figure_and_the_replay_of_the_readme(project):
             "fmi-cosim @ git+https://host/cosim.git@1ab2",
         ),
         ({"url": "file:///home/me/cosim", "dir_info": {}}, "fmi-cosim @ file:///home/me/cosim"),
-        ({"url": "file:///home/me/cosim", "dir_info": {"editable": True}}, "-e file:///home/me/cosim"),
-        ({"url": "https://host/fmi_cosim.whl", "archive_info": {}}, "fmi-cosim @ https://host/fmi_cosim.whl"),
+        (
+            {"url": "file:///home/me/cosim", "dir_info": {"editable": True}},
+            "-e file:///home/me/cosim",
+        ),
+        (
+            {"url": "https://host/fmi_cosim.whl", "archive_info": {}},
+            "fmi-cosim @ https://host/fmi_cosim.whl",
+        ),
     ],
 )
 def test_the_requirements_name_the_origin_of_cosim(source, line):
@@ -105,7 +125,11 @@ def test_the_requirements_are_installed_first_and_the_readme_has_the_projects_na
     commands = [line.strip() for line in made.stdout.partition("Next:\n")[2].splitlines()]
     assert commands[1] == "pip install -r requirements.txt"
     assert commands[-1] == "python -m pytest"
-    named = [line for line in (project / "requirements.txt").read_text().splitlines() if not line.startswith("#")]
+    named = [
+        line
+        for line in (project / "requirements.txt").read_text().splitlines()
+        if not line.startswith("#")
+    ]
     assert named == [pip_requirement(pip_origin()), "pytest"]
     assert (project / "README.md").read_text().startswith("# my controllers\n")
 

@@ -43,25 +43,36 @@ def cosim(*arguments, cwd):
 def new(folder, name, language, *more):
     """Run `cosim new controller` in this process, which is faster."""
     out, err = StringIO(), StringIO()
-    with chdir(folder), redirect_stdout(out), redirect_stderr(err), pytest.raises(SystemExit) as end:
+    with (
+        chdir(folder),
+        redirect_stdout(out),
+        redirect_stderr(err),
+        pytest.raises(SystemExit) as end,
+    ):
         main(["new", "controller", name, "--language", language, *more])
     return subprocess.CompletedProcess("cosim new", end.value.code, out.getvalue(), err.getvalue())
 
 
 def next_commands(done):
-    return [shlex.split(line)[1:] for line in done.stdout.splitlines() if line.startswith("  cosim ")]
+    return [
+        shlex.split(line)[1:] for line in done.stdout.splitlines() if line.startswith("  cosim ")
+    ]
 
 
 @pytest.fixture(scope="module")
 def moved(tmp_path_factory):
-    """Function that creates a controller of a role in a language, runs all proposed commands and returns the folder."""
+    """Function that creates a controller of a role in a language, runs all proposed commands and
+    returns the folder.
+    """
 
     @cache
     def move(role, language):
         folder = tmp_path_factory.mktemp(language)
         made = new(folder, "my_pilot", language, "--role", role)
         assert made.returncode == 0, made.stderr
-        assert sorted(path.name for path in (folder / "my_pilot").iterdir()) == sorted([*MADE[language], *COMMON, "fmus"])
+        assert sorted(path.name for path in (folder / "my_pilot").iterdir()) == sorted(
+            [*MADE[language], *COMMON, "fmus"]
+        )
         for command in next_commands(made):
             done = cosim(*command, cwd=folder)
             assert done.returncode == 0, done.stdout + done.stderr
@@ -78,14 +89,29 @@ def role(request):
 @pytest.mark.parametrize("language", MADE)
 def test_a_new_controller_declares_the_variables_of_its_role(moved, role, language):
     """It replaces a shipped controller in `demo1_box` without a change of the wiring."""
-    component, system = {"vessel_autopilot": ("usv", "fmu"), "uav_controller": ("uav", "system")}[role]
+    component, system = {"vessel_autopilot": ("usv", "fmu"), "uav_controller": ("uav", "system")}[
+        role
+    ]
     fmu = moved(role, language) / "my_pilot/my_pilot.fmu"
-    settings = [f"/components/{component}/{system}=null", f"/components/{component}/fmu={json.dumps(str(fmu))}"]
+    settings = [
+        f"/components/{component}/{system}=null",
+        f"/components/{component}/fmu={json.dumps(str(fmu))}",
+    ]
     parameters = {"altitude_command": 2.0, "yaw_command": 0.0}
     if component == "uav":
         # the KPIs and figures of the scenario read signals that only the shipped controller has
-        settings += [f"/components/uav/parameters={json.dumps(parameters)}", "/kpis=[]", "/checks=[]", "/figures=[]"]
-    done = cosim("check", "demo1_box", *(word for text in settings for word in ("--set", text)), cwd=moved(role, language))
+        settings += [
+            f"/components/uav/parameters={json.dumps(parameters)}",
+            "/kpis=[]",
+            "/checks=[]",
+            "/figures=[]",
+        ]
+    done = cosim(
+        "check",
+        "demo1_box",
+        *(word for text in settings for word in ("--set", text)),
+        cwd=moved(role, language),
+    )
     assert done.returncode == 0, done.stderr
 
 
@@ -97,13 +123,16 @@ def test_the_scenario_of_a_new_controller_gets_no_recommendations_and_warnings(m
 
 def test_all_languages_give_the_same_trajectory(moved, role):
     ours, theirs, reference = (
-        Result.from_csv(moved(role, one) / "runs/my_pilot/result.csv") for one in ("modelica", "c", "python")
+        Result.from_csv(moved(role, one) / "runs/my_pilot/result.csv")
+        for one in ("modelica", "c", "python")
     )
     names = [name for name in reference if name.startswith(("vessel.", "quadcopter."))]
     assert len(names) > 20
     for name in names:
         for other in (ours, theirs):
-            assert np.abs(other[name].astype(float) - reference[name].astype(float)).max() < 1e-9, name
+            assert np.abs(other[name].astype(float) - reference[name].astype(float)).max() < 1e-9, (
+                name
+            )
 
 
 @pytest.mark.parametrize("language", MADE)
@@ -112,10 +141,20 @@ def test_the_exported_fmu_gives_the_same_trajectory(moved, role, language):
     folder = moved(role, language)
     scenario = json.loads((folder / "my_pilot/my_pilot.json").read_text())
     name = "usv" if role == "vessel_autopilot" else "uav"
-    scenario["components"][name] = {"fmu": "my_pilot.fmu", "parameters": scenario["components"][name]["parameters"]}
+    scenario["components"][name] = {
+        "fmu": "my_pilot.fmu",
+        "parameters": scenario["components"][name]["parameters"],
+    }
     (folder / "my_pilot/exported.json").write_text(json.dumps(scenario))
-    assert cosim("run", "my_pilot/exported.json", "--no-report", "--output-dir", "out", cwd=folder).returncode == 0
-    first, second = (Result.from_csv(file / "result.csv") for file in (folder / "runs/my_pilot", folder / "out"))
+    assert (
+        cosim(
+            "run", "my_pilot/exported.json", "--no-report", "--output-dir", "out", cwd=folder
+        ).returncode
+        == 0
+    )
+    first, second = (
+        Result.from_csv(file / "result.csv") for file in (folder / "runs/my_pilot", folder / "out")
+    )
     assert np.array_equal(first["vessel.position.x"], second["vessel.position.x"])
 
 
@@ -123,7 +162,15 @@ def run_pytest(folder, name):
     """Run the test of a controller without plugins, whose imports would take half of the time."""
     command = [sys.executable, "-m", "pytest", "-q", "-p", "no:cacheprovider", name]
     environment = {**os.environ, "PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1"}
-    return subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False, timeout=60, env=environment)
+    return subprocess.run(
+        command,
+        cwd=folder,
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+        env=environment,
+    )
 
 
 @pytest.mark.parametrize(("role", "language"), [*zip(ROLES, ["python", "c"], strict=True)])
@@ -132,7 +179,10 @@ def test_the_test_of_a_new_controller_passes(moved, role, language):
     assert done.returncode == 0, done.stdout
 
 
-@pytest.mark.parametrize(("name", "expected"), [("PIDKeeper", "pid_keeper/PidKeeper.mo"), ("k2_slow", "k2_slow/K2Slow.mo")])
+@pytest.mark.parametrize(
+    ("name", "expected"),
+    [("PIDKeeper", "pid_keeper/PidKeeper.mo"), ("k2_slow", "k2_slow/K2Slow.mo")],
+)
 def test_names_take_the_form_of_the_language(tmp_path, name, expected):
     assert new(tmp_path, name, "modelica", "--directory", "mine").returncode == 0
     text = (tmp_path / "mine" / expected).read_text()
@@ -143,12 +193,21 @@ def test_names_take_the_form_of_the_language(tmp_path, name, expected):
 
 @pytest.mark.parametrize("language", MADE)
 def test_the_templates_name_is_replaced_everywhere(moved, role, language):
-    texts = [(moved(role, language) / "my_pilot" / name).read_text() for name in (*MADE[language], *COMMON)]
-    assert not [text for text in texts if re.search("waypoint_follower|deck_follower|Follower|CONTROLLER", text)]
+    texts = [
+        (moved(role, language) / "my_pilot" / name).read_text()
+        for name in (*MADE[language], *COMMON)
+    ]
+    assert not [
+        text
+        for text in texts
+        if re.search("waypoint_follower|deck_follower|Follower|CONTROLLER", text)
+    ]
 
 
 def test_a_binary_of_another_c_controller_is_refused(tmp_path):
-    """The GUID contains the controller's name, so that the binary of another controller does not match."""
+    """The GUID contains the controller's name, so that the binary of another controller does not
+    match.
+    """
     for name in ("one", "two"):
         assert new(tmp_path, name, "c").returncode == 0
     shutil.copy(tmp_path / "one/one.c", tmp_path / "two/two.c")
@@ -168,7 +227,10 @@ def test_the_folder_can_be_moved(tmp_path):
     assert done.returncode == 0, done.stderr
 
 
-FIGURES = [("vessel_autopilot", "course", ["vessel"]), ("uav_controller", "track", ["quadcopter", "vessel"])]
+FIGURES = [
+    ("vessel_autopilot", "course", ["vessel"]),
+    ("uav_controller", "track", ["quadcopter", "vessel"]),
+]
 
 
 @pytest.mark.parametrize(("role", "figure", "bodies"), FIGURES)
@@ -176,14 +238,18 @@ def test_a_run_writes_a_figure_and_a_replay(moved, role, figure, bodies):
     folder = moved(role, "python")
     runs = folder / "runs/my_pilot"
     assert (runs / f"{figure}.png").is_file()
-    assert [body["name"] for body in build_scene(json.loads((runs / "run.json").read_text()))["bodies"]] == bodies
+    assert [
+        body["name"] for body in build_scene(json.loads((runs / "run.json").read_text()))["bodies"]
+    ] == bodies
     done = cosim("replay", runs, cwd=folder)
     assert (done.returncode, done.stderr) == (0, "")
 
 
 @pytest.mark.parametrize("language", MADE)
 def test_an_fmu_older_than_its_source_is_recognized(moved, language, tmp_path):
-    folder = shutil.copytree(moved("vessel_autopilot", language) / "my_pilot", tmp_path / "my_pilot")
+    folder = shutil.copytree(
+        moved("vessel_autopilot", language) / "my_pilot", tmp_path / "my_pilot"
+    )
     assert find_changed_sources(FmuFile(folder / "my_pilot.fmu")) == []
     source = folder / MADE[language][-1]
     source.write_text(source.read_text() + "\n")
@@ -191,11 +257,17 @@ def test_an_fmu_older_than_its_source_is_recognized(moved, language, tmp_path):
 
 
 def test_an_fmu_of_a_class_that_imports_another_file_is_not_older_than_its_source(moved, tmp_path):
-    folder = shutil.copytree(moved("vessel_autopilot", "python") / "my_pilot", tmp_path / "my_pilot")
-    (folder / "bold.py").write_text("from my_pilot import MyPilot\n\n\nclass Bold(MyPilot):\n    pass\n")
+    folder = shutil.copytree(
+        moved("vessel_autopilot", "python") / "my_pilot", tmp_path / "my_pilot"
+    )
+    (folder / "bold.py").write_text(
+        "from my_pilot import MyPilot\n\n\nclass Bold(MyPilot):\n    pass\n"
+    )
     assert cosim("build", "bold.py", "--output", "bold.fmu", cwd=folder).returncode == 0
     assert find_changed_sources(FmuFile(folder / "bold.fmu")) == []
-    (folder / "bold.py").write_text("from my_pilot import MyPilot\n\n\nclass Bold(MyPilot):\n    gain = 2\n")
+    (folder / "bold.py").write_text(
+        "from my_pilot import MyPilot\n\n\nclass Bold(MyPilot):\n    gain = 2\n"
+    )
     assert find_changed_sources(FmuFile(folder / "bold.fmu")) == [folder / "bold.py"]
     (folder / "bold.py").write_text("from my_pilot import\n")
     assert find_changed_sources(FmuFile(folder / "bold.fmu")) == [folder / "bold.py"]
@@ -207,7 +279,10 @@ def test_a_run_of_an_fmu_older_than_its_source_warns(moved, tmp_path):
         source.write("/* changed */\n")
     done = cosim("check", "my_pilot/my_pilot.json", cwd=tmp_path)
     command = "cosim build my_pilot --output my_pilot/my_pilot.fmu"
-    warning = f'"my_pilot/my_pilot.fmu" was built from another version of my_pilot/my_pilot.c: `{command}` builds it again'
+    warning = (
+        '"my_pilot/my_pilot.fmu" was built from another version of my_pilot/my_pilot.c: '
+        f"`{command}` builds it again"
+    )
     assert f"WARNING {warning}\n" in done.stderr
 
 
@@ -220,7 +295,13 @@ def test_files_are_overwritten_only_with_force(tmp_path):
     assert refused.returncode == 2
     assert refused.stderr.splitlines() == [
         f"keeper/{file}: exists; --force overwrites it"
-        for file in ("keeper.py", "keeper.json", "test_keeper.py", "pictures.py", "fmus/strider.fmu")
+        for file in (
+            "keeper.py",
+            "keeper.json",
+            "test_keeper.py",
+            "pictures.py",
+            "fmus/strider.fmu",
+        )
     ]
     assert source.read_text() == "mine"
     assert new(tmp_path, "keeper", "python", "--force").returncode == 0
@@ -230,19 +311,42 @@ def test_files_are_overwritten_only_with_force(tmp_path):
 @pytest.mark.parametrize(
     ("name", "language", "message"),
     [
-        ("keeper", "pyton", 'there is no template for the language "pyton"; did you mean "python"?'),
-        ("keeper", "ada", 'there is no template for the language "ada"; valid: python, modelica, c'),
+        (
+            "keeper",
+            "pyton",
+            'there is no template for the language "pyton"; did you mean "python"?',
+        ),
+        (
+            "keeper",
+            "ada",
+            'there is no template for the language "ada"; valid: python, modelica, c',
+        ),
         (
             "my-keeper",
             "c",
-            '"my-keeper" is not a valid name of a controller: expected a letter, then letters, digits and underscores',
+            (
+                '"my-keeper" is not a valid name of a controller: expected a letter, then letters, '
+                "digits and underscores"
+            ),
         ),
         ("../keeper", "c", '"../keeper" is not a valid name of a controller'),
         ("2fast", "python", '"2fast" is not a valid name of a controller'),
         ("math", "python", '"math" is already used for something else; choose another name'),
-        ("pictures", "python", '"pictures" is already used for something else; choose another name'),
-        ("vehicle", "modelica", '"vehicle" is already used for something else; choose another name'),
-        ("Boolean", "modelica", '"Boolean" is already used for something else; choose another name'),
+        (
+            "pictures",
+            "python",
+            '"pictures" is already used for something else; choose another name',
+        ),
+        (
+            "vehicle",
+            "modelica",
+            '"vehicle" is already used for something else; choose another name',
+        ),
+        (
+            "Boolean",
+            "modelica",
+            '"Boolean" is already used for something else; choose another name',
+        ),
     ],
 )
 def test_unsuitable_names_and_languages_are_refused(tmp_path, name, language, message):
@@ -255,7 +359,10 @@ def test_unsuitable_names_and_languages_are_refused(tmp_path, name, language, me
 def test_a_missing_language_and_a_file_in_the_place_of_the_folder_are_named(tmp_path):
     (tmp_path / "room").write_text("x")
     done = new(tmp_path, "room", "python")
-    assert (done.returncode, done.stderr) == (2, "room: is a file, expected the name of a new folder\n")
+    assert (done.returncode, done.stderr) == (
+        2,
+        "room: is a file, expected the name of a new folder\n",
+    )
     done = run_cosim("new", "controller", "keeper", cwd=tmp_path)
     assert "Missing option '--language': python, modelica, c" in done.stderr
 
@@ -263,7 +370,13 @@ def test_a_missing_language_and_a_file_in_the_place_of_the_folder_are_named(tmp_
 def test_the_test_of_a_new_controller_ends_an_endless_loop(tmp_path):
     assert new(tmp_path, "keeper", "python").returncode == 0
     source = tmp_path / "keeper/keeper.py"
-    source.write_text(re.sub(r"(    def do_step\(.*\n)", r"\1        while True:\n            pass\n", source.read_text()))
+    source.write_text(
+        re.sub(
+            r"(    def do_step\(.*\n)",
+            r"\1        while True:\n            pass\n",
+            source.read_text(),
+        )
+    )
     scenario = tmp_path / "keeper/keeper.json"
     scenario.write_text(json.dumps(json.loads(scenario.read_text()) | {"deadlines": {"step": 0.3}}))
     done = run_pytest(tmp_path, "keeper")
@@ -275,15 +388,27 @@ def test_the_output_of_a_build_is_an_fmu(tmp_path):
     (tmp_path / "room.py").write_text("x = 1")
     done = run_cosim("build", "room.py", "--output", "room", cwd=tmp_path)
     assert done.returncode == 2
-    assert '--output: expected the name of an FMU; found "room"; did you mean "room.fmu"?' in done.stderr
+    assert (
+        '--output: expected the name of an FMU; found "room"; did you mean "room.fmu"?'
+        in done.stderr
+    )
 
 
 @pytest.mark.parametrize(
     ("text", "line"),
     [
-        ('{\n "family": "multirotor",\n "mass": 1.0\n "inertia": 1\n}', "boat.json:3:13: expected ',' or '}'"),
-        ('{"family": "submerged", "mass": NaN}', "boat.json:1:33: $.mass: NaN is not allowed, expected a finite number"),
-        ('{\n "family": "multirotr"}', """boat.json:2:2: $.family: found 'multirotr'; did you mean "multirotor"?"""),
+        (
+            '{\n "family": "multirotor",\n "mass": 1.0\n "inertia": 1\n}',
+            "boat.json:3:13: expected ',' or '}'",
+        ),
+        (
+            '{"family": "submerged", "mass": NaN}',
+            "boat.json:1:33: $.mass: NaN is not allowed, expected a finite number",
+        ),
+        (
+            '{\n "family": "multirotr"}',
+            """boat.json:2:2: $.family: found 'multirotr'; did you mean "multirotor"?""",
+        ),
         ("[1]", "boat.json:1:1: $: expected an object, the data of a vehicle"),
     ],
 )
@@ -294,7 +419,8 @@ def test_the_export_of_a_vehicle_file_names_the_place_of_a_fault(tmp_path, text,
 
 
 @pytest.mark.parametrize(
-    ("base", "hint"), [("ar_drone", "cosim run demo1_box --set"), ("x500", "multirotor_controller.fmu flies it")]
+    ("base", "hint"),
+    [("ar_drone", "cosim run demo1_box --set"), ("x500", "multirotor_controller.fmu flies it")],
 )
 def test_a_new_multirotor_comes_with_a_way_to_fly_it(tmp_path: Path, base: str, hint: str) -> None:
     done = run_cosim("new", "vehicle", "my_quad", "--from", base, cwd=tmp_path)

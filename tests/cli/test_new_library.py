@@ -1,6 +1,7 @@
 """`cosim new controller --library`: a speed controller around LimPID flies demo1.
 
-Without the Standard Library in MODELICAPATH, a small library with a block of the same name and parameters replaces it.
+Without the Standard Library in MODELICAPATH, a small library with a block of the same name and
+parameters replaces it.
 """
 
 from __future__ import annotations
@@ -89,7 +90,9 @@ def test_a_controller_around_the_library_pid_flies_demo1(tmp_path):
         "MySpeed.mo", "autopilot.json", "fmus", "my_speed.json", "test_my_speed.py",
     ]  # fmt: skip
     scenario = tmp_path / "my_speed" / "my_speed.json"
-    keys = json.loads(scenario.read_text()) | {"record": {"signals": ["plant.*", "uav.*", "usv.*", INTERNAL]}}
+    keys = json.loads(scenario.read_text()) | {
+        "record": {"signals": ["plant.*", "uav.*", "usv.*", INTERNAL]}
+    }
     scenario.write_text(json.dumps(keys))
     result = cosim.run(scenario)
     assert [check.name for check in result.checks if not check.passed] == []

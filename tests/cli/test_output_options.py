@@ -28,7 +28,8 @@ class Talker(Fmi2Slave):
         return True
 """
 KPIS = (
-    "from cosim import units\n\n\n@units(value='m')\ndef last(result, signal):\n    return {'value': float(result[signal][-1])}\n"
+    "from cosim import units\n\n\n@units(value='m')\ndef last(result, signal):\n    return "
+    "{'value': float(result[signal][-1])}\n"
 )
 FIGURES = """
 from matplotlib.figure import Figure
@@ -64,10 +65,16 @@ def talker(folder, limit=100.0, largest=2.0, **more):
 
 @pytest.mark.parametrize("isolation", ["run", "none"])
 def test_json_of_a_run_is_not_mixed_with_what_components_print(tmp_path, isolation):
-    done = run_cosim("run", talker(tmp_path), "--json", "--no-report", "--isolation", isolation, cwd=tmp_path)
+    done = run_cosim(
+        "run", talker(tmp_path), "--json", "--no-report", "--isolation", isolation, cwd=tmp_path
+    )
     assert done.returncode == 0, done.stderr
     summary = json.loads(done.stdout)
-    assert (summary["exit_code"], summary["failure"], summary["kpis"]) == (0, None, {"end.value": 2.0})
+    assert (summary["exit_code"], summary["failure"], summary["kpis"]) == (
+        0,
+        None,
+        {"end.value": 2.0},
+    )
     assert summary["checks"] == [{"kpi": "end.value", "max": 2.0, "value": 2.0, "passed": True}]
     assert (tmp_path / summary["folder"] / summary["files"][0]).is_file()
     assert "stepping 1.0" in done.stderr
@@ -77,12 +84,19 @@ def test_quiet_prints_only_what_is_wrong(tmp_path):
     good = run_cosim("run", talker(tmp_path), "--quiet", cwd=tmp_path)
     assert (good.returncode, good.stdout, good.stderr) == (0, "", "")
     bad = run_cosim("run", talker(tmp_path, largest=1.0), "--quiet", cwd=tmp_path)
-    assert (bad.returncode, bad.stdout, bad.stderr) == (3, "", "check failed: end.value is 2 m, expected at most 1.0 m\n")
+    assert (bad.returncode, bad.stdout, bad.stderr) == (
+        3,
+        "",
+        "check failed: end.value is 2 m, expected at most 1.0 m\n",
+    )
     both = run_cosim("run", tmp_path / "talk.json", "--quiet", "--json", cwd=tmp_path)
     assert json.loads(both.stdout)["exit_code"] == 3
     regressed = run_cosim("regress", tmp_path / "talk.json", "-q", cwd=tmp_path)
     assert (regressed.returncode, regressed.stdout) == (3, "")
-    assert regressed.stderr == "talk: end.value is 2 m, expected at most 1.0 m\ntalk: see runs/talk/report.html\n"
+    assert (
+        regressed.stderr
+        == "talk: end.value is 2 m, expected at most 1.0 m\ntalk: see runs/talk/report.html\n"
+    )
 
 
 def test_verbose_prints_timings(tmp_path):
@@ -93,7 +107,9 @@ def test_verbose_prints_timings(tmp_path):
 def test_a_failed_run_has_a_report_with_its_cause_and_the_figures_that_can_be_drawn(tmp_path):
     (tmp_path / "figures.py").write_text(FIGURES)
     line = {"name": "course", "python": "figures.py:line", "arguments": {"signal": "a.y"}}
-    file = talker(tmp_path, limit=2.0, figures=[line, {"name": "other", "python": "figures.py:broken"}])
+    file = talker(
+        tmp_path, limit=2.0, figures=[line, {"name": "other", "python": "figures.py:broken"}]
+    )
     done = run_cosim("run", file, "--json", cwd=tmp_path)
     assert done.returncode == 1
     summary = json.loads(done.stdout)
@@ -107,11 +123,16 @@ def test_a_failed_run_has_a_report_with_its_cause_and_the_figures_that_can_be_dr
 def test_a_crashed_run_has_a_report_with_its_cause(tmp_path):
     file = talker(tmp_path)
     text = (tmp_path / "talker.py").read_text()
-    (tmp_path / "talker.py").write_text(f"import os\n{text}".replace("return True", "os.kill(os.getpid(), 11)"))
+    (tmp_path / "talker.py").write_text(
+        f"import os\n{text}".replace("return True", "os.kill(os.getpid(), 11)")
+    )
     done = run_cosim("run", file, "--json", cwd=tmp_path)
     assert done.returncode == 1
     assert "SIGSEGV" in json.loads(done.stdout)["failure"]
-    assert "The run failed: a: do_step failed at t = 0 s" in (tmp_path / "runs/talk/report.html").read_text()
+    assert (
+        "The run failed: a: do_step failed at t = 0 s"
+        in (tmp_path / "runs/talk/report.html").read_text()
+    )
 
 
 def test_data_of_all_commands_is_printed_as_json(tmp_path):
@@ -123,7 +144,9 @@ def test_data_of_all_commands_is_printed_as_json(tmp_path):
     assert described["properties"]["model"] == "mixer"
     assert {"name", "unit", "causality", "start"} <= set(described["variables"][0])
     assert set(json.loads(run_cosim("simulate", fmu, "--json").stdout)) == {"time", "values"}
-    compared = json.loads(run_cosim("compare", tmp_path / "a.csv", tmp_path / "a.csv", "--json").stdout)
+    compared = json.loads(
+        run_cosim("compare", tmp_path / "a.csv", tmp_path / "a.csv", "--json").stdout
+    )
     assert (compared["passed"], compared["signals"][0]["signal"]) == (True, "y")
     regressed = json.loads(run_cosim("regress", scenario, "--json", cwd=tmp_path).stdout)
     assert (regressed["failed"], regressed["scenarios"][0]["summary"]) == (0, "1 check")
@@ -137,15 +160,30 @@ def test_every_command_has_quiet_and_verbose():
 
 def test_list_names_what_is_shipped():
     done = run_cosim("list")
-    for text in ("demo1_box ", "landing_envelope ", "ar_drone ", "uav_mixer ", "cosim.kpis:rms ", "kpis.py:landing "):
+    for text in (
+        "demo1_box ",
+        "landing_envelope ",
+        "ar_drone ",
+        "uav_mixer ",
+        "cosim.kpis:rms ",
+        "kpis.py:landing ",
+    ):
         assert text in done.stdout
     listed = json.loads(run_cosim("list", "--json", "scenarios", "kpis").stdout)
-    assert [entry["name"] for entry in listed["scenarios"]] == sorted(path.stem for path in (ROOT / "scenarios").glob("*.json"))
-    assert all(Path(entry["file"]).is_file() and entry["description"] for found in listed.values() for entry in found)
+    assert [entry["name"] for entry in listed["scenarios"]] == sorted(
+        path.stem for path in (ROOT / "scenarios").glob("*.json")
+    )
+    assert all(
+        Path(entry["file"]).is_file() and entry["description"]
+        for found in listed.values()
+        for entry in found
+    )
 
 
 def test_scenarios_are_listed_in_the_groups_of_their_document():
-    """Each scenario is in one group; the document has a heading for each group and a table of its scenarios."""
+    """Each scenario is in one group; the document has a heading for each group and a table of its
+    scenarios.
+    """
     text = run_cosim("list", "scenarios").stdout
     listed = {
         head.lower(): sorted(re.findall(r"^  (\w+)", rows, re.M))
@@ -164,5 +202,7 @@ def test_scenarios_are_listed_in_the_groups_of_their_document():
 
 def test_an_fmu_in_place_of_a_scenario_is_explained():
     done = run_cosim("run", "x.fmu")
-    message = "x.fmu is an FMU, expected a scenario; `cosim simulate x.fmu` simulates a single FMU\n"
+    message = (
+        "x.fmu is an FMU, expected a scenario; `cosim simulate x.fmu` simulates a single FMU\n"
+    )
     assert (done.returncode, done.stderr) == (2, message)

@@ -40,7 +40,9 @@ def last(result, signal):
 """
 REFERENCE = {"file": "references/cooling.csv", "tolerances": {"body.*": {"absolute": 0.1}}}
 CHECK = {
-    "kpis": [{"name": "end", "python": "cooling.py:last", "arguments": {"signal": "body.temperature"}}],
+    "kpis": [
+        {"name": "end", "python": "cooling.py:last", "arguments": {"signal": "body.temperature"}}
+    ],
     "checks": [{"kpi": "end.value", "max": 10}],
 }
 
@@ -54,7 +56,13 @@ def folder(tmp_path):
 
 def scenario(folder, name="cooling", rate=0.5, **more):
     body = {"python": "cooling.py:Body", "parameters": {"rate": rate}}
-    content = {"name": name, "stop_time": 5, "step_size": 0.01, "components": {"body": body}, **more}
+    content = {
+        "name": name,
+        "stop_time": 5,
+        "step_size": 0.01,
+        "components": {"body": body},
+        **more,
+    }
     (folder / f"scenarios/{name}.json").write_text(json.dumps(content))
 
 
@@ -67,10 +75,14 @@ def test_a_reference_is_written_and_met(folder):
     updated = regress(folder, "--update")
     assert updated.returncode == 0, updated.stdout + updated.stderr
     assert "1 signal, " in updated.stdout
-    assert json.loads((folder / "scenarios/references/cooling.json").read_text())["versions"]["numpy"]
+    assert json.loads((folder / "scenarios/references/cooling.json").read_text())["versions"][
+        "numpy"
+    ]
     again = regress(folder)
     assert (again.returncode, again.stdout.splitlines()[-1]) == (0, "1 scenario, all passed")
-    assert "1 signal (25% of the tolerances)" in again.stdout  # the deviation of the decimated reference
+    assert (
+        "1 signal (25% of the tolerances)" in again.stdout
+    )  # the deviation of the decimated reference
 
 
 def test_a_changed_result_fails_with_signal_time_and_changes(folder):
@@ -83,12 +95,17 @@ def test_a_changed_result_fails_with_signal_time_and_changes(folder):
     assert "changed since the reference was made: scenarios/cooling.json\n" in done.stdout
     assert "        tube: the reference plus and minus its tolerances" in done.stdout
     command = "cosim regress --update scenarios/cooling.json"
-    assert done.stdout.splitlines()[-1] == f"if the change is meant, make this run the reference: {command}"
+    assert (
+        done.stdout.splitlines()[-1]
+        == f"if the change is meant, make this run the reference: {command}"
+    )
     assert (folder / "runs/cooling/tubes.png").stat().st_size > 10_000
     assert f"see {Path('runs/cooling/report.html')}\n" in done.stdout
     page = (folder / "runs/cooling/report.html").read_text()
     assert "comparison" in re.findall(r"<figcaption>(.*?)</figcaption>", page)
-    assert '<p class="verdict bad">✗ Comparison with the reference: 1 of 1 signal failed</p>' in page
+    assert (
+        '<p class="verdict bad">✗ Comparison with the reference: 1 of 1 signal failed</p>' in page
+    )
     assert "<li>Changed since the reference was made: scenarios/cooling.json</li>" in page
     assert f"<li>If the change is meant, make this run the reference: {command}</li>" in page
     suite = etree.parse(folder / "out/junit.xml").getroot().find("testsuite")
@@ -108,8 +125,18 @@ def test_a_run_that_is_longer_than_its_reference_says_so(folder):
     assert regress(folder, "--update").returncode == 0
     scenario(folder, reference=REFERENCE, stop_time=6)
     done = regress(folder)
-    assert (done.returncode, "1 signal (25% of the tolerances; the reference ends at 5 s)" in done.stdout) == (0, True)
-    scenario(folder, reference=REFERENCE, stop_time=6, kpis=CHECK["kpis"], checks=[{"kpi": "end.value", "max": 1}], rate=0.6)
+    assert (
+        done.returncode,
+        "1 signal (25% of the tolerances; the reference ends at 5 s)" in done.stdout,
+    ) == (0, True)
+    scenario(
+        folder,
+        reference=REFERENCE,
+        stop_time=6,
+        kpis=CHECK["kpis"],
+        checks=[{"kpi": "end.value", "max": 1}],
+        rate=0.6,
+    )
     assert regress(folder).returncode == 3
     page = (folder / "runs/cooling/report.html").read_text()
     assert ("Changed since" in page, "If the change is meant" in page) == (True, False)
@@ -168,8 +195,15 @@ def test_a_folder_without_scenarios_is_told_that_the_shipped_ones_are_run(folder
     """With the outcome of one of them, because all of them take long."""
     monkeypatch.chdir(folder / "scenarios")
     outcome = RegressionOutcome("demo1_box", 0, "5 checks")
-    monkeypatch.setattr(regress_command, "run_regressions", lambda folders, *_: [outcome] if folders[0].is_absolute() else [])
-    assert "no folder scenarios/ here: the shipped scenarios are run\n" in CliRunner().invoke(regress_command.command).stderr
+    monkeypatch.setattr(
+        regress_command,
+        "run_regressions",
+        lambda folders, *_: [outcome] if folders[0].is_absolute() else [],
+    )
+    assert (
+        "no folder scenarios/ here: the shipped scenarios are run\n"
+        in CliRunner().invoke(regress_command.command).stderr
+    )
 
 
 def test_missing_and_unreadable_scenarios_are_refused(folder):
@@ -177,7 +211,10 @@ def test_missing_and_unreadable_scenarios_are_refused(folder):
     assert regress(folder).returncode == 2
     assert 'no shipped scenario "colling"' in regress(folder, "colling").stderr
     (folder / "free_flight").mkdir()
-    assert '"free_flight" is a folder here and a shipped scenario: write ' in regress(folder, "free_flight").stderr
+    assert (
+        '"free_flight" is a folder here and a shipped scenario: write '
+        in regress(folder, "free_flight").stderr
+    )
     (folder / "scenarios/aimless.json").write_text("{]")
     assert "aimless.json:1:2:" in regress(folder).stdout
     (folder / "scenarios/aimless.json").write_text("[" * 100_000)
@@ -187,12 +224,20 @@ def test_missing_and_unreadable_scenarios_are_refused(folder):
 def test_an_fmu_older_than_its_source_in_the_folder_of_controllers_is_named(folder):
     (folder / "controllers").mkdir()
     (folder / "scenarios/cooling.py").rename(folder / "controllers/body.py")
-    assert run_cosim("build", "controllers/body.py", "--output", "fmus/body.fmu", cwd=folder).returncode == 0
+    assert (
+        run_cosim(
+            "build", "controllers/body.py", "--output", "fmus/body.fmu", cwd=folder
+        ).returncode
+        == 0
+    )
     scenario(folder, components={"body": {"fmu": "../fmus/body.fmu"}}, reference=REFERENCE)
     updated = regress(folder, "--update")
     assert (updated.returncode, "WARNING" in updated.stdout) == (0, False)
     (folder / "controllers/body.py").write_text(COOLING + "# changed")
     done = regress(folder)
     command = "cosim build controllers/body.py --output fmus/body.fmu"
-    warning = f'"fmus/body.fmu" was built from another version of controllers/body.py: `{command}` builds it again'
+    warning = (
+        f'"fmus/body.fmu" was built from another version of controllers/body.py: `{command}` '
+        "builds it again"
+    )
     assert (done.returncode, done.stdout.splitlines()[1]) == (0, f"        WARNING {warning}")

@@ -11,10 +11,14 @@ from cosim.results import Result
 
 
 def cosim_run(folder, fmus, *options, **algorithm):
-    """Run one component per FMU (c0, c1, ... in one stage); return exit code, standard output and standard error."""
+    """Run one component per FMU (c0, c1, ... in one stage); return exit code, standard output and
+    standard error.
+    """
     components = {f"c{i}": {"fmu": str(fmu)} for i, fmu in enumerate(fmus)}
     document = {"name": "busy", "stop_time": 0.5, "step_size": 0.01, "components": components}
-    (folder / "busy.json").write_text(json.dumps(document | {"algorithm": {"stages": [list(components)], **algorithm}}))
+    (folder / "busy.json").write_text(
+        json.dumps(document | {"algorithm": {"stages": [list(components)], **algorithm}})
+    )
     done = run_cosim("run", "busy.json", "--output-dir", "out", *options, cwd=folder)
     return done.returncode, done.stdout, done.stderr
 
@@ -44,10 +48,16 @@ def test_a_late_run_ends_and_keeps_its_rows_with_late_fail(tmp_path):
 
 def test_a_crash_on_a_thread_names_all_components_of_the_stage(tmp_path):
     """Without threads, the failing component itself is named."""
-    fmus = [slow_fmu(tmp_path, "good", 2e-4, True), slow_fmu(tmp_path, "bad", 2e-4, True, "FATAL_TIME=0.105")]
+    fmus = [
+        slow_fmu(tmp_path, "good", 2e-4, True),
+        slow_fmu(tmp_path, "bad", 2e-4, True, "FATAL_TIME=0.105"),
+    ]
     code, _, err = cosim_run(tmp_path, fmus, parallel=True)
     assert code == 1
-    assert "one of c0, c1: parallel step failed at t = 0.11 s: the process was ended by signal 6 (SIGABRT" in err
+    assert (
+        "one of c0, c1: parallel step failed at t = 0.11 s: the process was ended by signal 6 "
+        "(SIGABRT"
+    ) in err
     assert "12 rows until t = 0.11 s kept in" in err
     err = cosim_run(tmp_path, fmus, "--set", "/algorithm/parallel=false")[2]
     assert "c1: fmi2DoStep failed at t = 0.11 s: the process was ended by signal 6" in err

@@ -48,9 +48,15 @@ def test_each_finding_is_a_line_and_the_exit_code_is_2(bad, probes):
     assert (done.returncode, done.stderr) == (2, "")
     good, first, second = done.stdout.splitlines()
     assert good.endswith("no findings")
-    assert first.startswith(f'{bad}: error: modelDescription.xml:13: variable "u": found start value NaN, expected a finite')
+    assert first.startswith(
+        f'{bad}: error: modelDescription.xml:13: variable "u": found start value NaN, expected a '
+        "finite"
+    )
     assert first.endswith("[start.finite, FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7.5]")
-    assert second.startswith(f"{bad}: warning: modelDescription.xml:11: found stopTime 0, expected more than the startTime 0")
+    assert second.startswith(
+        f"{bad}: warning: modelDescription.xml:11: found stopTime 0, expected more than the "
+        "startTime 0"
+    )
 
 
 def test_json_has_the_same_findings(bad):
@@ -58,7 +64,11 @@ def test_json_has_the_same_findings(bad):
     assert done.returncode == 2
     error, warning = json.loads(done.stdout)
     assert (error["file"], error["severity"], error["rule"]) == (str(bad), "error", "start.finite")
-    assert (warning["severity"], warning["member"], warning["line"]) == ("warning", "modelDescription.xml", 11)
+    assert (warning["severity"], warning["member"], warning["line"]) == (
+        "warning",
+        "modelDescription.xml",
+        11,
+    )
     assert json.loads(validate(FMUS[0], "--json").stdout) == []
 
 

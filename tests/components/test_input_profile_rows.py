@@ -13,7 +13,10 @@ from cosim.engine.layout import build_layout
 @pytest.mark.parametrize(
     ("text", "words"),
     [
-        ("time;u\n0;1\n", 'the first column "time;u", expected "time" and columns separated by commas'),
+        (
+            "time;u\n0;1\n",
+            'the first column "time;u", expected "time" and columns separated by commas',
+        ),
         ("time,u\n0,1\n\n1,x\n", ":4: column \"u\": found 'x', expected a finite number"),
         ("time,u\n0,1\n0,2\n", ":3: expected a time above that of the row before"),
         ("time,u\n0,nan\n", ":2: column \"u\": found 'nan', expected a finite number"),
@@ -34,7 +37,9 @@ def test_the_row_is_named(tmp_path, text, words):
 def test_empty_rows_are_passed_over(tmp_path):
     file = tmp_path / "in.csv"
     file.write_text("time,u\r\n0,1\r\n\r\n1,2\r\n\r\n")
-    assert [variable.name for variable in read_input_table(file, {"u": None}, "linear").variables] == ["u"]
+    assert [
+        variable.name for variable in read_input_table(file, {"u": None}, "linear").variables
+    ] == ["u"]
 
 
 COLOURS = (("red", 1), ("green", 2))
@@ -55,7 +60,9 @@ COLOURS = (("red", 1), ("green", 2))
 def test_a_column_has_the_type_of_its_input(tmp_path, kind, cells, values):
     file = tmp_path / "in.csv"
     file.write_text(f"time,ignored,u\n0,x,{cells[0]}\n2,x,{cells[1]}\n")
-    table = read_input_table(file, {"u": Variable("u", kind, items=COLOURS if kind == "Enumeration" else ())}, "linear")
+    table = read_input_table(
+        file, {"u": Variable("u", kind, items=COLOURS if kind == "Enumeration" else ())}, "linear"
+    )
     ports = build_layout({"table": table.variables}).ports["table"]
     table.bind(Ports((), {}), ports)
     table.enter_initialization_mode(0.0, 2.0)
@@ -82,5 +89,11 @@ def test_a_column_has_the_type_of_its_input(tmp_path, kind, cells, values):
 def test_a_cell_of_another_type_is_refused(tmp_path, kind, cell):
     file = tmp_path / "in.csv"
     file.write_text(f"time,u\n0,{cell}\n")
-    with pytest.raises(InputError, match=f"column \"u\": found '{cell}', expected a value of type {kind}"):
-        read_input_table(file, {"u": Variable("u", kind, items=COLOURS if kind == "Enumeration" else ())}, "linear")
+    with pytest.raises(
+        InputError, match=f"column \"u\": found '{cell}', expected a value of type {kind}"
+    ):
+        read_input_table(
+            file,
+            {"u": Variable("u", kind, items=COLOURS if kind == "Enumeration" else ())},
+            "linear",
+        )

@@ -10,7 +10,11 @@ from cosim.components.object_state import snapshot
 
 class Filter:
     def __init__(self):
-        self.past, self.weights, self.names = deque([1.0, 2.0], maxlen=2), np.array([0.5, 0.5]), {"a", "b"}
+        self.past, self.weights, self.names = (
+            deque([1.0, 2.0], maxlen=2),
+            np.array([0.5, 0.5]),
+            {"a", "b"},
+        )
 
     def __call__(self, u):
         self.past.append(u)
@@ -29,7 +33,9 @@ class Controller:
         change, self.last = u - self.last, u
         self.table["gains"][1][0] += change
         self.table.setdefault("calls", []).append(u)
-        return self.filter(u) + self.table["gains"][1][0] + self.noise.random() + self.draws.normal()
+        return (
+            self.filter(u) + self.table["gains"][1][0] + self.noise.random() + self.draws.normal()
+        )
 
     def replace_attributes(self):
         del self.filter.names

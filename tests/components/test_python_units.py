@@ -1,4 +1,6 @@
-"""The class attribute `units` of a PythonFMU class, in process and exported: units are converted, or refused."""
+"""The class attribute `units` of a PythonFMU class, in process and exported: units are converted,
+or refused.
+"""
 
 import json
 from pathlib import Path
@@ -36,10 +38,18 @@ def scenario(folder: Path, exported: bool, output: object, expected: object) -> 
         source.write_text(SOURCE.format(name=name, units=units))
         if exported:
             build_to(source, None, source.with_suffix(".fmu"))
-        components[name.lower()] = {"fmu": f"{source.stem}.fmu"} if exported else {"python": f"{source.name}:{name}"}
+        components[name.lower()] = (
+            {"fmu": f"{source.stem}.fmu"} if exported else {"python": f"{source.name}:{name}"}
+        )
     connections = [{"from": "sender.y", "to": "receiver.x"}]
     file = folder / "s.json"
-    content = {"name": "s", "stop_time": 2, "step_size": 1, "components": components, "connections": connections}
+    content = {
+        "name": "s",
+        "stop_time": 2,
+        "step_size": 1,
+        "components": components,
+        "connections": connections,
+    }
     file.write_text(json.dumps(content))
     return file
 
@@ -83,14 +93,23 @@ def test_wrong_units_of_a_vector_are_one_line_with_the_place_of_their_declaratio
     components = {name: {"python": "both.py:Both"} for name in "ab"}
     wires = [{"from": "a.y", "to": "b.x"}]
     (tmp_path / "s.json").write_text(
-        json.dumps({"name": "s", "stop_time": 2, "step_size": 1, "components": components, "connections": wires})
+        json.dumps(
+            {
+                "name": "s",
+                "stop_time": 2,
+                "step_size": 1,
+                "components": components,
+                "connections": wires,
+            }
+        )
     )
     with pytest.raises(InputError) as refusal:
         cosim.run(tmp_path / "s.json")
     (problem,) = refusal.value.problems
     place = "is declared by Base.units (both.py:7)"
     assert problem.message == (
-        'a.y[1] cannot feed b.x[1], and 2 more elements likewise: units "m" and "rad" measure different quantities'
+        'a.y[1] cannot feed b.x[1], and 2 more elements likewise: units "m" and "rad" measure '
+        "different quantities"
         f'; "m" {place}; "rad" {place}'
     )
 
@@ -98,14 +117,22 @@ def test_wrong_units_of_a_vector_are_one_line_with_the_place_of_their_declaratio
 @pytest.mark.parametrize(
     ("units", "message"),
     [
-        ({"xx": "rad"}, 'names "xx", but no register_variable of type Real does; registered: x, y$'),
+        (
+            {"xx": "rad"},
+            'names "xx", but no register_variable of type Real does; registered: x, y$',
+        ),
         ({"y": "radd"}, r'contains "radd" for "y": unknown unit'),
-        ({"x": "metre", "y": "metre"}, r'contains "metre" for "x", "y": unknown unit "metre"; did you mean "m"\?$'),
+        (
+            {"x": "metre", "y": "metre"},
+            r'contains "metre" for "x", "y": unknown unit "metre"; did you mean "m"\?$',
+        ),
         (["y"], "is not a dict of names of variables and units"),
     ],
 )
 def test_wrong_units_are_refused(tmp_path, units, message):
-    with pytest.raises(InputError, match=rf"the class attribute Sender\.units \(sender\.py:6\) {message}"):
+    with pytest.raises(
+        InputError, match=rf"the class attribute Sender\.units \(sender\.py:6\) {message}"
+    ):
         cosim.run(scenario(tmp_path, False, units, {}))
     with pytest.raises(InputError, match=rf'sender\.py: the class attribute "units" {message}'):
         scenario(tmp_path, True, units, {})

@@ -1,4 +1,6 @@
-"""Files of a folder import each other as the files of a script do, and folders with modules of equal names do not mix."""
+"""Files of a folder import each other as the files of a script do, and folders with modules of
+equal names do not mix.
+"""
 
 from pathlib import Path
 
@@ -40,9 +42,15 @@ def test_each_folder_has_its_own_modules(tmp_path):
 def test_only_imports_of_the_folder_are_changed(tmp_path):
     folder = write(tmp_path / "one", 1)
     text = read_with_relative_imports(folder / "main.py", folder)
-    assert text.splitlines()[1:4] == ["import math; from . import helper; from .parts import wing as w", *text.splitlines()[2:4]]
+    assert text.splitlines()[1:4] == [
+        "import math; from . import helper; from .parts import wing as w",
+        *text.splitlines()[2:4],
+    ]
     assert text.count("\n") == MAIN.count("\n")
-    assert text.splitlines()[6:] == ["    from . import helper as h; return h.value", MAIN.splitlines()[7]]
+    assert text.splitlines()[6:] == [
+        "    from . import helper as h; return h.value",
+        MAIN.splitlines()[7],
+    ]
 
 
 def test_the_files_of_a_run_contain_the_imported_ones(tmp_path):

@@ -20,7 +20,11 @@ def unpacked(tmp_path_factory: pytest.TempPathFactory) -> Callable[[str], str]:
 
     @cache
     def unpack(name: str) -> str:
-        return str(extract(str(ROOT / "fmus" / f"{name}.fmu"), str(tmp_path_factory.mktemp(Path(name).name))))
+        return str(
+            extract(
+                str(ROOT / "fmus" / f"{name}.fmu"), str(tmp_path_factory.mktemp(Path(name).name))
+            )
+        )
 
     return unpack
 

@@ -13,7 +13,9 @@ PYTHON_TYPES = {"Real": float, "Integer": int, "Enumeration": int, "Boolean": bo
 
 
 class ControllerFmu:
-    """The FMU unpacked to `folder`: `step` runs the tick at the present time on the given inputs and returns all outputs."""
+    """The FMU unpacked to `folder`: `step` runs the tick at the present time on the given inputs
+    and returns all outputs.
+    """
 
     def __init__(self, folder: str, parameters: Mapping[str, Any]):
         description = read_model_description(folder)
@@ -55,7 +57,10 @@ class ControllerFmu:
         values: dict[str, Any] = {}
         for kind, variables in kinds.items():
             found = getattr(self.fmu, f"get{kind}")([v.valueReference for v in variables])
-            values |= {v.name: PYTHON_TYPES[v.type](value) for v, value in zip(variables, found, strict=True)}
+            values |= {
+                v.name: PYTHON_TYPES[v.type](value)
+                for v, value in zip(variables, found, strict=True)
+            }
         return values
 
 
@@ -63,7 +68,9 @@ def by_kind(variables: Iterable[Any]) -> dict[str, list[Any]]:
     """Group variables by the word in the names of the functions that access them."""
     kinds: dict[str, list[Any]] = {}
     for variable in variables:
-        kinds.setdefault("Integer" if variable.type == "Enumeration" else variable.type, []).append(variable)
+        kinds.setdefault("Integer" if variable.type == "Enumeration" else variable.type, []).append(
+            variable
+        )
     return kinds
 
 

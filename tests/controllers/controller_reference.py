@@ -1,8 +1,10 @@
-"""The controllers re-stated in Python from the equations of the paper and its repository, for comparison with the FMUs.
+"""The controllers re-stated in Python from the equations of the paper and its repository, for
+comparison with the FMUs.
 
 The landing logic is this project's own: the original was stateless and never cut its motors.
 
-Nothing here knows how the FMUs are made. Signs follow the project's frames: positive pitch = nose down, yaw counter-clockwise.
+Nothing here knows how the FMUs are made. Signs follow the project's frames: positive pitch = nose
+down, yaw counter-clockwise.
 """
 
 from __future__ import annotations
@@ -24,7 +26,9 @@ def wrap(angle: float) -> float:
 
 @dataclass
 class Pid:
-    """u = P e + I int(e) + D N/(1 + N/s) e, its filter integrated over a period by ode3 with the error held."""
+    """u = P e + I int(e) + D N/(1 + N/s) e, its filter integrated over a period by ode3 with the
+    error held.
+    """
 
     P: float
     I: float = 0.0  # noqa: E741
@@ -53,12 +57,16 @@ class Pid:
 
 
 class PositionReference:
-    """Errors are rotated into the heading frame (forward, left); tilt commands in degrees inside, rad outside."""
+    """Errors are rotated into the heading frame (forward, left); tilt commands in degrees inside,
+    rad outside.
+    """
 
     def __init__(self, p: dict[str, float]):
         speed, tilt = (-p["speed_limit"], p["speed_limit"]), (-p["tilt_limit"], p["tilt_limit"])
         self.position = [Pid(p["position_P"], p["position_I"], limits=speed) for _ in "xy"]
-        self.velocity = [Pid(p["velocity_P"], 0.0, p["velocity_D"], p["velocity_N"], tilt) for _ in "xy"]
+        self.velocity = [
+            Pid(p["velocity_P"], 0.0, p["velocity_D"], p["velocity_N"], tilt) for _ in "xy"
+        ]
 
     def __call__(self, i: dict[str, Any]) -> dict[str, float]:
         heading = complex(math.cos(i["vehicle.attitude.yaw"]), -math.sin(i["vehicle.attitude.yaw"]))
@@ -69,10 +77,12 @@ class PositionReference:
 
         pairs = zip(body("position_reference"), body("vehicle.position"), strict=True)
         commands = [
-            pid(r - x, f, i["reset"]) for pid, (r, x), f in zip(self.position, pairs, body("velocity_reference"), strict=True)
+            pid(r - x, f, i["reset"])
+            for pid, (r, x), f in zip(self.position, pairs, body("velocity_reference"), strict=True)
         ]
         forward, left = (
-            pid(c - v, reset=i["reset"]) for pid, c, v in zip(self.velocity, commands, body("vehicle.velocity"), strict=True)
+            pid(c - v, reset=i["reset"])
+            for pid, c, v in zip(self.velocity, commands, body("vehicle.velocity"), strict=True)
         )
         return {"pitch_command": math.radians(forward), "roll_command": -math.radians(left)}
 
@@ -81,12 +91,20 @@ class AltitudeReference:
     """The integral starts at the throttle that carries the weight: 4 CT omega^2 = m g."""
 
     def __init__(self, p: dict[str, float]):
-        hover = math.sqrt(p["mass"] * 9.81 / (4 * p["thrust_coefficient"])) / (5000 * 0.10471976) * 100
+        hover = (
+            math.sqrt(p["mass"] * 9.81 / (4 * p["thrust_coefficient"])) / (5000 * 0.10471976) * 100
+        )
         limits = (p["throttle_min"], p["throttle_max"])
-        self.pid = Pid(p["altitude_P"], p["altitude_I"], p["altitude_D"], p["altitude_N"], limits, hover)
+        self.pid = Pid(
+            p["altitude_P"], p["altitude_I"], p["altitude_D"], p["altitude_N"], limits, hover
+        )
 
     def __call__(self, i: dict[str, Any]) -> dict[str, float]:
-        return {"throttle": self.pid(i["altitude_reference"] - i["vehicle.position.z"], reset=i["reset"])}
+        return {
+            "throttle": self.pid(
+                i["altitude_reference"] - i["vehicle.position.z"], reset=i["reset"]
+            )
+        }
 
 
 class AttitudeReference:
@@ -94,13 +112,21 @@ class AttitudeReference:
 
     def __init__(self, p: dict[str, float]):
         def pid(axis: str, band: str, limit: str) -> Pid:
-            return Pid(p[f"{axis}_P"], p[f"{axis}_I"], p[f"{axis}_D"], p[band], (-p[limit], p[limit]))
+            return Pid(
+                p[f"{axis}_P"], p[f"{axis}_I"], p[f"{axis}_D"], p[band], (-p[limit], p[limit])
+            )
 
-        self.roll, self.pitch = pid("roll", "tilt_N", "tilt_limit"), pid("pitch", "tilt_N", "tilt_limit")
+        self.roll, self.pitch = (
+            pid("roll", "tilt_N", "tilt_limit"),
+            pid("pitch", "tilt_N", "tilt_limit"),
+        )
         self.yaw = pid("yaw", "yaw_N", "yaw_limit")
 
     def __call__(self, i: dict[str, Any]) -> dict[str, float]:
-        error = {axis: i[f"{axis}_command"] - i[f"vehicle.attitude.{axis}"] for axis in ("roll", "pitch", "yaw")}
+        error = {
+            axis: i[f"{axis}_command"] - i[f"vehicle.attitude.{axis}"]
+            for axis in ("roll", "pitch", "yaw")
+        }
         return {
             "roll_difference": self.roll(math.degrees(error["roll"]), reset=i["reset"]),
             "pitch_difference": self.pitch(math.degrees(error["pitch"]), reset=i["reset"]),
@@ -110,7 +136,9 @@ class AttitudeReference:
 
 def mix_rotor_speeds(i: dict[str, float]) -> dict[str, float]:
     """Rotors 1 front, 2 left, 3 rear, 4 right; throttle 0..100 % is 0..5000 rpm."""
-    common, roll, pitch, yaw = (i[k] for k in ("throttle", "roll_difference", "pitch_difference", "yaw_difference"))
+    common, roll, pitch, yaw = (
+        i[k] for k in ("throttle", "roll_difference", "pitch_difference", "yaw_difference")
+    )
     rotors = (common - pitch + yaw, common + roll - yaw, common + pitch + yaw, common - roll - yaw)
     return {
         f"rotor_speed[{n}]": i["motor_share"] * clamp(throttle, 0, 100) / 100 * 5000 * 0.10471976
@@ -126,7 +154,9 @@ class Guidance:
 
     def ahead(self, i: dict[str, float]) -> tuple[float, float]:
         k = self.active - 1
-        return self.p["waypoint_x"][k] - i["vehicle.position.x"], self.p["waypoint_y"][k] - i["vehicle.position.y"]
+        return self.p["waypoint_x"][k] - i["vehicle.position.x"], self.p["waypoint_y"][k] - i[
+            "vehicle.position.y"
+        ]
 
     def __call__(self, i: dict[str, float]) -> dict[str, Any]:
         stop, repeat, _ = 1, 2, 3
@@ -142,7 +172,9 @@ class Guidance:
             self.course = math.atan2(dy, dx)
         return {
             "heading_reference": self.course,
-            "speed_reference": 0.0 if self.finished and self.p["end_policy"] == stop else self.p["speed_command"],
+            "speed_reference": 0.0
+            if self.finished and self.p["end_policy"] == stop
+            else self.p["speed_command"],
             "distance": math.hypot(dx, dy),
             "active_waypoint": self.active,
             "finished": self.finished,
@@ -206,7 +238,11 @@ class Vtol:
         return "follow" if self.position[2] > self.home[2] + self.p["clearance"] else "take_off"
 
     def follow(self) -> str:
-        return "approach" if self.p["landing_enabled"] and self.tick * T >= self.p["landing_time"] else "follow"
+        return (
+            "approach"
+            if self.p["landing_enabled"] and self.tick * T >= self.p["landing_time"]
+            else "follow"
+        )
 
     def approach(self) -> str:
         if not self.p["landing_enabled"]:
@@ -227,7 +263,10 @@ class Vtol:
         return "landed"
 
     def __call__(self, i: dict[str, Any]) -> dict[str, Any]:
-        self.position, self.yaw = tuple(i[f"vehicle.position.{a}"] for a in "xyz"), i["vehicle.attitude.yaw"]
+        self.position, self.yaw = (
+            tuple(i[f"vehicle.position.{a}"] for a in "xyz"),
+            i["vehicle.attitude.yaw"],
+        )
         deck = [i[f"target.position.{a}"] for a in "xyz"]
         down = deck[2] + self.p["resting_height"]
         self.error = math.dist(deck[:2], self.position[:2])
@@ -241,16 +280,26 @@ class Vtol:
 
     def references(self, i: dict[str, Any], deck: list[float], down: float) -> dict[str, Any]:
         on_ground, going_up = self.mode in ("idle", "landed"), self.mode in ("idle", "take_off")
-        self.share = clamp(self.share + (-1 if on_ground else 1) * T / self.p["ramp_time"], 0.0, 1.0)
+        self.share = clamp(
+            self.share + (-1 if on_ground else 1) * T / self.p["ramp_time"], 0.0, 1.0
+        )
         destination, rate = i["altitude_command"], self.p["climb_rate"]
         if self.mode == "take_off":
             destination = max(destination, self.home[2] + 2 * self.p["clearance"])
         elif self.mode == "approach":
             destination = down + self.p["approach_height"]
         elif self.mode == "descend":
-            destination, rate = down - self.p["press_depth"], self.p["descent_rate"] * (self.error <= self.p["landing_error"])
-        self.altitude = self.position[2] if self.share < 1 else rate_limited(self.altitude, destination, rate)
-        speed = [i[f"target.velocity.{a}"] if self.p["velocity_feed_forward"] and not going_up else 0.0 for a in "xy"]
+            destination, rate = (
+                down - self.p["press_depth"],
+                self.p["descent_rate"] * (self.error <= self.p["landing_error"]),
+            )
+        self.altitude = (
+            self.position[2] if self.share < 1 else rate_limited(self.altitude, destination, rate)
+        )
+        speed = [
+            i[f"target.velocity.{a}"] if self.p["velocity_feed_forward"] and not going_up else 0.0
+            for a in "xy"
+        ]
         return {
             "position_reference.x": self.home[0] if going_up else deck[0],
             "position_reference.y": self.home[1] if going_up else deck[1],

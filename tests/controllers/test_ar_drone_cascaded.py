@@ -1,4 +1,6 @@
-"""The five control blocks as one FMU, and as the nested system that wires them: the same controller, bit for bit."""
+"""The five control blocks as one FMU, and as the nested system that wires them: the same
+controller, bit for bit.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,9 @@ from typing import Any
 
 import numpy as np
 
-SYSTEM = json.loads((Path(__file__).parents[2] / "scenarios/systems/ar_drone_cascaded.json").read_text())
+SYSTEM = json.loads(
+    (Path(__file__).parents[2] / "scenarios/systems/ar_drone_cascaded.json").read_text()
+)
 
 
 def covered(name: str, prefix: str) -> bool:
@@ -19,7 +23,9 @@ class Wired:
     """The nested system, run block by block in its stage order."""
 
     def __init__(self, controller: Any):
-        self.blocks = {name: controller(Path(c["fmu"]).stem) for name, c in SYSTEM["components"].items()}
+        self.blocks = {
+            name: controller(Path(c["fmu"]).stem) for name, c in SYSTEM["components"].items()
+        }
 
     def step(self, inputs: dict[str, float]) -> dict[str, float]:
         pending: dict[str, dict[str, float]] = {name: {} for name in self.blocks}
@@ -40,7 +46,14 @@ class Wired:
             if covered(signal, inner)
         }
 
-    def _deliver(self, ends: str | list[str], head: str, source: str, value: float, pending: dict[str, dict[str, float]]) -> None:
+    def _deliver(
+        self,
+        ends: str | list[str],
+        head: str,
+        source: str,
+        value: float,
+        pending: dict[str, dict[str, float]],
+    ) -> None:
         for end in [ends] if isinstance(ends, str) else ends:
             block, _, variable = (end + source.removeprefix(head)).partition(".")
             if variable in self.blocks[block].variables:
@@ -54,8 +67,21 @@ def measurements(rng: np.random.Generator, k: int) -> dict[str, Any]:
     vehicle = {f"vehicle.attitude.{axis}": value for axis, value in noise.items()}
     vehicle |= {f"vehicle.velocity.{axis}": float(rng.normal(0, 0.1)) for axis in "xy"}
     vehicle |= {f"vehicle.position.{axis}": float(rng.normal(0, 0.01)) for axis in "xy"}
-    deck = {"target.position.x": 0.0, "target.position.y": 0.0, "target.position.z": 0.2689, "target.velocity.x": 0.3}
-    return vehicle | deck | {"vehicle.position.z": altitude, "vehicle.contact.vessel": k > 890, "altitude_command": 1.9}
+    deck = {
+        "target.position.x": 0.0,
+        "target.position.y": 0.0,
+        "target.position.z": 0.2689,
+        "target.velocity.x": 0.3,
+    }
+    return (
+        vehicle
+        | deck
+        | {
+            "vehicle.position.z": altitude,
+            "vehicle.contact.vessel": k > 890,
+            "altitude_command": 1.9,
+        }
+    )
 
 
 def test_one_fmu_equals_the_nested_system_bit_for_bit(controller: Any) -> None:

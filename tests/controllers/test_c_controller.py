@@ -31,15 +31,24 @@ def keeper(controller):
 
 @pytest.fixture
 def measured():
-    """Random walks over 10 s: yaw crosses +-pi, the speed error changes its sign, both outputs come to their limits."""
+    """Random walks over 10 s: yaw crosses +-pi, the speed error changes its sign, both outputs come
+    to their limits.
+    """
     steps = np.random.default_rng(4).normal(0, [[0.3], [0.05], [0.05]], (3, 1000))
     yaw, speed, rate = np.cumsum(steps, axis=1)
-    return {"vehicle.attitude.yaw": yaw, "vehicle.velocity_body.u": 1 + speed, "vehicle.rates.r": rate}
+    return {
+        "vehicle.attitude.yaw": yaw,
+        "vehicle.velocity_body.u": 1 + speed,
+        "vehicle.rates.r": rate,
+    }
 
 
 def stepped(keeper, measured):
     """Outputs of all steps by name."""
-    rows = [keeper.step(dict(zip(measured, values, strict=True))) for values in zip(*measured.values(), strict=True)]
+    rows = [
+        keeper.step(dict(zip(measured, values, strict=True)))
+        for values in zip(*measured.values(), strict=True)
+    ]
     return {name: np.array([row[name] for row in rows]) for name in rows[0]}
 
 

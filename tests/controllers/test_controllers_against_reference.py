@@ -1,4 +1,6 @@
-"""Controller FMUs against the equations of the fact sheet, with the shipped gains and with random ones."""
+"""Controller FMUs against the equations of the fact sheet, with the shipped gains and with random
+ones.
+"""
 
 from __future__ import annotations
 
@@ -55,7 +57,9 @@ GAINS: dict[str, dict[str, float]] = {
         "rudder_limit": np.radians(35.0),
     },
 }
-GAINS["strider_autopilot"] = GAINS["waypoint_guidance"] | GAINS["speed_controller"] | GAINS["heading_controller"]
+GAINS["strider_autopilot"] = (
+    GAINS["waypoint_guidance"] | GAINS["speed_controller"] | GAINS["heading_controller"]
+)
 #: half the width of the random walk of every input, and where it is centred when not at 0
 INPUTS: dict[str, dict[str, float | tuple[float, float]]] = {
     "position_controller": {
@@ -114,7 +118,11 @@ def wandering(name: str, rng: np.random.Generator) -> list[dict[str, Any]]:
     for variable, span in INPUTS[name].items():
         centre, half = span if isinstance(span, tuple) else (0.0, span)
         knots = rng.uniform(-half, half, TICKS // 20 + 2)
-        values = centre + np.interp(np.arange(TICKS) / 20, np.arange(len(knots)), knots) + half / 20 * rng.normal(size=TICKS)
+        values = (
+            centre
+            + np.interp(np.arange(TICKS) / 20, np.arange(len(knots)), knots)
+            + half / 20 * rng.normal(size=TICKS)
+        )
         for tick, value in zip(ticks, values, strict=True):
             tick[variable] = float(value)
     for k, tick in enumerate(ticks):
@@ -128,7 +136,9 @@ def waypoints(rng: np.random.Generator, end_policy: int) -> dict[str, Any]:
     return {"waypoint_count": 6, "waypoint_x": x, "waypoint_y": y, "end_policy": end_policy}
 
 
-def assert_agreement(fmu: Any, reference: Callable[..., dict[str, Any]], ticks: list[dict[str, Any]]) -> None:
+def assert_agreement(
+    fmu: Any, reference: Callable[..., dict[str, Any]], ticks: list[dict[str, Any]]
+) -> None:
     for k, inputs in enumerate(ticks):
         found, expected = fmu.step(inputs), reference(inputs)
         for name, value in expected.items():
@@ -139,7 +149,9 @@ def assert_agreement(fmu: Any, reference: Callable[..., dict[str, Any]], ticks: 
 def test_shipped_gains_are_those_of_the_fact_sheet(controller: Any, name: str) -> None:
     rng = np.random.default_rng(1)
     extra = waypoints(rng, end_policy=1) if "acceptance_radius" in GAINS[name] else {}
-    assert_agreement(controller(name, extra), REFERENCES[name](GAINS[name] | extra), wandering(name, rng))
+    assert_agreement(
+        controller(name, extra), REFERENCES[name](GAINS[name] | extra), wandering(name, rng)
+    )
 
 
 @pytest.mark.parametrize("seed", range(2, 5))
@@ -148,7 +160,9 @@ def test_every_gain_is_a_parameter(controller: Any, name: str, seed: int) -> Non
     rng = np.random.default_rng(seed)
     gains = {gain: value * float(rng.uniform(0.5, 1.5)) for gain, value in GAINS[name].items()}
     extra = waypoints(rng, end_policy=seed - 1) if "acceptance_radius" in GAINS[name] else {}
-    assert_agreement(controller(name, gains | extra), REFERENCES[name](gains | extra), wandering(name, rng))
+    assert_agreement(
+        controller(name, gains | extra), REFERENCES[name](gains | extra), wandering(name, rng)
+    )
 
 
 def test_gains_can_be_tuned_while_running(controller: Any) -> None:

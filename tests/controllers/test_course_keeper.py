@@ -27,7 +27,10 @@ def flown(tmp_path, source, course):
             "vessel": {"fmu": str(ROOT / "fmus/strider.fmu"), "parameters": start},
         },
         "connections": [{"from": "vessel", "to": "keeper.vehicle"}]
-        + [{"from": f"keeper.{name}", "to": f"vessel.{name}"} for name in ("thrust", "rudder_angle")],
+        + [
+            {"from": f"keeper.{name}", "to": f"vessel.{name}"}
+            for name in ("thrust", "rudder_angle")
+        ],
     }
     file = tmp_path / "course.json"
     file.write_text(json.dumps(scenario))
@@ -40,7 +43,9 @@ def test_it_turns_to_the_course_and_keeps_it(tmp_path, course):
     error = result["vessel.attitude.yaw"] - course
     late = result.time > 15
     assert np.abs(np.arctan2(np.sin(error), np.cos(error)))[late].max() < 0.01
-    assert result["vessel.velocity_body.u"][late] == pytest.approx(1.0, abs=0.02)  # without integral action
+    assert result["vessel.velocity_body.u"][late] == pytest.approx(
+        1.0, abs=0.02
+    )  # without integral action
 
 
 def test_in_process_and_exported_are_the_same_to_the_bit(tmp_path):

@@ -32,15 +32,27 @@ def test_otter_stays_within_half_a_metre_and_turns_into_the_weather(towards: flo
 
 def test_without_weather_the_propellers_rest(controller: Callable[..., Any]) -> None:
     out = controller("dynamic_positioning").step({})
-    assert (out["propeller_speed[1]"], out["propeller_speed[2]"], out["position_error"]) == (0.0, 0.0, 0.0)
+    assert (out["propeller_speed[1]"], out["propeller_speed[2]"], out["position_error"]) == (
+        0.0,
+        0.0,
+        0.0,
+    )
 
 
-@pytest.mark.parametrize(("velocity", "yaw_rate"), [((0.3, 0.0), 0.0), ((-0.3, 0.1), 0.2), ((0.0, 0.2), -0.3)])
+@pytest.mark.parametrize(
+    ("velocity", "yaw_rate"), [((0.3, 0.0), 0.0), ((-0.3, 0.1), 0.2), ((0.0, 0.2), -0.3)]
+)
 def test_allocation_produces_the_wanted_surge_force_and_yaw_moment(
     controller: Callable[..., Any], velocity: tuple[float, float], yaw_rate: float
 ) -> None:
-    """At the station only the velocity of the hinge, 1 m ahead, counts: damping of 1.4 times mass 85 kg or inertia 42 kg m2."""
-    inputs = {"vehicle.velocity.x": velocity[0], "vehicle.velocity.y": velocity[1], "vehicle.rates.r": yaw_rate}
+    """At the station only the velocity of the hinge, 1 m ahead, counts: damping of 1.4 times mass
+    85 kg or inertia 42 kg m2.
+    """
+    inputs = {
+        "vehicle.velocity.x": velocity[0],
+        "vehicle.velocity.y": velocity[1],
+        "vehicle.rates.r": yaw_rate,
+    }
     out = controller("dynamic_positioning").step(inputs)
     speeds = [out["propeller_speed[1]"], out["propeller_speed[2]"]]
     port, starboard = ((THRUST_AHEAD if n > 0 else -THRUST_ASTERN) * n * n for n in speeds)
@@ -48,8 +60,14 @@ def test_allocation_produces_the_wanted_surge_force_and_yaw_moment(
     assert ARM * (starboard - port) == pytest.approx(-1.4 * 42 * (velocity[1] + yaw_rate), abs=1e-9)
 
 
-def test_steering_has_priority_at_the_limit_of_the_propellers(controller: Callable[..., Any]) -> None:
-    out = controller("dynamic_positioning").step({"vehicle.rates.r": -3.0, "vehicle.velocity.x": -5.0})
+def test_steering_has_priority_at_the_limit_of_the_propellers(
+    controller: Callable[..., Any],
+) -> None:
+    out = controller("dynamic_positioning").step(
+        {"vehicle.rates.r": -3.0, "vehicle.velocity.x": -5.0}
+    )
     port, starboard = out["propeller_speed[1]"], out["propeller_speed[2]"]
     assert starboard == pytest.approx(100.0)
-    assert THRUST_AHEAD * starboard**2 + THRUST_ASTERN * port**2 == pytest.approx(2 * THRUST_ASTERN * 100**2)
+    assert THRUST_AHEAD * starboard**2 + THRUST_ASTERN * port**2 == pytest.approx(
+        2 * THRUST_ASTERN * 100**2
+    )

@@ -1,4 +1,6 @@
-"""Extended Kalman filter of the inertial navigation: consistency by Monte Carlo, with the C code of the FMU."""
+"""Extended Kalman filter of the inertial navigation: consistency by Monte Carlo, with the C code of
+the FMU.
+"""
 
 from __future__ import annotations
 
@@ -36,8 +38,8 @@ BIASES = np.array([0.02, 0.2])
 INSTANTS = (1, 10, 30, 60, 100, 150, 200, 300)
 #: number of starts
 COUNT = 100
-#: standard deviation of roll and pitch at the start (rad), noise density of the velocity, and amplitudes of the rates (rad/s) and
-#: accelerations (m/s2)
+#: standard deviation of roll and pitch at the start (rad), noise density of the velocity, and
+#: amplitudes of the rates (rad/s) and accelerations (m/s2)
 VEHICLES = {"quadcopter": (0.02, 3e-3, 0.4, 1.5), "vessel": (0.04, 6e-3, 0.15, 0.5)}
 
 
@@ -45,7 +47,11 @@ VEHICLES = {"quadcopter": (0.02, 3e-3, 0.4, 1.5), "vessel": (0.04, 6e-3, 0.15, 0
 def library(tmp_path_factory: pytest.TempPathFactory) -> Any:
     folder = tmp_path_factory.mktemp("ekf")
     (folder / "ekf.c").write_text(SOURCE)
-    subprocess.run([COMPILER, "-O2", "-shared", "-fPIC", f"-I{HEADERS}", "ekf.c", "-o", "ekf.so", "-lm"], cwd=folder, check=True)
+    subprocess.run(
+        [COMPILER, "-O2", "-shared", "-fPIC", f"-I{HEADERS}", "ekf.c", "-o", "ekf.so", "-lm"],
+        cwd=folder,
+        check=True,
+    )
     library, number = ctypes.CDLL(str(folder / "ekf.so")), ctypes.c_double
     array = np.ctypeslib.ndpointer(float, flags="C")
     library.start.argtypes = [ctypes.c_int, *[array] * 7]
@@ -64,7 +70,9 @@ def library(tmp_path_factory: pytest.TempPathFactory) -> Any:
 
 
 class Flights:
-    """Manoeuvres with the shipped IMU and other sensors as in the model of the filter, and the filters; arrays (start, axis)."""
+    """Manoeuvres with the shipped IMU and other sensors as in the model of the filter, and the
+    filters; arrays (start, axis).
+    """
 
     def __init__(self, library: Any, tilt: float, density: float, turning: float, pushing: float):
         rng = self.rng = np.random.default_rng(2)
@@ -74,10 +82,23 @@ class Flights:
         tilts = np.column_stack([*rng.normal(0, tilt, (2, COUNT)), rng.uniform(-3, 3, COUNT)])
         self.attitude = Rotation.from_rotvec(tilts)
         self.biases = self._noise(BIASES[0]), self._noise(BIASES[1])
-        self.motion = turning, pushing, *rng.uniform(0.5, 2, (2, COUNT, 3)), rng.uniform(0, 6, (COUNT, 3))
+        self.motion = (
+            turning,
+            pushing,
+            *rng.uniform(0.5, 2, (2, COUNT, 3)),
+            rng.uniform(0, 6, (COUNT, 3)),
+        )
         self.past: list[Any] = []
         deviations = np.array([tilt, *BIASES])
-        library.start(COUNT, *self._fix(self.position, self.velocity), self._field(), EARTH, deviations, NOISE, self.states)
+        library.start(
+            COUNT,
+            *self._fix(self.position, self.velocity),
+            self._field(),
+            EARTH,
+            deviations,
+            NOISE,
+            self.states,
+        )
 
     def _noise(self, deviation: Any) -> np.ndarray:
         return self.rng.normal(0, deviation, (COUNT, 3))
@@ -108,7 +129,14 @@ class Flights:
 
     def _filter(self, rates: np.ndarray, force: np.ndarray) -> None:
         k = self.count
-        sight = int(k % 10 == 9 and k > 10), *self._fix(*self.past[max(0, k - 5)]), DELAY, int(k % 2 == 0), self._field(), EARTH
+        sight = (
+            int(k % 10 == 9 and k > 10),
+            *self._fix(*self.past[max(0, k - 5)]),
+            DELAY,
+            int(k % 2 == 0),
+            self._field(),
+            EARTH,
+        )
         self.library.step(COUNT, self.states, H, rates, force, self.density, *sight, NOISE)
 
     def normalised_errors(self) -> np.ndarray:
@@ -116,13 +144,19 @@ class Flights:
         s = self.states
         turns = (Rotation.from_quat(s[:, [7, 8, 9, 6]]).inv() * self.attitude).as_rotvec()
         biases = self.biases[0] - s[:, 10:13], self.biases[1] - s[:, 13:16]
-        errors = np.hstack([self.position - s[:, :3], self.velocity - s[:, 3:6], turns, *biases])[:, :, None]
-        return np.asarray((errors * np.linalg.solve(s[:, 19:].reshape(-1, 15, 15), errors)).sum((1, 2)))
+        errors = np.hstack([self.position - s[:, :3], self.velocity - s[:, 3:6], turns, *biases])[
+            :, :, None
+        ]
+        return np.asarray(
+            (errors * np.linalg.solve(s[:, 19:].reshape(-1, 15, 15), errors)).sum((1, 2))
+        )
 
 
 @pytest.mark.parametrize("vehicle", VEHICLES)
 def test_filter_is_consistent_from_the_start(library: Any, vehicle: str) -> None:
-    """The mean NEES lies within the 95 % bounds of chi-squared at three quarters of the instants, and within 99.9 % at all."""
+    """The mean NEES lies within the 95 % bounds of chi-squared at three quarters of the instants,
+    and within 99.9 % at all.
+    """
     flights, means = Flights(library, *VEHICLES[vehicle]), []
     for k in range(1, 301):
         flights.step()
@@ -140,26 +174,49 @@ def shipped_flight(seed: int, stop_time: float) -> cosim.Result:
     waves = {f"{sea}/waves/significant_height": 0.6, f"{sea}/waves/peak_period": 4.38}
     seeds = {f"{sea}/seed": seed, "/components/measured/parameters/seed": seed}
     everything = {"/record": {"signals": ["*"]}, "/kpis": [], "/checks": [], "/figures": []}
-    return cosim.run("landing_waves_on_sensors", {**waves, **seeds, **everything}, stop_time=stop_time)
+    return cosim.run(
+        "landing_waves_on_sensors", {**waves, **seeds, **everything}, stop_time=stop_time
+    )
 
 
 def normalised_errors(result: cosim.Result, estimate: str, truth: str) -> np.ndarray:
-    """Return the squared errors of position, velocity and attitude over their variances, shape (instants, 9)."""
-    position, motion = (truth, truth) if truth == "plant.uav" else (f"{truth}.deck", f"{truth}.deck")
-    errors = [result[f"{estimate}.position.{axis}"] - result[f"{position}.position.{axis}"] for axis in "xyz"]
-    errors += [result[f"{estimate}.velocity.{axis}"] - result[f"{motion}.velocity.{axis}"] for axis in "xyz"]
+    """Return the squared errors of position, velocity and attitude over their variances, shape
+    (instants, 9).
+    """
+    position, motion = (
+        (truth, truth) if truth == "plant.uav" else (f"{truth}.deck", f"{truth}.deck")
+    )
+    errors = [
+        result[f"{estimate}.position.{axis}"] - result[f"{position}.position.{axis}"]
+        for axis in "xyz"
+    ]
+    errors += [
+        result[f"{estimate}.velocity.{axis}"] - result[f"{motion}.velocity.{axis}"]
+        for axis in "xyz"
+    ]
     turns = [
-        Rotation.from_quat(np.column_stack([result[f"{name}.orientation.{part}"] for part in "xyzw"]))
+        Rotation.from_quat(
+            np.column_stack([result[f"{name}.orientation.{part}"] for part in "xyzw"])
+        )
         for name in (estimate, truth)
     ]
     errors += list((turns[0].inv() * turns[1]).as_rotvec().T)
     deviations = [result[f"{estimate}.deviation[{i}]"] for i in range(1, 10)]
-    return np.column_stack([(error[1:] / deviation[1:]) ** 2 for error, deviation in zip(errors, deviations, strict=True)])
+    return np.column_stack(
+        [
+            (error[1:] / deviation[1:]) ** 2
+            for error, deviation in zip(errors, deviations, strict=True)
+        ]
+    )
 
 
-@pytest.mark.parametrize(("estimate", "truth"), [("measured.navigation", "plant.uav"), ("measured.vessel", "plant.usv")])
+@pytest.mark.parametrize(
+    ("estimate", "truth"), [("measured.navigation", "plant.uav"), ("measured.vessel", "plant.usv")]
+)
 def test_deviations_agree_with_the_errors_on_shipped_sensors(estimate: str, truth: str) -> None:
-    """Over the first seconds in a seaway, take-off included, the mean squared error is that which the filter expects."""
+    """Over the first seconds in a seaway, take-off included, the mean squared error is that which
+    the filter expects.
+    """
     flights = [normalised_errors(shipped_flight(seed, 4.0), estimate, truth) for seed in (1, 2, 3)]
     after = np.mean([flight[20:] for flight in flights], axis=(0, 1))
     assert 0.4 < after.mean() < 1.8, after
@@ -171,6 +228,9 @@ def test_quadcopter_lands_on_the_filter() -> None:
     assert all(outcome.passed for outcome in result.checks)
     flying = (result.time > 3) & (result.time < 11)
     errors = [
-        abs(result[f"measured.estimate.position.{axis}"] - result[f"plant.uav.position.{axis}"])[flying].max() for axis in "xyz"
+        abs(result[f"measured.estimate.position.{axis}"] - result[f"plant.uav.position.{axis}"])[
+            flying
+        ].max()
+        for axis in "xyz"
     ]
     assert max(errors) < 0.06

@@ -1,4 +1,6 @@
-"""Inverse kinematics against the paper's equations with numpy and scipy, and the mission that flies on it."""
+"""Inverse kinematics against the paper's equations with numpy and scipy, and the mission that flies
+on it.
+"""
 
 from __future__ import annotations
 
@@ -31,7 +33,9 @@ GAINS = {
 
 
 class Reference:
-    """Equations 14 to 20 of the paper as they stand there, and a Butterworth filter designed by scipy, settled at hover."""
+    """Equations 14 to 20 of the paper as they stand there, and a Butterworth filter designed by
+    scipy, settled at hover.
+    """
 
     def __init__(self, p: dict[str, float]):
         self.p, self.weight = p, p["mass"] * 9.81
@@ -47,7 +51,9 @@ class Reference:
 
     def __call__(self, i: dict[str, Any]) -> dict[str, float]:
         force = self.filtered(self.pid(i["altitude_command"] - i["vehicle.position.z"]))
-        t = np.array([self.p["mass"] * i[f"acceleration_command.{axis}"] for axis in "xy"] + [force])
+        t = np.array(
+            [self.p["mass"] * i[f"acceleration_command.{axis}"] for axis in "xy"] + [force]
+        )
         z_b = t / np.linalg.norm(t)
         x_c = np.array([np.cos(i["yaw_command"]), np.sin(i["yaw_command"]), 0.0])
         y_b = np.cross(z_b, x_c) / np.linalg.norm(np.cross(z_b, x_c))
@@ -63,17 +69,30 @@ class Reference:
 
 
 def random_ticks(rng: np.random.Generator, count: int = 600) -> list[dict[str, float]]:
-    """Smooth in the altitude, so that the vertical force is inside its limits and at them; jumps in everything else."""
+    """Smooth in the altitude, so that the vertical force is inside its limits and at them; jumps in
+    everything else.
+    """
     z = 2.0 + 0.3 * np.sin(np.arange(count) / 40)
     ranges = {"acceleration_command.x": 3.0, "acceleration_command.y": 3.0, "yaw_command": 3.1}
-    ticks = [{name: float(rng.uniform(-width, width)) for name, width in ranges.items()} for _ in range(count)]
-    return [{**tick, "altitude_command": 2.0, "vehicle.position.z": float(height)} for tick, height in zip(ticks, z, strict=True)]
+    ticks = [
+        {name: float(rng.uniform(-width, width)) for name, width in ranges.items()}
+        for _ in range(count)
+    ]
+    return [
+        {**tick, "altitude_command": 2.0, "vehicle.position.z": float(height)}
+        for tick, height in zip(ticks, z, strict=True)
+    ]
 
 
 @pytest.mark.parametrize("seed", range(4))
-def test_outputs_equal_the_equations_of_the_paper(controller: Callable[..., ControllerFmu], seed: int) -> None:
+def test_outputs_equal_the_equations_of_the_paper(
+    controller: Callable[..., ControllerFmu], seed: int
+) -> None:
     rng = np.random.default_rng(seed)
-    gains = {name: value * float(rng.uniform(0.7, 1.3)) if seed else value for name, value in GAINS.items()}
+    gains = {
+        name: value * float(rng.uniform(0.7, 1.3)) if seed else value
+        for name, value in GAINS.items()
+    }
     fmu, reference = controller("inverse_kinematics", gains), Reference(gains)
     for k, inputs in enumerate(random_ticks(rng)):
         found = fmu.step(inputs)
@@ -81,7 +100,9 @@ def test_outputs_equal_the_equations_of_the_paper(controller: Callable[..., Cont
             assert found[name] == pytest.approx(value, rel=1e-9, abs=1e-9), f"{name} at tick {k}"
 
 
-def test_shipped_gains_are_those_of_the_fact_sheet(controller: Callable[..., ControllerFmu]) -> None:
+def test_shipped_gains_are_those_of_the_fact_sheet(
+    controller: Callable[..., ControllerFmu],
+) -> None:
     fmu = controller("inverse_kinematics")
     assert {name: fmu.get(name) for name in GAINS} == GAINS
 
@@ -109,7 +130,12 @@ def test_reset_goes_back_to_the_start(controller: Callable[..., ControllerFmu]) 
 
 @pytest.mark.parametrize(
     ("yaw", "axis", "tilted", "sign"),
-    [(0.0, "x", "pitch", 1), (0.0, "y", "roll", -1), (math.pi / 2, "x", "roll", 1), (math.pi / 2, "y", "pitch", 1)],
+    [
+        (0.0, "x", "pitch", 1),
+        (0.0, "y", "roll", -1),
+        (math.pi / 2, "x", "roll", 1),
+        (math.pi / 2, "y", "pitch", 1),
+    ],
 )
 def test_it_tilts_towards_the_acceleration_in_the_world(
     controller: Callable[..., ControllerFmu], yaw: float, axis: str, tilted: str, sign: int
@@ -122,13 +148,20 @@ def test_it_tilts_towards_the_acceleration_in_the_world(
 
 
 def closed_forms(time: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Half of a minimum-jerk move of 10 m in 10 s and back; a quarter of speeding up to 10 m/s in 10 s and slowing down."""
+    """Half of a minimum-jerk move of 10 m in 10 s and back; a quarter of speeding up to 10 m/s in
+    10 s and slowing down.
+    """
     s, sign = time % 10 / 10, np.where(time < 10, 1.0, -1.0)
     return sign * (60 * s - 180 * s**2 + 120 * s**3) / 10 / 2, sign * 30 * s**2 * (1 - s) ** 2 / 4
 
 
 def test_the_profiles_are_their_closed_forms() -> None:
-    time, ax, ay = np.loadtxt(resources.root() / "scenarios/profiles/accelerations.csv", delimiter=",", skiprows=1, unpack=True)
+    time, ax, ay = np.loadtxt(
+        resources.root() / "scenarios/profiles/accelerations.csv",
+        delimiter=",",
+        skiprows=1,
+        unpack=True,
+    )
     assert np.array_equal(time, np.arange(2001) / 100)
     for found, expected in zip((ax, ay), closed_forms(time), strict=True):
         np.testing.assert_allclose(found, expected, rtol=0, atol=1e-12)
@@ -157,8 +190,10 @@ def test_demo3_keeps_altitude_and_heading(demo: Result) -> None:
 
 
 def test_the_end_error_comes_from_trim_and_mass(demo: Result) -> None:
-    """Rotors do not act through the centre of mass: while the attitude integrals find their trim, a tilt of some hundredths of
-    a degree second leaves a speed error that stays; and the vehicle is heavier than the controller believes.
+    """Rotors do not act through the centre of mass: while the attitude integrals find their trim, a
+    tilt of some hundredths of
+    a degree second leaves a speed error that stays; and the vehicle is heavier than the controller
+    believes.
     """
     trimmed = cosim.run("demo3_inverse_kinematics", parameters={"uav.inverse.mass": 0.443892})
     gain = trimmed["quadcopter.position.y"][-1] - demo["quadcopter.position.y"][-1]

@@ -1,4 +1,6 @@
-"""Landing on decks in waves: how well the quadcopter moves with a deck, and that it lands where the cascaded control does."""
+"""Landing on decks in waves: how well the quadcopter moves with a deck, and that it lands where the
+cascaded control does.
+"""
 
 import json
 
@@ -47,8 +49,16 @@ def hover_above_the_deck(folder, controller, unread=(), **parameters):
                 "parameters": {"vtol.landing_time": 10.0, "vtol.landing_error": 0.0} | parameters,
             },
         },
-        "connections": [connection("plant", "uav.vehicle"), connection("uav.rotor_speed", "plant.rotor_speed")],
-        "inputs": [{"file": "deck.csv", "to": {name: to for name, to in motion.items() if name not in unread}}],
+        "connections": [
+            connection("plant", "uav.vehicle"),
+            connection("uav.rotor_speed", "plant.rotor_speed"),
+        ],
+        "inputs": [
+            {
+                "file": "deck.csv",
+                "to": {name: to for name, to in motion.items() if name not in unread},
+            }
+        ],
         "algorithm": {"stages": [["uav"], ["plant"]]},
     }
     (folder / "swell.json").write_text(json.dumps(document))
@@ -56,7 +66,9 @@ def hover_above_the_deck(folder, controller, unread=(), **parameters):
 
 
 def errors(result):
-    """Root mean squares of the horizontal error and of the one in the distance to the deck, over the last 15 s."""
+    """Root mean squares of the horizontal error and of the one in the distance to the deck, over
+    the last 15 s.
+    """
     late = result.time > 25
     t = result.time[late]
     x, y, z = (result[f"plant.position.{axis}"][late] for axis in "xyz")
@@ -71,7 +83,9 @@ def flights(tmp_path_factory):
         return hover_above_the_deck(tmp_path_factory.mktemp(name), f"{name}.fmu", **more)
 
     cascaded = fly("ar_drone_cascaded", unread=["velocity.z"])
-    return {"cascaded": cascaded} | {name: fly(f"ar_drone_{name}") for name in ("geometric", "indi", "lqr", "mpc")}
+    return {"cascaded": cascaded} | {
+        name: fly(f"ar_drone_{name}") for name in ("geometric", "indi", "lqr", "mpc")
+    }
 
 
 @pytest.mark.parametrize("name", ["geometric", "indi", "lqr", "mpc"])
@@ -90,7 +104,10 @@ def test_cascaded_control_lags_behind_the_deck(flights):
 @pytest.mark.parametrize(
     "controller",
     [
-        *({"fmu": str(FMUS / f"ar_drone_{name}.fmu")} for name in ("geometric", "indi", "lqr", "mpc")),
+        *(
+            {"fmu": str(FMUS / f"ar_drone_{name}.fmu")}
+            for name in ("geometric", "indi", "lqr", "mpc")
+        ),
         {"system": str(SCENARIOS / "systems" / "ar_drone_inverse_landing.json")},
     ],
     ids=["geometric", "INDI", "LQR", "MPC", "inverse kinematics"],
@@ -117,8 +134,14 @@ def touchdown_tilt(**parameters):
         f"{sea}/wind/speed": 7.0,
         f"{sea}/seed": 4,
     }
-    flight = weather | {"usv.speed_command": 1.2} | {f"uav.{name}": value for name, value in parameters.items()}
-    return cosim.run(SCENARIOS / "landing_waves.json", flight, stop_time=16.0).kpis["touchdown.tilt"]
+    flight = (
+        weather
+        | {"usv.speed_command": 1.2}
+        | {f"uav.{name}": value for name, value in parameters.items()}
+    )
+    return cosim.run(SCENARIOS / "landing_waves.json", flight, stop_time=16.0).kpis[
+        "touchdown.tilt"
+    ]
 
 
 def test_tilt_is_limited_just_above_the_deck():
@@ -127,17 +150,28 @@ def test_tilt_is_limited_just_above_the_deck():
 
 
 def largest_error_in_a_gust(controller):
-    """Return the largest horizontal error of a hovering quadcopter (m) when 6 m/s of wind begin at 5 s."""
+    """Return the largest horizontal error of a hovering quadcopter (m) when 6 m/s of wind begin at
+    5 s.
+    """
     wind = {"time": 5.0, "set": {"plant.wind.x": 6.0, "plant.wind.y": 0.0}}
     document = {
         "name": "gust",
         "stop_time": 15,
         "step_size": 0.01,
         "components": {
-            "plant": {"fmu": str(FMUS / "ar_drone.fmu"), "parameters": {"initial.position.z": 0.5, "body_drag.x": 0.02}},
-            "uav": {"fmu": str(FMUS / f"{controller}.fmu"), "parameters": {"vtol.landing_enabled": False}},
+            "plant": {
+                "fmu": str(FMUS / "ar_drone.fmu"),
+                "parameters": {"initial.position.z": 0.5, "body_drag.x": 0.02},
+            },
+            "uav": {
+                "fmu": str(FMUS / f"{controller}.fmu"),
+                "parameters": {"vtol.landing_enabled": False},
+            },
         },
-        "connections": [connection("plant", "uav.vehicle"), connection("uav.rotor_speed", "plant.rotor_speed")],
+        "connections": [
+            connection("plant", "uav.vehicle"),
+            connection("uav.rotor_speed", "plant.rotor_speed"),
+        ],
         "events": [wind],
         "algorithm": {"stages": [["uav"], ["plant"]]},
     }
@@ -146,17 +180,23 @@ def largest_error_in_a_gust(controller):
 
 
 def test_inversion_rejects_a_gust_better_than_integral_action():
-    geometric, indi = (largest_error_in_a_gust(f"ar_drone_{name}") for name in ("geometric", "indi"))
+    geometric, indi = (
+        largest_error_in_a_gust(f"ar_drone_{name}") for name in ("geometric", "indi")
+    )
     assert indi < 0.7 * geometric
 
 
 def deck_speeds_at_the_decision(folder, **parameters):
-    """Return the vertical speeds of the deck (m/s) when the descent leaves the waiting height, for several landing times."""
+    """Return the vertical speeds of the deck (m/s) when the descent leaves the waiting height, for
+    several landing times.
+    """
     for delay in np.arange(0.0, 2.5, 0.8):
         settings = {"vtol.landing_time": 6.0 + delay, "vtol.landing_error": 0.1} | parameters
         result = hover_above_the_deck(folder, "ar_drone_geometric.fmu", **settings)
         heave = HEAVE * np.sin(OMEGA * result.time)
-        decided = (result["uav.mode"] == 5) & (result["uav.altitude_reference"] - heave < 0.3 + 0.056 + 0.13)
+        decided = (result["uav.mode"] == 5) & (
+            result["uav.altitude_reference"] - heave < 0.3 + 0.056 + 0.13
+        )
         yield OMEGA * HEAVE * abs(np.cos(OMEGA * result.time[decided.argmax()]))
 
 
@@ -168,13 +208,17 @@ def test_descent_waits_for_a_calm_deck(tmp_path):
 
 
 def variable_start(fmu, name):
-    return float(next(v.start for v in read_model_description(str(fmu)).modelVariables if v.name == name))
+    return float(
+        next(v.start for v in read_model_description(str(fmu)).modelVariables if v.name == name)
+    )
 
 
 def regulator_gains(state_matrix, input_matrix, weights):
     """Return the gains of the discrete regulator at 0.01 s with an input weight of 1."""
     count = len(weights)
-    a, b, *_ = cont2discrete((state_matrix, input_matrix, np.eye(count), np.zeros((count, 1))), 0.01)
+    a, b, *_ = cont2discrete(
+        (state_matrix, input_matrix, np.eye(count), np.zeros((count, 1))), 0.01
+    )
     cost = solve_discrete_are(a, b, np.diag(weights), np.eye(1))
     return np.linalg.solve(1 + b.T @ cost @ b, b.T @ cost @ a)[0]
 
@@ -184,8 +228,12 @@ def test_gains_of_the_regulator_solve_the_riccati_equation():
     chain = np.diag([1.0, 1.0, 1.0], 1)
     chain[3, 3] = -1 / lag
     expected = {
-        "horizontal": regulator_gains(chain, np.array([[0.0], [0.0], [0.0], [1 / lag]]), [100, 200, 8, 0]),
-        "vertical": regulator_gains(np.diag([1.0, 1.0], 1), np.array([[0.0], [0.0], [1.0]]), [100, 200, 30]),
+        "horizontal": regulator_gains(
+            chain, np.array([[0.0], [0.0], [0.0], [1 / lag]]), [100, 200, 8, 0]
+        ),
+        "vertical": regulator_gains(
+            np.diag([1.0, 1.0], 1), np.array([[0.0], [0.0], [1.0]]), [100, 200, 30]
+        ),
     }
     for axis, gains in expected.items():
         found = [variable_start(fmu, f"tracking.{axis}_gain[{i + 1}]") for i in range(len(gains))]
@@ -198,5 +246,9 @@ def standing_alone(document, folder, path):
         for key in ("fmu", "python"):
             if spec.get(key, "").startswith("../"):
                 spec[key] = str(folder / spec[key])
-    path.write_text(json.dumps({key: value for key, value in document.items() if key not in ("reference", "figures")}))
+    path.write_text(
+        json.dumps(
+            {key: value for key, value in document.items() if key not in ("reference", "figures")}
+        )
+    )
     return path

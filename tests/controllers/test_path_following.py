@@ -1,4 +1,6 @@
-"""Straight legs in current and waves: adaptive line of sight, heading loop with integral action and wave filter."""
+"""Straight legs in current and waves: adaptive line of sight, heading loop with integral action and
+wave filter.
+"""
 
 from __future__ import annotations
 
@@ -30,13 +32,21 @@ def test_error_in_a_cross_current_vanishes(current: float) -> None:
 
 
 def test_line_of_sight_to_the_waypoint_drifts_metres_off_the_leg() -> None:
-    kpis = [{"name": "error", "python": "cosim.kpis:peak", "arguments": {"signal": "vessel.position.y"}}]
+    kpis = [
+        {"name": "error", "python": "cosim.kpis:peak", "arguments": {"signal": "vessel.position.y"}}
+    ]
     system = str(ROOT / "scenarios/systems/strider_autopilot.json")
-    result = cosim.run("path_in_current", {"/components/usv/system": system, "/kpis": kpis, "/checks": []}, stop_time=55)
+    result = cosim.run(
+        "path_in_current",
+        {"/components/usv/system": system, "/kpis": kpis, "/checks": []},
+        stop_time=55,
+    )
     assert largest_error(result) > 6
 
 
-def test_integral_action_removes_the_error_of_a_steady_moment(controller: Callable[..., Any]) -> None:
+def test_integral_action_removes_the_error_of_a_steady_moment(
+    controller: Callable[..., Any],
+) -> None:
     """With a heading error that does not change, the rudder angle grows until its limit."""
     fmu = controller("heading_autopilot")
     rudder = [fmu.step({"vehicle.attitude.yaw": 0.1})["rudder_angle"] for _ in range(1000)]
@@ -46,7 +56,13 @@ def test_integral_action_removes_the_error_of_a_steady_moment(controller: Callab
 
 def test_wave_filter_is_the_notch_of_the_textbook(controller: Callable[..., Any]) -> None:
     """The rudder does not follow yaw motion of the wave period; slower motion passes."""
-    pure = {"heading_P": 1.0, "heading_I": 0.0, "heading_D": 0.0, "wave_period": 1.25, "wave_depth": 0.0}
+    pure = {
+        "heading_P": 1.0,
+        "heading_I": 0.0,
+        "heading_D": 0.0,
+        "wave_period": 1.25,
+        "wave_depth": 0.0,
+    }
     fmu, t = controller("heading_autopilot", pure), 0.01 * np.arange(3000)
     for period, lowest, highest in ((1.25, 0.0, 1e-3), (10.0, 0.98, 1.0)):
         yaw = 0.1 * np.sin(2 * np.pi * t / period)

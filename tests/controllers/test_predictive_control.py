@@ -24,17 +24,38 @@ STEPS, STEP, LAG, WEIGHTS = 20, 0.1, 0.12, (40.0, 8.0, 0.1)
 def command(tmp_path_factory: pytest.TempPathFactory) -> Callable[..., float]:
     """First command of the shipped C code for errors, lower and upper bounds."""
     folder = tmp_path_factory.mktemp("mpc")
-    signature = "const double *e, double h, double l, double p, double v, double r, const double *a, const double *b"
+    signature = (
+        "const double *e, double h, double l, double p, double v, double r, const double *a, const "
+        "double *b"
+    )
     call = "box_mpc_command(e, h, l, p, v, r, a, b)"
-    (folder / "mpc.c").write_text(f'#include "box_mpc.h"\ndouble command({signature}) {{ return {call}; }}\n')
-    subprocess.run([COMPILER, "-O2", "-shared", "-fPIC", f"-I{HEADERS}", "mpc.c", "-o", "mpc.so", "-lm"], cwd=folder, check=True)
+    (folder / "mpc.c").write_text(
+        f'#include "box_mpc.h"\ndouble command({signature}) {{ return {call}; }}\n'
+    )
+    subprocess.run(
+        [COMPILER, "-O2", "-shared", "-fPIC", f"-I{HEADERS}", "mpc.c", "-o", "mpc.so", "-lm"],
+        cwd=folder,
+        check=True,
+    )
     function = ctypes.CDLL(str(folder / "mpc.so")).command
     array = np.ctypeslib.ndpointer(float, flags="C")
-    function.argtypes, function.restype = [array, *[ctypes.c_double] * 5, array, array], ctypes.c_double
+    function.argtypes, function.restype = (
+        [array, *[ctypes.c_double] * 5, array, array],
+        ctypes.c_double,
+    )
 
     def call_it(error: Any, lower: Any, upper: Any) -> float:
         return float(
-            function(*(np.asarray(error, float), STEP, LAG, *WEIGHTS, np.asarray(lower, float), np.asarray(upper, float)))
+            function(
+                *(
+                    np.asarray(error, float),
+                    STEP,
+                    LAG,
+                    *WEIGHTS,
+                    np.asarray(lower, float),
+                    np.asarray(upper, float),
+                )
+            )
         )
 
     return call_it
@@ -47,12 +68,19 @@ def optimal_command(error: Any, lower: Any, upper: Any) -> float:
     roots = np.sqrt(WEIGHTS)
     rows, target = [], []
     for k in range(1, STEPS + 1):
-        effect = np.hstack([np.linalg.matrix_power(a, k - 1 - j) @ b if j < k else np.zeros((3, 1)) for j in range(STEPS)])
+        effect = np.hstack(
+            [
+                np.linalg.matrix_power(a, k - 1 - j) @ b if j < k else np.zeros((3, 1))
+                for j in range(STEPS)
+            ]
+        )
         rows.append(roots[:2, None] * effect[:2])
         target.append(-roots[:2] * (np.linalg.matrix_power(a, k) @ error)[:2])
     system = np.vstack([*rows, roots[2] * np.eye(STEPS)])
     bounds = np.repeat(lower, 2), np.repeat(upper, 2)
-    return float(lsq_linear(system, np.concatenate([*target, np.zeros(STEPS)]), bounds, tol=1e-14).x[0])
+    return float(
+        lsq_linear(system, np.concatenate([*target, np.zeros(STEPS)]), bounds, tol=1e-14).x[0]
+    )
 
 
 def test_command_is_that_of_an_independent_solver(command: Callable[..., float]) -> None:
@@ -74,7 +102,9 @@ def deck_velocity(seed: int) -> np.ndarray:
 
 
 def recursive_least_squares(samples: np.ndarray, forgetting: float = 0.998) -> np.ndarray:
-    """Return the forecasts of 1 to 10 steps after the last sample, by the equations of the textbook."""
+    """Return the forecasts of 1 to 10 steps after the last sample, by the equations of the
+    textbook.
+    """
     covariance, weights = 100 * np.eye(8), np.zeros(8)
     padded = np.concatenate([np.zeros(8), samples])
     for k, sample in enumerate(samples):

@@ -55,7 +55,10 @@ class InProcess:
     """Python controller in process with the interface of `ControllerFmu`."""
 
     def __init__(self, name: str, parameters: dict[str, Any]):
-        self.component, self.time = load_component(f"{name}.py:{TWINS[name]}", SOURCES, name, {}), 0.0
+        self.component, self.time = (
+            load_component(f"{name}.py:{TWINS[name]}", SOURCES, name, {}),
+            0.0,
+        )
         self.outputs = [v.name for v in self.component.variables if v.causality == "output"]
         self.component.bind(Ports((), {}), Ports((), {}))
         self.set(parameters)
@@ -74,7 +77,9 @@ class InProcess:
 
 
 def exported(name: str, parameters: dict[str, Any], folder: Path) -> ControllerFmu:
-    return ControllerFmu(str(extract(str(ROOT / f"fmus/python/{name}.fmu"), str(folder / name))), parameters)
+    return ControllerFmu(
+        str(extract(str(ROOT / f"fmus/python/{name}.fmu"), str(folder / name))), parameters
+    )
 
 
 def random_parameters(variables: dict[str, Any], rng: np.random.Generator) -> dict[str, Any]:
@@ -82,8 +87,14 @@ def random_parameters(variables: dict[str, Any], rng: np.random.Generator) -> di
     parameters: dict[str, Any] = {}
     for name, variable in variables.items():
         if variable.causality == "parameter" and variable.type == "Real":
-            parameters[name] = float(variable.start) * float(rng.uniform(0.7, 1.3)) or float(rng.uniform(-0.4, 0.4))
-    parameters |= {"waypoint_count": 20, "end_policy": int(rng.integers(1, 4))} if "waypoint_count" in variables else {}
+            parameters[name] = float(variable.start) * float(rng.uniform(0.7, 1.3)) or float(
+                rng.uniform(-0.4, 0.4)
+            )
+    parameters |= (
+        {"waypoint_count": 20, "end_policy": int(rng.integers(1, 4))}
+        if "waypoint_count" in variables
+        else {}
+    )
     return parameters | (EAGER_LANDING if "landing_time" in variables else {})
 
 
@@ -95,11 +106,15 @@ def random_inputs(variables: dict[str, Any], rng: np.random.Generator) -> list[d
         walk = np.interp(np.arange(TICKS) / 20, np.arange(len(knots)), knots)
         for tick, value in zip(ticks, walk, strict=True):
             unit = variables[name].unit
-            tick[name] = value > 0.6 if variables[name].type == "Boolean" else float(value) * WIDTHS[unit]
+            tick[name] = (
+                value > 0.6 if variables[name].type == "Boolean" else float(value) * WIDTHS[unit]
+            )
     return ticks
 
 
-def test_random_inputs_pass_through_all_flight_modes(controller: Callable[..., ControllerFmu]) -> None:
+def test_random_inputs_pass_through_all_flight_modes(
+    controller: Callable[..., ControllerFmu],
+) -> None:
     rng = np.random.default_rng(1)
     vtol = controller("vtol", random_parameters(controller("vtol").variables, rng))
     flown = [vtol.step(inputs) for inputs in random_inputs(vtol.variables, rng)]
@@ -108,33 +123,49 @@ def test_random_inputs_pass_through_all_flight_modes(controller: Callable[..., C
 
 
 def assert_same(name: str, found: dict[str, Any], expected: dict[str, Any], tick: int) -> None:
-    """To the bit; but compilers and the C library may round the cosines of the low-pass differently."""
-    close = {k: pytest.approx(v, rel=1e-12, abs=1e-12) for k, v in expected.items()} if name == "inverse_kinematics" else expected
+    """To the bit; but compilers and the C library may round the cosines of the low-pass
+    differently.
+    """
+    close = (
+        {k: pytest.approx(v, rel=1e-12, abs=1e-12) for k, v in expected.items()}
+        if name == "inverse_kinematics"
+        else expected
+    )
     assert found == close, f"tick {tick}"
 
 
 @pytest.mark.parametrize("seed", [1, 2])
 @pytest.mark.parametrize("name", TWINS)
-def test_in_process_equals_modelica(controller: Callable[..., ControllerFmu], name: str, seed: int) -> None:
+def test_in_process_equals_modelica(
+    controller: Callable[..., ControllerFmu], name: str, seed: int
+) -> None:
     rng = np.random.default_rng(seed)
     parameters = random_parameters(controller(name).variables, rng)
     modelica, python = controller(name, parameters), InProcess(name, parameters)
-    for k, inputs in enumerate(random_inputs(modelica.variables, rng)[: TICKS if name == "vtol" else FEW_TICKS]):
+    for k, inputs in enumerate(
+        random_inputs(modelica.variables, rng)[: TICKS if name == "vtol" else FEW_TICKS]
+    ):
         assert_same(name, python.step(inputs), modelica.step(inputs), k)
 
 
 @pytest.mark.parametrize("name", TWINS)
-def test_exported_equals_modelica(controller: Callable[..., ControllerFmu], tmp_path: Path, name: str) -> None:
+def test_exported_equals_modelica(
+    controller: Callable[..., ControllerFmu], tmp_path: Path, name: str
+) -> None:
     rng = np.random.default_rng(3)
     parameters = random_parameters(controller(name).variables, rng)
     modelica, python = controller(name, parameters), exported(name, parameters, tmp_path)
-    for k, inputs in enumerate(random_inputs(modelica.variables, rng)[: TICKS if name == "vtol" else FEW_TICKS]):
+    for k, inputs in enumerate(
+        random_inputs(modelica.variables, rng)[: TICKS if name == "vtol" else FEW_TICKS]
+    ):
         assert_same(name, python.step(inputs), modelica.step(inputs), k)
     python.close()
 
 
 @pytest.mark.parametrize("name", TWINS)
-def test_interfaces_are_the_same(controller: Callable[..., ControllerFmu], tmp_path: Path, name: str) -> None:
+def test_interfaces_are_the_same(
+    controller: Callable[..., ControllerFmu], tmp_path: Path, name: str
+) -> None:
     def interface(instance: ControllerFmu) -> dict[str, tuple[Any, ...]]:
         shown = (v for v in instance.variables.values() if v.causality != "local")
         return {v.name: (kind(v.type), v.causality, v.variability, v.unit, start(v)) for v in shown}
@@ -144,7 +175,12 @@ def test_interfaces_are_the_same(controller: Callable[..., ControllerFmu], tmp_p
 
     def start(variable: Any) -> Any:
         known = variable.start is not None and variable.causality in ("input", "parameter")
-        return {"true": 1.0, "false": 0.0}.get(variable.start) or float(variable.start.replace("false", "0")) if known else None
+        return (
+            {"true": 1.0, "false": 0.0}.get(variable.start)
+            or float(variable.start.replace("false", "0"))
+            if known
+            else None
+        )
 
     python = exported(name, {}, tmp_path)
     assert interface(python) == interface(controller(name))
@@ -163,8 +199,14 @@ def python_system(tmp_path: Path, system: str) -> str:
 
 def test_demo1_flies_the_same_with_python_controllers(tmp_path: Path) -> None:
     original = json.loads((ROOT / "scenarios/demo1_box.json").read_text())["components"]["usv"]
-    autopilot = {"python": str(SOURCES / "strider_autopilot.py:StriderAutopilot"), "parameters": original["parameters"]}
-    changes = {"/components/uav/system": python_system(tmp_path, "ar_drone_cascaded.json"), "/components/usv": autopilot}
+    autopilot = {
+        "python": str(SOURCES / "strider_autopilot.py:StriderAutopilot"),
+        "parameters": original["parameters"],
+    }
+    changes = {
+        "/components/uav/system": python_system(tmp_path, "ar_drone_cascaded.json"),
+        "/components/usv": autopilot,
+    }
     modelica, python = cosim.run("demo1_box"), cosim.run("demo1_box", changes)
     assert set(np.unique(modelica["uav.mode"])) == {1, 2, 3, 4, 5, 6}
     for name in modelica:
@@ -172,8 +214,13 @@ def test_demo1_flies_the_same_with_python_controllers(tmp_path: Path) -> None:
 
 
 def test_demo3_flies_the_same_with_python_controllers(tmp_path: Path) -> None:
-    changes = {"/components/uav/system": python_system(tmp_path, "ar_drone_inverse_kinematics.json")}
-    modelica, python = cosim.run("demo3_inverse_kinematics"), cosim.run("demo3_inverse_kinematics", changes)
+    changes = {
+        "/components/uav/system": python_system(tmp_path, "ar_drone_inverse_kinematics.json")
+    }
+    modelica, python = (
+        cosim.run("demo3_inverse_kinematics"),
+        cosim.run("demo3_inverse_kinematics", changes),
+    )
     for name in modelica:
         np.testing.assert_allclose(python[name], modelica[name], rtol=1e-9, atol=1e-9, err_msg=name)
 

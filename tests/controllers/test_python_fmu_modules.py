@@ -37,7 +37,9 @@ def oracle(folder: Path, number: float) -> Path:
     """Sources of the same names with another content each."""
     (folder / "parts").mkdir(parents=True)
     (folder / "oracle.py").write_text(SOURCE)
-    (folder / "parts/helper.py").write_text(f"from .numbers import NUMBER\n\n\ndef answer():\n    return {number} + NUMBER\n")
+    (folder / "parts/helper.py").write_text(
+        f"from .numbers import NUMBER\n\n\ndef answer():\n    return {number} + NUMBER\n"
+    )
     (folder / "parts/numbers.py").write_text("NUMBER = 0.5\n")
     (folder / "parts/unused.py").write_text("raise RuntimeError\n")
     return folder / "oracle.py"

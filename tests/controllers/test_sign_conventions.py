@@ -1,4 +1,6 @@
-"""Sign conventions: right-hand rule, body axes forward, left, up; rotors 1 front, 2 left, 3 rear, 4 right."""
+"""Sign conventions: right-hand rule, body axes forward, left, up; rotors 1 front, 2 left, 3 rear, 4
+right.
+"""
 
 from __future__ import annotations
 
@@ -51,9 +53,12 @@ def test_stopped_motors_stand_still(controller: Any) -> None:
 
 
 @pytest.mark.parametrize(
-    ("axis", "error"), [("roll", 0.1), ("roll", -0.1), ("pitch", 0.1), ("pitch", -0.1), ("yaw", 0.1), ("yaw", -0.1)]
+    ("axis", "error"),
+    [("roll", 0.1), ("roll", -0.1), ("pitch", 0.1), ("pitch", -0.1), ("yaw", 0.1), ("yaw", -0.1)],
 )
-def test_attitude_is_corrected_towards_the_command(controller: Any, axis: str, error: float) -> None:
+def test_attitude_is_corrected_towards_the_command(
+    controller: Any, axis: str, error: float
+) -> None:
     differences = controller("attitude_controller").step(REST | {f"{axis}_command": error})
     assert differences.pop(f"{axis}_difference") * error > 0
     assert set(differences.values()) == {0.0}
@@ -61,16 +66,24 @@ def test_attitude_is_corrected_towards_the_command(controller: Any, axis: str, e
 
 def test_yaw_turns_the_short_way_round(controller: Any) -> None:
     across = {"yaw_command": radians(170), "vehicle.attitude.yaw": radians(-170)}
-    yaw_difference = controller("attitude_controller", {"yaw_limit": 100.0}).step(REST | across)["yaw_difference"]
+    yaw_difference = controller("attitude_controller", {"yaw_limit": 100.0}).step(REST | across)[
+        "yaw_difference"
+    ]
     assert yaw_difference == pytest.approx(-20 * 0.665668467901894)
 
 
 @pytest.mark.parametrize(
     ("yaw", "east_of_it", "command", "sign"),
-    [(0.0, True, "pitch_command", 1), (pi / 2, True, "roll_command", 1), (pi, True, "pitch_command", -1),
-     (-pi / 2, True, "roll_command", -1), (0.0, False, "roll_command", -1), (pi / 2, False, "pitch_command", 1)],
+    [(0.0, True, (
+        "pitch_command"
+    ), 1), (pi / 2, True, "roll_command", 1), (pi, True, "pitch_command", -1),
+     (-pi / 2, True, "roll_command", -1), (0.0, False, "roll_command", -1), (pi / 2, False, (
+         "pitch_command"
+     ), 1)],
 )  # fmt: skip
-def test_tilts_towards_the_reference_at_every_yaw(controller: Any, yaw: float, east_of_it: bool, command: str, sign: int) -> None:
+def test_tilts_towards_the_reference_at_every_yaw(
+    controller: Any, yaw: float, east_of_it: bool, command: str, sign: int
+) -> None:
     reference = {"position_reference.x": 0.1} if east_of_it else {"position_reference.y": 0.1}
     tilt = controller("position_controller").step(REST | reference | {"vehicle.attitude.yaw": yaw})
     assert sign * tilt.pop(command) > 0.01
@@ -78,7 +91,11 @@ def test_tilts_towards_the_reference_at_every_yaw(controller: Any, yaw: float, e
 
 
 def test_feed_forward_keeps_the_speed_of_a_moving_reference(controller: Any) -> None:
-    moving = {f"{kind}.{axis}": 0.7 for kind in ("velocity_reference", "vehicle.velocity") for axis in "xy"}
+    moving = {
+        f"{kind}.{axis}": 0.7
+        for kind in ("velocity_reference", "vehicle.velocity")
+        for axis in "xy"
+    }
     tilt = controller("position_controller").step(REST | moving | {"vehicle.attitude.yaw": 0.3})
     assert list(tilt.values()) == pytest.approx([0.0, 0.0], abs=1e-12)
 
@@ -93,6 +110,8 @@ def test_reset_levels_and_forgets(controller: Any) -> None:
 
 
 @pytest.mark.parametrize(("yaw", "rudder"), [(0.2, 1), (-0.2, -1)])
-def test_positive_rudder_answers_a_bow_too_far_to_port(controller: Any, yaw: float, rudder: int) -> None:
+def test_positive_rudder_answers_a_bow_too_far_to_port(
+    controller: Any, yaw: float, rudder: int
+) -> None:
     fmu = controller("strider_autopilot", {"waypoint_x": [100.0]})
     assert fmu.step({"vehicle.attitude.yaw": yaw})["rudder_angle"] * rudder > 0.1

@@ -1,7 +1,8 @@
-"""Step responses of the control loops with the quadcopter's equations against a published re-simulation.
+"""Step responses of the control loops with the quadcopter's equations against a published
+re-simulation.
 
-The original charged its altitude integrator from 0 in the first seconds; a controller that believes in no mass does the same.
-The figures hold within 3 % or 0.05 s.
+The original charged its altitude integrator from 0 in the first seconds; a controller that believes
+in no mass does the same. The figures hold within 3 % or 0.05 s.
 """
 
 from __future__ import annotations
@@ -16,12 +17,21 @@ LOOPS = ("position_controller", "altitude_controller", "attitude_controller", "m
 ROTORS = [f"rotor_speed[{n}]" for n in range(1, 5)]
 
 
-def respond(controller: Any, seconds: float, step: dict[str, float], mass: float) -> dict[str, np.ndarray]:
-    """From rest at the origin, the step after one tick: time histories of the quadcopter's outputs and of the throttle."""
+def respond(
+    controller: Any, seconds: float, step: dict[str, float], mass: float
+) -> dict[str, np.ndarray]:
+    """From rest at the origin, the step after one tick: time histories of the quadcopter's outputs
+    and of the throttle.
+    """
     plant = controller("ar_drone")
-    loops = [controller(name, {"mass": mass} if name == "altitude_controller" else {}) for name in LOOPS]
+    loops = [
+        controller(name, {"mass": mass} if name == "altitude_controller" else {}) for name in LOOPS
+    ]
     outputs = [variable.name for kind in plant.outputs.values() for variable in kind]
-    bus: dict[str, Any] = {f"vehicle.{name}": plant.get(name) for name in outputs} | {"reset": False, "motor_share": 1.0}
+    bus: dict[str, Any] = {f"vehicle.{name}": plant.get(name) for name in outputs} | {
+        "reset": False,
+        "motor_share": 1.0,
+    }
     rows = []
     for _ in range(round(seconds / 0.01)):
         for loop in loops:

@@ -1,4 +1,6 @@
-"""The swap: an FMU with exactly the variables of the role flies demo1_box in the place of the shipped controller."""
+"""The swap: an FMU with exactly the variables of the role flies demo1_box in the place of the
+shipped controller.
+"""
 
 import json
 from pathlib import Path
@@ -23,13 +25,22 @@ EXTRA_OUTPUTS = (
 
 
 def fly(fmu, folder, *options):
-    """Run demo1_box with an FMU in the folder in place of its controller; the path starts from the working directory."""
+    """Run demo1_box with an FMU in the folder in place of its controller; the path starts from the
+    working directory.
+    """
     component = json.dumps({"fmu": fmu.name, "parameters": COMMANDS})
-    return run_cosim("run", "demo1_box", "--set", f"/components/uav={component}", *options, cwd=folder)
+    return run_cosim(
+        "run", "demo1_box", "--set", f"/components/uav={component}", *options, cwd=folder
+    )
 
 
 def outputs(fmu):
-    return [name for v in FmuFile(fmu).description.variables if v.causality == "output" for name in v.scalar_names]
+    return [
+        name
+        for v in FmuFile(fmu).description.variables
+        if v.causality == "output"
+        for name in v.scalar_names
+    ]
 
 
 def assert_flies(done):
@@ -55,7 +66,15 @@ def test_a_python_fmu_with_the_variables_of_the_role_flies_demo1_box(tmp_path):
 def test_a_check_of_a_kpi_that_is_left_out_is_not_met(tmp_path):
     component = json.dumps({"python": f"{SOURCE}:RoleController", "parameters": COMMANDS})
     check = '/checks=[{"kpi": "descent.aborts", "max": 0}]'
-    options = ("--set", f"/components/uav={component}", "--set", check, "--stop-time", "1", "--no-report")
+    options = (
+        "--set",
+        f"/components/uav={component}",
+        "--set",
+        check,
+        "--stop-time",
+        "1",
+        "--no-report",
+    )
     done = run_cosim("run", "demo1_box", *options, cwd=tmp_path)
     assert done.returncode == 3, done.stdout + done.stderr
     (line,) = (line for line in done.stdout.splitlines() if line.startswith("descent.aborts"))

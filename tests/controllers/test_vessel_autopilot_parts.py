@@ -1,4 +1,6 @@
-"""Guidance, speed and heading control of the vessel: one FMU, three wired ones, or any one of the three replaced alone."""
+"""Guidance, speed and heading control of the vessel: one FMU, three wired ones, or any one of the
+three replaced alone.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,11 @@ from cosim.core import resources
 
 ROOT = resources.root()
 SYSTEM = ROOT / "scenarios/systems/strider_autopilot.json"
-BLOCKS = {"guidance": "WaypointGuidance", "speed": "SpeedController", "heading": "HeadingController"}
+BLOCKS = {
+    "guidance": "WaypointGuidance",
+    "speed": "SpeedController",
+    "heading": "HeadingController",
+}
 
 #: a heading controller of somebody else: proportional, damped by the measured yaw rate
 RATE_DAMPED = """
@@ -131,12 +137,16 @@ def test_another_heading_controller_sails_demo1(tmp_path: Path) -> None:
     system = with_block(tmp_path, "heading", {"python": str(tmp_path / "own.py:RateDamped")})
     result = cosim.run("demo1_box", nested("demo1_box", system))
     assert all(outcome.passed for outcome in result.checks)
-    assert not np.array_equal(result["usv.rudder_angle"], cosim.run("demo1_box")["usv.rudder_angle"])
+    assert not np.array_equal(
+        result["usv.rudder_angle"], cosim.run("demo1_box")["usv.rudder_angle"]
+    )
 
 
 def test_another_guidance_needs_only_two_references(tmp_path: Path) -> None:
     (tmp_path / "own.py").write_text(COURSE)
-    usv = {"system": str(with_block(tmp_path, "guidance", {"python": str(tmp_path / "own.py:Course")}))}
+    usv = {
+        "system": str(with_block(tmp_path, "guidance", {"python": str(tmp_path / "own.py:Course")}))
+    }
     result = cosim.run("free_flight", {"/components/usv": usv})
     assert result["vessel.position.x"][-1] > 3.0
     assert result["vessel.attitude.yaw"][-1] == pytest.approx(0.8, abs=0.01)

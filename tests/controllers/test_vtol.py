@@ -19,7 +19,9 @@ APPROACH_ALTITUDE = RESTING + 0.675
 
 @dataclass
 class Flight:
-    """Vehicle at its reference position, `offset` (m) east of the deck centre from the mode follow on."""
+    """Vehicle at its reference position, `offset` (m) east of the deck centre from the mode follow
+    on.
+    """
 
     vtol: Any
     offset: float = 0.0
@@ -46,9 +48,13 @@ class Flight:
         inputs |= {"vehicle.position.x": self.position[0], "vehicle.position.y": self.position[1]}
         inputs |= {"vehicle.position.z": self.altitude, "vehicle.contact.vessel": self.contact}
         inputs |= {"target.velocity.x": 0.8, "target.velocity.y": -0.6}
-        self.out = self.vtol.step(inputs | {"vehicle.attitude.yaw": pi / 2, "altitude_command": 2.0, "yaw_command": 0.1})
+        self.out = self.vtol.step(
+            inputs | {"vehicle.attitude.yaw": pi / 2, "altitude_command": 2.0, "yaw_command": 0.1}
+        )
         self.tick += 1
-        self.altitude = max(self.out["altitude_reference"], RESTING if self.out["mode"] >= DESCEND else 0.0)
+        self.altitude = max(
+            self.out["altitude_reference"], RESTING if self.out["mode"] >= DESCEND else 0.0
+        )
         if self.out["mode"] >= FOLLOW:
             self.position = [self.deck[0] + self.offset, self.deck[1]]
         return self.out
@@ -62,7 +68,12 @@ def flight(controller: Any) -> Callable[..., Flight]:
 def test_waits_for_the_take_off_time_with_stopped_motors(flight: Any) -> None:
     waiting = flight(take_off_time=1.0)
     out = waiting.fly(1.0)
-    assert (out["mode"], out["motor_share"], out["motors_on"], out["reset"]) == (IDLE, 0.0, False, True)
+    assert (out["mode"], out["motor_share"], out["motors_on"], out["reset"]) == (
+        IDLE,
+        0.0,
+        False,
+        True,
+    )
     assert waiting.fly(0.01)["mode"] == TAKE_OFF
 
 
@@ -82,7 +93,11 @@ def test_climbs_over_its_starting_point_until_it_is_clear(flight: Any) -> None:
     while climb.altitude <= 0.532 + 0.4:
         out = climb.fly(0.01)
         assert out["mode"] == TAKE_OFF
-        assert (out["position_reference.x"], out["position_reference.y"], out["yaw_reference"]) == (-5.0, 1.0, pi / 2)
+        assert (out["position_reference.x"], out["position_reference.y"], out["yaw_reference"]) == (
+            -5.0,
+            1.0,
+            pi / 2,
+        )
         assert (out["velocity_reference.x"], out["velocity_reference.y"]) == (0.0, 0.0)
     assert climb.fly(0.01)["mode"] == FOLLOW
 
@@ -250,18 +265,30 @@ TIMES = {"take_off_time", "landing_time", "hold_time", "contact_time"}
 
 def random_parameters(rng: np.random.Generator) -> dict[str, Any]:
     """Every number scaled; times stay on the grid of ticks, so that rounding decides nothing."""
-    scaled = {n: v * float(rng.uniform(0.7, 1.4)) for n, v in DEFAULTS.items() if not isinstance(v, bool)}
+    scaled = {
+        n: v * float(rng.uniform(0.7, 1.4)) for n, v in DEFAULTS.items() if not isinstance(v, bool)
+    }
     scaled |= {name: round(scaled[name], 2) for name in TIMES}
     return DEFAULTS | scaled | {"velocity_feed_forward": bool(rng.integers(2))}
 
 
-def erratic(rng: np.random.Generator, k: int, altitude: float, offset: np.ndarray) -> dict[str, Any]:
-    """Inputs of tick k: a circling, heaving deck and a vehicle `offset` beside its centre, with flickering contact."""
+def erratic(
+    rng: np.random.Generator, k: int, altitude: float, offset: np.ndarray
+) -> dict[str, Any]:
+    """Inputs of tick k: a circling, heaving deck and a vehicle `offset` beside its centre, with
+    flickering contact.
+    """
     deck = np.array([np.cos(k / 300), np.sin(k / 300), DECK + 0.02 * np.sin(k / 40)])
     position = [*(deck[:2] + offset).tolist(), altitude]
-    inputs: dict[str, Any] = dict(zip((f"target.position.{axis}" for axis in "xyz"), deck.tolist(), strict=True))
+    inputs: dict[str, Any] = dict(
+        zip((f"target.position.{axis}" for axis in "xyz"), deck.tolist(), strict=True)
+    )
     inputs |= dict(zip((f"vehicle.position.{axis}" for axis in "xyz"), position, strict=True))
-    inputs |= {"vehicle.attitude.yaw": float(rng.uniform(-3, 3)), "yaw_command": 0.4, "altitude_command": 1.7}
+    inputs |= {
+        "vehicle.attitude.yaw": float(rng.uniform(-3, 3)),
+        "yaw_command": 0.4,
+        "altitude_command": 1.7,
+    }
     inputs |= {"target.velocity.x": float(deck[1]), "target.velocity.y": float(-deck[0])}
     return inputs | {"vehicle.contact.vessel": bool(altitude < DECK + 0.07 and rng.uniform() < 0.8)}
 
@@ -270,7 +297,10 @@ def erratic(rng: np.random.Generator, k: int, altitude: float, offset: np.ndarra
 def test_agrees_with_its_restatement_on_erratic_flights(controller: Any, seed: int) -> None:
     rng = np.random.default_rng(seed)
     parameters = random_parameters(rng) if seed else DEFAULTS
-    vtol, reference = controller("vtol", parameters if seed else {}), controller_reference.Vtol(parameters)
+    vtol, reference = (
+        controller("vtol", parameters if seed else {}),
+        controller_reference.Vtol(parameters),
+    )
     altitude, offset, seen = 0.532, np.zeros(2), [IDLE]
     for k in range(2500):
         inputs = erratic(rng, k, altitude, offset)

@@ -69,8 +69,13 @@ def test_keep_course_sails_on(controller: Any) -> None:
     assert out["thrust"] == pytest.approx(82.65 * 0.01)
 
 
-@pytest.mark.parametrize(("end_policy", "speeds"), [(STOP, [2.0, 2.0, 0.0]), (REPEAT, [2.0] * 3), (KEEP_COURSE, [2.0] * 3)])
-def test_guidance_commands_no_speed_after_a_stop_only(controller: Any, end_policy: int, speeds: list[float]) -> None:
+@pytest.mark.parametrize(
+    ("end_policy", "speeds"),
+    [(STOP, [2.0, 2.0, 0.0]), (REPEAT, [2.0] * 3), (KEEP_COURSE, [2.0] * 3)],
+)
+def test_guidance_commands_no_speed_after_a_stop_only(
+    controller: Any, end_policy: int, speeds: list[float]
+) -> None:
     fmu = controller("waypoint_guidance", SQUARE | {"speed_command": 2.0, "end_policy": end_policy})
     assert [out["speed_reference"] for out in tour(fmu)] == speeds
 
@@ -83,7 +88,9 @@ def test_on_top_of_a_waypoint_nothing_is_undefined(controller: Any) -> None:
 
 def test_uses_all_32_waypoints(controller: Any) -> None:
     x = [float(k) for k in range(1, 33)]
-    fmu = controller("strider_autopilot", {"waypoint_count": 32, "waypoint_x": x, "waypoint_y": [0.0] * 32})
+    fmu = controller(
+        "strider_autopilot", {"waypoint_count": 32, "waypoint_x": x, "waypoint_y": [0.0] * 32}
+    )
     assert [fmu.step(at(k, 0))["active_waypoint"] for k in range(1, 33)] == [*range(2, 33), 32]
 
 

@@ -7,7 +7,13 @@ import pytest
 
 from cosim.core.expressions import parse_condition, parse_expression
 
-VALUES = {"landing.error": 0.5, "waypoints.time[2]": 8.0, "gain": 3.0, "flown": True, "lost": math.nan}
+VALUES = {
+    "landing.error": 0.5,
+    "waypoints.time[2]": 8.0,
+    "gain": 3.0,
+    "flown": True,
+    "lost": math.nan,
+}
 
 
 @pytest.mark.parametrize(
@@ -25,12 +31,16 @@ def test_arithmetic(text, value):
     assert parse_expression(text)(VALUES) == pytest.approx(value)
 
 
-@pytest.mark.parametrize("text", ["1 / (gain - 3)", "sqrt(-gain)", "log(0)", "1e300 ** 2", "(-8) ** 0.5", "missing + 1"])
+@pytest.mark.parametrize(
+    "text", ["1 / (gain - 3)", "sqrt(-gain)", "log(0)", "1e300 ** 2", "(-8) ** 0.5", "missing + 1"]
+)
 def test_an_undefined_expression_is_nan(text):
     assert math.isnan(parse_expression(text)(VALUES))
 
 
-@pytest.mark.parametrize("text", ["max(0, lost)", "min(lost, 1)", "lost ** 0", "1 ** lost", "min(1, max(lost, 2))"])
+@pytest.mark.parametrize(
+    "text", ["max(0, lost)", "min(lost, 1)", "lost ** 0", "1 ** lost", "min(1, max(lost, 2))"]
+)
 def test_nan_in_any_part_makes_the_expression_nan(text):
     """Python's `min`, `max` and `**` drop some NaN, depending on the order of arguments."""
     assert math.isnan(parse_expression(text)(VALUES))
@@ -63,7 +73,10 @@ def test_other_syntax_is_refused(text, message):
 
 
 def test_an_unknown_name_is_reported_with_the_nearest_one():
-    assert parse_expression("gian + 1").unknown_name_problem(VALUES) == 'no KPI or parameter "gian"; did you mean "gain"?'
+    assert (
+        parse_expression("gian + 1").unknown_name_problem(VALUES)
+        == 'no KPI or parameter "gian"; did you mean "gain"?'
+    )
     assert parse_expression("gain + landing.error").unknown_name_problem(VALUES) == ""
 
 
@@ -82,12 +95,16 @@ def test_conditions(text, holds):
     assert parse_condition(text)(VALUES) == holds
 
 
-@pytest.mark.parametrize("text", ["lost > 1", "not lost > 1", "lost or flown", "1 / (gain - 3) > 0", "flown and lost"])
+@pytest.mark.parametrize(
+    "text", ["lost > 1", "not lost > 1", "lost or flown", "1 / (gain - 3) > 0", "flown and lost"]
+)
 def test_a_condition_with_an_undefined_part_has_no_value(text):
     assert math.isnan(parse_condition(text)(VALUES))
 
 
-@pytest.mark.parametrize("text", ["gain in landing", "gain is gain", "gain if flown else 1", "x := 1", "gain > 'a'"])
+@pytest.mark.parametrize(
+    "text", ["gain in landing", "gain is gain", "gain if flown else 1", "x := 1", "gain > 'a'"]
+)
 def test_other_conditions_are_refused(text):
     with pytest.raises(ValueError, match="is not"):
         parse_condition(text)

@@ -6,7 +6,9 @@ from cosim.core.units import parse_unit
 
 
 def typed(causality, kind, **more):
-    return FakeComponent([Variable("v", kind, causality, **more)], lambda _values, _time, _step: None)
+    return FakeComponent(
+        [Variable("v", kind, causality, **more)], lambda _values, _time, _step: None
+    )
 
 
 def texts(built):
@@ -19,7 +21,11 @@ def test_a_valid_system_has_no_problems():
 
 def test_all_problems_are_found_at_once():
     components = {"a": gain(), "b": gain(), "c": gain(), "f": gain()}
-    built = make_system(components, "a.y > b.u, c.y > b.u, a.z > c.u, a.u > c.u, a.y > d.u", stages=[("a", "e"), ("b",)])
+    built = make_system(
+        components,
+        "a.y > b.u, c.y > b.u, a.z > c.u, a.u > c.u, a.y > d.u",
+        stages=[("a", "e"), ("b",)],
+    )
     assert texts(built) == [
         'unknown component "e"; valid: c, f',
         'component "c" is in no stage of "algorithm", so it would never step',
@@ -37,7 +43,9 @@ def test_a_wrong_name_in_a_stage_explains_a_missing_one():
 
 
 def test_an_output_cannot_be_a_target():
-    assert texts(make_system({"a": gain(), "b": gain()}, "a.y > b.y")) == ["b.y is of causality output, expected an input"]
+    assert texts(make_system({"a": gain(), "b": gain()}, "a.y > b.y")) == [
+        "b.y is of causality output, expected an input"
+    ]
 
 
 def test_a_component_in_two_stages_is_refused():
@@ -53,15 +61,36 @@ def test_different_quantities_are_not_connected():
 
 
 def test_types_with_lossy_conversion_are_not_connected():
-    for source, target in [("Float64", "Int32"), ("Int64", "Int32"), ("Boolean", "Float64"), ("String", "Float64")]:
-        built = make_system({"a": typed("output", source), "b": typed("input", target)}, "a.v > b.v")
+    for source, target in [
+        ("Float64", "Int32"),
+        ("Int64", "Int32"),
+        ("Boolean", "Float64"),
+        ("String", "Float64"),
+    ]:
+        built = make_system(
+            {"a": typed("output", source), "b": typed("input", target)}, "a.v > b.v"
+        )
         hint = ' unless the connection has "convert": true' if source == "Boolean" else ""
-        assert texts(built) == [f"a.v cannot feed b.v: type {source} cannot be converted to {target}{hint}"]
+        assert texts(built) == [
+            f"a.v cannot feed b.v: type {source} cannot be converted to {target}{hint}"
+        ]
 
 
 def test_types_with_lossless_conversion_are_connected():
-    for source, target in [("Int32", "Float64"), ("Float32", "Float64"), ("Int32", "Int64"), ("Enumeration", "Int64")]:
-        assert texts(make_system({"a": typed("output", source), "b": typed("input", target)}, "a.v > b.v")) == []
+    for source, target in [
+        ("Int32", "Float64"),
+        ("Float32", "Float64"),
+        ("Int32", "Int64"),
+        ("Enumeration", "Int64"),
+    ]:
+        assert (
+            texts(
+                make_system(
+                    {"a": typed("output", source), "b": typed("input", target)}, "a.v > b.v"
+                )
+            )
+            == []
+        )
 
 
 def test_each_array_element_is_an_endpoint():

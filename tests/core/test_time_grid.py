@@ -33,12 +33,16 @@ def test_times_of_a_60_hz_grid_are_rounded_once():
     points = grid(10, "1/60")
     for n in (1, 7, 59, 600):
         assert points.time_at(n) == float(Fraction(n, 60))
-    assert not np.array_equal([n * (1 / 60) for n in range(601)], [points.time_at(n) for n in range(601)])
+    assert not np.array_equal(
+        [n * (1 / 60) for n in range(601)], [points.time_at(n) for n in range(601)]
+    )
 
 
 def test_the_grid_ends_at_the_last_whole_step():
     assert (grid(0.027, 0.01).count, grid(0.027, 0.01).end) == (2, Fraction(2, 100))
-    with pytest.raises(ValueError, match=r"the duration 0\.027 s is shorter than the step size 0\.1 s"):
+    with pytest.raises(
+        ValueError, match=r"the duration 0\.027 s is shorter than the step size 0\.1 s"
+    ):
         grid(0.027, 0.1)
 
 

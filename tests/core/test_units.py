@@ -9,7 +9,14 @@ from cosim.core.units import Unit, multiply_units, named_unit, parse_unit
 
 @pytest.mark.parametrize(
     ("text", "like"),
-    [("N", "kg.m/s2"), ("N.m", "kg.m2/s2"), ("W/(m2.K)", "kg/(s3.K)"), ("m/s2", "m.s-2"), ("1/s", "Hz"), ("V.A", "J/s")],
+    [
+        ("N", "kg.m/s2"),
+        ("N.m", "kg.m2/s2"),
+        ("W/(m2.K)", "kg/(s3.K)"),
+        ("m/s2", "m.s-2"),
+        ("1/s", "Hz"),
+        ("V.A", "J/s"),
+    ],
 )
 def test_derived_units_have_the_exponents_of_their_definition(text, like):
     assert parse_unit(text).exponents == parse_unit(like).exponents
@@ -70,7 +77,9 @@ HOSTILE = [
 ]
 
 
-@pytest.mark.parametrize("text", ["bar_g", "bar(g)", "€/kWh", "$/MWh", "10^3 m", "people", "{", "/", "m//", *HOSTILE])
+@pytest.mark.parametrize(
+    "text", ["bar_g", "bar(g)", "€/kWh", "$/MWh", "10^3 m", "people", "{", "/", "m//", *HOSTILE]
+)
 def test_a_text_that_is_no_known_unit_is_a_unit_by_its_name(text):
     unit, metre = named_unit(text), parse_unit("m")
     assert unit == Unit(text, ())
@@ -136,7 +145,9 @@ def test_no_prefixed_unit_has_the_name_of_another_unit_with_another_meaning():
     prefixed = {f"{prefix}{name}": (prefix, name) for prefix in PREFIXES for name in PREFIXED}
     assert len(prefixed) == len(PREFIXES) * len(PREFIXED)
     for text, (prefix, name) in prefixed.items():
-        assert parse_unit(text).factor == pytest.approx(PREFIXES[prefix] * PREFIXED[name][0], rel=1e-15)
+        assert parse_unit(text).factor == pytest.approx(
+            PREFIXES[prefix] * PREFIXED[name][0], rel=1e-15
+        )
     assert set(prefixed).intersection({*PREFIXED, *UNPREFIXED}) == {"kg"}
 
 
@@ -146,7 +157,8 @@ def test_an_unknown_unit_is_refused_with_the_nearest_one():
 
 
 @pytest.mark.parametrize(
-    ("text", "hint"), [("mps", '; did you mean "m/s"?'), ("rmp", '; did you mean "rpm"?'), ("psj", ""), ("sm", "")]
+    ("text", "hint"),
+    [("mps", '; did you mean "m/s"?'), ("rmp", '; did you mean "rpm"?'), ("psj", ""), ("sm", "")],
 )
 def test_a_short_unknown_unit_has_no_hint_at_a_unit_that_resembles_it_by_chance(text, hint):
     with pytest.raises(ValueError, match=f'^unknown unit "{text}"{re.escape(hint)}$'):
@@ -171,7 +183,10 @@ def test_the_same_unit_needs_no_conversion():
     assert parse_unit("km/h").conversion(parse_unit("km/h")) == (1.0, 0.0)
 
 
-@pytest.mark.parametrize("text", ["", "parsec", "m//", "(m", "bar_g", "10^3 m", "1e-3", "W/m2K", "€/kWh", "{m}", "m/(s.(kg.K))"])
+@pytest.mark.parametrize(
+    "text",
+    ["", "parsec", "m//", "(m", "bar_g", "10^3 m", "1e-3", "W/m2K", "€/kWh", "{m}", "m/(s.(kg.K))"],
+)
 def test_unreadable_input_is_refused(text):
     with pytest.raises(ValueError, match="unit"):
         parse_unit(text)
@@ -191,7 +206,10 @@ def test_unreadable_input_is_refused(text):
 )
 def test_products_of_units(factors, expected):
     assert multiply_units(factors) == expected
-    exponents = [sum(power * parse_unit(text).exponents[i] for text, power in factors) for i in range(len(BASE_UNITS))]
+    exponents = [
+        sum(power * parse_unit(text).exponents[i] for text, power in factors)
+        for i in range(len(BASE_UNITS))
+    ]
     assert list(parse_unit(expected).exponents) == exponents
 
 

@@ -1,4 +1,6 @@
-"""Fragments of JSON files in the reference: components are created, other parts are valid where they belong."""
+"""Fragments of JSON files in the reference: components are created, other parts are valid where
+they belong.
+"""
 
 import json
 import re
@@ -21,7 +23,10 @@ MULTIROTOR = vehicle_file_schema()["oneOf"][0]
 #: arguments of a world
 WORLD_KEYS = signature(World).parameters
 #: files of the reader, and shipped ones in their place
-OWN_FILES = {"my_quad.json": "../plant_src/vehicles/data/x500.json", "my_boat.json": "../plant_src/vehicles/data/heron.json"}
+OWN_FILES = {
+    "my_quad.json": "../plant_src/vehicles/data/x500.json",
+    "my_boat.json": "../plant_src/vehicles/data/heron.json",
+}
 #: language of fragments, in docs/ beside that of complete files
 FRAGMENTS = ("json", "jsonc")
 BLOCK = re.compile(r"^```(\w+)\n(.*?)^```$", re.MULTILINE | re.DOTALL)
@@ -32,9 +37,14 @@ def fragments():
     """Return the pages and texts of the blocks that are part of a JSON file."""
     pages = [*sorted(ROOT.glob("plant_src/**/*.md")), ROOT / "docs/scenarios.md"]
     found = [
-        (page, text) for page in pages for language, text in blocks(page) if language == FRAGMENTS[page.parent.name == "docs"]
+        (page, text)
+        for page in pages
+        for language, text in blocks(page)
+        if language == FRAGMENTS[page.parent.name == "docs"]
     ]
-    return [(page, text) for page, text in found if not text.startswith('{"family"')]  # tests/plant_src/test_urdf.py
+    return [
+        (page, text) for page, text in found if not text.startswith('{"family"')
+    ]  # tests/plant_src/test_urdf.py
 
 
 def blocks(page):
@@ -53,7 +63,9 @@ def parts(text):
 
 
 def schema_of(key, value):
-    """Return the schema of the place where a part stands; None for components and parts of the world."""
+    """Return the schema of the place where a part stands; None for components and parts of the
+    world.
+    """
     if key in SCENARIO["properties"]:
         return SCENARIO["properties"][key]
     if key in DEFINITIONS["AlgorithmSpec"]["properties"]:
@@ -63,7 +75,9 @@ def schema_of(key, value):
     return None if key else DEFINITIONS["FunctionSpec" if "python" in value else "ConnectionSpec"]
 
 
-@pytest.mark.parametrize(("page", "text"), fragments(), ids=lambda value: str(getattr(value, "parent", value))[-40:])
+@pytest.mark.parametrize(
+    ("page", "text"), fragments(), ids=lambda value: str(getattr(value, "parent", value))[-40:]
+)
 def test_the_parts_of_a_fragment_are_valid(page, text, monkeypatch):
     monkeypatch.chdir(ROOT / "scenarios")
     components, world = {}, {}
@@ -73,9 +87,20 @@ def test_the_parts_of_a_fragment_are_valid(page, text, monkeypatch):
         else:
             (world if key in WORLD_KEYS else components)[key] = value
     if world:
-        components["plant"] = {"python": "../plant_src/world.py:World", "arguments": {"vehicles": {}, **world}}
+        components["plant"] = {
+            "python": "../plant_src/world.py:World",
+            "arguments": {"vehicles": {}, **world},
+        }
     if components:
-        cosim.load({"name": page.stem, "stop_time": 0.1, "step_size": 0.01, "components": components, "connections": []}).close()
+        cosim.load(
+            {
+                "name": page.stem,
+                "stop_time": 0.1,
+                "step_size": 0.01,
+                "components": components,
+                "connections": [],
+            }
+        ).close()
 
 
 #: languages of blocks that this module or test_documents.py executes
@@ -85,7 +110,14 @@ SHOWN = {"text": 10, "bash": 1, "markdown": 1}
 
 
 def test_no_block_of_a_page_outside_of_the_guides_escapes():
-    pages = [ROOT / name for name in re.findall(r": ([\w/]+\.md)$", (ROOT / "mkdocs.yml").read_text(), re.MULTILINE)]
-    others = [page for page in pages if page.parent.name not in ("tutorials", "how_to") and page.exists()]
+    pages = [
+        ROOT / name
+        for name in re.findall(r": ([\w/]+\.md)$", (ROOT / "mkdocs.yml").read_text(), re.MULTILINE)
+    ]
+    others = [
+        page for page in pages if page.parent.name not in ("tutorials", "how_to") and page.exists()
+    ]
     languages = Counter(language for page in others for language, _ in blocks(page))
-    assert {language: count for language, count in languages.items() if language not in EXECUTED} == SHOWN
+    assert {
+        language: count for language, count in languages.items() if language not in EXECUTED
+    } == SHOWN

@@ -19,15 +19,22 @@ def run_cell(source, names):
 
 @pytest.fixture
 def run_notebook(tmp_path, monkeypatch):
-    """Function that runs a notebook in an empty folder and returns its names and the values of its cells."""
+    """Function that runs a notebook in an empty folder and returns its names and the values of its
+    cells.
+    """
     nbformat = pytest.importorskip("nbformat")
     monkeypatch.chdir(tmp_path)
 
     def run(name):
-        book, names = nbformat.read(NOTEBOOKS / f"{name}.ipynb", as_version=4), {"__name__": "__main__"}
+        book, names = (
+            nbformat.read(NOTEBOOKS / f"{name}.ipynb", as_version=4),
+            {"__name__": "__main__"},
+        )
         nbformat.validate(book)
         assert not any(cell.get("outputs") for cell in book.cells)  # results are made by running it
-        return names, [run_cell(cell.source, names) for cell in book.cells if cell.cell_type == "code"]
+        return names, [
+            run_cell(cell.source, names) for cell in book.cells if cell.cell_type == "code"
+        ]
 
     return run
 
@@ -50,4 +57,6 @@ def test_own_controller(run_notebook):
 def test_envelope(run_notebook):
     _, values = run_notebook("envelope")
     assert [passed for height, passed in values[-1] if height == 0.3] == [True, True]
-    assert [sum(passed for height, passed in values[-1] if height == high) for high in (0.9, 1.2)] == [1, 1]
+    assert [
+        sum(passed for height, passed in values[-1] if height == high) for high in (0.9, 1.2)
+    ] == [1, 1]

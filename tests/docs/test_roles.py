@@ -1,4 +1,6 @@
-"""Reference of the roles: variables with units and meanings, and the settings of the shipped scenarios."""
+"""Reference of the roles: variables with units and meanings, and the settings of the shipped
+scenarios.
+"""
 
 import importlib
 import json
@@ -8,7 +10,13 @@ from pathlib import Path
 import pytest
 
 from cosim.scenario.nested_systems import load_scenario
-from cosim.studies.controller_bench.role import OutputsSpec, VariableSpec, read_role, read_role_file, role_names
+from cosim.studies.controller_bench.role import (
+    OutputsSpec,
+    VariableSpec,
+    read_role,
+    read_role_file,
+    role_names,
+)
 
 ROOT = Path(__file__).parents[2]
 SCENARIOS = sorted((ROOT / "scenarios").glob("*.json"))
@@ -35,16 +43,31 @@ def test_a_role_names_everything_that_shipped_scenarios_set_or_connect(roles, na
     known = [*role.inputs, *role.parameters]
     used = {setting for scenario in SCENARIOS for setting in roles.settings_of(name, scenario)}
     assert used
-    assert [each for each in used if not any(re.match(rf"{re.escape(each)}($|[.\[])", name) for name in known)] == []
+    assert [
+        each
+        for each in used
+        if not any(re.match(rf"{re.escape(each)}($|[.\[])", name) for name in known)
+    ] == []
 
 
 def test_the_table_counts_the_scenarios_that_set_a_parameter(roles):
     """The names are in no other place of a scenario than the parameters of the controller."""
     texts = [json.dumps(load_scenario(path).root.document.value) for path in SCENARIOS]
-    lines = roles.parameter_table("uav_controller", read_role_file("uav_controller")[1].parameters).splitlines()
-    for parameter, start in {"vtol.take_off_time": "0", "vtol.ramp_time": "0.3", "vtol.clearance": "0.4"}.items():
+    lines = roles.parameter_table(
+        "uav_controller", read_role_file("uav_controller")[1].parameters
+    ).splitlines()
+    for parameter, start in {
+        "vtol.take_off_time": "0",
+        "vtol.ramp_time": "0.3",
+        "vtol.clearance": "0.4",
+    }.items():
         count = sum(f'"{parameter}"' in text for text in texts)
         cells = next(line for line in lines if line.startswith(f"| `{parameter}` |")).split(" | ")
         assert count
-        assert cells[1:5] == ["Real", "m" if parameter == "vtol.clearance" else "s", start, str(count)]
+        assert cells[1:5] == [
+            "Real",
+            "m" if parameter == "vtol.clearance" else "s",
+            start,
+            str(count),
+        ]
     assert any(line.startswith("| `vtol.landing_enabled` | Boolean |  | true |") for line in lines)

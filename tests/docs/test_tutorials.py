@@ -1,4 +1,6 @@
-"""Tutorials and guides: every block of a page is executed, in the order of the page, in one empty folder."""
+"""Tutorials and guides: every block of a page is executed, in the order of the page, in one empty
+folder.
+"""
 
 import io
 import os
@@ -21,7 +23,15 @@ PAGES += [DOCS / "python.md", DOCS / "analysis.md"]
 BLOCK = re.compile(r'^```(\w+)(?: title="([^"]+)"| (\w+))?\n(.*?)^```$', re.MULTILINE | re.DOTALL)
 
 #: pages that take more than two seconds
-SLOW = {"cluster", "compare_runs", "controller_modelica", "controller_other_tools", "landing", "rank_controllers", "regression"}
+SLOW = {
+    "cluster",
+    "compare_runs",
+    "controller_modelica",
+    "controller_other_tools",
+    "landing",
+    "rank_controllers",
+    "regression",
+}
 SLOW |= {"analysis", "python", "run_foreign_fmus", "sweep"}
 #: shown, but of programs that are not installed here
 NOT_EXECUTED = {"matlab"}
@@ -45,7 +55,9 @@ class Story:
         for line in text.splitlines():
             words = shlex.split(line, comments=True)
             if manner == "background":
-                self.background.append(subprocess.Popen([sys.executable, "-m", *words], stderr=subprocess.DEVNULL))
+                self.background.append(
+                    subprocess.Popen([sys.executable, "-m", *words], stderr=subprocess.DEVNULL)
+                )
             elif words[:1] == ["cd"]:
                 os.chdir(words[1])
             elif words:
@@ -58,9 +70,13 @@ class Story:
             done = run_cosim(*words[1:], cwd=Path.cwd())
         else:
             assert words[0] == "python"
-            done = subprocess.run([sys.executable, *words[1:]], capture_output=True, text=True, check=False)
+            done = subprocess.run(
+                [sys.executable, *words[1:]], capture_output=True, text=True, check=False
+            )
         self.output += done.stdout
-        assert (done.returncode == 3) if manner == "fails" else (done.returncode == 0), done.stdout + done.stderr
+        assert (done.returncode == 3) if manner == "fails" else (done.returncode == 0), (
+            done.stdout + done.stderr
+        )
 
     def text(self, text, _):
         """Every line shown was printed before."""
@@ -91,7 +107,11 @@ def wait_for_port(port, limit=30.0):
 
 
 @pytest.mark.parametrize(
-    "page", [pytest.param(page, id=page.stem, marks=[pytest.mark.long] if page.stem in SLOW else []) for page in PAGES]
+    "page",
+    [
+        pytest.param(page, id=page.stem, marks=[pytest.mark.long] if page.stem in SLOW else [])
+        for page in PAGES
+    ],
 )
 def test_a_reader_can_follow_the_page(page, tmp_path, monkeypatch):
     if page.stem == "cluster":
@@ -106,10 +126,14 @@ def test_a_reader_can_follow_the_page(page, tmp_path, monkeypatch):
             process.wait()
 
 
-@pytest.mark.parametrize("page", sorted((DOCS / "tutorials").glob("*.md")), ids=lambda page: page.stem)
+@pytest.mark.parametrize(
+    "page", sorted((DOCS / "tutorials").glob("*.md")), ids=lambda page: page.stem
+)
 def test_a_tutorial_names_the_folder_of_its_commands_before_the_first_one(page):
     beginning = page.read_text().partition("\n## ")[0]
-    assert re.search(r"\b[Rr]un (all|the first) commands? in .*\bfolder\b|run all commands in it", beginning)
+    assert re.search(
+        r"\b[Rr]un (all|the first) commands? in .*\bfolder\b|run all commands in it", beginning
+    )
 
 
 def test_every_block_is_found():

@@ -33,10 +33,17 @@ UNITS = {"rad": parse_unit("rad"), "deg": parse_unit("deg")}
 
 
 def random_component(seed):
-    """Return a component with an input and an output of every type; the outputs mix inputs and random numbers."""
+    """Return a component with an input and an output of every type; the outputs mix inputs and
+    random numbers.
+    """
     draw = random.Random(seed)  # noqa: S311
     variables = [
-        Variable(f"{side}_{name}", name, causality, unit=UNITS[draw.choice(["rad", "deg"])] if name == "Float64" else None)
+        Variable(
+            f"{side}_{name}",
+            name,
+            causality,
+            unit=UNITS[draw.choice(["rad", "deg"])] if name == "Float64" else None,
+        )
         for name in [*NUMBERS, "String"]
         for side, causality in (("u", "input"), ("y", "output"))
     ]
@@ -51,7 +58,11 @@ def random_component(seed):
 
 def _mixed(name, value, draw):
     if name.startswith("Float"):
-        return float(np.float32(draw.uniform(-1, 1) + 0.5 * value)) if name == "Float32" else draw.uniform(-1, 1) + 0.5 * value
+        return (
+            float(np.float32(draw.uniform(-1, 1) + 0.5 * value))
+            if name == "Float32"
+            else draw.uniform(-1, 1) + 0.5 * value
+        )
     if name == "Boolean":
         return bool(value) != (draw.random() < 0.5)
     if name == "Enumeration":
@@ -61,24 +72,41 @@ def _mixed(name, value, draw):
 
 
 def random_system(seed, extra=()):
-    """Return a system with random connections of all types, delays, gains, periods, stages and groups; and its output names."""
+    """Return a system with random connections of all types, delays, gains, periods, stages and
+    groups; and its output names.
+    """
     draw = random.Random(seed)  # noqa: S311
     components = {f"m{i}": random_component(100 * seed + i) for i in range(5)} | dict(extra)
     ends = {
         causality: [
-            Endpoint(n, s) for n, c in components.items() for v in c.variables if v.causality == causality for s in v.scalar_names
+            Endpoint(n, s)
+            for n, c in components.items()
+            for v in c.variables
+            if v.causality == causality
+            for s in v.scalar_names
         ]
         for causality in ("input", "output")
     }
     find_element = System(components).find_element
     connections = []
     for target in ends["input"]:
-        sources = [e for e in ends["output"] if not incompatibility(find_element(e).variable, find_element(target).variable)]
+        sources = [
+            e
+            for e in ends["output"]
+            if not incompatibility(find_element(e).variable, find_element(target).variable)
+        ]
         if sources and draw.random() < 0.9:
-            mapping = draw.choice([{}, {"gain": -0.3}, {"offset": 0.7}, {"gain": 0.1, "offset": -0.2}])
+            mapping = draw.choice(
+                [{}, {"gain": -0.3}, {"offset": 0.7}, {"gain": 0.1, "offset": -0.2}]
+            )
             is_float = find_element(target).variable.type in FLOAT_TYPES
             connections.append(
-                Connection(draw.choice(sources), target, draw.choice([0, 0, 0, 1, 3]), **(mapping if is_float else {}))
+                Connection(
+                    draw.choice(sources),
+                    target,
+                    draw.choice([0, 0, 0, 1, 3]),
+                    **(mapping if is_float else {}),
+                )
             )
     names = draw.sample(list(components), len(components))
     stages = ((names[0], Group("g", ((names[1],), (names[2], names[3])))), tuple(names[4:]))
@@ -110,9 +138,14 @@ def recorded(kind, build, share=1.0, interval="1/100"):
 
 
 @pytest.mark.parametrize("seed", range(12))
-@pytest.mark.parametrize(("share", "interval"), [(1.0, "1/100"), (0.2, "3/100")], ids=["everything", "some"])
+@pytest.mark.parametrize(
+    ("share", "interval"), [(1.0, "1/100"), (0.2, "3/100")], ids=["everything", "some"]
+)
 def test_random_systems_are_bit_identical(seed, share, interval):
-    native, python = (recorded(kind, lambda: random_system(seed), share, interval) for kind in ("native", "python"))
+    native, python = (
+        recorded(kind, lambda: random_system(seed), share, interval)
+        for kind in ("native", "python")
+    )
     assert native == python
 
 
@@ -120,7 +153,10 @@ def test_random_systems_are_bit_identical(seed, share, interval):
 def test_random_systems_with_foreign_fmus_are_bit_identical(seed, probes):
     def build(isolation=None):
         files = [FmuFile(path) for path in probes.values()] * 2
-        fmus = {f"f{i}": create_component(file, f"f{i}", isolation=isolation) for i, file in enumerate(files)}
+        fmus = {
+            f"f{i}": create_component(file, f"f{i}", isolation=isolation)
+            for i, file in enumerate(files)
+        }
         return random_system(seed, fmus)
 
     def build_isolated():
@@ -145,7 +181,9 @@ def test_random_systems_with_fmus_on_threads_are_bit_identical(seed, kind, probe
 
     def build(parallel):
         files = [FmuFile(path) for path in probes.values()]
-        built, outputs = random_system(seed, {f"f{i}": create_component(file, f"f{i}") for i, file in enumerate(3 * files)})
+        built, outputs = random_system(
+            seed, {f"f{i}": create_component(file, f"f{i}") for i, file in enumerate(3 * files)}
+        )
         return replace(built, parallel=parallel), outputs
 
     assert recorded(kind, lambda: build(True)) == recorded(kind, lambda: build(False))
@@ -169,9 +207,18 @@ def test_an_output_that_is_not_finite_is_named_with_its_source(kind):
     for stages in ([("a", "b")], [("a",), ("b",)]):
         outcome = simulate(
             built(*stages),
-            Settings(exact_fraction(0), exact_fraction(1), exact_fraction(0.01), {"a.y": endpoint("a.y")}, executor=kind),
+            Settings(
+                exact_fraction(0),
+                exact_fraction(1),
+                exact_fraction(0.01),
+                {"a.y": endpoint("a.y")},
+                executor=kind,
+            ),
         )
-        assert str(outcome.failure) == 'a: do_step failed at t = 0.05 s: the output "y" is nan, and b.u reads it'
+        assert (
+            str(outcome.failure)
+            == 'a: do_step failed at t = 0.05 s: the output "y" is nan, and b.u reads it'
+        )
         assert len(outcome.recording.time) == 6
 
 
@@ -186,26 +233,50 @@ def test_of_several_outputs_that_are_not_finite_the_first_in_the_order_of_steps_
         values["x"] = values["u"]
 
     def block(read, written, step):
-        variables = [Variable(read, causality="input", start=0.0), Variable(written, causality="output")]
+        variables = [
+            Variable(read, causality="input", start=0.0),
+            Variable(written, causality="output"),
+        ]
         return FakeComponent(variables, step)
 
-    connections = [Connection(endpoint("plant.x"), endpoint("pi.e")), Connection(endpoint("pi.y"), endpoint("plant.u"))]
-    system = System({"plant": block("u", "x", plant), "pi": block("e", "y", control)}, connections, [("pi",), ("plant",)])
-    outcome = simulate(system, Settings(exact_fraction(0), exact_fraction(1), exact_fraction(0.01), {}, executor=kind))
-    assert str(outcome.failure).startswith('pi: do_step failed at t = 0.05 s: the output "y" is nan')
+    connections = [
+        Connection(endpoint("plant.x"), endpoint("pi.e")),
+        Connection(endpoint("pi.y"), endpoint("plant.u")),
+    ]
+    system = System(
+        {"plant": block("u", "x", plant), "pi": block("e", "y", control)},
+        connections,
+        [("pi",), ("plant",)],
+    )
+    outcome = simulate(
+        system,
+        Settings(exact_fraction(0), exact_fraction(1), exact_fraction(0.01), {}, executor=kind),
+    )
+    assert str(outcome.failure).startswith(
+        'pi: do_step failed at t = 0.05 s: the output "y" is nan'
+    )
 
 
 @pytest.mark.parametrize("kind", EXECUTORS)
 @pytest.mark.parametrize("copies", [1, 300])
-@pytest.mark.parametrize(("type_", "largest"), [("Float64", np.finfo(np.float64).max), ("Float32", np.finfo(np.float32).max)])
+@pytest.mark.parametrize(
+    ("type_", "largest"),
+    [("Float64", np.finfo(np.float64).max), ("Float32", np.finfo(np.float32).max)],
+)
 def test_the_largest_floats_are_finite_and_the_next_ones_are_not(kind, copies, type_, largest):
     def built(last):
         def step(values, t, _h):
-            values.update(dict.fromkeys(values, -float(largest)) | {f"y{copies - 1}": last if t > 0.045 else 0.0})
+            values.update(
+                dict.fromkeys(values, -float(largest))
+                | {f"y{copies - 1}": last if t > 0.045 else 0.0}
+            )
 
         names = [f"y{i}" for i in range(copies)]
         a = FakeComponent([Variable(name, type_, "output") for name in names], step)
-        b = FakeComponent([Variable(name, type_, "input", start=0.0) for name in names], lambda _values, _t, _h: None)
+        b = FakeComponent(
+            [Variable(name, type_, "input", start=0.0) for name in names],
+            lambda _values, _t, _h: None,
+        )
         wires = [Connection(Endpoint("a", name), Endpoint("b", name)) for name in names]
         return System({"a": a, "b": b}, wires, [("a", "b")])
 
@@ -213,16 +284,26 @@ def test_the_largest_floats_are_finite_and_the_next_ones_are_not(kind, copies, t
     assert simulate(built(float(largest)), settings).failure is None
     for last in (float("inf"), -float("inf"), float("nan")):
         y = f"y{copies - 1}"
-        expected = f'a: do_step failed at t = 0.05 s: the output "{y}" is {last}, and b.{y} reads it'
+        expected = (
+            f'a: do_step failed at t = 0.05 s: the output "{y}" is {last}, and b.{y} reads it'
+        )
         assert str(simulate(built(last), settings).failure) == expected
 
 
 @pytest.mark.parametrize("kind", EXECUTORS)
 def test_unconnected_outputs_may_be_infinite(kind):
-    source = FakeComponent([Variable("y", causality="output")], lambda v, _t, _h: v.update(y=float("inf")))
+    source = FakeComponent(
+        [Variable("y", causality="output")], lambda v, _t, _h: v.update(y=float("inf"))
+    )
     outcome = simulate(
         System({"a": source}, (), (("a",),)),
-        Settings(exact_fraction(0), exact_fraction(1), exact_fraction(0.1), {"a.y": endpoint("a.y")}, executor=kind),
+        Settings(
+            exact_fraction(0),
+            exact_fraction(1),
+            exact_fraction(0.1),
+            {"a.y": endpoint("a.y")},
+            executor=kind,
+        ),
     )
     assert outcome.failure is None
     assert np.isinf(outcome.recording.columns["a.y"][1:]).all()
@@ -232,10 +313,20 @@ def test_unconnected_outputs_may_be_infinite(kind):
 def test_rows_are_complete_when_they_need_several_chunks(kind, monkeypatch):
     monkeypatch.setattr("cosim.process.run_files.row_store.CHUNK_BYTES", 1000)
     monkeypatch.setattr("cosim.process.run_files.row_store.MAX_MEMORY_BYTES", 0)
-    count = FakeComponent([Variable("y", causality="output")], lambda v, _t, _h: v.update(y=v["y"] + 1), start={"y": 0.0})
+    count = FakeComponent(
+        [Variable("y", causality="output")],
+        lambda v, _t, _h: v.update(y=v["y"] + 1),
+        start={"y": 0.0},
+    )
     outcome = simulate(
         System({"a": count}, (), (("a",),)),
-        Settings(exact_fraction(0), exact_fraction(10000), exact_fraction(1), {"a.y": endpoint("a.y")}, executor=kind),
+        Settings(
+            exact_fraction(0),
+            exact_fraction(10000),
+            exact_fraction(1),
+            {"a.y": endpoint("a.y")},
+            executor=kind,
+        ),
     )
     assert outcome.recording.columns["a.y"].tolist() == list(range(10001))
 
@@ -247,7 +338,9 @@ def test_constants_of_the_native_module_are_those_of_python():
 
 
 def spoiled_source(type_="Float64", value=float("nan"), copies=1, spoiled=-1):
-    """Return a component with the outputs y0, y1, ..., one of which has this value in steps that begin after 0.045 s."""
+    """Return a component with the outputs y0, y1, ..., one of which has this value in steps that
+    begin after 0.045 s.
+    """
     variables = [Variable(f"y{i}", type_, "output") for i in range(copies)]
 
     def step(values, t, _h):
@@ -258,7 +351,15 @@ def spoiled_source(type_="Float64", value=float("nan"), copies=1, spoiled=-1):
 
 def fail_settings(kind, *recorded, **more):
     columns = {name: endpoint(name) for name in recorded}
-    return Settings(Fraction(0), Fraction(1), Fraction(1, 100), columns, executor=kind, non_finite="fail", **more)
+    return Settings(
+        Fraction(0),
+        Fraction(1),
+        Fraction(1, 100),
+        columns,
+        executor=kind,
+        non_finite="fail",
+        **more,
+    )
 
 
 @pytest.mark.parametrize("kind", EXECUTORS)
@@ -267,7 +368,9 @@ def fail_settings(kind, *recorded, **more):
 @pytest.mark.parametrize("value", [float("nan"), float("inf"), -float("inf")])
 def test_a_recorded_output_must_be_finite_on_request(kind, copies, type_, value):
     names = [f"a.y{i}" for i in range(copies)]
-    outcome = simulate(make_system({"a": spoiled_source(type_, value, copies=copies)}), fail_settings(kind, *names))
+    outcome = simulate(
+        make_system({"a": spoiled_source(type_, value, copies=copies)}), fail_settings(kind, *names)
+    )
     text = f'the output "y{copies - 1}" is {value}, and is recorded for t = 0.06 s'
     assert str(outcome.failure) == f"a: do_step failed at t = 0.05 s: {text}"
     assert len(outcome.recording.time) == 6
@@ -275,16 +378,24 @@ def test_a_recorded_output_must_be_finite_on_request(kind, copies, type_, value)
 
 @pytest.mark.parametrize("kind", EXECUTORS)
 def test_the_time_is_exact_between_recorded_rows(kind):
-    outcome = simulate(make_system({"a": spoiled_source()}), fail_settings(kind, "a.y0", record_interval=Fraction(1, 10)))
+    outcome = simulate(
+        make_system({"a": spoiled_source()}),
+        fail_settings(kind, "a.y0", record_interval=Fraction(1, 10)),
+    )
     assert str(outcome.failure).endswith("is nan, and is recorded for t = 0.06 s")
     assert outcome.recording.time.tolist() == [0]
 
 
 @pytest.mark.parametrize("kind", EXECUTORS)
 def test_initial_outputs_must_be_finite_on_request(kind):
-    source = FakeComponent([Variable("y0", causality="output")], lambda *_: None, start={"y0": float("inf")})
+    source = FakeComponent(
+        [Variable("y0", causality="output")], lambda *_: None, start={"y0": float("inf")}
+    )
     outcome = simulate(make_system({"a": source}), fail_settings(kind, "a.y0"))
-    text = 'a: exit_initialization_mode failed at t = 0 s: the output "y0" is inf, and is recorded for t = 0.0 s'
+    text = (
+        'a: exit_initialization_mode failed at t = 0 s: the output "y0" is inf, and is recorded '
+        "for t = 0.0 s"
+    )
     assert (str(outcome.failure), len(outcome.recording.time)) == (text, 0)
 
 

@@ -16,7 +16,9 @@ pytestmark = pytest.mark.usefixtures("executor")
 
 
 class Function(FakeComponent):
-    """y = function(u, v), directly; with a derivative (with respect to u) it offers directional derivatives."""
+    """y = function(u, v), directly; with a derivative (with respect to u) it offers directional
+    derivatives.
+    """
 
     def __init__(self, function, derivative=None, start=0.0, **attributes):
         def feed(values):
@@ -28,10 +30,16 @@ class Function(FakeComponent):
 
     def get_directional_derivative(self, outputs, input_name):
         self.asked += 1
-        return [self._derivative(self.values["u"]) for _ in outputs] if self._derivative and input_name == "u" else None
+        return (
+            [self._derivative(self.values["u"]) for _ in outputs]
+            if self._derivative and input_name == "u"
+            else None
+        )
 
 
-@pytest.mark.parametrize("derivative", [None, lambda _u: 2.0], ids=["differences", "directional derivatives"])
+@pytest.mark.parametrize(
+    "derivative", [None, lambda _u: 2.0], ids=["differences", "directional derivatives"]
+)
 def test_a_loop_with_a_gain_above_1_is_solved(derivative):
     one = Function(lambda u, _v: 2 * u + 1, derivative)
     recording = run_system(make_system({"a": one}, "a.y > a.u"), 3, 1, ["a.y"])
@@ -40,7 +48,9 @@ def test_a_loop_with_a_gain_above_1_is_solved(derivative):
 
 
 def test_a_nonlinear_loop_through_two_components_with_units_is_solved():
-    """x = y / 1000 (mm to m), y = 3000 exp(-x) - 1000: 1.01 x = 3 exp(-x) - 1 has a root by bisection."""
+    """x = y / 1000 (mm to m), y = 3000 exp(-x) - 1000: 1.01 x = 3 exp(-x) - 1 has a root by
+    bisection.
+    """
     mm, m = parse_unit("mm"), parse_unit("m")
     one = Function(lambda u, _v: 3 * math.exp(-u) - 1 - 3 * u, start=0.0, unit=m)
     two = Function(lambda u, v: u + v, lambda _u: 1.0, unit=mm)
@@ -57,7 +67,12 @@ def test_a_loop_downstream_of_a_loop_gets_its_solution():
         "b": Function(lambda u, v: v - 5 * u),
         "a": Function(lambda u, _v: 3 * u - 4, lambda _u: 3.0),
     }
-    recording = run_system(make_system(parts, "a.y > a.u, a.y > b.v, b.y > b.u, b.y > c.u"), 1, 1, ["a.y", "b.y", "c.y"])
+    recording = run_system(
+        make_system(parts, "a.y > a.u, a.y > b.v, b.y > b.u, b.y > c.u"),
+        1,
+        1,
+        ["a.y", "b.y", "c.y"],
+    )
     found = [recording.columns[name][0] for name in ("a.y", "b.y", "c.y")]
     np.testing.assert_allclose(found, [2.0, 1 / 3, 10 / 3], rtol=1e-11)
 
@@ -68,7 +83,9 @@ def test_a_linear_network_of_many_components_is_solved():
     n = 6
     matrix, constant = rng.normal(size=(n, n)), rng.normal(size=n)
     parts = {
-        f"s{i}": FakeComponent([*inputs(*(f"u{j}" for j in range(n))), *outputs("y")], *_row(matrix[i], constant[i]))
+        f"s{i}": FakeComponent(
+            [*inputs(*(f"u{j}" for j in range(n))), *outputs("y")], *_row(matrix[i], constant[i])
+        )
         for i in range(n)
     }
     wires = ", ".join(f"s{j}.y > s{i}.u{j}" for i in range(n) for j in range(n))
@@ -86,11 +103,17 @@ def _row(factors, constant):
 
 
 def test_a_loop_without_a_solution_is_reported_with_its_residuals():
-    built = make_system({"a": Function(lambda u, _v: u + 1), "b": gain(), "c": gain()}, "a.y > b.u, b.y > a.u, a.y > c.u")
+    built = make_system(
+        {"a": Function(lambda u, _v: u + 1), "b": gain(), "c": gain()},
+        "a.y > b.u, b.y > a.u, a.y > c.u",
+    )
     with pytest.raises(ComponentError) as failure:
         run_system(built, 1, 1)
     text = str(failure.value)
-    assert text.startswith("b, a: initialization failed at t = 0 s: an algebraic loop does not converge (a.y -> b.u, b.y -> a.u")
+    assert text.startswith(
+        "b, a: initialization failed at t = 0 s: an algebraic loop does not converge (a.y -> b.u, "
+        "b.y -> a.u"
+    )
     assert "residuals after Newton's method: " in text
 
 

@@ -1,4 +1,6 @@
-"""Iterated systems in a child process: a crash in get_state or set_state is reported with its component."""
+"""Iterated systems in a child process: a crash in get_state or set_state is reported with its
+component.
+"""
 
 import json
 
@@ -48,14 +50,22 @@ def cosim_run(tmp_path):
         "name": "loop",
         "stop_time": 0.1,
         "step_size": 0.01,
-        "components": {"intact": {"python": "parts.py:Half"}, "broken": {"python": "parts.py:Broken"}},
-        "connections": [{"from": "intact.y", "to": "broken.u"}, {"from": "broken.y", "to": "intact.u"}],
+        "components": {
+            "intact": {"python": "parts.py:Half"},
+            "broken": {"python": "parts.py:Broken"},
+        },
+        "connections": [
+            {"from": "intact.y", "to": "broken.u"},
+            {"from": "broken.y", "to": "intact.u"},
+        ],
         "algorithm": {"stages": [["broken"], ["intact"]], "iteration": {"tolerance": 1e-9}},
     }
     (tmp_path / "loop.json").write_text(json.dumps(document))
 
     def run(**environment):
-        return run_cosim("run", "loop.json", "--output-dir", "out", "--no-report", cwd=tmp_path, env=environment)
+        return run_cosim(
+            "run", "loop.json", "--output-dir", "out", "--no-report", cwd=tmp_path, env=environment
+        )
 
     return run
 
@@ -71,4 +81,7 @@ def test_the_outputs_converge_to_the_fixed_point(cosim_run, tmp_path):
 def test_a_crash_in_a_state_function_names_the_component(cosim_run, function):
     done = cosim_run(FAIL_IN=function)
     assert done.returncode == 1
-    assert f"broken: {function} failed at t = 0 s: the process was ended by signal 11 (SIGSEGV" in done.stderr
+    assert (
+        f"broken: {function} failed at t = 0 s: the process was ended by signal 11 (SIGSEGV"
+        in done.stderr
+    )

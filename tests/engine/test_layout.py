@@ -32,5 +32,8 @@ VARIABLES = {
 def test_variables_that_one_fmi_call_can_get_are_adjacent(chosen, order):
     component = FakeComponent([VARIABLES[name] for name in chosen], lambda _values, _t, _h: None)
     columns = {name: endpoint(f"a.{name}") for name in chosen}
-    plan = compile_plan(make_system({"a": component}), Settings(exact_fraction(0), exact_fraction(1), exact_fraction(1), columns))
+    plan = compile_plan(
+        make_system({"a": component}),
+        Settings(exact_fraction(0), exact_fraction(1), exact_fraction(1), columns),
+    )
     assert [variable.name for variable in plan.outputs.ports["a"].variables] == order

@@ -23,7 +23,9 @@ pytestmark = pytest.mark.usefixtures("executor")
 
 def paced(component, stop, factor=1.0, **more):
     columns = {"a.y": endpoint("a.y")}
-    settings = Settings(Fraction(0), exact_fraction(stop), exact_fraction("0.01"), columns, real_time=factor, **more)
+    settings = Settings(
+        Fraction(0), exact_fraction(stop), exact_fraction("0.01"), columns, real_time=factor, **more
+    )
     return simulate(make_system({"a": component}), settings)
 
 
@@ -86,7 +88,8 @@ def test_lateness_is_measured_and_caught_up(clock):
         clock.now += 12_000_000 if n == 10 else 1_000_000
         pacer.wait(n)
     found = pacer.statistics()
-    # one step of 12 ms in a slot of 5 ms is 7 ms late, the next ones need 1 ms each: 3 ms late, then in time
+    # one step of 12 ms in a slot of 5 ms is 7 ms late, the next ones need 1 ms each: 3 ms late,
+    # then in time
     lateness = np.array([0.007, 0.003] + [0.0] * 98)
     assert (found["factor"], found["steps"], found["late_steps"]) == (2.0, 100, 2)
     assert found["max_lateness"] == pytest.approx(0.007)
@@ -126,7 +129,10 @@ def test_an_invalid_factor_is_refused(factor):
 
 @pytest.mark.parametrize("factor", [5e-324, 1e-300, 1e-9])
 def test_a_factor_that_lets_a_step_last_for_days_is_refused(factor):
-    with pytest.raises(InputError, match=r"a step of 0\.01 s takes more than 1000000 s of wall time with the factor"):
+    with pytest.raises(
+        InputError,
+        match=r"a step of 0\.01 s takes more than 1000000 s of wall time with the factor",
+    ):
         paced(counter(), 1.0, factor)
 
 

@@ -31,14 +31,25 @@ def simulate_files(files, parallel, wires="", stop="0.3", events=(), start_value
     """Simulate one component per file (c0, c1, ...) in one stage."""
     loaded = {path: FmuFile(path) for path in files}
     components = {f"c{i}": create_component(loaded[path], f"c{i}") for i, path in enumerate(files)}
-    columns = {f"{name}.{output}": endpoint(f"{name}.{output}") for name in components for output in ("y", "i_out", "e_out")}
+    columns = {
+        f"{name}.{output}": endpoint(f"{name}.{output}")
+        for name in components
+        for output in ("y", "i_out", "e_out")
+    }
     built = make_system(components, wires, parallel=parallel, start_values=start_values or {})
-    return simulate(built, Settings(Fraction(0), exact_fraction(stop), exact_fraction("0.01"), columns, events=events))
+    return simulate(
+        built,
+        Settings(Fraction(0), exact_fraction(stop), exact_fraction("0.01"), columns, events=events),
+    )
 
 
 def on_threads(run):
     """Return the components that stepped on another thread than the first one."""
-    return {name.partition(".")[0] for name, values in run.recording.columns.items() if name.endswith("e_out") and values[-1]}
+    return {
+        name.partition(".")[0]
+        for name, values in run.recording.columns.items()
+        if name.endswith("e_out") and values[-1]
+    }
 
 
 RING = "c0.y > c1.u, c1.y > c2.u, c2.y >2 c0.u"
@@ -64,13 +75,21 @@ def test_one_file_steps_one_instance_at_a_time_unless_the_scenario_says_so(long)
 
 
 def test_results_are_those_of_one_thread(long):
-    events = [Event(exact_fraction("0.1"), {"c1": {"fail_time": 1e6}}), Event(exact_fraction("0.02"), {"c2": {"i_in": 3}})]
+    events = [
+        Event(exact_fraction("0.1"), {"c1": {"fail_time": 1e6}}),
+        Event(exact_fraction("0.02"), {"c2": {"i_in": 3}}),
+    ]
     starts = {"c0": {"y_start": 0.5}}
-    serial, parallel = (simulate_files([*long, long[0]], way, RING, events=events, start_values=starts) for way in (False, True))
+    serial, parallel = (
+        simulate_files([*long, long[0]], way, RING, events=events, start_values=starts)
+        for way in (False, True)
+    )
     assert serial.failure is None
     assert parallel.failure is None
     for name in ("c0.y", "c1.y", "c2.y"):
-        assert parallel.recording.columns[name].tobytes() == serial.recording.columns[name].tobytes()
+        assert (
+            parallel.recording.columns[name].tobytes() == serial.recording.columns[name].tobytes()
+        )
 
 
 def test_a_failure_on_a_thread_names_component_function_and_time(long):

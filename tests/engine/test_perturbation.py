@@ -17,11 +17,20 @@ def scenario(**more):
     """Return a chain of three blocks y = u; the first one is an integrator of its input."""
     components = {"a": block([[1]], [[1]], [[1]]), "b": block(*GAIN), "c": block(*GAIN)}
     connections = [{"from": "a.y0", "to": "b.u0"}, {"from": "b.y0", "to": "c.u0", "gain": 3}]
-    return {"name": "chain", "stop_time": 10, "step_size": 1, "components": components, "connections": connections, **more}
+    return {
+        "name": "chain",
+        "stop_time": 10,
+        "step_size": 1,
+        "components": components,
+        "connections": connections,
+        **more,
+    }
 
 
 def run(values, targets, content=None, active=None):
-    """Return the recorded outputs and the observed values of a run with values that are added to one channel."""
+    """Return the recorded outputs and the observed values of a run with values that are added to
+    one channel.
+    """
     run = PlanRun(load(content or scenario()).plan, executor=PerturbingExecutor)
     try:
         run.initialize()
@@ -29,7 +38,9 @@ def run(values, targets, content=None, active=None):
         run.executor.set_values(np.array(values, float)[:, None])
         run.advance(len(values) + 1)
         columns = run.outcome().recording.columns
-        return {name: columns[name].tolist() for name in columns}, run.executor.observed[:, 0].tolist()
+        return {name: columns[name].tolist() for name in columns}, run.executor.observed[
+            :, 0
+        ].tolist()
     finally:
         run.close()
 
@@ -63,7 +74,11 @@ def test_components_that_are_not_active_hold_their_outputs():
 
 
 def test_inputs_of_iterated_components_are_refused():
-    algorithm = {"kind": "staged", "stages": [["a"], ["b", "c"]], "iteration": {"tolerance": 1e-9, "limit": 20}}
+    algorithm = {
+        "kind": "staged",
+        "stages": [["a"], ["b", "c"]],
+        "iteration": {"tolerance": 1e-9, "limit": 20},
+    }
     content = scenario(algorithm=algorithm)
     with pytest.raises(InputError, match=r"c\.u0 belongs to components that are iterated"):
         run([1], [PerturbationTarget(Endpoint("c", "u0"))], content)

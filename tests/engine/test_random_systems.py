@@ -1,4 +1,6 @@
-"""Random systems compared with a reference importer that copies one value at a time, in the order of the stages."""
+"""Random systems compared with a reference importer that copies one value at a time, in the order
+of the stages.
+"""
 
 import math
 import random
@@ -30,7 +32,11 @@ def mixer(seed, units):
         for j in indices:
             values[f"y{j}"] = mixed(seed, j, t, h, given)
 
-    sides = [side(f"{letter}{j}", unit=UNITS[units[j]])[0] for side, letter in ((inputs, "u"), (outputs, "y")) for j in indices]
+    sides = [
+        side(f"{letter}{j}", unit=UNITS[units[j]])[0]
+        for side, letter in ((inputs, "u"), (outputs, "y"))
+        for j in indices
+    ]
     return FakeComponent(sides, step, start={f"y{j}": seed + 0.1 * j for j in indices})
 
 
@@ -45,7 +51,9 @@ def in_stages(draw, members):
 
 
 def random_system(seed):
-    """Return a random system of mixers with units, delays, sums, periods, stages and a group; and the units by component."""
+    """Return a random system of mixers with units, delays, sums, periods, stages and a group; and
+    the units by component.
+    """
     draw = random.Random(seed)  # noqa: S311
     names = [f"m{i}" for i in range(draw.randint(2, 5))]
     units = {name: [draw.choice(list(UNITS)) for _ in range(draw.randint(1, 6))] for name in names}
@@ -56,12 +64,21 @@ def random_system(seed):
             sources = [source for source, other in outs if _fits(other, unit)]
             count = draw.choice([0, 1, 1, 1, 2, 3])
             for term in range(count):
-                delay, numbers = draw.choice([0, 0, 0, 1, 2, 5]), (draw.choice([1.0, -2.5]), 0.5, term + 1) if count > 1 else ()
-                connections.append(Connection(draw.choice(sources), Endpoint(name, f"u{j}"), delay, "", *numbers))
+                delay, numbers = (
+                    draw.choice([0, 0, 0, 1, 2, 5]),
+                    (draw.choice([1.0, -2.5]), 0.5, term + 1) if count > 1 else (),
+                )
+                connections.append(
+                    Connection(draw.choice(sources), Endpoint(name, f"u{j}"), delay, "", *numbers)
+                )
     grouped = draw.sample(names, draw.choice([0, 0, 1, 2]))
     outside = [name for name in names if name not in grouped]
     stages = in_stages(draw, outside + ([Group("g", in_stages(draw, grouped))] if grouped else []))
-    periods = {name: exact_fraction(f"{count}/10") for name in names if (count := draw.choice([1, 1, 1, 2, 3])) > 1}
+    periods = {
+        name: exact_fraction(f"{count}/10")
+        for name in names
+        if (count := draw.choice([1, 1, 1, 2, 3])) > 1
+    }
     components = {name: mixer(i, units[name]) for i, name in enumerate(names)}
     return System(components, connections, stages, periods), units
 
@@ -76,10 +93,15 @@ class ReferenceImporter:
     def __init__(self, system, units):
         self.system, self.units = system, units
         self.seeds = {name: i for i, name in enumerate(units)}
-        self.y = {name: [self.seeds[name] + 0.1 * j for j in range(len(units[name]))] for name in units}
+        self.y = {
+            name: [self.seeds[name] + 0.1 * j for j in range(len(units[name]))] for name in units
+        }
         self.u = {name: [0.0] * len(units[name]) for name in units}
         self.terms = {(c.target, c.term): 0.0 for c in system.connections if c.term}
-        self.delayed = {c: [self.y[c.source.component][int(c.source.scalar[1:])]] * c.delay for c in system.connections}
+        self.delayed = {
+            c: [self.y[c.source.component][int(c.source.scalar[1:])]] * c.delay
+            for c in system.connections
+        }
 
     def rows(self):
         rows = [{name: list(values) for name, values in self.y.items()}]
@@ -90,10 +112,15 @@ class ReferenceImporter:
 
     def stages(self, stages, inside, n):
         for stage in stages:
-            groups = [set(component_names(member.stages)) for member in stage if isinstance(member, Group)]
+            groups = [
+                set(component_names(member.stages)) for member in stage if isinstance(member, Group)
+            ]
             for connection in self.system.connections:
                 ends = {connection.source.component, connection.target.component}
-                reads_now = connection.target.component in component_names([stage]) and connection.source.component in inside
+                reads_now = (
+                    connection.target.component in component_names([stage])
+                    and connection.source.component in inside
+                )
                 if reads_now and not any(ends <= group for group in groups):
                     self.read(connection)
             for member in stage:
@@ -139,4 +166,6 @@ def test_random_systems_follow_stages_units_delays_sums_and_periods(first):
         recording = run_system(system, STEPS * exact_fraction("1/10"), "1/10", names)
         for n, row in enumerate(ReferenceImporter(system, units).rows()):
             found = {name: recording.columns[name][n] for name in names}
-            assert found == {f"{name}.y{j}": row[name][j] for name in units for j in range(len(units[name]))}, (seed, n)
+            assert found == {
+                f"{name}.y{j}": row[name][j] for name in units for j in range(len(units[name]))
+            }, (seed, n)

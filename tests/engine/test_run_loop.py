@@ -27,7 +27,13 @@ pytestmark = pytest.mark.usefixtures("executor")
 
 
 def settings(stop=3, step=1, record=("a.y",), **more):
-    return Settings(Fraction(0), exact_fraction(stop), exact_fraction(step), {name: endpoint(name) for name in record}, **more)
+    return Settings(
+        Fraction(0),
+        exact_fraction(stop),
+        exact_fraction(step),
+        {name: endpoint(name) for name in record},
+        **more,
+    )
 
 
 def failing(at, failure):
@@ -42,7 +48,16 @@ def failing(at, failure):
 def test_the_life_cycle_calls_are_in_order():
     component = counter()
     simulate(make_system({"a": component}, start_values={"a": {"y": 5.0}}), settings())
-    assert component.calls == ["set y", "enter", "exit", "step 0", "step 1", "step 2", "terminate", "free"]
+    assert component.calls == [
+        "set y",
+        "enter",
+        "exit",
+        "step 0",
+        "step 1",
+        "step 2",
+        "terminate",
+        "free",
+    ]
 
 
 def test_row_zero_holds_the_initial_outputs_and_the_last_row_the_stop_time():
@@ -52,7 +67,9 @@ def test_row_zero_holds_the_initial_outputs_and_the_last_row_the_stop_time():
 
 
 def test_the_record_interval_may_be_a_multiple_of_the_step_size():
-    outcome = simulate(make_system({"a": counter()}), settings(6, record_interval=exact_fraction(3)))
+    outcome = simulate(
+        make_system({"a": counter()}), settings(6, record_interval=exact_fraction(3))
+    )
     assert outcome.recording.time.tolist() == [0, 3, 6]
     assert outcome.recording.columns["a.y"].tolist() == [0, 3, 6]
 
@@ -64,14 +81,23 @@ def test_an_event_sets_values_before_the_step_that_starts_there():
 
 
 def test_an_event_after_the_stop_time_has_no_effect():
-    recording = run_system(make_system({"a": integrator()}), 2, 1, ["a.y"], [Event(exact_fraction(3), {"a": {"u": 1.0}})])
+    recording = run_system(
+        make_system({"a": integrator()}),
+        2,
+        1,
+        ["a.y"],
+        [Event(exact_fraction(3), {"a": {"u": 1.0}})],
+    )
     assert recording.columns["a.y"].tolist() == [0, 0, 0]
 
 
 def test_events_off_the_grid_or_on_variables_that_cannot_be_set_are_refused():
     fixed = Variable("k", causality="parameter", variability="fixed", start=1.0)
     a = FakeComponent([*inputs("u", "free"), *outputs("y"), fixed], lambda _values, _t, _h: None)
-    events = [Event(exact_fraction(0.5), {"a": {"free": 1.0}}), Event(exact_fraction(1), {"a": {"u": 1.0, "k": 2.0}})]
+    events = [
+        Event(exact_fraction(0.5), {"a": {"free": 1.0}}),
+        Event(exact_fraction(1), {"a": {"u": 1.0, "k": 2.0}}),
+    ]
     with pytest.raises(InputError) as refusal:
         simulate(make_system({"a": a, "b": gain()}, "b.y > a.u"), settings(events=events))
     assert [problem.message for problem in refusal.value.problems] == [
@@ -82,7 +108,9 @@ def test_events_off_the_grid_or_on_variables_that_cannot_be_set_are_refused():
 
 
 def test_periods_must_fit_the_step_and_the_duration():
-    built = make_system({"a": counter(), "b": counter()}, periods={"a": exact_fraction(1.5), "b": exact_fraction(4)})
+    built = make_system(
+        {"a": counter(), "b": counter()}, periods={"a": exact_fraction(1.5), "b": exact_fraction(4)}
+    )
     with pytest.raises(InputError) as refusal:
         simulate(built, settings())
     assert [problem.message for problem in refusal.value.problems] == [
@@ -104,23 +132,39 @@ def test_a_step_longer_than_periods_is_one_problem():
 
 def test_a_step_that_divides_no_period_is_one_problem_with_a_valid_step():
     """Events are compared with the valid step, which 1.5 s fits."""
-    built = make_system({name: counter() for name in "ab"}, periods={"a": exact_fraction(3), "b": exact_fraction(4.5)})
-    changed = settings(stop=9, step=2, record_interval=exact_fraction(1.5), events=[Event(exact_fraction(1.5), {})])
-    for step, example in ((0.8, ", such as 0.75 s"), ("4/3", ", such as 0.75 s"), (0.7, ", such as 0.375 s")):
+    built = make_system(
+        {name: counter() for name in "ab"},
+        periods={"a": exact_fraction(3), "b": exact_fraction(4.5)},
+    )
+    changed = settings(
+        stop=9, step=2, record_interval=exact_fraction(1.5), events=[Event(exact_fraction(1.5), {})]
+    )
+    for step, example in (
+        (0.8, ", such as 0.75 s"),
+        ("4/3", ", such as 0.75 s"),
+        (0.7, ", such as 0.375 s"),
+    ):
         with pytest.raises(InputError) as refusal:
             simulate(built, replace(changed, step_size=exact_fraction(step)))
         (problem,) = refusal.value.problems
-        assert problem.message.endswith(f" s divides no period of a, b: expected 1.5 s or a whole fraction of it{example}")
+        assert problem.message.endswith(
+            f" s divides no period of a, b: expected 1.5 s or a whole fraction of it{example}"
+        )
         assert problem.subject == ("step_size",)
     simulate(built, replace(changed, step_size=exact_fraction(0.75)))
 
 
 def test_a_duration_shorter_than_periods_is_one_problem():
-    built = make_system({name: counter() for name in "ab"}, periods={"a": exact_fraction(4), "b": exact_fraction(5)})
+    built = make_system(
+        {name: counter() for name in "ab"}, periods={"a": exact_fraction(4), "b": exact_fraction(5)}
+    )
     with pytest.raises(InputError) as refusal:
         simulate(built, settings())
     (problem,) = refusal.value.problems
-    assert problem.message == "the duration 3.0 s is shorter than the period of a, b: expected at least 5.0 s"
+    assert (
+        problem.message
+        == "the duration 3.0 s is shorter than the period of a, b: expected at least 5.0 s"
+    )
     assert problem.subject == ("stop_time",)
 
 
@@ -149,21 +193,31 @@ def test_a_component_may_request_termination():
     def step(_values, t, h):
         return StepResult(t + h, terminate_requested=True) if t >= 1 else None
 
-    outcome = simulate(make_system({"a": FakeComponent(outputs("y"), step), "b": counter()}), settings(5, record=["b.y"]))
+    outcome = simulate(
+        make_system({"a": FakeComponent(outputs("y"), step), "b": counter()}),
+        settings(5, record=["b.y"]),
+    )
     assert outcome.termination == ("a", 2.0, True, None)
     assert outcome.recording.columns["b.y"].tolist() == [0, 1, 2]
 
 
 def test_observers_see_progress_and_the_end():
     seen = []
-    simulate(make_system({"a": counter()}), settings(1000), [lambda finished, total: seen.append((finished, total))])
+    simulate(
+        make_system({"a": counter()}),
+        settings(1000),
+        [lambda finished, total: seen.append((finished, total))],
+    )
     assert seen[0] == (0, 1000)
     assert seen[-1] == (1000, 1000)
     assert len(seen) == 101
 
 
 def test_a_recording_larger_than_the_disk_is_refused(tmp_path):
-    with pytest.raises(InputError, match=r"3\d* rows of 1 signal take about .* GB are free in .*; make the step longer"):
+    with pytest.raises(
+        InputError,
+        match=r"3\d* rows of 1 signal take about .* GB are free in .*; make the step longer",
+    ):
         simulate(make_system({"a": counter()}), settings(30, exact_fraction("1/1000000000000")))
     sparse = settings(30, exact_fraction("1/1000000000000"), record_interval=exact_fraction(30))
     plan = compile_plan(make_system({"a": counter()}), sparse)
@@ -171,7 +225,8 @@ def test_a_recording_larger_than_the_disk_is_refused(tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("csv", "replaced", "fits"), [(False, 0.0, True), (True, 0.0, False), (True, 1.0, True), (True, 0.5, False)]
+    ("csv", "replaced", "fits"),
+    [(False, 0.0, True), (True, 0.0, False), (True, 1.0, True), (True, 0.5, False)],
 )
 def test_the_free_space_is_that_of_the_folder_with_the_rows(tmp_path, csv, replaced, fits):
     """Rows of half the free space; with a CSV file they need 1.75 times of it."""
@@ -210,13 +265,17 @@ def floating_point_mode(change):
         library.fesetenv(before)
 
 
-@pytest.mark.skipif((sys.platform, platform.machine()) != ("linux", "x86_64"), reason="numbers of <fenv.h>")
+@pytest.mark.skipif(
+    (sys.platform, platform.machine()) != ("linux", "x86_64"), reason="numbers of <fenv.h>"
+)
 @pytest.mark.parametrize("change", [flush_small_numbers, round_up, trap_division_by_zero])
 def test_results_do_not_depend_on_the_floating_point_mode_of_the_caller(probe, change):
     """No component is reported for it, and the caller's mode is restored afterwards."""
 
     def simulated_bytes():
-        built = make_system({"a": create_component(FmuFile(probe), "a")}, start_values={"a": {"u": 1 / 3}})
+        built = make_system(
+            {"a": create_component(FmuFile(probe), "a")}, start_values={"a": {"u": 1 / 3}}
+        )
         return run_system(built, 1, "1/10", ["a.y"]).columns["a.y"].tobytes()
 
     expected = simulated_bytes()
@@ -234,11 +293,14 @@ def fixed_counter():
 
 
 def test_without_variable_steps_a_run_ends_at_the_last_common_end_of_all_steps_before_the_stop_time():
-    built = make_system({"a": fixed_counter(), "b": fixed_counter()}, periods={"b": exact_fraction(2)})
+    built = make_system(
+        {"a": fixed_counter(), "b": fixed_counter()}, periods={"b": exact_fraction(2)}
+    )
     plan = compile_plan(built, settings(stop=5.5))
     assert plan.grid.end == 4
     assert plan.end_warning == (
-        "the run ends at t = 4 s, the last whole multiple of the step size 1 s and all periods before the stop time 5.5 s, "
+        "the run ends at t = 4 s, the last whole multiple of the step size 1 s and all periods "
+        "before the stop time 5.5 s, "
         "because a, b cannot make a shorter step"
     )
     assert simulate(built, settings(stop=5.5)).recording.time.tolist() == [0, 1, 2, 3, 4]

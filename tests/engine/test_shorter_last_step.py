@@ -1,4 +1,6 @@
-"""Stop times off the grid: the last step is shorter if the components allow it, otherwise the run ends before it."""
+"""Stop times off the grid: the last step is shorter if the components allow it, otherwise the run
+ends before it.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,13 @@ from scipy.linalg import expm
 from systems import endpoint, make_system, run_system
 
 import cosim
-from cosim.components.fmi import FmuFile, InstanceSettings, Isolation, SolverSettings, create_component
+from cosim.components.fmi import (
+    FmuFile,
+    InstanceSettings,
+    Isolation,
+    SolverSettings,
+    create_component,
+)
 from cosim.core.errors import InputError
 from cosim.core.system import Connection, Group, Iteration, System
 from cosim.core.time_grid import exact_fraction
@@ -53,15 +61,21 @@ def test_the_last_step_ends_at_the_stop_time(probe, isolation):
 def test_an_fmu_without_variable_steps_stops_at_the_last_whole_step_and_is_named(probe, tmp_path):
     fixed = create_component(FmuFile(with_fixed_steps(probe, tmp_path)), "a")
     parts = {"a": fixed, "b": create_component(FmuFile(probe), "b")}
-    plan = compile_plan(make_system(parts), Settings(*map(exact_fraction, ("0", "0.234", "0.01")), {"a.y": endpoint("a.y")}))
+    plan = compile_plan(
+        make_system(parts),
+        Settings(*map(exact_fraction, ("0", "0.234", "0.01")), {"a.y": endpoint("a.y")}),
+    )
     assert float(plan.grid.end) == 0.23
     assert plan.end_warning == (
-        "the run ends at t = 0.23 s, the last whole multiple of the step size 0.01 s before the stop time 0.234 s, "
+        "the run ends at t = 0.23 s, the last whole multiple of the step size 0.01 s before the "
+        "stop time 0.234 s, "
         "because a cannot make a shorter step"
     )
 
 
-def test_an_fmu_with_fixed_steps_that_end_at_the_stop_time_does_not_hinder_the_others(probe, tmp_path):
+def test_an_fmu_with_fixed_steps_that_end_at_the_stop_time_does_not_hinder_the_others(
+    probe, tmp_path
+):
     """Steps of 0.02 s end at 0.1 s, those of 0.03 s do not; the last one of these begins at 0.09 s."""
     parts = {"a": create_component(FmuFile(with_fixed_steps(probe, tmp_path)), "a")}
     parts["b"] = create_component(FmuFile(probe), "b")
@@ -97,7 +111,9 @@ def test_a_linear_input_has_the_slope_of_the_shorter_step(ball, method, isolatio
 
 
 def test_an_iterated_last_step_is_shorter_too(tmp_path_factory):
-    """Two masses that are solved exactly for linear inputs, iterated: the error is of the order 2, not that of a wrong time."""
+    """Two masses that are solved exactly for linear inputs, iterated: the error is of the order 2,
+    not that of a wrong time.
+    """
     from probe_fmus import build_probe_fmu
 
     mass = FmuFile(build_probe_fmu(2, tmp_path_factory.mktemp("mass"), name="mass"))
@@ -117,7 +133,12 @@ def test_an_iterated_last_step_is_shorter_too(tmp_path_factory):
 
 
 def test_a_session_that_returns_makes_whole_steps_again(probe):
-    content = {"name": "s", "stop_time": 0.35, "step_size": 0.1, "components": {"a": {"fmu": str(probe)}}}
+    content = {
+        "name": "s",
+        "stop_time": 0.35,
+        "step_size": 0.1,
+        "components": {"a": {"fmu": str(probe)}},
+    }
     with cosim.load(content) as simulation:
         simulation.step(2)
         saved = simulation.save()
@@ -132,16 +153,33 @@ def test_a_session_that_returns_makes_whole_steps_again(probe):
 
 
 def test_a_supervised_run_and_the_commands_record_the_stop_time(probe, tmp_path):
-    content = {"name": "s", "stop_time": "1/3", "step_size": 0.1, "components": {"a": {"fmu": str(probe)}}}
+    content = {
+        "name": "s",
+        "stop_time": "1/3",
+        "step_size": 0.1,
+        "components": {"a": {"fmu": str(probe)}},
+    }
     file = tmp_path / "s.json"
     file.write_text(json.dumps(content))
     assert run_cosim("run", file, "--output-dir", tmp_path / "out", "--no-report").returncode == 0
     assert read_csv(tmp_path / "out/result.csv").time.tolist() == [0, 0.1, 0.2, 0.3, 1 / 3]
-    done = run_cosim("simulate", probe, "--stop-time", "0.025", "--step-size", "0.01", "--output-file", tmp_path / "y.csv")
+    done = run_cosim(
+        "simulate",
+        probe,
+        "--stop-time",
+        "0.025",
+        "--step-size",
+        "0.01",
+        "--output-file",
+        tmp_path / "y.csv",
+    )
     assert (done.returncode, done.stderr) == (0, "")
     assert (tmp_path / "y.csv").read_text().splitlines()[-1].startswith("0.025,")
     fixed = with_fixed_steps(probe, tmp_path)
-    assert "cannot make a shorter step" in run_cosim("simulate", fixed, "--stop-time", "0.025", "--step-size", "0.01").stderr
+    assert (
+        "cannot make a shorter step"
+        in run_cosim("simulate", fixed, "--stop-time", "0.025", "--step-size", "0.01").stderr
+    )
 
 
 def test_a_shipped_scenario_ends_at_an_edited_stop_time():
@@ -155,4 +193,6 @@ def test_a_shipped_scenario_ends_at_an_edited_stop_time():
 def test_a_duration_below_one_step_is_still_refused(probe):
     built = make_system({"a": create_component(FmuFile(probe), "a")})
     with pytest.raises(InputError, match="is shorter than the step size"):
-        simulate(built, Settings(Fraction(0), Fraction(1, 20), Fraction(1, 10), {"a.y": endpoint("a.y")}))
+        simulate(
+            built, Settings(Fraction(0), Fraction(1, 20), Fraction(1, 10), {"a.y": endpoint("a.y")})
+        )

@@ -1,4 +1,6 @@
-"""Data flow of a macro step: stages, groups, periods, delays, units, initialization, results of steps."""
+"""Data flow of a macro step: stages, groups, periods, delays, units, initialization, results of
+steps.
+"""
 
 import itertools
 import re
@@ -35,7 +37,9 @@ NAMES = ("c0", "c1", "c2")
 
 
 def final(stages, steps=3):
-    recording = run_system(make_system(chain(3), RING, stages), steps, 1, [f"{name}.y" for name in NAMES])
+    recording = run_system(
+        make_system(chain(3), RING, stages), steps, 1, [f"{name}.y" for name in NAMES]
+    )
     return [recording.columns[f"{name}.y"][-1] for name in NAMES]
 
 
@@ -60,7 +64,9 @@ def test_a_group_reads_outside_values_at_the_start_of_its_stage_and_steps_in_its
     components = chain(4)
     wires = "c0.y > c1.u, c1.y > c2.u, c2.y > c3.u, c3.y > c0.u"
     stages = [("c0", Group("g", (("c1",), ("c2",)))), ("c3",)]
-    recording = run_system(make_system(components, wires, stages), 1, 1, ["c0.y", "c1.y", "c2.y", "c3.y"])
+    recording = run_system(
+        make_system(components, wires, stages), 1, 1, ["c0.y", "c1.y", "c2.y", "c3.y"]
+    )
     # c1 reads the old c0 although c0 is named before it; c2 reads the new c1; c3 the new c2
     assert [column[-1] for column in recording.columns.values()] == [1, 1, 2, 3]
 
@@ -68,7 +74,9 @@ def test_a_group_reads_outside_values_at_the_start_of_its_stage_and_steps_in_its
 def test_components_do_not_read_new_values_of_a_group_in_their_stage():
     components = chain(3)
     stages = [(Group("g", (("c0",), ("c1",))), "c2")]
-    recording = run_system(make_system(components, "c0.y > c1.u, c1.y > c2.u", stages), 1, 1, ["c1.y", "c2.y"])
+    recording = run_system(
+        make_system(components, "c0.y > c1.u, c1.y > c2.u", stages), 1, 1, ["c1.y", "c2.y"]
+    )
     assert [column[-1] for column in recording.columns.values()] == [2, 1]
 
 
@@ -76,12 +84,16 @@ def test_a_group_in_a_group():
     components = chain(3)
     inner = Group("g.h", (("c1",), ("c2",)))
     stages = [(Group("g", (("c0",), (inner,))),)]
-    recording = run_system(make_system(components, "c0.y > c1.u, c1.y > c2.u", stages), 1, 1, ["c2.y"])
+    recording = run_system(
+        make_system(components, "c0.y > c1.u, c1.y > c2.u", stages), 1, 1, ["c2.y"]
+    )
     assert recording.columns["c2.y"][-1] == 3
 
 
 def test_a_slow_component_steps_at_its_period_with_its_own_step_size():
-    built = make_system({"slow": clock(), "fast": counter()}, periods={"slow": exact_fraction(0.05)})
+    built = make_system(
+        {"slow": clock(), "fast": counter()}, periods={"slow": exact_fraction(0.05)}
+    )
     recording = run_system(built, 0.1, 0.01, ["slow.y", "fast.y"])
     assert recording.columns["slow.y"].tolist() == [0] + 5 * [0.05] + 5 * [0.1]
     assert recording.columns["fast.y"][-1] == 10
@@ -95,30 +107,51 @@ def test_a_delay_counts_macro_steps_and_starts_with_the_initial_output():
 
 
 def test_a_delay_counts_macro_steps_for_slow_readers_too():
-    built = make_system({"a": counter(), "b": gain()}, "a.y >1 b.u", [("a",), ("b",)], periods={"b": exact_fraction(2)})
+    built = make_system(
+        {"a": counter(), "b": gain()},
+        "a.y >1 b.u",
+        [("a",), ("b",)],
+        periods={"b": exact_fraction(2)},
+    )
     assert run_system(built, 6, 1, ["b.y"]).columns["b.y"].tolist() == [0, 0, 0, 2, 2, 4, 4]
 
 
 def test_a_delay_inside_a_group_counts_each_macro_step_once():
-    built = make_system({"a": counter(), "b": gain()}, "a.y >2 b.u", [(Group("g", (("a",), ("b",))),)])
+    built = make_system(
+        {"a": counter(), "b": gain()}, "a.y >2 b.u", [(Group("g", (("a",), ("b",))),)]
+    )
     assert run_system(built, 5, 1, ["b.y"]).columns["b.y"].tolist() == [0, 0, 0, 1, 2, 3]
 
 
 def test_units_are_converted_on_the_way():
-    source = FakeComponent(outputs("y", unit=parse_unit("deg")), lambda _values, _t, _h: None, start={"y": 180.0})
-    sink = FakeComponent([*inputs("u", unit=parse_unit("rad")), *outputs("y")], lambda v, _t, _h: v.update(y=v["u"]), start={})
+    source = FakeComponent(
+        outputs("y", unit=parse_unit("deg")), lambda _values, _t, _h: None, start={"y": 180.0}
+    )
+    sink = FakeComponent(
+        [*inputs("u", unit=parse_unit("rad")), *outputs("y")],
+        lambda v, _t, _h: v.update(y=v["u"]),
+        start={},
+    )
     recording = run_system(make_system({"a": source, "b": sink}, "a.y > b.u"), 1, 1, ["b.y"])
     assert recording.columns["b.y"][-1] == np.pi
 
 
 def test_a_difference_has_no_offset():
     source = FakeComponent(
-        outputs("y", unit=parse_unit("degC"), relative_quantity=True), lambda _values, _t, _h: None, start={"y": 1.5}
+        outputs("y", unit=parse_unit("degC"), relative_quantity=True),
+        lambda _values, _t, _h: None,
+        start={"y": 1.5},
     )
     sink = FakeComponent(
-        [*inputs("u", unit=parse_unit("K"), relative_quantity=True), *outputs("y")], lambda v, _t, _h: v.update(y=v["u"])
+        [*inputs("u", unit=parse_unit("K"), relative_quantity=True), *outputs("y")],
+        lambda v, _t, _h: v.update(y=v["u"]),
     )
-    assert run_system(make_system({"a": source, "b": sink}, "a.y > b.u"), 1, 1, ["b.y"]).columns["b.y"][-1] == 1.5
+    assert (
+        run_system(make_system({"a": source, "b": sink}, "a.y > b.u"), 1, 1, ["b.y"]).columns[
+            "b.y"
+        ][-1]
+        == 1.5
+    )
 
 
 def test_integers_feed_reals_and_keep_their_own_type_in_the_recording():
@@ -130,20 +163,30 @@ def test_integers_feed_reals_and_keep_their_own_type_in_the_recording():
 
 def test_strings_are_transferred():
     source = FakeComponent(
-        [Variable("name", "String", "output"), *outputs("y")], lambda v, t, _h: v.update(name=f"step {t:g}"), start={"name": "-"}
+        [Variable("name", "String", "output"), *outputs("y")],
+        lambda v, t, _h: v.update(name=f"step {t:g}"),
+        start={"name": "-"},
     )
     sink = FakeComponent(
-        [Variable("text", "String", "input"), Variable("copy", "String", "output")], lambda v, _t, _h: v.update(copy=v["text"])
+        [Variable("text", "String", "input"), Variable("copy", "String", "output")],
+        lambda v, _t, _h: v.update(copy=v["text"]),
     )
     built = make_system({"a": source, "b": sink}, "a.name > b.text", [("a",), ("b",)])
-    assert run_system(built, 2, 1, ["b.copy"]).columns["b.copy"].tolist() == ["", "step 0", "step 1"]
+    assert run_system(built, 2, 1, ["b.copy"]).columns["b.copy"].tolist() == [
+        "",
+        "step 0",
+        "step 1",
+    ]
 
 
 def test_arrays_are_wired_element_by_element_and_keep_their_start_values_elsewhere():
     def step(values, _t, _h):
         values["sum"] = sum(values["u"])
 
-    vector = FakeComponent([Variable("u", causality="input", shape=(3,), start=(1.0, 10.0, 100.0)), *outputs("sum")], step)
+    vector = FakeComponent(
+        [Variable("u", causality="input", shape=(3,), start=(1.0, 10.0, 100.0)), *outputs("sum")],
+        step,
+    )
     built = make_system({"a": counter(), "b": vector}, "a.y > b.u[2]", [("a",), ("b",)])
     assert run_system(built, 2, 1, ["b.sum"]).columns["b.sum"].tolist() == [0, 102, 103]
 
@@ -166,7 +209,9 @@ def test_a_ring_that_starts_in_equilibrium_stays_there():
 def test_an_algebraic_loop_that_is_a_contraction_converges_in_initialization(wires):
     """Solve a = 1 - b / 2, b = 0.9 a."""
     one = FakeComponent(
-        [*inputs("u"), *outputs("y")], lambda v, _t, _h: v.update(y=1 - v["u"] / 2), lambda v: v.update(y=1 - v["u"] / 2)
+        [*inputs("u"), *outputs("y")],
+        lambda v, _t, _h: v.update(y=1 - v["u"] / 2),
+        lambda v: v.update(y=1 - v["u"] / 2),
     )
     recording = run_system(make_system({"a": one, "b": gain(0.9)}, wires), 3, 1, ["a.y"])
     np.testing.assert_allclose(recording.columns["a.y"], 1 / 1.45, rtol=1e-11)
@@ -174,11 +219,15 @@ def test_an_algebraic_loop_that_is_a_contraction_converges_in_initialization(wir
 
 def test_an_early_return_is_an_error_with_the_time_reached():
     short = FakeComponent(outputs("y"), lambda _values, t, h: StepResult(t + h / 2))
-    with pytest.raises(ComponentError, match=r"a: do_step failed at t = 0 s: reached only t = 0\.5 s of 1\.0 s"):
+    with pytest.raises(
+        ComponentError, match=r"a: do_step failed at t = 0 s: reached only t = 0\.5 s of 1\.0 s"
+    ):
         run_system(make_system({"a": short}), 1, 1)
 
 
-@pytest.mark.parametrize(("part", "rows"), [(1.0, [0, 1, 2, 3]), (0.5, [0, 1, 2])], ids=["complete", "incomplete"])
+@pytest.mark.parametrize(
+    ("part", "rows"), [(1.0, [0, 1, 2, 3]), (0.5, [0, 1, 2])], ids=["complete", "incomplete"]
+)
 def test_the_macro_step_of_a_termination_request_counts_if_it_is_complete(part, rows):
     def step(values, t, h):
         values["y"] += 1
@@ -186,7 +235,13 @@ def test_the_macro_step_of_a_termination_request_counts_if_it_is_complete(part, 
 
     built = make_system({"a": FakeComponent(outputs("y"), step), "b": counter()})
     outcome = simulate(
-        built, Settings(exact_fraction(0), exact_fraction(9), exact_fraction(1), {"a.y": endpoint("a.y"), "b.y": endpoint("b.y")})
+        built,
+        Settings(
+            exact_fraction(0),
+            exact_fraction(9),
+            exact_fraction(1),
+            {"a.y": endpoint("a.y"), "b.y": endpoint("b.y")},
+        ),
     )
     assert (outcome.failure, outcome.termination.time) == (None, 2 + part)
     assert outcome.recording.time.tolist() == rows == outcome.recording.columns["a.y"].tolist()
@@ -195,7 +250,9 @@ def test_the_macro_step_of_a_termination_request_counts_if_it_is_complete(part, 
 
 def test_a_step_that_reaches_nan_is_an_error():
     faulty = FakeComponent(outputs("y"), lambda _values, _t, _h: StepResult(float("nan")))
-    with pytest.raises(ComponentError, match="a: do_step failed at t = 0 s: reached only t = nan s"):
+    with pytest.raises(
+        ComponentError, match="a: do_step failed at t = 0 s: reached only t = nan s"
+    ):
         run_system(make_system({"a": faulty}), 1, 1)
 
 
@@ -209,7 +266,10 @@ class Panic(BaseException):
 
 
 FAILURES = {
-    "ValueError": (ValueError("too\x1b[31m steep"), r"ValueError: too\\x1b\[31m steep \(test_staged_algorithm.py:"),
+    "ValueError": (
+        ValueError("too\x1b[31m steep"),
+        r"ValueError: too\\x1b\[31m steep \(test_staged_algorithm.py:",
+    ),
     "SystemExit": (SystemExit(0), "SystemExit: 0"),
     "no Exception": (Panic("index out of bounds"), "Panic: index out of bounds"),
     "text of no characters": (ValueError("\ud800"), r"ValueError: \\ud800"),

@@ -40,8 +40,13 @@ def stale(request, tmp_path_factory):
     assert text.count(old) == 1
     source.write_text(text.replace(old, new))
     headers = sysconfig.get_path("include")
-    subprocess.run([*find_compiler(), "-shared", "-fPIC", "-O0", f"-I{headers}", source, "-o", library], check=True)
-    module = module_from_spec(ModuleSpec("_native", ExtensionFileLoader("_native", str(library)), origin=str(library)))
+    subprocess.run(
+        [*find_compiler(), "-shared", "-fPIC", "-O0", f"-I{headers}", source, "-o", library],
+        check=True,
+    )
+    module = module_from_spec(
+        ModuleSpec("_native", ExtensionFileLoader("_native", str(library)), origin=str(library))
+    )
     return request.param, module
 
 
@@ -58,7 +63,10 @@ def message(stale, monkeypatch):
 
 def test_a_run_says_to_build_it_again(message, probes, capfd):
     code = run_guarded(
-        lambda: cli.main(["simulate", str(probes[2]), "--isolation", "none"], standalone_mode=False), CommandLine()
+        lambda: cli.main(
+            ["simulate", str(probes[2]), "--isolation", "none"], standalone_mode=False
+        ),
+        CommandLine(),
     )
     assert (code, *capfd.readouterr()) == (2, "", message)
 

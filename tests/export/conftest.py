@@ -75,14 +75,32 @@ const char *model_step(Model *m, double time, double step_size)
     return 0;
 }
 """
-MODES = (("HOLD", "keep the integral"), ("INTEGRATE", ""), ("FAIL", 'refuse to step, "loudly" & <clearly>'))
+MODES = (
+    ("HOLD", "keep the integral"),
+    ("INTEGRATE", ""),
+    ("FAIL", 'refuse to step, "loudly" & <clearly>'),
+)
 
 
 VARIABLES = (
-    BlockVariable("gain", "gain", "Float64", "parameter", "tunable", 2.0, "1/s", description='gain "k"', minimum=0.0),
+    BlockVariable(
+        "gain",
+        "gain",
+        "Float64",
+        "parameter",
+        "tunable",
+        2.0,
+        "1/s",
+        description='gain "k"',
+        minimum=0.0,
+    ),
     BlockVariable("limit", "limit", "Float64", "parameter", "fixed", 10.0, "m", maximum=1e3),
-    BlockVariable("doubled_gain", "doubled_gain", "Float64", "calculatedParameter", "tunable", unit="1/s"),
-    BlockVariable("weights", "weights", "Float64", "parameter", "tunable", (1.0, 0.5, 0.25), shape=(3,)),
+    BlockVariable(
+        "doubled_gain", "doubled_gain", "Float64", "calculatedParameter", "tunable", unit="1/s"
+    ),
+    BlockVariable(
+        "weights", "weights", "Float64", "parameter", "tunable", (1.0, 0.5, 0.25), shape=(3,)
+    ),
     BlockVariable("repeat", "repeat", "Int32", "parameter", "tunable", 1, minimum=1, maximum=4),
     BlockVariable("mode", "mode", "Enumeration", "parameter", "tunable", 2, enumeration=MODES),
     BlockVariable("enabled", "enabled", "Boolean", "input", "discrete", True),
@@ -90,7 +108,9 @@ VARIABLES = (
     BlockVariable("matrix", "matrix", "Float64", "input", "continuous", shape=(2, 2)),
     BlockVariable("outputs", "outputs", "Float64", "output", "continuous", unit="m", shape=(3,)),
     BlockVariable("inner_product", "inner_product", "Float64", "output", "discrete", shape=(2,)),
-    BlockVariable("active_mode", "active_mode", "Enumeration", "output", "discrete", enumeration=MODES),
+    BlockVariable(
+        "active_mode", "active_mode", "Enumeration", "output", "discrete", enumeration=MODES
+    ),
     BlockVariable("steps", "steps", "Int32", "output", "discrete"),
     BlockVariable("saturated", "saturated", "Boolean", "output", "discrete"),
     BlockVariable("clock", "clock", "Float64", "local", "continuous", unit="s"),
@@ -99,14 +119,22 @@ VARIABLES = (
 
 @pytest.fixture(scope="session")
 def make_block() -> Callable[..., Block]:
-    """Return a function that creates the sample block with replacements in its source: `make_block(("old", "new"))`."""
+    """Return a function that creates the sample block with replacements in its source:
+    `make_block(("old", "new"))`.
+    """
 
     def make(*replacements: tuple[str, str]) -> Block:
         source = SOURCE
         for old, new in replacements:
             assert old in source
             source = source.replace(old, new)
-        return Block("sample", "an integrator & more", VARIABLES, 0.01, {"model.h": HEADER, "model.c": source})
+        return Block(
+            "sample",
+            "an integrator & more",
+            VARIABLES,
+            0.01,
+            {"model.h": HEADER, "model.c": source},
+        )
 
     return make
 
@@ -128,7 +156,9 @@ def fmu(block: Block, version: int, tmp_path_factory: pytest.TempPathFactory) ->
 
 
 class FmuInstance:
-    """An FMPy instance with the same methods for FMI 2.0 and 3.0; arrays are accessed by name, log messages are recorded."""
+    """An FMPy instance with the same methods for FMI 2.0 and 3.0; arrays are accessed by name, log
+    messages are recorded.
+    """
 
     def __init__(self, folder: str, guid: str | None = None, messages: list[str] | None = None):
         self.description = read_model_description(folder)
@@ -137,19 +167,27 @@ class FmuInstance:
         self.messages: list[str] = [] if messages is None else messages
         slave_class = FMU2Slave if self.version == 2 else FMU3Slave
         token = self.description.guid if guid is None else guid
-        self.fmu = slave_class(guid=token, unzipDirectory=folder, modelIdentifier="sample", instanceName="one")
+        self.fmu = slave_class(
+            guid=token, unzipDirectory=folder, modelIdentifier="sample", instanceName="one"
+        )
         if self.version == 2:
             # FMPy's own logger would format the messages
             self._callbacks = fmi2CallbackFunctions()
-            self._callbacks.logger = fmi2CallbackLoggerTYPE(lambda _e, _name, _status, _category, text: self._log(text))
+            self._callbacks.logger = fmi2CallbackLoggerTYPE(
+                lambda _e, _name, _status, _category, text: self._log(text)
+            )
             self.fmu.instantiate(callbacks=self._callbacks)
         else:
-            self.fmu.instantiate(logMessage=lambda _environment, _status, _category, text: self._log(text))
+            self.fmu.instantiate(
+                logMessage=lambda _environment, _status, _category, text: self._log(text)
+            )
 
     def _log(self, text: bytes) -> None:
         self.messages.append(text.decode())
 
-    def initialize(self, start: float = 0.0, stop: float | None = None, **values: Any) -> FmuInstance:
+    def initialize(
+        self, start: float = 0.0, stop: float | None = None, **values: Any
+    ) -> FmuInstance:
         self.enter(start, stop)
         for name, value in values.items():
             self.set(name, value)
@@ -179,9 +217,13 @@ class FmuInstance:
     def _address(self, name: str) -> tuple[str, list[int]]:
         if self.version == 3:
             variable = self.variables[name]
-            return {"Enumeration": "Int64"}.get(variable.type, variable.type), [variable.valueReference]
+            return {"Enumeration": "Int64"}.get(variable.type, variable.type), [
+                variable.valueReference
+            ]
         scalars = [v for v in self.variables.values() if v.name.partition("[")[0] == name]
-        return {"Enumeration": "Integer"}.get(scalars[0].type, scalars[0].type), [v.valueReference for v in scalars]
+        return {"Enumeration": "Integer"}.get(scalars[0].type, scalars[0].type), [
+            v.valueReference for v in scalars
+        ]
 
     def _size(self, name: str) -> int:
         return {"weights": 3, "outputs": 3, "matrix": 4, "inner_product": 2}.get(name, 1)
@@ -193,10 +235,14 @@ class FmuInstance:
         (self.fmu.setFMUstate if self.version == 2 else self.fmu.setFMUState)(state)
 
     def serialize(self, state: Any) -> bytes:
-        return (self.fmu.serializeFMUstate if self.version == 2 else self.fmu.serializeFMUState)(state)
+        return (self.fmu.serializeFMUstate if self.version == 2 else self.fmu.serializeFMUState)(
+            state
+        )
 
     def deserialize(self, content: bytes) -> Any:
-        return (self.fmu.deSerializeFMUstate if self.version == 2 else self.fmu.deserializeFMUState)(content)
+        return (
+            self.fmu.deSerializeFMUstate if self.version == 2 else self.fmu.deserializeFMUState
+        )(content)
 
     def all_values(self) -> dict[str, Any]:
         names = {name.partition("[")[0] for name in self.variables}

@@ -164,7 +164,10 @@ def test_building_all_removes_fmus_without_a_source(root):
 
 
 def test_a_file_that_is_not_a_source_is_refused_with_a_suggestion(root):
-    with pytest.raises(InputError, match=r'doubbler\.py: is not a source .*did you mean "controllers/python/doubler\.py"'):
+    with pytest.raises(
+        InputError,
+        match=r'doubbler\.py: is not a source .*did you mean "controllers/python/doubler\.py"',
+    ):
         build([Path("controllers/python/doubbler.py")], root)
 
 
@@ -174,9 +177,13 @@ def test_two_sources_of_one_fmu_are_refused(root):
         find_sources(root)
 
 
-@pytest.mark.parametrize("folder", ["plant_src/vehicles/raft", "plant_src/replica/forces/sail", "plant_src/wind"])
+@pytest.mark.parametrize(
+    "folder", ["plant_src/vehicles/raft", "plant_src/replica/forces/sail", "plant_src/wind"]
+)
 def test_equations_are_found_anywhere_in_the_plant_and_named_by_their_folder(tmp_path, folder):
-    (source,) = find_sources(write(tmp_path, {f"{folder}/equations.py": EQUATIONS, "elsewhere/equations.py": EQUATIONS}))
+    (source,) = find_sources(
+        write(tmp_path, {f"{folder}/equations.py": EQUATIONS, "elsewhere/equations.py": EQUATIONS})
+    )
     assert (source.manifest_key, source.kind.name) == (folder.split("/")[-1], "equations")
 
 
@@ -186,9 +193,18 @@ def test_a_fresh_build_passes_the_check(built_once):
 
 @pytest.mark.usefixtures("forked")
 def test_the_check_finds_a_changed_source(root):
-    write(root, {f"{VEHICLE}/parameters.py": "GAIN = 1.0  # a remark\n", "controllers/python/doubler.py": CLASS + "\n"})
+    write(
+        root,
+        {
+            f"{VEHICLE}/parameters.py": "GAIN = 1.0  # a remark\n",
+            "controllers/python/doubler.py": CLASS + "\n",
+        },
+    )
     assert messages(root) == [
-        'controllers/python/doubler.py: changed since "python/doubler" was built; run `cosim build`',
+        (
+            'controllers/python/doubler.py: changed since "python/doubler" was built; run `cosim '
+            "build`"
+        ),
         f'{VEHICLE}/parameters.py: changed since "raft" was built; run `cosim build`',
     ]
 
@@ -215,8 +231,17 @@ def test_the_check_finds_an_fmu_without_source_and_a_source_without_fmu(root):
 
 @pytest.mark.usefixtures("forked")
 def test_the_check_finds_changed_behaviour_despite_equal_hashes(root):
-    """model.c is not listed as a source here, so that only a simulation of both FMUs shows the difference."""
-    write(root, {f"{VEHICLE}/model.c": MODEL.replace("m->x * h", "m->x * h * (m->gain == 1.0 ? 1.0 : 1.000001)")})
+    """model.c is not listed as a source here, so that only a simulation of both FMUs shows the
+    difference.
+    """
+    write(
+        root,
+        {
+            f"{VEHICLE}/model.c": MODEL.replace(
+                "m->x * h", "m->x * h * (m->gain == 1.0 ? 1.0 : 1.000001)"
+            )
+        },
+    )
     found = messages(root)
     assert [text.split(": ")[0] for text in found] == ["fmus/raft.fmu", "fmus/fmi3/raft.fmu"]
     assert all('differs from a rebuild: output "y" differs at t = ' in text for text in found)
@@ -235,13 +260,17 @@ def test_the_check_finds_changed_variables(root):
     manifest = read_manifest(root)
     manifest["raft"]["sources"][f"{VEHICLE}/equations.py"] = sha256(equations.encode()).hexdigest()
     (root / "fmus/manifest.json").write_text(json.dumps(manifest))
-    assert messages(root)[0] == 'fmus/raft.fmu: differs from a rebuild: variable "x" has start 0.0 and 0.5'
+    assert (
+        messages(root)[0]
+        == 'fmus/raft.fmu: differs from a rebuild: variable "x" has start 0.0 and 0.5'
+    )
 
 
 def test_the_check_reports_an_fmu_that_crashes(root):
     write(root, {f"{VEHICLE}/model.c": MODEL.replace("m->y +=", "if (t > 1) abort(); m->y +=")})
     assert any(
-        "fmus/raft.fmu: differs from a rebuild: the process that simulates the FMUs crashed" in text for text in messages(root)
+        "fmus/raft.fmu: differs from a rebuild: the process that simulates the FMUs crashed" in text
+        for text in messages(root)
     )
 
 
@@ -261,17 +290,24 @@ def test_a_damaged_manifest_is_refused(root):
 def test_a_single_file_is_built_to_any_target(tmp_path):
     source = write(tmp_path, {"doubler.py": CLASS}) / "doubler.py"
     fmu = build_to(source, None, tmp_path / "elsewhere/d.fmu")
-    assert simulate_fmu(str(fmu), stop_time=0.1, output_interval=0.1, start_values={"x": 4.0})["y"][-1] == 8.0
+    assert (
+        simulate_fmu(str(fmu), stop_time=0.1, output_interval=0.1, start_values={"x": 4.0})["y"][-1]
+        == 8.0
+    )
 
 
 def test_python_classes_support_fmi2_only(tmp_path):
     source = write(tmp_path, {"doubler.py": CLASS}) / "doubler.py"
-    with pytest.raises(InputError, match=r"doubler\.py: a PythonFMU class cannot be exported as FMI 3\.0"):
+    with pytest.raises(
+        InputError, match=r"doubler\.py: a PythonFMU class cannot be exported as FMI 3\.0"
+    ):
         build_to(source, None, tmp_path / "d.fmu", fmi_version=3)
 
 
 def test_other_files_are_refused():
-    with pytest.raises(InputError, match=r"controller\.slx: cannot be exported; expected a \.mo or \.py file"):
+    with pytest.raises(
+        InputError, match=r"controller\.slx: cannot be exported; expected a \.mo or \.py file"
+    ):
         classify_source(Path("controller.slx"))
 
 
@@ -290,7 +326,9 @@ def test_faulty_equations_are_refused(tmp_path, text, message):
 
 
 def test_a_missing_extra_is_named():
-    with pytest.raises(InputError, match=r'exporting needs "no-such-tool".*pip install "fmi-cosim\[build\]"'):
+    with pytest.raises(
+        InputError, match=r'exporting needs "no-such-tool".*pip install "fmi-cosim\[build\]"'
+    ):
         tool_version("no-such-tool")
 
 
@@ -317,7 +355,9 @@ def test_a_cached_fmu_is_built_once(tmp_path, cache):
     assert cached_fmu(source, "SampledPi") == fmu
     assert fmu.stat().st_mtime_ns == written
     assert (
-        simulate_fmu(str(fmu), stop_time=0.01, output_interval=0.01, start_values={"e": 0.25})["u"][-1]
+        simulate_fmu(str(fmu), stop_time=0.01, output_interval=0.01, start_values={"e": 0.25})["u"][
+            -1
+        ]
         == 0.25 * 2 + 0.01 * 0.5 * 0.25
     )
 
@@ -329,4 +369,9 @@ def test_a_cached_fmu_is_rebuilt_when_its_source_changes(tmp_path):
     source.write_text(MODELICA.replace("kp = 2.0", "kp = 3.0"))
     after = cached_fmu(source, "SampledPi")
     assert after != before
-    assert simulate_fmu(str(after), stop_time=0.01, output_interval=0.01, start_values={"e": 0.25, "ki": 0.0})["u"][-1] == 0.75
+    assert (
+        simulate_fmu(
+            str(after), stop_time=0.01, output_interval=0.01, start_values={"e": 0.25, "ki": 0.0}
+        )["u"][-1]
+        == 0.75
+    )

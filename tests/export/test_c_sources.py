@@ -48,13 +48,21 @@ def test_the_fmu_is_valid_and_contains_its_sources(folder, tmp_path):
     assert validate_fmu(str(fmu)) == []
     headers = {"fmi2Functions.h", "fmi2FunctionTypes.h", "fmi2TypesPlatform.h"}
     with ZipFile(fmu) as archive:
-        sources = {name.removeprefix("sources/") for name in archive.namelist() if name.startswith("sources/")}
-        assert archive.read("modelDescription.xml") == (folder / "modelDescription.xml").read_bytes()
+        sources = {
+            name.removeprefix("sources/")
+            for name in archive.namelist()
+            if name.startswith("sources/")
+        }
+        assert (
+            archive.read("modelDescription.xml") == (folder / "modelDescription.xml").read_bytes()
+        )
     assert sources == {"speed_keeper.c", "own.h", *headers}
 
 
 def test_the_same_sources_give_the_same_bytes(folder, tmp_path):
-    first, second = (build_to(source, None, tmp_path / f"{source.name}.fmu") for source in (folder, KEEPER))
+    first, second = (
+        build_to(source, None, tmp_path / f"{source.name}.fmu") for source in (folder, KEEPER)
+    )
     assert first.read_bytes() == second.read_bytes()
 
 
@@ -68,10 +76,20 @@ def test_the_fmu_can_be_rebuilt_from_its_sources_alone(folder, tmp_path):
 
 
 def test_several_files_are_compiled_together(folder, description, tmp_path):
-    replace(folder / "speed_keeper.c", "static double clamp(double value, double limit) {", "double clamp(double, double); /*")
+    replace(
+        folder / "speed_keeper.c",
+        "static double clamp(double value, double limit) {",
+        "double clamp(double, double); /*",
+    )
     replace(folder / "speed_keeper.c", "fmax(-limit, fmin(limit, value)); }", "*/")
-    (folder / "clamp.c").write_text("double clamp(double value, double limit) { return value < limit ? value : limit / 2; }\n")
-    replace(description, '<File name="speed_keeper.c"/>', '<File name="speed_keeper.c"/><File name="clamp.c"/>')
+    (folder / "clamp.c").write_text(
+        "double clamp(double value, double limit) { return value < limit ? value : limit / 2; }\n"
+    )
+    replace(
+        description,
+        '<File name="speed_keeper.c"/>',
+        '<File name="speed_keeper.c"/><File name="clamp.c"/>',
+    )
     fmu = build_to(folder, None, tmp_path / "keeper.fmu")
     assert simulate_fmu(str(fmu), stop_time=0.1, output=["thrust"])["thrust"][-1] == 1.5
 
@@ -80,12 +98,18 @@ def test_a_built_fmu_is_in_the_manifest_and_passes_the_check(folder, description
     (built,) = build([folder], tmp_path)
     assert built.fmus == {2: tmp_path / "fmus/c/keeper.fmu"}
     entry = read_manifest(tmp_path)["c/keeper"]
-    assert list(entry["sources"]) == ["controllers/c/keeper/modelDescription.xml", "controllers/c/keeper/speed_keeper.c"]
+    assert list(entry["sources"]) == [
+        "controllers/c/keeper/modelDescription.xml",
+        "controllers/c/keeper/speed_keeper.c",
+    ]
     assert set(entry["tools"]) == {"fmpy", "compiler"}
     assert check_fmus(tmp_path) == []
     replace(description, "Keeps a speed", "Keeps one speed")
     assert [str(problem) for problem in check_fmus(tmp_path)] == [
-        'controllers/c/keeper/modelDescription.xml: changed since "c/keeper" was built; run `cosim build`'
+        (
+            'controllers/c/keeper/modelDescription.xml: changed since "c/keeper" was built; run '
+            "`cosim build`"
+        )
     ]
 
 
@@ -97,7 +121,11 @@ def test_every_folder_is_found_and_named_after_itself(folder, tmp_path):
 @pytest.mark.parametrize(
     ("old", "new", "message"),
     [
-        ('name="speed_keeper.c"', 'name="speed_kepper.c"', r'"speed_kepper\.c"> does not exist; did you mean "speed_keeper\.c"'),
+        (
+            'name="speed_keeper.c"',
+            'name="speed_kepper.c"',
+            r'"speed_kepper\.c"> does not exist; did you mean "speed_keeper\.c"',
+        ),
         (
             '<SourceFiles>\n      <File name="speed_keeper.c"/>\n    </SourceFiles>',
             "",
@@ -117,20 +145,31 @@ def test_a_faulty_description_is_refused(folder, description, tmp_path, old, new
 
 def test_model_exchange_alone_is_refused(folder, description, tmp_path):
     text = description.read_text()
-    before, after = text[: text.index("<CoSimulation")], text[text.index("</CoSimulation>") + len("</CoSimulation>") :]
+    before, after = (
+        text[: text.index("<CoSimulation")],
+        text[text.index("</CoSimulation>") + len("</CoSimulation>") :],
+    )
     description.write_text(f'{before}<ModelExchange modelIdentifier="keeper"/>{after}')
     with pytest.raises(InputError, match=r"modelDescription\.xml: has no <CoSimulation>"):
         build_to(folder, None, tmp_path / "keeper.fmu")
 
 
 def test_compiler_errors_are_shown_with_their_line(folder, tmp_path):
-    replace(folder / "speed_keeper.c", "#include <math.h>", "#include <math.h>\nint wrong = thrust;")
-    with pytest.raises(InputError, match=r"speed_keeper: speed_keeper\.c:8:\d+: error: .thrust. undeclared"):
+    replace(
+        folder / "speed_keeper.c", "#include <math.h>", "#include <math.h>\nint wrong = thrust;"
+    )
+    with pytest.raises(
+        InputError, match=r"speed_keeper: speed_keeper\.c:8:\d+: error: .thrust. undeclared"
+    ):
         build_to(folder, None, tmp_path / "keeper.fmu")
 
 
 def test_a_missing_function_is_named(folder, tmp_path):
-    replace(folder / "speed_keeper.c", "static double clamp(", "extern double clamp(double, double);\nstatic double unused(")
+    replace(
+        folder / "speed_keeper.c",
+        "static double clamp(",
+        "extern double clamp(double, double);\nstatic double unused(",
+    )
     with pytest.raises(InputError, match="undefined reference to `clamp'"):
         build_to(folder, None, tmp_path / "keeper.fmu")
 
@@ -163,7 +202,8 @@ def test_the_command_builds_a_model_of_a_package_in_a_file(tmp_path):
     assert read_model_description(tmp_path / "deck_pilot.fmu").modelName == "deck_pilot"
     done = cosim("build", "Pilots.mo", "--output", "x.fmu", cwd=tmp_path)
     assert done.stderr.endswith(
-        "no model with the name Pilots, but Pilots.DeckPilot, Pilots.Other; write Pilots.mo:Pilots.DeckPilot\n"
+        "no model with the name Pilots, but Pilots.DeckPilot, Pilots.Other; write "
+        "Pilots.mo:Pilots.DeckPilot\n"
     )
 
 

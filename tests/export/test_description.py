@@ -24,7 +24,13 @@ def variables(fmu):
 
 def test_causality_variability_and_limits_are_written(fmu):
     gain, limit = variables(fmu)["gain"], variables(fmu)["limit"]
-    assert (gain.causality, gain.variability, gain.start, gain.minimum, gain.maximum) == ("parameter", "tunable", 2.0, 0.0, None)
+    assert (gain.causality, gain.variability, gain.start, gain.minimum, gain.maximum) == (
+        "parameter",
+        "tunable",
+        2.0,
+        0.0,
+        None,
+    )
     assert (limit.variability, limit.maximum, limit.description) == ("fixed", 1000.0, "")
     assert gain.description == 'gain "k"'
     assert variables(fmu)["doubled_gain"].causality == "calculatedParameter"
@@ -37,7 +43,13 @@ def test_units_are_defined_by_their_base_units(fmu):
 
 def test_units_with_factor_and_offset_are_exact():
     names = ["deg", "degC", "kg.m2/s3", "rev"]
-    block = Block("units", "", [BlockVariable(n, n, "Float64", "local", "continuous", unit=n) for n in names], 0.01, {})
+    block = Block(
+        "units",
+        "",
+        [BlockVariable(n, n, "Float64", "local", "continuous", unit=n) for n in names],
+        0.01,
+        {},
+    )
     text = model_description_xml(block, 2, "", ["model.c"]).decode()
     assert f'<BaseUnit rad="1" factor="{pi / 180!r}" />' in text
     assert '<BaseUnit K="1" offset="273.15" />' in text
@@ -48,7 +60,12 @@ def test_units_with_factor_and_offset_are_exact():
 def test_fmi2_has_a_scalar_for_each_element(fmu):
     found = variables(fmu)
     assert [found[f"weights[{i}]"].start for i in (1, 2, 3)] == [1.0, 0.5, 0.25]
-    assert [name for name in found if name.startswith("matrix")] == ["matrix[1,1]", "matrix[1,2]", "matrix[2,1]", "matrix[2,2]"]
+    assert [name for name in found if name.startswith("matrix")] == [
+        "matrix[1,1]",
+        "matrix[1,2]",
+        "matrix[2,1]",
+        "matrix[2,2]",
+    ]
 
 
 @pytest.mark.parametrize("version", [3], indirect=True)
@@ -62,8 +79,15 @@ def test_fmi3_has_arrays(fmu):
 def test_enumerations_share_one_type_with_literals(fmu):
     model = read_model_description(fmu)
     (declared,) = model.typeDefinitions
-    assert [(item.name, item.value) for item in declared.items] == [("HOLD", "1"), ("INTEGRATE", "2"), ("FAIL", "3")]
-    assert [v.name for v in model.modelVariables if v.declaredType is declared] == ["mode", "active_mode"]
+    assert [(item.name, item.value) for item in declared.items] == [
+        ("HOLD", "1"),
+        ("INTEGRATE", "2"),
+        ("FAIL", "3"),
+    ]
+    assert [v.name for v in model.modelVariables if v.declaredType is declared] == [
+        "mode",
+        "active_mode",
+    ]
 
 
 def test_step_size_and_capabilities_are_written(fmu):
@@ -80,7 +104,11 @@ def test_step_size_and_capabilities_are_written(fmu):
 def test_fmi3_has_a_build_description(fmu):
     (configuration,) = read_build_description(str(fmu))
     (files,) = configuration.sourceFileSets
-    assert (configuration.modelIdentifier, files.language, files.sourceFiles) == ("sample", "C11", ["fmi3.c", "model.c"])
+    assert (configuration.modelIdentifier, files.language, files.sourceFiles) == (
+        "sample",
+        "C11",
+        ["fmi3.c", "model.c"],
+    )
 
 
 def test_every_source_file_that_is_named_exists(fmu):
@@ -93,13 +121,19 @@ def test_every_source_file_that_is_named_exists(fmu):
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        ({"type": "Flaot64"}, 'sample: variable "gain": unknown type "Flaot64"; did you mean "Float64"?'),
+        (
+            {"type": "Flaot64"},
+            'sample: variable "gain": unknown type "Flaot64"; did you mean "Float64"?',
+        ),
         ({"causality": "ouput"}, 'unknown causality "ouput"; did you mean "output"?'),
         ({"unit": "furlong"}, 'variable "gain": unknown unit "furlong"'),
         ({"start": (1.0, 2.0)}, "found 2 start values, expected 1"),
         ({"name": "limit"}, 'variable name "limit" is used 2 times'),
         ({"name": "time"}, 'variable name "time" is used 2 times'),
-        ({"type": "Boolean"}, "found variability continuous for the type Boolean, expected discrete"),
+        (
+            {"type": "Boolean"},
+            "found variability continuous for the type Boolean, expected discrete",
+        ),
         ({"type": "Enumeration", "variability": "tunable"}, "the enumeration has no literals"),
     ],
 )

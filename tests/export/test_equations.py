@@ -24,22 +24,36 @@ SHELL = resources.package_folder() / "export/shell"
 
 
 def oscillator() -> ContinuousModel:
-    """Create the model x'' = -stiffness x + force, with an array input, a Boolean output and all kinds of variables."""
+    """Create the model x'' = -stiffness x + force, with an array input, a Boolean output and all
+    kinds of variables.
+    """
     return ContinuousModel(
         "oscillator",
         "Two forces on a spring",
         (
             Variable("stiffness", causality="parameter", variability="fixed", start=4.0),
-            Variable("initial.x", causality="parameter", variability="fixed", start=1.0, unit=parse_unit("m")),
-            Variable("force", causality="input", start=(0.0, 0.5), shape=(2,), unit=parse_unit("N")),
+            Variable(
+                "initial.x",
+                causality="parameter",
+                variability="fixed",
+                start=1.0,
+                unit=parse_unit("m"),
+            ),
+            Variable(
+                "force", causality="input", start=(0.0, 0.5), shape=(2,), unit=parse_unit("N")
+            ),
             Variable("x", causality="output", unit=parse_unit("m")),
             Variable("left", "Boolean", "output", "discrete"),
             Variable("energy", causality="output", unit=parse_unit("J")),
         ),
         ("x", "v"),
         lambda parameters: ca.vertcat(parameters[1], 0),
-        lambda state, inputs, parameters: ca.vertcat(state[1], -parameters[0] * state[0] + inputs[0] + inputs[1]),
-        lambda state, _, parameters: ca.vertcat(state[0], state[0] < 0, (parameters[0] * state[0] ** 2 + state[1] ** 2) / 2),
+        lambda state, inputs, parameters: ca.vertcat(
+            state[1], -parameters[0] * state[0] + inputs[0] + inputs[1]
+        ),
+        lambda state, _, parameters: ca.vertcat(
+            state[0], state[0] < 0, (parameters[0] * state[0] ** 2 + state[1] ** 2) / 2
+        ),
     )
 
 
@@ -49,7 +63,18 @@ class Compiled:
     def __init__(self, block: Block, folder: Path, *options: str):
         for name, text in block.files.items():
             (folder / name).write_text(text)
-        command = ["gcc", "-std=c11", "-O0", "-ffp-contract=off", "-Wall", "-Werror", "-fPIC", "-shared", f"-I{SHELL}", *options]
+        command = [
+            "gcc",
+            "-std=c11",
+            "-O0",
+            "-ffp-contract=off",
+            "-Wall",
+            "-Werror",
+            "-fPIC",
+            "-shared",
+            f"-I{SHELL}",
+            *options,
+        ]
         subprocess.run([*command, "model.c", "-o", "model.so", "-lm"], cwd=folder, check=True)
         self.library = ctypes.CDLL(str(folder / "model.so"))
         for name in ("model_initialize", "model_step"):
@@ -57,7 +82,9 @@ class Compiled:
         members = re.findall(r"(double|bool) (\w+)\[(\d+)\];", block.files["model.h"])
         kinds = {"double": ctypes.c_double, "bool": ctypes.c_bool}
         self.model = type(
-            "Model", (ctypes.Structure,), {"_fields_": [(name, kinds[kind] * int(n)) for kind, name, n in members]}
+            "Model",
+            (ctypes.Structure,),
+            {"_fields_": [(name, kinds[kind] * int(n)) for kind, name, n in members]},
         )()
         self.library.model_start(ctypes.byref(self.model))
         self.library.model_parameters(ctypes.byref(self.model))
@@ -66,7 +93,9 @@ class Compiled:
         return self.library.model_initialize(ctypes.byref(self.model), ctypes.c_double(0))
 
     def step(self, size: float) -> bytes | None:
-        return self.library.model_step(ctypes.byref(self.model), ctypes.c_double(0), ctypes.c_double(size))
+        return self.library.model_step(
+            ctypes.byref(self.model), ctypes.c_double(0), ctypes.c_double(size)
+        )
 
     def call(self, name: str, results: int, *arguments: list[float]) -> list[float]:
         vectors = [(ctypes.c_double * len(argument))(*argument) for argument in arguments]
@@ -128,7 +157,9 @@ def test_the_integration_error_is_of_fourth_order(tmp_path: Path) -> None:
         model = oscillator()
         folder = tmp_path / str(sub_step)
         folder.mkdir()
-        compiled = Compiled(as_block(ContinuousModel(**{**vars(model), "max_sub_step": sub_step})), folder)
+        compiled = Compiled(
+            as_block(ContinuousModel(**{**vars(model), "max_sub_step": sub_step})), folder
+        )
         compiled.initialize()
         compiled.step(1.0)
         return abs(compiled.model.output[0] - exact(1.0))
@@ -189,7 +220,9 @@ def test_a_model_without_states_has_outputs_after_initialization(spring: Compile
     assert (list(spring.model.output), list(spring.model.flag)) == ([-2.0], [True])
 
 
-def test_a_model_without_states_follows_inputs_and_parameters_in_every_step(spring: Compiled) -> None:
+def test_a_model_without_states_follows_inputs_and_parameters_in_every_step(
+    spring: Compiled,
+) -> None:
     spring.initialize()
     spring.model.input[0], spring.model.parameter[0] = -0.25, 10.0
     assert spring.step(0.01) is None
@@ -244,7 +277,9 @@ OPERATIONS: list[tuple[ca.SX, Callable[[float, float], float]]] = [
 
 
 def test_exported_functions_compute_what_python_computes(tmp_path: Path) -> None:
-    function = ca.Function("probe", [a, b], [ca.vertcat(*(expression for expression, _ in OPERATIONS))])
+    function = ca.Function(
+        "probe", [a, b], [ca.vertcat(*(expression for expression, _ in OPERATIONS))]
+    )
     compiled = Compiled(as_block(oscillator(), [function]), tmp_path)
     for x, y in ((0.7, 2.3), (-1.9, 0.4), (3.5, 3.5), (-2.0, -7.25)):
         found = compiled.call("probe", len(OPERATIONS), [x], [y])

@@ -23,7 +23,9 @@ def test_the_fmu_validates_without_problems(fmu):
 
 
 def test_outputs_follow_the_equations(instantiate_sample):
-    instance = instantiate_sample().initialize(gain=3.0, repeat=2, weights=[1.0, -2.0, 0.5], **{X: 0.25})
+    instance = instantiate_sample().initialize(
+        gain=3.0, repeat=2, weights=[1.0, -2.0, 0.5], **{X: 0.25}
+    )
     random = np.random.default_rng(7)
     integral = 6.0 * 0.25
     for k in range(300):
@@ -34,7 +36,10 @@ def test_outputs_follow_the_equations(instantiate_sample):
         for _ in range(2):
             integral += 6.0 * x * 0.01
         assert instance.get("outputs") == [integral, -2.0 * integral, 0.5 * integral]
-        assert instance.get("inner_product") == [matrix[0] * integral + matrix[1], matrix[2] * integral + matrix[3]]
+        assert instance.get("inner_product") == [
+            matrix[0] * integral + matrix[1],
+            matrix[2] * integral + matrix[3],
+        ]
     assert instance.get("steps") == 300
 
 
@@ -81,7 +86,9 @@ def test_enumerations_and_booleans_are_typed(instantiate_sample):
 
 @contextmanager
 def refused(instance, message):
-    """Check that the call in this block fails and logs exactly one message, which contains `message`."""
+    """Check that the call in this block fails and logs exactly one message, which contains
+    `message`.
+    """
     assert instance.messages == []
     with pytest.raises(FMICallException, match=r"status 3 \(error\)"):
         yield
@@ -118,7 +125,9 @@ def test_an_enumeration_accepts_only_its_literals(instantiate_sample, value):
 def test_reading_as_another_type_is_refused(instantiate_sample):
     instance = instantiate_sample()
     with refused(instance, "is of type Boolean"):
-        (instance.fmu.getReal if instance.version == 2 else instance.fmu.getFloat64)(instance._address("enabled")[1])
+        (instance.fmu.getReal if instance.version == 2 else instance.fmu.getFloat64)(
+            instance._address("enabled")[1]
+        )
 
 
 def test_an_unknown_value_reference_is_refused(instantiate_sample):
@@ -186,7 +195,9 @@ def test_communication_points_may_be_rounded(instantiate_sample):
 def test_a_failing_model_ends_the_step_with_its_reason(instantiate_sample):
     instance = instantiate_sample().initialize()
     instance.set("mode", 3)
-    reason = "mode is FAIL (100 %% ##sure)" if instance.version == 2 else "mode is FAIL (100 % #sure)"
+    reason = (
+        "mode is FAIL (100 %% ##sure)" if instance.version == 2 else "mode is FAIL (100 % #sure)"
+    )
     with refused(instance, f"DoStep: assertion: {reason}"):
         instance.step(0.0)
 
@@ -245,7 +256,10 @@ def test_a_serialized_state_can_be_restored_in_another_instance(instantiate_samp
     assert content == one.serialize(one.deserialize(content))
 
 
-@pytest.mark.parametrize(("change", "message"), [(lambda c: c[:-1], "bytes, expected"), (lambda c: b"?" + c[1:], "another FMU")])
+@pytest.mark.parametrize(
+    ("change", "message"),
+    [(lambda c: c[:-1], "bytes, expected"), (lambda c: b"?" + c[1:], "another FMU")],
+)
 def test_a_foreign_serialized_state_is_refused(instantiate_sample, change, message):
     instance = instantiate_sample().initialize()
     content = instance.serialize(instance.save())

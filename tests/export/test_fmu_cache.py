@@ -1,4 +1,6 @@
-"""Cache of FMUs built from Modelica sources: one build for all processes, and damaged files are replaced."""
+"""Cache of FMUs built from Modelica sources: one build for all processes, and damaged files are
+replaced.
+"""
 
 from __future__ import annotations
 
@@ -108,7 +110,10 @@ def file_size_limit(size: int) -> Iterator[None]:
 def test_a_full_disk_leaves_the_former_fmu_and_no_part_of_a_new_one(tmp_path, size):
     fmu = tmp_path / "a.fmu"
     fmu.write_bytes(b"former")
-    with file_size_limit(size), pytest.raises(OutputError, match=r"cannot write .*a.fmu: .*File too large"):
+    with (
+        file_size_limit(size),
+        pytest.raises(OutputError, match=r"cannot write .*a.fmu: .*File too large"),
+    ):
         write_archive({"a": os.urandom(5000)}, fmu)
     assert [path.read_bytes() for path in tmp_path.iterdir()] == [b"former"]
 
@@ -117,5 +122,7 @@ def test_a_full_disk_leaves_the_former_fmu_and_no_part_of_a_new_one(tmp_path, si
 def test_a_cache_that_cannot_be_written_is_named(source, tmp_path, monkeypatch):
     (tmp_path / "file").touch()
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "file"))
-    with pytest.raises(InputError, match=r'cannot write to ".*file/cosim/fmus/\w+": Not a directory'):
+    with pytest.raises(
+        InputError, match=r'cannot write to ".*file/cosim/fmus/\w+": Not a directory'
+    ):
         cached_fmu(source, "Doubler")

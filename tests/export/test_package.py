@@ -29,13 +29,18 @@ def test_the_binary_is_in_the_folder_that_the_standard_defines(version, fmu):
     from fmpy import platform, platform_tuple, sharedLibraryExtension
 
     with ZipFile(fmu) as archive:
-        assert f"binaries/{platform if version == 2 else platform_tuple}/sample{sharedLibraryExtension}" in archive.namelist()
+        assert (
+            f"binaries/{platform if version == 2 else platform_tuple}/sample{sharedLibraryExtension}"
+            in archive.namelist()
+        )
 
 
 def test_resources_are_packed_under_their_names(block, tmp_path):
     original = tmp_path / "Sample.mo"
     original.write_text("model Sample end Sample;")
-    fmu = write_fmu(replace(block, resources={"Fleet/Sample.mo": original}), 2, tmp_path / "sample.fmu")
+    fmu = write_fmu(
+        replace(block, resources={"Fleet/Sample.mo": original}), 2, tmp_path / "sample.fmu"
+    )
     with ZipFile(fmu) as archive:
         assert archive.read("resources/Fleet/Sample.mo") == original.read_bytes()
 
@@ -45,7 +50,9 @@ def test_archives_do_not_depend_on_order_clock_or_umask(tmp_path):
     second = write_archive({"a": b"1", "b": b"2"}, tmp_path / "second.fmu")
     assert first.read_bytes() == second.read_bytes()
     with ZipFile(first) as archive:
-        assert [(m.filename, m.date_time, oct(m.external_attr >> 16)) for m in archive.infolist()] == [
+        assert [
+            (m.filename, m.date_time, oct(m.external_attr >> 16)) for m in archive.infolist()
+        ] == [
             ("a", (1980, 1, 1, 0, 0, 0), "0o100644"),
             ("b", (1980, 1, 1, 0, 0, 0), "0o100644"),
         ]
@@ -61,7 +68,9 @@ def test_fmi2_and_fmi3_compute_the_same(block, tmp_path):
     for version in (2, 3):
         fmu = write_fmu(block, version, tmp_path / f"{version}.fmu")
         run = {"vehicle.position.x": 0.3, "gain": 1.7}
-        results.append(simulate_fmu(str(fmu), stop_time=2.0, output_interval=0.01, start_values=run))
+        results.append(
+            simulate_fmu(str(fmu), stop_time=2.0, output_interval=0.01, start_values=run)
+        )
     assert len(results[0]) == 201
     assert [row["outputs[2]"] for row in results[0]] == [row["outputs"][1] for row in results[1]]
 
@@ -75,12 +84,19 @@ def test_errors_of_the_compiler_name_file_and_line(make_block, tmp_path):
 
 def test_a_missing_model_function_is_found_when_linking(make_block, tmp_path):
     with pytest.raises(InputError, match=r"sample: .*undefined reference to `model_step'"):
-        write_fmu(make_block(("const char *model_step", "const char *model_stop")), 2, tmp_path / "broken.fmu")
+        write_fmu(
+            make_block(("const char *model_step", "const char *model_stop")),
+            2,
+            tmp_path / "broken.fmu",
+        )
 
 
 def test_a_missing_compiler_is_reported_with_a_hint(block, tmp_path, monkeypatch):
     monkeypatch.setenv("CC", "no-such-compiler")
-    with pytest.raises(InputError, match=r"needs a C compiler, but none was found .*no-such-compiler.*; install gcc or set CC"):
+    with pytest.raises(
+        InputError,
+        match=r"needs a C compiler, but none was found .*no-such-compiler.*; install gcc or set CC",
+    ):
         write_fmu(block, 2, tmp_path / "sample.fmu")
 
 
@@ -92,8 +108,13 @@ def test_an_unknown_fmi_version_is_refused(block, tmp_path):
 def test_the_binary_depends_only_on_its_libraries(fmu, tmp_path):
     """A C program can load it with immediate binding: its libraries define all symbols."""
     with ZipFile(fmu) as archive:
-        library = archive.extract(next(name for name in archive.namelist() if name.startswith("binaries/")), tmp_path)
+        library = archive.extract(
+            next(name for name in archive.namelist() if name.startswith("binaries/")), tmp_path
+        )
     host = tmp_path / "host.c"
-    host.write_text("#include <dlfcn.h>\nint main(int n, char **v) { return dlopen(v[n - 1], RTLD_NOW) ? 0 : 1; }\n")
+    host.write_text(
+        "#include <dlfcn.h>\nint main(int n, char **v) { return dlopen(v[n - 1], RTLD_NOW) ? 0 : "
+        "1; }\n"
+    )
     subprocess.run([*find_compiler(), str(host), "-o", str(tmp_path / "host"), "-ldl"], check=True)
     assert subprocess.run([tmp_path / "host", library], check=False).returncode == 0

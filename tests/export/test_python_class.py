@@ -61,7 +61,9 @@ def test_it_validates_without_problems(python_fmu):
 
 
 def test_it_computes_what_the_class_computes(python_fmu):
-    result = simulate_fmu(str(python_fmu), stop_time=1.0, output_interval=0.1, start_values={"vehicle.x": 3.0})
+    result = simulate_fmu(
+        str(python_fmu), stop_time=1.0, output_interval=0.1, start_values={"vehicle.x": 3.0}
+    )
     y = 0.0
     for row in result:
         assert row["y"] == pytest.approx(y, rel=1e-12)
@@ -117,7 +119,13 @@ def test_it_runs_on_linux_and_windows(python_fmu):
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        ("x = 1\n", r"empty\.py: cannot be exported: ValueError: No child class of Fmi2Slave found in module empty\.py"),
+        (
+            "x = 1\n",
+            (
+                r"empty\.py: cannot be exported: ValueError: No child class of Fmi2Slave found in "
+                r"module empty\.py"
+            ),
+        ),
         (
             SOURCE.replace("self.history = ", "del self.gain\n        self.history = "),
             r"empty\.py: cannot be exported: AttributeError: ",
@@ -169,7 +177,12 @@ def reader_fmu(tmp_path_factory):
     (folder / "tables").mkdir()
     for file in (folder / "tables/offset.txt", other / "offset.txt"):
         file.write_text("2.0")
-    return build_to(folder / "reader.py", None, folder / "r.fmu", include=[folder / "tables", other / "offset.txt"])
+    return build_to(
+        folder / "reader.py",
+        None,
+        folder / "r.fmu",
+        include=[folder / "tables", other / "offset.txt"],
+    )
 
 
 def test_imported_modules_and_included_files_travel_with_the_fmu(reader_fmu):
@@ -199,7 +212,8 @@ def test_an_exception_in_an_fmu_is_told_with_text_and_line(reader_fmu):
     component.set("u", 1.0)
     component.exit_initialization_mode()
     message = (
-        r"one: fmi2DoStep failed at t = 0 s: status 4 \(fatal\): ZeroDivisionError: float division by zero \(reader\.py:20\)"
+        r"one: fmi2DoStep failed at t = 0 s: status 4 \(fatal\): ZeroDivisionError: float division "
+        r"by zero \(reader\.py:20\)"
     )
     with pytest.raises(ComponentError, match=message):
         component.do_step(0.0, 0.1)
@@ -211,12 +225,16 @@ def test_an_exception_in_the_constructor_is_told_with_text_and_line(tmp_path):
     source.write_text(SOURCE.replace("self.gain, ", f"{guarded}\n        self.gain, "))
     component = create_component(FmuFile(build_to(source, None, tmp_path / "r.fmu")), "one")
     component.bind(Ports((), {}), Ports((), {}))
-    with pytest.raises(ComponentError, match=r"one: fmi2Instantiate failed: .*ZeroDivisionError.*\(reader\.py:12\)"):
+    with pytest.raises(
+        ComponentError, match=r"one: fmi2Instantiate failed: .*ZeroDivisionError.*\(reader\.py:12\)"
+    ):
         component.instantiate()
 
 
 def test_an_fmu_can_be_instantiated_many_times(reader_fmu):
-    """The wrapper of PythonFMU releases the globals of the FMU's entry once too often at each instantiation."""
+    """The wrapper of PythonFMU releases the globals of the FMU's entry once too often at each
+    instantiation.
+    """
     for _ in range(20):
         component = create_component(FmuFile(reader_fmu), "one")
         component.bind(Ports((), {}), Ports((), {}))
@@ -235,7 +253,10 @@ def test_a_class_of_several_in_a_file_is_exported_by_name(tmp_path):
     step = "def do_step(self, time, step_size):\n        self.y = {}\n        return True\n"
     further = f"\n\nclass Fast(LeakyIntegrator):\n    {step}"
     path.write_text(SOURCE + further.format(5.0) + further.format(7.0).replace("Fast", "Faster"))
-    with pytest.raises(InputError, match=r"several PythonFMU classes \(Fast, Faster, LeakyIntegrator\).*write pilots.py:Fast$"):
+    with pytest.raises(
+        InputError,
+        match=r"several PythonFMU classes \(Fast, Faster, LeakyIntegrator\).*write pilots.py:Fast$",
+    ):
         build_to(path, None, tmp_path / "x.fmu")
     with pytest.raises(InputError, match="no PythonFMU class is named Fist; found: Fast"):
         build_to(path, "Fist", tmp_path / "x.fmu")

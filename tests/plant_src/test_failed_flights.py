@@ -42,7 +42,9 @@ def settings(tmp_path: Path) -> dict[str, object]:
     return {"/components/uav": {"python": f"{tmp_path}/first.py:Controller"}, "/figures": []}
 
 
-def test_a_first_controller_that_falls_into_the_sea_ends_with_its_cause(tmp_path: Path, settings: dict[str, object]) -> None:
+def test_a_first_controller_that_falls_into_the_sea_ends_with_its_cause(
+    tmp_path: Path, settings: dict[str, object]
+) -> None:
     options = [f"--set={name}={json.dumps(value)}" for name, value in settings.items()]
     done = run_cosim("run", "demo1_box", *options, "--output-dir", "out", cwd=tmp_path)
     assert done.returncode == 3, done.stderr
@@ -60,9 +62,17 @@ def test_a_first_controller_that_falls_into_the_sea_ends_with_its_cause(tmp_path
     assert f"✗ {line}" in (tmp_path / "out/report.html").read_text()
 
 
-def test_without_the_condition_the_quadcopter_floats_and_kpis_tell_it(settings: dict[str, object]) -> None:
-    kpi = {"name": "uav", "python": f"{root()}/plant_src/kpis.py:failures", "arguments": {"vehicle": "plant.uav"}}
+def test_without_the_condition_the_quadcopter_floats_and_kpis_tell_it(
+    settings: dict[str, object],
+) -> None:
+    kpi = {
+        "name": "uav",
+        "python": f"{root()}/plant_src/kpis.py:failures",
+        "arguments": {"vehicle": "plant.uav"},
+    }
     result = cosim.run("demo1_box", {**settings, "/stop_when": [], "/kpis": [kpi], "/checks": []})
     assert result.time[-1] == 40.0
-    assert result["plant.uav.position.z"][-1] == pytest.approx(0.0866 * (0.5 - 0.443892 / (1025 * 7.5e-4)), abs=1e-3)  # afloat
+    assert result["plant.uav.position.z"][-1] == pytest.approx(
+        0.0866 * (0.5 - 0.443892 / (1025 * 7.5e-4)), abs=1e-3
+    )  # afloat
     assert result.kpis == {"uav.crashed": False, "uav.ditched": True, "uav.time": 1.27}

@@ -21,22 +21,36 @@ LANDING = {
 
 def drawn(axes):
     """The labelled lines: label -> (x, y)."""
-    return {line.get_label(): line.get_data() for line in axes.lines if not line.get_label().startswith("_")}
+    return {
+        line.get_label(): line.get_data()
+        for line in axes.lines
+        if not line.get_label().startswith("_")
+    }
 
 
 def not_landed():
-    return mission_result(plant__uav__contact__vessel=np.zeros_like(mission_result().time, dtype=bool))
+    return mission_result(
+        plant__uav__contact__vessel=np.zeros_like(mission_result().time, dtype=bool)
+    )
 
 
 def test_paths_are_the_recorded_positions():
     result = mission_result()
     lines = drawn(paths(result, **DECK).axes[0])
     for label, vehicle in (("vessel", "plant.usv"), ("quadcopter", "plant.uav")):
-        assert np.array_equal(lines[label], [result[f"{vehicle}.position.x"], result[f"{vehicle}.position.y"]])
+        assert np.array_equal(
+            lines[label], [result[f"{vehicle}.position.x"], result[f"{vehicle}.position.y"]]
+        )
 
 
 def test_waypoints_have_circles_of_acceptance_and_numbers():
-    axes = paths(mission_result(), **DECK, waypoint_x=[5.0, 10.0], waypoint_y=[1.0, -1.0], acceptance_radius=0.5).axes[0]
+    axes = paths(
+        mission_result(),
+        **DECK,
+        waypoint_x=[5.0, 10.0],
+        waypoint_y=[1.0, -1.0],
+        acceptance_radius=0.5,
+    ).axes[0]
     circles = [(patch.center, patch.radius) for patch in axes.patches if isinstance(patch, Circle)]
     assert circles == [((5.0, 1.0), 0.5), ((10.0, -1.0), 0.5)]
     assert [text.get_text() for text in axes.texts] == ["1", "2"]
@@ -61,10 +75,20 @@ def test_without_a_landing_there_is_no_mark(figure):
 
 
 def test_both_axes_have_the_same_scale():
-    figure = paths(mission_result(), **DECK, waypoint_x=[0.0, 0.0], waypoint_y=[-3.0, 14.0], acceptance_radius=0.5)
+    figure = paths(
+        mission_result(),
+        **DECK,
+        waypoint_x=[0.0, 0.0],
+        waypoint_y=[-3.0, 14.0],
+        acceptance_radius=0.5,
+    )
     axes = figure.axes[0]
     figure.draw_without_rendering()
-    (x_first, x_last), (y_first, y_last), box = axes.get_xlim(), axes.get_ylim(), axes.get_window_extent()
+    (x_first, x_last), (y_first, y_last), box = (
+        axes.get_xlim(),
+        axes.get_ylim(),
+        axes.get_window_extent(),
+    )
     assert box.width / (x_last - x_first) == pytest.approx(box.height / (y_last - y_first))
     assert y_last - y_first > 17
 
@@ -83,7 +107,9 @@ def test_altitudes_are_the_recorded_ones_until_shortly_after_touchdown():
 
 
 def test_the_error_is_the_distance_from_the_deck():
-    time, error = landing(mission_result(offset=(0.06, 0.08)), **LANDING).axes[1].lines[0].get_data()
+    time, error = (
+        landing(mission_result(offset=(0.06, 0.08)), **LANDING).axes[1].lines[0].get_data()
+    )
     assert error[time >= 9.0] == pytest.approx(0.1)
     assert error[0] == pytest.approx(np.hypot(5.0, 1.0))
 
@@ -92,12 +118,22 @@ def test_touchdown_is_marked_in_both_panels():
     above, below = landing(mission_result(), **LANDING).axes
     time, altitude = drawn(above)["touchdown"]
     assert (time[0], altitude[0]) == pytest.approx((TOUCHDOWN, 0.325))
-    assert all([TOUCHDOWN, TOUCHDOWN] in [list(line.get_xdata()) for line in axes.lines] for axes in (above, below))
+    assert all(
+        [TOUCHDOWN, TOUCHDOWN] in [list(line.get_xdata()) for line in axes.lines]
+        for axes in (above, below)
+    )
 
 
 def test_phases_are_shaded_and_named_once_each():
     above, below = landing(mission_result(), **LANDING).axes
-    assert [text.get_text() for text in above.texts] == ["idle", "take-off", "follow", "approach", "descend", "landed"]
+    assert [text.get_text() for text in above.texts] == [
+        "idle",
+        "take-off",
+        "follow",
+        "approach",
+        "descend",
+        "landed",
+    ]
     for axes in (above, below):
         assert [span.get_x() for span in axes.patches] == pytest.approx([0, 1, 3, 6, 9, 12])
         assert [span.get_width() for span in axes.patches] == pytest.approx([1, 2, 3, 3, 3, 4])
@@ -124,10 +160,18 @@ def test_a_window_can_be_chosen():
 
 def test_a_vehicle_has_one_colour_in_all_figures():
     colours = [
-        {line.get_label(): line.get_color() for line in figure(mission_result(), **DECK).axes[0].lines}
+        {
+            line.get_label(): line.get_color()
+            for line in figure(mission_result(), **DECK).axes[0].lines
+        }
         for figure in (paths, landing)
     ]
-    assert colours[0]["quadcopter"] == colours[1]["quadcopter"] != colours[0]["vessel"] == colours[1]["deck"]
+    assert (
+        colours[0]["quadcopter"]
+        == colours[1]["quadcopter"]
+        != colours[0]["vessel"]
+        == colours[1]["deck"]
+    )
 
 
 @pytest.mark.parametrize("figure", [paths, landing])
@@ -141,18 +185,26 @@ def test_axes_carry_units_and_the_figure_fits_a_column(figure):
 
 def short_phases(result):
     """Modes of which two are too short for a horizontal name."""
-    return np.select([result.time < 8, result.time < 8.7, result.time < 9.4], [3, 4, 5], 4).astype(np.int32)
+    return np.select([result.time < 8, result.time < 8.7, result.time < 9.4], [3, 4, 5], 4).astype(
+        np.int32
+    )
 
 
 def test_all_texts_are_inside_of_the_figure():
     result = mission_result(offset=(6e-4, 8e-4))
     result = with_signals(result, uav__vtol__mode=short_phases(result))
-    far = with_signals(result, **{f"plant__{name}__position__y": 1000 * result.time for name in ("uav", "usv")})
+    far = with_signals(
+        result, **{f"plant__{name}__position__y": 1000 * result.time for name in ("uav", "usv")}
+    )
     turns = {"vehicle": "plant.uav", "target": "plant.usv.deck", **TURNS, "limit": 0.1255}
     for function, recorded, arguments in (
         (landing, result, {**LANDING, "limit": 0.1255}),
         (tracking_error, result, turns),
-        (paths, result, {**DECK, "waypoint_x": [5.0], "waypoint_y": [0.0], "acceptance_radius": 0.5}),
+        (
+            paths,
+            result,
+            {**DECK, "waypoint_x": [5.0], "waypoint_y": [0.0], "acceptance_radius": 0.5},
+        ),
         (paths, far, DECK),
     ):
         figure = draw_figure(recorded, function.__name__, function, arguments)

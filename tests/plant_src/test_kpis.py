@@ -19,7 +19,10 @@ TIME = mission_result().time
 def contacts(*spans):
     """Contact with the vessel in these time spans, after a start on the platform."""
     vessel = np.any([(start <= TIME) & (stop > TIME) for start, stop in spans], axis=0)
-    return {"plant__uav__contact__vessel": vessel, "plant__uav__contact__touching": vessel | (TIME < TAKE_OFF)}
+    return {
+        "plant__uav__contact__vessel": vessel,
+        "plant__uav__contact__touching": vessel | (TIME < TAKE_OFF),
+    }
 
 
 def test_landing_is_evaluated_at_the_touchdown():
@@ -58,7 +61,9 @@ def test_waiting_on_the_deck_is_no_landing():
 
 
 def test_a_start_just_above_the_deck_is_no_landing():
-    dropped = with_signals(mission_result(**contacts((0.03, STOP + 1))), plant__uav__contact__touching=TIME >= 0.03)
+    dropped = with_signals(
+        mission_result(**contacts((0.03, STOP + 1))), plant__uav__contact__touching=TIME >= 0.03
+    )
     assert math.isnan(landing(dropped, **DECK)["time"])
 
 
@@ -104,22 +109,36 @@ def test_slide_is_the_largest_distance_on_the_deck():
 
 def test_motion_after_leaving_the_deck_is_not_a_slide():
     away = carried(yaw=0.0 * TIME, forward=0.1 + np.maximum(0, TIME - 15), left=0.0)
-    assert landing(with_signals(away, **contacts((12.0, 15.0))), **DECK)["slide"] == pytest.approx(0.0, abs=1e-12)
+    assert landing(with_signals(away, **contacts((12.0, 15.0))), **DECK)["slide"] == pytest.approx(
+        0.0, abs=1e-12
+    )
 
 
 def test_a_result_from_its_file_has_the_same_kpis(tmp_path):
     mission_result().to_csv(tmp_path / "result.csv")
-    assert landing(Result.from_csv(tmp_path / "result.csv"), **DECK) == landing(mission_result(), **DECK)
+    assert landing(Result.from_csv(tmp_path / "result.csv"), **DECK) == landing(
+        mission_result(), **DECK
+    )
 
 
 def test_waypoints_are_reached_one_after_the_other():
-    kpis = waypoints(mission_result(), "plant.usv", waypoint_x=[5.0, 10.0], waypoint_y=[0.29, 0.0], acceptance_radius=0.5)
+    kpis = waypoints(
+        mission_result(),
+        "plant.usv",
+        waypoint_x=[5.0, 10.0],
+        waypoint_y=[0.29, 0.0],
+        acceptance_radius=0.5,
+    )
     assert kpis == {"reached": 2, "all_reached": True, "time[1]": 4.6, "time[2]": 9.5}
 
 
 def test_a_waypoint_out_of_order_does_not_count():
     kpis = waypoints(
-        mission_result(), "plant.usv", waypoint_x=[10.0, 5.0, 15.0], waypoint_y=[0.0, 0.0, 0.0], acceptance_radius=0.5
+        mission_result(),
+        "plant.usv",
+        waypoint_x=[10.0, 5.0, 15.0],
+        waypoint_y=[0.0, 0.0, 0.0],
+        acceptance_radius=0.5,
     )
     assert (kpis["reached"], kpis["all_reached"], kpis["time[1]"]) == (1, False, 9.5)
     assert math.isnan(kpis["time[2]"])
@@ -127,35 +146,52 @@ def test_a_waypoint_out_of_order_does_not_count():
 
 
 def test_a_waypoint_out_of_reach_is_not_reached():
-    kpis = waypoints(mission_result(), "plant.usv", waypoint_x=[5.0], waypoint_y=[0.6], acceptance_radius=0.5)
+    kpis = waypoints(
+        mission_result(), "plant.usv", waypoint_x=[5.0], waypoint_y=[0.6], acceptance_radius=0.5
+    )
     assert (kpis["reached"], kpis["all_reached"]) == (0, False)
 
 
 def test_tracking_is_the_distance_in_its_window():
-    swinging = mission_result(plant__uav__position__x=TIME, plant__uav__position__y=0.4 * np.sin(2 * np.pi * TIME))
+    swinging = mission_result(
+        plant__uav__position__x=TIME, plant__uav__position__y=0.4 * np.sin(2 * np.pi * TIME)
+    )
     kpis = tracking(swinging, "plant.uav", "plant.usv", start=8.0, stop=11.99)
     assert kpis == pytest.approx({"rms": 0.4 / math.sqrt(2), "max": 0.4}, rel=1e-12)
 
 
 def test_tracking_lasts_until_the_end_and_leaves_the_start_out():
-    assert tracking(mission_result(offset=(0.0, 0.2)), "plant.uav", "plant.usv", start=9.0) == pytest.approx(
-        {"rms": 0.2, "max": 0.2}
+    assert tracking(
+        mission_result(offset=(0.0, 0.2)), "plant.uav", "plant.usv", start=9.0
+    ) == pytest.approx({"rms": 0.2, "max": 0.2})
+    assert (
+        tracking(mission_result(offset=(0.0, 0.2)), "plant.uav", "plant.usv", start=0.0)["max"]
+        > 5.0
     )
-    assert tracking(mission_result(offset=(0.0, 0.2)), "plant.uav", "plant.usv", start=0.0)["max"] > 5.0
 
 
 def test_tracking_in_an_empty_window_is_nan():
-    assert all(math.isnan(value) for value in tracking(mission_result(), "plant.uav", "plant.usv", start=99.0).values())
+    assert all(
+        math.isnan(value)
+        for value in tracking(mission_result(), "plant.uav", "plant.usv", start=99.0).values()
+    )
 
 
 def test_motors_stop_when_the_last_of_them_does():
     late = mission_result(**{"uav__rotor_speed[3]": np.where(TIME < 12.5, 500.0, 0.0)})
     kpis = motors(late, "uav.rotor_speed")
-    assert kpis == {"stopped_at_end": True, "stop_time": 12.5, "final_speed": 0.0, "max_speed": 500.0}
+    assert kpis == {
+        "stopped_at_end": True,
+        "stop_time": 12.5,
+        "final_speed": 0.0,
+        "max_speed": 500.0,
+    }
 
 
 def test_motors_that_start_again_have_not_stopped():
-    again = mission_result(**{"uav__rotor_speed[2]": np.where((TIME > 13) & (TIME < 19.99), 0.0, 300.0)})
+    again = mission_result(
+        **{"uav__rotor_speed[2]": np.where((TIME > 13) & (TIME < 19.99), 0.0, 300.0)}
+    )
     kpis = motors(again, "uav.rotor_speed")
     assert (kpis["stopped_at_end"], kpis["final_speed"]) == (False, 300.0)
     assert math.isnan(kpis["stop_time"])
@@ -174,19 +210,26 @@ def test_motor_commands_are_converted_from_their_unit():
     assert kpis["max_speed"] == pytest.approx(200 * np.pi, rel=1e-12)  # 6000 revolutions per minute
     assert (kpis["stopped_at_end"], kpis["stop_time"], kpis["final_speed"]) == (True, 2.0, 0.9)
     in_newtons = Recording(recorded.time, commands, dict.fromkeys(names, "N"))
-    with pytest.raises(InputError, match=r'"uav.rotor_speed\[1\]" has the unit N, which does not convert to rad/s'):
+    with pytest.raises(
+        InputError, match=r'"uav.rotor_speed\[1\]" has the unit N, which does not convert to rad/s'
+    ):
         motors(Result(in_newtons), "uav.rotor_speed")
 
 
 def test_unknown_signal_names_are_rejected():
-    with pytest.raises(InputError, match=r'KPI "landing": no signal "plant.uva.contact.vessel" .* "plant.uav.contact.vessel"'):
+    with pytest.raises(
+        InputError,
+        match=r'KPI "landing": no signal "plant.uva.contact.vessel" .* "plant.uav.contact.vessel"',
+    ):
         evaluate_kpis(mission_result(), [("landing", landing, {**DECK, "vehicle": "plant.uva"})])
     with pytest.raises(InputError, match=r'KPI "motors": no signal "uav.rotors\[1\]"'):
         evaluate_kpis(mission_result(), [("motors", motors, {"rotor_speed": "uav.rotors"})])
 
 
 def test_the_final_value_of_a_signal():
-    assert final(mission_result(), "plant.uav.position.z") == {"value": mission_result()["plant.uav.position.z"][-1]}
+    assert final(mission_result(), "plant.uav.position.z") == {
+        "value": mission_result()["plant.uav.position.z"][-1]
+    }
 
 
 @pytest.mark.parametrize(

@@ -41,8 +41,12 @@ def test_errors_are_those_along_the_deck():
 
 
 def test_speeds_refer_to_the_normal_of_a_rolled_deck():
-    """Left side up by 0.2 rad: the normal leans to the right, a fall straight down slides to the right."""
-    falling = mission_result(plant__usv__attitude__roll=ZERO + 0.2, plant__uav__velocity__x=ZERO + 1.0)
+    """Left side up by 0.2 rad: the normal leans to the right, a fall straight down slides to the
+    right.
+    """
+    falling = mission_result(
+        plant__usv__attitude__roll=ZERO + 0.2, plant__uav__velocity__x=ZERO + 1.0
+    )
     kpis = touchdown(falling, **DECK, mass=MASS)
     assert kpis["normal_speed"] == pytest.approx(DESCENT_RATE * math.cos(0.2))
     assert kpis["tangential_speed"] == pytest.approx(DESCENT_RATE * math.sin(0.2))
@@ -51,37 +55,55 @@ def test_speeds_refer_to_the_normal_of_a_rolled_deck():
 
 
 def test_tilt_is_relative():
-    together = mission_result(plant__usv__attitude__pitch=ZERO + 0.1, plant__uav__attitude__pitch=ZERO + 0.1)
+    together = mission_result(
+        plant__usv__attitude__pitch=ZERO + 0.1, plant__uav__attitude__pitch=ZERO + 0.1
+    )
     assert touchdown(together, **DECK, mass=MASS)["tilt"] == pytest.approx(0.0, abs=1e-7)
-    crossed = mission_result(plant__usv__attitude__roll=ZERO + 0.3, plant__uav__attitude__pitch=ZERO + 0.4)
-    assert touchdown(crossed, **DECK, mass=MASS)["tilt"] == pytest.approx(math.acos(math.cos(0.3) * math.cos(0.4)))
+    crossed = mission_result(
+        plant__usv__attitude__roll=ZERO + 0.3, plant__uav__attitude__pitch=ZERO + 0.4
+    )
+    assert touchdown(crossed, **DECK, mass=MASS)["tilt"] == pytest.approx(
+        math.acos(math.cos(0.3) * math.cos(0.4))
+    )
 
 
 def test_a_turning_deck_moves_the_point_below():
     """0.5 m ahead of the centre, a yaw rate of 2 rad/s carries the deck to the left at 1 m/s."""
-    turning = mission_result(offset=(0.5, 0.0), plant__usv__rates__r=ZERO + 2.0, plant__uav__velocity__x=ZERO + 1.0)
+    turning = mission_result(
+        offset=(0.5, 0.0), plant__usv__rates__r=ZERO + 2.0, plant__uav__velocity__x=ZERO + 1.0
+    )
     assert touchdown(turning, **DECK, mass=MASS)["tangential_speed"] == pytest.approx(1.0, rel=0.01)
 
 
 def test_a_pitching_deck_comes_up():
     """Positive pitch rate is nose down: 0.5 m ahead of the centre the deck sinks at 0.1 m/s."""
-    pitching = mission_result(offset=(0.5, 0.0), plant__usv__rates__q=ZERO + 0.2, plant__uav__velocity__x=ZERO + 1.0)
-    assert touchdown(pitching, **DECK, mass=MASS)["normal_speed"] == pytest.approx(DESCENT_RATE - 0.1, rel=0.01)
+    pitching = mission_result(
+        offset=(0.5, 0.0), plant__usv__rates__q=ZERO + 0.2, plant__uav__velocity__x=ZERO + 1.0
+    )
+    assert touchdown(pitching, **DECK, mass=MASS)["normal_speed"] == pytest.approx(
+        DESCENT_RATE - 0.1, rel=0.01
+    )
 
 
 def test_errors_lie_in_the_plane_of_a_rolled_deck():
-    """Left side up by 0.2 rad: a place 0.3 m to the left and as high as the deck rises there is that far up the slope."""
+    """Left side up by 0.2 rad: a place 0.3 m to the left and as high as the deck rises there is
+    that far up the slope.
+    """
     rolled = mission_result(
         offset=(0.0, 0.3),
         plant__usv__attitude__roll=ZERO + 0.2,
         plant__uav__position__z=ZERO + 0.27 + 0.3 * math.tan(0.2),
     )
     kpis = touchdown(rolled, **DECK, mass=MASS)
-    assert (kpis["left_error"], kpis["lateral_error"]) == pytest.approx((0.3 / math.cos(0.2), 0.3 / math.cos(0.2)))
+    assert (kpis["left_error"], kpis["lateral_error"]) == pytest.approx(
+        (0.3 / math.cos(0.2), 0.3 / math.cos(0.2))
+    )
 
 
 def test_a_vehicle_that_rolls_along_with_the_deck_does_not_slide():
-    """0.5 m left of the centre and 0.05 m above the deck, carried along by a deck that heels after touchdown."""
+    """0.5 m left of the centre and 0.05 m above the deck, carried along by a deck that heels after
+    touchdown.
+    """
     roll = 0.3 * np.clip(TIME - TOUCHDOWN, 0, 1)
     carried = mission_result(
         offset=(0.0, 0.0),
@@ -93,14 +115,19 @@ def test_a_vehicle_that_rolls_along_with_the_deck_does_not_slide():
 
 
 def test_heave_is_the_height_above_the_mean():
-    heaving = mission_result(plant__usv__deck__position__z=0.27 + 0.1 * np.where(TIME >= TOUCHDOWN, 1.0, -1.0))
+    heaving = mission_result(
+        plant__usv__deck__position__z=0.27 + 0.1 * np.where(TIME >= TOUCHDOWN, 1.0, -1.0)
+    )
     mean = 0.1 * np.mean(np.where(TIME >= TOUCHDOWN, 1.0, -1.0))
     assert touchdown(heaving, **DECK, mass=MASS)["deck_heave"] == pytest.approx(0.1 - mean)
 
 
 def test_the_peak_of_the_force_is_that_after_touchdown():
     hit = np.where(TIME == 0.5, 99.0, np.where(TIME == 12.02, 30.0, 4.1))
-    assert touchdown(mission_result(plant__uav__contact__force=hit), **DECK, mass=MASS)["peak_force"] == 30.0
+    assert (
+        touchdown(mission_result(plant__uav__contact__force=hit), **DECK, mass=MASS)["peak_force"]
+        == 30.0
+    )
 
 
 def test_without_a_touchdown_all_kpis_are_nan():
@@ -153,7 +180,9 @@ def test_cross_track_error_is_the_distance_from_each_leg():
 def test_distances_are_those_on_either_side():
     for side in (1, -1):
         y = np.where(TIME > 1, side * 0.4, 0.0)
-        assert cross_track(sailing(TIME, y), "plant.usv", [10.0], [0.0], 0.5)["max"] == pytest.approx(0.4)
+        assert cross_track(sailing(TIME, y), "plant.usv", [10.0], [0.0], 0.5)[
+            "max"
+        ] == pytest.approx(0.4)
 
 
 def test_a_leg_that_is_not_finished_lasts_to_the_end_and_the_next_is_not_begun():
@@ -170,5 +199,7 @@ def test_rows_after_the_last_waypoint_do_not_count():
 
 
 def test_a_start_on_the_first_waypoint_is_a_leg_too():
-    still = with_signals(mission_result(), plant__usv__position__x=ZERO, plant__usv__position__y=ZERO)
+    still = with_signals(
+        mission_result(), plant__usv__position__x=ZERO, plant__usv__position__y=ZERO
+    )
     assert cross_track(still, "plant.usv", [0.0], [0.0], 0.5)["max"] == 0.0

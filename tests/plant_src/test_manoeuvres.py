@@ -18,13 +18,17 @@ DEGREE = math.pi / 180
 
 
 def sailed(time, place, heading, speed):
-    """A vessel `place` (ahead + i left, m, from the order on the original course), `heading` (rad from it), `speed` (m/s)."""
+    """A vessel `place` (ahead + i left, m, from the order on the original course), `heading` (rad
+    from it), `speed` (m/s).
+    """
     world = place * np.exp(1j * COURSE) + (3 - 4j)
     velocity = speed * np.exp(1j * (heading + COURSE))
     columns = {
         "usv.position.x": world.real,
         "usv.position.y": world.imag,
-        "usv.attitude.yaw": np.angle(np.exp(1j * (heading + COURSE))),  # jumps at pi as the plant's does
+        "usv.attitude.yaw": np.angle(
+            np.exp(1j * (heading + COURSE))
+        ),  # jumps at pi as the plant's does
         "usv.velocity.x": velocity.real,
         "usv.velocity.y": velocity.imag,
         "usv.velocity_body.u": speed,
@@ -64,7 +68,9 @@ def test_a_circle_has_the_measures_of_a_circle(side):
 
 def test_speed_loss_refers_to_the_last_full_turn():
     kpis = turning_circle(circle(1, later=0.6), "usv", ORDER, LENGTH)
-    assert (kpis["steady_speed"], kpis["speed_loss"], kpis["advance"]) == pytest.approx((0.6, 0.6, 4.0), rel=1e-5)
+    assert (kpis["steady_speed"], kpis["speed_loss"], kpis["advance"]) == pytest.approx(
+        (0.6, 0.6, 4.0), rel=1e-5
+    )
 
 
 def test_a_measure_that_was_not_reached_is_nan():
@@ -80,13 +86,17 @@ def test_a_spiral_has_the_diameter_of_its_last_turn():
     time = np.arange(4001) / 100
     angle = np.maximum(time - ORDER, 0)
     radius = np.where(angle < 2 * math.pi, 5.0, 3.0)
-    place = np.concatenate([[0], np.cumsum(np.diff(angle) * radius[1:] * np.exp(1j * (angle[1:] + angle[:-1]) / 2))])
+    place = np.concatenate(
+        [[0], np.cumsum(np.diff(angle) * radius[1:] * np.exp(1j * (angle[1:] + angle[:-1]) / 2))]
+    )
     kpis = turning_circle(sailed(time, place, angle, radius), "usv", ORDER, LENGTH)
     assert kpis["steady_diameter"] == pytest.approx(6.0, rel=1e-5)
 
 
 def zigzags(corners):
-    """Headings (degrees from the original course) that are straight lines between `corners` of (s after the order, deg)."""
+    """Headings (degrees from the original course) that are straight lines between `corners` of (s
+    after the order, deg).
+    """
     times, angles = np.transpose(corners)
     time = np.arange(round(100 * (ORDER + times[-1])) + 1) / 100
     time = np.unique(np.concatenate([time, ORDER + times]))
@@ -114,7 +124,13 @@ def test_the_zig_zag_of_straight_lines(side):
 
 
 def test_a_wider_zig_zag_counts_its_own_angle():
-    kpis = zigzag(zigzags([(0, 0), (8, 25), (20, -28), (30, 23)]), "usv", ORDER, angle=20 * DEGREE, overshoots=2)
+    kpis = zigzag(
+        zigzags([(0, 0), (8, 25), (20, -28), (30, 23)]),
+        "usv",
+        ORDER,
+        angle=20 * DEGREE,
+        overshoots=2,
+    )
     assert (kpis["overshoot[1]"], kpis["overshoot[2]"]) == pytest.approx((5 * DEGREE, 8 * DEGREE))
 
 
@@ -133,14 +149,23 @@ def test_without_any_turn_all_measures_are_nan():
 def test_initial_turning_on_a_circle_is_an_arc():
     kpis = initial_turning(circle(-1), "usv", ORDER, LENGTH)
     arc = 10 * DEGREE * 4.0
-    assert kpis == pytest.approx({"distance": arc, "distance_lengths": arc / 2, "time": arc / 1.5}, rel=1e-5)
+    assert kpis == pytest.approx(
+        {"distance": arc, "distance_lengths": arc / 2, "time": arc / 1.5}, rel=1e-5
+    )
 
 
 def stopping_ship(course=0.5):
-    """Decelerates all the time by 0.5 m/s2, with 3 m/s at the order, aslant of its heading; at last it goes astern."""
+    """Decelerates all the time by 0.5 m/s2, with 3 m/s at the order, aslant of its heading; at last
+    it goes astern.
+    """
     time = np.arange(2001) / 100
     since = time - ORDER
-    return sailed(time, (3 * since - 0.25 * since**2) * np.exp(1j * course), np.zeros_like(time), 3 - 0.5 * since)
+    return sailed(
+        time,
+        (3 * since - 0.25 * since**2) * np.exp(1j * course),
+        np.zeros_like(time),
+        3 - 0.5 * since,
+    )
 
 
 def test_a_constant_deceleration_stops_after_half_the_square_of_the_speed():
@@ -180,7 +205,10 @@ def test_the_strider_turns_on_the_circle_of_its_speed_and_rate(tmp_path):
         "stop_time": 60,
         "step_size": 0.01,
         "components": {
-            "vessel": {"fmu": str(root / "fmus/strider.fmu"), "parameters": {"thrust": 2.0, "initial.velocity_body.u": 1.0}}
+            "vessel": {
+                "fmu": str(root / "fmus/strider.fmu"),
+                "parameters": {"thrust": 2.0, "initial.velocity_body.u": 1.0},
+            }
         },
         "events": [{"time": 20.0, "set": {"vessel.rudder_angle": 35 * DEGREE}}],
         "kpis": [{**turn, "arguments": {"vehicle": "vessel", "start": 20.0, "length": 1.0}}],

@@ -13,7 +13,15 @@ def test_demo1_lands_on_a_vessel_in_irregular_waves(measured: MeasurementCheck) 
     assert kpis["landing.landed_at_end"]
     assert kpis["waypoints.all_reached"]
     error = kpis["landing.lateral_error"]
-    measured("Contact", "Demo 1 in waves: touchdown from the deck's centre", error, 0.0, "m", "middle of the deck", within=0.15)
+    measured(
+        "Contact",
+        "Demo 1 in waves: touchdown from the deck's centre",
+        error,
+        0.0,
+        "m",
+        "middle of the deck",
+        within=0.15,
+    )
 
 
 def test_three_pairs_survey_and_land(measured: MeasurementCheck) -> None:
@@ -23,5 +31,12 @@ def test_three_pairs_survey_and_land(measured: MeasurementCheck) -> None:
         assert kpis[f"lanes{pair}.all_reached"]
         error, case = kpis[f"landing{pair}.lateral_error"], f"pair {pair}"
         measured(
-            "Fleets", "survey: touchdown from the deck's centre", error, 0.0, "m", "middle of the deck", within=0.1, case=case
+            "Fleets",
+            "survey: touchdown from the deck's centre",
+            error,
+            0.0,
+            "m",
+            "middle of the deck",
+            within=0.1,
+            case=case,
         )

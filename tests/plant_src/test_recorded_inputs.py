@@ -1,4 +1,6 @@
-"""Inputs and parameters are recorded beside outputs, in the plant, in sensors and in FMUs, by both executors."""
+"""Inputs and parameters are recorded beside outputs, in the plant, in sensors and in FMUs, by both
+executors.
+"""
 
 from __future__ import annotations
 
@@ -24,7 +26,10 @@ def scenario(recorded: list[str], **components: Any) -> dict[str, Any]:
         "stop_time": 0.05,
         "step_size": 0.01,
         "components": {
-            "plant": {"python": f"{ROOT}/plant_src/world.py:World", "arguments": {"vehicles": VEHICLES}},
+            "plant": {
+                "python": f"{ROOT}/plant_src/world.py:World",
+                "arguments": {"vehicles": VEHICLES},
+            },
             **components,
         },
         "record": {"signals": recorded},
@@ -43,8 +48,17 @@ def run(document: dict[str, Any], **inputs: Any) -> cosim.Result:
 @pytest.mark.usefixtures("executor")
 def test_inputs_and_parameters_of_the_plant_leave_its_outputs_in_place() -> None:
     outputs = ["plant.uav.position.*", "plant.usv.*", "plant.usv.contact.*"]
-    others = ["plant.uav.mass", "plant.uav.rotor_speed*", "plant.usv.thrust", "plant.usv.rudder_angle"]
-    inputs = {"plant__uav__rotor_speed": SPEEDS, "plant__usv__thrust": 3.0, "plant__usv__rudder_angle": 0.2}
+    others = [
+        "plant.uav.mass",
+        "plant.uav.rotor_speed*",
+        "plant.usv.thrust",
+        "plant.usv.rudder_angle",
+    ]
+    inputs = {
+        "plant__uav__rotor_speed": SPEEDS,
+        "plant__usv__thrust": 3.0,
+        "plant__usv__rudder_angle": 0.2,
+    }
     plain, recorded = (run(scenario(names), **inputs) for names in (outputs, outputs + others))
     for name in plain.signals():
         assert np.array_equal(plain[name], recorded[name]), name
@@ -63,10 +77,16 @@ def test_inputs_of_a_sensor_and_of_an_fmu_are_recorded() -> None:
     }
     connection = {"from": "plant.usv.velocity_body.u", "to": "speed.vehicle.velocity_body.u"}
     outputs = ["plant.usv.velocity_body.u", "gnss.*", "speed.*"]
-    others = ["gnss.seed", "gnss.vehicle.position.x", "speed.vehicle.velocity_body.u", "speed.speed_reference"]
+    others = [
+        "gnss.seed",
+        "gnss.vehicle.position.x",
+        "speed.vehicle.velocity_body.u",
+        "speed.speed_reference",
+    ]
     inputs = {"gnss__vehicle__position__x": 7.0, "speed__speed_reference": 1.5}
     plain, recorded = (
-        run({**scenario(names, **components), "connections": [connection]}, **inputs) for names in (outputs, outputs + others)
+        run({**scenario(names, **components), "connections": [connection]}, **inputs)
+        for names in (outputs, outputs + others)
     )
     for name in plain.signals():
         assert np.array_equal(plain[name], recorded[name]), name

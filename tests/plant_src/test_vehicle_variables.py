@@ -18,6 +18,12 @@ def test_the_command_of_the_document_finds_the_models() -> None:
     assert f"`{COMMAND}`" in DOCUMENT.read_text()
     module = COMMAND.split()[-1]
     code = f"from {module} import make_tables; print(make_tables())"
-    done = subprocess.run([sys.executable, "-c", code], cwd=DOCUMENT.parents[1], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-c", code],
+        cwd=DOCUMENT.parents[1],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
     assert done.stdout.strip() in DOCUMENT.read_text(), done.stderr
     assert done.stdout

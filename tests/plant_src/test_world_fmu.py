@@ -31,7 +31,9 @@ FLIGHT = ((10, 0.0), (40, 1.1 * HOVER), (30, HOVER), (100, 0.9 * HOVER), (60, 0.
 
 @pytest.fixture(scope="module")
 def fmu(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return build_to(ROOT / "plant_src/world_fmu.py", None, tmp_path_factory.mktemp("world") / "world.fmu")
+    return build_to(
+        ROOT / "plant_src/world_fmu.py", None, tmp_path_factory.mktemp("world") / "world.fmu"
+    )
 
 
 class Importer:
@@ -56,7 +58,9 @@ class Importer:
         self.steps = 0
 
     def step(self, speed: float) -> list[Any]:
-        self.slave.setReal([self.references[f"uav.rotor_speed[{k}]"] for k in (1, 2, 3, 4)], [speed] * 4)
+        self.slave.setReal(
+            [self.references[f"uav.rotor_speed[{k}]"] for k in (1, 2, 3, 4)], [speed] * 4
+        )
         self.slave.setReal([self.references["usv.thrust"]], [1.0])
         self.slave.doStep(self.steps * 0.01, 0.01)
         self.steps += 1
@@ -64,7 +68,10 @@ class Importer:
 
     def values(self) -> list[Any]:
         reals = self.slave.getReal([self.references[name] for name in self.names])
-        return reals + [bool(value) for value in self.slave.getBoolean([self.references[name] for name in self.flags])]
+        return reals + [
+            bool(value)
+            for value in self.slave.getBoolean([self.references[name] for name in self.flags])
+        ]
 
 
 @pytest.fixture
@@ -90,14 +97,26 @@ def in_process(names: list[str]) -> Iterator[list[Any]]:
         yield [trial[name] for name in names]
 
 
-def test_the_fmu_computes_what_the_world_does(importer: Importer, measured: MeasurementCheck) -> None:
+def test_the_fmu_computes_what_the_world_does(
+    importer: Importer, measured: MeasurementCheck
+) -> None:
     names = importer.names + importer.flags
     expected = list(in_process(names))
     assert importer.values() == expected[0]
-    differing = sum(importer.step(speed) != row for speed, row in zip(speeds(), expected[1:], strict=True))
-    measured("World and plant FMUs", "differing steps of 240, world FMU in FMPy", differing, 0, "1", "world in process")
+    differing = sum(
+        importer.step(speed) != row for speed, row in zip(speeds(), expected[1:], strict=True)
+    )
+    measured(
+        "World and plant FMUs",
+        "differing steps of 240, world FMU in FMPy",
+        differing,
+        0,
+        "1",
+        "world in process",
+    )
     height, touching = (
-        np.array([row[names.index(name)] for row in expected]) for name in ("uav.position.z", "uav.contact.force")
+        np.array([row[names.index(name)] for row in expected])
+        for name in ("uav.position.z", "uav.contact.force")
     )
     assert height.max() > 1.0
     assert touching[-1] > 0
@@ -105,7 +124,9 @@ def test_the_fmu_computes_what_the_world_does(importer: Importer, measured: Meas
 
 
 @pytest.mark.parametrize("begun", [0, 60, 140, 152, 230])
-def test_states_are_restored_bit_for_bit(importer: Importer, begun: int, measured: MeasurementCheck) -> None:
+def test_states_are_restored_bit_for_bit(
+    importer: Importer, begun: int, measured: MeasurementCheck
+) -> None:
     """On the platform, in flight, about touchdown, at rest."""
     plan = speeds()
     for speed in plan[:begun]:
@@ -116,8 +137,17 @@ def test_states_are_restored_bit_for_bit(importer: Importer, begun: int, measure
         importer.slave.setFMUstate(state)
         importer.steps = begun
         assert importer.values() == before
-        differing = sum(importer.step(speed) != row for speed, row in zip(plan[begun:], expected, strict=False))
-        measured("World and plant FMUs", "steps that differ after a return, world FMU", differing, 0, "1", AGAIN)
+        differing = sum(
+            importer.step(speed) != row for speed, row in zip(plan[begun:], expected, strict=False)
+        )
+        measured(
+            "World and plant FMUs",
+            "steps that differ after a return, world FMU",
+            differing,
+            0,
+            "1",
+            AGAIN,
+        )
     importer.slave.freeFMUstate(state)
 
 
@@ -126,7 +156,11 @@ def test_it_is_the_plant_of_demo1() -> None:
 
 
 def test_demo1_lands_with_it(fmu: Path, tmp_path: Path) -> None:
-    text = DEMO.read_text().replace('"../', f'"{ROOT}/').replace('"systems/', f'"{ROOT}/scenarios/systems/')
+    text = (
+        DEMO.read_text()
+        .replace('"../', f'"{ROOT}/')
+        .replace('"systems/', f'"{ROOT}/scenarios/systems/')
+    )
     demo = json.loads(text)
     for key in ("reference", "figures", "checks", "kpis", "seeds"):
         demo.pop(key)
@@ -140,8 +174,13 @@ def test_demo1_lands_with_it(fmu: Path, tmp_path: Path) -> None:
 
 def test_another_world_can_be_chosen(tmp_path: Path) -> None:
     """The JSON file beside the source determines the variables."""
-    shutil.copytree(ROOT / "plant_src", tmp_path / "plant_src", ignore=shutil.ignore_patterns("__pycache__"))
-    other = {"vehicles": {"boat": {"model": "strider", "position": [0, 0]}}, "environment": {"wind": {"speed": 2.0}}}
+    shutil.copytree(
+        ROOT / "plant_src", tmp_path / "plant_src", ignore=shutil.ignore_patterns("__pycache__")
+    )
+    other = {
+        "vehicles": {"boat": {"model": "strider", "position": [0, 0]}},
+        "environment": {"wind": {"speed": 2.0}},
+    }
     (tmp_path / "plant_src/world_fmu.json").write_text(json.dumps(other))
     target = build_to(tmp_path / "plant_src/world_fmu.py", None, tmp_path / "boat.fmu")
     names = {v.name: v for v in read_model_description(target).modelVariables}

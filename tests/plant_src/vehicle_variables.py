@@ -32,13 +32,24 @@ def make_tables() -> str:
         for motion, model in motions.items():
             name = f"v{len(vehicles)}"
             position = [10 * len(vehicles), 0] if model.is_vessel else [10 * len(vehicles), 0, 5]
-            vehicles[name] = {"model": vehicle, "position": position, **({"motion": motion} if len(motions) > 1 else {})}
+            vehicles[name] = {
+                "model": vehicle,
+                "position": position,
+                **({"motion": motion} if len(motions) > 1 else {}),
+            }
             labels[name] = f"{vehicle} ({motion})" if len(motions) > 1 else vehicle
-    variables = [variable for variable in World("plant", vehicles=vehicles).variables if variable.name.split(".")[0] in labels]
+    variables = [
+        variable
+        for variable in World("plant", vehicles=vehicles).variables
+        if variable.name.split(".")[0] in labels
+    ]
     parts = []
     for title, causality in (("Measurements (outputs)", "output"), ("Inputs", "input")):
         parts += [f"### {title}\n", "| variable | unit | meaning | vehicles |", "|---|---|---|---|"]
-        parts += [*_rows([variable for variable in variables if variable.causality == causality], labels), ""]
+        parts += [
+            *_rows([variable for variable in variables if variable.causality == causality], labels),
+            "",
+        ]
     parts += [
         "### Rotors\n",
         "| vehicle | input | place | position forward, left / m | its reaction turns the body |",
@@ -48,14 +59,22 @@ def make_tables() -> str:
         *_rotor_rows(),
         "",
         "### Parameters\n",
-        "The argument `vehicles/NAME/parameters` of the world sets these parameters of a vehicle. The parameters of vehicles",
+        (
+            "The argument `vehicles/NAME/parameters` of the world sets these parameters of a "
+            "vehicle. The parameters of vehicles"
+        ),
         "that are given by files are those of their family; the file contains their values.\n",
         "| vehicle | parameter | unit | default | meaning |",
         "|---|---|---|---|---|",
     ]
     models = [each for motions in VEHICLE_MODELS.values() for each in motions.values()]
-    described = {model.equations or label: model for label, model in reversed([*zip(labels.values(), models, strict=True)])}
-    rows = [row for label, model in sorted(described.items()) for row in _parameter_rows(label, model)]
+    described = {
+        model.equations or label: model
+        for label, model in reversed([*zip(labels.values(), models, strict=True)])
+    }
+    rows = [
+        row for label, model in sorted(described.items()) for row in _parameter_rows(label, model)
+    ]
     return "\n".join([*parts, *rows, ""])
 
 
@@ -65,13 +84,22 @@ def _parameter_rows(label: str, model: Model) -> Iterator[str]:
             unit = variable.unit.name if variable.unit else ""
             lengths = ["n"] if model.equations and len(variable.shape) == 1 else variable.shape
             size = f"[{','.join(f'1..{length}' for length in lengths)}]" if lengths else ""
-            default = "" if model.equations else ", ".join(f"{value:.7g}" for value in np.ravel(variable.start))
+            default = (
+                ""
+                if model.equations
+                else ", ".join(f"{value:.7g}" for value in np.ravel(variable.start))
+            )
             meaning = variable.description.replace("|", "\\|")
             yield f"| {label} | `{variable.name}{size}` | {unit} | {default} | {meaning} |"
 
 
 def _rotor_rows() -> Iterator[str]:
-    airframes = [model.airframe for motions in VEHICLE_MODELS.values() for model in motions.values() if model.airframe]
+    airframes = [
+        model.airframe
+        for motions in VEHICLE_MODELS.values()
+        for model in motions.values()
+        if model.airframe
+    ]
     for airframe in airframes:
         for i, rotor in enumerate(airframe.rotors, start=1):
             sense = "counter-clockwise" if rotor.torque_sign > 0 else "clockwise"
@@ -87,13 +115,18 @@ def _rows(variables: list[Variable], labels: dict[str, str]) -> Iterator[str]:
         size = f"[1..{len(variable.scalar_names)}]" if variable.shape else ""
         quantity, part, end, meaning = _split(name + size, variable.description)
         unit = variable.unit.name if variable.unit else f"({variable.type})"
-        rows.setdefault((f"{quantity}{{}}{end}", unit, meaning), {}).setdefault(vehicle, []).append(part)
+        rows.setdefault((f"{quantity}{{}}{end}", unit, meaning), {}).setdefault(vehicle, []).append(
+            part
+        )
     for (pattern, unit, meaning), users in rows.items():
         for parts in dict.fromkeys(map(tuple, users.values())):
             names = [labels[vehicle] for vehicle, used in users.items() if tuple(used) == parts]
             name = pattern.format("\\|".join(part for part in parts))
             text = meaning.replace("|", "\\|")
-            yield f"| `{name}` | {unit} | {text} | {'all' if len(names) == len(labels) else ', '.join(names)} |"
+            yield (
+                f"| `{name}` | {unit} | {text} | "
+                f"{'all' if len(names) == len(labels) else ', '.join(names)} |"
+            )
 
 
 def _split(name: str, description: str) -> tuple[str, str, str, str]:

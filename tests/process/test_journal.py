@@ -30,7 +30,9 @@ def test_an_impossible_phase_is_not_that_of_a_run(value):
 
 
 def test_calls_on_threads_are_not_recorded_one_by_one():
-    """Otherwise a crash on one thread would be attributed to the component that another thread has called last."""
+    """Otherwise a crash on one thread would be attributed to the component that another thread has
+    called last.
+    """
     journal = Journal(bytearray(JOURNAL_SIZE))
     set_current_journal(journal)
     try:

@@ -83,7 +83,11 @@ def test_foreign_code_finds_no_descriptor_of_the_lock(tmp_path):
 
     def descriptors_of_lock() -> list[str]:
         links = [f"/proc/self/fd/{number}" for number in os.listdir("/proc/self/fd")]  # noqa: PTH208
-        return [path for link in links if os.path.lexists(link) and LOCK_FILE in (path := os.readlink(link))]  # noqa: PTH115
+        return [
+            path
+            for link in links
+            if os.path.lexists(link) and LOCK_FILE in (path := os.readlink(link))  # noqa: PTH115
+        ]
 
     with LockKeeper() as keeper:
         keeper.lock(tmp_path / LOCK_FILE, tmp_path)

@@ -1,4 +1,6 @@
-"""An exception, a hang or a crash in a Python controller, in process or exported, is told with its line."""
+"""An exception, a hang or a crash in a Python controller, in process or exported, is told with its
+line.
+"""
 
 import json
 import re
@@ -62,17 +64,29 @@ def folder(tmp_path_factory):
     return folder
 
 
-@pytest.mark.parametrize("source", [{"python": "faulty.py:Faulty"}, {"fmu": "faulty.fmu"}], ids=["class", "fmu"])
+@pytest.mark.parametrize(
+    "source", [{"python": "faulty.py:Faulty"}, {"fmu": "faulty.fmu"}], ids=["class", "fmu"]
+)
 @pytest.mark.parametrize("fault", REASONS)
 def test_the_line_is_told(folder, tmp_path, source, fault):
     components = {"a": {**source, "parameters": {"fault": fault}}}
-    content = {"name": "s", "stop_time": 5, "step_size": 1, "deadlines": {"step": 0.3}, "components": components}
+    content = {
+        "name": "s",
+        "stop_time": 5,
+        "step_size": 1,
+        "deadlines": {"step": 0.3},
+        "components": components,
+    }
     file = folder / f"{tmp_path.name}.json"
     file.write_text(json.dumps(content))
     done = run_cosim("run", file, "--no-report", cwd=tmp_path)
     assert done.returncode == 1
-    line = next(number for number, text in enumerate(SOURCE.splitlines(), 1) if text.endswith(f"# {fault}"))
+    line = next(
+        number for number, text in enumerate(SOURCE.splitlines(), 1) if text.endswith(f"# {fault}")
+    )
     message = done.stderr.splitlines()[-1]
     assert re.match(r"a: (fmi2D|d)o_?[sS]tep failed at t = 2 s: ", message)
     lines = {line - 1, line} if fault == "loop" else {line}
-    assert message.endswith(tuple(f"{REASONS[fault]} (faulty.py:{number})" for number in lines)), message
+    assert message.endswith(tuple(f"{REASONS[fault]} (faulty.py:{number})" for number in lines)), (
+        message
+    )

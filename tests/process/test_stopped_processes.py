@@ -20,7 +20,9 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
 @pytest.fixture(autouse=True)
 def settings(monkeypatch):
-    """A short timeout; and no search for orphans, which would end other children of this process, such as servers of tests."""
+    """A short timeout; and no search for orphans, which would end other children of this process,
+    such as servers of tests.
+    """
     monkeypatch.setattr("cosim.process.supervisor.STOP_TIMEOUT", 0.2)
     monkeypatch.setattr("cosim.process.supervisor._child_processes", list)
 
@@ -50,7 +52,9 @@ def stop() -> None:
     os.kill(os.getpid(), signal.SIGSTOP)
 
 
-@pytest.mark.parametrize("phase", [Phase.IDLE, Phase.WAITING, Phase.STEPPING, Phase.CALLING, Phase.RESULTS_WRITTEN])
+@pytest.mark.parametrize(
+    "phase", [Phase.IDLE, Phase.WAITING, Phase.STEPPING, Phase.CALLING, Phase.RESULTS_WRITTEN]
+)
 def test_a_stopped_process_is_ended_in_each_phase(journal, phase):
     """Also where no call has a deadline, as while a real-time run waits."""
     began = time.monotonic()
@@ -60,7 +64,9 @@ def test_a_stopped_process_is_ended_in_each_phase(journal, phase):
         stop()
 
     outcome = supervise(work, journal)
-    assert "cosim: the run failed: its process was stopped from outside for 0.2 s" in (outcome.warning or str(outcome.failure))
+    assert "cosim: the run failed: its process was stopped from outside for 0.2 s" in (
+        outcome.warning or str(outcome.failure)
+    )
     assert 0.2 < time.monotonic() - began < 3.0
 
 

@@ -30,6 +30,8 @@ print(len(looks))
 
 @pytest.mark.parametrize("descriptors", ["12", "012", "1", ""])
 def test_a_child_that_closed_its_output_is_looked_at_as_rarely_as_any(descriptors):
-    done = subprocess.run([sys.executable, "-c", PROGRAM, *descriptors], capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", PROGRAM, *descriptors], capture_output=True, text=True, check=True
+    )
     assert int(done.stdout) < 20
     assert done.stderr == "last words"

@@ -1,4 +1,6 @@
-"""Temporary folders of processes that start at the same time: none loses its folder to another one's cleaning up."""
+"""Temporary folders of processes that start at the same time: none loses its folder to another
+one's cleaning up.
+"""
 
 from __future__ import annotations
 
@@ -16,7 +18,9 @@ from cosim.process.temporary_folders import FMU_PREFIX, RUN_PREFIX, WORKER_PREFI
 
 @pytest.fixture
 def interfere(tmp_path, monkeypatch):
-    """Function that sets what another process does to the first folder between its creation and its lock."""
+    """Function that sets what another process does to the first folder between its creation and its
+    lock.
+    """
     monkeypatch.setattr(tempfile, "tempdir", str(tmp_path))
     create = tempfile.mkdtemp
 
@@ -35,7 +39,9 @@ def interfere(tmp_path, monkeypatch):
 
 
 def lock_and_remove_soon(folder):
-    """Lock the folder as a process that cleans up, and remove it while its owner waits for the lock."""
+    """Lock the folder as a process that cleans up, and remove it while its owner waits for the
+    lock.
+    """
     lock = os.open(folder, os.O_RDONLY)
     fcntl.flock(lock, fcntl.LOCK_EX)
     Timer(0.05, lambda: (Path(folder).rmdir(), os.close(lock))).start()
@@ -49,7 +55,9 @@ def clean_up(folder):
 
 @pytest.mark.parametrize("prefix", [RUN_PREFIX, FMU_PREFIX, WORKER_PREFIX])
 @pytest.mark.parametrize("action", [clean_up, os.rmdir, lock_and_remove_soon])
-def test_a_folder_that_is_removed_before_it_is_locked_is_replaced_by_a_locked_one(interfere, tmp_path, prefix, action):
+def test_a_folder_that_is_removed_before_it_is_locked_is_replaced_by_a_locked_one(
+    interfere, tmp_path, prefix, action
+):
     interfere(action)
     folder = LockedFolder(prefix)
     temporary_folders._remove_abandoned_folders.__wrapped__(str(tmp_path))

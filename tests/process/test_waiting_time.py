@@ -33,7 +33,10 @@ def test_processes_that_share_a_processor_wait_for_each_other(busy_processes):
     begin, before = time.monotonic(), [waiting_time(process) for process in busy_processes]
     time.sleep(0.6)
     wall = time.monotonic() - begin
-    shares = [(waiting_time(process) - waited) / wall for process, waited in zip(busy_processes, before, strict=True)]
+    shares = [
+        (waiting_time(process) - waited) / wall
+        for process, waited in zip(busy_processes, before, strict=True)
+    ]
     assert 1.5 < sum(shares) < 3.1  # 2 on a machine without other load
 
 

@@ -9,7 +9,9 @@ import cosim
 
 @pytest.fixture(scope="session")
 def flight_result():
-    """Demo 1 until shortly after the landing: one of its five checks fails, it has not been round the box."""
+    """Demo 1 until shortly after the landing: one of its five checks fails, it has not been round
+    the box.
+    """
     return cosim.run("demo1_box", stop_time=16)
 
 
@@ -22,7 +24,12 @@ class PageVisit:
         self.requests, self.console_messages, self.url = [], [], file.absolute().as_uri()
         self.page.on("request", lambda request: self.requests.append(request.url))
         self.page.on(
-            "console", lambda said: self.console_messages.append(said.text) if said.type in ("error", "warning") else None
+            "console",
+            lambda said: (
+                self.console_messages.append(said.text)
+                if said.type in ("error", "warning")
+                else None
+            ),
         )
         self.page.on("pageerror", lambda error: self.console_messages.append(str(error)))
         self.page.goto(self.url)
@@ -53,7 +60,10 @@ class PageVisit:
     def body(self, number):
         """Position and orientation (w, x, y, z) of a body as it stands in the scene."""
         of = f"cosimReplay.view.actors[{number}].object"
-        return self(f"[{of}.position.toArray(), [{of}.quaternion.w, ...{of}.quaternion.toArray().slice(0, 3)]]")
+        return self(
+            f"[{of}.position.toArray(), [{of}.quaternion.w, ...{of}.quaternion.toArray().slice(0, "
+            "3)]]"
+        )
 
 
 @pytest.fixture(scope="module")

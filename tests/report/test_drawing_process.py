@@ -36,10 +36,20 @@ def number(result):
 
 def run(folder, *options, figures, block="Gain", **more):
     (folder / "own.py").write_text(FIGURES)
-    entries = [{"name": name, "python": f"own.py:{name.rstrip('12')}", "arguments": values} for name, values in figures.items()]
+    entries = [
+        {"name": name, "python": f"own.py:{name.rstrip('12')}", "arguments": values}
+        for name, values in figures.items()
+    ]
     kpis = [{"name": "last", "python": "own.py:last", "arguments": {"signal": "a.y"}}]
     components = {"a": {"python": f"{BLOCKS}:{block}"}}
-    scenario = {"name": "small", "stop_time": 3, "step_size": 1, "components": components, "kpis": kpis, "figures": entries}
+    scenario = {
+        "name": "small",
+        "stop_time": 3,
+        "step_size": 1,
+        "components": components,
+        "kpis": kpis,
+        "figures": entries,
+    }
     (folder / "small.json").write_text(json.dumps({**scenario, **more}))
     return run_cosim("run", "small.json", *options, cwd=folder)
 
@@ -53,7 +63,9 @@ def test_figures_and_report_are_those_of_a_run_in_one_process(tmp_path):
     for name in ("curve1.png", "curve2.png", "result.csv", "kpis.json"):
         assert (tmp_path / "run" / name).read_bytes() == (tmp_path / "none" / name).read_bytes()
     reports = [(tmp_path / mode / "report.html").read_text() for mode in ("run", "none")]
-    first, second = ([line for line in report.splitlines() if "<path" in line] for report in reports)
+    first, second = (
+        [line for line in report.splitlines() if "<path" in line] for report in reports
+    )
     assert first == second != []
 
 
@@ -61,7 +73,10 @@ def test_figures_and_report_are_those_of_a_run_in_one_process(tmp_path):
     ("name", "words"),
     [
         ("failing", "failing failed: ValueError: no data for this (own.py:15)"),
-        ("crashing", "crashing failed: the process was ended by signal 11 (SIGSEGV, segmentation fault)"),
+        (
+            "crashing",
+            "crashing failed: the process was ended by signal 11 (SIGSEGV, segmentation fault)",
+        ),
         ("ending", "ending failed: it ended the process with exit code 0"),
         ("number", "number failed: returned int, expected a matplotlib.figure.Figure"),
     ],
@@ -80,7 +95,13 @@ def test_a_module_that_cannot_be_imported_is_refused_once(tmp_path, mode):
     figures = [{"name": "curve", "python": "broken.py:curve"}]
     (tmp_path / "own.py").write_text(FIGURES)
     components = {"a": {"python": f"{BLOCKS}:Gain"}}
-    scenario = {"name": "small", "stop_time": 3, "step_size": 1, "components": components, "figures": figures}
+    scenario = {
+        "name": "small",
+        "stop_time": 3,
+        "step_size": 1,
+        "components": components,
+        "figures": figures,
+    }
     (tmp_path / "small.json").write_text(json.dumps(scenario))
     done = run_cosim("run", "small.json", "--isolation", mode, cwd=tmp_path)
     assert done.returncode == 2
@@ -89,7 +110,9 @@ def test_a_module_that_cannot_be_imported_is_refused_once(tmp_path, mode):
 
 
 def test_a_run_that_fails_draws_nothing(tmp_path):
-    done = run(tmp_path, "--output-dir", "out", figures={"curve": {"signal": "a.y"}}, block="FailingBlock")
+    done = run(
+        tmp_path, "--output-dir", "out", figures={"curve": {"signal": "a.y"}}, block="FailingBlock"
+    )
     assert done.returncode == 1
     assert "figure" not in done.stderr
     assert not (tmp_path / "out/curve.png").exists()

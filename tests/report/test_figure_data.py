@@ -42,7 +42,10 @@ def test_bars_are_listed_by_their_names(tmp_path):
     axes = figure.add_subplot(ylabel="factor")
     axes.bar([0, 1], [10.0, 20.5], label="cosim")
     axes.set_xticks([0, 1], ["short\nrun", "long"])
-    assert table(figure, tmp_path)[1:] == [("factor", "cosim", "short run", "10.0"), ("factor", "cosim", "long", "20.5")]
+    assert table(figure, tmp_path)[1:] == [
+        ("factor", "cosim", "short run", "10.0"),
+        ("factor", "cosim", "long", "20.5"),
+    ]
 
 
 def test_a_figure_without_data_writes_no_file(tmp_path):

@@ -108,7 +108,12 @@ def test_axes_at_a_position_of_their_own_keep_it():
         figure.add_axes((0.0, 0.0, 1.0, 1.0)).set_axis_off()
         return figure
 
-    assert draw_figure(RESULT, "picture", picture, {}).axes[0].get_position().bounds == (0.0, 0.0, 1.0, 1.0)
+    assert draw_figure(RESULT, "picture", picture, {}).axes[0].get_position().bounds == (
+        0.0,
+        0.0,
+        1.0,
+        1.0,
+    )
 
 
 def test_a_failing_figure_is_named():
@@ -116,7 +121,11 @@ def test_a_failing_figure_is_named():
         raise ValueError("no such thing")
 
     with pytest.raises(
-        ComponentError, match=r'^figure "paths": broken failed: ValueError: no such thing \(test_figure_files.py:[0-9]+\)$'
+        ComponentError,
+        match=(
+            r'^figure "paths": broken failed: ValueError: no such thing '
+            r"\(test_figure_files.py:[0-9]+\)$"
+        ),
     ):
         draw_figure(RESULT, "paths", broken, {})
 
@@ -127,7 +136,10 @@ def test_wrong_arguments_are_refused():
 
 
 def test_a_function_that_returns_no_figure_is_refused():
-    with pytest.raises(ComponentError, match=r'figure "curve": .* returned NoneType, expected a matplotlib.figure.Figure'):
+    with pytest.raises(
+        ComponentError,
+        match=r'figure "curve": .* returned NoneType, expected a matplotlib.figure.Figure',
+    ):
         draw_figure(RESULT, "curve", lambda _result: None, {})
 
 
@@ -143,6 +155,9 @@ def test_a_failed_write_leaves_the_former_file(tmp_path):
 
 
 def test_matplotlib_is_imported_late():
-    code = "import sys, cosim.report.figures, cosim.report.tables; print({'matplotlib', 'rich'} & set(sys.modules))"
+    code = (
+        "import sys, cosim.report.figures, cosim.report.tables; print({'matplotlib', 'rich'} & "
+        "set(sys.modules))"
+    )
     run = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert run.stdout == "set()\n"

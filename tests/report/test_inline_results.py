@@ -38,14 +38,19 @@ def test_a_failed_run_is_shown_with_its_failure():
 def test_signals_are_drawn_by_unit(flight):
     figure = flight.plot("plant.uav.position.*", "usv.thrust")
     assert [axes.get_ylabel() for axes in figure.axes] == ["m", "N"]
-    assert [line.get_label() for line in figure.axes[0].lines] == [f"plant.uav.position.{axis}" for axis in "xyz"]
+    assert [line.get_label() for line in figure.axes[0].lines] == [
+        f"plant.uav.position.{axis}" for axis in "xyz"
+    ]
     assert figure._repr_svg_().startswith("<?xml")
 
 
 @pytest.mark.parametrize(
     ("names", "line"),
     [
-        (["plant.uav.positon.z"], 'no signal "plant.uav.positon.z" was recorded; did you mean "plant.uav.position.z"?'),
+        (
+            ["plant.uav.positon.z"],
+            'no signal "plant.uav.positon.z" was recorded; did you mean "plant.uav.position.z"?',
+        ),
         ([3], "expected names of signals, found 3"),
         ([], "expected 1 to 12 signals, found 0"),
         (["*"], "expected 1 to 12 signals, found 9"),
@@ -62,7 +67,10 @@ def test_a_data_frame_has_a_column_for_each_signal(flight):
     frame = flight.to_dataframe()
     assert frame.shape == (51, len(flight))
     assert frame.index.name == "time"
-    assert frame["plant.uav.position.z"].to_numpy().tobytes() == flight["plant.uav.position.z"].tobytes()
+    assert (
+        frame["plant.uav.position.z"].to_numpy().tobytes()
+        == flight["plant.uav.position.z"].tobytes()
+    )
     assert frame.attrs["units"]["plant.uav.position.z"] == "m"
 
 

@@ -8,7 +8,12 @@ import pytest
 from cosim.report.tables import format_number, print_kpis
 from cosim.results.checks import evaluate_checks
 
-KPIS = {"landing.lateral_error": 0.0868369, "landing.landed_at_end": True, "waypoints.time[1]": math.nan, "landing.bounces": 2}
+KPIS = {
+    "landing.lateral_error": 0.0868369,
+    "landing.landed_at_end": True,
+    "waypoints.time[1]": math.nan,
+    "landing.bounces": 2,
+}
 UNITS = {"landing.lateral_error": "m", "waypoints.time[1]": "s"}
 
 
@@ -59,7 +64,9 @@ def test_output_to_a_file_has_no_colours_and_complete_names():
 
 
 def test_an_ascii_terminal_shows_words_instead_of_marks():
-    text = printed(KPIS, evaluate_checks(KPIS, [{"kpi": "landing.bounces", "max": 3}]), encoding="ascii")
+    text = printed(
+        KPIS, evaluate_checks(KPIS, [{"kpi": "landing.bounces", "max": 3}]), encoding="ascii"
+    )
     assert text.isascii()
     assert "ok" in text
 
@@ -79,7 +86,14 @@ def test_without_kpis_there_is_no_table():
 
 @pytest.mark.parametrize(
     ("value", "text"),
-    [(0.1234567, "0.1235"), (12345.678, "1.235e+04"), (1e-9, "1e-09"), (False, "no"), (7, "7"), (math.inf, "inf")],
+    [
+        (0.1234567, "0.1235"),
+        (12345.678, "1.235e+04"),
+        (1e-9, "1e-09"),
+        (False, "no"),
+        (7, "7"),
+        (math.inf, "inf"),
+    ],
 )
 def test_numbers_have_four_significant_digits(value, text):
     assert format_number(value) == text

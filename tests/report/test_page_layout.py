@@ -32,17 +32,30 @@ def report(open_page, flight_result, tmp_path_factory):
         {"kpi": "landing.touchdown_speed", "min": 0.123456, "max": 0.234567},
         {"kpi": "waypoints.all_reached", "equals": True},
     ]
-    ended = {"terminated_by": {"time": 16.0, "since": 13.0, "condition": "landed", "cause": "plant.uav.contact.vessel"}}
-    result = replace(flight_result, metadata={**flight_result.metadata, **ended, "system": LONG_NAMES})
+    ended = {
+        "terminated_by": {
+            "time": 16.0,
+            "since": 13.0,
+            "condition": "landed",
+            "cause": "plant.uav.contact.vessel",
+        }
+    }
+    result = replace(
+        flight_result, metadata={**flight_result.metadata, **ended, "system": LONG_NAMES}
+    )
     write_report(result, evaluate_checks(flight_result.kpis, checks), [], file)
     return open_page(file)
 
 
 def test_texts_of_the_diagram_are_inside_their_boxes(report):
     """In the widest font of the page; texts that fit are not shortened."""
-    widths = report("[...document.querySelectorAll('.component text')].map((text) => text.getBBox().width)")
+    widths = report(
+        "[...document.querySelectorAll('.component text')].map((text) => text.getBBox().width)"
+    )
     assert 110 < max(widths) < 152 - 8, widths
-    texts = report("[...document.querySelectorAll('.component text')].map((text) => text.textContent)")
+    texts = report(
+        "[...document.querySelectorAll('.component text')].map((text) => text.textContent)"
+    )
     assert texts[0::2] == ["WaveMeasure…", "illinois", "uav.attitude"]
     assert texts[1] == "DeckController.mo:D…"
 
@@ -60,11 +73,15 @@ def test_nothing_overflows_and_texts_are_legible(report, width, height, scheme):
 def test_a_phone_shows_the_picture_first(report):
     report.page.set_viewport_size({"width": 360, "height": 740})
     tops = report(
-        "['.stage', '.bar', 'h1', '.card', '.signals'].map((part) => document.querySelector(part).getBoundingClientRect().top)"
+        "['.stage', '.bar', 'h1', '.card', '.signals'].map((part) => "
+        "document.querySelector(part).getBoundingClientRect().top)"
     )
     assert tops == sorted(tops)
     assert tops[0] <= 0
-    places = "cosimReplay.view.actors.map(({position}) => position.clone().project(cosimReplay.view.cameras.camera).x)"
+    places = (
+        "cosimReplay.view.actors.map(({position}) => "
+        "position.clone().project(cosimReplay.view.cameras.camera).x)"
+    )
     assert all(abs(x) < 0.9 for x in report(places))
 
 
@@ -96,6 +113,8 @@ def test_full_screen_shows_picture_and_controls(report):
     report.page.set_viewport_size({"width": 1280, "height": 800})
     report.page.locator(".full").click()
     report.until("document.fullscreenElement?.id === 'replay'")
-    assert report("document.querySelector('.bar').getBoundingClientRect().bottom <= innerHeight + 1")
+    assert report(
+        "document.querySelector('.bar').getBoundingClientRect().bottom <= innerHeight + 1"
+    )
     report.page.locator(".full").click()
     report.until("!document.fullscreenElement")

@@ -23,7 +23,14 @@ def test_figures_are_written_beside_the_result_with_their_data(tmp_path):
     run = write(tmp_path)
     done = plot(run)
     assert done.exit_code == 0, done.output
-    assert names(run) == ["curve.csv", "curve.png", "curve.svg", "kpis.json", "result.csv", "run.json"]
+    assert names(run) == [
+        "curve.csv",
+        "curve.png",
+        "curve.svg",
+        "kpis.json",
+        "result.csv",
+        "run.json",
+    ]
     assert done.output.split() == [str(run / f"curve.{suffix}") for suffix in ("png", "svg", "csv")]
     with (run / "curve.csv").open(newline="") as file:
         assert list(csv.reader(file)) == [["panel", "curve", "t / s", "value"]] + [
@@ -44,7 +51,10 @@ def test_several_runs_have_a_folder_each_and_one_comparison(tmp_path):
     done = plot(*runs, "--timings", "--format", "png", "--output-dir", tmp_path / "plotted")
     assert done.exit_code == 0, done.output
     assert names(tmp_path / "plotted") == ["first_run", "second_run", "timings.csv", "timings.png"]
-    heights = [row.rpartition(",")[2] for row in (tmp_path / "plotted/timings.csv").read_text().splitlines()[1:]]
+    heights = [
+        row.rpartition(",")[2]
+        for row in (tmp_path / "plotted/timings.csv").read_text().splitlines()[1:]
+    ]
     assert heights == ["4.0", "4.0"]
 
 
@@ -60,7 +70,14 @@ def test_run_json_contains_the_path_of_the_scenario(tmp_path):
     from cosim.results import write_run
 
     block = Path(__file__).parents[1] / "scenario/pythonfmu_blocks.py"
-    scenario = {"name": "small", "stop_time": 1, "step_size": 1, "components": {"a": {"python": f"{block}:Gain"}}}
+    scenario = {
+        "name": "small",
+        "stop_time": 1,
+        "step_size": 1,
+        "components": {"a": {"python": f"{block}:Gain"}},
+    }
     (tmp_path / "small.json").write_text(json.dumps(scenario))
     write_run(cosim.run(tmp_path / "small.json"), tmp_path / "run")
-    assert json.loads((tmp_path / "run/run.json").read_text())["scenario_file"] == str(tmp_path / "small.json")
+    assert json.loads((tmp_path / "run/run.json").read_text())["scenario_file"] == str(
+        tmp_path / "small.json"
+    )

@@ -15,7 +15,9 @@ print(progress is None)
 
 
 def output(stderr):
-    return subprocess.run([sys.executable, "-c", CODE], stdout=subprocess.PIPE, stderr=stderr, text=True, check=True).stdout
+    return subprocess.run(
+        [sys.executable, "-c", CODE], stdout=subprocess.PIPE, stderr=stderr, text=True, check=True
+    ).stdout
 
 
 def test_a_terminal_shows_name_and_percentage():

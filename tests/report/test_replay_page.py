@@ -1,4 +1,6 @@
-"""The replay page in a browser. Every test also checks that the page loads nothing and reports no errors."""
+"""The replay page in a browser. Every test also checks that the page loads nothing and reports no
+errors.
+"""
 
 from copy import deepcopy
 from dataclasses import replace
@@ -26,7 +28,9 @@ def shared(open_page, flight_result, tmp_path_factory):
 
 @pytest.fixture
 def opened(shared):
-    """The replay of the flight at its start, as seen by the camera that it begins with; one page for all, since it takes long."""
+    """The replay of the flight at its start, as seen by the camera that it begins with; one page
+    for all, since it takes long.
+    """
     shared.page.get_by_role("button", name="Orbit", exact=True).click()
     shared.seek(0)
     yield shared
@@ -42,8 +46,12 @@ def test_bodies_have_their_recorded_positions(opened, flight_result):
         opened.seek(time)
         for number, body in enumerate(BODIES):
             position, orientation = opened.body(number)
-            assert position == pytest.approx([column(flight_result, f"{body}.position.{axis}", time) for axis in "xyz"], abs=2e-5)
-            recorded = [column(flight_result, f"{body}.orientation.{part}", time) for part in "wxyz"]
+            assert position == pytest.approx(
+                [column(flight_result, f"{body}.position.{axis}", time) for axis in "xyz"], abs=2e-5
+            )
+            recorded = [
+                column(flight_result, f"{body}.orientation.{part}", time) for part in "wxyz"
+            ]
             assert abs(np.dot(orientation, recorded)) == pytest.approx(1.0, abs=1e-5)
 
 
@@ -58,30 +66,47 @@ def test_scrubber_keys_and_plots_change_the_time(opened, flight_result):
     over.click(position={"x": over.bounding_box()["width"] / 4, "y": 20})
     assert opened.time == pytest.approx(4.0, abs=0.1)
     assert opened.page.locator(".clock b").inner_text() == f"{opened.time:.2f}"
-    altitude = flight_result["plant.uav.position.z"][np.searchsorted(flight_result.time, opened.time, side="right") - 1]
+    altitude = flight_result["plant.uav.position.z"][
+        np.searchsorted(flight_result.time, opened.time, side="right") - 1
+    ]
     assert opened.page.locator(".plot b").first.inner_text() == f"{altitude:.4g} m"
 
 
 def test_the_view_from_above_shows_paths_waypoints_and_present_positions(opened, flight_result):
     """The dots move with the time, east to the right and north upwards, by the same scale."""
-    dots = "cosimReplay.above.dots.map((dot) => dot.transform.baseVal[0].matrix).map(({e, f}) => [e, f])"
+    dots = (
+        "cosimReplay.above.dots.map((dot) => dot.transform.baseVal[0].matrix).map(({e, f}) => [e, "
+        "f])"
+    )
     before = opened(dots)
     opened.seek(9.5)
     scale, moved = opened("cosimReplay.above.scale"), np.array(opened(dots)) - before
     assert len(moved) == len(BODIES)
     for body, (right, down) in zip(BODIES, moved, strict=True):
         east, north = (
-            column(flight_result, f"{body}.position.{axis}", 9.5) - flight_result[f"{body}.position.{axis}"][0] for axis in "xy"
+            column(flight_result, f"{body}.position.{axis}", 9.5)
+            - flight_result[f"{body}.position.{axis}"][0]
+            for axis in "xy"
         )
         assert (right / scale, -down / scale) == pytest.approx((east, north), abs=0.02)
         assert abs(east) > 1
     assert opened.page.locator(".above .path").count() == 2
     assert opened.page.locator(".above .waypoint").count() == 5
-    assert opened.page.locator(".above figcaption span").all_inner_texts() == ["uav", "usv", "waypoints"]
+    assert opened.page.locator(".above figcaption span").all_inner_texts() == [
+        "uav",
+        "usv",
+        "waypoints",
+    ]
 
 
 def test_a_legend_names_the_lines_on_the_slider_and_the_speed_is_that_of_the_replay(opened):
-    assert opened.page.locator(".bar .legend").inner_text().split() == ["On", "the", "slider:", "uav", "touches"]
+    assert opened.page.locator(".bar .legend").inner_text().split() == [
+        "On",
+        "the",
+        "slider:",
+        "uav",
+        "touches",
+    ]
     assert opened.page.get_by_label("Replay speed", exact=True).input_value() == "1"
 
 
@@ -95,7 +120,10 @@ def test_the_space_bar_plays_at_once_whatever_was_clicked(open_page, shared):
 
 
 def scale(opened, axis="x"):
-    return opened(f"cosimReplay.plots.list.map(({{chart}}) => [chart.scales.{axis}.min, chart.scales.{axis}.max])")
+    return opened(
+        f"cosimReplay.plots.list.map(({{chart}}) => [chart.scales.{axis}.min, "
+        f"chart.scales.{axis}.max])"
+    )
 
 
 def test_plots_are_zoomed_and_panned_by_pointer_and_buttons(opened):
@@ -111,7 +139,9 @@ def test_plots_are_zoomed_and_panned_by_pointer_and_buttons(opened):
         opened.page.mouse.up()
 
     drag(0.25, 0.5)
-    assert np.array(scale(opened)) == pytest.approx(np.tile([4.0, 8.0], (len(scale(opened)), 1)), abs=0.1)
+    assert np.array(scale(opened)) == pytest.approx(
+        np.tile([4.0, 8.0], (len(scale(opened)), 1)), abs=0.1
+    )
     opened.page.keyboard.down("Shift")
     drag(0.75, 0.5)
     opened.page.keyboard.up("Shift")
@@ -119,7 +149,13 @@ def test_plots_are_zoomed_and_panned_by_pointer_and_buttons(opened):
     over.dblclick(position={"x": 5, "y": 20})
     assert scale(opened)[-1] == [0, 16]
     opened.seek(8)
-    for button, expected in (("Zoom in", [4, 12]), ("Later", [6, 14]), ("Later", [8, 16]), ("Later", [8, 16]), ("All", [0, 16])):
+    for button, expected in (
+        ("Zoom in", [4, 12]),
+        ("Later", [6, 14]),
+        ("Later", [8, 16]),
+        ("Later", [8, 16]),
+        ("All", [0, 16]),
+    ):
         opened.page.get_by_role("button", name=button, exact=True).click()
         assert scale(opened)[0] == expected
 
@@ -142,13 +178,17 @@ def test_axes_have_units_and_angles_have_no_jumps(open_page, tmp_path):
     time = np.linspace(0, 20, 401)
     turned = np.pi - 0.9 * time
     columns = {"yaw": np.arctan2(np.sin(turned), np.cos(turned)), "rest": np.zeros(401)}
-    result = Result(Recording(time, columns, {"yaw": "rad", "rest": "m"}), metadata={"name": "turns"})
+    result = Result(
+        Recording(time, columns, {"yaw": "rad", "rest": "m"}), metadata={"name": "turns"}
+    )
     write_replay([result], tmp_path / "turns.html")
     opened = open_page(tmp_path / "turns.html")
     charts = "cosimReplay.plots.list.map(({chart}) => chart.axes.map((axis) => axis.label))"
     assert ["time (s)", "rad"] in opened(charts)
     opened.seek(20)
-    assert float(opened.page.locator(".plot b").first.inner_text().removesuffix(" rad")) == pytest.approx(turned[-1], abs=0.01)
+    assert float(
+        opened.page.locator(".plot b").first.inner_text().removesuffix(" rad")
+    ) == pytest.approx(turned[-1], abs=0.01)
     low, _ = scale(opened, "y")[0]
     assert low < turned[-1]
 
@@ -171,7 +211,9 @@ def test_cameras_show_their_targets(opened):
     distances = []
     for time in (2.0, 9.0):
         opened.seek(time)
-        distances.append(opened(f"{camera}.position.distanceTo(cosimReplay.view.actors[0].object.position)"))
+        distances.append(
+            opened(f"{camera}.position.distanceTo(cosimReplay.view.actors[0].object.position)")
+        )
     assert distances[0] == pytest.approx(distances[1], abs=1e-6)
     opened.page.get_by_role("button", name="Deck", exact=True).click()
     vessel = "cosimReplay.view.actors[1].object"
@@ -202,9 +244,13 @@ def test_trails_end_at_the_bodies_and_follow_their_paths(opened, flight_result):
 def nearest(path, places):
     """The points of a path of straight pieces that are nearest to some places."""
     starts, steps = path[:-1], np.diff(path, axis=0)
-    along = np.einsum("psi,si->ps", places[:, None] - starts, steps) / np.maximum(np.sum(steps**2, axis=1), 1e-12)
+    along = np.einsum("psi,si->ps", places[:, None] - starts, steps) / np.maximum(
+        np.sum(steps**2, axis=1), 1e-12
+    )
     feet = starts + np.clip(along, 0, 1)[..., None] * steps
-    return feet[np.arange(len(places)), np.argmin(np.linalg.norm(feet - places[:, None], axis=2), axis=1)]
+    return feet[
+        np.arange(len(places)), np.argmin(np.linalg.norm(feet - places[:, None], axis=2), axis=1)
+    ]
 
 
 def test_ghosts_can_be_switched_on(opened):
@@ -236,19 +282,31 @@ def test_something_is_drawn(opened):
 
 
 def test_the_vehicles_are_large_at_the_start_and_stay_in_the_picture(opened):
-    """The camera of the start follows all vehicles; the vessel is at least a tenth as wide as the picture."""
+    """The camera of the start follows all vehicles; the vessel is at least a tenth as wide as the
+    picture.
+    """
     opened.page.get_by_role("button", name="Group", exact=True).click()
     camera = "cosimReplay.view.cameras.camera"
-    project = f"({{object: {{position}}}}) => position.clone().project({camera}).toArray().slice(0, 2)"
+    project = (
+        f"({{object: {{position}}}}) => position.clone().project({camera}).toArray().slice(0, 2)"
+    )
     width = f"2 * Math.tan({camera}.fov * Math.PI / 360) * {camera}.aspect"
     vessel = "cosimReplay.view.actors[1]"
     for time in (0.0, 4.0, 8.0, 16.0):
         opened.seek(time)
         assert np.abs(opened(f"cosimReplay.view.actors.map({project})")).max() < 0.95
-        assert opened(f"2 * {vessel}.reach / ({vessel}.position.distanceTo({camera}.position) * {width})") > 0.1
+        assert (
+            opened(
+                f"2 * {vessel}.reach / ({vessel}.position.distanceTo({camera}.position) * {width})"
+            )
+            > 0.1
+        )
 
 
-ENVIRONMENT = {"seed": 5, "waves": {"spectrum": "jonswap", "significant_height": 0.3, "peak_period": 3.0, "spreading": 2}}
+ENVIRONMENT = {
+    "seed": 5,
+    "waves": {"spectrum": "jonswap", "significant_height": 0.3, "peak_period": 3.0, "spreading": 2},
+}
 
 
 @pytest.fixture(scope="module")
@@ -257,7 +315,10 @@ def compared(open_page, flight_result, tmp_path_factory):
     scenario = deepcopy(flight_result.metadata["scenario"])
     scenario["components"]["plant"]["arguments"]["environment"] = ENVIRONMENT
     rough = replace(flight_result, metadata={**flight_result.metadata, "scenario": scenario})
-    moved = {**flight_result.recording.columns, "plant.uav.position.z": flight_result["plant.uav.position.z"] + 1.0}
+    moved = {
+        **flight_result.recording.columns,
+        "plant.uav.position.z": flight_result["plant.uav.position.z"] + 1.0,
+    }
     higher = replace(flight_result, recording=replace(flight_result.recording, columns=moved))
     file = tmp_path_factory.mktemp("compared") / "two.html"
     write_replay([rough, higher], file)
@@ -290,36 +351,60 @@ NUMBERS = {
 
 def test_tick_labels_are_complete_and_without_a_unit_there_is_no_label(open_page, tmp_path):
     time = np.linspace(0, 5, 101)
-    columns = {name: low + (high - low) * np.sin(time) ** 2 for name, (low, high, _) in NUMBERS.items()}
-    write_replay([Result(Recording(time, columns, {}), metadata={"name": "numbers"})], tmp_path / "numbers.html")
+    columns = {
+        name: low + (high - low) * np.sin(time) ** 2 for name, (low, high, _) in NUMBERS.items()
+    }
+    write_replay(
+        [Result(Recording(time, columns, {}), metadata={"name": "numbers"})],
+        tmp_path / "numbers.html",
+    )
     opened = open_page(tmp_path / "numbers.html")
     for name, (_, _, texts) in NUMBERS.items():
         opened(f"cosimReplay.plots.add(['{name}'])")
         chart = "cosimReplay.plots.list.at(-1).chart"
         opened.until(f"{chart}.axes[1]._values?.length > 0")
         assert opened(f"[{chart}.axes[1]._values, {chart}.axes[1].label]") == [texts, ""]
-        widths = opened(f"{chart}.axes[1]._values.map((text) => {chart}.ctx.measureText(text).width)")
+        widths = opened(
+            f"{chart}.axes[1]._values.map((text) => {chart}.ctx.measureText(text).width)"
+        )
         assert opened(f"{chart}.axes[1]._size") > max(widths) + 5
 
 
 def test_the_diagram_of_one_component_is_as_large_as_its_texts(open_page, flight_result, tmp_path):
     box = {"name": "alone", "origin": "alone.fmu", "inputs": 0, "outputs": 1, "period": None}
     system = {"components": [box], "stages": [["alone"]], "connections": []}
-    write_report(replace(flight_result, metadata={"name": "alone", "system": system}), [], [], tmp_path / "report.html")
+    write_report(
+        replace(flight_result, metadata={"name": "alone", "system": system}),
+        [],
+        [],
+        tmp_path / "report.html",
+    )
     rectangle = open_page(tmp_path / "report.html").page.locator(".diagram .box").bounding_box()
     assert rectangle["width"] == pytest.approx(WIDTH, abs=2)
 
 
 def test_the_report_of_a_failed_run_opens_before_the_failure(open_page, flight_result, tmp_path):
-    write_report(replace(flight_result, metadata={"failure": "usv: stopped"}), [], [], tmp_path / "report.html")
+    write_report(
+        replace(flight_result, metadata={"failure": "usv: stopped"}),
+        [],
+        [],
+        tmp_path / "report.html",
+    )
     opened = open_page(tmp_path / "report.html")
     assert opened.time == 14
-    assert [mark.get_attribute("title") for mark in opened.page.locator(".spans b").all()] == ["failure at 16.00 s"]
+    assert [mark.get_attribute("title") for mark in opened.page.locator(".spans b").all()] == [
+        "failure at 16.00 s"
+    ]
 
 
 def test_the_report_escapes_texts_of_the_scenario(open_page, flight_result, tmp_path):
-    evil = "</script><script>window.caught = true</script><img src=x onerror='window.caught = true'>"
-    result = replace(flight_result, metadata={"scenario": {"description": evil}, "name": evil, "warnings": [evil]})
+    evil = (
+        "</script><script>window.caught = true</script><img src=x onerror='window.caught = true'>"
+    )
+    result = replace(
+        flight_result,
+        metadata={"scenario": {"description": evil}, "name": evil, "warnings": [evil]},
+    )
     write_report(result, [], [], tmp_path / "report.html")
     opened = open_page(tmp_path / "report.html")
     assert opened("window.caught === undefined")
@@ -342,7 +427,9 @@ def fallen(open_page, flight_result, tmp_path_factory):
     """The replay of the flight of which the quadcopter falls through the sea, from t = 10 s on."""
     time, columns = flight_result.time, dict(flight_result.recording.columns)
     late = time >= 10
-    columns["plant.uav.position.z"] = np.where(late, -4664.0 * (time - 10) / (time[-1] - 10), columns["plant.uav.position.z"])
+    columns["plant.uav.position.z"] = np.where(
+        late, -4664.0 * (time - 10) / (time[-1] - 10), columns["plant.uav.position.z"]
+    )
     columns["plant.uav.ditched"] = late
     fall = replace(flight_result, recording=replace(flight_result.recording, columns=columns))
     file = tmp_path_factory.mktemp("fall") / "replay.html"
@@ -351,11 +438,16 @@ def fallen(open_page, flight_result, tmp_path_factory):
 
 
 def test_a_failure_is_a_mark_on_the_slider_in_the_plots_and_in_the_scene(fallen):
-    assert [mark.get_attribute("title") for mark in fallen.page.locator(".spans b").all()] == ["uav ditched at 10.00 s"]
+    assert [mark.get_attribute("title") for mark in fallen.page.locator(".spans b").all()] == [
+        "uav ditched at 10.00 s"
+    ]
     line = fallen.page.locator(".plot").first.locator(".mark")
     assert line.get_attribute("title") == "uav ditched at 10.00 s"
     assert line.evaluate("(element) => element.offsetWidth") <= 2  # pixels: a straight line
-    crosses = "cosimReplay.view.actors.flatMap((actor) => actor.crosses.map((cross) => cross.object.visible))"
+    crosses = (
+        "cosimReplay.view.actors.flatMap((actor) => actor.crosses.map((cross) => "
+        "cross.object.visible))"
+    )
     fallen.seek(9.9)
     assert fallen(crosses) == [False]
     fallen.seek(10.1)
@@ -363,4 +455,6 @@ def test_a_failure_is_a_mark_on_the_slider_in_the_plots_and_in_the_scene(fallen)
 
 
 def test_the_camera_shows_the_mission_whatever_falls(fallen, opened):
-    assert fallen("cosimReplay.view.cameras.size") == pytest.approx(opened("cosimReplay.view.cameras.size"), rel=0.3)
+    assert fallen("cosimReplay.view.cameras.size") == pytest.approx(
+        opened("cosimReplay.view.cameras.size"), rel=0.3
+    )

@@ -54,7 +54,8 @@ def test_a_level_that_was_too_slow_is_not_tried_again(opened):
 def drawn(opened):
     """Return the number of frames drawn, and the triangles and pixels of the last one."""
     return opened(
-        "(({frames, renderer}) => [frames, renderer.info.render.triangles, renderer.domElement.width])(cosimReplay.view)"
+        "(({frames, renderer}) => [frames, renderer.info.render.triangles, "
+        "renderer.domElement.width])(cosimReplay.view)"
     )
 
 

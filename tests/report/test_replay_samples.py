@@ -13,7 +13,13 @@ from cosim.results import Result
 
 def result(**columns):
     rows = len(next(iter(columns.values())))
-    return Result(Recording(np.arange(rows) / 100, {k: np.asarray(v) for k, v in columns.items()}, dict.fromkeys(columns, "m")))
+    return Result(
+        Recording(
+            np.arange(rows) / 100,
+            {k: np.asarray(v) for k, v in columns.items()},
+            dict.fromkeys(columns, "m"),
+        )
+    )
 
 
 def unpacked(packed):
@@ -39,7 +45,9 @@ def test_columns_unpack_to_32_bit_floats():
 
 
 def test_a_constant_signal_is_one_number():
-    packed = samples.pack_run(result(still=[2.5, 2.5], never=[np.inf, np.inf], text=np.array(["a", "b"], object)))
+    packed = samples.pack_run(
+        result(still=[2.5, 2.5], never=[np.inf, np.inf], text=np.array(["a", "b"], object))
+    )
     assert packed["constants"] == {"still": 2.5}
     assert packed["columns"] == ["time", "never"]
     assert packed["units"] == {"still": "m", "never": "m"}
@@ -58,7 +66,9 @@ def test_a_long_run_is_downsampled_and_keeps_its_peaks():
     assert columns["touching"].max() == 1.0
     assert columns["force"][-5:].max() == 7.0
     assert columns["time"][-1] == pytest.approx((rows - 1) / 100)
-    np.testing.assert_allclose(np.interp(columns["time"], np.arange(rows) / 100, smooth), columns["smooth"], atol=1e-5)
+    np.testing.assert_allclose(
+        np.interp(columns["time"], np.arange(rows) / 100, smooth), columns["smooth"], atol=1e-5
+    )
     at_peak = columns["time"][columns["force"].argmax()]
     assert at_peak == pytest.approx(314.15, abs=2 * rows / samples.MAX_ROWS / 100)
 

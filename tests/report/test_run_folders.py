@@ -25,9 +25,19 @@ def write(folder, **metadata):
     (folder / "scenario").mkdir()
     (folder / "scenario/own_figures.py").write_text(FIGURE)
     spec = {"name": "curve", "python": "own_figures.py:curve", "arguments": {"signal": "a.x"}}
-    about = {"name": "small", "scenario": {"figures": [spec]}, "scenario_file": str(folder / "scenario/small.json"), **metadata}
+    about = {
+        "name": "small",
+        "scenario": {"figures": [spec]},
+        "scenario_file": str(folder / "scenario/small.json"),
+        **metadata,
+    }
     time = np.arange(3) / 2
-    result = Result(Recording(time, {"a.x": time**2}, {"a.x": "m"}), {"end.x": 1.0}, {"loop_seconds": 0.25}, about)
+    result = Result(
+        Recording(time, {"a.x": time**2}, {"a.x": "m"}),
+        {"end.x": 1.0},
+        {"loop_seconds": 0.25},
+        about,
+    )
     write_run(result, folder / "run")
     return folder / "run"
 
@@ -52,7 +62,9 @@ def test_a_run_without_figures_has_none(tmp_path):
 
 
 def test_a_folder_without_a_run_is_refused(tmp_path):
-    with pytest.raises(InputError, match=r"run\.json: No such file.*expected a folder that `cosim run` wrote"):
+    with pytest.raises(
+        InputError, match=r"run\.json: No such file.*expected a folder that `cosim run` wrote"
+    ):
         read_run(tmp_path)
 
 
@@ -68,7 +80,9 @@ def test_a_run_with_an_invalid_file_is_refused(tmp_path):
 def test_a_file_that_is_no_object_is_refused(tmp_path, name, text):
     run = write(tmp_path)
     (run / name).write_text(text)
-    with pytest.raises(InputError, match=rf"{name} is not valid JSON: .*; expected a file that `cosim run` wrote"):
+    with pytest.raises(
+        InputError, match=rf"{name} is not valid JSON: .*; expected a file that `cosim run` wrote"
+    ):
         read_run(run)
 
 
@@ -76,11 +90,16 @@ def test_a_file_that_is_no_object_is_refused(tmp_path, name, text):
 def test_a_kpi_that_is_no_number_is_refused_with_its_line(tmp_path, value):
     run = write(tmp_path)
     (run / "kpis.json").write_text(json.dumps({"good": 1.5, "bad": value}, indent=2))
-    with pytest.raises(InputError, match=r"kpis\.json:3:3: \$\.bad: expected a number, true, false or null; found"):
+    with pytest.raises(
+        InputError, match=r"kpis\.json:3:3: \$\.bad: expected a number, true, false or null; found"
+    ):
         read_run(run)
 
 
-DIAGRAM = {"components": [{"name": "a", "origin": "a.fmu", "inputs": 0, "outputs": 1, "period": None}], "connections": []}
+DIAGRAM = {
+    "components": [{"name": "a", "origin": "a.fmu", "inputs": 0, "outputs": 1, "period": None}],
+    "connections": [],
+}
 
 
 @pytest.mark.parametrize(
@@ -92,11 +111,17 @@ DIAGRAM = {"components": [{"name": "a", "origin": "a.fmu", "inputs": 0, "outputs
         ({"scenario": []}, "scenario"),
         ({"scenario": {"checks": ["x"]}}, r"scenario\.checks\[0\]"),
         ({"scenario": {"checks": [{"max": 1}]}}, r"scenario\.checks\[0\]\.kpi"),
-        ({"scenario": {"figures": [{"name": "a", "python": 1}]}}, r"scenario\.figures\[0\]\.python"),
+        (
+            {"scenario": {"figures": [{"name": "a", "python": 1}]}},
+            r"scenario\.figures\[0\]\.python",
+        ),
         ({"scenario": {"components": {"a": 1}}}, r"scenario\.components\.a"),
         ({"system": {}}, "system"),
         ({"system": {**DIAGRAM, "stages": [["b"]]}}, "system"),
-        ({"system": {**DIAGRAM, "stages": [["a"]], "connections": [["a.x"]]}}, r"system\.connections\[0\]"),
+        (
+            {"system": {**DIAGRAM, "stages": [["a"]], "connections": [["a.x"]]}},
+            r"system\.connections\[0\]",
+        ),
         ({"terminated_by": {"component": "a"}}, r"terminated_by\.time"),
         ({"real_time": {"steps": 1}}, r"real_time\.late_steps"),
         ({"warnings": [1]}, r"warnings\[0\]"),

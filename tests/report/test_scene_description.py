@@ -16,7 +16,9 @@ SHIPPED = sorted((root() / "scenarios").glob("*.json"))
 
 
 def scene(file):
-    return build_scene({"scenario": read_system_document(Path(file)).value, "scenario_file": str(file)})
+    return build_scene(
+        {"scenario": read_system_document(Path(file)).value, "scenario_file": str(file)}
+    )
 
 
 @pytest.mark.parametrize("file", SHIPPED, ids=lambda file: file.stem)
@@ -35,7 +37,9 @@ def test_signals_of_the_scene_are_recorded(flight_result):
     for body in found["bodies"]:
         assert all(name in flight_result for name in (*body["position"], *body["orientation"]))
     assert all(span["signal"] in flight_result for span in found["spans"])
-    assert all(any(flight_result.signals(pattern) for pattern in patterns) for patterns in found["plots"])
+    assert all(
+        any(flight_result.signals(pattern) for pattern in patterns) for patterns in found["plots"]
+    )
 
 
 def test_demo_1_has_its_waypoints_and_platforms():
@@ -53,7 +57,12 @@ def test_a_boat_has_a_landing_mark_of_five_parts_only_beside_a_multirotor(boat, 
     def part_counts(*models):
         vehicles = {model: {"model": model, "position": [0, 0]} for model in models}
         plant = {"python": "../plant_src/world.py:World", "arguments": {"vehicles": vehicles}}
-        found = build_scene({"scenario": {"components": {"plant": plant}}, "scenario_file": str(root() / "scenarios/boat.json")})
+        found = build_scene(
+            {
+                "scenario": {"components": {"plant": plant}},
+                "scenario_file": str(root() / "scenarios/boat.json"),
+            }
+        )
         return {body["title"]: len(body["parts"]) for body in found["bodies"]}
 
     assert part_counts(boat) == {boat: hull_parts}
@@ -62,13 +71,20 @@ def test_a_boat_has_a_landing_mark_of_five_parts_only_beside_a_multirotor(boat, 
 
 def test_a_world_inside_a_nested_system_is_found_by_its_full_name():
     found = scene(root() / "scenarios/performance_1.json")
-    assert [body["position"][0] for body in found["bodies"]] == ["demo1.plant.uav.position.x", "demo1.plant.usv.position.x"]
+    assert [body["position"][0] for body in found["bodies"]] == [
+        "demo1.plant.uav.position.x",
+        "demo1.plant.usv.position.x",
+    ]
     assert len(found["markers"]) == 5
 
 
 def test_angles_of_the_published_simulator_are_converted():
     body = scene(root() / "scenarios/demo1_replica.json")["bodies"][0]
-    assert body["attitude"] == ["plant.uav.attitude.phi", "-plant.uav.attitude.theta", "-plant.uav.attitude.psi"]
+    assert body["attitude"] == [
+        "plant.uav.attitude.phi",
+        "-plant.uav.attitude.theta",
+        "-plant.uav.attitude.psi",
+    ]
 
 
 LAMP = """
@@ -83,20 +99,26 @@ def night(scenario, bodies):
 
 
 LIT = (
-    "{'bodies': [{'name': name, 'position': [0, 0, 'a.z'], 'attitude': [0, 0, 0], 'parts': [{'shape': 'sphere', 'size': [1]}]}]}"
+    "{'bodies': [{'name': name, 'position': [0, 0, 'a.z'], 'attitude': [0, 0, 0], 'parts': "
+    "[{'shape': 'sphere', 'size': [1]}]}]}"
 )
 
 
 def lamp(folder, answer=LIT, **scenario):
     (folder / "lamp.py").write_text(LAMP.format(answer=answer))
     components = {"a": {"python": "lamp.py:Lamp"}, "b": {"fmu": "b.fmu"}}
-    return {"scenario": {"components": components, **scenario}, "scenario_file": str(folder / "s.json")}
+    return {
+        "scenario": {"components": components, **scenario},
+        "scenario_file": str(folder / "s.json"),
+    }
 
 
 def test_components_and_the_scenario_may_have_scenes(tmp_path):
     more = {
         "python": "lamp.py:night",
-        "arguments": {"bodies": [{"name": "moon", "position": [0, 0, 9], "orientation": [1, 0, 0, 0]}]},
+        "arguments": {
+            "bodies": [{"name": "moon", "position": [0, 0, 9], "orientation": [1, 0, 0, 0]}]
+        },
     }
     found = build_scene(lamp(tmp_path, scene=more))["bodies"]
     assert [body["title"] for body in found] == ["a", "moon"]
@@ -105,14 +127,21 @@ def test_components_and_the_scenario_may_have_scenes(tmp_path):
 
 def test_a_method_scene_that_is_not_static_is_ignored(tmp_path):
     about = lamp(tmp_path)
-    (tmp_path / "lamp.py").write_text("class Lamp:\n    def scene(self):\n        return 'backstage'\n")
+    (tmp_path / "lamp.py").write_text(
+        "class Lamp:\n    def scene(self):\n        return 'backstage'\n"
+    )
     assert build_scene(about)["bodies"] == []
 
 
 def test_without_scene_or_scenario_there_is_nothing_to_draw(tmp_path):
     shutil.copy(root() / "controllers/python/course_keeper.py", tmp_path)
     components = {"keeper": {"python": "course_keeper.py:CourseKeeper"}}
-    assert build_scene({"scenario": {"components": components}, "scenario_file": str(tmp_path / "s.json")})["bodies"] == []
+    assert (
+        build_scene(
+            {"scenario": {"components": components}, "scenario_file": str(tmp_path / "s.json")}
+        )["bodies"]
+        == []
+    )
     assert build_scene({})["water"] is None
 
 
@@ -125,7 +154,9 @@ WRONG = {
     "{'fixed': [{'shape': 'bax', 'size': [1, 1, 1]}]}": 'unknown shape "bax"; did you mean "box"',
     "{'fixed': [{'shape': 'box', 'size': [1]}]}": r"a box has 3 numbers as its size, found \[1\]",
     "{'bodies': [{'name': 'b'}]}": 'a body has no "position"',
-    "{'bodies': [{'name': 'b', 'position': [0, 0, 0]}]}": 'body "b" needs either "orientation" or "attitude"',
+    (
+        "{'bodies': [{'name': 'b', 'position': [0, 0, 0]}]}"
+    ): 'body "b" needs either "orientation" or "attitude"',
 }
 
 
@@ -142,7 +173,9 @@ def test_a_scene_function_with_a_mistake_is_refused_before_the_run(tmp_path):
         component["fmu"] = str(root() / "fmus" / Path(component["fmu"]).name)
     scenario["scene"]["python"] = f"{root()}/plant_src/scene/replay.py:free"
     (tmp_path / "flight.json").write_text(json.dumps(scenario))
-    with pytest.raises(InputError, match=r'scene: "free" takes no argument "vehicle"; did you mean "vehicles"'):
+    with pytest.raises(
+        InputError, match=r'scene: "free" takes no argument "vehicle"; did you mean "vehicles"'
+    ):
         load(tmp_path / "flight.json")
 
 

@@ -9,7 +9,13 @@ from cosim.report.diagram import HEIGHT, WIDTH, build_diagram
 
 
 def component(name, period=None):
-    return {"name": name, "origin": f"../fmus/{name}.fmu", "inputs": 2, "outputs": 3, "period": period}
+    return {
+        "name": name,
+        "origin": f"../fmus/{name}.fmu",
+        "inputs": 2,
+        "outputs": 3,
+        "period": period,
+    }
 
 
 SYSTEM = {
@@ -47,7 +53,11 @@ def test_no_boxes_overlap_and_all_lie_inside():
 def test_the_frame_of_a_nested_system_contains_only_its_components():
     drawn = build_diagram(SYSTEM)
     (frame,) = drawn.frames
-    inside = {b.name for b in drawn.boxes if frame.x < b.x < frame.x + frame.width and frame.y < b.y < frame.y + frame.height}
+    inside = {
+        b.name
+        for b in drawn.boxes
+        if frame.x < b.x < frame.x + frame.width and frame.y < b.y < frame.y + frame.height
+    }
     assert (frame.name, inside) == ("uav", {"uav.path", "uav.mixer"})
 
 
@@ -71,8 +81,16 @@ def test_a_wire_begins_and_ends_at_its_boxes():
 
 
 def test_the_tooltip_contains_the_period():
-    system = {**SYSTEM, "components": [component("usv", 0.05)], "stages": [["usv"]], "connections": []}
-    assert build_diagram(system).boxes[0].tooltip == "usv\n../fmus/usv.fmu\n2 inputs, 3 outputs, every 0.05 s"
+    system = {
+        **SYSTEM,
+        "components": [component("usv", 0.05)],
+        "stages": [["usv"]],
+        "connections": [],
+    }
+    assert (
+        build_diagram(system).boxes[0].tooltip
+        == "usv\n../fmus/usv.fmu\n2 inputs, 3 outputs, every 0.05 s"
+    )
 
 
 def test_an_empty_system_is_an_empty_diagram():

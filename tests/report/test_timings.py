@@ -15,7 +15,9 @@ from cosim.results import Result
 
 def run(name, duration, loop_seconds):
     return Result(
-        Recording(np.array([5.0, 5.0 + duration]), {}, {}), timing={"loop_seconds": loop_seconds}, metadata={"name": name}
+        Recording(np.array([5.0, 5.0 + duration]), {}, {}),
+        timing={"loop_seconds": loop_seconds},
+        metadata={"name": name},
     )
 
 
@@ -35,7 +37,9 @@ def test_the_published_band_is_drawn_and_within_the_axis():
 
 
 def test_a_result_without_wall_time_is_refused():
-    with pytest.raises(InputError, match=r"^foreign: the wall time of the stepping loop is missing"):
+    with pytest.raises(
+        InputError, match=r"^foreign: the wall time of the stepping loop is missing"
+    ):
         draw_timings(run("foreign", 10.0, 0.0))
 
 

@@ -59,7 +59,10 @@ def source(tmp_path):
 def read(path):
     reader = imageio_ffmpeg.read_frames(str(path))
     about = next(reader)
-    return about, [np.frombuffer(frame, np.uint8).reshape(about["size"][1], about["size"][0], 3) for frame in reader]
+    return about, [
+        np.frombuffer(frame, np.uint8).reshape(about["size"][1], about["size"][0], 3)
+        for frame in reader
+    ]
 
 
 def test_a_video_of_two_seconds_has_its_frames(tmp_path, source):
@@ -90,7 +93,9 @@ def test_an_exception_in_a_worker_process_is_raised(source):
 
 
 def test_an_input_error_in_a_worker_process_keeps_its_text(source):
-    with pytest.raises(InputError, match=r'own_frames\.py" defines no "Scenes"; did you mean "Scene"'):
+    with pytest.raises(
+        InputError, match=r'own_frames\.py" defines no "Scenes"; did you mean "Scene"'
+    ):
         collected(source.replace(":Scene", ":Scenes"), 2)
 
 
@@ -105,13 +110,28 @@ def test_text_that_libraries_print_does_not_disturb_the_frames(source):
 
 def test_progress_is_reported_after_every_frame(tmp_path, source):
     progress = []
-    write_video(RESULT, tmp_path / "run.mp4", "chase", (160, 90), 2, source, lambda *counts: progress.append(counts))
+    write_video(
+        RESULT,
+        tmp_path / "run.mp4",
+        "chase",
+        (160, 90),
+        2,
+        source,
+        lambda *counts: progress.append(counts),
+    )
     assert progress == [(i, 5) for i in range(1, 6)]
 
 
 def test_a_failure_leaves_no_file(tmp_path, source):
     with pytest.raises(ValueError, match="the lights went out"):
-        write_video(RESULT, tmp_path / "run.mp4", "chase", (160, 90), 10, source.replace(":Scene", ":Failing"))
+        write_video(
+            RESULT,
+            tmp_path / "run.mp4",
+            "chase",
+            (160, 90),
+            10,
+            source.replace(":Scene", ":Failing"),
+        )
     assert [path.name for path in tmp_path.iterdir() if path.is_file()] == ["own_frames.py"]
 
 
@@ -122,17 +142,30 @@ def test_a_missing_extra_is_named(tmp_path, source, monkeypatch):
 
 
 def result_of(folder, components):
-    return replace(RESULT, metadata={"scenario": {"components": components}, "scenario_file": f"{folder}/scenario.json"})
+    return replace(
+        RESULT,
+        metadata={
+            "scenario": {"components": components},
+            "scenario_file": f"{folder}/scenario.json",
+        },
+    )
 
 
 def test_the_frames_come_from_the_first_component_class_that_renders_them(tmp_path, source):
     (tmp_path / "plain.py").write_text("class Plain:\n    pass\n")
-    components = {"f": {"fmu": "f.fmu"}, "p": {"python": "plain.py:Plain"}, "w": {"python": "own_frames.py:Scene"}}
+    components = {
+        "f": {"fmu": "f.fmu"},
+        "p": {"python": "plain.py:Plain"},
+        "w": {"python": "own_frames.py:Scene"},
+    }
     assert find_frame_source(result_of(tmp_path, components)) == source
 
 
 def test_a_scenario_without_such_a_component_has_no_video(tmp_path):
-    with pytest.raises(InputError, match=r'no component of the scenario renders a video: .* static method "video_frames"'):
+    with pytest.raises(
+        InputError,
+        match=r'no component of the scenario renders a video: .* static method "video_frames"',
+    ):
         find_frame_source(result_of(tmp_path, {"f": {"fmu": "f.fmu"}}))
 
 

@@ -24,7 +24,9 @@ def resident():
     return int(STATISTICS.read_text().split()[1]) * resource.getpagesize()
 
 
-@pytest.mark.skipif(not STATISTICS.exists(), reason="only Linux tells how much memory is in use this way")
+@pytest.mark.skipif(
+    not STATISTICS.exists(), reason="only Linux tells how much memory is in use this way"
+)
 def test_memory_of_a_mapped_file_is_released_after_reading(tmp_path):
     rows = np.dtype([("x", np.float64), ("y", np.float64)])
     np.full(2_000_000, 1.0).tofile(tmp_path / "rows")

@@ -15,7 +15,9 @@ LONG = "x" * (MAX_TEXT_LENGTH + 1)
 
 
 def recording(time, **columns):
-    return Recording(np.asarray(time, float), {name: np.asarray(column) for name, column in columns.items()}, {})
+    return Recording(
+        np.asarray(time, float), {name: np.asarray(column) for name, column in columns.items()}, {}
+    )
 
 
 def written(tmp_path, text):
@@ -42,7 +44,17 @@ def test_csv_has_the_documented_format(tmp_path):
 
 def test_every_double_returns_bit_for_bit(tmp_path):
     bits = np.random.default_rng(3).integers(0, 2**64, 20_000, dtype=np.uint64)
-    edges = [0.0, -0.0, 5e-324, 2.2250738585072014e-308, 1.7976931348623157e308, 0.1 + 0.2, math.inf, -math.inf, math.nan]
+    edges = [
+        0.0,
+        -0.0,
+        5e-324,
+        2.2250738585072014e-308,
+        1.7976931348623157e308,
+        0.1 + 0.2,
+        math.inf,
+        -math.inf,
+        math.nan,
+    ]
     values = np.concatenate([bits.view(np.float64), edges])
     write_csv(recording(np.arange(values.size), x=values), tmp_path / "x.csv")
     returned = read_csv(tmp_path / "x.csv").columns["x"]
@@ -52,17 +64,26 @@ def test_every_double_returns_bit_for_bit(tmp_path):
 
 
 def test_digits_are_the_shortest_that_round_trip(tmp_path):
-    values = np.random.default_rng(4).standard_normal(2000) * 10.0 ** np.arange(-1000, 1000).clip(-250, 250)
+    values = np.random.default_rng(4).standard_normal(2000) * 10.0 ** np.arange(-1000, 1000).clip(
+        -250, 250
+    )
     write_csv(recording(np.arange(2000), x=values), tmp_path / "x.csv")
     with (tmp_path / "x.csv").open(newline="") as file:
         texts = [row[1] for row in csv.reader(file)][1:]
     significant = [text.split("e")[0].strip("-").replace(".", "").strip("0") for text in texts]
-    expected = [repr(value).split("e")[0].strip("-").replace(".", "").strip("0") for value in values.tolist()]
+    expected = [
+        repr(value).split("e")[0].strip("-").replace(".", "").strip("0")
+        for value in values.tolist()
+    ]
     assert significant == expected
 
 
 def test_whole_integers_return_as_integers(tmp_path):
-    limits = {"i": np.array([-(2**63), 2**63 - 1]), "u": np.array([0, 2**64 - 1], np.uint64), "b": np.array([True, False])}
+    limits = {
+        "i": np.array([-(2**63), 2**63 - 1]),
+        "u": np.array([0, 2**64 - 1], np.uint64),
+        "b": np.array([True, False]),
+    }
     write_csv(recording([0, 1], **limits), tmp_path / "x.csv")
     columns = read_csv(tmp_path / "x.csv").columns
     assert [columns[name].dtype for name in "iub"] == [np.int64, np.uint64, np.int64]
@@ -111,7 +132,9 @@ def test_an_impossible_path_is_refused(tmp_path):
 
 
 def test_files_of_other_programs_are_read(tmp_path):
-    path = written(tmp_path, "\ufefftime,x,state\r\n0,1,on\r\n0.5,+2.5e0,off\r\n0.5,.25,off\r\n\r\n")
+    path = written(
+        tmp_path, "\ufefftime,x,state\r\n0,1,on\r\n0.5,+2.5e0,off\r\n0.5,.25,off\r\n\r\n"
+    )
     foreign = read_csv(path)
     assert foreign.time.tolist() == [0.0, 0.5, 0.5]
     assert foreign.columns["x"].tolist() == [1.0, 2.5, 0.25]
@@ -127,9 +150,19 @@ def test_files_of_other_programs_are_read(tmp_path):
         ("time,x\n0,1\n\n1\n", r"given\.csv:4: 1 cells, expected 2 as in the header"),
         ("time,x\n0,1\nsoon,2\n", "the column time: .*soon"),
         ("time,x\n0,1\nnan,2\n", "not finite"),
-        pytest.param(f"time,x\n0,{LONG}x\n", r"given\.csv:2: cannot read the row: field larger than", id="long cell"),
-        pytest.param(f"time,{LONG}x\n", r"given\.csv:1: cannot read the row: field larger than", id="long name"),
-        pytest.param(f'time,x\n0,"{LONG}\n', r"given\.csv:\d: cannot read the row: ", id="quote without end"),
+        pytest.param(
+            f"time,x\n0,{LONG}x\n",
+            r"given\.csv:2: cannot read the row: field larger than",
+            id="long cell",
+        ),
+        pytest.param(
+            f"time,{LONG}x\n",
+            r"given\.csv:1: cannot read the row: field larger than",
+            id="long name",
+        ),
+        pytest.param(
+            f'time,x\n0,"{LONG}\n', r"given\.csv:\d: cannot read the row: ", id="quote without end"
+        ),
         ("time,x\n0,1\n0.2,2\n0.1,2\n", r"time goes back from 0\.2 s to 0\.1 s"),
     ],
 )
@@ -141,7 +174,9 @@ def test_unreadable_input_is_refused(tmp_path, text, message):
 def test_a_file_in_another_encoding_is_refused(tmp_path):
     path = tmp_path / "given.csv"
     path.write_bytes(b"time,\xe9\n0,1\n")
-    with pytest.raises(InputError, match=r"cannot read .*given\.csv: it is not UTF-8 text: .* at byte 5"):
+    with pytest.raises(
+        InputError, match=r"cannot read .*given\.csv: it is not UTF-8 text: .* at byte 5"
+    ):
         read_csv(path)
 
 

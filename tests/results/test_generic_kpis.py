@@ -19,16 +19,28 @@ ZETA, OMEGA = 0.3, 2.0
 DAMPED = OMEGA * math.sqrt(1 - ZETA**2)
 
 first_order = 1 - np.exp(-TIME / TAU)
-second_order = 1 - np.exp(-ZETA * OMEGA * TIME) * (np.cos(DAMPED * TIME) + ZETA * OMEGA / DAMPED * np.sin(DAMPED * TIME))
+second_order = 1 - np.exp(-ZETA * OMEGA * TIME) * (
+    np.cos(DAMPED * TIME) + ZETA * OMEGA / DAMPED * np.sin(DAMPED * TIME)
+)
 
 
 def run(time=TIME, **columns):
     return Result(
-        Recording(np.asarray(time, dtype=float), {name: np.asarray(v) for name, v in columns.items()}, dict.fromkeys(columns, ""))
+        Recording(
+            np.asarray(time, dtype=float),
+            {name: np.asarray(v) for name, v in columns.items()},
+            dict.fromkeys(columns, ""),
+        )
     )
 
 
-RUN = run(first=first_order, second=second_order, sine=3 * np.sin(2 * np.pi * TIME), step=5 - 2 * first_order, t=TIME)
+RUN = run(
+    first=first_order,
+    second=second_order,
+    sine=3 * np.sin(2 * np.pi * TIME),
+    step=5 - 2 * first_order,
+    t=TIME,
+)
 
 
 def value(function, *arguments, result=RUN, **named):
@@ -37,20 +49,26 @@ def value(function, *arguments, result=RUN, **named):
 
 def test_rise_time_of_first_order_is_tau_log_nine():
     assert value(kpis.rise_time, "first") == pytest.approx(TAU * math.log(9), rel=1e-7)
-    assert value(kpis.rise_time, "first", low=0.0, high=1 - math.exp(-1)) == pytest.approx(TAU, rel=1e-7)
+    assert value(kpis.rise_time, "first", low=0.0, high=1 - math.exp(-1)) == pytest.approx(
+        TAU, rel=1e-7
+    )
 
 
 def test_step_response_with_given_initial_value_and_target():
     assert value(kpis.rise_time, "step") == pytest.approx(TAU * math.log(9), rel=1e-7)
     shifted = run(TIME + 3, late=np.where(TIME < 1, 0.2, first_order))
-    assert value(kpis.rise_time, "late", result=shifted, start=4.0, initial=0.0, target=1.0) == pytest.approx(
-        TAU * math.log(10) - 1
-    )
+    assert value(
+        kpis.rise_time, "late", result=shifted, start=4.0, initial=0.0, target=1.0
+    ) == pytest.approx(TAU * math.log(10) - 1)
 
 
 def test_settling_time_of_first_order_is_tau_log_fifty():
-    assert value(kpis.settling_time, "first", target=1.0) == pytest.approx(TAU * math.log(50), rel=1e-6)
-    assert value(kpis.settling_time, "first", target=1.0, band=0.05) == pytest.approx(TAU * math.log(20), rel=1e-6)
+    assert value(kpis.settling_time, "first", target=1.0) == pytest.approx(
+        TAU * math.log(50), rel=1e-6
+    )
+    assert value(kpis.settling_time, "first", target=1.0, band=0.05) == pytest.approx(
+        TAU * math.log(20), rel=1e-6
+    )
 
 
 def test_overshoot_of_second_order_is_that_of_its_damping():
@@ -68,7 +86,9 @@ def test_a_downward_step_overshoots_downwards():
 
 
 def test_settling_of_second_order_ends_with_its_last_swing():
-    """Afterwards the envelope exp(-zeta omega t) / sqrt(1 - zeta^2) may be outside the band, but not the response."""
+    """Afterwards the envelope exp(-zeta omega t) / sqrt(1 - zeta^2) may be outside the band, but
+    not the response.
+    """
     settled = value(kpis.settling_time, "second", target=1.0)
     assert settled <= math.log(1 / (0.02 * math.sqrt(1 - ZETA**2))) / (ZETA * OMEGA)
     assert np.abs(np.interp(settled, TIME, second_order) - 1) == pytest.approx(0.02)
@@ -101,19 +121,27 @@ def test_error_integrals_of_first_order():
 
 def test_error_integrals_of_second_order():
     """ISE of a step of 1 / (s^2/w^2 + 2 z s/w + 1): (1 + 4 z^2) / (4 z w)."""
-    assert value(kpis.ise, "second", 1.0) == pytest.approx((1 + 4 * ZETA**2) / (4 * ZETA * OMEGA), rel=1e-4)
+    assert value(kpis.ise, "second", 1.0) == pytest.approx(
+        (1 + 4 * ZETA**2) / (4 * ZETA * OMEGA), rel=1e-4
+    )
 
 
 def test_time_in_itae_begins_with_the_window():
     late = run(TIME + 100, first=first_order)
-    assert value(kpis.itae, "first", 1.0, result=late, start=100.0) == pytest.approx(TAU**2, rel=1e-6)
+    assert value(kpis.itae, "first", 1.0, result=late, start=100.0) == pytest.approx(
+        TAU**2, rel=1e-6
+    )
 
 
 def test_kpis_of_a_sine_match_closed_forms():
     assert value(kpis.rms, "sine") == pytest.approx(3 / math.sqrt(2))
     assert value(kpis.mean, "sine") == pytest.approx(0, abs=1e-12)
     assert value(kpis.mean, "sine", stop=0.5) == pytest.approx(6 / math.pi, rel=1e-6)
-    assert (value(kpis.maximum, "sine"), value(kpis.minimum, "sine"), value(kpis.peak, "sine", 1.0)) == pytest.approx((3, -3, 4))
+    assert (
+        value(kpis.maximum, "sine"),
+        value(kpis.minimum, "sine"),
+        value(kpis.peak, "sine", 1.0),
+    ) == pytest.approx((3, -3, 4))
 
 
 def test_target_can_be_another_signal():
@@ -150,19 +178,33 @@ def test_nan_makes_settling_and_saturation_nan():
 
 
 def test_energy_is_in_joules_whatever_the_units_of_the_signals():
-    values = {"torque": np.array([2.0, 2.0]), "rate": np.array([30.0, 30.0]), "power": np.array([3.0, 3.0])}
-    result = Result(Recording(np.array([0.0, 2.0]), values, {"torque": "N.m", "rate": "rpm", "power": "kW"}))
-    assert value(kpis.energy, "torque", "rate", result=result) == pytest.approx(4 * np.pi, rel=1e-12)
+    values = {
+        "torque": np.array([2.0, 2.0]),
+        "rate": np.array([30.0, 30.0]),
+        "power": np.array([3.0, 3.0]),
+    }
+    result = Result(
+        Recording(np.array([0.0, 2.0]), values, {"torque": "N.m", "rate": "rpm", "power": "kW"})
+    )
+    assert value(kpis.energy, "torque", "rate", result=result) == pytest.approx(
+        4 * np.pi, rel=1e-12
+    )
     assert value(kpis.energy, "power", result=result) == pytest.approx(6000.0, rel=1e-12)
 
 
 def test_energy_of_integers_does_not_overflow():
-    small = run([0, 3], force=np.array([100_000, 100_000], np.int32), speed=np.array([50_000, 50_000], np.int32))
+    small = run(
+        [0, 3],
+        force=np.array([100_000, 100_000], np.int32),
+        speed=np.array([50_000, 50_000], np.int32),
+    )
     assert value(kpis.energy, "force", "speed", result=small) == 1.5e10
 
 
 FUNCTIONS = [
-    function for name, function in vars(kpis).items() if getattr(function, "__module__", "") == "cosim.kpis" and name[0].islower()
+    function
+    for name, function in vars(kpis).items()
+    if getattr(function, "__module__", "") == "cosim.kpis" and name[0].islower()
 ]
 
 
@@ -175,7 +217,13 @@ def test_kpis_outside_the_run_are_nan(function):
 
 def scenario(folder, **kpi):
     block = {"python": "saw.py:Saw"}
-    content = {"name": "saw", "stop_time": 1, "step_size": 0.25, "components": {"a": block}, "kpis": [{"name": "x", **kpi}]}
+    content = {
+        "name": "saw",
+        "stop_time": 1,
+        "step_size": 0.25,
+        "components": {"a": block},
+        "kpis": [{"name": "x", **kpi}],
+    }
     (folder / "saw.py").write_text(
         "from pythonfmu import Fmi2Causality, Fmi2Slave, Real\n\n\n"
         "class Saw(Fmi2Slave):\n"
@@ -192,7 +240,9 @@ def scenario(folder, **kpi):
 
 
 def test_a_scenario_names_a_kpi_by_its_module(tmp_path):
-    done = scenario(tmp_path, python="cosim.kpis:time_to_reach", arguments={"signal": "a.y", "level": 0.75})
+    done = scenario(
+        tmp_path, python="cosim.kpis:time_to_reach", arguments={"signal": "a.y", "level": 0.75}
+    )
     assert done.returncode == 0, done.stderr
     assert json.loads((tmp_path / "runs/saw/kpis.json").read_text()) == {"x.value": 0.75}
     assert "x.value    0.75   s" in done.stdout
@@ -201,11 +251,19 @@ def test_a_scenario_names_a_kpi_by_its_module(tmp_path):
 @pytest.mark.parametrize(
     ("python", "arguments", "message"),
     [
-        ("cosim.kpis:rise_tme", {"signal": "a.y"}, 'defines no function "rise_tme"; did you mean "rise_time"?'),
+        (
+            "cosim.kpis:rise_tme",
+            {"signal": "a.y"},
+            'defines no function "rise_tme"; did you mean "rise_time"?',
+        ),
         ("cosim.kpis:rms", {"signl": "a.y"}, 'takes no argument "signl"; did you mean "signal"?'),
         ("cosim.kpsi:rms", {}, 'module "cosim.kpsi" does not exist'),
         ("nowhere.kpis:rms", {}, 'module "nowhere.kpis" does not exist'),
-        ("cosim/kpis:rms", {}, 'expected "file.py:function" or "package.module:function", found "cosim/kpis:rms"'),
+        (
+            "cosim/kpis:rms",
+            {},
+            'expected "file.py:function" or "package.module:function", found "cosim/kpis:rms"',
+        ),
     ],
 )
 def test_unknown_kpis_and_signals_are_refused_before_the_run(tmp_path, python, arguments, message):
@@ -226,7 +284,11 @@ def test_units_are_those_of_the_signals():
         ("unknown", kpis.ise, {"signal": "other"}),
         ("overshoot", kpis.overshoot, {"signal": "speed"}),
     ]
-    units = kpi_units(named, [f"{name}.value" for name, _, _ in named], {"speed": "m/s", "angle": "rad", "other": ""})
+    units = kpi_units(
+        named,
+        [f"{name}.value" for name, _, _ in named],
+        {"speed": "m/s", "angle": "rad", "other": ""},
+    )
     assert list(units.values()) == ["s", "J", "m/s", "m", "m2/s", "rad.s2", "", ""]
 
 
@@ -236,7 +298,11 @@ def test_better_is_declared():
 
 
 def test_a_target_is_converted_to_the_unit_of_the_signal():
-    values = {"tank": np.array([20.0, 30.0]), "setpoint": np.array([293.15, 300.15]), "power": np.array([1.0, 2.0])}
+    values = {
+        "tank": np.array([20.0, 30.0]),
+        "setpoint": np.array([293.15, 300.15]),
+        "power": np.array([1.0, 2.0]),
+    }
     units = {"tank": "degC", "setpoint": "K", "power": "W"}
     result = Result(Recording(np.array([0.0, 1.0]), values, units))
     assert value(kpis.final, "tank", "setpoint", result=result) == pytest.approx(3.0)
@@ -248,8 +314,16 @@ def test_a_target_is_converted_to_the_unit_of_the_signal():
     ("function", "arguments", "message"),
     [
         (kpis.settling_time, {"band": -0.3}, "expected a band of 0 or more; found -0.3"),
-        (kpis.rise_time, {"low": 0.9, "high": 0.1}, "expected 0 <= low < high; found low 0.9, high 0.1"),
-        (kpis.saturation_share, {"lower": 2.0, "upper": 1.0}, "lower limit 2 is above upper limit 1"),
+        (
+            kpis.rise_time,
+            {"low": 0.9, "high": 0.1},
+            "expected 0 <= low < high; found low 0.9, high 0.1",
+        ),
+        (
+            kpis.saturation_share,
+            {"lower": 2.0, "upper": 1.0},
+            "lower limit 2 is above upper limit 1",
+        ),
         (kpis.peak, {"start": 3.0, "stop": 2.0}, "start 3 s is after stop 2 s"),
     ],
 )

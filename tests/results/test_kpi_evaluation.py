@@ -22,7 +22,9 @@ def extent(result, signal, above=0.0):
 
 
 def test_kpi_values_are_named_python_numbers():
-    values = evaluate_kpis(RESULT, [("all", extent, {"signal": "x"}), ("high", extent, {"signal": "x", "above": 5})])
+    values = evaluate_kpis(
+        RESULT, [("all", extent, {"signal": "x"}), ("high", extent, {"signal": "x", "above": 5})]
+    )
     assert values == {
         **{"all.largest": 4.0, "all.exceeds": True, "all.rows": 3},
         **{"high.largest": 4.0, "high.exceeds": False, "high.rows": 3},
@@ -59,7 +61,9 @@ def test_units_may_depend_on_those_of_signals(declared, unit, expected):
     @units(value=declared)
     def kpi(result, signal): ...
 
-    assert kpi_units([("x", kpi, {"signal": "y"})], ["x.value"], {"y": unit}) == {"x.value": expected}
+    assert kpi_units([("x", kpi, {"signal": "y"})], ["x.value"], {"y": unit}) == {
+        "x.value": expected
+    }
 
 
 def test_a_failing_kpi_is_named():
@@ -67,7 +71,11 @@ def test_a_failing_kpi_is_named():
         return {"ratio": 1 / 0}
 
     with pytest.raises(
-        ComponentError, match=r'^KPI "speed": ratio failed: ZeroDivisionError: division by zero \(test_kpi_evaluation.py:\d+\)$'
+        ComponentError,
+        match=(
+            r'^KPI "speed": ratio failed: ZeroDivisionError: division by zero '
+            r"\(test_kpi_evaluation.py:\d+\)$"
+        ),
     ):
         evaluate_kpis(RESULT, [("speed", ratio, {})])
 
@@ -76,7 +84,9 @@ def test_a_kpi_whose_library_panics_is_named():
     def ratio(_result):
         raise BaseException("index out of bounds")
 
-    with pytest.raises(ComponentError, match=r'^KPI "speed": ratio failed: BaseException: index out of bounds'):
+    with pytest.raises(
+        ComponentError, match=r'^KPI "speed": ratio failed: BaseException: index out of bounds'
+    ):
         evaluate_kpis(RESULT, [("speed", ratio, {})])
 
 
@@ -136,7 +146,11 @@ def test_limits_include_their_own_value(limits, value, passed):
 
 
 def test_all_bad_checks_are_refused_together():
-    checks = [{"kpi": "landing.eror", "max": 1}, {"kpi": "landing.error", "mx": 1}, {"kpi": "landing.error"}]
+    checks = [
+        {"kpi": "landing.eror", "max": 1},
+        {"kpi": "landing.error", "mx": 1},
+        {"kpi": "landing.error"},
+    ]
     with pytest.raises(InputError) as refused:
         evaluate_checks({"landing.error": 0.0}, checks)
     assert [str(problem) for problem in refused.value.problems] == [
@@ -149,7 +163,8 @@ def test_all_bad_checks_are_refused_together():
 def test_a_check_of_a_missing_kpi_fails():
     """A result contains every check, also one with a misspelt name."""
     eror, error = evaluate_all_checks(
-        {"landing.error": 0.0}, [{"kpi": "landing.eror", "max": 1}, {"kpi": "landing.error", "max": 1}]
+        {"landing.error": 0.0},
+        [{"kpi": "landing.eror", "max": 1}, {"kpi": "landing.error", "max": 1}],
     )
     assert (eror.passed, error.passed) == (False, True)
     assert str(eror) == "landing.eror has no value, expected at most 1"

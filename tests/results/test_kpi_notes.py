@@ -23,15 +23,29 @@ def notes(result, name, function, **arguments):
 
 def test_values_with_the_same_reason_share_a_line(flight):
     assert notes(flight, "landing", landing, vehicle="plant.uav", deck="plant.usv.deck") == [
-        "landing.time, landing.lateral_error, landing.touchdown_speed and 3 more: plant.uav touches no vessel after a flight"
+        (
+            "landing.time, landing.lateral_error, landing.touchdown_speed and 3 more: plant.uav "
+            "touches no vessel after a flight"
+        )
     ]
-    path = {"vehicle": "plant.usv", "waypoint_x": [90.0], "waypoint_y": [9.0], "acceptance_radius": 0.5}
-    assert notes(flight, "waypoints", waypoints, **path) == ["waypoints.time[1]: plant.usv did not reach this waypoint"]
+    path = {
+        "vehicle": "plant.usv",
+        "waypoint_x": [90.0],
+        "waypoint_y": [9.0],
+        "acceptance_radius": 0.5,
+    }
+    assert notes(flight, "waypoints", waypoints, **path) == [
+        "waypoints.time[1]: plant.usv did not reach this waypoint"
+    ]
 
 
 def test_a_vehicle_that_never_took_off_is_no_vehicle_that_missed_the_vessel():
     """The motors stay off: the quadcopter falls 2 mm onto its platform and stays there."""
-    result = cosim.run("demo1_box", {"/kpis": [], "/checks": [], "/figures": [], "/connections/2/gain": 0.0}, stop_time=1)
+    result = cosim.run(
+        "demo1_box",
+        {"/kpis": [], "/checks": [], "/figures": [], "/connections/2/gain": 0.0},
+        stop_time=1,
+    )
     deck = {"vehicle": "plant.uav", "deck": "plant.usv.deck"}
     values = evaluate_kpis(
         result,
@@ -72,6 +86,12 @@ def test_a_copy_as_for_another_process_has_the_reason():
 def test_a_run_names_the_signals_of_optional_kpis():
     result = cosim.run("demo1_box", {"/figures": []}, stop_time=0.1)
     assert result.metadata["check_notes"] == [
-        "landing.lateral_error, landing.touchdown_speed: plant.uav never took off, it is in contact during the whole run"
+        (
+            "landing.lateral_error, landing.touchdown_speed: plant.uav never took off, it is in "
+            "contact during the whole run"
+        )
     ]
-    assert 'descent is computed from the signal uav.mode (argument "mode")' in result.metadata["kpi_notes"]
+    assert (
+        'descent is computed from the signal uav.mode (argument "mode")'
+        in result.metadata["kpi_notes"]
+    )

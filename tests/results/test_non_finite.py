@@ -26,18 +26,29 @@ def spoiled(rows, row, value=NAN, dtype=np.float64):
 @pytest.mark.parametrize("row", [0, 1, 16383, 16384, 39999])
 def test_a_signal_has_one_warning_with_its_first_time(caplog, row, value, dtype):
     """Rows are examined in chunks of 16384."""
-    assert warn_non_finite(recording(40000, y=spoiled(40000, row, value, dtype))) == {"y": row / 100}
-    assert caplog.messages == [f"y is {value} at t = {row / 100:.12g} s, its first value that is not finite"]
+    assert warn_non_finite(recording(40000, y=spoiled(40000, row, value, dtype))) == {
+        "y": row / 100
+    }
+    assert caplog.messages == [
+        f"y is {value} at t = {row / 100:.12g} s, its first value that is not finite"
+    ]
 
 
 def test_the_largest_floats_are_finite(caplog):
-    columns = {dtype.__name__: np.array([np.finfo(dtype).max, np.finfo(dtype).min], dtype) for dtype in (np.float64, np.float32)}
+    columns = {
+        dtype.__name__: np.array([np.finfo(dtype).max, np.finfo(dtype).min], dtype)
+        for dtype in (np.float64, np.float32)
+    }
     assert warn_non_finite(recording(2, **columns)) == {}
     assert not caplog.messages
 
 
 def test_only_floats_are_examined():
-    columns = {"i": np.array([1, 2]), "b": np.array([True, False]), "s": np.array(["nan", "inf"], object)}
+    columns = {
+        "i": np.array([1, 2]),
+        "b": np.array([True, False]),
+        "s": np.array(["nan", "inf"], object),
+    }
     assert warn_non_finite(recording(2, **columns)) == {}
 
 

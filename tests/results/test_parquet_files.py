@@ -20,7 +20,9 @@ def recording(rows=5):
         "a.on": np.arange(rows) % 2 == 0,
         "a.text": np.array([f"row {i}, \u00e9" for i in range(rows)], object),
     }
-    return Recording(np.arange(rows) / 100, columns, {"a.x": "m/s", "a.n": "", "a.on": "", "a.text": ""})
+    return Recording(
+        np.arange(rows) / 100, columns, {"a.x": "m/s", "a.n": "", "a.on": "", "a.text": ""}
+    )
 
 
 def test_every_column_returns_in_its_own_type(tmp_path):
@@ -28,7 +30,13 @@ def test_every_column_returns_in_its_own_type(tmp_path):
     write_parquet(given, tmp_path / "r.parquet")
     table = parquet.read_table(tmp_path / "r.parquet")
     assert table.column_names == ["time", "a.x", "a.n", "a.on", "a.text"]
-    assert [str(field.type) for field in table.schema] == ["double", "double", "int32", "bool", "string"]
+    assert [str(field.type) for field in table.schema] == [
+        "double",
+        "double",
+        "int32",
+        "bool",
+        "string",
+    ]
     for name, values in {"time": given.time, **given.columns}.items():
         assert table[name].to_pylist() == values.tolist()
 
@@ -36,7 +44,11 @@ def test_every_column_returns_in_its_own_type(tmp_path):
 def test_units_are_in_the_schema(tmp_path):
     write_parquet(recording(), tmp_path / "r.parquet")
     schema = parquet.read_schema(tmp_path / "r.parquet")
-    assert [schema.field(name).metadata[b"unit"] for name in ("time", "a.x", "a.n")] == [b"s", b"m/s", b""]
+    assert [schema.field(name).metadata[b"unit"] for name in ("time", "a.x", "a.n")] == [
+        b"s",
+        b"m/s",
+        b"",
+    ]
 
 
 def test_rows_are_written_group_by_group(tmp_path, monkeypatch):

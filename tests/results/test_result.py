@@ -34,7 +34,10 @@ def test_signals_are_found_by_name(result):
 
 
 def test_an_unknown_signal_names_the_nearest(result):
-    with pytest.raises(InputError, match=r'^no signal "plant.uav.positon.z" was.*; did you mean "plant.uav.position.z"\?$'):
+    with pytest.raises(
+        InputError,
+        match=r'^no signal "plant.uav.positon.z" was.*; did you mean "plant.uav.position.z"\?$',
+    ):
         result["plant.uav.positon.z"]
 
 
@@ -50,10 +53,14 @@ def test_the_time_as_signal_is_refused_with_a_hint(result):
 
 
 def test_an_unknown_kpi_names_the_nearest_or_all():
-    with pytest.raises(KeyError, match=r'^no KPI "landing.tme" was computed; did you mean "landing.time"\?$'):
+    with pytest.raises(
+        KeyError, match=r'^no KPI "landing.tme" was computed; did you mean "landing.time"\?$'
+    ):
         Kpis({"landing.time": 14.5})["landing.tme"]
     many = Kpis({f"{name}.{i}": 1.0 for name in ("landing", "waypoints") for i in range(8)})
-    with pytest.raises(KeyError, match=r'^no KPI "speed.value" was computed; valid: landing\.\*, waypoints\.\*$'):
+    with pytest.raises(
+        KeyError, match=r'^no KPI "speed.value" was computed; valid: landing\.\*, waypoints\.\*$'
+    ):
         many["speed.value"]
 
 
@@ -77,7 +84,11 @@ def test_a_star_matches_dots_and_brackets(result, pattern, places):
 def test_repr_shows_name_size_failure_and_kpis(result):
     assert repr(result) == "Result: 2 rows of 5 signals, 0 s to 0.01 s"
     kpis = {"landing.lateral_error": 0.05, "landing.landed_at_end": True, "landing.bounces": 2}
-    about = {"name": "demo", "failure": "uav: fmi2DoStep failed", "kpi_units": {"landing.lateral_error": "m"}}
+    about = {
+        "name": "demo",
+        "failure": "uav: fmi2DoStep failed",
+        "kpi_units": {"landing.lateral_error": "m"},
+    }
     assert repr(Result(result.recording, kpis, metadata=about)).splitlines() == [
         "demo: 2 rows of 5 signals, 0 s to 0.01 s",
         "ended early: uav: fmi2DoStep failed",
@@ -85,9 +96,14 @@ def test_repr_shows_name_size_failure_and_kpis(result):
         "  landing.landed_at_end  True",
         "  landing.bounces        2",
     ]
-    checks = evaluate_all_checks(kpis, [{"kpi": "landing.bounces", "max": 1}, {"kpi": "landing.landed_at_end", "equals": True}])
+    checks = evaluate_all_checks(
+        kpis,
+        [{"kpi": "landing.bounces", "max": 1}, {"kpi": "landing.landed_at_end", "equals": True}],
+    )
     units = {"landing.bounces": "m", "landing.landed_at_end": "1"}
-    assert repr(Result(result.recording, checks=checks, metadata={"kpi_units": units})).splitlines()[1:] == [
+    assert repr(
+        Result(result.recording, checks=checks, metadata={"kpi_units": units})
+    ).splitlines()[1:] == [
         "1 of 2 checks passed:",
         "  landing.bounces is 2 m, expected at most 1 m",
     ]
@@ -103,9 +119,21 @@ def test_csv_keeps_every_signal(result, tmp_path):
 
 
 def test_write_run_writes_three_files(result, tmp_path):
-    kpis = {"landing.lateral_error": 0.05, "landing.slide": math.nan, "landing.landed_at_end": True, "landing.bounces": 2}
-    metadata = {"name": "demo", "seeds": np.array([1, 2]), "limit": np.float64(math.inf), "scenario": Path("a/b.json")}
-    write_run(Result(result.recording, kpis, {"loop_seconds": 0.5}, metadata), tmp_path / "runs" / "demo")
+    kpis = {
+        "landing.lateral_error": 0.05,
+        "landing.slide": math.nan,
+        "landing.landed_at_end": True,
+        "landing.bounces": 2,
+    }
+    metadata = {
+        "name": "demo",
+        "seeds": np.array([1, 2]),
+        "limit": np.float64(math.inf),
+        "scenario": Path("a/b.json"),
+    }
+    write_run(
+        Result(result.recording, kpis, {"loop_seconds": 0.5}, metadata), tmp_path / "runs" / "demo"
+    )
     folder = tmp_path / "runs" / "demo"
     assert sorted(path.name for path in folder.iterdir()) == ["kpis.json", "result.csv", "run.json"]
     assert (folder / "kpis.json").read_text() == (
@@ -114,4 +142,10 @@ def test_write_run_writes_three_files(result, tmp_path):
     )
     run = json.loads((folder / "run.json").read_text())
     assert run.pop("units") == result.recording.units
-    assert run == {"name": "demo", "seeds": [1, 2], "limit": None, "scenario": "a/b.json", "timing": {"loop_seconds": 0.5}}
+    assert run == {
+        "name": "demo",
+        "seeds": [1, 2],
+        "limit": None,
+        "scenario": "a/b.json",
+        "timing": {"loop_seconds": 0.5},
+    }

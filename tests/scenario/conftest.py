@@ -28,17 +28,29 @@ class ScenarioFolder:
     def block(name: str, **more: Any) -> dict[str, Any]:
         return {"python": f"{BLOCKS}:{name}", **more}
 
-    def scenario(self, components: dict[str, Any], connections: list[dict[str, Any]] | None = None, **more: Any) -> Path:
+    def scenario(
+        self,
+        components: dict[str, Any],
+        connections: list[dict[str, Any]] | None = None,
+        **more: Any,
+    ) -> Path:
         content = {"name": "test", "stop_time": 3, "step_size": 1, "components": components}
         return self.write({**content, "connections": connections or [], **more})
 
     def problems_of(self, file: Path, **settings: Any) -> list[str]:
-        """Return the problems for which a scenario file is refused, with paths relative to this folder."""
+        """Return the problems for which a scenario file is refused, with paths relative to this
+        folder.
+        """
         with pytest.raises(cosim.InputError) as refusal:
             cosim.run(file, **settings)
         return [str(problem).replace(f"{self.path}/", "") for problem in refusal.value.problems]
 
-    def problems(self, components: dict[str, Any], connections: list[dict[str, Any]] | None = None, **more: Any) -> list[str]:
+    def problems(
+        self,
+        components: dict[str, Any],
+        connections: list[dict[str, Any]] | None = None,
+        **more: Any,
+    ) -> list[str]:
         """Return the problems for which a scenario with these keys is refused."""
         return self.problems_of(self.scenario(components, connections, **more))
 

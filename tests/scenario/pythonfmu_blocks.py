@@ -14,7 +14,9 @@ class Block(Fmi2Slave):
 
     def real(self, name, causality, start=0.0):
         self.values[name] = start
-        variability = Fmi2Variability.tunable if causality == PARAMETER else Fmi2Variability.continuous
+        variability = (
+            Fmi2Variability.tunable if causality == PARAMETER else Fmi2Variability.continuous
+        )
         self.register_variable(
             Real(
                 name,
@@ -55,7 +57,9 @@ class Plant(Block):
 
     def do_step(self, _current_time, _step_size):
         for i, axis in enumerate("xy", 1):
-            self.values[f"{self.vehicle}.position.{axis}"] += self.values[f"{self.vehicle}.motor[{i}]"]
+            self.values[f"{self.vehicle}.position.{axis}"] += self.values[
+                f"{self.vehicle}.motor[{i}]"
+            ]
         return True
 
 
@@ -82,9 +86,15 @@ class Typed(Fmi2Slave):
     def __init__(self, **arguments):
         super().__init__(**arguments)
         self.number, self.flag, self.text = 1, False, "x"
-        self.register_variable(Integer("number", causality=PARAMETER, variability=Fmi2Variability.tunable))
-        self.register_variable(Boolean("flag", causality=PARAMETER, variability=Fmi2Variability.tunable))
-        self.register_variable(String("text", causality=PARAMETER, variability=Fmi2Variability.tunable))
+        self.register_variable(
+            Integer("number", causality=PARAMETER, variability=Fmi2Variability.tunable)
+        )
+        self.register_variable(
+            Boolean("flag", causality=PARAMETER, variability=Fmi2Variability.tunable)
+        )
+        self.register_variable(
+            String("text", causality=PARAMETER, variability=Fmi2Variability.tunable)
+        )
         self.register_variable(Boolean("out", causality=OUT))
         self.out = True
 

@@ -37,9 +37,17 @@ def test_a_setting_of_the_caller_turns_threads_off(tmp_path, probe):
 
 
 def test_nested_systems_have_a_parallel_setting_of_their_own(tmp_path, probe):
-    inner = {"components": {"a": {"fmu": str(probe)}}, "algorithm": {"stages": [["a"]], "parallel": False}}
+    inner = {
+        "components": {"a": {"fmu": str(probe)}},
+        "algorithm": {"stages": [["a"]], "parallel": False},
+    }
     (tmp_path / "inner.json").write_text(json.dumps(inner))
-    outer = {"name": "outer", "stop_time": 1, "step_size": 0.1, "components": {"n": {"system": "inner.json"}}}
+    outer = {
+        "name": "outer",
+        "stop_time": 1,
+        "step_size": 0.1,
+        "components": {"n": {"system": "inner.json"}},
+    }
     (tmp_path / "outer.json").write_text(json.dumps(outer))
     prepared = load(tmp_path / "outer.json")
     ((group,),) = prepared.system.stages
@@ -93,12 +101,22 @@ def test_without_stages_components_step_after_those_that_feed_them(folder):
     gains = {name: folder.block("Gain") for name in "cba"}
     chain = [connection("a.y", "b.u"), connection("b.y", "c.u")]
     assert stage_order(folder, gains, chain) == (("a",), ("b",), ("c",))
-    assert stage_order(folder, gains, [connection("a.y", "b.u", delay=1)]) == (("c",), ("b",), ("a",))
-    assert stage_order(folder, gains, [*chain, connection("c.y", "a.u")]) == (("c",), ("b",), ("a",))  # unknown dependencies
+    assert stage_order(folder, gains, [connection("a.y", "b.u", delay=1)]) == (
+        ("c",),
+        ("b",),
+        ("a",),
+    )
+    assert stage_order(folder, gains, [*chain, connection("c.y", "a.u")]) == (
+        ("c",),
+        ("b",),
+        ("a",),
+    )  # unknown dependencies
 
 
 def test_in_a_loop_the_component_with_direct_feedthrough_steps_last(folder, loop):
     wires = [connection("controller.y", "plant.u"), connection("plant.y", "controller.u")]
     assert stage_order(folder, loop, wires) == (("plant",), ("controller",))
-    ((group,),) = stage_order(folder, {name: folder.block("Gain") for name in "ab"}, algorithm={"iteration": {}})
+    ((group,),) = stage_order(
+        folder, {name: folder.block("Gain") for name in "ab"}, algorithm={"iteration": {}}
+    )
     assert group.stages == (("a",), ("b",))

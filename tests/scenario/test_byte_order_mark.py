@@ -1,4 +1,6 @@
-"""JSON files with a UTF-8 byte order mark, as some editors on Windows write them, are read like those without."""
+"""JSON files with a UTF-8 byte order mark, as some editors on Windows write them, are read like
+those without.
+"""
 
 import json
 
@@ -29,10 +31,18 @@ def marked(folder):
 
 
 def test_a_scenario_and_a_nested_system(folder, marked):
-    marked({"components": {"x": folder.block("Gain")}, "ports": {"inputs": {"u": "x.u"}, "outputs": {"y": "x.y"}}}, "n.json")
+    marked(
+        {
+            "components": {"x": folder.block("Gain")},
+            "ports": {"inputs": {"u": "x.u"}, "outputs": {"y": "x.y"}},
+        },
+        "n.json",
+    )
     components = {"a": {"system": "n.json", "parameters": {"x.u": 3.0}}, "b": folder.block("Gain")}
     content = {"name": "bom", "stop_time": 1, "step_size": 1, "components": components}
-    assert cosim.run(marked(content | {"connections": [connection("a.y", "b.u")]}))["b.y"].tolist() == [0.0, 12.0]
+    assert cosim.run(marked(content | {"connections": [connection("a.y", "b.u")]}))[
+        "b.y"
+    ].tolist() == [0.0, 12.0]
 
 
 def test_positions_do_not_count_the_mark(marked):
@@ -47,7 +57,11 @@ def test_a_second_mark_is_no_json(marked):
 
 
 def test_a_sweep_and_a_tuning(marked):
-    sweep = {"name": "s", "scenario": "demo1_box", "factors": [{"name": "f", "set": "a.b", "values": [1, 2]}]}
+    sweep = {
+        "name": "s",
+        "scenario": "demo1_box",
+        "factors": [{"name": "f", "set": "a.b", "values": [1, 2]}],
+    }
     assert len(Sweep.from_file(marked(sweep, "sweep.json"))) == 2
     parameter = {"name": "p", "set": "a.b", "min": 0.0, "max": 1.0}
     tuning = {"name": "t", "scenario": "demo1_box", "minimize": "p", "parameters": [parameter]}

@@ -60,21 +60,36 @@ def chain(folder, levels, width, last, **more):
     ],
     ids=["10^12 components", "10^98 components", "a little too many", "systems without components"],
 )
-def test_small_files_that_expand_to_many_components_are_refused_before(folder, levels, width, last, found):
+def test_small_files_that_expand_to_many_components_are_refused_before(
+    folder, levels, width, last, found
+):
     folder.write({"components": {}}, "empty.json")
     line = refusal(chain(folder, levels, width, last))
     assert line.startswith("scenario.json:1:")
     assert f"$.components: found {found}" in line
-    assert line.endswith(" components and nested systems in the expanded scenario, expected at most 100 000")
+    assert line.endswith(
+        " components and nested systems in the expanded scenario, expected at most 100 000"
+    )
 
 
 def test_a_file_is_read_once_however_often_it_is_used(folder, monkeypatch):
     read, files = extension.read_document, []
-    monkeypatch.setattr(extension, "read_document", lambda file: files.append(file.name) or read(file))
+    monkeypatch.setattr(
+        extension, "read_document", lambda file: files.append(file.name) or read(file)
+    )
     (folder.path / "up").mkdir()
     folder.write({"components": {"x": folder.block("Gain")}}, "leaf.json")
-    folder.write({"components": {"a": {"system": "leaf.json"}, "b": {"system": "up/../leaf.json"}}}, "pair.json")
-    scenario = folder.scenario({"p": {"system": "pair.json"}, "q": {"system": "up/../pair.json"}, "x": {"system": "leaf.json"}})
+    folder.write(
+        {"components": {"a": {"system": "leaf.json"}, "b": {"system": "up/../leaf.json"}}},
+        "pair.json",
+    )
+    scenario = folder.scenario(
+        {
+            "p": {"system": "pair.json"},
+            "q": {"system": "up/../pair.json"},
+            "x": {"system": "leaf.json"},
+        }
+    )
     loaded = load(scenario)
     loaded.free()
     assert list(loaded.system.components) == ["p.a.x", "p.b.x", "q.a.x", "q.b.x", "x.x"]
@@ -92,7 +107,10 @@ def test_deeply_nested_systems_are_refused_at_the_level_that_is_too_deep(folder)
     load(folder.scenario({"a": {"system": "level0.json"}})).free()
     folder.write({"components": {"c0": {"system": "level0.json"}}}, "more.json")
     line = refusal(folder.scenario({"a": {"system": "level0.json"}, "b": {"system": "more.json"}}))
-    assert line.endswith('$.components.c0.system: the nested system "level0.json" is nested more than 100 levels deep')
+    assert line.endswith(
+        '$.components.c0.system: the nested system "level0.json" is nested more than 100 levels '
+        "deep"
+    )
     assert line.startswith("more.json")
 
 
@@ -102,22 +120,47 @@ def fan(folder, levels, kind, names, **root):
         last = level == levels - 1
         inner = folder.block("Gain") if last else {"system": f"level{level + 1}.json"}
         targets = ["c.u"] if last else names
-        folder.write({"components": {"c": inner}, "ports": {kind: {"p": targets, "q": targets}}}, f"level{level}.json")
+        folder.write(
+            {"components": {"c": inner}, "ports": {kind: {"p": targets, "q": targets}}},
+            f"level{level}.json",
+        )
     return folder.scenario({"a": {"system": "level0.json"}, "g": folder.block("Gain")}, **root)
 
 
 @pytest.mark.parametrize(
     ("kind", "names", "root", "line"),
     [
-        ("inputs", ["c.p", "c.q"], {"connections": [connection("g.y", "a.p")]}, "connections and output ports"),
-        ("inputs", ["c", "c"], {"connections": [connection("g.y", "a.p" + 39 * ".p")]}, "connections and output ports"),
-        ("parameters", ["c.p", "c.q"], {"events": [{"time": 1, "set": {"a.p": 1}}]}, "values of parameters and events"),
-        ("inputs", ["c.p", "c.q"], {"inputs": [{"file": "x.csv", "to": {"x": ["a.q"]}}]}, "connections and output ports"),
+        (
+            "inputs",
+            ["c.p", "c.q"],
+            {"connections": [connection("g.y", "a.p")]},
+            "connections and output ports",
+        ),
+        (
+            "inputs",
+            ["c", "c"],
+            {"connections": [connection("g.y", "a.p" + 39 * ".p")]},
+            "connections and output ports",
+        ),
+        (
+            "parameters",
+            ["c.p", "c.q"],
+            {"events": [{"time": 1, "set": {"a.p": 1}}]},
+            "values of parameters and events",
+        ),
+        (
+            "inputs",
+            ["c.p", "c.q"],
+            {"inputs": [{"file": "x.csv", "to": {"x": ["a.q"]}}]},
+            "connections and output ports",
+        ),
     ],
     ids=["connection", "ports by the rest of a name", "event", "input profile"],
 )
 def test_ports_that_double_at_each_level_are_refused(folder, kind, names, root, line):
-    assert f"found 549 755 813 888 {line}" in refusal(fan(folder, 40, kind, names, **root)).replace("889", "888")
+    assert f"found 549 755 813 888 {line}" in refusal(fan(folder, 40, kind, names, **root)).replace(
+        "889", "888"
+    )
 
 
 def test_parameters_through_ports_that_double_at_each_level_are_refused(folder):
@@ -131,7 +174,10 @@ def test_delays_of_nested_systems_are_counted_with_all_instances(folder):
     pair = {"components": {"x": folder.block("Gain"), "y": folder.block("Gain")}}
     folder.write({**pair, "connections": [connection("x.y", "y.u", delay=1_000_000)]}, "pair.json")
     line = refusal(folder.scenario({f"c{i}": {"system": "pair.json"} for i in range(101)}))
-    assert line.endswith("found 101 000 000 values that delays store in the expanded scenario, expected at most 100 000 000")
+    assert line.endswith(
+        "found 101 000 000 values that delays store in the expanded scenario, expected at most 100 "
+        "000 000"
+    )
 
 
 @pytest.mark.parametrize(("size", "delay"), [(1000, 1_000_000), (20_000, 5001), (101, 1_000_000)])
@@ -139,29 +185,46 @@ def test_delays_of_arrays_are_counted_with_all_elements(folder, size, delay):
     (folder.path / "arrays.py").write_text(ARRAYS)
     array = {"python": "arrays.py:Arrays", "arguments": {"shape": [size]}}
     connections = [connection("g.y", "g.u"), connection("a.y0", "b.u", delay=delay)]
-    line = refusal(folder.scenario({"a": array, "b": array, "g": folder.block("Gain")}, connections))
-    assert line.endswith(f"the delays store {size_limits.format_count(size * delay)} values, expected at most 100 000 000")
+    line = refusal(
+        folder.scenario({"a": array, "b": array, "g": folder.block("Gain")}, connections)
+    )
+    assert line.endswith(
+        f"the delays store {size_limits.format_count(size * delay)} values, expected at most 100 "
+        "000 000"
+    )
     assert "$.connections[1]" in line
 
 
 @pytest.mark.parametrize(
     ("shape", "count", "found"),
-    [([1_000_001], 1, "2 000 002"), ([1000, 1000, 1000], 1, "2 000 000 000"), ([10_000], 101, "2 020 000")],
+    [
+        ([1_000_001], 1, "2 000 002"),
+        ([1000, 1000, 1000], 1, "2 000 000 000"),
+        ([10_000], 101, "2 020 000"),
+    ],
     ids=["long array", "array of three dimensions", "many components"],
 )
 def test_elements_of_arrays_are_counted_before_they_get_names(folder, shape, count, found):
     (folder.path / "arrays.py").write_text(ARRAYS)
     array = {"python": "arrays.py:Arrays", "arguments": {"shape": shape}}
     line = refusal(folder.scenario({f"a{i}": array for i in range(count)}))
-    assert f"$.components.a{count - 1}: found {found} variables and elements of arrays up to a{count - 1}, expected" in line
+    assert (
+        f"$.components.a{count - 1}: found {found} variables and elements of arrays up to "
+        f"a{count - 1}, expected"
+    ) in line
 
 
 def test_output_ports_that_show_the_same_array_again_are_counted(folder, monkeypatch):
     monkeypatch.setattr("cosim.scenario.system_builder.MAX_SCALARS", 20_000)
     (folder.path / "arrays.py").write_text(ARRAYS)
     array = {"python": "arrays.py:Arrays", "arguments": {"shape": [1000]}}
-    folder.write({"components": {"x": array}, "ports": {"outputs": {f"p{i}": "x.y0" for i in range(1000)}}}, "n.json")
-    assert "found 21 000 signals of output ports up to a.p20" in refusal(folder.scenario({"a": {"system": "n.json"}}))
+    folder.write(
+        {"components": {"x": array}, "ports": {"outputs": {f"p{i}": "x.y0" for i in range(1000)}}},
+        "n.json",
+    )
+    assert "found 21 000 signals of output ports up to a.p20" in refusal(
+        folder.scenario({"a": {"system": "n.json"}})
+    )
 
 
 def test_the_same_connection_of_arrays_again_and_again_is_refused(folder, monkeypatch):
@@ -169,20 +232,34 @@ def test_the_same_connection_of_arrays_again_and_again_is_refused(folder, monkey
     (folder.path / "arrays.py").write_text(ARRAYS)
     array = {"python": "arrays.py:Arrays", "arguments": {"shape": [1000]}}
     line = refusal(folder.scenario({"a": array, "b": array}, [connection("a.y0", "b.u")] * 1000))
-    assert "$.connections[10]: found 10 001 connections of scalars up to here, expected at most 10 000" in line
+    assert (
+        "$.connections[10]: found 10 001 connections of scalars up to here, expected at most 10 000"
+        in line
+    )
 
 
 def ring(folder, groups):
-    """Write a scenario of one nested system that contains `groups` nested systems of 10 connected components each."""
+    """Write a scenario of one nested system that contains `groups` nested systems of 10 connected
+    components each.
+    """
     names = [f"c{i}" for i in range(10)]
     wires = [connection(f"{a}.y", f"{b}.u") for a, b in pairwise(names)]
     ports = {"inputs": {"u": "c0.u"}, "outputs": {"y": "c9.y"}}
     folder.write(
-        {"components": {n: folder.block("Gain", period=1) for n in names}, "connections": wires, "ports": ports}, "n.json"
+        {
+            "components": {n: folder.block("Gain", period=1) for n in names},
+            "connections": wires,
+            "ports": ports,
+        },
+        "n.json",
     )
     outer = [f"s{i}" for i in range(groups)]
-    wires = [connection(f"{a}.y", f"{b}.u") for a, b in zip(outer, outer[1:] + outer[:1], strict=True)]
-    folder.write({"components": {n: {"system": "n.json"} for n in outer}, "connections": wires}, "ring.json")
+    wires = [
+        connection(f"{a}.y", f"{b}.u") for a, b in zip(outer, outer[1:] + outer[:1], strict=True)
+    ]
+    folder.write(
+        {"components": {n: {"system": "n.json"} for n in outer}, "connections": wires}, "ring.json"
+    )
     return folder.scenario({"all": {"system": "ring.json"}})
 
 

@@ -1,4 +1,6 @@
-"""Arguments of KPIs, figures and scenes that are taken from the system, and functions that may be left out."""
+"""Arguments of KPIs, figures and scenes that are taken from the system, and functions that may be
+left out.
+"""
 
 import pytest
 from cosim_command import run_cosim
@@ -25,10 +27,15 @@ def last(result, signal: Signal):
 @pytest.fixture
 def write(folder):
     (folder.path / "own.py").write_text(KPIS)
-    folder.write({"components": {"g": folder.block("Gain")}, "ports": {"parameters": {"gain": "g.k"}}}, "nested.json")
+    folder.write(
+        {"components": {"g": folder.block("Gain")}, "ports": {"parameters": {"gain": "g.k"}}},
+        "nested.json",
+    )
     components = {
         "a": folder.block("Gain", parameters={"u": 1.0}),
-        "pilot": folder.block("Controller", parameters={"gain": [1.0, 10.0], "vehicle.position.x": 0.0}),
+        "pilot": folder.block(
+            "Controller", parameters={"gain": [1.0, 10.0], "vehicle.position.x": 0.0}
+        ),
         "n": {"system": "nested.json"},
     }
 
@@ -63,7 +70,10 @@ def test_scalars_with_indices_are_a_list(write):
 
 
 def test_arguments_that_are_not_given_are_taken_by_name(write):
-    assert cosim.run(write("double", **{"from": "a"}), parameters={"a.k": 8.0}).kpis == {"k.k": 16.0, "k.limit": 0.0}
+    assert cosim.run(write("double", **{"from": "a"}), parameters={"a.k": 8.0}).kpis == {
+        "k.k": 16.0,
+        "k.limit": 0.0,
+    }
     assert cosim.run(write("double", {"k": 1.0}, **{"from": "a"})).kpis["k.k"] == 2.0
     file = write("double", **{"from": ["/components/a/parameters", "a"]})
     assert cosim.run(file, parameters={"/components/a/parameters/k": 6.0}).kpis["k.k"] == 12.0
@@ -72,8 +82,16 @@ def test_arguments_that_are_not_given_are_taken_by_name(write):
 @pytest.mark.parametrize(
     ("arguments", "keys", "problem"),
     [
-        ({"k": {"from": "a.q"}}, {}, '$.kpis[0].arguments.k: component "a" has no parameter "q"; valid: u, k'),
-        ({"k": {"from": "a.y"}}, {}, '$.kpis[0].arguments.k: "a.y" is an output, expected a parameter'),
+        (
+            {"k": {"from": "a.q"}},
+            {},
+            '$.kpis[0].arguments.k: component "a" has no parameter "q"; valid: u, k',
+        ),
+        (
+            {"k": {"from": "a.y"}},
+            {},
+            '$.kpis[0].arguments.k: "a.y" is an output, expected a parameter',
+        ),
         ({"k": {"from": "b.k"}}, {}, '$.kpis[0].arguments.k: unknown component "b"'),
         ({"k": {"from": "/stop"}}, {}, '$.kpis[0].arguments.k: the scenario has no "/stop"'),
         ({}, {"from": "pilot"}, '$.kpis[0].from: component "pilot" has no parameter "k"'),
@@ -91,9 +109,16 @@ def test_the_run_records_the_values(write):
     assert kpi == {"name": "k", "python": "own.py:double", "arguments": {"k": 2.0}}
 
 
-@pytest.mark.parametrize(("function", "arguments"), [("last", {"signal": "a.z"}), ("double", {"k": {"from": "a.q"}})])
+@pytest.mark.parametrize(
+    ("function", "arguments"), [("last", {"signal": "a.z"}), ("double", {"k": {"from": "a.q"}})]
+)
 def test_an_optional_function_is_left_out_with_one_line(write, tmp_path, function, arguments):
-    file = write(function, arguments, optional=True, checks=[{"kpi": f"k.{'value' if function == 'last' else 'k'}", "max": 1.0}])
+    file = write(
+        function,
+        arguments,
+        optional=True,
+        checks=[{"kpi": f"k.{'value' if function == 'last' else 'k'}", "max": 1.0}],
+    )
     done = run_cosim("run", str(file), "--no-report", cwd=tmp_path)
     assert done.returncode == 3, done.stderr
     (line,) = [line for line in done.stderr.splitlines() if "nothing feeds" not in line]
@@ -118,7 +143,9 @@ def test_one_change_of_a_scenario_changes_everything():
         "/stop_time": 1,
     }
     scenario = cosim.run("demo1_box", parameters=settings).metadata["scenario"]
-    arguments = {each["name"]: each["arguments"] for each in (*scenario["kpis"], *scenario["figures"])}
+    arguments = {
+        each["name"]: each["arguments"] for each in (*scenario["kpis"], *scenario["figures"])
+    }
     assert arguments["touchdown"]["mass"] == 0.5
     for name in ("waypoints", "paths"):
         assert (arguments[name]["waypoint_count"], arguments[name]["waypoint_x"][3]) == (4, -4.0)

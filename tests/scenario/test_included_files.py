@@ -26,7 +26,13 @@ class Echo(Component):
 def scenario(folder: Path, arguments: dict[str, Any], **more: Any) -> Path:
     (folder / "echo.py").write_text(COMPONENT)
     component = {"python": "echo.py:Echo", "arguments": arguments}
-    content = {"name": "s", "stop_time": 1.0, "step_size": 0.1, "components": {"echo": component}, **more}
+    content = {
+        "name": "s",
+        "stop_time": 1.0,
+        "step_size": 0.1,
+        "components": {"echo": component},
+        **more,
+    }
     (file := folder / "s.json").write_text(json.dumps(content))
     return file
 
@@ -51,12 +57,20 @@ def test_the_path_starts_from_the_file_that_contains_it(tmp_path: Path) -> None:
     (tmp_path / "base/one.json").write_text('{"mass": 1, "size": 2}')
     scenario(tmp_path / "base", {"a": "one.json"})
     (file := tmp_path / "t.json").write_text(
-        json.dumps({"name": "t", "extends": "base/s", "components": {"echo": {"arguments": {"a": {"mass": 3}}}}})
+        json.dumps(
+            {
+                "name": "t",
+                "extends": "base/s",
+                "components": {"echo": {"arguments": {"a": {"mass": 3}}}},
+            }
+        )
     )
     assert arguments_of(file) == {"a": {"mass": 3, "size": 2}}
 
 
-def test_settings_reach_into_included_values_and_include_files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+def test_settings_reach_into_included_values_and_include_files(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     (tmp_path / "one.json").write_text('{"mass": 1}')
     file = scenario(tmp_path, {"a": "one.json"})
     assert arguments_of(file, {"/components/echo/arguments/a/mass": 5}) == {"a": {"mass": 5}}
@@ -69,12 +83,20 @@ def test_settings_reach_into_included_values_and_include_files(tmp_path: Path, m
 @pytest.mark.parametrize(
     ("text", "message"),
     [
-        (None, r's\.json:1:\d+: \$\.components\.echo\.arguments\.a: cannot read ".*one\.json": No such file'),
+        (
+            None,
+            (
+                r's\.json:1:\d+: \$\.components\.echo\.arguments\.a: cannot read ".*one\.json": No '
+                r"such file"
+            ),
+        ),
         ("{", r"one\.json:1:2: expected a key in double quotes"),
         ('{"mass": NaN}', r"one\.json:1:10: \$\.mass: NaN is not allowed"),
     ],
 )
-def test_a_file_that_cannot_be_included_is_named(text: str | None, message: str, tmp_path: Path) -> None:
+def test_a_file_that_cannot_be_included_is_named(
+    text: str | None, message: str, tmp_path: Path
+) -> None:
     if text is not None:
         (tmp_path / "one.json").write_text(text)
     file = scenario(tmp_path, {"a": "one.json"})
@@ -82,7 +104,9 @@ def test_a_file_that_cannot_be_included_is_named(text: str | None, message: str,
         arguments_of(file)
     assert len(caught.value.problems) == 1
     with pytest.raises(InputError, match=r"one\.json"):
-        arguments_of(scenario(tmp_path, {}), {"/components/echo/arguments/a": str(tmp_path / "one.json")})
+        arguments_of(
+            scenario(tmp_path, {}), {"/components/echo/arguments/a": str(tmp_path / "one.json")}
+        )
 
 
 def test_included_files_belong_to_the_files_of_the_scenario(tmp_path: Path) -> None:
@@ -101,7 +125,10 @@ def test_a_problem_in_a_file_that_a_setting_names_has_its_line(tmp_path: Path) -
 
 def test_the_scene_includes_files(tmp_path: Path) -> None:
     (tmp_path / "boat.json").write_text('{"mass": 1}')
-    scene = {"python": "cosim:plant_src/scene/replay.py:free", "arguments": {"vehicles": {"usv": "boat.json"}}}
+    scene = {
+        "python": "cosim:plant_src/scene/replay.py:free",
+        "arguments": {"vehicles": {"usv": "boat.json"}},
+    }
     loaded = load_scenario(scenario(tmp_path, {}, scene=scene))
     assert loaded.spec.scene is not None
     assert loaded.spec.scene.arguments == {"vehicles": {"usv": {"mass": 1}}}

@@ -21,8 +21,13 @@ from cosim.scenario import load
         ({"modelica": "missing.mo:X"}, 'file "missing.mo" does not exist'),
     ],
 )
-def test_a_component_with_an_invalid_source_is_reported_once_and_without_consequences(folder, component, line):
-    found = folder.problems({"a": component, "b": folder.block("Gain")}, [connection("a.y", "b.u"), connection("b.y", "a.u")])
+def test_a_component_with_an_invalid_source_is_reported_once_and_without_consequences(
+    folder, component, line
+):
+    found = folder.problems(
+        {"a": component, "b": folder.block("Gain")},
+        [connection("a.y", "b.u"), connection("b.y", "a.u")],
+    )
     assert len(found) == 1
     assert line in found[0]
 
@@ -45,7 +50,12 @@ def test_values_must_have_the_type_of_their_variables(folder, parameters, line):
 
 
 @pytest.mark.parametrize(
-    ("value", "end"), [("4.5", 'found "4.5"; write 4.5 without quotes'), ("true", 'found "true"'), ("4,5", 'found "4,5"')]
+    ("value", "end"),
+    [
+        ("4.5", 'found "4.5"; write 4.5 without quotes'),
+        ("true", 'found "true"'),
+        ("4,5", 'found "4,5"'),
+    ],
 )
 def test_a_number_in_quotes_is_refused_with_a_hint(folder, probes, value, end):
     (line,) = folder.problems({"a": {"fmu": str(probes[2]), "parameters": {"y_start": value}}})
@@ -84,7 +94,10 @@ def test_enumeration_items_can_be_set_by_number_or_name(folder, probe, value):
 def test_an_event_must_set_all_elements_of_an_array(folder, probes):
     """The elements that are missing would get their start values again."""
     events = [{"time": 1, "set": {"a.v_in": [11.0]}}]
-    assert "takes 3 values, found 1" in folder.problems({"a": {"fmu": str(probes[3])}}, events=events)[0]
+    assert (
+        "takes 3 values, found 1"
+        in folder.problems({"a": {"fmu": str(probes[3])}}, events=events)[0]
+    )
 
 
 def test_a_list_that_is_too_long_is_reported_with_the_largest_length(folder):
@@ -95,15 +108,22 @@ def test_a_list_that_is_too_long_is_reported_with_the_largest_length(folder):
 
 
 def test_periods_must_fit_step_size_and_duration(folder):
-    found = folder.problems({"a": folder.block("Gain", period=1.5), "b": folder.block("Gain", period=4)})
+    found = folder.problems(
+        {"a": folder.block("Gain", period=1.5), "b": folder.block("Gain", period=4)}
+    )
     assert [line.split(": $.")[1] for line in found] == [
         "components.a.period: period 1.5 s is no multiple of the step size 1.0 s",
-        "components.b.period: the duration 3.0 s is shorter than the period of b: expected at least 4.0 s",
+        (
+            "components.b.period: the duration 3.0 s is shorter than the period of b: expected at "
+            "least 4.0 s"
+        ),
     ]
 
 
 def test_arguments_may_have_the_parameter_names_of_the_loader(folder):
-    load(folder.scenario({"a": folder.block("Gain", arguments={"kind": 1, "reference": "x"})})).free()
+    load(
+        folder.scenario({"a": folder.block("Gain", arguments={"kind": 1, "reference": "x"})})
+    ).free()
 
 
 def test_the_instance_name_cannot_be_an_argument(folder):
@@ -113,15 +133,27 @@ def test_the_instance_name_cannot_be_an_argument(folder):
 
 def test_problems_of_a_python_component_are_located_at_its_arguments(folder):
     world = str(resources.root() / "plant_src/world.py:World")
-    vehicles = {"uav": {"model": "ar_dron", "position": [0, 0, 1]}, "usv": {"model": "strider", "position": [0]}}
+    vehicles = {
+        "uav": {"model": "ar_dron", "position": [0, 0, 1]},
+        "usv": {"model": "strider", "position": [0]},
+    }
     found = folder.problems({"plant": {"python": world, "arguments": {"vehicles": vehicles}}})
     assert [line.split(": ", 1)[1] for line in found] == [
-        '$.components.plant.arguments.vehicles.uav.model: unknown vehicle model "ar_dron"; did you mean "ar_drone"?',
-        "$.components.plant.arguments.vehicles.usv.position: found [0], expected a list of 2 numbers [x, y]",
+        (
+            '$.components.plant.arguments.vehicles.uav.model: unknown vehicle model "ar_dron"; did '
+            'you mean "ar_drone"?'
+        ),
+        (
+            "$.components.plant.arguments.vehicles.usv.position: found [0], expected a list of 2 "
+            "numbers [x, y]"
+        ),
     ]
 
 
-@pytest.mark.parametrize(("source", "key"), [("x.py:Class", "python"), ("plant.mo:Plant", "modelica"), ("plant.mo", "modelica")])
+@pytest.mark.parametrize(
+    ("source", "key"),
+    [("x.py:Class", "python"), ("plant.mo:Plant", "modelica"), ("plant.mo", "modelica")],
+)
 def test_a_source_that_is_no_fmu_names_its_key(folder, source, key):
     (problem,) = folder.problems_of(folder.scenario({"a": {"fmu": source}}))
     assert problem.endswith(f'{source}" is not an FMU; it is named by "{key}" instead of "fmu"')

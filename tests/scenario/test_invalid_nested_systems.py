@@ -12,14 +12,23 @@ def test_a_port_does_not_hide_a_component_of_the_nested_system(folder):
 
 
 def test_an_unknown_port_is_reported_with_the_nearest_name(folder):
-    folder.write({"components": {"g": folder.block("Gain")}, "ports": {"inputs": {"command": "g.u"}}}, "n.json")
+    folder.write(
+        {"components": {"g": folder.block("Gain")}, "ports": {"inputs": {"command": "g.u"}}},
+        "n.json",
+    )
     components = {"a": {"system": "n.json"}, "b": folder.block("Gain")}
     (line,) = folder.problems(components, [connection("b.y", "a.comand")])
     assert 'nested system "a" has no input port "comand"; did you mean "command"?' in line
 
 
 def test_problems_in_a_nested_file_are_located_in_that_file(folder):
-    folder.write({"components": {"g": folder.block("Gain", parameters={"kk": 1})}, "ports": {"outputs": {"y": "h.y"}}}, "n.json")
+    folder.write(
+        {
+            "components": {"g": folder.block("Gain", parameters={"kk": 1})},
+            "ports": {"outputs": {"y": "h.y"}},
+        },
+        "n.json",
+    )
     found = folder.problems({"a": {"system": "n.json"}})
     assert [line.split(":")[0] for line in found] == ["n.json", "n.json"]
     assert 'component "a.g" has no variable "kk"' in found[0]
@@ -40,6 +49,11 @@ def test_a_system_that_contains_itself_is_refused(folder):
 
 
 def test_a_nested_system_with_times_is_refused(folder):
-    folder.write({"components": {"g": folder.block("Gain")}, "stop_time": 3, "step_size": 1}, "n.json")
+    folder.write(
+        {"components": {"g": folder.block("Gain")}, "stop_time": 3, "step_size": 1}, "n.json"
+    )
     found = folder.problems({"a": {"system": "n.json"}})
-    assert [line.split(";")[0].split(": ", 1)[1] for line in found] == ["$.stop_time: unknown key", "$.step_size: unknown key"]
+    assert [line.split(";")[0].split(": ", 1)[1] for line in found] == [
+        "$.stop_time: unknown key",
+        "$.step_size: unknown key",
+    ]

@@ -1,4 +1,6 @@
-"""Invalid scenarios: all problems are reported at once, each with file, line and JSON path, before the first step."""
+"""Invalid scenarios: all problems are reported at once, each with file, line and JSON path, before
+the first step.
+"""
 
 import numpy as np
 import pytest
@@ -50,37 +52,91 @@ def test_all_problems_are_reported_at_once(folder):
     [
         ({"stop_tme": 1}, '$.stop_tme: unknown key; did you mean "stop_time"?'),
         ({"step_size": 0}, "$.step_size: expected a positive number of seconds; found 0"),
-        ({"step_size": "fast"}, 'expected seconds as a number or as a fraction in text such as "1/60"; found "fast"'),
+        (
+            {"step_size": "fast"},
+            'expected seconds as a number or as a fraction in text such as "1/60"; found "fast"',
+        ),
         ({"step_size": "0.01"}, 'such as "1/60"; found "0.01"; write 0.01 without quotes'),
         ({"checks": [{"kpi": "k.value", "max": "2"}]}, '; found "2"; write 2 without quotes'),
         (
             {"start_time": 1e15, "stop_time": 1e15 + 3, "step_size": 0.01},
-            "$.step_size: a step of 0.01 s is not resolved at t = 1000000000000003.0 s, where the times of components are 0.125",
+            (
+                "$.step_size: a step of 0.01 s is not resolved at t = 1000000000000003.0 s, where "
+                "the times of components are 0.125"
+            ),
         ),
         (
             {"start_time": -1e15, "stop_time": -1e15 + 3, "step_size": 0.125},
             "a step of 0.125 s is not resolved at t = 10000000",
         ),
         ({"start_time": 2**53, "stop_time": 2**53}, "a step of 1.0 s is not resolved"),
-        ({"start_time": 1e10, "stop_time": 1e10 + 1, "step_size": 0.0001}, "a step of 0.0001 s is not resolved at t = 1000"),
+        (
+            {"start_time": 1e10, "stop_time": 1e10 + 1, "step_size": 0.0001},
+            "a step of 0.0001 s is not resolved at t = 1000",
+        ),
         ({"stop_time": 0.5}, "$.stop_time: the duration 0.5 s is shorter than the step size 1.0 s"),
-        ({"record": {"signals": ["a.z"]}}, '$.record.signals[0]: no variable matches "a.z"; did you mean "a.y"?'),
-        ({"record": {"signals": ["a.[yz]"]}}, '$.record.signals[0]: no variable matches "a.[yz]"; only "*" is a wildcard'),
-        ({"record": {"interval": 1.5}}, "$.record.interval: recording interval 1.5 s is no multiple of the step size 1.0 s"),
-        ({"events": [{"time": 0.5, "set": {"a.u": 1}}]}, "$.events[0]: event time 0.5 s lies between two"),
-        ({"events": [{"time": 1, "set": {"a.q": 1}}]}, '$.events[0].set["a.q"]: component "a" has no variable "q"'),
+        (
+            {"record": {"signals": ["a.z"]}},
+            '$.record.signals[0]: no variable matches "a.z"; did you mean "a.y"?',
+        ),
+        (
+            {"record": {"signals": ["a.[yz]"]}},
+            '$.record.signals[0]: no variable matches "a.[yz]"; only "*" is a wildcard',
+        ),
+        (
+            {"record": {"interval": 1.5}},
+            "$.record.interval: recording interval 1.5 s is no multiple of the step size 1.0 s",
+        ),
+        (
+            {"events": [{"time": 0.5, "set": {"a.u": 1}}]},
+            "$.events[0]: event time 0.5 s lies between two",
+        ),
+        (
+            {"events": [{"time": 1, "set": {"a.q": 1}}]},
+            '$.events[0].set["a.q"]: component "a" has no variable "q"',
+        ),
         ({"algorithm": {"stages": [["a"], ["b"]]}}, '$.algorithm.stages: unknown component "b"'),
-        ({"algorithm": {"stages": []}}, '$.components.a: component "a" is in no stage of "algorithm", so it would never step'),
-        ({"algorithm": {"kind": "magic", "stages": [["a"]]}}, "$.algorithm.kind: expected 'staged'"),
-        ({"connections": [connection("a.y", "a.u", delay=-1)]}, "$.connections[0].delay: expected greater than or equal to 0"),
-        ({"connections": [connection("a.y", "a.u", delay=1.5)]}, "$.connections[0].delay: expected a valid integer"),
-        ({"connections": [connection("a.y", "a")]}, "$.connections[0]: input a.u has no matching output a.y.u"),
-        ({"connections": [connection("a.u", "a.u")]}, "$.connections[0].from: a.u is an input, expected an output"),
-        ({"connections": [connection("a.y", "a.y")]}, "$.connections[0].to: a.y is an output, expected an input"),
-        ({"connections": [connection("a.yy", "a.u")]}, 'component "a" has no output "yy"; did you mean "y"?'),
+        (
+            {"algorithm": {"stages": []}},
+            '$.components.a: component "a" is in no stage of "algorithm", so it would never step',
+        ),
+        (
+            {"algorithm": {"kind": "magic", "stages": [["a"]]}},
+            "$.algorithm.kind: expected 'staged'",
+        ),
+        (
+            {"connections": [connection("a.y", "a.u", delay=-1)]},
+            "$.connections[0].delay: expected greater than or equal to 0",
+        ),
+        (
+            {"connections": [connection("a.y", "a.u", delay=1.5)]},
+            "$.connections[0].delay: expected a valid integer",
+        ),
+        (
+            {"connections": [connection("a.y", "a")]},
+            "$.connections[0]: input a.u has no matching output a.y.u",
+        ),
+        (
+            {"connections": [connection("a.u", "a.u")]},
+            "$.connections[0].from: a.u is an input, expected an output",
+        ),
+        (
+            {"connections": [connection("a.y", "a.y")]},
+            "$.connections[0].to: a.y is an output, expected an input",
+        ),
+        (
+            {"connections": [connection("a.yy", "a.u")]},
+            'component "a" has no output "yy"; did you mean "y"?',
+        ),
         ({"connections": [connection("aa.y", "a.u")]}, 'unknown component "aa"; did you mean "a"?'),
-        ({"connections": [connection("a.y", "a.u")] * 2}, "input a.u is connected twice: it is already fed by a.y"),
-        ({"kpis": [{"name": "k", "python": "none.py:f"}]}, '$.kpis[0]: file "none.py" does not exist'),
+        (
+            {"connections": [connection("a.y", "a.u")] * 2},
+            "input a.u is connected twice: it is already fed by a.y",
+        ),
+        (
+            {"kpis": [{"name": "k", "python": "none.py:f"}]},
+            '$.kpis[0]: file "none.py" does not exist',
+        ),
         ({"checks": [{"kpi": "k.x", "max": 1}]}, '$.checks[0].kpi: no KPI "k.x"'),
         ({"checks": [{"kpi": "k.x"}]}, 'expected at least one of "min", "max", "equals"'),
         ({"inputs": [{"file": "no.csv", "to": {"x": "a.u"}}]}, "no.csv: No such file"),
@@ -114,7 +170,10 @@ def test_text_that_is_not_json_is_reported_with_its_position(folder, text, line)
 
 def test_numbers_beyond_a_double_are_refused(folder):
     found = folder.problems_of(
-        folder.write('{"name": "x", "stop_time": 1e400, "step_size": 1, "components": {"a": {"fmu": "x.fmu"}}}')
+        folder.write(
+            '{"name": "x", "stop_time": 1e400, "step_size": 1, "components": {"a": {"fmu": '
+            '"x.fmu"}}}'
+        )
     )
     assert "$.stop_time: 1e400 is not allowed, expected a finite number" in found[0]
 
@@ -126,26 +185,39 @@ def test_the_name_of_a_scenario_must_be_usable_as_a_folder_name(folder):
 
 @pytest.mark.parametrize("components", [None, [], 3, {}])
 def test_without_components_there_are_no_further_problems_with_components(folder, components):
-    content = {"name": "x", "stop_time": 1, "step_size": 1, "connections": [connection("a.y", "b.u")]}
+    content = {
+        "name": "x",
+        "stop_time": 1,
+        "step_size": 1,
+        "connections": [connection("a.y", "b.u")],
+    }
     if components is not None:
         content["components"] = components
-    (line,) = folder.problems_of(folder.write({**content, "algorithm": {"stages": [["a"]]}, "record": {"signals": ["a.y"]}}))
+    (line,) = folder.problems_of(
+        folder.write({**content, "algorithm": {"stages": [["a"]]}, "record": {"signals": ["a.y"]}})
+    )
     assert "$.components" in line
 
 
 def test_an_invalid_step_size_is_reported_without_consequences(folder):
     gain = folder.block("Gain", period=0.3)
-    (line,) = folder.problems({"a": gain}, step_size="fast", events=[{"time": 0.7, "set": {"a.u": 1}}])
+    (line,) = folder.problems(
+        {"a": gain}, step_size="fast", events=[{"time": 0.7, "set": {"a.u": 1}}]
+    )
     assert "$.step_size: expected seconds" in line
 
 
 def test_an_invalid_stop_time_does_not_hide_an_invalid_event(folder):
-    found = folder.problems({"a": folder.block("Gain")}, stop_time=-1, events=[{"time": 0.7, "set": {"a.u": 1}}])
+    found = folder.problems(
+        {"a": folder.block("Gain")}, stop_time=-1, events=[{"time": 0.7, "set": {"a.u": 1}}]
+    )
     assert [line.split(": ")[1] for line in found] == ["$.stop_time", "$.events[0]"]
 
 
 def test_for_an_unknown_scenario_the_nearest_shipped_one_is_suggested():
-    with pytest.raises(cosim.InputError, match='no shipped scenario "demo1_bx"; did you mean "demo1_box"'):
+    with pytest.raises(
+        cosim.InputError, match='no shipped scenario "demo1_bx"; did you mean "demo1_box"'
+    ):
         load("demo1_bx")
 
 
@@ -162,14 +234,19 @@ def test_settings_of_the_caller_are_checked(folder):
         'setting "/components/b/period": the scenario has no "/components/b"; "components" has: a'
     ]
     assert folder.problems_of(file, parameters={"/connections/0/from": "a.y"}) == [
-        'setting "/connections/0/from": the scenario has no "/connections/0"; "connections" has 0 elements'
+        (
+            'setting "/connections/0/from": the scenario has no "/connections/0"; "connections" '
+            "has 0 elements"
+        )
     ]
 
 
 def test_settings_of_the_caller_may_be_arrays_and_must_be_finite(folder):
     file = folder.scenario({"a": folder.block("Controller")})
     cosim.run(file, {"a.gain": np.array([1.0, 2.0])})
-    assert folder.problems_of(file, parameters={"a.gain": []}) == ['setting "a.gain": "gain" is a list of values, found []']
+    assert folder.problems_of(file, parameters={"a.gain": []}) == [
+        'setting "a.gain": "gain" is a list of values, found []'
+    ]
     assert folder.problems_of(file, parameters={"a.offset": np.inf}) == [
         'setting "a.offset": "offset" is of type Float64, found Infinity'
     ]
@@ -210,6 +287,11 @@ def test_a_python_file_is_not_read_as_json(folder):
 def test_a_gain_of_the_wrong_type_and_a_wrong_name_are_reported_in_one_line_each(folder):
     blocks = {"a": folder.block("Gain"), "b": folder.block("Gain")}
     (found,) = folder.problems(blocks, [{"from": "a.y", "to": "b.u", "gain": "2"}])
-    assert found.endswith('$.connections[0].gain: expected a number or a list of numbers; found "2"; write 2 without quotes')
+    assert found.endswith(
+        '$.connections[0].gain: expected a number or a list of numbers; found "2"; write 2 without '
+        "quotes"
+    )
     (found,) = folder.problems(blocks, name="my run/1")
-    assert found.endswith('$.name: expected a name of letters, digits, "_", ".", "-" and spaces; found "my run/1"')
+    assert found.endswith(
+        '$.name: expected a name of letters, digits, "_", ".", "-" and spaces; found "my run/1"'
+    )

@@ -1,6 +1,7 @@
 """The JSON Schema and the loader accept and refuse the same values.
 
-Rules that JSON Schema cannot express are left out: `min` above `max`, and times in text that are too large for a double.
+Rules that JSON Schema cannot express are left out: `min` above `max`, and times in text that are
+too large for a double.
 """
 
 import copy
@@ -35,7 +36,21 @@ TIMES = [
 TIME_KEYS = {"start_time", "stop_time", "step_size", "period", "delay", "interval", "time"}
 NUMBERS = [0, 1, -1, 2, 0.5, 1.0, -0.0, 1e300, 2**53, 2**53 + 1, -(2**53)]
 TEXTS = ["", "a", "a.y", "auto", "fmu", "staged", "linear", "error", "a b"]
-OTHERS = [None, True, False, [], [1], ["a"], [["a"]], [None], [{}], [True, "x", 1.5], {}, {"a": 1}, {"a": {}}]
+OTHERS = [
+    None,
+    True,
+    False,
+    [],
+    [1],
+    ["a"],
+    [["a"]],
+    [None],
+    [{}],
+    [True, "x", 1.5],
+    {},
+    {"a": 1},
+    {"a": {}},
+]
 NAMES = ["b-1", "", "1b", "b c", "b.c", "_x", "\u00e9", "unknown"]
 
 SCENARIO = {
@@ -46,17 +61,31 @@ SCENARIO = {
     "stop_time": 3,
     "step_size": 1,
     "components": {
-        "a": {"python": "x.py:A", "arguments": {"q": 1}, "parameters": {"k": 1.0, "l": [1, 2]}, "period": 1},
+        "a": {
+            "python": "x.py:A",
+            "arguments": {"q": 1},
+            "parameters": {"k": 1.0, "l": [1, 2]},
+            "period": 1,
+        },
         "f": {"fmu": "x.fmu", "isolation": "fmu"},
         "s": {"system": "n.json"},
     },
     "connections": [{"from": "a.y", "to": "f.u", "delay": 1}],
-    "algorithm": {"kind": "staged", "stages": [["a"]], "parallel": "auto", "iteration": {"tolerance": 1e-9, "limit": 5}},
+    "algorithm": {
+        "kind": "staged",
+        "stages": [["a"]],
+        "parallel": "auto",
+        "iteration": {"tolerance": 1e-9, "limit": 5},
+    },
     "record": {"signals": ["*"], "interval": 1},
     "events": [{"time": 1, "set": {"a.u": 1}}],
     "inputs": [{"file": "x.csv", "to": {"c": ["a.u"], "d": "a.v"}, "interpolation": "hold"}],
     "kpis": [{"name": "k", "python": "x.py:k", "arguments": {}}],
-    "checks": [{"kpi": "k.x", "min": 0}, {"kpi": "k.x", "max": 1.5}, {"kpi": "k.x", "equals": True}],
+    "checks": [
+        {"kpi": "k.x", "min": 0},
+        {"kpi": "k.x", "max": 1.5},
+        {"kpi": "k.x", "equals": True},
+    ],
     "scene": {"python": "x.py:s"},
     "reference": {"file": "r.csv", "tolerances": {"*": {"absolute": 0.1}}},
     "deadlines": {"load": 1},
@@ -64,7 +93,11 @@ SCENARIO = {
 }
 NESTED = {
     "components": {"m": {"modelica": "m.mo:M"}},
-    "ports": {"inputs": {"u": ["m.u"], "v": "m.v"}, "outputs": {"y": "m.y"}, "parameters": {"p": "m.p"}},
+    "ports": {
+        "inputs": {"u": ["m.u"], "v": "m.v"},
+        "outputs": {"y": "m.y"},
+        "parameters": {"p": "m.p"},
+    },
 }
 #: shortest valid scenario; short documents make the tests quick
 MINIMUM = {"name": "n", "stop_time": 3, "step_size": 1, "components": {"f": {"fmu": "x.fmu"}}}
@@ -73,14 +106,22 @@ KINDS = {"scenario": (SCENARIO, ScenarioSpec), "nested system": (NESTED, NestedS
 
 def paths(value, path=()):
     """Yield the paths of all values in a document."""
-    items = value.items() if isinstance(value, dict) else enumerate(value) if isinstance(value, list) else ()
+    items = (
+        value.items()
+        if isinstance(value, dict)
+        else enumerate(value)
+        if isinstance(value, list)
+        else ()
+    )
     for key, each in items:
         yield (*path, key)
         yield from paths(each, (*path, key))
 
 
 def mutants(document, path):
-    """Yield (change, document) with another value at a path, without it, under other names, and with a further key."""
+    """Yield (change, document) with another value at a path, without it, under other names, and
+    with a further key.
+    """
     *parents, last = path
 
     def mutant():
@@ -112,7 +153,9 @@ def problems(document, kind, tmp_path):
 
 
 @pytest.mark.parametrize(
-    ("kind", "key"), [(kind, key) for kind, (document, _) in KINDS.items() for key in document], ids=lambda text: text
+    ("kind", "key"),
+    [(kind, key) for kind, (document, _) in KINDS.items() for key in document],
+    ids=lambda text: text,
 )
 def test_the_schema_and_the_loader_agree(kind, key, tmp_path):
     complete, spec = KINDS[kind]

@@ -15,7 +15,10 @@ def ring(folder, probe, size):
         "stop_time": 0.1,
         "step_size": 0.01,
         "components": {name: {"fmu": str(probe)} for name in names},
-        "connections": [{"from": f"{a}.y", "to": f"{b}.u"} for a, b in zip(names, names[1:] + names[:1], strict=True)],
+        "connections": [
+            {"from": f"{a}.y", "to": f"{b}.u"}
+            for a, b in zip(names, names[1:] + names[:1], strict=True)
+        ],
         "algorithm": {"stages": [names]},
     }
     scenario.write_text(json.dumps(document))
@@ -27,7 +30,9 @@ def test_one_file_is_extracted_and_loaded_once(tmp_path, probe, monkeypatch):
     extracted, loaded = [], []
     extract, load_library = file.extract, instance.load_library
     monkeypatch.setattr(file, "extract", lambda *args: extracted.append(args) or extract(*args))
-    monkeypatch.setattr(instance, "load_library", lambda *args: loaded.append(args) or load_library(*args))
+    monkeypatch.setattr(
+        instance, "load_library", lambda *args: loaded.append(args) or load_library(*args)
+    )
     result = cosim.run(ring(tmp_path, probe, 20))
     assert (len(extracted), len(loaded)) == (1, 1)
     assert all(result[f"p{i}.y"][-1] == 1.0 for i in range(20))
@@ -46,6 +51,16 @@ def test_instances_of_one_library_keep_their_names_and_values(tmp_path, probe):
 
 def test_the_timing_of_a_run_has_all_its_parts(tmp_path, probe):
     timing = cosim.run(ring(tmp_path, probe, 2)).timing
-    parts = {"parse_seconds", "instantiate_seconds", "wiring_seconds", "initialize_seconds", "loop_seconds"}
+    parts = {
+        "parse_seconds",
+        "instantiate_seconds",
+        "wiring_seconds",
+        "initialize_seconds",
+        "loop_seconds",
+    }
     assert set(timing) >= parts
-    assert 0 < sum(timing[part] for part in parts) <= timing["load_seconds"] + timing["simulate_seconds"]
+    assert (
+        0
+        < sum(timing[part] for part in parts)
+        <= timing["load_seconds"] + timing["simulate_seconds"]
+    )

@@ -33,12 +33,18 @@ def test_a_modelica_source_runs_and_is_built_once(folder, tmp_path, monkeypatch)
     assert cosim.run(file)["a.y"].tolist() == [0, 7, 7, 7]
 
 
-def test_the_files_of_a_run_are_the_modelica_files_that_it_needs_and_not_the_cached_fmu(folder, tmp_path):
+def test_the_files_of_a_run_are_the_modelica_files_that_it_needs_and_not_the_cached_fmu(
+    folder, tmp_path
+):
     for name in ("Used", "Beside"):
         (tmp_path / name).mkdir()
-        (tmp_path / name / "package.mo").write_text(f"package {name}\n  constant Real k = 2;\nend {name};\n")
+        (tmp_path / name / "package.mo").write_text(
+            f"package {name}\n  constant Real k = 2;\nend {name};\n"
+        )
     (tmp_path / "Doubler.mo").write_text(GAIN.replace("k*u", "Used.k*u"))
-    result = cosim.run(folder.scenario({"a": {"modelica": "Doubler.mo:Doubler", "parameters": {"u": 3.0}}}))
+    result = cosim.run(
+        folder.scenario({"a": {"modelica": "Doubler.mo:Doubler", "parameters": {"u": 3.0}}})
+    )
     assert result["a.y"].tolist() == [0, 6, 6, 6]
     assert sorted(result.metadata["sha256"]) == ["Doubler.mo", "Used/package.mo", "scenario.json"]
 

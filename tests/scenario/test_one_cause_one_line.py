@@ -1,4 +1,6 @@
-"""Scenarios with one mistake each: the refusal is one line, without what only follows from the mistake."""
+"""Scenarios with one mistake each: the refusal is one line, without what only follows from the
+mistake.
+"""
 
 import json
 from pathlib import Path
@@ -34,7 +36,9 @@ def renamed(old, new, count=-1):
 
 
 def changed(path, value):
-    """Return the scenario with one value changed or added; keys and indices of `path` are separated by "/"."""
+    """Return the scenario with one value changed or added; keys and indices of `path` are separated
+    by "/".
+    """
     document = json.loads(TEXT)
     *parents, last = [int(key) if key.isdigit() else key for key in path.split("/")]
     target = document
@@ -59,14 +63,35 @@ ROOTS = {
 
 NAMES = {
     "a component twice": (TEXT.replace('"b": {', '"a": {', 1), "$.components.a: duplicate key"),
-    "a component twice, both used": (TEXT.replace('"b": {', '"b": {}, "b": {', 1), "$.components.b: duplicate key"),
-    "a hyphen in a name": (TEXT.replace('"b"', '"b-1"').replace('"b.', '"b-1.'), "expected a name of letters"),
-    "a dot in a name": (TEXT.replace('"b"', '"b.c"').replace('"b.', '"b.c.'), "expected a name of letters"),
-    "a space in a name": (TEXT.replace('"b"', '"b c"').replace('"b.', '"b c.'), "expected a name of letters"),
-    "an empty name": (TEXT.replace('"b": {', '"": {', 1), '$.components[""]: expected a name of letters'),
+    "a component twice, both used": (
+        TEXT.replace('"b": {', '"b": {}, "b": {', 1),
+        "$.components.b: duplicate key",
+    ),
+    "a hyphen in a name": (
+        TEXT.replace('"b"', '"b-1"').replace('"b.', '"b-1.'),
+        "expected a name of letters",
+    ),
+    "a dot in a name": (
+        TEXT.replace('"b"', '"b.c"').replace('"b.', '"b.c.'),
+        "expected a name of letters",
+    ),
+    "a space in a name": (
+        TEXT.replace('"b"', '"b c"').replace('"b.', '"b c.'),
+        "expected a name of letters",
+    ),
+    "an empty name": (
+        TEXT.replace('"b": {', '"": {', 1),
+        '$.components[""]: expected a name of letters',
+    ),
     "a digit in front": (TEXT.replace('"b": {', '"1b": {', 1), "expected a name of letters"),
-    "a misspelt stage": (changed("algorithm/stages/1/0", "bb"), 'unknown component "bb"; did you mean "b"?'),
-    "an illegal stage": (changed("algorithm/stages/1/0", "b-"), "$.algorithm.stages[1][0]: expected a name"),
+    "a misspelt stage": (
+        changed("algorithm/stages/1/0", "bb"),
+        'unknown component "bb"; did you mean "b"?',
+    ),
+    "an illegal stage": (
+        changed("algorithm/stages/1/0", "b-"),
+        "$.algorithm.stages[1][0]: expected a name",
+    ),
     "stages without lists": (
         changed("algorithm/stages", ["a", "b"]),
         'expected a valid list; found "a", and 1 more element likewise',
@@ -75,17 +100,34 @@ NAMES = {
     "the connections twice": (repeated("connections", []), "$.connections: duplicate key"),
     "a source twice": (repeated("python", "x.py:X"), "python: duplicate key"),
     "the stages twice": (repeated("stages", [["c"]]), "$.algorithm.stages: duplicate key"),
-    "a misspelt stop time": (renamed("stop_time", "stop_tme"), 'unknown key; did you mean "stop_time"?'),
-    "misspelt components": (renamed("components", "component"), 'unknown key; did you mean "components"?'),
-    "a misspelt source": (renamed("python", "pyhton", 1), 'unknown key; did you mean "python"?'),
-    "misspelt connections": (renamed("connections", "conections"), 'unknown key; did you mean "connections"?'),
-    "misspelt components with seeds": (
-        json.dumps(SCENARIO | {"seeds": ["/components/a/parameters/k"]}).replace('"components"', '"compnents"'),
+    "a misspelt stop time": (
+        renamed("stop_time", "stop_tme"),
+        'unknown key; did you mean "stop_time"?',
+    ),
+    "misspelt components": (
+        renamed("components", "component"),
         'unknown key; did you mean "components"?',
     ),
-    "a misspelt list of signals": (TEXT.replace('"record": {"signals"', '"recrod": {"signals"'), 'did you mean "record"?'),
+    "a misspelt source": (renamed("python", "pyhton", 1), 'unknown key; did you mean "python"?'),
+    "misspelt connections": (
+        renamed("connections", "conections"),
+        'unknown key; did you mean "connections"?',
+    ),
+    "misspelt components with seeds": (
+        json.dumps(SCENARIO | {"seeds": ["/components/a/parameters/k"]}).replace(
+            '"components"', '"compnents"'
+        ),
+        'unknown key; did you mean "components"?',
+    ),
+    "a misspelt list of signals": (
+        TEXT.replace('"record": {"signals"', '"recrod": {"signals"'),
+        'did you mean "record"?',
+    ),
     "misspelt KPIs": (renamed("kpis", "kpsi"), 'unknown key; did you mean "kpis"?'),
-    "a misspelt end of a connection": (renamed("from", "form", 1), 'unknown key; did you mean "from"?'),
+    "a misspelt end of a connection": (
+        renamed("from", "form", 1),
+        'unknown key; did you mean "from"?',
+    ),
 }
 
 NUMBERS = {
@@ -130,14 +172,29 @@ SURROGATES = {
         "checks/0/kpi",
     )
 } | {
-    "surrogate as component": (TEXT.replace('"b": {', '"\\ud800": {', 1), '$.components["\\ufffd"]: the character U+D800'),
-    "surrogate as key": (TEXT.replace('"stop_time"', '"\\ud800"', 1), '$["\\ufffd"]: the character U+D800'),
-    "surrogate as variable": (TEXT.replace('"k": 3.0', '"\\udfff": 3.0'), "the character U+DFFF is not allowed"),
-    "NUL in a path": (changed("components/a/python", "a\0.py:A"), "the character U+0000 is not allowed"),
+    "surrogate as component": (
+        TEXT.replace('"b": {', '"\\ud800": {', 1),
+        '$.components["\\ufffd"]: the character U+D800',
+    ),
+    "surrogate as key": (
+        TEXT.replace('"stop_time"', '"\\ud800"', 1),
+        '$["\\ufffd"]: the character U+D800',
+    ),
+    "surrogate as variable": (
+        TEXT.replace('"k": 3.0', '"\\udfff": 3.0'),
+        "the character U+DFFF is not allowed",
+    ),
+    "NUL in a path": (
+        changed("components/a/python", "a\0.py:A"),
+        "the character U+0000 is not allowed",
+    ),
 }
 
 CONSEQUENCES = {
-    "a missing source": (changed("components/a", {"fmu": "none.fmu"}), '$.components.a: FMU "none.fmu" does not exist'),
+    "a missing source": (
+        changed("components/a", {"fmu": "none.fmu"}),
+        '$.components.a: FMU "none.fmu" does not exist',
+    ),
     "a value of the wrong type for an input of a prefix": (
         TEXT.replace(', "delay": 1', "")
         .replace(json.dumps(connection("a.y", "b.u")), "")
@@ -150,14 +207,35 @@ CONSEQUENCES = {
         'has no output "yy"; did you mean "y"?',
     ),
     "an input profile that does not exist": (
-        json.dumps(SCENARIO | {"connections": [connection("a", "b")], "inputs": [{"file": "no.csv", "to": {"x": "b.u"}}]}),
+        json.dumps(
+            SCENARIO
+            | {
+                "connections": [connection("a", "b")],
+                "inputs": [{"file": "no.csv", "to": {"x": "b.u"}}],
+            }
+        ),
         "cannot read no.csv",
     ),
-    "a KPI without a valid name": (changed("kpis/0/name", 5), "$.kpis[0].name: expected a valid string; found 5"),
-    "a KPI with a misspelt key": (changed("kpis/0", {"name": "k", "pyhton": "x"}), 'unknown key; did you mean "python"?'),
-    "a recorded signal of the wrong type": (changed("record/signals/1", 5), "$.record.signals[1]: expected a valid string"),
-    "recorded signals of the wrong type": (changed("record/signals", [1, 2, 3]), "found 1, and 2 more elements likewise"),
-    "components in a list": (changed("components", [GAIN, GAIN]), "$.components: expected an object; found [{"),
+    "a KPI without a valid name": (
+        changed("kpis/0/name", 5),
+        "$.kpis[0].name: expected a valid string; found 5",
+    ),
+    "a KPI with a misspelt key": (
+        changed("kpis/0", {"name": "k", "pyhton": "x"}),
+        'unknown key; did you mean "python"?',
+    ),
+    "a recorded signal of the wrong type": (
+        changed("record/signals/1", 5),
+        "$.record.signals[1]: expected a valid string",
+    ),
+    "recorded signals of the wrong type": (
+        changed("record/signals", [1, 2, 3]),
+        "found 1, and 2 more elements likewise",
+    ),
+    "components in a list": (
+        changed("components", [GAIN, GAIN]),
+        "$.components: expected an object; found [{",
+    ),
     "a step of zero": (changed("step_size", 0), "$.step_size: expected a positive number"),
 }
 
@@ -198,7 +276,9 @@ def test_a_nested_system_in_no_stage_is_one_line(folder):
     folder.write(NESTED | {"components": {"x": GAIN, "z": GAIN}}, "n.json")
     stages = {"components": {"a": GAIN, "b": GAIN, "n": {"system": "n.json"}}, "seeds": []}
     (line,) = refusal(folder, json.dumps(SCENARIO | stages))
-    assert line.endswith('$.components.n: component "n" is in no stage of "algorithm", so it would never step')
+    assert line.endswith(
+        '$.components.n: component "n" is in no stage of "algorithm", so it would never step'
+    )
 
 
 @pytest.mark.parametrize(
@@ -206,8 +286,14 @@ def test_a_nested_system_in_no_stage_is_one_line(folder):
     [
         (json.dumps([NESTED]), "n.json:1:1: $: expected an object"),
         (json.dumps(NESTED).replace('"x": {', '"x": {}, "x": {'), "$.components.x: duplicate key"),
-        (json.dumps(NESTED).replace('"x.y"', "5"), "$.ports.outputs.y: expected a valid string; found 5"),
-        (json.dumps(NESTED).replace('"x.y"', '"z.y"'), '$.ports.outputs.y: unknown component "z"; valid: x'),
+        (
+            json.dumps(NESTED).replace('"x.y"', "5"),
+            "$.ports.outputs.y: expected a valid string; found 5",
+        ),
+        (
+            json.dumps(NESTED).replace('"x.y"', '"z.y"'),
+            '$.ports.outputs.y: unknown component "z"; valid: x',
+        ),
         (json.dumps(NESTED).replace("ports", "prots"), 'unknown key; did you mean "ports"?'),
         (json.dumps(NESTED).replace('"x"', '"x-1"'), "expected a name of letters"),
         (json.dumps(NESTED)[:-1], "expected ',' or '}'"),
@@ -237,12 +323,24 @@ def test_one_mistake_in_a_nested_system_gives_one_line(folder, text, words):
 
 def test_a_missing_component_is_one_line_with_the_number_of_its_places(folder):
     wires = [connection("a", "b"), connection("helm.y", "b.u"), connection("helm.y", "a.u")]
-    (line,) = refusal(folder, json.dumps(SCENARIO | {"connections": wires, "events": [{"time": 1, "set": {"helm.k": 1.0}}]}))
-    assert '$.connections[1].from: unknown component "helm"; valid: a, b; 2 more places likewise' in line
+    (line,) = refusal(
+        folder,
+        json.dumps(
+            SCENARIO | {"connections": wires, "events": [{"time": 1, "set": {"helm.k": 1.0}}]}
+        ),
+    )
+    assert (
+        '$.connections[1].from: unknown component "helm"; valid: a, b; 2 more places likewise'
+        in line
+    )
 
 
 def test_a_mistake_hides_no_other_mistake(folder):
-    text = TEXT.replace('"k": 3.0', '"k": NaN').replace('"b.y"]', '"b.z"]').replace('"step": 5', '"steps": 5')
+    text = (
+        TEXT.replace('"k": 3.0', '"k": NaN')
+        .replace('"b.y"]', '"b.z"]')
+        .replace('"step": 5', '"steps": 5')
+    )
     assert [line.partition(": ")[2] for line in refusal(folder, text)] == [
         "$.components.a.parameters.k: NaN is not allowed, expected a finite number",
         '$.deadlines.steps: unknown key; did you mean "step"?',

@@ -1,4 +1,6 @@
-"""Options of `cosim.load` and `cosim.run` in Python: other numbers for times; unknown values are refused, never ignored."""
+"""Options of `cosim.load` and `cosim.run` in Python: other numbers for times; unknown values are
+refused, never ignored.
+"""
 
 from __future__ import annotations
 
@@ -16,10 +18,15 @@ from cosim.scenario import load
 def test_times(time):
     prepared = load("free_flight", stop_time=time, step_size=Fraction(1, 100))
     prepared.free()
-    assert (prepared.settings.stop_time, prepared.settings.step_size) == (Fraction(1, 10), Fraction(1, 100))
+    assert (prepared.settings.stop_time, prepared.settings.step_size) == (
+        Fraction(1, 10),
+        Fraction(1, 100),
+    )
 
 
-@pytest.mark.parametrize("options", [{"isolation": "fmus"}, {"late": "never"}, {"sandbox": "strict"}])
+@pytest.mark.parametrize(
+    "options", [{"isolation": "fmus"}, {"late": "never"}, {"sandbox": "strict"}]
+)
 def test_unknown_values(options):
     ((name, value),) = options.items()
     with pytest.raises(cosim.InputError, match=rf"{name}: expected .*found '{value}'"):
@@ -29,11 +36,19 @@ def test_unknown_values(options):
 @pytest.mark.parametrize(
     ("method", "message"),
     [
-        ("do_step(self, t)", "x.py:A: expected do_step(self, current_time, step_size); found do_step(self, t) (x.py:3)"),
+        (
+            "do_step(self, t)",
+            (
+                "x.py:A: expected do_step(self, current_time, step_size); found do_step(self, t) "
+                "(x.py:3)"
+            ),
+        ),
         ("dostep(self, t, h)", "x.py:A has no method do_step(self, current_time, step_size)"),
     ],
 )
 def test_a_wrong_or_missing_do_step_is_named_before_the_run(folder, method, message):
-    (folder.path / "x.py").write_text(f"from pythonfmu import Fmi2Slave\nclass A(Fmi2Slave):\n    def {method}: return True\n")
+    (folder.path / "x.py").write_text(
+        f"from pythonfmu import Fmi2Slave\nclass A(Fmi2Slave):\n    def {method}: return True\n"
+    )
     (found,) = folder.problems({"a": {"python": "x.py:A"}})
     assert found.endswith(message)

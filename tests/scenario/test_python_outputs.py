@@ -22,7 +22,9 @@ def last(kind, value):
             self.y = value
             return True
 
-    return run_system(make_system({"a": PythonFmuComponent(Constant(instance_name="a"), "a")}), 1, 1, ["a.y"]).columns["a.y"][-1]
+    return run_system(
+        make_system({"a": PythonFmuComponent(Constant(instance_name="a"), "a")}), 1, 1, ["a.y"]
+    ).columns["a.y"][-1]
 
 
 @pytest.mark.parametrize("unit", ["m/s", "°C", "-", "bar_g", "€/kWh"])
@@ -75,5 +77,7 @@ def test_a_value_that_converts_without_loss_is_accepted(kind, value, expected):
     ],
 )
 def test_any_other_value_is_an_error_that_names_the_output(kind, value, expected):
-    with pytest.raises(ComponentError, match=f'output "y" is .*, expected {expected}$'):  # and no line of cosim itself
+    with pytest.raises(
+        ComponentError, match=f'output "y" is .*, expected {expected}$'
+    ):  # and no line of cosim itself
         last(kind, value)

@@ -1,4 +1,6 @@
-"""The route in docs/route.md is the order in which a run first calls the functions of its table, and it is short."""
+"""The route in docs/route.md is the order in which a run first calls the functions of its table,
+and it is short.
+"""
 
 import re
 import sys
@@ -27,7 +29,9 @@ def called_functions(action):
 
     def record(frame, event, _):
         if event == "call" and frame.f_code.co_filename.startswith(f"{ROOT}/cosim/"):
-            calls.append((str(Path(frame.f_code.co_filename).relative_to(ROOT)), frame.f_code.co_qualname))
+            calls.append(
+                (str(Path(frame.f_code.co_filename).relative_to(ROOT)), frame.f_code.co_qualname)
+            )
 
     sys.setprofile(record)
     try:

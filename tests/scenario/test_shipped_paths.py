@@ -43,10 +43,20 @@ def test_shipped_files_that_do_not_exist_are_refused():
 
 def test_a_shipped_nested_system_is_extended(tmp_path, monkeypatch):
     monkeypatch.chdir(tmp_path)
-    changed = {"altitude": {"fmu": "cosim:fmus/altitude_controller.fmu", "parameters": {"altitude_P": 100.0}}}
+    changed = {
+        "altitude": {
+            "fmu": "cosim:fmus/altitude_controller.fmu",
+            "parameters": {"altitude_P": 100.0},
+        }
+    }
     system = {"extends": "cosim:scenarios/systems/ar_drone_cascaded.json", "components": changed}
     (tmp_path / "control.json").write_text(json.dumps(system))
-    scenario = {"extends": "demo1_box", "name": "own", "components": {"uav": {"system": "control.json"}}, "stop_time": 0.1}
+    scenario = {
+        "extends": "demo1_box",
+        "name": "own",
+        "components": {"uav": {"system": "control.json"}},
+        "stop_time": 0.1,
+    }
     (tmp_path / "own.json").write_text(json.dumps(scenario))
     with cosim.load("own") as simulation:  # a file of the working directory, without ".json"
         assert simulation.get("uav.altitude.altitude_P") == 100.0
@@ -54,7 +64,8 @@ def test_a_shipped_nested_system_is_extended(tmp_path, monkeypatch):
 
 def test_the_sources_of_components_have_the_names_of_the_user(tmp_path):
     (tmp_path / "own.py").write_text(
-        "from pythonfmu import Fmi2Slave\n\n\nclass Own(Fmi2Slave):\n    def do_step(self, time, step):\n        return True\n"
+        "from pythonfmu import Fmi2Slave\n\n\nclass Own(Fmi2Slave):\n    def do_step(self, time, "
+        "step):\n        return True\n"
     )
     components = {
         "a": {"fmu": "cosim:fmus/mixer.fmu"},
@@ -62,7 +73,11 @@ def test_the_sources_of_components_have_the_names_of_the_user(tmp_path):
         "c": {"python": "own.py:Own"},
     }
     file = tmp_path / "mixers.json"
-    file.write_text(json.dumps({"name": "mixers", "stop_time": 1, "step_size": 0.01, "components": components}))
+    file.write_text(
+        json.dumps({"name": "mixers", "stop_time": 1, "step_size": 0.01, "components": components})
+    )
     prepared = load(file)
     prepared.free()
-    assert prepared.sources == {name: component.get("fmu") or component["python"] for name, component in components.items()}
+    assert prepared.sources == {
+        name: component.get("fmu") or component["python"] for name, component in components.items()
+    }

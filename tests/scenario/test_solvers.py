@@ -11,7 +11,12 @@ import cosim
 
 def scenario(folder, fmu, **component):
     file = folder / "s.json"
-    content = {"name": "s", "stop_time": 0.5, "step_size": 0.01, "components": {"ball": {"fmu": str(fmu), **component}}}
+    content = {
+        "name": "s",
+        "stop_time": 0.5,
+        "step_size": 0.01,
+        "components": {"ball": {"fmu": str(fmu), **component}},
+    }
     file.write_text(json.dumps(content))
     return file
 
@@ -29,14 +34,21 @@ def test_the_solver_of_a_component_is_used_and_recorded(component, solver, balls
     result = cosim.run(scenario(tmp_path, balls[2], **component))
     (recorded,) = result.metadata["system"]["components"]
     assert recorded["solver"] == solver
-    options = {"solver": solver["method"], "solver_step_size": solver.get("step_size"), "tolerance": solver.get("tolerance")}
+    options = {
+        "solver": solver["method"],
+        "solver_step_size": solver.get("step_size"),
+        "tolerance": solver.get("tolerance"),
+    }
     alone = cosim.simulate(balls[2], stop_time=0.5, **options)
     assert alone["h"].tolist() == result["ball.h"].tolist()
 
 
 REFUSED = [
     ({"solver": {"method": "heun"}}, '"heun"'),
-    ({"solver": {"method": "cvode", "step_size": 0.1}}, '"step_size" is for methods with fixed step size'),
+    (
+        {"solver": {"method": "cvode", "step_size": 0.1}},
+        '"step_size" is for methods with fixed step size',
+    ),
     ({"tolerance": 0}, "$.components.ball.tolerance"),
 ]
 
@@ -50,7 +62,9 @@ def test_wrong_settings_are_refused_in_one_line(component, words, balls, tmp_pat
 
 
 def test_a_solver_for_an_fmu_without_model_exchange_is_refused(probe, tmp_path):
-    with pytest.raises(cosim.InputError, match="has no interface for model-exchange, only for co-simulation"):
+    with pytest.raises(
+        cosim.InputError, match="has no interface for model-exchange, only for co-simulation"
+    ):
         cosim.load(scenario(tmp_path, probe, solver={"method": "rk4"}))
 
 

@@ -14,12 +14,24 @@ END = {"name": "end", "when": "a.y > 3", "for": 2}
 @pytest.mark.parametrize(
     ("change", "line"),
     [
-        ({"when": "a.yy > 3"}, '$.stop_when[0].when: no recorded signal "a.yy"; did you mean "a.y"?'),
+        (
+            {"when": "a.yy > 3"},
+            '$.stop_when[0].when: no recorded signal "a.yy"; did you mean "a.y"?',
+        ),
         ({"when": "a.u > 3"}, '$.stop_when[0].when: no recorded signal "a.u"; did you mean "a.y"?'),
         ({"when": "a.y >"}, '$.stop_when[0].when: "a.y >" is not an expression: invalid syntax'),
-        ({"when": "import os"}, '$.stop_when[0].when: "import os" is not an expression: "import" is a reserved word of Python'),
+        (
+            {"when": "import os"},
+            (
+                '$.stop_when[0].when: "import os" is not an expression: "import" is a reserved '
+                "word of Python"
+            ),
+        ),
         ({"for": -1}, "$.stop_when[0].for: expected 0 s or more; found -1"),
-        ({"outcome": "crashed"}, "$.stop_when[0].outcome: expected 'crash' or 'decided'; found \"crashed\""),
+        (
+            {"outcome": "crashed"},
+            "$.stop_when[0].outcome: expected 'crash' or 'decided'; found \"crashed\"",
+        ),
     ],
 )
 def test_an_invalid_condition_is_refused(folder: Any, change: dict[str, Any], line: str) -> None:
@@ -33,7 +45,9 @@ def test_a_repeated_name_is_refused(folder: Any) -> None:
 
 
 def test_signals_of_an_invalid_component_are_not_reported(folder: Any) -> None:
-    (found,) = folder.problems({"a": {"python": "none.py:A"}, "b": folder.block("Gain")}, stop_when=[END])
+    (found,) = folder.problems(
+        {"a": {"python": "none.py:A"}, "b": folder.block("Gain")}, stop_when=[END]
+    )
     assert 'file "none.py" does not exist' in found
 
 

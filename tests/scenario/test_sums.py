@@ -29,7 +29,10 @@ pytestmark = pytest.mark.usefixtures("executor")
 @pytest.fixture
 def gains(folder):
     """y = 1, 2 and 3 after the first step, and a sum of them."""
-    blocks = {name: folder.block("Gain", parameters={"u": u, "k": 1.0}) for name, u in zip("abc", (1.0, 2.0, 3.0), strict=True)}
+    blocks = {
+        name: folder.block("Gain", parameters={"u": u, "k": 1.0})
+        for name, u in zip("abc", (1.0, 2.0, 3.0), strict=True)
+    }
     return {**blocks, "total": folder.block("Gain", parameters={"k": 10.0})}
 
 
@@ -38,16 +41,25 @@ def test_outputs_are_added_with_a_gain_each(folder, gains):
     result = cosim.run(folder.scenario(gains, wires))
     assert result["total.y"].tolist()[1:] == [10 * (1.0 - 2 * 2.0 + 0.5 * 3.0 + 4.0)] * 3
     notes = [note for *_, note in result.metadata["system"]["connections"]]
-    assert notes == ["term 1 of a sum, offset 4", "term 2 of a sum, gain -2", "term 3 of a sum, gain 0.5"]
+    assert notes == [
+        "term 1 of a sum, offset 4",
+        "term 2 of a sum, gain -2",
+        "term 3 of a sum, gain 0.5",
+    ]
 
 
 def test_a_sum_of_prefixes_adds_the_outputs_of_the_same_names(folder):
     plants = {name: folder.block("Plant") for name in ("one", "two", "three")}
-    wires = [connection(["one.ship.position.*", "two.ship.position.*"], "three.ship.motor[*]", delay=1)]
+    wires = [
+        connection(["one.ship.position.*", "two.ship.position.*"], "three.ship.motor[*]", delay=1)
+    ]
     (line, *_) = folder.problems(plants, wires)
     assert "input three.ship.motor[1] has no matching output one.ship.position.1" in line
     names = {"x": "1", "y": "2"}
-    wires = [connection([f"{p}.ship.position.{a}" for p in ("one", "two")], f"three.ship.motor[{i}]") for a, i in names.items()]
+    wires = [
+        connection([f"{p}.ship.position.{a}" for p in ("one", "two")], f"three.ship.motor[{i}]")
+        for a, i in names.items()
+    ]
     result = cosim.run(folder.scenario(plants, wires))
     assert result["three.ship.position.y"].tolist() == [1.0, 3.0, 5.0, 7.0]  # + 1 + 1 in each step
 
@@ -67,26 +79,45 @@ def test_a_sum_crosses_the_border_of_an_iterated_system(folder, gains):
 
 def test_elements_and_whole_arrays_are_connected(folder, probes):
     fmu = {"fmu": str(probes[3])}
-    wires = [connection("a.v_out", "b.v_in"), connection("a.v_out[3]", "b.u", gain=2.0), connection("a.y", "b.v_in[2]")]
+    wires = [
+        connection("a.v_out", "b.v_in"),
+        connection("a.v_out[3]", "b.u", gain=2.0),
+        connection("a.y", "b.v_in[2]"),
+    ]
     prepared = load(folder.scenario({"a": fmu, "b": fmu}, wires))
     fed = {str(each.target): str(each.source) for each in prepared.system.connections}
     prepared.free()
-    assert fed == {"b.v_in[1]": "a.v_out[1]", "b.v_in[2]": "a.y", "b.v_in[3]": "a.v_out[3]", "b.u": "a.v_out[3]"}
+    assert fed == {
+        "b.v_in[1]": "a.v_out[1]",
+        "b.v_in[2]": "a.y",
+        "b.v_in[3]": "a.v_out[3]",
+        "b.u": "a.v_out[3]",
+    }
 
 
 def test_booleans_and_integers_become_reals_on_request(folder):
     (folder.path / "signals.py").write_text(SIGNALS)
-    parts = {"s": {"python": "signals.py:Signals"}, "g": folder.block("Gain", parameters={"k": 1.0})}
+    parts = {
+        "s": {"python": "signals.py:Signals"},
+        "g": folder.block("Gain", parameters={"k": 1.0}),
+    }
     (line,) = folder.problems(parts, [connection("s.on", "g.u")])
-    assert line.endswith('type Boolean cannot be converted to Float64 unless the connection has "convert": true')
-    result = cosim.run(folder.scenario(parts, [connection(["s.on", "s.count"], "g.u", convert=True, gain=[100.0, 1.0])]))
+    assert line.endswith(
+        'type Boolean cannot be converted to Float64 unless the connection has "convert": true'
+    )
+    result = cosim.run(
+        folder.scenario(
+            parts, [connection(["s.on", "s.count"], "g.u", convert=True, gain=[100.0, 1.0])]
+        )
+    )
     assert result["g.y"].tolist()[1:] == [101.0, 2.0, 103.0]
 
 
 def test_wrong_sums_are_refused_in_one_line(folder, gains):
     (line,) = folder.problems(gains, [connection(["a.y", "b.y"], "total.u", gain=[1.0])])
     assert line.endswith(
-        'expected a number or one "gain" for each of 2 outputs, found 1; found {"from": ["a.y", "b.y"], '
+        'expected a number or one "gain" for each of 2 outputs, found 1; found {"from": ["a.y", '
+        '"b.y"], '
         '"to": "total.u", "gain": [1.0]}'
     )
     (line,) = folder.problems(gains, [connection([], "total.u")])
@@ -96,8 +127,12 @@ def test_wrong_sums_are_refused_in_one_line(folder, gains):
 
 
 def test_a_removed_component_leaves_the_sum(folder, gains):
-    base = folder.scenario(gains, [connection(["a.y", "b.y", "c.y"], "total.u", gain=[1.0, -2.0, 0.5])])
-    extension = folder.write({"extends": base.name, "name": "less", "components": {"b": None}}, "less.json")
+    base = folder.scenario(
+        gains, [connection(["a.y", "b.y", "c.y"], "total.u", gain=[1.0, -2.0, 0.5])]
+    )
+    extension = folder.write(
+        {"extends": base.name, "name": "less", "components": {"b": None}}, "less.json"
+    )
     (wire,) = load_scenario(extension).expanded()["connections"]
     assert wire == {"from": ["a.y", "c.y"], "to": "total.u", "gain": [1.0, 0.5]}
     assert cosim.run(extension)["total.y"].tolist()[1:] == [25.0] * 3

@@ -1,4 +1,6 @@
-"""Texts with characters that no FMU and no file can hold, and texts that are too long: refused wherever values come in."""
+"""Texts with characters that no FMU and no file can hold, and texts that are too long: refused
+wherever values come in.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,12 @@ from cosim.core.text import MAX_TEXT_LENGTH
 from cosim.studies.document import read_study
 from cosim.studies.schema import SweepSpec
 
-BAD = {"U+0000": "a\0b", "U+D800": "\ud800", "U+DFFF": "end\udfff", "characters is not": "x" * (MAX_TEXT_LENGTH + 1)}
+BAD = {
+    "U+0000": "a\0b",
+    "U+D800": "\ud800",
+    "U+DFFF": "end\udfff",
+    "characters is not": "x" * (MAX_TEXT_LENGTH + 1),
+}
 bad = pytest.mark.parametrize(("words", "text"), BAD.items(), ids=BAD)
 
 READER = """
@@ -36,13 +43,21 @@ class Reader(Fmi2Slave):
 
 @pytest.fixture
 def reader(tmp_path: Path) -> Any:
-    """Write the scenario of a component with a string parameter, in which `more` replaces keys; return its path."""
+    """Write the scenario of a component with a string parameter, in which `more` replaces keys;
+    return its path.
+    """
     (tmp_path / "reader.py").write_text(READER)
 
     def write(parameters: Any = None, spoiled: str = "", **more: Any) -> Path:
         (tmp_path / "reader.py").write_text(f"SPOILED = {spoiled!a}\n{READER}")
         component = {"python": "reader.py:Reader", "parameters": parameters or {}}
-        content = {"name": "texts", "stop_time": 0.1, "step_size": 0.01, "components": {"reader": component}, **more}
+        content = {
+            "name": "texts",
+            "stop_time": 0.1,
+            "step_size": 0.01,
+            "components": {"reader": component},
+            **more,
+        }
         path = tmp_path / "texts.json"
         path.write_text(json.dumps(content))
         return path
@@ -71,7 +86,9 @@ def test_in_an_event(reader, words, text):
 
 
 @bad
-@pytest.mark.parametrize("name", ["reader.text", "reader.spoil", "/components/reader/parameters/text", "/description"])
+@pytest.mark.parametrize(
+    "name", ["reader.text", "reader.spoil", "/components/reader/parameters/text", "/description"]
+)
 def test_in_a_value_of_the_caller(reader, words, text, name):
     assert words in refusal(reader({"text": "x"}), {name: text})
 
@@ -92,7 +109,13 @@ def test_in_a_sweep(reader, words, text):
     path = reader()
     file = path.with_name("sweep.json")
     file.write_text(
-        json.dumps({"name": "sweep", "scenario": path.name, "factors": [{"parameter": "reader.text", "values": ["good", text]}]})
+        json.dumps(
+            {
+                "name": "sweep",
+                "scenario": path.name,
+                "factors": [{"parameter": "reader.text", "values": ["good", text]}],
+            }
+        )
     )
     with pytest.raises(cosim.InputError, match=re.escape(words)):
         read_study(file, SweepSpec)
@@ -100,10 +123,18 @@ def test_in_a_sweep(reader, words, text):
 
 def test_in_an_output_of_a_component_in_python(reader):
     path = reader({"spoil": True}, spoiled="a\0b")
-    with pytest.raises(cosim.ComponentError, match=r"reader: get_outputs failed .*output \"copy\" is 'a.x00b', expected"):
+    with pytest.raises(
+        cosim.ComponentError,
+        match=r"reader: get_outputs failed .*output \"copy\" is 'a.x00b', expected",
+    ):
         cosim.run(path)
 
 
 def test_other_characters_are_accepted(reader):
     text = "\N{GREEK SMALL LETTER ALPHA}\t\n\N{PILE OF POO}" + "x" * (MAX_TEXT_LENGTH - 4)
-    assert cosim.run(reader(record={"signals": ["reader.copy"]}), {"reader.text": text})["reader.copy"][-1] == text
+    assert (
+        cosim.run(reader(record={"signals": ["reader.copy"]}), {"reader.text": text})[
+            "reader.copy"
+        ][-1]
+        == text
+    )

@@ -1,7 +1,8 @@
-"""Two coupled masses, each solved exactly for linear inputs: only the error of the coupling remains.
+"""Two coupled masses, each solved exactly for linear inputs: only the error of the coupling
+remains.
 
-The errors of each coupling were computed by two programs independent of cosim; the reference solution is the exponential of the
-matrix of the whole system.
+The errors of each coupling were computed by two programs independent of cosim; the reference
+solution is the exponential of the matrix of the whole system.
 """
 
 import numpy as np
@@ -14,7 +15,8 @@ import cosim
 from cosim.engine import EXECUTORS
 
 STEPS = [0.02, 0.01, 0.005, 0.0025, 0.00125]
-#: largest difference of a displacement (m) to the exact solution within 10 s, for each of the steps, and the order
+#: largest difference of a displacement (m) to the exact solution within 10 s, for each of the
+#: steps, and the order
 ERRORS = {
     "Jacobi, hold": ([3.89e-1, 2.05e-1, 1.11e-1, 5.83e-2, 3.00e-2], 1),
     "Jacobi, linear": ([3.25e-2, 8.15e-3, 2.04e-3, 5.09e-4, 1.27e-4], 2),
@@ -33,17 +35,31 @@ def mass(tmp_path_factory):
 
 def algorithm(scheme):
     stages = [["one"], ["two"]] if scheme == "Gauss-Seidel" else [["one", "two"]]
-    return {"stages": stages, **({"iteration": {"tolerance": 1e-8}} if scheme == "iterated" else {})}
+    return {
+        "stages": stages,
+        **({"iteration": {"tolerance": 1e-8}} if scheme == "iterated" else {}),
+    }
 
 
 def displacements(folder, mass, coupling, step, stop_time=10, **more):
     scheme, interpolation = coupling.split(", ")
     pairs = [("one", "two"), ("two", "one")]
-    wires = [connection(f"{a}.{y}", f"{b}.{u}", interpolation=interpolation) for a, b in pairs for y, u in ("xu", "vw")]
-    parts = {"one": {"fmu": str(mass), "parameters": {"x_start": 1.0, **more}}, "two": {"fmu": str(mass), "parameters": more}}
-    file = folder.scenario(parts, wires, stop_time=stop_time, step_size=step, algorithm=algorithm(scheme))
+    wires = [
+        connection(f"{a}.{y}", f"{b}.{u}", interpolation=interpolation)
+        for a, b in pairs
+        for y, u in ("xu", "vw")
+    ]
+    parts = {
+        "one": {"fmu": str(mass), "parameters": {"x_start": 1.0, **more}},
+        "two": {"fmu": str(mass), "parameters": more},
+    }
+    file = folder.scenario(
+        parts, wires, stop_time=stop_time, step_size=step, algorithm=algorithm(scheme)
+    )
     result = cosim.run(file, isolation="none")
-    return np.column_stack([result[f"{name}.{signal}"] for name in ("one", "two") for signal in "xv"])
+    return np.column_stack(
+        [result[f"{name}.{signal}"] for name in ("one", "two") for signal in "xv"]
+    )
 
 
 def exact(step, count):
@@ -67,7 +83,9 @@ def test_the_errors_and_orders_are_those_of_the_coupling(folder, mass, coupling,
     expected, order = ERRORS[coupling]
     found = [error(folder, mass, coupling, step) for step in STEPS[:count]]
     np.testing.assert_allclose(found, expected[:count], rtol=0.05)
-    np.testing.assert_allclose(np.log2(np.divide(found[:-1], found[1:])), order, atol=ORDER_TOLERANCE)
+    np.testing.assert_allclose(
+        np.log2(np.divide(found[:-1], found[1:])), order, atol=ORDER_TOLERANCE
+    )
 
 
 @pytest.mark.parametrize("coupling", ERRORS)
@@ -75,17 +93,26 @@ def test_both_executors_couple_alike(folder, mass, sloped_mass, coupling, monkey
     found = []
     for kind in EXECUTORS.values():
         monkeypatch.setattr("cosim.engine.plan_run.executor_class", lambda _, kind=kind: kind)
-        found.append([displacements(folder, fmu, coupling, 0.02, stop_time=1).tolist() for fmu in (mass, sloped_mass)])
+        found.append(
+            [
+                displacements(folder, fmu, coupling, 0.02, stop_time=1).tolist()
+                for fmu in (mass, sloped_mass)
+            ]
+        )
     assert found[0] == found[1]
 
 
 @pytest.fixture(scope="session")
 def sloped_mass(tmp_path_factory):
-    return build_probe_fmu(2, tmp_path_factory.mktemp("slopes"), name="mass", flags='maxOutputDerivativeOrder="1"')
+    return build_probe_fmu(
+        2, tmp_path_factory.mktemp("slopes"), name="mass", flags='maxOutputDerivativeOrder="1"'
+    )
 
 
 def along_tangents(step, count):
-    """Return x and v of both masses if each sees the tangents of the other's displacement and velocity, without cosim."""
+    """Return x and v of both masses if each sees the tangents of the other's displacement and
+    velocity, without cosim.
+    """
     one = np.zeros((6, 6))  # x, v, and of the other mass: x, v and their slopes
     one[0, 1] = one[2, 4] = one[3, 5] = 1
     one[1, :4] = -40, -0.3, 30, 0.2
@@ -101,7 +128,9 @@ def along_tangents(step, count):
 
 
 @pytest.mark.parametrize("step", STEPS[:2])
-def test_outputs_with_derivatives_are_extrapolated_along_their_tangents(folder, mass, sloped_mass, step):
+def test_outputs_with_derivatives_are_extrapolated_along_their_tangents(
+    folder, mass, sloped_mass, step
+):
     found = displacements(folder, sloped_mass, "Jacobi, linear", step)
     np.testing.assert_allclose(found, along_tangents(step, len(found) - 1), rtol=0, atol=1e-12)
     tangents, secants = (error(folder, fmu, "Jacobi, linear", step) for fmu in (sloped_mass, mass))
@@ -111,7 +140,9 @@ def test_outputs_with_derivatives_are_extrapolated_along_their_tangents(folder, 
 @pytest.mark.parametrize("coupling", ["Gauss-Seidel, linear", "iterated, linear"])
 def test_known_values_at_both_ends_are_better_than_tangents(folder, mass, sloped_mass, coupling):
     """Inputs whose source has stepped before pass through both values."""
-    second = [displacements(folder, fmu, coupling, 0.02, stop_time=1) for fmu in (sloped_mass, mass)]
+    second = [
+        displacements(folder, fmu, coupling, 0.02, stop_time=1) for fmu in (sloped_mass, mass)
+    ]
     if coupling.startswith("iterated"):
         assert second[0].tolist() == second[1].tolist()
     else:
@@ -128,29 +159,44 @@ def test_gauss_seidel_with_hold_conserves_the_energy(folder, mass):
 
 def test_an_isolated_fmu_interpolates_alike(folder, mass):
     parts = {
-        name: {"fmu": str(mass), "isolation": "fmu", "parameters": {"x_start": x}} for name, x in (("one", 1.0), ("two", 0.0))
+        name: {"fmu": str(mass), "isolation": "fmu", "parameters": {"x_start": x}}
+        for name, x in (("one", 1.0), ("two", 0.0))
     }
     wires = [
         connection(f"{a}.{y}", f"{b}.{u}", interpolation="linear")
         for a, b in (("one", "two"), ("two", "one"))
         for y, u in ("xu", "vw")
     ]
-    file = folder.scenario(parts, wires, stop_time=1, step_size=0.02, algorithm={"stages": [["one"], ["two"]]})
+    file = folder.scenario(
+        parts, wires, stop_time=1, step_size=0.02, algorithm={"stages": [["one"], ["two"]]}
+    )
     isolated = cosim.run(file)["one.x"]
     for part in parts.values():
         del part["isolation"]
-    file = folder.scenario(parts, wires, stop_time=1, step_size=0.02, algorithm={"stages": [["one"], ["two"]]})
+    file = folder.scenario(
+        parts, wires, stop_time=1, step_size=0.02, algorithm={"stages": [["one"], ["two"]]}
+    )
     assert isolated.tolist() == cosim.run(file)["one.x"].tolist()
 
 
 def test_linear_inputs_need_a_component_that_interpolates(folder, mass):
     parts = {"m": {"fmu": str(mass)}, "g": folder.block("Gain")}
-    wires = [connection("m.x", "g.u", interpolation="linear"), connection("g.y", "m.u", interpolation="linear", delay=1)]
+    wires = [
+        connection("m.x", "g.u", interpolation="linear"),
+        connection("g.y", "m.u", interpolation="linear", delay=1),
+    ]
     first, second = folder.problems(parts, wires)
     assert first.endswith(
-        'm.x cannot feed g.u: "interpolation" is "linear", but "g" does not interpolate its inputs (FMI: canInterpolateInputs)'
+        'm.x cannot feed g.u: "interpolation" is "linear", but "g" does not interpolate its inputs '
+        "(FMI: canInterpolateInputs)"
     )
-    assert second.endswith('"interpolation" is "linear", so it cannot have a delay or be part of a sum')
+    assert second.endswith(
+        '"interpolation" is "linear", so it cannot have a delay or be part of a sum'
+    )
     parts["g"]["period"] = 2
-    (line,) = folder.problems(parts, [connection("g.y", "m.u", interpolation="linear")], stop_time=4)
-    assert line.endswith('"interpolation" is "linear", so both components must step in every macro step')
+    (line,) = folder.problems(
+        parts, [connection("g.y", "m.u", interpolation="linear")], stop_time=4
+    )
+    assert line.endswith(
+        '"interpolation" is "linear", so both components must step in every macro step'
+    )

@@ -1,4 +1,6 @@
-"""Component classes of users are checked when they are loaded, so that mistakes are reported before the run."""
+"""Component classes of users are checked when they are loaded, so that mistakes are reported before
+the run.
+"""
 
 import json
 import subprocess
@@ -62,7 +64,9 @@ def test_a_valid_component_runs_without_the_optional_methods(folder, own):
 
 
 def test_pythonfmu_is_not_imported_for_a_scenario_without_its_classes(folder, own):
-    program = "import sys, cosim; cosim.load(sys.argv[1]).close(); print('pythonfmu' in sys.modules)"
+    program = (
+        "import sys, cosim; cosim.load(sys.argv[1]).close(); print('pythonfmu' in sys.modules)"
+    )
     command = [sys.executable, "-c", program, folder.scenario(own())]
     assert subprocess.run(command, capture_output=True, text=True, check=True).stdout == "False\n"
 
@@ -73,14 +77,45 @@ def test_pythonfmu_is_not_imported_for_a_scenario_without_its_classes(folder, ow
         ("def do_step", "def dostep", 'it does not define "do_step", but "dostep"'),
         ("def get_outputs", "def outputs_of", 'it does not define "get_outputs"'),
         ("has_state = False", "has_state = True", 'it does not define "get_state"'),
-        ("do_step(self, time, step_size)", "do_step(self, time)", '"do_step" does not take the arguments (time, step_size)'),
-        ('parse_unit("N")', '"N"', "variable \"u\": unit is 'N', expected a cosim.core.units.Unit, such as parse_unit('N')"),
-        ('"output", v', '"outptu", v', 'variable "y": causality is "outptu"; did you mean "output"?'),
-        ('"continuous"', '"continous"', 'variable "y": variability is "continous"; did you mean "continuous"?'),
+        (
+            "do_step(self, time, step_size)",
+            "do_step(self, time)",
+            '"do_step" does not take the arguments (time, step_size)',
+        ),
+        (
+            'parse_unit("N")',
+            '"N"',
+            (
+                "variable \"u\": unit is 'N', expected a cosim.core.units.Unit, such as "
+                "parse_unit('N')"
+            ),
+        ),
+        (
+            '"output", v',
+            '"outptu", v',
+            'variable "y": causality is "outptu"; did you mean "output"?',
+        ),
+        (
+            '"continuous"',
+            '"continous"',
+            'variable "y": variability is "continous"; did you mean "continuous"?',
+        ),
         ('Variable("y", ', 'Variable("u", ', 'variable "u" is declared 2 times'),
-        ('Variable("y", ', 'Variable("y", shape=3, ', 'variable "y": shape is 3, expected a tuple of sizes'),
-        ('Variable("y", causality="output", variability="continuous")', '"y"', "\"variables\" contains 'y', expected a cosim"),
-        ("has_state = False", "", "it has no has_state; expected a component or an Fmi2Slave class"),
+        (
+            'Variable("y", ',
+            'Variable("y", shape=3, ',
+            'variable "y": shape is 3, expected a tuple of sizes',
+        ),
+        (
+            'Variable("y", causality="output", variability="continuous")',
+            '"y"',
+            "\"variables\" contains 'y', expected a cosim",
+        ),
+        (
+            "has_state = False",
+            "",
+            "it has no has_state; expected a component or an Fmi2Slave class",
+        ),
         (
             'Variable("y", ',
             'Variable("y", "Flaot64", ',
@@ -103,20 +138,37 @@ def test_all_mistakes_in_the_class_are_reported_together(folder, own):
 
 
 def test_do_step_must_return_none_or_a_step_result(folder, own):
-    with pytest.raises(ComponentError, match="a: do_step failed at t = 0 s: returned True, expected None or a StepResult"):
+    with pytest.raises(
+        ComponentError,
+        match="a: do_step failed at t = 0 s: returned True, expected None or a StepResult",
+    ):
         cosim.run(folder.scenario(own("return None", "return True")))
 
 
 @pytest.mark.parametrize("place", ["module", "constructor"])
 def test_a_class_that_hangs_while_it_is_loaded_ends_at_its_deadline(tmp_path, place):
     sleep = "import time\ntime.sleep(60)\n"
-    constructor = "class Slow:\n    def __init__(self, instance_name):\n        import time\n        time.sleep(60)\n"
+    constructor = (
+        "class Slow:\n    def __init__(self, instance_name):\n        import time\n        "
+        "time.sleep(60)\n"
+    )
     (tmp_path / "slow.py").write_text(sleep if place == "module" else constructor)
     components = {"slow": {"python": "slow.py:Slow"}}
-    content = {"name": "slow", "stop_time": 1, "step_size": 0.1, "components": components, "deadlines": {"load": 0.2}}
+    content = {
+        "name": "slow",
+        "stop_time": 1,
+        "step_size": 0.1,
+        "components": components,
+        "deadlines": {"load": 0.2},
+    }
     (tmp_path / "slow.json").write_text(json.dumps(content))
     command = [sys.executable, "-m", "cosim", "run", "slow.json", "--no-report"]
-    done = subprocess.run(command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=30)
+    done = subprocess.run(
+        command, cwd=tmp_path, capture_output=True, text=True, check=False, timeout=30
+    )
     line = {"module": 2, "constructor": 4}[place]
-    assert done.stderr == f"slow: loading the class failed: did not return within 0.2 s (slow.py:{line})\n"
+    assert (
+        done.stderr
+        == f"slow: loading the class failed: did not return within 0.2 s (slow.py:{line})\n"
+    )
     assert done.returncode == 1

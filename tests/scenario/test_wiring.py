@@ -49,13 +49,20 @@ def test_components_step_in_the_listed_order_by_default(folder):
     listed = folder.scenario(gains, [connection("a.y", "b.u")], stop_time=1)
     assert columns(listed)["b.y"] == [0, 4]
     together = folder.scenario(
-        gains, [connection("a.y", "b.u")], stop_time=1, algorithm={"kind": "staged", "stages": [["a", "b"]]}
+        gains,
+        [connection("a.y", "b.u")],
+        stop_time=1,
+        algorithm={"kind": "staged", "stages": [["a", "b"]]},
     )
     assert columns(together)["b.y"] == [0, 0]
 
 
 def test_a_connection_of_single_variables_overrides_a_prefix(folder):
-    components = {"pilot": folder.block("Controller"), "gain": folder.block("Gain"), "plant": folder.block("Plant")}
+    components = {
+        "pilot": folder.block("Controller"),
+        "gain": folder.block("Gain"),
+        "plant": folder.block("Plant"),
+    }
     file = folder.scenario(components, [*PAIR, connection("gain.y", "plant.ship.motor[2]")])
     prepared = load(file)
     fed = {str(c.target): str(c.source) for c in prepared.system.connections}
@@ -66,12 +73,21 @@ def test_a_connection_of_single_variables_overrides_a_prefix(folder):
 
 def test_an_input_below_a_prefix_without_output_may_be_set_by_a_parameter(folder):
     plant = folder.block("Plant", parameters={"ship.motor[2]": 5.0})
-    file = folder.scenario({"gain": folder.block("Gain"), "plant": plant}, [connection("gain.y", "plant.ship.motor[1]")])
+    file = folder.scenario(
+        {"gain": folder.block("Gain"), "plant": plant},
+        [connection("gain.y", "plant.ship.motor[1]")],
+    )
     assert columns(file)["plant.ship.position.y"] == [1, 6, 11, 16]
 
 
 def test_a_component_alone_is_a_prefix_too(folder):
-    folder.write({"components": {"head": folder.block("Controller")}, "ports": {"inputs": {"vehicle": "head.vehicle"}}}, "n.json")
+    folder.write(
+        {
+            "components": {"head": folder.block("Controller")},
+            "ports": {"inputs": {"vehicle": "head.vehicle"}},
+        },
+        "n.json",
+    )
     (folder.path / "plant.py").write_text(WHOLE_PLANT)
     components = {"plant": {"python": "plant.py:Whole"}, "pilot": {"system": "n.json"}}
     prepared = load(folder.scenario(components, [connection("plant", "pilot.vehicle")]))
@@ -83,7 +99,13 @@ def test_a_component_alone_is_a_prefix_too(folder):
 
 def test_a_port_may_name_variables_that_only_some_inner_components_have(folder):
     components = {"head": folder.block("Controller"), "tail": folder.block("Controller")}
-    folder.write({"components": components, "ports": {"inputs": {"vehicle": ["head.vehicle", "tail.gains"]}}}, "n.json")
+    folder.write(
+        {
+            "components": components,
+            "ports": {"inputs": {"vehicle": ["head.vehicle", "tail.gains"]}},
+        },
+        "n.json",
+    )
     file = folder.scenario(
         {"plant": folder.block("Plant"), "pilot": {"system": "n.json"}},
         [connection("plant.ship.position.x", "pilot.vehicle.position.x")],
@@ -96,7 +118,10 @@ def test_a_port_may_name_variables_that_only_some_inner_components_have(folder):
 def nested(folder):
     folder.write(
         {
-            "components": {"head": folder.block("Controller", parameters={"gain": [1, 1]}), "tail": folder.block("Gain")},
+            "components": {
+                "head": folder.block("Controller", parameters={"gain": [1, 1]}),
+                "tail": folder.block("Gain"),
+            },
             "connections": [connection("head.motor[2]", "tail.u")],
             "ports": {
                 "inputs": {"vehicle": ["head.vehicle"], "offset": "head.offset"},
@@ -140,7 +165,10 @@ def test_a_period_of_a_nested_system_holds_for_all_inside(folder):
     components["pilot"]["period"] = 3
     prepared = load(folder.scenario(components, PAIR))
     prepared.free()
-    assert {name: float(period) for name, period in prepared.system.periods.items()} == {"pilot.head": 3.0, "pilot.tail": 3.0}
+    assert {name: float(period) for name, period in prepared.system.periods.items()} == {
+        "pilot.head": 3.0,
+        "pilot.tail": 3.0,
+    }
 
 
 def test_input_profiles_feed_inputs_with_the_value_at_the_communication_point(folder):
@@ -156,23 +184,34 @@ def test_input_profiles_feed_inputs_with_the_value_at_the_communication_point(fo
 def test_a_profile_with_hold_jumps_at_its_rows(folder):
     (folder.path / "profile.csv").write_text("time,step\n0,1\n1.5,2\n2,3\n")
     inputs = [{"file": "profile.csv", "to": {"step": "a.u"}, "interpolation": "hold"}]
-    result = columns(folder.scenario({"a": folder.block("Gain")}, inputs=inputs, stop_time=2, step_size=0.5))
+    result = columns(
+        folder.scenario({"a": folder.block("Gain")}, inputs=inputs, stop_time=2, step_size=0.5)
+    )
     assert result["inputs.0.step"] == [1, 1, 1, 2, 3]
 
 
 @pytest.mark.parametrize(("step_size", "count"), [("1/10", 9), ("1/100", 90), ("1/1000", 900)])
-def test_a_profile_with_hold_jumps_exactly_at_its_rows_despite_rounded_times(folder, step_size, count):
+def test_a_profile_with_hold_jumps_exactly_at_its_rows_despite_rounded_times(
+    folder, step_size, count
+):
     """0.7 + 0.1 is less than 0.8."""
     step = exact_fraction(step_size)
     rows = "".join(f"{float(n * step)!r},{n}\n" for n in range(count + 1))
     (folder.path / "profile.csv").write_text(f"time,step\n{rows}")
     inputs = [{"file": "profile.csv", "to": {"step": "a.u"}, "interpolation": "hold"}]
-    result = columns(folder.scenario({"a": folder.block("Gain")}, inputs=inputs, stop_time="9/10", step_size=step_size))
+    result = columns(
+        folder.scenario(
+            {"a": folder.block("Gain")}, inputs=inputs, stop_time="9/10", step_size=step_size
+        )
+    )
     assert result["inputs.0.step"] == list(range(count + 1))
 
 
 def test_events_set_inputs_and_tunable_parameters_through_ports_too(folder):
-    events = [{"time": 1, "set": {"pilot.offset": 1.0}}, {"time": 2, "set": {"pilot.tail.k": 100.0}}]
+    events = [
+        {"time": 1, "set": {"pilot.offset": 1.0}},
+        {"time": 2, "set": {"pilot.tail.k": 100.0}},
+    ]
     result = columns(folder.scenario(nested(folder), PAIR, events=events))
     assert result["pilot.extra"] == [0, 2, 4, 200]
 
@@ -200,10 +239,15 @@ def test_a_component_that_fails_keeps_its_rows(folder):
     file = folder.scenario({"a": folder.block("FailingBlock")})
     with pytest.raises(cosim.ComponentError) as failure:
         cosim.run(file)
-    assert str(failure.value).startswith("a: do_step failed at t = 2 s: ValueError: tilt beyond limit (pythonfmu_blocks.py:")
+    assert str(failure.value).startswith(
+        "a: do_step failed at t = 2 s: ValueError: tilt beyond limit (pythonfmu_blocks.py:"
+    )
     assert failure.value.result["a.y"].tolist() == [0, 1, 2]
 
 
 def test_a_base_exception_in_do_step_is_a_component_error(folder):
-    with pytest.raises(cosim.ComponentError, match="a: do_step failed at t = 0 s: BaseException: index out of bounds"):
+    with pytest.raises(
+        cosim.ComponentError,
+        match="a: do_step failed at t = 0 s: BaseException: index out of bounds",
+    ):
         cosim.run(folder.scenario({"a": folder.block("BaseExceptionBlock")}))

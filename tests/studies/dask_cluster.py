@@ -22,20 +22,44 @@ class DaskCluster:
     def __init__(self, folder: Path, workers: int):
         self.folder = folder
         self._file = folder / "scheduler.json"
-        self.scheduler = self._start("scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", self._file)
+        self.scheduler = self._start(
+            "scheduler", "--host", "127.0.0.1", "--port", "0", "--scheduler-file", self._file
+        )
         self.address: str = self._wait_for_file()["address"]
         self.workers = [self.start_worker() for _ in range(workers)]
 
     def start_worker(self, **environment: str) -> subprocess.Popen[bytes]:
         """Start another worker with one thread and its own folder for received files."""
-        words = (self.address, "--no-nanny", "--nthreads", 1, "--host", "127.0.0.1", "--local-directory", self.folder / "scratch")
+        words = (
+            self.address,
+            "--no-nanny",
+            "--nthreads",
+            1,
+            "--host",
+            "127.0.0.1",
+            "--local-directory",
+            self.folder / "scratch",
+        )
         return self._start("worker", *words, **environment)
 
     def _start(self, kind: str, *words: object, **environment: str) -> subprocess.Popen[bytes]:
-        command = [sys.executable, "-m", f"distributed.cli.dask_{kind}", "--no-dashboard", *map(str, words)]
+        command = [
+            sys.executable,
+            "-m",
+            f"distributed.cli.dask_{kind}",
+            "--no-dashboard",
+            *map(str, words),
+        ]
         with (self.folder / "log").open("ab") as log:
             variables = {**os.environ, **environment}
-            return subprocess.Popen(command, cwd=self.folder, stdin=subprocess.DEVNULL, stdout=log, stderr=log, env=variables)
+            return subprocess.Popen(
+                command,
+                cwd=self.folder,
+                stdin=subprocess.DEVNULL,
+                stdout=log,
+                stderr=log,
+                env=variables,
+            )
 
     def _wait_for_file(self) -> dict[str, Any]:
         end = time.monotonic() + START_TIMEOUT

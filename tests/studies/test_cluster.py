@@ -17,11 +17,16 @@ pytestmark = pytest.mark.slow
 
 pytest.importorskip("distributed")
 
-LEVELS = {f"run {run}": {"lag.y_start": 1 + run / 100, "lag.fault": SEGV_ORDER if run == 3 else ""} for run in range(8)}
+LEVELS = {
+    f"run {run}": {"lag.y_start": 1 + run / 100, "lag.fault": SEGV_ORDER if run == 3 else ""}
+    for run in range(8)
+}
 FACTORS = [{"name": "level", "levels": LEVELS}]
 #: a sweep of 30 runs of about 0.1 s each
 SLOW = {
-    "factors": [{"name": "start", "set": "lag.y_start", "values": [1 + run / 10 for run in range(30)]}],
+    "factors": [
+        {"name": "start", "set": "lag.y_start", "values": [1 + run / 10 for run in range(30)]}
+    ],
     "settings": {"/stop_time": 100, "/record/interval": 1},
 }
 
@@ -47,10 +52,14 @@ def two_workers(tmp_path_factory):
 def test_a_cluster_writes_the_same_files_as_a_local_sweep(lag, two_workers):
     sweep = lag.write(factors=FACTORS)
     local = lag.run_command("sweep", sweep, "--output-dir", "local")
-    away = lag.run_command("sweep", sweep, "--scheduler", two_workers.address, "--output-dir", "cluster")
+    away = lag.run_command(
+        "sweep", sweep, "--scheduler", two_workers.address, "--output-dir", "cluster"
+    )
     assert (local.code, away.code) == (1, 1), away.err
     for name in ("table.csv", "aggregates.csv", "success.csv"):
-        assert (lag.folder / "local" / name).read_bytes() == (lag.folder / "cluster" / name).read_bytes(), name
+        assert (lag.folder / "local" / name).read_bytes() == (
+            lag.folder / "cluster" / name
+        ).read_bytes(), name
     shipped = list(two_workers.folder.glob("scratch/**/trees/*/lag.fmu"))
     assert {file.read_bytes() for file in shipped} == {(lag.folder / "lag.fmu").read_bytes()}
 
@@ -82,7 +91,11 @@ def test_a_sweep_is_refused_when_no_scheduler_answers(lag, monkeypatch):
 
 @pytest.mark.long
 def test_a_worker_with_another_cosim_is_refused(lag, tmp_path):
-    shutil.copytree(root() / "cosim", tmp_path / "other" / "cosim", ignore=shutil.ignore_patterns("__pycache__", "_bundle"))
+    shutil.copytree(
+        root() / "cosim",
+        tmp_path / "other" / "cosim",
+        ignore=shutil.ignore_patterns("__pycache__", "_bundle"),
+    )
     with (tmp_path / "other/cosim/core/version.py").open("a") as file:
         file.write('\n__version__ = "0.0.9"\n')
     with running_cluster(tmp_path, workers=0) as made:

@@ -35,7 +35,11 @@ RANGE = {"name": "r", "set": "a.r", "range": {"min": 2.0, "max": 32.0}}
 
 
 def made(*factors, **more):
-    return build_design(SweepSpec.model_validate({"name": "d", "scenario": "s.json", "factors": list(factors), **more}))
+    return build_design(
+        SweepSpec.model_validate(
+            {"name": "d", "scenario": "s.json", "factors": list(factors), **more}
+        )
+    )
 
 
 def sampled(kind, runs, *factors, seed=1):
@@ -48,7 +52,9 @@ def test_a_full_factorial_design_has_all_combinations_and_seeds_vary_fastest():
         {"name": "b", "set": ["y.b", "/b"], "values": [1, 2, 3]},
         seeds={"set": "/seed", "first": 7, "count": 2},
     )
-    assert [tuple(p.labels.values()) for p in points] == [(a, b, s) for a in "pq" for b in (1, 2, 3) for s in (7, 8)]
+    assert [tuple(p.labels.values()) for p in points] == [
+        (a, b, s) for a in "pq" for b in (1, 2, 3) for s in (7, 8)
+    ]
     assert points[3].settings == {"x.a": "p", "y.b": 2, "/b": 2, "/seed": 8}
     assert len(points) == 12
 
@@ -74,7 +80,15 @@ def test_samples_are_stratified_in_every_factor(kind):
 
 def test_an_integral_number_with_a_decimal_point_is_a_count():
     assert len(sampled("sobol", 8.0, RANGE, seed=1.0)) == 8
-    assert len(made(RANGE | {"range": {"min": 0.1, "max": 0.7, "count": 4.0}}, seeds={"set": "a.s", "count": 2.0})) == 8
+    assert (
+        len(
+            made(
+                RANGE | {"range": {"min": 0.1, "max": 0.7, "count": 4.0}},
+                seeds={"set": "a.s", "count": 2.0},
+            )
+        )
+        == 8
+    )
 
 
 @pytest.mark.parametrize("kind", ["latin_hypercube", "sobol"])
@@ -87,14 +101,24 @@ def test_the_same_seed_gives_the_same_points(kind):
 def test_samples_follow_their_distribution(kind):
     """A Latin hypercube has one value in each of its equally likely parts."""
     given = {name: ARGUMENTS[name] for name in DISTRIBUTIONS[kind]}
-    points = sampled("latin_hypercube", 200, {"name": "d", "set": "a.d", "distribution": {"kind": kind, **given}})
+    points = sampled(
+        "latin_hypercube", 200, {"name": "d", "set": "a.d", "distribution": {"kind": kind, **given}}
+    )
     parts = TEXTBOOK[kind].cdf(sorted(p.labels["d"] for p in points)) * 200
     assert np.floor(parts + 1e-9).tolist() == list(range(200))
 
 
 def test_levels_of_a_distribution_are_the_medians_of_its_parts():
-    points = made({"name": "d", "set": "a.d", "distribution": {"kind": "normal", "mean": 5.0, "std": 2.0, "count": 3}})
-    assert [p.labels["d"] for p in points] == pytest.approx([5 + 2 * stats.norm.ppf(q) for q in (1 / 6, 1 / 2, 5 / 6)])
+    points = made(
+        {
+            "name": "d",
+            "set": "a.d",
+            "distribution": {"kind": "normal", "mean": 5.0, "std": 2.0, "count": 3},
+        }
+    )
+    assert [p.labels["d"] for p in points] == pytest.approx(
+        [5 + 2 * stats.norm.ppf(q) for q in (1 / 6, 1 / 2, 5 / 6)]
+    )
 
 
 def test_integers_are_rounded():
@@ -111,5 +135,9 @@ def test_points_are_computed_on_demand():
 
 
 def test_normal_samples_are_finite_at_the_ends():
-    normal = {"name": "d", "set": "a.d", "distribution": {"kind": "normal", "mean": 0.0, "std": 1.0}}
+    normal = {
+        "name": "d",
+        "set": "a.d",
+        "distribution": {"kind": "normal", "mean": 0.0, "std": 1.0},
+    }
     assert all(math.isfinite(p.labels["d"]) for p in sampled("sobol", 1024, normal))

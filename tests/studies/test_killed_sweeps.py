@@ -1,4 +1,6 @@
-"""Killed sweeps and workers: finished runs are kept, no run is made twice, no process is left behind."""
+"""Killed sweeps and workers: finished runs are kept, no run is made twice, no process is left
+behind.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,9 @@ pytestmark = pytest.mark.slow
 RUNS = 14
 #: runs of about a tenth of a second
 SWEEP = {
-    "factors": [{"name": "start", "set": "lag.y_start", "values": [1 + run / 10 for run in range(RUNS)]}],
+    "factors": [
+        {"name": "start", "set": "lag.y_start", "values": [1 + run / 10 for run in range(RUNS)]}
+    ],
     "settings": {"/stop_time": 100, "/record/interval": 1},
 }
 
@@ -42,7 +46,9 @@ def wait_until(condition, seconds=60.0):
 
 
 def assert_completed(lag):
-    """Continue a sweep that was ended, and assert that it is complete and that no run was made twice."""
+    """Continue a sweep that was ended, and assert that it is complete and that no run was made
+    twice.
+    """
     done = lag.run_command("sweep", "sweep.json", "--workers", 2)
     keys = [record["key"] for record in lag.records()]
     assert (done.code, len(keys), len(set(keys))) == (0, RUNS, RUNS), done.err
@@ -79,11 +85,17 @@ def test_stopped_workers_and_fork_servers_are_replaced(lag, monkeypatch, whom):
     monkeypatch.setattr("cosim.studies.execution.worker_pool.STOP_TIMEOUT", 0.2)
     monkeypatch.setattr("cosim.studies.execution.worker_pool._STOP_CHECK_INTERVAL", 0.1)
     others = set(descendants(os.getpid()))
-    sweep = threading.Thread(target=lag.run_command, args=("sweep", lag.write(**SWEEP), "--workers", 1))
+    sweep = threading.Thread(
+        target=lag.run_command, args=("sweep", lag.write(**SWEEP), "--workers", 1)
+    )
     sweep.start()
     wait_until(lambda: lag.records())
-    fork_server, worker = [process for process in descendants(os.getpid()) if process not in others][:2]
-    for victim in {"worker": [worker], "fork server": [fork_server], "both": [fork_server, worker]}[whom]:
+    fork_server, worker = [
+        process for process in descendants(os.getpid()) if process not in others
+    ][:2]
+    for victim in {"worker": [worker], "fork server": [fork_server], "both": [fork_server, worker]}[
+        whom
+    ]:
         os.kill(victim, signal.SIGSTOP)
     sweep.join(60)
     assert not sweep.is_alive()
@@ -105,7 +117,13 @@ def test_an_interrupted_sweep_keeps_its_finished_runs(lag, sweep_process):
 
 
 @pytest.mark.parametrize(
-    "request_", [b"", json.dumps({"scenario": "", "root": "", "fmus": [], "deadline": None, "preload": False}).encode()]
+    "request_",
+    [
+        b"",
+        json.dumps(
+            {"scenario": "", "root": "", "fmus": [], "deadline": None, "preload": False}
+        ).encode(),
+    ],
 )
 def test_a_fork_server_ends_without_output_when_its_sweep_was_interrupted(request_):
     own, other = socket.socketpair()

@@ -19,9 +19,23 @@ def write_small_sweep(folder):
     controller, speed, wind, _ = content["factors"]
     controllers = {name: controller["levels"][name] for name in ("cascaded", "geometric")}
     factors = [controller | {"levels": controllers}, wind | {"values": [1.0, 12.0]}]
-    calm = {**content["settings"], speed["set"]: 0.8, **RIPPLES, "uav.vtol.landing_time": 3.0, "/stop_time": 14.0}
-    content |= {"scenario": str(SWEEPS / content["scenario"]), "factors": factors, "settings": calm, "by": []}
-    content |= {"seeds": content["seeds"] | {"count": 1}, "maps": [{"x": "wind", "y": "controller"}]}
+    calm = {
+        **content["settings"],
+        speed["set"]: 0.8,
+        **RIPPLES,
+        "uav.vtol.landing_time": 3.0,
+        "/stop_time": 14.0,
+    }
+    content |= {
+        "scenario": str(SWEEPS / content["scenario"]),
+        "factors": factors,
+        "settings": calm,
+        "by": [],
+    }
+    content |= {
+        "seeds": content["seeds"] | {"count": 1},
+        "maps": [{"x": "wind", "y": "controller"}],
+    }
     (folder / "small.json").write_text(json.dumps(content))
     return folder / "small.json"
 
@@ -30,7 +44,15 @@ def write_small_sweep(folder):
 def folder(tmp_path_factory):
     folder = tmp_path_factory.mktemp("envelope")
     done = CliRunner().invoke(
-        command, [str(write_small_sweep(folder)), "--output-dir", str(folder), "--workers", "1", "--replays"]
+        command,
+        [
+            str(write_small_sweep(folder)),
+            "--output-dir",
+            str(folder),
+            "--workers",
+            "1",
+            "--replays",
+        ],
     )
     assert done.exit_code == 0, done.output
     return folder

@@ -10,7 +10,13 @@ VALUES = {"landing.error": 0.5, "gain": 3.0, "lost": math.nan}
 
 
 @pytest.mark.parametrize(
-    ("text", "violation"), [("gain <= 3", 0.0), ("gain <= 2.5", 0.5), ("gain >= 5 * landing.error", 0.0), ("gain + 1 >= 6", 2.0)]
+    ("text", "violation"),
+    [
+        ("gain <= 3", 0.0),
+        ("gain <= 2.5", 0.5),
+        ("gain >= 5 * landing.error", 0.0),
+        ("gain + 1 >= 6", 2.0),
+    ],
 )
 def test_the_violation_of_a_constraint_is_its_excess(text, violation):
     assert parse_constraint(text).violation(VALUES) == violation

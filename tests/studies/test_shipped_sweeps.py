@@ -21,7 +21,10 @@ def test_a_shipped_file_can_be_run(file):
         tuning = Tuning.from_file(file.stem)
         study, settings = (
             tuning.study,
-            {**tuning.spec.cases[0], **tuning.settings({p.name: p.min for p in tuning.spec.parameters})},
+            {
+                **tuning.spec.cases[0],
+                **tuning.settings({p.name: p.min for p in tuning.spec.parameters}),
+            },
         )
     elif "parameters" in content:
         search = WorstCase.from_file(file.stem)
@@ -34,7 +37,11 @@ def test_a_shipped_file_can_be_run(file):
         study, settings = sweep.study, next(iter(sweep.design)).settings
         assert sweep.criteria
     assert str(study.bundle.scenario) in study.bundle.files
-    prepared = load(study.study_file.scenario, study.job(settings).settings, settings_folder=study.study_file.scenario.parent)
+    prepared = load(
+        study.study_file.scenario,
+        study.job(settings).settings,
+        settings_folder=study.study_file.scenario.parent,
+    )
     assert prepared.kpis()
     prepared.free()
 

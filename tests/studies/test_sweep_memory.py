@@ -31,7 +31,12 @@ def proportional_kilobytes(processes):
 def test_100_000_runs_take_less_than_300_megabytes(lag):
     """Only the last 100 runs are made; records of the others, of realistic length, exist already."""
     half = {"range": {"min": 1.0, "max": 2.0, "count": RUNS // 2}}
-    sweep = lag.write(factors=[{"name": "y", "set": "lag.y_start", **half}, {"name": "T", "set": "lag.T", "values": [0.5, 1.0]}])
+    sweep = lag.write(
+        factors=[
+            {"name": "y", "set": "lag.y_start", **half},
+            {"name": "T", "set": "lag.T", "values": [0.5, 1.0]},
+        ]
+    )
     folder = lag.folder / "runs/sweep"
     folder.mkdir(parents=True)
     with RunStore(folder) as run_store:

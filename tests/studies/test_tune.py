@@ -41,17 +41,26 @@ class InProcessRunner:
 def with_kpis(lag, body):
     """Replace the scenario's KPIs by "own", which `body` computes from the last output y."""
     (lag.folder / "own.py").write_text(
-        f"from math import nan\n\ndef own(result):\n    y = result['lag.y'][-1]\n    return {body}\n"
+        "from math import nan\n\ndef own(result):\n    y = result['lag.y'][-1]\n    return "
+        f"{body}\n"
     )
     file = lag.folder / "lag.json"
-    file.write_text(json.dumps(json.loads(file.read_text()) | {"kpis": [{"name": "own", "python": "own.py:own"}]}))
+    file.write_text(
+        json.dumps(
+            json.loads(file.read_text()) | {"kpis": [{"name": "own", "python": "own.py:own"}]}
+        )
+    )
     return lag
 
 
 def tuned(lag, **content):
     """Run a tuning; return the best trial, all trials and the number of runs."""
     minimize = "abs(end.value - 0.5)"
-    tuning = Tuning.from_file(lag.write("tune", **{"parameters": [PARAMETER], "minimize": minimize, "method": SEARCH, **content}))
+    tuning = Tuning.from_file(
+        lag.write(
+            "tune", **{"parameters": [PARAMETER], "minimize": minimize, "method": SEARCH, **content}
+        )
+    )
     runner = InProcessRunner(tuning.study.context)
     with RunStore(lag.folder) as run_store:
         best = tuning.run(run_store, runner, lambda _record: None)
@@ -84,7 +93,9 @@ def test_parameters_stay_within_their_bounds(lag):
 
 def test_bounds_with_many_digits_are_not_rounded(lag):
     low = 0.7853981633974483
-    _, trials, _ = tuned(lag, parameters=[PARAMETER | {"min": low, "start": low}], method=SEARCH | {"evaluations": 3})
+    _, trials, _ = tuned(
+        lag, parameters=[PARAMETER | {"min": low, "start": low}], method=SEARCH | {"evaluations": 3}
+    )
     assert min(trial.parameters["T"] for trial in trials) == low
 
 
@@ -99,7 +110,11 @@ def test_the_best_point_meets_the_constraints(lag):
 def test_the_least_violation_is_best_when_no_point_is_feasible(lag):
     best, trials, _ = tuned(lag, constraints=["end.value >= 3"])
     assert not best.feasible
-    assert best.violation == min(trial.violation for trial in trials) == pytest.approx(3 - best.parameters["T"] ** 0, abs=0.2)
+    assert (
+        best.violation
+        == min(trial.violation for trial in trials)
+        == pytest.approx(3 - best.parameters["T"] ** 0, abs=0.2)
+    )
 
 
 @pytest.mark.parametrize("over", ["mean", "max"])
@@ -114,7 +129,11 @@ def test_the_objective_covers_all_cases(lag, over):
 def test_a_nan_in_one_case_makes_the_value_of_the_point_nan(lag, over):
     """The second case has no value above 0.5, so the best point is just below."""
     with_kpis(lag, '{"y": float(y) if y <= 0.5 else nan}')
-    content = {"minimize": "max(0, 1 - own.y)", "cases": [{"lag.y_start": 0.5}, {}], "over_cases": over}
+    content = {
+        "minimize": "max(0, 1 - own.y)",
+        "cases": [{"lag.y_start": 0.5}, {}],
+        "over_cases": over,
+    }
     best, trials, _ = tuned(lag, method=GENERATIONS, **content)
     assert any(math.isnan(trial.value) for trial in trials)
     assert 0.9 * HALF < best.parameters["T"] <= HALF
@@ -123,7 +142,12 @@ def test_a_nan_in_one_case_makes_the_value_of_the_point_nan(lag, over):
 def test_a_search_continues_while_no_point_has_a_value(lag):
     """About one point in seven has a value; none of the first generation has."""
     with_kpis(lag, '{"y": float(y) if y < 0.05 else nan}')
-    best, trials, _ = tuned(lag, minimize="own.y", parameters=[PARAMETER | {"start": 2.0}], method=GENERATIONS | {"seed": 17})
+    best, trials, _ = tuned(
+        lag,
+        minimize="own.y",
+        parameters=[PARAMETER | {"start": 2.0}],
+        method=GENERATIONS | {"seed": 17},
+    )
     assert all(math.isnan(trial.value) for trial in trials[:6])
     assert best.feasible
 
@@ -144,13 +168,17 @@ def test_unknown_names_are_refused_after_the_first_points(lag):
 def test_a_kpi_that_few_runs_lack_has_no_value_there(lag):
     """A run that ends above 0.5 has another KPI."""
     with_kpis(lag, '{"low": float(y)} if y <= 0.5 else {"high": float(y)}')
-    best, trials, _ = tuned(lag, minimize="1 - own.low", parameters=[PARAMETER | {"start": 1.0}], method=GENERATIONS)
+    best, trials, _ = tuned(
+        lag, minimize="1 - own.low", parameters=[PARAMETER | {"start": 1.0}], method=GENERATIONS
+    )
     assert math.isnan(trials[0].value)
     assert best.feasible
 
 
 def test_an_interrupt_in_the_first_generation_leaves_earlier_files_alone(lag, monkeypatch):
-    file = lag.write("tune", parameters=[PARAMETER], minimize="end.value", method=SEARCH | {"evaluations": 3})
+    file = lag.write(
+        "tune", parameters=[PARAMETER], minimize="end.value", method=SEARCH | {"evaluations": 3}
+    )
     assert lag.run_command("tune", file).code == 0
     before = lag.table("runs/tune", "trials.csv")
 
@@ -182,7 +210,10 @@ def test_the_command_prints_how_to_run_the_best_and_says_when_all_crash(lag):
 def test_the_command_says_when_no_point_has_a_value(lag):
     with_kpis(lag, '{"y": nan}')
     done = lag.run_command(
-        "tune", lag.write("tune", parameters=[PARAMETER], minimize="own.y", method=SEARCH | {"evaluations": 3})
+        "tune",
+        lag.write(
+            "tune", parameters=[PARAMETER], minimize="own.y", method=SEARCH | {"evaluations": 3}
+        ),
     )
     assert (done.code, done.err) == (3, "own.y has no value at any point\n")
     assert "nan" not in done.out
@@ -192,7 +223,9 @@ def test_the_command_says_when_no_point_has_a_value(lag):
 
 
 def test_json_is_the_content_of_the_file(lag):
-    file = lag.write("tune", parameters=[PARAMETER], minimize="end.value", method=SEARCH | {"evaluations": 3})
+    file = lag.write(
+        "tune", parameters=[PARAMETER], minimize="end.value", method=SEARCH | {"evaluations": 3}
+    )
     done = lag.run_command("tune", file, "--json")
     assert (done.code, done.err) == (0, "")
     written = json.loads((lag.folder / "runs/tune/best.json").read_text())

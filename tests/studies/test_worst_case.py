@@ -18,11 +18,15 @@ LIMITS = [{"kpi": "end.value", "max": 0.9, "min": 0.1}]
 
 
 def written(lag, **content):
-    return lag.write("worst", **{"parameters": [TIME_CONSTANT], "success": LIMITS, "method": METHOD, **content})
+    return lag.write(
+        "worst", **{"parameters": [TIME_CONSTANT], "success": LIMITS, "method": METHOD, **content}
+    )
 
 
 def test_the_largest_excess_is_found_and_kept_as_a_scenario_that_misses_the_check(lag):
-    """The end value rises with T; at T = 2 s it is 0.951, 5.7 % above its limit, and at 0.05 s it is 0.107, within its limits."""
+    """The end value rises with T; at T = 2 s it is 0.951, 5.7 % above its limit, and at 0.05 s it
+    is 0.107, within its limits.
+    """
     done = lag.run_command("tune", "--worst", written(lag, keep=2), "--workers", "2")
     assert done.code == 3, done.err
     folder = lag.folder / "runs/worst"
@@ -45,7 +49,9 @@ def test_the_largest_excess_is_found_and_kept_as_a_scenario_that_misses_the_chec
 
 
 def test_no_counterexample_within_the_limits(lag):
-    done = lag.run_command("tune", "--worst", written(lag, success=[{"kpi": "end.value", "max": 0.99}]))
+    done = lag.run_command(
+        "tune", "--worst", written(lag, success=[{"kpi": "end.value", "max": 0.99}])
+    )
     assert done.code == 0, done.err
     assert "all checks passed; closest: end.value is 0.95" in done.out
     assert not (lag.folder / "runs/worst/counterexamples").exists()
@@ -63,11 +69,15 @@ def test_whole_numbers_are_searched_from_python(lag):
 
 
 def test_multiples_are_searched_so_that_a_fault_falls_on_a_communication_point(make_lag):
-    """The lag falls towards 0 until its input becomes 5; the later it does, the smaller is the end value."""
+    """The lag falls towards 0 until its input becomes 5; the later it does, the smaller is the end
+    value.
+    """
     lag = make_lag(events=[{"time": 0.05, "set": {"lag.u": 5.0}}])
     fault = {"name": "t", "set": "/events/0/time", "min": 0.005, "max": 0.098, "multiple_of": 0.01}
     found = cosim.worst_case(
-        written(lag, parameters=[fault], success=[{"kpi": "end.value", "min": 2.0}]), output_dir=lag.folder / "out", workers=1
+        written(lag, parameters=[fault], success=[{"kpi": "end.value", "min": 2.0}]),
+        output_dir=lag.folder / "out",
+        workers=1,
     )
     assert {each.parameters["t"] for each in found.attempts} <= {n / 100 for n in range(1, 10)}
     assert all(each.severity < 10 for each in found.attempts)
@@ -87,8 +97,13 @@ def test_a_failed_run_is_the_worst(make_lag):
 
 def test_a_search_without_checks_and_one_with_unknown_kpis_are_refused(lag):
     done = lag.run_command("tune", "--worst", written(lag, success=[]))
-    assert (done.code, done.err.strip()) == (2, 'worst: nothing can break, expected "success" or checks of the scenario')
-    done = lag.run_command("tune", "--worst", written(lag, success=[{"kpi": "ende.value", "max": 1}]))
+    assert (done.code, done.err.strip()) == (
+        2,
+        'worst: nothing can break, expected "success" or checks of the scenario',
+    )
+    done = lag.run_command(
+        "tune", "--worst", written(lag, success=[{"kpi": "ende.value", "max": 1}])
+    )
     assert (done.code, lag.records("runs/worst")) == (2, [])
     assert '$.success[0].kpi: no KPI "ende.value"; did you mean "end.value"?' in done.err
 

@@ -1,4 +1,6 @@
-"""Model Exchange FMUs for tests: a lag, a bouncing ball and a counter (tests/components/fmi/model_exchange/ball.c)."""
+"""Model Exchange FMUs for tests: a lag, a bouncing ball and a counter
+(tests/components/fmi/model_exchange/ball.c).
+"""
 
 from __future__ import annotations
 
@@ -40,10 +42,13 @@ def model_description(version: int) -> str:
     """Return modelDescription.xml of the FMU for an FMI major version."""
     lines = list(_variables_2() if version == 2 else _variables_3())
     flags = f'modelIdentifier="ball" canGetAndSetFMU{"state" if version == 2 else "State"}="true"'
-    token = 'guid="ball" numberOfEventIndicators="1"' if version == 2 else 'instantiationToken="ball"'
+    token = (
+        'guid="ball" numberOfEventIndicators="1"' if version == 2 else 'instantiationToken="ball"'
+    )
     completes = "" if version == 2 else ' needsCompletedIntegratorStep="true"'
     return (
-        f'<?xml version="1.0" encoding="UTF-8"?>\n<fmiModelDescription fmiVersion="{version}.0" modelName="Ball" {token}>\n'
+        f'<?xml version="1.0" encoding="UTF-8"?>\n<fmiModelDescription fmiVersion="{version}.0" '
+        f'modelName="Ball" {token}>\n'
         f"<ModelExchange {flags}{completes}/>\n"
         '<DefaultExperiment startTime="0" stopTime="2" stepSize="0.01" tolerance="1e-8"/>\n'
         f"<ModelVariables>\n{chr(10).join(lines)}\n</ModelVariables>\n<ModelStructure>{_structure(version)}</ModelStructure>\n"
@@ -58,11 +63,16 @@ def _variables_2() -> Iterator[str]:
         reference, kind, text = VARIABLES[name]
         attributes = dict(pair.split("=") for pair in text.split())
         if "derivative" in attributes:
-            attributes["derivative"] = f'"{references[int(attributes["derivative"].strip(chr(34)))]}"'
+            attributes["derivative"] = (
+                f'"{references[int(attributes["derivative"].strip(chr(34)))]}"'
+            )
         inner = " ".join(f"{key}={value}" for key, value in attributes.items() if key in _FMI2_ONLY)
-        outer = " ".join(f"{key}={value}" for key, value in attributes.items() if key not in _FMI2_ONLY)
+        outer = " ".join(
+            f"{key}={value}" for key, value in attributes.items() if key not in _FMI2_ONLY
+        )
         yield (
-            f'<ScalarVariable name="{name}" valueReference="{reference}" {outer}><{_FMI2_TYPES[kind]} {inner}/></ScalarVariable>'
+            f'<ScalarVariable name="{name}" valueReference="{reference}" '
+            f"{outer}><{_FMI2_TYPES[kind]} {inner}/></ScalarVariable>"
         )
 
 
@@ -74,27 +84,40 @@ def _variables_3() -> Iterator[str]:
 def _variables_1() -> Iterator[str]:
     for name, (reference, kind, text) in VARIABLES.items():
         attributes = dict(pair.split("=") for pair in text.split())
-        causality = {'"parameter"': '"internal"', '"local"': '"internal"', '"independent"': '"none"'}.get(
-            attributes["causality"], attributes["causality"]
+        causality = {
+            '"parameter"': '"internal"',
+            '"local"': '"internal"',
+            '"independent"': '"none"',
+        }.get(attributes["causality"], attributes["causality"])
+        variability = (
+            '"parameter"'
+            if attributes["causality"] == '"parameter"'
+            else attributes.get("variability", '"continuous"')
         )
-        variability = '"parameter"' if attributes["causality"] == '"parameter"' else attributes.get("variability", '"continuous"')
         start = f" start={attributes['start']}" if "start" in attributes else ""
         yield (
-            f'<ScalarVariable name="{name}" valueReference="{reference}" causality={causality} variability={variability}>'
+            f'<ScalarVariable name="{name}" valueReference="{reference}" causality={causality} '
+            f"variability={variability}>"
             f"<{_FMI2_TYPES[kind]}{start}/></ScalarVariable>"
         )
-    yield ('<ScalarVariable name="minus_x" valueReference="1" causality="output" alias="negatedAlias"><Real/></ScalarVariable>')
+    yield (
+        '<ScalarVariable name="minus_x" valueReference="1" causality="output" '
+        'alias="negatedAlias"><Real/></ScalarVariable>'
+    )
 
 
 def description_1(interface: str) -> str:
     """Return modelDescription.xml of the FMI 1.0 FMU for "ME" or "CS"."""
     capabilities = (
-        '<CoSimulation_StandAlone><Capabilities canHandleVariableCommunicationStepSize="true"/></CoSimulation_StandAlone>'
+        "<CoSimulation_StandAlone><Capabilities "
+        'canHandleVariableCommunicationStepSize="true"/></CoSimulation_StandAlone>'
     )
     implementation = f"<Implementation>{capabilities}</Implementation>" if interface == "CS" else ""
     return (
-        '<?xml version="1.0" encoding="ISO-8859-1"?>\n<fmiModelDescription fmiVersion="1.0" modelName="Ball" '
-        'modelIdentifier="ball" guid="ball" numberOfContinuousStates="3" numberOfEventIndicators="1">\n'
+        '<?xml version="1.0" encoding="ISO-8859-1"?>\n<fmiModelDescription fmiVersion="1.0" '
+        'modelName="Ball" '
+        'modelIdentifier="ball" guid="ball" numberOfContinuousStates="3" '
+        'numberOfEventIndicators="1">\n'
         '<DefaultExperiment startTime="0" stopTime="2" tolerance="1e-8"/>\n'
         f"<ModelVariables>\n{chr(10).join(_variables_1())}\n</ModelVariables>\n{implementation}</fmiModelDescription>\n"
     )
@@ -106,7 +129,15 @@ def _structure(version: int) -> str:
     derivatives = [name for name in VARIABLES if name.startswith("der(")]
     if version == 3:
         lines = [f'<Output valueReference="{VARIABLES[name][0]}"/>' for name in outputs]
-        return "".join([*lines, *(f'<ContinuousStateDerivative valueReference="{VARIABLES[name][0]}"/>' for name in derivatives)])
+        return "".join(
+            [
+                *lines,
+                *(
+                    f'<ContinuousStateDerivative valueReference="{VARIABLES[name][0]}"/>'
+                    for name in derivatives
+                ),
+            ]
+        )
     groups = {"Outputs": outputs, "Derivatives": derivatives}
     return "".join(
         f"<{group}>{''.join(f'<Unknown index={chr(34)}{indices[name]}{chr(34)}/>' for name in names)}</{group}>"
@@ -121,8 +152,13 @@ def build_ball_fmu(version: int, folder: Path, interface: str = "ME") -> Path:
     options = ["-shared", "-fPIC", "-O0", f"-DFMI={version}", f"-I{HEADERS}"]
     subprocess.run([compiler, *options, SOURCE, "-o", library, "-lm"], check=True)
     with ZipFile(target, "w") as archive:
-        archive.writestr("modelDescription.xml", description_1(interface) if version == 1 else model_description(version))
-        archive.write(library, f"binaries/{fmpy.platform_tuple if version == 3 else fmpy.platform}/ball.so")
+        archive.writestr(
+            "modelDescription.xml",
+            description_1(interface) if version == 1 else model_description(version),
+        )
+        archive.write(
+            library, f"binaries/{fmpy.platform_tuple if version == 3 else fmpy.platform}/ball.so"
+        )
     return target
 
 

@@ -17,7 +17,11 @@ SOFTWARE_RENDERING_FLAGS = ("--use-gl=angle", "--use-angle=swiftshader")
 def open_browser(flags: Sequence[str] = ()) -> Iterator:
     """Playwright's Browser of an installed Chromium; skips the test where either is missing."""
     playwright = pytest.importorskip("playwright.sync_api", reason="playwright is not installed")
-    path = shutil.which("chromium") or shutil.which("chromium-browser") or shutil.which("google-chrome")
+    path = (
+        shutil.which("chromium")
+        or shutil.which("chromium-browser")
+        or shutil.which("google-chrome")
+    )
     if path is None:
         pytest.skip("no chromium here")
     with playwright.sync_playwright() as driver:

@@ -1,4 +1,6 @@
-"""`cosim` commands for tests, in processes forked from one that has done all imports (see `fork_server`)."""
+"""`cosim` commands for tests, in processes forked from one that has done all imports (see
+`fork_server`).
+"""
 
 from __future__ import annotations
 
@@ -16,9 +18,16 @@ from pathlib import Path
 from typing import Any
 
 #: `limit`: time limit of a command (s); `executor`: its kind;
-#: `observe`: report what the command changed in its process; `wait`: answer when the command has ended;
-#: `closed`: numbers of closed standard streams
-CONDITIONS = {"limit": 120, "stdin": os.devnull, "executor": "auto", "observe": False, "wait": True, "closed": ()}
+#: `observe`: report what the command changed in its process; `wait`: answer when the command has
+#: ended; `closed`: numbers of closed standard streams
+CONDITIONS = {
+    "limit": 120,
+    "stdin": os.devnull,
+    "executor": "auto",
+    "observe": False,
+    "wait": True,
+    "closed": (),
+}
 
 
 class ForkServer:
@@ -26,16 +35,24 @@ class ForkServer:
 
     def __init__(self, *options: str) -> None:
         command = [sys.executable, Path(__file__).with_name("fork_server.py"), *options]
-        self._process = subprocess.Popen(command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True)
+        self._process = subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, text=True
+        )
 
     def close(self) -> None:
         """End the server."""
         self._process.communicate()
 
     def run(
-        self, folder: Path, output: Path, words: tuple[object, ...], environment: Mapping[str, str], **conditions: Any
+        self,
+        folder: Path,
+        output: Path,
+        words: tuple[object, ...],
+        environment: Mapping[str, str],
+        **conditions: Any,
     ) -> dict[str, Any]:
-        """Run a command in `folder` and return its exit code, wall time (s) and the ids of processes that outlived it.
+        """Run a command in `folder` and return its exit code, wall time (s) and the ids of
+        processes that outlived it.
 
         Args:
             folder: Working directory.
@@ -46,7 +63,9 @@ class ForkServer:
         """
         return dict(self._ask(self._request(folder, output, words, environment, **conditions)))
 
-    def start(self, folder: Path, output: Path, words: tuple[object, ...], environment: Mapping[str, str]) -> int:
+    def start(
+        self, folder: Path, output: Path, words: tuple[object, ...], environment: Mapping[str, str]
+    ) -> int:
         """Start a command like `run` and return its process id."""
         return int(self._ask(self._request(folder, output, words, environment, wait=False)))
 
@@ -57,7 +76,11 @@ class ForkServer:
 
     @staticmethod
     def _request(
-        folder: Path, output: Path, words: tuple[object, ...], environment: Mapping[str, str], **conditions: Any
+        folder: Path,
+        output: Path,
+        words: tuple[object, ...],
+        environment: Mapping[str, str],
+        **conditions: Any,
     ) -> dict[str, Any]:
         places = {"folder": str(folder), "output": str(output), "environment": dict(environment)}
         return {**CONDITIONS, **conditions, "arguments": [*map(str, words)], **places}
@@ -79,14 +102,18 @@ def shared_server() -> ForkServer:
 
 @cache
 def starting_server() -> ForkServer:
-    """Return the server of this test process for commands that go on; orphans of those belong to no process of the tests."""
+    """Return the server of this test process for commands that go on; orphans of those belong to no
+    process of the tests.
+    """
     server = ForkServer("--without-orphans")
     atexit.register(server.close)
     return server
 
 
 class StartedCommand:
-    """A command with the methods of `subprocess.Popen` that tests call, in a forked process that leads its session."""
+    """A command with the methods of `subprocess.Popen` that tests call, in a forked process that
+    leads its session.
+    """
 
     def __init__(self, *words: object, cwd: Path, env: Mapping[str, str]):
         self.args: list[str] = ["cosim", *map(str, words)]
@@ -124,7 +151,9 @@ class StartedCommand:
         return self._text("stdout"), self._text("stderr")
 
     def first_line(self) -> str:
-        """Wait for the first line of the output, or for the end of the command, and return the line."""
+        """Wait for the first line of the output, or for the end of the command, and return the
+        line.
+        """
         while "\n" not in self._text("stdout") and self.poll() is None:
             time.sleep(0.005)
         return self._text("stdout").partition("\n")[0]
@@ -137,9 +166,16 @@ class StartedCommand:
 def run_cosim(
     *words: object, cwd: Path | str | None = None, env: Mapping[str, str] | None = None
 ) -> subprocess.CompletedProcess[str]:
-    """Run a command like `subprocess.run([python, "-m", "cosim", *words], cwd=cwd, env={**os.environ, **env})`."""
+    """Run a command like `subprocess.run([python, "-m", "cosim", *words], cwd=cwd,
+    env={**os.environ, **env})`.
+    """
     variables = {name: value for name, value in os.environ.items() if name != "PYTEST_CURRENT_TEST"}
     with tempfile.TemporaryDirectory() as output:
-        ended = shared_server().run(Path(cwd or Path.cwd()), Path(output), words, {**variables, **(env or {})})
-        texts = [Path(output, name).read_text(encoding="utf-8", errors="replace") for name in ("stdout", "stderr")]
+        ended = shared_server().run(
+            Path(cwd or Path.cwd()), Path(output), words, {**variables, **(env or {})}
+        )
+        texts = [
+            Path(output, name).read_text(encoding="utf-8", errors="replace")
+            for name in ("stdout", "stderr")
+        ]
     return subprocess.CompletedProcess(["cosim", *map(str, words)], ended["code"], *texts)

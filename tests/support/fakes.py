@@ -23,8 +23,9 @@ def outputs(*names: str, **attributes: Any) -> list[Variable]:
 class FakeComponent(Component):
     """Component whose step is a function.
 
-    `step(values, time, step_size)` changes the values (by variable name) in place. `feed_through(values)` computes outputs
-    directly from inputs, in initialization mode too. `calls` lists the calls of the life cycle.
+    `step(values, time, step_size)` changes the values (by variable name) in place.
+    `feed_through(values)` computes outputs directly from inputs, in initialization mode too.
+    `calls` lists the calls of the life cycle.
     """
 
     binds_everything = False
@@ -38,7 +39,9 @@ class FakeComponent(Component):
         start: Mapping[str, Any] | None = None,
     ):
         self.variables = list(variables)
-        self.values: dict[str, Any] = {v.name: self._start(v) for v in variables} | dict(start or {})
+        self.values: dict[str, Any] = {v.name: self._start(v) for v in variables} | dict(
+            start or {}
+        )
         self._step, self._feed_through = step, feed_through
         self.calls: list[str] = []
 
@@ -46,7 +49,9 @@ class FakeComponent(Component):
     def _start(variable: Variable) -> Any:
         if variable.shape:
             return list(variable.start or [0.0] * len(variable.scalar_names))
-        return ("" if variable.type == "String" else 0) if variable.start is None else variable.start
+        return (
+            ("" if variable.type == "String" else 0) if variable.start is None else variable.start
+        )
 
     def set(self, name: str, value: Any) -> None:
         self.calls.append(f"set {name}")
@@ -109,7 +114,9 @@ def gain(factor: float = 1.0, start: float = 0.0) -> FakeComponent:
     def feed(values: dict[str, Any]) -> None:
         values["y"] = factor * values["u"]
 
-    return FakeComponent([*inputs("u"), *outputs("y")], lambda values, _, __: feed(values), feed, {"y": start})
+    return FakeComponent(
+        [*inputs("u"), *outputs("y")], lambda values, _, __: feed(values), feed, {"y": start}
+    )
 
 
 def integrator(start: float = 0.0) -> FakeComponent:

@@ -21,7 +21,11 @@ PLATFORMS = {2: fmpy.platform, 3: fmpy.platform_tuple}
 STEP, STEP_COUNT = 0.01, 10
 NO_CHANGES: Mapping[str, str] = {}
 #: functions that have another name in FMI 3.0
-IN_FMI3 = {"Instantiate": "InstantiateCoSimulation", "GetReal": "GetFloat64", "SetReal": "SetFloat64"}
+IN_FMI3 = {
+    "Instantiate": "InstantiateCoSimulation",
+    "GetReal": "GetFloat64",
+    "SetReal": "SetFloat64",
+}
 
 
 def function_name(version: int, name: str) -> str:
@@ -35,7 +39,9 @@ def build_library(version: int, folder: Path) -> Path:
     library = folder / f"fault{version}.so"
     sources = [HERE / f"fault{version}.c", HERE / "fault_actions.c", HERE / "attacks.c"]
     options = ["-shared", "-fPIC", "-O1", "-Wl,-Bsymbolic", f"-I{HEADERS}"]
-    subprocess.run([compiler, *options, *sources, "-o", library, "-lm", "-lpthread", "-lrt"], check=True)
+    subprocess.run(
+        [compiler, *options, *sources, "-o", library, "-lm", "-lpthread", "-lrt"], check=True
+    )
     return library
 
 
@@ -48,9 +54,10 @@ def changed(text: str, changes: Mapping[str, str]) -> str:
 
 @dataclass(frozen=True)
 class FaultFmus:
-    """`fmus(2, "DoStep 6 segv")` is an FMI 2.0 FMU that crashes in its sixth step; the orders stand in fault_actions.h, with
-    the names of FMI 2.0 for both versions. `changes` replaces words of its description; `attacks` are lines for the order
-    "attack".
+    """`fmus(2, "DoStep 6 segv")` is an FMI 2.0 FMU that crashes in its sixth step; the orders stand
+    in fault_actions.h, with
+    the names of FMI 2.0 for both versions. `changes` replaces words of its description; `attacks`
+    are lines for the order "attack".
 
     Each of its calls, and what became of an order, is a line in the file `calls`.
     """
@@ -59,15 +66,24 @@ class FaultFmus:
     folder: Path
 
     def __call__(
-        self, version: int, order: str = "", name: str = "lag", changes: Mapping[str, str] = NO_CHANGES, attacks: str = ""
+        self,
+        version: int,
+        order: str = "",
+        name: str = "lag",
+        changes: Mapping[str, str] = NO_CHANGES,
+        attacks: str = "",
     ) -> Path:
         target = self.folder / f"{name}.fmu"
         where, _, rest = order.partition(" ")
         order = f"{IN_FMI3.get(where, where) if version == 3 else where} {rest}"
         with ZipFile(target, "w") as archive:
-            archive.writestr("modelDescription.xml", changed((HERE / f"fault{version}.xml").read_text(), changes))
+            archive.writestr(
+                "modelDescription.xml", changed((HERE / f"fault{version}.xml").read_text(), changes)
+            )
             archive.write(self.libraries[version], f"binaries/{PLATFORMS[version]}/fault.so")
-            archive.writestr("resources/fault.txt", f"fault {order}\nrecord {self.calls}\n{attacks}")
+            archive.writestr(
+                "resources/fault.txt", f"fault {order}\nrecord {self.calls}\n{attacks}"
+            )
         return target
 
     @property
@@ -80,7 +96,9 @@ class FaultFmus:
         return [line.rstrip() for line in text.splitlines() if line.startswith(word)]
 
 
-def scenario(folder: Path, fmu: Path, deadlines: dict[str, float] | None = None, **more: Any) -> Path:
+def scenario(
+    folder: Path, fmu: Path, deadlines: dict[str, float] | None = None, **more: Any
+) -> Path:
     """A scenario with the FMU as its component `lag`; `more` replaces keys."""
     content = {
         "name": "fault",
@@ -96,7 +114,9 @@ def scenario(folder: Path, fmu: Path, deadlines: dict[str, float] | None = None,
 
 
 def lag_output(n: int, y: float = 1.0, lag_time: float = 0.5) -> float:
-    """Output of the lag after n Euler steps without input, in the order of the C source's operations."""
+    """Output of the lag after n Euler steps without input, in the order of the C source's
+    operations.
+    """
     for _ in range(n):
         y += STEP * (0.0 - y) / lag_time
     return y

@@ -1,9 +1,11 @@
 """Server process that forks `cosim` commands: `python -m cosim` without the time for its imports.
 
-Reads one JSON object per line (see `cosim_command.ForkServer.run`) and answers {"code", "seconds", "processes"}: the exit code
-as `subprocess` defines it, the wall time, and the ids of processes that outlived the command. Those are killed; this process is
-their subreaper. With "observe" the file "changes" in the working directory lists what the command changed in its process.
-With "wait": false the answer is the process id of the command, and {"poll": id} asks for its exit code, null while it runs.
+Reads one JSON object per line (see `cosim_command.ForkServer.run`) and answers {"code", "seconds",
+"processes"}: the exit code as `subprocess` defines it, the wall time, and the ids of processes that
+outlived the command. Those are killed; this process is their subreaper. With "observe" the file
+"changes" in the working directory lists what the command changed in its process. With "wait": false
+the answer is the process id of the command, and {"poll": id} asks for its exit code, null while it
+runs.
 """
 
 from __future__ import annotations
@@ -45,7 +47,10 @@ PRELOADED = (
     "report.tables",
     "results.comparison.reference",
     "scenario.nested_systems",
-    *(f"cli.commands.{name}" for name in ("bench_controller", "check", "regress", "run", "simulate", "sweep")),
+    *(
+        f"cli.commands.{name}"
+        for name in ("bench_controller", "check", "regress", "run", "simulate", "sweep")
+    ),
     "cli.bench_table",
     "cli.messages",
     "components.fmi.isolated.isolated_fmu",
@@ -66,7 +71,13 @@ OTHERS = (
     "email.parser",
     "concurrent.futures.thread",
 )
-OTHERS += ("encodings.utf_8_sig", "encodings.ascii", "encodings.unicode_escape", "pydantic.root_model", "pydantic.type_adapter")
+OTHERS += (
+    "encodings.utf_8_sig",
+    "encodings.ascii",
+    "encodings.unicode_escape",
+    "pydantic.root_model",
+    "pydantic.type_adapter",
+)
 OTHERS += ("jinja2.debug", "pythonfmu.builder", "numpy.ma")
 #: classes and functions of shipped scenarios
 SHIPPED = ("world.py:World", "kpis.py:waypoints", "figures.py:paths")
@@ -74,7 +85,9 @@ PR_SET_CHILD_SUBREAPER = 36
 
 
 def serve_requests() -> dict[str, Any] | None:
-    """Answer requests until the input ends; in a child that is to run a command, return the request."""
+    """Answer requests until the input ends; in a child that is to run a command, return the
+    request.
+    """
     for line in sys.stdin:
         request = json.loads(line)
         if "poll" in request:
@@ -85,7 +98,10 @@ def serve_requests() -> dict[str, Any] | None:
         if child == 0:
             prepare_child(**request)
             return dict(request)
-        print(json.dumps(judge_child(child, began, request["limit"]) if request["wait"] else child), flush=True)
+        print(
+            json.dumps(judge_child(child, began, request["limit"]) if request["wait"] else child),
+            flush=True,
+        )
     return None
 
 
@@ -102,15 +118,27 @@ def exit_code(child: int) -> int | None:
 
 
 def prepare_child(
-    folder: str, output: str, environment: dict[str, str], stdin: str, executor: ExecutorKind, closed: list[int], **_: Any
+    folder: str,
+    output: str,
+    environment: dict[str, str],
+    stdin: str,
+    executor: ExecutorKind,
+    closed: list[int],
+    **_: Any,
 ) -> None:
-    """Make this process like a new one: session, working directory, environment, standard streams, executor."""
+    """Make this process like a new one: session, working directory, environment, standard streams,
+    executor.
+    """
     os.setsid()
     os.chdir(folder)
     os.environ.update(environment)
     tempfile.tempdir = None
     plan_run.executor_class = lambda kind: executor_class(executor if kind == "auto" else kind)
-    files = ((0, stdin, os.O_RDWR), (1, f"{output}/stdout", os.O_WRONLY), (2, f"{output}/stderr", os.O_WRONLY))
+    files = (
+        (0, stdin, os.O_RDWR),
+        (1, f"{output}/stdout", os.O_WRONLY),
+        (2, f"{output}/stderr", os.O_WRONLY),
+    )
     for number, name, flags in files:
         file = os.open(name, flags | os.O_CREAT | os.O_TRUNC * (number > 0), 0o666)
         os.dup2(file, number)
@@ -130,11 +158,15 @@ def wait_for_exit(child: int, limit: float) -> int:
 
 
 def children() -> list[int]:
-    return [int(word) for word in Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()]
+    return [
+        int(word) for word in Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+    ]
 
 
 def end_orphans(grace: float = 1.0) -> list[int]:
-    """Ids of processes that are still there `grace` s after the command; they are ended, generation after generation."""
+    """Ids of processes that are still there `grace` s after the command; they are ended, generation
+    after generation.
+    """
     left, latest = [], time.monotonic() + grace
     while found := children():
         for process in found:
@@ -147,7 +179,9 @@ def end_orphans(grace: float = 1.0) -> list[int]:
 
 
 def run_and_exit(request: dict[str, Any]) -> None:
-    """Run the command and end like an interpreter, but for taking its modules apart, which takes longer than the command."""
+    """Run the command and end like an interpreter, but for taking its modules apart, which takes
+    longer than the command.
+    """
     code = 0
     try:
         if request["observe"]:
@@ -173,8 +207,15 @@ def process_state() -> dict[str, Any]:
         "umask": mask,
         "locale": str(own.setlocale(locale.LC_ALL, None)),
         "environment": [str(own.getenv(name)) for name in (b"HOME", b"PATH")],
-        "signals": [str(signal.getsignal(number)) for number in (signal.SIGINT, signal.SIGTERM, signal.SIGCHLD)],
-        "ignored": [line for line in Path("/proc/self/status").read_text().splitlines() if line.startswith("SigIgn")],
+        "signals": [
+            str(signal.getsignal(number))
+            for number in (signal.SIGINT, signal.SIGTERM, signal.SIGCHLD)
+        ],
+        "ignored": [
+            line
+            for line in Path("/proc/self/status").read_text().splitlines()
+            if line.startswith("SigIgn")
+        ],
         "rounding": [own.fegetround(), own.fegetexcept()],
         "flush to zero": 1e-310 * float("0.5") == 0.0,
         "descriptors": sorted(path.name for path in Path("/proc/self/fd").iterdir()),
@@ -190,7 +231,13 @@ def run_observed(arguments: list[str]) -> None:
     finally:
         file_cache.remove_idle_folders()
         after = process_state()
-        report.write_text("\n".join(f"{name}: {before[name]} -> {after[name]}" for name in before if before[name] != after[name]))
+        report.write_text(
+            "\n".join(
+                f"{name}: {before[name]} -> {after[name]}"
+                for name in before
+                if before[name] != after[name]
+            )
+        )
 
 
 if __name__ == "__main__":

@@ -22,7 +22,9 @@ _CONTEXT.set_forkserver_preload([fork_server.__name__, *RUN_MODULES])
 class ForkedServer:
     """Fork server with the methods of `subprocess.Popen` that the worker pool calls."""
 
-    def __init__(self, command: Sequence[str], pass_fds: Sequence[int], env: Mapping[str, str], **_: Any):
+    def __init__(
+        self, command: Sequence[str], pass_fds: Sequence[int], env: Mapping[str, str], **_: Any
+    ):
         assert command[1:3] == ["-m", fork_server.__name__]
         self._process = _CONTEXT.Process(target=_serve, args=(DupFd(pass_fds[0]), dict(env)))
         self._process.start()
@@ -41,7 +43,9 @@ class ForkedServer:
 
 
 #: takes the place of the module `subprocess` in the module `worker_pool`
-SUBPROCESS = SimpleNamespace(Popen=ForkedServer, DEVNULL=subprocess.DEVNULL, TimeoutExpired=subprocess.TimeoutExpired)
+SUBPROCESS = SimpleNamespace(
+    Popen=ForkedServer, DEVNULL=subprocess.DEVNULL, TimeoutExpired=subprocess.TimeoutExpired
+)
 
 
 def _serve(connection: Any, environment: Mapping[str, str]) -> None:

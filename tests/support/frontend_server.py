@@ -1,7 +1,8 @@
 """Modelica front ends for tests, in processes forked from one that has imported rumoca.
 
-`python frontend_server.py DESCRIPTOR PROGRAM` runs the program `rumoca_process` for each message on a socket. A message carries
-the descriptors of the input, output and error files. The answer is the status of the forked process, as of `os.waitpid`.
+`python frontend_server.py DESCRIPTOR PROGRAM` runs the program `rumoca_process` for each message on
+a socket. A message carries the descriptors of the input, output and error files. The answer is the
+status of the forked process, as of `os.waitpid`.
 """
 
 from __future__ import annotations

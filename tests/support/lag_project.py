@@ -41,7 +41,12 @@ class LagProject:
     def create(cls, folder: Path, library: Path, **more: Any) -> LagProject:
         """Create the FMU and its scenario in `folder`; `more` replaces keys of the scenario."""
         FaultFmus({2: library}, folder)(2)
-        content = {"name": "lag", "stop_time": 0.1, "step_size": 0.01, "components": {"lag": {"fmu": "lag.fmu"}}}
+        content = {
+            "name": "lag",
+            "stop_time": 0.1,
+            "step_size": 0.01,
+            "components": {"lag": {"fmu": "lag.fmu"}},
+        }
         content |= {"record": {"signals": ["lag.y"]}, "kpis": KPIS, **more}
         (folder / "lag.json").write_text(json.dumps(content))
         return cls(folder)
@@ -56,7 +61,9 @@ class LagProject:
         """Run a command in this process, where all modules are imported already."""
         out, err = StringIO(), StringIO()
         with chdir(self.folder), redirect_stdout(out), redirect_stderr(err):
-            code = run_guarded(lambda: cli.main([*map(str, words)], standalone_mode=False), CommandLine())
+            code = run_guarded(
+                lambda: cli.main([*map(str, words)], standalone_mode=False), CommandLine()
+            )
         self.last_result = CommandResult(code, out.getvalue(), err.getvalue())
         return self.last_result
 

@@ -6,7 +6,9 @@ from cosim import Component, Variable
 
 
 class StateSpace(Component):
-    """x[k+1] = A x[k] + B u[k]; after each step y = C x + D u, with the new state and the input of the step."""
+    """x[k+1] = A x[k] + B u[k]; after each step y = C x + D u, with the new state and the input of
+    the step.
+    """
 
     binds_everything = True
     has_state = True
@@ -86,12 +88,17 @@ def block(a, b, c, d=None, **more):
 
 
 def loop(gain, plant, step=0.1, stop_time=1.0):
-    """Return a scenario in which a controller u = -gain y acts on a plant; the controller steps first."""
+    """Return a scenario in which a controller u = -gain y acts on a plant; the controller steps
+    first.
+    """
     controller = block([], [], [[]], [[-gain]])
     return {
         "name": "loop",
         "stop_time": stop_time,
         "step_size": step,
         "components": {"controller": controller, "plant": plant},
-        "connections": [{"from": "controller.y0", "to": "plant.u0"}, {"from": "plant.y0", "to": "controller.u0"}],
+        "connections": [
+            {"from": "controller.y0", "to": "plant.u0"},
+            {"from": "plant.y0", "to": "controller.u0"},
+        ],
     }

@@ -36,8 +36,12 @@ class LiveRun:
         self.host, self.path = parts.netloc, parts.path
         self.version = -1
 
-    def request(self, method: str, path: str, body: bytes | None = None, **headers: str | None) -> HttpReply:
-        """A request; underscores in names of headers are hyphens, a header that is None is left out."""
+    def request(
+        self, method: str, path: str, body: bytes | None = None, **headers: str | None
+    ) -> HttpReply:
+        """A request; underscores in names of headers are hyphens, a header that is None is left
+        out.
+        """
         connection = HTTPConnection(self.host, timeout=60)
         connection.putrequest(method, path, skip_host=True, skip_accept_encoding=True)
         for name, value in {"Host": self.host, **headers}.items():
@@ -53,7 +57,11 @@ class LiveRun:
         return self.request("GET", self.path + resource, **headers)
 
     def post(self, body: bytes, **headers: str | None) -> HttpReply:
-        usual = {"Origin": f"http://{self.host}", "Content_Type": "application/json", "Content_Length": str(len(body))}
+        usual = {
+            "Origin": f"http://{self.host}",
+            "Content_Type": "application/json",
+            "Content_Length": str(len(body)),
+        }
         return self.request("POST", f"{self.path}command", body, **{**usual, **headers})
 
     def command(self, command: str, **more: Any) -> Any:
@@ -66,7 +74,9 @@ class LiveRun:
 
     def rows(self, first: int = 0) -> tuple[Any, np.ndarray]:
         """The state, and the rows from `first` on, shape (columns, rows)."""
-        state, _, rows = self.get(f"rows?first={first}&version={self.version}").body.partition(b"\n")
+        state, _, rows = self.get(f"rows?first={first}&version={self.version}").body.partition(
+            b"\n"
+        )
         told = json.loads(state)
         self.version = told["version"]
         table = np.frombuffer(rows, "<f4")

@@ -1,7 +1,9 @@
-"""Independent implementation of the AR.Drone and the planar Strider from the fact sheet of the original system.
+"""Independent implementation of the AR.Drone and the planar Strider from the fact sheet of the
+original system.
 
-No code is shared with the plant. The quadcopter uses the original's body frame (x forward, y right, z down) and a rotation matrix
-instead of a quaternion. Both vehicles are integrated with an eighth-order method and tight tolerances.
+No code is shared with the plant. The quadcopter uses the original's body frame (x forward, y right,
+z down) and a rotation matrix instead of a quaternion. Both vehicles are integrated with an
+eighth-order method and tight tolerances.
 """
 
 from __future__ import annotations
@@ -40,7 +42,9 @@ HOVER_SPEED = np.sqrt(QUADCOPTER_MASS * GRAVITY / 4 / THRUST_COEFFICIENT)
 Segments = Sequence[tuple[float, np.ndarray]]  # (duration, held inputs)
 
 
-def integrate(rate: Callable[[np.ndarray, np.ndarray], np.ndarray], state: np.ndarray, segments: Segments) -> np.ndarray:
+def integrate(
+    rate: Callable[[np.ndarray, np.ndarray], np.ndarray], state: np.ndarray, segments: Segments
+) -> np.ndarray:
     """Return the state at the end of each segment."""
     states = []
     for duration, inputs in segments:
@@ -50,14 +54,20 @@ def integrate(rate: Callable[[np.ndarray, np.ndarray], np.ndarray], state: np.nd
     return np.array(states)
 
 
-def quadcopter_state(position: Sequence[float], yaw: float, velocity: Sequence[float], rates: Sequence[float]) -> np.ndarray:
-    """Return position and velocity (world), rotation matrix and rates (forward-right-down); `rates` are forward-left-up."""
+def quadcopter_state(
+    position: Sequence[float], yaw: float, velocity: Sequence[float], rates: Sequence[float]
+) -> np.ndarray:
+    """Return position and velocity (world), rotation matrix and rates (forward-right-down); `rates`
+    are forward-left-up.
+    """
     turn = np.array([[np.cos(yaw), -np.sin(yaw), 0], [np.sin(yaw), np.cos(yaw), 0], [0, 0, 1]])
     return np.concatenate([position, velocity, (turn @ FLIP).ravel(), FLIP @ rates])
 
 
 def quadcopter_rate(state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-    """Return the time derivative by Newton-Euler; inputs: four rotor speeds, external force and torque (world)."""
+    """Return the time derivative by Newton-Euler; inputs: four rotor speeds, external force and
+    torque (world).
+    """
     velocity, to_world, rates = state[3:6], state[6:15].reshape(3, 3), state[15:18]
     squared = np.clip(inputs[:4], 0, MAX_ROTOR_SPEED) ** 2
     force, torque = np.zeros(3), np.zeros(3)
@@ -83,7 +93,9 @@ VESSEL_MASS, VESSEL_MOMENT = 4.11, 0.6391
 
 
 def vessel_rate(state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
-    """Return the time derivative of x, y, yaw, surge, sway, yaw rate; inputs: thrust, rudder angle, force and torque (world)."""
+    """Return the time derivative of x, y, yaw, surge, sway, yaw rate; inputs: thrust, rudder angle,
+    force and torque (world).
+    """
     yaw, u, v, r = state[2:]
     thrust, delta = inputs[:2]
     heading = np.array([np.cos(yaw), np.sin(yaw)])
@@ -93,9 +105,21 @@ def vessel_rate(state: np.ndarray, inputs: np.ndarray) -> np.ndarray:
     lift = 0.5 * 998 * 1.2 * 0.0064 * u**2 * np.sin(np.pi / 2 * saturated)
     side = lift * np.cos(delta)
     surge_force = thrust - lift * np.sin(delta) - 0.1 * np.sign(u) * u**2 + heading @ inputs[2:4]
-    side_force = side - 0.1 * np.sign(v) * v**2 + 2 * (-3.899501881 * v + 1.774273356 * r) + abeam @ inputs[2:4]
+    side_force = (
+        side
+        - 0.1 * np.sign(v) * v**2
+        + 2 * (-3.899501881 * v + 1.774273356 * r)
+        + abeam @ inputs[2:4]
+    )
     moment = -0.34727 * side + 2 * (-1.774273356 * v - 0.807294377 * r) + inputs[7]
     x_rate, y_rate = u * heading + v * abeam
     return np.array(
-        [x_rate, y_rate, r, surge_force / VESSEL_MASS + v * r, side_force / VESSEL_MASS - u * r, moment / VESSEL_MOMENT]
+        [
+            x_rate,
+            y_rate,
+            r,
+            surge_force / VESSEL_MASS + v * r,
+            side_force / VESSEL_MASS - u * r,
+            moment / VESSEL_MOMENT,
+        ]
     )

@@ -1,7 +1,8 @@
-"""Independent NumPy implementation of the Otter in its original frames (north-east-down, forward-starboard-down).
+"""Independent NumPy implementation of the Otter in its original frames (north-east-down,
+forward-starboard-down).
 
-It follows the model `otter` of Fossen's Marine Systems Simulator (revision of 2026-06-27; Fossen 2021) with Euler angles and the
-classical Runge-Kutta method. No code is shared with the plant.
+It follows the model `otter` of Fossen's Marine Systems Simulator (revision of 2026-06-27; Fossen
+2021) with Euler angles and the classical Runge-Kutta method. No code is shared with the plant.
 """
 
 from __future__ import annotations
@@ -56,7 +57,9 @@ def transformation_matrix(r: np.ndarray) -> np.ndarray:
 def rotation(attitude: np.ndarray) -> np.ndarray:
     phi, theta, psi = attitude
     about_x = np.array([[1, 0, 0], [0, np.cos(phi), -np.sin(phi)], [0, np.sin(phi), np.cos(phi)]])
-    about_y = np.array([[np.cos(theta), 0, np.sin(theta)], [0, 1, 0], [-np.sin(theta), 0, np.cos(theta)]])
+    about_y = np.array(
+        [[np.cos(theta), 0, np.sin(theta)], [0, 1, 0], [-np.sin(theta), 0, np.cos(theta)]]
+    )
     about_z = np.array([[np.cos(psi), -np.sin(psi), 0], [np.sin(psi), np.cos(psi), 0], [0, 0, 1]])
     return about_z @ about_y @ about_x
 
@@ -65,12 +68,16 @@ def euler_rates(attitude: np.ndarray, rates: np.ndarray) -> np.ndarray:
     phi, theta, _ = attitude
     p, q, r = rates
     turning = q * np.sin(phi) + r * np.cos(phi)
-    return np.array([p + turning * np.tan(theta), q * np.cos(phi) - r * np.sin(phi), turning / np.cos(theta)])
+    return np.array(
+        [p + turning * np.tan(theta), q * np.cos(phi) - r * np.sin(phi), turning / np.cos(theta)]
+    )
 
 
 @dataclass
 class Otter:
-    """State: eta (6), nu (6) at CO; shaft speeds (2) follow the commands after each step by a tenth."""
+    """State: eta (6), nu (6) at CO; shaft speeds (2) follow the commands after each step by a
+    tenth.
+    """
 
     payload: float = 25.0
     payload_place: tuple[float, float, float] = (0.05, 0.0, -0.35)
@@ -83,7 +90,9 @@ class Otter:
         self.mass = HULL_MASS + m
         self.draught = (volume := self.mass / RHO) / (2 * C_B * BEAM * L)
         self.centre = (HULL_MASS * HULL_CENTRE + m * place) / self.mass
-        self.inertia = HULL_MASS * np.diag(RADII**2) - HULL_MASS * np.linalg.matrix_power(skew(HULL_CENTRE - self.centre), 2)
+        self.inertia = HULL_MASS * np.diag(RADII**2) - HULL_MASS * np.linalg.matrix_power(
+            skew(HULL_CENTRE - self.centre), 2
+        )
         self.inertia -= m * np.linalg.matrix_power(skew(place - self.centre), 2)
         self.to_centre = transformation_matrix(self.centre)
         body = np.zeros((6, 6))
@@ -95,16 +104,25 @@ class Otter:
 
     def _set_up_water(self, volume: float) -> None:
         waterplane = C_W * L * BEAM
-        i_t = 2 * (1 / 12) * L * BEAM**3 * (6 * C_W**3 / ((1 + C_W) * (1 + 2 * C_W))) + 2 * waterplane * PONTOON_OFFSET**2
+        i_t = (
+            2 * (1 / 12) * L * BEAM**3 * (6 * C_W**3 / ((1 + C_W) * (1 + 2 * C_W)))
+            + 2 * waterplane * PONTOON_OFFSET**2
+        )
         i_l = 0.8 * 2 * (1 / 12) * BEAM * L**3
         buoyancy_height = (5 * self.draught / 2 - 0.5 * volume / (L * BEAM)) / 3
-        heights = [buoyancy_height + i / volume - (self.draught - self.centre[2]) for i in (i_t, i_l)]
-        stiffness = np.array([2 * RHO * G * waterplane, *(RHO * G * volume * height for height in heights)])
+        heights = [
+            buoyancy_height + i / volume - (self.draught - self.centre[2]) for i in (i_t, i_l)
+        ]
+        stiffness = np.array(
+            [2 * RHO * G * waterplane, *(RHO * G * volume * height for height in heights)]
+        )
         to_flotation = transformation_matrix(FLOTATION)
         self.stiffness = to_flotation.T @ np.diag([0, 0, *stiffness, 0]) @ to_flotation
         w3, w4, w5 = np.sqrt(stiffness / np.diag(self.mass_matrix)[2:5])
         m = np.diag(self.mass_matrix)
-        self.linear_damping = np.array([24.4 * G / (6 * 0.5144), m[1], 0.6 * w3 * m[2], 0.4 * w4 * m[3], 0.8 * w5 * m[4], m[5]])
+        self.linear_damping = np.array(
+            [24.4 * G / (6 * 0.5144), m[1], 0.6 * w3 * m[2], 0.4 * w4 * m[3], 0.8 * w5 * m[4], m[5]]
+        )
         self.drag = np.interp(BEAM / (2 * self.draught), *HOERNER.T)
 
     def trim(self, eta: np.ndarray) -> np.ndarray:
@@ -129,8 +147,12 @@ class Otter:
         flow[3:, 3:] = -skew(momentum[3:])
         load = self.thrust() + self.damping(relative) - self.stiffness @ level
         load -= (self.to_centre.T @ coriolis @ self.to_centre + flow) @ relative
-        acceleration = np.concatenate([-np.cross(spin, water), np.zeros(3)]) + np.linalg.solve(self.mass_matrix, load)
-        return np.concatenate([rotation(level[3:]) @ nu[:3], euler_rates(level[3:], spin)]), acceleration
+        acceleration = np.concatenate([-np.cross(spin, water), np.zeros(3)]) + np.linalg.solve(
+            self.mass_matrix, load
+        )
+        return np.concatenate(
+            [rotation(level[3:]) @ nu[:3], euler_rates(level[3:], spin)]
+        ), acceleration
 
     def thrust(self) -> np.ndarray:
         n = np.clip(self.shafts, N_MIN, N_MAX)
@@ -155,5 +177,8 @@ class Otter:
         k2 = self.rate(*(a + h / 2 * b for a, b in zip(x, k1, strict=True)))
         k3 = self.rate(*(a + h / 2 * b for a, b in zip(x, k2, strict=True)))
         k4 = self.rate(*(a + h * b for a, b in zip(x, k3, strict=True)))
-        self.eta, self.nu = (a + h / 6 * (p + 2 * q + 2 * r + s) for a, p, q, r, s in zip(x, k1, k2, k3, k4, strict=True))
+        self.eta, self.nu = (
+            a + h / 6 * (p + 2 * q + 2 * r + s)
+            for a, p, q, r, s in zip(x, k1, k2, k3, k4, strict=True)
+        )
         self.shafts = self.shafts + 0.1 * (np.array(commands) - self.shafts)

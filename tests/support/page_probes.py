@@ -1,6 +1,7 @@
 """Scripts that a browser runs to find what is wrong with the layout of a page."""
 
-#: ratio of the luminances of every visible text and its background (WCAG 2.2, 1.4.3), those below the limit
+#: ratio of the luminances of every visible text and its background (WCAG 2.2, 1.4.3), those below
+#: the limit
 LOW_CONTRAST = """() => {
   const canvas = document.createElement("canvas").getContext("2d", {willReadFrequently: true});
   const rgba = (css) => { canvas.clearRect(0, 0, 1, 1); canvas.fillStyle = css; canvas.fillRect(0, 0, 1, 1);

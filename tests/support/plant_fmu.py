@@ -23,7 +23,9 @@ class PlantFmu:
     def __init__(self, name: str, start: Mapping[str, float]):
         folder = unpack_fmu(name)
         description = read_model_description(folder)
-        self.references = {variable.name: variable.valueReference for variable in description.modelVariables}
+        self.references = {
+            variable.name: variable.valueReference for variable in description.modelVariables
+        }
         self.slave = FMU2Slave(
             guid=description.guid,
             unzipDirectory=folder,
@@ -38,7 +40,9 @@ class PlantFmu:
         self.time = 0.0
 
     def set(self, values: Mapping[str, float]) -> None:
-        self.slave.setReal([self.references[name] for name in values], [float(value) for value in values.values()])
+        self.slave.setReal(
+            [self.references[name] for name in values], [float(value) for value in values.values()]
+        )
 
     def get(self, *names: str) -> np.ndarray:
         return np.array(self.slave.getReal([self.references[name] for name in names]))

@@ -1,11 +1,13 @@
-"""Validation of the plant: tests compare quantities with references, and docs/validation.md lists the comparisons.
+"""Validation of the plant: tests compare quantities with references, and docs/validation.md lists
+the comparisons.
 
 A test requests the fixture `measured` and calls
 
-    measured("Otter", "speed at 100/100 rad/s", found, expected, "m/s", "golden value of MSS `otter.m`", within=5e-6)
+    measured("Otter", "speed at 100/100 rad/s", found, expected, "m/s", "golden value of MSS
+    `otter.m`", within=5e-6)
 
-which fails if the values differ by more than the limit. `pytest tests -m "" --validation FILE` runs these tests and writes the
-document.
+which fails if the values differ by more than the limit. `pytest tests -m "" --validation FILE` runs
+these tests and writes the document.
 """
 
 from __future__ import annotations
@@ -86,7 +88,9 @@ VEHICLE_COLUMNS = ("quantity", "unit", "vehicle", "model", "difference", "limit"
 
 @dataclass(frozen=True)
 class Statement:
-    """A comparison without its values; `test` is its file (below tests/) and function, `limit` the text in the document."""
+    """A comparison without its values; `test` is its file (below tests/) and function, `limit` the
+    text in the document.
+    """
 
     model: str
     quantity: str
@@ -96,10 +100,27 @@ class Statement:
     test: str
 
 
-def statement(test: str, model: str, what: str, unit: str, source: str, within: float = 0.0, relative: float = 0.0) -> Statement:
+def statement(
+    test: str,
+    model: str,
+    what: str,
+    unit: str,
+    source: str,
+    within: float = 0.0,
+    relative: float = 0.0,
+) -> Statement:
     """Return the statement of a call of `measured`."""
-    assert model in (known := MODELS + MEASURED_VEHICLES), f"unknown model {model}, expected one of {known}"
-    return Statement(model, what, unit, f"{relative:g} rel." if relative else f"{within:g}" if within else "exact", source, test)
+    assert model in (known := MODELS + MEASURED_VEHICLES), (
+        f"unknown model {model}, expected one of {known}"
+    )
+    return Statement(
+        model,
+        what,
+        unit,
+        f"{relative:g} rel." if relative else f"{within:g}" if within else "exact",
+        source,
+        test,
+    )
 
 
 @dataclass(frozen=True)
@@ -121,7 +142,9 @@ class MeasurementCheck:
         relative: float = 0.0,
         case: str = "",
     ) -> None:
-        """Assert |found - expected| <= within, or <= relative |expected|, in every element; `case` names one of several cases."""
+        """Assert |found - expected| <= within, or <= relative |expected|, in every element; `case`
+        names one of several cases.
+        """
         test = f"{self.node.path.relative_to(TESTS).as_posix()}::{self.node.originalname}"
         comparison = statement(test, model, what, unit, source, within, relative)
         values = worst_deviation(found, expected, bool(relative))
@@ -138,12 +161,23 @@ def worst_deviation(found: ArrayLike, expected: ArrayLike, relative: bool) -> di
     values, references = (np.ravel(pair) for pair in pairs)
     deviations = np.abs(values - references) / (np.abs(references) if relative else 1.0)
     k = int(np.argmax(deviations))
-    return {"found": float(values[k]), "expected": float(references[k]), "deviation": float(deviations[k])}
+    return {
+        "found": float(values[k]),
+        "expected": float(references[k]),
+        "deviation": float(deviations[k]),
+    }
 
 
 def render_document(records: Sequence[dict[str, Any]]) -> str:
     """Return the document: a table for each model, ordered by files, lines and cases."""
-    parts = [INTRODUCTION, *(f"## {model}\n\n{table}" for model in MODELS if (table := render_table(records, model, COLUMNS)))]
+    parts = [
+        INTRODUCTION,
+        *(
+            f"## {model}\n\n{table}"
+            for model in MODELS
+            if (table := render_table(records, model, COLUMNS))
+        ),
+    ]
     text = MEASUREMENTS.read_text()
     for vehicle in MEASURED_VEHICLES:
         heading = f"### {vehicle}\n\n"
@@ -182,7 +216,8 @@ def table_row(record: dict[str, Any]) -> list[str]:
         f"{record['quantity']} [{record['case']}]" if record["case"] else record["quantity"],
         record["unit"],
         *(f"{record[name]:.6g}" if record["expected"] else "" for name in ("expected", "found")),
-        format_deviation(record["deviation"]) + (" rel." if record["limit"].endswith("rel.") else ""),
+        format_deviation(record["deviation"])
+        + (" rel." if record["limit"].endswith("rel.") else ""),
         record["limit"],
         record["source"],
         f"[{test}](../tests/{file})",
@@ -196,7 +231,9 @@ def format_deviation(deviation: float) -> str:
 
 
 class ValidationReport:
-    """pytest plugin that collects the records, also of pytest-xdist workers, and writes the document if all tests passed."""
+    """pytest plugin that collects the records, also of pytest-xdist workers, and writes the
+    document if all tests passed.
+    """
 
     def __init__(self, target: Path):
         self.target, self.records = target, []
@@ -210,6 +247,8 @@ class ValidationReport:
         if exitstatus == 0:
             self.target.write_text(render_document(self.records))
 
-    def pytest_terminal_summary(self, terminalreporter: pytest.TerminalReporter, exitstatus: int) -> None:
+    def pytest_terminal_summary(
+        self, terminalreporter: pytest.TerminalReporter, exitstatus: int
+    ) -> None:
         outcome = "written" if exitstatus == 0 else "not written, because tests failed"
         terminalreporter.write_line(f"{self.target}: {outcome}")

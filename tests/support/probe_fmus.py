@@ -15,7 +15,9 @@ PROBE_SOURCES = Path(__file__).parents[1] / "components/fmi/foreign"
 HEADERS = Path(fmpy.__file__).parent / "c-code"
 
 
-def build_probe_fmu(version: int, folder: Path, identifier: str = "probe", name: str = "", flags: str = "") -> Path:
+def build_probe_fmu(
+    version: int, folder: Path, identifier: str = "probe", name: str = "", flags: str = ""
+) -> Path:
     """Build the probe FMU of an FMI major version, or the one of another source.
 
     Args:
@@ -29,10 +31,14 @@ def build_probe_fmu(version: int, folder: Path, identifier: str = "probe", name:
     compiler = os.environ.get("CC") or shutil.which("cc") or "gcc"
     library, target = folder / f"{name}.so", folder / f"{name}.fmu"
     source = PROBE_SOURCES / f"{name}.c"
-    subprocess.run([compiler, "-shared", "-fPIC", "-O0", f"-I{HEADERS}", source, "-o", library], check=True)
+    subprocess.run(
+        [compiler, "-shared", "-fPIC", "-O0", f"-I{HEADERS}", source, "-o", library], check=True
+    )
     with ZipFile(target, "w") as archive:
         description = (PROBE_SOURCES / f"{name}.xml").read_text()
-        archive.writestr("modelDescription.xml", description.replace("<CoSimulation ", f"<CoSimulation {flags} "))
+        archive.writestr(
+            "modelDescription.xml", description.replace("<CoSimulation ", f"<CoSimulation {flags} ")
+        )
         platform = fmpy.platform if version == 2 else fmpy.platform_tuple
         archive.write(library, f"binaries/{platform}/{identifier}.so")
     return target

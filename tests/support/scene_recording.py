@@ -11,11 +11,17 @@ SCENARIO = {"components": {"plant": {"arguments": {"vehicles": VEHICLES, "platfo
 
 
 def scene_mission():
-    """The mission of `mission_recording` with level vehicles, the vessel at its height, and its scenario."""
+    """The mission of `mission_recording` with level vehicles, the vessel at its height, and its
+    scenario.
+    """
     result = mission_result()
     still = np.zeros_like(result.time)
     columns = dict(result.recording.columns)
     for vehicle in ("plant.uav", "plant.usv"):
         columns |= {f"{vehicle}.orientation.{part}": still + (part == "w") for part in "wxyz"}
     columns["plant.usv.position.z"] = still + 0.1245
-    return replace(result, recording=replace(result.recording, columns=columns), metadata={"scenario": SCENARIO})
+    return replace(
+        result,
+        recording=replace(result.recording, columns=columns),
+        metadata={"scenario": SCENARIO},
+    )

@@ -1,4 +1,6 @@
-"""The Strider as data of the planar and of the floating family, from the parameters of its own equations."""
+"""The Strider as data of the planar and of the floating family, from the parameters of its own
+equations.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,10 @@ HULLS = -p.HULL_COUNT * np.array([[0, 0, 0], [0, p.Y_V, p.Y_R], [0, p.N_V, p.N_R
 
 
 def _common() -> dict[str, Any]:
-    boxes = [{"size": [2 * half for half in box.half_extents], "position": list(box.position)} for box in geometry.BODY.boxes]
+    boxes = [
+        {"size": [2 * half for half in box.half_extents], "position": list(box.position)}
+        for box in geometry.BODY.boxes
+    ]
     return {
         "mass": p.MASS,
         "water_density": p.WATER_DENSITY,
@@ -31,7 +36,13 @@ def _common() -> dict[str, Any]:
 def _rudder(height: float) -> dict[str, Any]:
     stall, lift = p.STALL_ANGLE, p.RUDDER_MAX_LIFT_COEFFICIENT
     place = [-p.RUDDER_ARM, 0, height]
-    return {"position": place, "area": p.RUDDER_AREA, "max_lift_coefficient": lift, "stall_angle": stall, "max_angle": 1.5}
+    return {
+        "position": place,
+        "area": p.RUDDER_AREA,
+        "max_lift_coefficient": lift,
+        "stall_angle": stall,
+        "max_angle": 1.5,
+    }
 
 
 def planar_strider() -> dict[str, Any]:
@@ -51,8 +62,17 @@ def floating_strider() -> dict[str, Any]:
     damping[np.ix_([0, 1, 5], [0, 1, 5])] = HULLS
     damping[3] = -p6.HULL_FORCE_HEIGHT * damping[1]
     damping[[2, 3, 4], [2, 3, 4]] += p6.DAMPING
-    hull = {"count": 2, "length": p.HULL_LENGTH, "beam": p.HULL_BEAM, "offset": p.HULL_OFFSET, "depth": p6.HULL_DEPTH}
-    hull |= {"bottom": -p.CENTRE_OF_MASS_HEIGHT - p6.MEAN_DRAUGHT, "waterplane_coefficient": p.WATERPLANE_COEFFICIENT}
+    hull = {
+        "count": 2,
+        "length": p.HULL_LENGTH,
+        "beam": p.HULL_BEAM,
+        "offset": p.HULL_OFFSET,
+        "depth": p6.HULL_DEPTH,
+    }
+    hull |= {
+        "bottom": -p.CENTRE_OF_MASS_HEIGHT - p6.MEAN_DRAUGHT,
+        "waterplane_coefficient": p.WATERPLANE_COEFFICIENT,
+    }
     return {
         **_common(),
         "family": "surface_vessel",

@@ -31,8 +31,13 @@ def rotation(quaternion: np.ndarray) -> np.ndarray:
 
 
 def arrays(craft: Craft) -> tuple[np.ndarray, ...]:
-    """Hubs, axes, loads of unit thrusts (6, n), coefficients of thrust (both senses) and of torque, and the rigid mass matrix."""
-    hubs, axes = (np.array([getattr(thruster, name) for thruster in craft.thrusters]) for name in ("position", "axis"))
+    """Hubs, axes, loads of unit thrusts (6, n), coefficients of thrust (both senses) and of torque,
+    and the rigid mass matrix.
+    """
+    hubs, axes = (
+        np.array([getattr(thruster, name) for thruster in craft.thrusters])
+        for name in ("position", "axis")
+    )
     names = ("thrust_coefficient", "reverse_thrust_coefficient", "torque_coefficient")
     gains = np.array([[getattr(thruster, name) for thruster in craft.thrusters] for name in names])
     rigid = np.diag([craft.mass] * 3 + [0.0] * 3)
@@ -40,8 +45,12 @@ def arrays(craft: Craft) -> tuple[np.ndarray, ...]:
     return hubs, axes, np.hstack([axes, np.cross(hubs, axes)]).T, gains, rigid
 
 
-def derivative(craft: Craft, state: np.ndarray, command: np.ndarray, loads: np.ndarray, water: np.ndarray) -> np.ndarray:
-    """Fossen's equations for nu in the body frame with nu_c' = -w x nu_c; `water` is the current and the level."""
+def derivative(
+    craft: Craft, state: np.ndarray, command: np.ndarray, loads: np.ndarray, water: np.ndarray
+) -> np.ndarray:
+    """Fossen's equations for nu in the body frame with nu_c' = -w x nu_c; `water` is the current
+    and the level.
+    """
     hubs, axes, arms, (ahead, astern, torque), rigid = arrays(craft)
     to_world = rotation(state[3:7])
     up, rates, speeds, depth = to_world[2], state[10:13], state[13:], water[2] - state[2]
@@ -54,17 +63,33 @@ def derivative(craft: Craft, state: np.ndarray, command: np.ndarray, loads: np.n
     places = np.array(craft.centre_of_buoyancy) + OCTANTS * size
     shares = np.clip((depth - places @ up) / (np.abs(up) @ size / 2) + 0.5, 0, 1) / 8
     lift, fraction = craft.water_density * craft.gravity * craft.displaced_volume * up, shares.sum()
-    load = np.concatenate([fraction * lift - craft.mass * craft.gravity * up, skew(shares @ places) @ lift])
+    load = np.concatenate(
+        [fraction * lift - craft.mass * craft.gravity * up, skew(shares @ places) @ lift]
+    )
     wet = np.clip((depth - hubs @ up) / (2 * craft.thruster_radius) + 0.5, 0, 1) * np.abs(speeds)
-    load += arms @ (wet * (np.where(speeds > 0, ahead, astern) * speeds - craft.advance_coefficient * (relative @ arms)))
+    load += arms @ (
+        wet
+        * (
+            np.where(speeds > 0, ahead, astern) * speeds
+            - craft.advance_coefficient * (relative @ arms)
+        )
+    )
     load[3:] += (wet * torque * speeds) @ axes
     load += np.concatenate([loads[:3] @ to_world, loads[3:] @ to_world])
 
     added = fraction * craft.added_mass
     load -= coriolis(rigid, nu) @ nu + coriolis(added, relative) @ relative
-    load -= fraction * (craft.linear_damping @ relative + craft.quadratic_damping @ (np.abs(relative) * relative))
-    nu_rate = np.linalg.solve(rigid + added, load + added @ np.concatenate([-turn @ current[:3], still]))
+    load -= fraction * (
+        craft.linear_damping @ relative + craft.quadratic_damping @ (np.abs(relative) * relative)
+    )
+    nu_rate = np.linalg.solve(
+        rigid + added, load + added @ np.concatenate([-turn @ current[:3], still])
+    )
     acceleration = to_world @ (nu_rate[:3] + turn @ nu[:3])
-    turning = 0.5 * np.concatenate([[-state[4:7] @ rates], state[3] * rates + skew(state[4:7]) @ rates])
-    speed_rates = (np.clip(command, -craft.max_thruster_speed, craft.max_thruster_speed) - speeds) / craft.thruster_time_constant
+    turning = 0.5 * np.concatenate(
+        [[-state[4:7] @ rates], state[3] * rates + skew(state[4:7]) @ rates]
+    )
+    speed_rates = (
+        np.clip(command, -craft.max_thruster_speed, craft.max_thruster_speed) - speeds
+    ) / craft.thruster_time_constant
     return np.concatenate([state[7:10], turning, acceleration, nu_rate[3:], speed_rates])

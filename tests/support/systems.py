@@ -20,8 +20,12 @@ def endpoint(name: str) -> Endpoint:
     return Endpoint(component, scalar)
 
 
-def make_system(components: Mapping[str, Component], wires: str = "", stages: Sequence[Stage] = (), **more: Any) -> System:
-    """Return a system with connections such as "a.y > b.u, b.y >2 a.u" (delay 2); default: all components in one stage."""
+def make_system(
+    components: Mapping[str, Component], wires: str = "", stages: Sequence[Stage] = (), **more: Any
+) -> System:
+    """Return a system with connections such as "a.y > b.u, b.y >2 a.u" (delay 2); default: all
+    components in one stage.
+    """
     connections = []
     for wire in filter(None, (part.strip() for part in wires.split(","))):
         source, arrow, target = wire.split()
@@ -30,11 +34,18 @@ def make_system(components: Mapping[str, Component], wires: str = "", stages: Se
 
 
 def run_system(
-    system: System, stop: float | str, step: float | str = "1/100", record: Sequence[str] = (), events: Sequence[Event] = ()
+    system: System,
+    stop: float | str,
+    step: float | str = "1/100",
+    record: Sequence[str] = (),
+    events: Sequence[Event] = (),
 ) -> Recording:
     """Simulate from 0 s and return the recording; a failure is raised."""
     columns = {name: endpoint(name) for name in record}
-    outcome = simulate(system, Settings(Fraction(0), exact_fraction(stop), exact_fraction(step), columns, events=events))
+    outcome = simulate(
+        system,
+        Settings(Fraction(0), exact_fraction(stop), exact_fraction(step), columns, events=events),
+    )
     if outcome.failure:
         raise outcome.failure
     return outcome.recording

@@ -12,7 +12,9 @@ from cosim.engine.initialization import copy_start_values
 from plant_src.world import World
 
 DECK_TOP = 0.2689  # m above the water
-REST_HEIGHT = 0.0566 - 0.000577  # m; centre of mass of the quadcopter above the surface on which it stands
+REST_HEIGHT = (
+    0.0566 - 0.000577
+)  # m; centre of mass of the quadcopter above the surface on which it stands
 PLATFORM = {"size": [4.0, 4.0, 0.05], "position": [0.0, 0.0, 0.475]}
 PLATFORM_TOP = 0.5
 
@@ -61,7 +63,13 @@ class WorldHarness:
 
 def _ports(world: World, causality: str) -> Ports:
     variables = [variable for variable in world.variables if variable.causality == causality]
-    return Ports(variables, {dtype: np.zeros(_size(variables, dtype), dtype) for dtype in {v.dtype: None for v in variables}})
+    return Ports(
+        variables,
+        {
+            dtype: np.zeros(_size(variables, dtype), dtype)
+            for dtype in {v.dtype: None for v in variables}
+        },
+    )
 
 
 def _size(variables: list[Variable], dtype: Any) -> int:

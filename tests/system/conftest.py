@@ -1,4 +1,6 @@
-"""System tests have the marker `slow`: they start whole programs, hundreds of times, and often let them fail."""
+"""System tests have the marker `slow`: they start whole programs, hundreds of times, and often let
+them fail.
+"""
 
 from __future__ import annotations
 

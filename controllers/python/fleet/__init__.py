@@ -1,4 +1,7 @@
-"""Constants, enumerations and functions of the controllers in Python: the counterpart of the Modelica package Fleet."""
+"""Constants, enumerations and functions of the controllers in Python.
+
+The counterpart of the Modelica package Fleet.
+"""
 
 from __future__ import annotations
 

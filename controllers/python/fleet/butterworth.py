@@ -1,4 +1,7 @@
-"""Sampled Butterworth low-pass of order 15 by the bilinear transform: seven second-order sections and one of first order."""
+"""Sampled Butterworth low-pass of order 15 by the bilinear transform.
+
+Seven second-order sections and one of first order.
+"""
 
 from __future__ import annotations
 
@@ -11,7 +14,10 @@ ORDER, SECTION_COUNT = 15, 7
 
 
 class Butterworth:
-    """Low-pass with a gain of exactly -3 dB at the cut-off frequency; sections in transposed direct form II."""
+    """Low-pass with a gain of exactly -3 dB at the cut-off frequency.
+
+    Sections in transposed direct form II.
+    """
 
     def __init__(self) -> None:
         self.running = False

@@ -10,7 +10,10 @@ from .sampled_controller import SampledController
 
 
 class HeadingControl(SampledController):
-    """PD control of the wrapped heading error by the rudder; gains for a rudder behind the centre of mass."""
+    """PD control of the wrapped heading error by the rudder.
+
+    Gains for a rudder behind the centre of mass.
+    """
 
     def __init__(self, **arguments: Any):
         super().__init__(**arguments)
@@ -27,4 +30,6 @@ class HeadingControl(SampledController):
         # a positive rudder angle reduces the yaw angle
         error = wrap_angle(self.vehicle.attitude.yaw - reference)
         limits = (-self.rudder_limit, self.rudder_limit)
-        self.rudder_angle = self.yaw(error, P=self.heading_P, D=self.heading_D, N=self.heading_N, limits=limits)
+        self.rudder_angle = self.yaw(
+            error, P=self.heading_P, D=self.heading_D, N=self.heading_N, limits=limits
+        )

@@ -27,7 +27,11 @@ class Notch:
         """
         K = math.tan(math.pi * SAMPLE_PERIOD / period)
         a0 = 1 + 2 * width * K + K * K
-        b0, b1, b2 = (1 + 2 * depth * K + K * K) / a0, 2 * (K * K - 1) / a0, (1 - 2 * depth * K + K * K) / a0
+        b0, b1, b2 = (
+            (1 + 2 * depth * K + K * K) / a0,
+            2 * (K * K - 1) / a0,
+            (1 - 2 * depth * K + K * K) / a0,
+        )
         a2 = (1 - 2 * width * K + K * K) / a0
         if not self.running:
             self.near, self.far, self.running = (1 - b0) * u, (b2 - a2) * u, True

@@ -8,8 +8,8 @@ from . import SAMPLE_PERIOD, limit
 class Pid:
     """PID controller u = P e + I integral(e) + D N/(1 + N/s) e with output limits.
 
-    The integral is held while it would drive u further beyond a limit. The derivative filter is integrated with one third-order
-    Runge-Kutta step per sample, as in the published simulator.
+    The integral is held while it would drive u further beyond a limit. The derivative filter is
+    integrated with one third-order Runge-Kutta step per sample, as in the published simulator.
     """
 
     def __init__(self) -> None:

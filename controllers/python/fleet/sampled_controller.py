@@ -1,4 +1,7 @@
-"""Base class of sampled controllers: declaration of variables with units, and ticks within a communication step."""
+"""Base class of sampled controllers.
+
+Declaration of variables with units, and ticks within a communication step.
+"""
 
 from __future__ import annotations
 
@@ -49,7 +52,9 @@ class SampledController(Fmi2Slave):
         """Compute the outputs at `time` (s)."""
         raise NotImplementedError
 
-    def setup_experiment(self, start_time: float, stop_time: float | None, tolerance: float | None) -> None:
+    def setup_experiment(
+        self, start_time: float, stop_time: float | None, tolerance: float | None
+    ) -> None:
         """Set the number of the first tick at or after `start_time` (s)."""
         self.ticks = max(0, math.ceil(start_time / SAMPLE_PERIOD - TIME_TOLERANCE))
 
@@ -63,12 +68,26 @@ class SampledController(Fmi2Slave):
 
     def parameter(self, name: str, start: Any, unit: str = "", description: str = "") -> None:
         """Declare a tunable parameter."""
-        self._declare(name, start, unit, description, causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable)
+        self._declare(
+            name,
+            start,
+            unit,
+            description,
+            causality=Fmi2Causality.parameter,
+            variability=Fmi2Variability.tunable,
+        )
 
-    def calculated_parameter(self, name: str, getter: Callable[[], float], unit: str = "", description: str = "") -> None:
+    def calculated_parameter(
+        self, name: str, getter: Callable[[], float], unit: str = "", description: str = ""
+    ) -> None:
         """Declare a calculated parameter; it has no attribute."""
-        kind = {"causality": Fmi2Causality.calculatedParameter, "variability": Fmi2Variability.tunable}
-        self.register_variable(RealWithUnit(name, unit, getter=getter, description=description, **kind))
+        kind = {
+            "causality": Fmi2Causality.calculatedParameter,
+            "variability": Fmi2Variability.tunable,
+        }
+        self.register_variable(
+            RealWithUnit(name, unit, getter=getter, description=description, **kind)
+        )
 
     def input(self, name: str, start: Any, unit: str = "", description: str = "") -> None:
         """Declare an input."""
@@ -76,11 +95,25 @@ class SampledController(Fmi2Slave):
 
     def output(self, name: str, start: Any, unit: str = "", description: str = "") -> None:
         """Declare a discrete output."""
-        self._declare(name, start, unit, description, causality=Fmi2Causality.output, variability=Fmi2Variability.discrete)
+        self._declare(
+            name,
+            start,
+            unit,
+            description,
+            causality=Fmi2Causality.output,
+            variability=Fmi2Variability.discrete,
+        )
 
     def local(self, name: str, start: Any, unit: str = "", description: str = "") -> None:
         """Declare a discrete local variable, for a state."""
-        self._declare(name, start, unit, description, causality=Fmi2Causality.local, variability=Fmi2Variability.discrete)
+        self._declare(
+            name,
+            start,
+            unit,
+            description,
+            causality=Fmi2Causality.local,
+            variability=Fmi2Variability.discrete,
+        )
 
     def add_block(self, name: str, block: BlockT) -> BlockT:
         """Declare the attributes of a block, its states, as local variables below `name` and return the block."""
@@ -89,15 +122,23 @@ class SampledController(Fmi2Slave):
             self.local(f"{name}.{state}", start)
         return block
 
-    def _declare(self, name: str, start: Any, unit: str, description: str, **attributes: Any) -> None:
+    def _declare(
+        self, name: str, start: Any, unit: str, description: str, **attributes: Any
+    ) -> None:
         setattr(self._create_owner(name), name.rpartition(".")[2], start)
         attributes["description"] = description or None
         if not isinstance(start, list):
             self.register_variable(_create_variable(name, start, unit, **attributes))
             return
         for i, element in enumerate(start):
-            access = {"getter": partial(start.__getitem__, i), "setter": partial(start.__setitem__, i)}
-            self.register_variable(_create_variable(f"{name}[{i + 1}]", element, unit, **access, **attributes), nested=False)
+            access = {
+                "getter": partial(start.__getitem__, i),
+                "setter": partial(start.__setitem__, i),
+            }
+            self.register_variable(
+                _create_variable(f"{name}[{i + 1}]", element, unit, **access, **attributes),
+                nested=False,
+            )
 
     def _create_owner(self, name: str) -> Any:
         """Return the object that has the attribute of a dotted name; create it if necessary."""
@@ -109,7 +150,13 @@ class SampledController(Fmi2Slave):
         return owner
 
 
-def _create_variable(name: str, start: Any, unit: str, **attributes: Any) -> Boolean | Integer | RealWithUnit:
+def _create_variable(
+    name: str, start: Any, unit: str, **attributes: Any
+) -> Boolean | Integer | RealWithUnit:
     if isinstance(start, bool):
         return Boolean(name, **attributes)
-    return Integer(name, **attributes) if isinstance(start, int) else RealWithUnit(name, unit, **attributes)
+    return (
+        Integer(name, **attributes)
+        if isinstance(start, int)
+        else RealWithUnit(name, unit, **attributes)
+    )

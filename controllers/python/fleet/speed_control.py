@@ -22,4 +22,6 @@ class SpeedControl(SampledController):
     def control_speed(self, reference: float) -> None:
         """Set the thrust of this sample for a surge speed `reference` (m/s)."""
         limits = (-self.thrust_limit, self.thrust_limit)
-        self.thrust = self.surge(reference - self.vehicle.velocity_body.u, P=self.speed_P, limits=limits)
+        self.thrust = self.surge(
+            reference - self.vehicle.velocity_body.u, P=self.speed_P, limits=limits
+        )

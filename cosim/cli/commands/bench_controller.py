@@ -42,8 +42,19 @@ _COSTS_FILE = "costs.json"
     shell_complete=complete_role,
     help="Role of the controller (see `cosim list roles`), or the path of a role's JSON file.",
 )
-@click.option("--all", "with_shipped", is_flag=True, help="Also benchmark all shipped controllers of the role.")
-@click.option("--set", "settings", multiple=True, metavar="NAME=value", help="Set a parameter of the (only) controller.")
+@click.option(
+    "--all",
+    "with_shipped",
+    is_flag=True,
+    help="Also benchmark all shipped controllers of the role.",
+)
+@click.option(
+    "--set",
+    "settings",
+    multiple=True,
+    metavar="NAME=value",
+    help="Set a parameter of the (only) controller.",
+)
 @click.option(
     "--scenarios",
     multiple=True,
@@ -53,12 +64,22 @@ _COSTS_FILE = "costs.json"
     help="Scenarios to run; default: the folder scenarios/ here, else the shipped ones.",
 )
 @click.option(
-    "--output-dir", type=click.Path(path_type=Path), default=Path("runs/bench"), show_default=True, help="Folder for the results."
+    "--output-dir",
+    type=click.Path(path_type=Path),
+    default=Path("runs/bench"),
+    show_default=True,
+    help="Folder for the results.",
 )
-@click.option("--jobs", type=click.IntRange(min=1), help="Number of scenarios at a time; default: one per processor.")
+@click.option(
+    "--jobs",
+    type=click.IntRange(min=1),
+    help="Number of scenarios at a time; default: one per processor.",
+)
 @json_option(
-    "an object with candidate, role, ranking, scenarios (name, applicable, code, seconds, problems, ignored_settings, "
-    "applied_settings, kpis) and notes; of several controllers: role, reference and controllers, objects with the same keys, "
+    "an object with candidate, role, ranking, scenarios (name, applicable, code, seconds, "
+    "problems, ignored_settings, "
+    "applied_settings, kpis) and notes; of several controllers: role, reference and controllers, "
+    "objects with the same keys, "
     "cost (s per step) and cost_ratio"
 )
 def command(
@@ -73,16 +94,18 @@ def command(
 ) -> int:
     """Benchmark each CONTROLLER in every scenario with its role.
 
-    CONTROLLER is an FMU, my.py:Class, my.mo:Model or the JSON file of a nested system. It replaces the scenario's own controller,
-    which is the one that the scenario file contains. The summary ranks both by passed checks, then by the goals of the role. The
-    page bench.html in the output directory shows the checked KPIs and goals. --verbose prints tables that compare all KPIs with
-    those of the scenario's own controller and of the candidate's last run, and the settings that each scenario gives the
-    controller (without it, of failed scenarios only).
+    CONTROLLER is an FMU, my.py:Class, my.mo:Model or the JSON file of a nested system. It replaces
+    the scenario's own controller, which is the one that the scenario file contains. The summary
+    ranks both by passed checks, then by the goals of the role. The page bench.html in the output
+    directory shows the checked KPIs and goals. --verbose prints tables that compare all KPIs with
+    those of the scenario's own controller and of the candidate's last run, and the settings that
+    each scenario gives the controller (without it, of failed scenarios only).
 
-    Several controllers, or those of --all, are shown side by side, with the processor time per step of each. A scenario that
-    does not feed an input of the controller is not applicable ("n/a") and does not count. Exit code 0: all checks passed; 1: a
-    component failed; 2: the controller's variables do not fit the role, or no scenario is applicable; 3: a check failed. The
-    controllers that --all adds to a named CONTROLLER do not affect it.
+    Several controllers, or those of --all, are shown side by side, with the processor time per step
+    of each. A scenario that does not feed an input of the controller is not applicable ("n/a") and
+    does not count. Exit code 0: all checks passed; 1: a component failed; 2: the controller's
+    variables do not fit the role, or no scenario is applicable; 3: a check failed. The controllers
+    that --all adds to a named CONTROLLER do not affect it.
     """
     from ...scenario.settings import parse_settings
     from ...studies.controller_bench.role import read_role
@@ -107,11 +130,16 @@ def _check_sources(sources: Sequence[str], settings: Sequence[str]) -> None:
         raise click.UsageError("--set needs a single CONTROLLER")
     names = [parse_source(source).name for source in sources]
     if repeated := next((name for name in names if names.count(name) > 1), None):
-        raise InputError(f'2 controllers are called "{repeated}": their results would go to one folder')
+        raise InputError(
+            f'2 controllers are called "{repeated}": their results would go to one folder'
+        )
 
 
 class _RefusedError(Exception):
-    """A controller was refused or crashed while it was examined; the child process has printed why."""
+    """A controller was refused or crashed while it was examined.
+
+    The child process has printed why.
+    """
 
     def __init__(self, code: int):
         super().__init__(code)
@@ -165,20 +193,33 @@ class _Bench:
             reference, costs = self._measure_costs(everything)
         except _RefusedError as refused:
             return refused.code
-        benched = [trials.as_benched(cost, costs[0]) for trials, cost in zip(everything, costs[1:], strict=True)]
+        benched = [
+            trials.as_benched(cost, costs[0])
+            for trials, cost in zip(everything, costs[1:], strict=True)
+        ]
         write_bench_page(self.role, benched, self._page, reference, costs[0])
         if self.as_json:
             shown = [
                 {**trials.as_json(), "cost": each.cost, "cost_ratio": each.cost_ratio}
                 for trials, each in zip(everything, benched, strict=True)
             ]
-            print_json({"role": self.role, "reference": reference, "reference_cost": costs[0], "controllers": shown})
+            print_json(
+                {
+                    "role": self.role,
+                    "reference": reference,
+                    "reference_cost": costs[0],
+                    "controllers": shown,
+                }
+            )
         else:
             print_side_by_side(order(benched), reference)
             for trials in everything:
                 print_omissions(trials.omissions, trials.name)
             click.echo(f"page: {self._page}")
-        return min((trials.exit_code for trials in everything[:number_of_own]), key=EXIT_CODE_SEVERITY.index)
+        return min(
+            (trials.exit_code for trials in everything[:number_of_own]),
+            key=EXIT_CODE_SEVERITY.index,
+        )
 
     def _run_trials(self, source: str, settings: Mapping[str, Any]) -> ControllerTrials:
         from ...studies.controller_bench.candidate import parse_source
@@ -186,15 +227,22 @@ class _Bench:
 
         name = parse_source(source).name
         folder = self.output_dir / Path(self.role).stem / name
-        prepared = _in_child(lambda: _write_scenarios(source, self.role, self.files, folder, settings), folder / _PREPARED_FILE)
+        prepared = _in_child(
+            lambda: _write_scenarios(source, self.role, self.files, folder, settings),
+            folder / _PREPARED_FILE,
+        )
         results = []
         with forked_commands(self.jobs) as run_command:
-            trials = _make_trials(prepared["scenarios"], folder, self.output_dir / "shipped", run_command)
+            trials = _make_trials(
+                prepared["scenarios"], folder, self.output_dir / "shipped", run_command
+            )
             for result in run_trials(trials, self.jobs):
                 results.append(result)
                 if not self.as_json:
                     print_trial(result, name)
-        ranking = rank([result.kpis for result in results if result.is_applicable], prepared["goals"])
+        ranking = rank(
+            [result.kpis for result in results if result.is_applicable], prepared["goals"]
+        )
         return ControllerTrials(source, name, prepared, results, ranking)
 
     def _measure_costs(self, everything: Sequence[ControllerTrials]) -> tuple[str, list[float]]:
@@ -203,7 +251,11 @@ class _Bench:
         The cost of a controller that does not run to its end in any scenario is NaN, and so are all if the process crashes.
         """
         file = self.output_dir / Path(self.role).stem / _COSTS_FILE
-        measured = {i: (trials.source, scenario) for i, trials in enumerate(everything) if (scenario := trials.first_finished())}
+        measured = {
+            i: (trials.source, scenario)
+            for i, trials in enumerate(everything)
+            if (scenario := trials.first_finished())
+        }
         found: Mapping[str, Any] = {"reference": "", "costs": [None] * (1 + len(measured))}
         try:
             if measured:
@@ -212,33 +264,62 @@ class _Bench:
             pass
         except ComponentError as error:
             click.echo(f"WARNING no cost is measured: {error}", err=True)
-        reference_cost, *costs = (math.nan if cost is None else float(cost) for cost in found["costs"])
+        reference_cost, *costs = (
+            math.nan if cost is None else float(cost) for cost in found["costs"]
+        )
         cost_of = dict(zip(measured, costs, strict=True))
-        return found["reference"], [reference_cost, *(cost_of.get(i, math.nan) for i in range(len(everything)))]
+        return found["reference"], [
+            reference_cost,
+            *(cost_of.get(i, math.nan) for i in range(len(everything))),
+        ]
 
 
 def _in_child(work: Callable[[], int], file: Path) -> Any:
-    """Do work that executes foreign code in a child process; return the content of the JSON file that it writes."""
+    """Do work that executes foreign code in a child process.
+
+    Return the content of the JSON file that it writes.
+    """
     if code := supervision.run_supervised_command(work, "run", lambda _outcome: None):
         raise _RefusedError(code)
     return json.loads(file.read_text(encoding="utf-8"))
 
 
-def _write_costs(role_name: str, measured: Sequence[tuple[str, Mapping[str, str]]], file: Path) -> int:
+def _write_costs(
+    role_name: str, measured: Sequence[tuple[str, Mapping[str, str]]], file: Path
+) -> int:
     from ...results.files import write_json
     from ...studies.controller_bench.role import read_role
     from ...studies.controller_bench.step_cost import MeasuredController, measure_step_costs
 
     reference = str(read_role(role_name).cost_reference or measured[0][0])
-    controllers = [MeasuredController(source, Path(each["file"]), each["component"]) for source, each in measured]
-    write_json({"reference": Path(reference).stem, "costs": measure_step_costs(controllers, reference)}, file)
+    controllers = [
+        MeasuredController(source, Path(each["file"]), each["component"])
+        for source, each in measured
+    ]
+    write_json(
+        {"reference": Path(reference).stem, "costs": measure_step_costs(controllers, reference)},
+        file,
+    )
     return 0
 
 
-def _write_scenarios(controller: str, role_name: str, files: Sequence[Path], folder: Path, settings: Mapping[str, Any]) -> int:
-    """Examine the candidate and write the scenarios that use it; runs in a child process, since it executes foreign code."""
+def _write_scenarios(
+    controller: str,
+    role_name: str,
+    files: Sequence[Path],
+    folder: Path,
+    settings: Mapping[str, Any],
+) -> int:
+    """Examine the candidate and write the scenarios that use it.
+
+    Runs in a child process, since it executes foreign code.
+    """
     from ...results.files import write_json
-    from ...studies.controller_bench.candidate import interface_problems, parse_source, read_interface
+    from ...studies.controller_bench.candidate import (
+        interface_problems,
+        parse_source,
+        read_interface,
+    )
     from ...studies.controller_bench.kpi_descriptions import describe_kpis
     from ...studies.controller_bench.role import read_role
     from ...studies.controller_bench.substitution import ControllerSubstitution
@@ -254,15 +335,30 @@ def _write_scenarios(controller: str, role_name: str, files: Sequence[Path], fol
         if path := substitution.write((folder / "scenarios").absolute()):
             places, own_names = zip(*substitution.replaced_components.items(), strict=True)
             own_name = ", ".join(dict.fromkeys(own_names))
-            ignored = list(dict.fromkeys(each.lacking for each in substitution.omissions if not each.entry))
-            meanings = describe_kpis(json.loads(path.read_text(encoding="utf-8"))["kpis"], path.parent)
-            about = {"own_name": own_name, "ignored_settings": ignored, "kpi_descriptions": meanings}
+            ignored = list(
+                dict.fromkeys(each.lacking for each in substitution.omissions if not each.entry)
+            )
+            meanings = describe_kpis(
+                json.loads(path.read_text(encoding="utf-8"))["kpis"], path.parent
+            )
+            about = {
+                "own_name": own_name,
+                "ignored_settings": ignored,
+                "kpi_descriptions": meanings,
+            }
             about["applied_settings"] = substitution.applied_settings
             written.append({"file": path, "original": file, "component": places[0], **about})
-            omissions += [{"scenario": file.stem, **asdict(each)} for each in dict.fromkeys(substitution.omissions)]
+            omissions += [
+                {"scenario": file.stem, **asdict(each)}
+                for each in dict.fromkeys(substitution.omissions)
+            ]
     if not written:
-        raise InputError(f'no scenario has a component with the role "{role.name}": {role.description}')
-    write_json({"scenarios": written, "omissions": omissions, "goals": role.goals}, folder / _PREPARED_FILE)
+        raise InputError(
+            f'no scenario has a component with the role "{role.name}": {role.description}'
+        )
+    write_json(
+        {"scenarios": written, "omissions": omissions, "goals": role.goals}, folder / _PREPARED_FILE
+    )
     return 0
 
 

@@ -17,9 +17,21 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("sources", nargs=-1)
-@click.option("--check", is_flag=True, help="Build nothing; check that the fmus/ of cosim are up to date.")
-@click.option("--output", type=click.Path(path_type=Path), help="Export a single source, in any folder, to this FMU.")
-@click.option("--fmi", "fmi_version", type=click.Choice(["2", "3"]), default="2", help="FMI version of --output; default: 2.")
+@click.option(
+    "--check", is_flag=True, help="Build nothing; check that the fmus/ of cosim are up to date."
+)
+@click.option(
+    "--output",
+    type=click.Path(path_type=Path),
+    help="Export a single source, in any folder, to this FMU.",
+)
+@click.option(
+    "--fmi",
+    "fmi_version",
+    type=click.Choice(["2", "3"]),
+    default="2",
+    help="FMI version of --output; default: 2.",
+)
 @click.option(
     "--modelica-compiler",
     type=click.Choice(["cosim", "omc"]),
@@ -38,14 +50,20 @@ if TYPE_CHECKING:
     type=click.Path(path_type=Path),
     multiple=True,
     metavar="DIR",
-    help="Folder of Modelica libraries for --output, searched before those of MODELICAPATH; repeatable.",
+    help=(
+        "Folder of Modelica libraries for --output, searched before those of MODELICAPATH; "
+        "repeatable."
+    ),
 )
 @click.option(
     "--set",
     "values",
     multiple=True,
     metavar="NAME=VALUE",
-    help="Parameter of a Modelica model for --output, also one that selects equations or array sizes; repeatable.",
+    help=(
+        "Parameter of a Modelica model for --output, also one that selects equations or array "
+        "sizes; repeatable."
+    ),
 )
 def command(
     sources: tuple[str, ...],
@@ -59,17 +77,20 @@ def command(
 ) -> int:
     """Export controllers and plants to fmus/.
 
-    SOURCES are .mo or .py files, vehicle files, or folders of controllers in C; default: all controllers and plants. The FMUs are
-    written to fmus/ (FMI 2.0) and fmus/fmi3/, and their hashes to fmus/manifest.json. --output exports a single source of your
-    own. Of a Modelica file it exports the model with the name of the file, of a Python file the only PythonFMU class.
-    file.mo:Package.Model or file.py:Class exports another one, without --output to a file with its name in the working
-    directory (model.fmu). With --output, --fmi selects the FMI version, and --modelica-compiler omc exports models that need
-    the Modelica Standard Library or features that cosim's own compiler lacks; OpenModelica must be installed (this was written
-    from its documentation and not tried with it).
+    SOURCES are .mo or .py files, vehicle files, or folders of controllers in C; default: all
+    controllers and plants. The FMUs are written to fmus/ (FMI 2.0) and fmus/fmi3/, and their hashes
+    to fmus/manifest.json. --output exports a single source of your own. Of a Modelica file it
+    exports the model with the name of the file, of a Python file the only PythonFMU class.
+    file.mo:Package.Model or file.py:Class exports another one, without --output to a file with its
+    name in the working directory (model.fmu). With --output, --fmi selects the FMI version, and
+    --modelica-compiler omc exports models that need the Modelica Standard Library or features that
+    cosim's own compiler lacks; OpenModelica must be installed (this was written from its
+    documentation and not tried with it).
 
-    Modelica models, equations and controllers in C require a C compiler, and Modelica models and equations the extra "build".
-    --check is for changes of cosim itself: it compares the hashes of all sources with the manifest, and the behaviour of newly
-    built FMUs with those in fmus/ (exit code 3 if they differ).
+    Modelica models, equations and controllers in C require a C compiler, and Modelica models and
+    equations the extra "build". --check is for changes of cosim itself: it compares the hashes of
+    all sources with the manifest, and the behaviour of newly built FMUs with those in fmus/ (exit
+    code 3 if they differ).
     """
     from ...core import resources
     from ...export.build import build
@@ -86,7 +107,8 @@ def command(
     if check:
         if sources or output:
             raise InputError(
-                "--check compares all FMUs that belong to cosim with their sources and takes no SOURCES and no --output"
+                "--check compares all FMUs that belong to cosim with their sources and takes no "
+                "SOURCES and no --output"
             )
         if problems := check_fmus(root):
             raise CheckError("\n".join(map(str, problems)))
@@ -105,16 +127,26 @@ def command(
     return 0
 
 
-def _refuse_options_of_one_source(fmi: str, modelica_compiler: str, include: Sequence[Path], values: Sequence[str]) -> None:
+def _refuse_options_of_one_source(
+    fmi: str, modelica_compiler: str, include: Sequence[Path], values: Sequence[str]
+) -> None:
     """Raise InputError for an option that is valid with --output only."""
     if fmi != "2":
         raise InputError("--fmi requires --output: fmus/ contains FMUs of both FMI versions")
     if values:
-        raise InputError("--set requires --output: the FMUs in fmus/ have the values of their sources")
+        raise InputError(
+            "--set requires --output: the FMUs in fmus/ have the values of their sources"
+        )
     if include:
-        raise InputError("--include requires --output: the FMUs in fmus/ contain the files that their sources import")
+        raise InputError(
+            "--include requires --output: the FMUs in fmus/ contain the files that their sources "
+            "import"
+        )
     if modelica_compiler != "cosim":
-        raise InputError("--modelica-compiler omc requires --output: the FMUs in fmus/ are built by the compiler of cosim")
+        raise InputError(
+            "--modelica-compiler omc requires --output: the FMUs in fmus/ are built by the "
+            "compiler of cosim"
+        )
 
 
 def _build_one(
@@ -133,7 +165,9 @@ def _build_one(
     if len(sources) != 1:
         raise InputError(f"an FMU of your own requires one source, found {len(sources)}")
     if output.suffix != ".fmu":
-        raise InputError(f'--output: expected the name of an FMU; found "{output}"; did you mean "{output}.fmu"?')
+        raise InputError(
+            f'--output: expected the name of an FMU; found "{output}"; did you mean "{output}.fmu"?'
+        )
     source, member = sources[0]
     if not source.exists():
         raise InputError(Problem(f"does not exist{nearest_file(source)}", str(source)))
@@ -155,7 +189,9 @@ def _build_one(
 
 
 def _print_built(built: BuildResult) -> None:
-    names = ", ".join(path.as_posix()[path.as_posix().rindex("fmus/") :] for path in built.fmus.values())
+    names = ", ".join(
+        path.as_posix()[path.as_posix().rindex("fmus/") :] for path in built.fmus.values()
+    )
     click.echo(f"{_relative_to_cwd(built.source)} -> {names}")
 
 

@@ -24,10 +24,16 @@ if TYPE_CHECKING:
 @click.argument("scenario", shell_complete=complete_scenario)
 @click.option("--set", "settings", multiple=True, metavar="NAME=value", help="As for `cosim run`.")
 @click.option("--connections/--no-connections", default=True, help="List every connection.")
-@click.option("--expanded", is_flag=True, help="Print the scenario as JSON instead, with what it extends and --set applied.")
+@click.option(
+    "--expanded",
+    is_flag=True,
+    help="Print the scenario as JSON instead, with what it extends and --set applied.",
+)
 @json_option(
-    "an object with name, start_time, stop_time and step_size (s), steps, signals, components, stages, connections (source, "
-    "target, unit, notes), unconnected_inputs, recommendations and warnings; with --expanded the scenario"
+    "an object with name, start_time, stop_time and step_size (s), steps, signals, components, "
+    "stages, connections (source, "
+    "target, unit, notes), unconnected_inputs, recommendations and warnings; with --expanded the "
+    "scenario"
 )
 @supervision.supervision_options
 def command(
@@ -41,11 +47,11 @@ def command(
 ) -> None:
     """Check SCENARIO without running it and print the expanded system.
 
-    SCENARIO is a JSON file or the name of a shipped scenario. Prints components, processes, stages, connections and unit
-    conversions, and recommends an order of the components. Probable mistakes are warnings: a forgotten connection, a missing
-    reference, an event after the end.
-    --isolation and --sandbox only affect the printed processes. The JSON of --expanded has absolute paths: a file with it is a
-    scenario that runs anywhere on this machine.
+    SCENARIO is a JSON file or the name of a shipped scenario. Prints components, processes, stages,
+    connections and unit conversions, and recommends an order of the components. Probable mistakes
+    are warnings: a forgotten connection, a missing reference, an event after the end. --isolation
+    and --sandbox only affect the printed processes. The JSON of --expanded has absolute paths: a
+    file with it is a scenario that runs anywhere on this machine.
     """
     from ...scenario import load
     from ...scenario.nested_systems import load_scenario
@@ -53,7 +59,9 @@ def command(
 
     fmu_isolation: Literal["fmu", "none"] = "fmu" if isolation == "fmu" else "none"
     logged = collect_log()
-    prepared = load(scenario, parse_settings(settings), isolation=fmu_isolation, sandbox=bool(sandbox))
+    prepared = load(
+        scenario, parse_settings(settings), isolation=fmu_isolation, sandbox=bool(sandbox)
+    )
     try:
         if problems := prepared.figure_problems():
             raise InputError(problems)
@@ -108,8 +116,10 @@ def _print_verdict(prepared: PreparedRun, warnings: Sequence[Problem]) -> None:
     rest = grid.end - grid.start - grid.whole_steps * grid.step
     last = f", the last one of {float(rest):.6g} s" if rest else ""
     click.echo(
-        f"\n{prepared.spec.name}: {float(grid.start):g} s ... {float(grid.end):g} s in {count_noun(grid.count, 'step')} of "
-        f"{float(times.step_size):g} s{last}, {count_noun(len(times.columns), 'signal')} recorded. {verdict}"
+        f"\n{prepared.spec.name}: {float(grid.start):g} s ... {float(grid.end):g} s in "
+        f"{count_noun(grid.count, 'step')} of "
+        f"{float(times.step_size):g} s{last}, {count_noun(len(times.columns), 'signal')} "
+        f"recorded. {verdict}"
     )
 
 
@@ -118,7 +128,8 @@ def _print_components(prepared: PreparedRun) -> None:
     width, sources = max(map(len, prepared.system.components)), prepared.sources
     for name, component in prepared.system.components.items():
         counts = {
-            kind: sum(len(v.scalar_names) for v in component.variables if v.causality == kind) for kind in ("input", "output")
+            kind: sum(len(v.scalar_names) for v in component.variables if v.causality == kind)
+            for kind in ("input", "output")
         }
         period = prepared.system.periods.get(name)
         every = f", every {float(period):g} s" if period else ""
@@ -130,18 +141,29 @@ def _print_processes(prepared: PreparedRun, isolation: str, sandbox: str | None)
     from ...components.fmi.isolated.isolated_fmu import IsolatedFmu
 
     components = prepared.system.components
-    isolated = {name: component.isolation for name, component in components.items() if isinstance(component, IsolatedFmu)}
+    isolated = {
+        name: component.isolation
+        for name, component in components.items()
+        if isinstance(component, IsolatedFmu)
+    }
     shared = [name for name in components if name not in isolated]
     click.echo("\nprocesses" + (", all in bubblewrap" if sandbox == "strict" else ""))
     if shared:
-        click.echo(f"  {'process of the command' if isolation == 'none' else 'supervised process'}: {', '.join(shared)}")
+        click.echo(
+            f"  {'process of the command' if isolation == 'none' else 'supervised process'}: "
+            f"{', '.join(shared)}"
+        )
     for name, settings in isolated.items():
         click.echo(f"  {name}: its own process{', in a sandbox' if settings.sandbox else ''}")
 
 
 def _print_stages(prepared: PreparedRun) -> None:
     given = prepared.spec.algorithm is not None and prepared.spec.algorithm.stages is not None
-    reason = 'the "stages" of the scenario' if given else "the default: a component steps after those that feed it"
+    reason = (
+        'the "stages" of the scenario'
+        if given
+        else "the default: a component steps after those that feed it"
+    )
     click.echo(f"\norder within a step: {reason}; components of one line may step in parallel")
     _print_nested_stages(prepared.system.stages, "  ")
 
@@ -170,7 +192,9 @@ def _print_connections(prepared: PreparedRun) -> None:
     click.echo(f"\nconnections ({len(system.connections)})")
     for connection in system.connections:
         notes = connection_notes(system, connection)
-        click.echo(f"  {connection.source} -> {connection.target}" + (f"  ({notes})" if notes else ""))
+        click.echo(
+            f"  {connection.source} -> {connection.target}" + (f"  ({notes})" if notes else "")
+        )
 
 
 def _print_unconnected_inputs(prepared: PreparedRun) -> None:
@@ -179,7 +203,9 @@ def _print_unconnected_inputs(prepared: PreparedRun) -> None:
 
     inputs: dict[str, dict[str, list[str]]] = {}
     for end, variable in unconnected_inputs(prepared).items():
-        inputs.setdefault(end.component, {}).setdefault(_start_text(variable), []).append(end.scalar)
+        inputs.setdefault(end.component, {}).setdefault(_start_text(variable), []).append(
+            end.scalar
+        )
     for name, slots_of in inputs.items():
         click.echo(f"\ninputs of {name} that nothing feeds; they keep their start values")
         for value, slots in slots_of.items():
@@ -191,7 +217,13 @@ def _start_text(variable: Variable) -> str:
     start = variable.start
     if isinstance(start, bool):
         return str(start).lower()
-    return f"{start:g}" if isinstance(start, int | float) else "value of the component" if start is None else str(start)
+    return (
+        f"{start:g}"
+        if isinstance(start, int | float)
+        else "value of the component"
+        if start is None
+        else str(start)
+    )
 
 
 def _unconnected_inputs(prepared: PreparedRun) -> dict[str, list[str]]:

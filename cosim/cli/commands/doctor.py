@@ -1,4 +1,7 @@
-"""`cosim doctor`: report on packages, tools and sandboxes; each reported item is tested on this machine."""
+"""`cosim doctor`: report on packages, tools and sandboxes.
+
+Each reported item is tested on this machine.
+"""
 
 from __future__ import annotations
 
@@ -26,7 +29,10 @@ DISTRIBUTION = "fmi-cosim"
 
 @dataclass(frozen=True)
 class Finding:
-    """Finding about one item; "missing" affects optional features, "broken" affects all commands."""
+    """Finding about one item.
+
+    "missing" affects optional features, "broken" affects all commands.
+    """
 
     section: str
     name: str
@@ -64,13 +70,22 @@ def _host_findings() -> Iterator[Finding]:
     from ...core.version import __version__
 
     yield Finding("cosim", "cosim", f"{__version__} in {package_folder()}")
-    yield Finding("cosim", "Python", f"{platform.python_version()} ({platform.system()} {platform.machine()})")
-    yield Finding("cosim", "processors", f"{available_processors()} of {os.cpu_count()} may be used")
+    yield Finding(
+        "cosim", "Python", f"{platform.python_version()} ({platform.system()} {platform.machine()})"
+    )
+    yield Finding(
+        "cosim", "processors", f"{available_processors()} of {os.cpu_count()} may be used"
+    )
     yield _executor_finding()
     cache = cache_directory()
     existing = next(path for path in (cache, *cache.parents) if path.exists())
     writable = os.access(existing, os.W_OK)
-    yield Finding("cosim", "cache", f"{cache}{'' if writable else ' cannot be written'}", "ok" if writable else "missing")
+    yield Finding(
+        "cosim",
+        "cache",
+        f"{cache}{'' if writable else ' cannot be written'}",
+        "ok" if writable else "missing",
+    )
 
 
 def _executor_finding() -> Finding:
@@ -94,25 +109,45 @@ def _package_findings() -> Iterator[Finding]:
     try:
         distribution = metadata.distribution(DISTRIBUTION)
     except metadata.PackageNotFoundError:
-        yield Finding("required packages", DISTRIBUTION, "not installed, so its requirements are unknown", "broken")
+        yield Finding(
+            "required packages",
+            DISTRIBUTION,
+            "not installed, so its requirements are unknown",
+            "broken",
+        )
         return
     requirements = [Requirement(text) for text in distribution.requires or ()]
     for requirement in requirements:
         if requirement.marker is None or requirement.marker.evaluate({"extra": ""}):
             version, fits = _installed_version(requirement)
-            yield Finding("required packages", requirement.name, version, "ok" if fits else "broken")
+            yield Finding(
+                "required packages", requirement.name, version, "ok" if fits else "broken"
+            )
     for extra in distribution.metadata.get_all("Provides-Extra") or ():
         yield _extra_finding(extra, requirements)
 
 
 def _extra_finding(extra: str, requirements: Iterable[Requirement]) -> Finding:
     """Return the finding about an extra; other extras that it includes have their own findings."""
-    own = [r for r in requirements if r.marker and r.marker.evaluate({"extra": extra}) and not r.marker.evaluate({"extra": ""})]
+    own = [
+        r
+        for r in requirements
+        if r.marker and r.marker.evaluate({"extra": extra}) and not r.marker.evaluate({"extra": ""})
+    ]
     packages = [r for r in own if r.name != DISTRIBUTION]
-    missing = [f"{r.name}: {_installed_version(r)[0]}" for r in packages if not _installed_version(r)[1]]
+    missing = [
+        f"{r.name}: {_installed_version(r)[0]}" for r in packages if not _installed_version(r)[1]
+    ]
     if missing:
-        return Finding("extras", extra, f"{'; '.join(missing)} (pip install '{DISTRIBUTION}[{extra}]')", "missing")
-    return Finding("extras", extra, ", ".join(f"{r.name} {_installed_version(r)[0]}" for r in packages))
+        return Finding(
+            "extras",
+            extra,
+            f"{'; '.join(missing)} (pip install '{DISTRIBUTION}[{extra}]')",
+            "missing",
+        )
+    return Finding(
+        "extras", extra, ", ".join(f"{r.name} {_installed_version(r)[0]}" for r in packages)
+    )
 
 
 def _installed_version(requirement: Requirement) -> tuple[str, bool]:
@@ -146,7 +181,9 @@ def _windows_finding() -> Finding:
 
     name, wine = "FMUs for Windows", find_wine()
     if not wine:
-        return Finding("tools", name, "no program wine64 or wine: 64-bit libraries cannot be used", "missing")
+        return Finding(
+            "tools", name, "no program wine64 or wine: 64-bit libraries cannot be used", "missing"
+        )
     try:
         compiler = compiler_version(tuple(find_windows_compiler()))
     except (InputError, OSError) as error:
@@ -168,7 +205,9 @@ def _library_findings() -> Iterator[Finding]:
         except InputError as error:
             yield Finding("tools", title, f"MODELICAPATH: {error}", "missing")
         else:
-            yield Finding("tools", title, f"{folder}: {found or 'none'}", "ok" if found else "missing")
+            yield Finding(
+                "tools", title, f"{folder}: {found or 'none'}", "ok" if found else "missing"
+            )
 
 
 def _program_finding(name: str, program: str, option: str) -> Finding:
@@ -192,17 +231,36 @@ def _sandbox_findings() -> Iterator[Finding]:
     else:
         yield Finding("sandbox", "Landlock", "not in this kernel (Linux 5.13 or newer)", "missing")
     if available.system_call_filter:
-        yield Finding("sandbox", "system call filter", "can close the network and all other processes")
+        yield Finding(
+            "sandbox", "system call filter", "can close the network and all other processes"
+        )
     else:
-        yield Finding("sandbox", "system call filter", "needs Linux with seccomp on x86_64 or aarch64", "missing")
+        yield Finding(
+            "sandbox",
+            "system call filter",
+            "needs Linux with seccomp on x86_64 or aarch64",
+            "missing",
+        )
     if available.bubblewrap:
-        yield Finding("sandbox", "bubblewrap", f"{available.bubblewrap} works: --sandbox strict can be used")
+        yield Finding(
+            "sandbox", "bubblewrap", f"{available.bubblewrap} works: --sandbox strict can be used"
+        )
     else:
-        yield Finding("sandbox", "bubblewrap", "no working program bwrap; --sandbox strict cannot be used", "missing")
+        yield Finding(
+            "sandbox",
+            "bubblewrap",
+            "no working program bwrap; --sandbox strict cannot be used",
+            "missing",
+        )
     yield from (
-        Finding("this process", name.replace("_", " "), _yes_or_no(value)) for name, value in asdict(probe_restrictions()).items()
+        Finding("this process", name.replace("_", " "), _yes_or_no(value))
+        for name, value in asdict(probe_restrictions()).items()
     )
 
 
 def _yes_or_no(value: Any) -> str:
-    return {True: "yes", False: "no", None: "unlimited"}[value] if value is None or isinstance(value, bool) else str(value)
+    return (
+        {True: "yes", False: "no", None: "unlimited"}[value]
+        if value is None or isinstance(value, bool)
+        else str(value)
+    )

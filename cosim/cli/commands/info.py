@@ -30,7 +30,10 @@ _START_WIDTH = 14
 #: length to which start values are shortened in the table (characters)
 _MAX_START_LENGTH = 40
 
-_INTERFACE_NAMES: Mapping[str, str] = {"co-simulation": "Co-Simulation", "model-exchange": "Model Exchange"}
+_INTERFACE_NAMES: Mapping[str, str] = {
+    "co-simulation": "Co-Simulation",
+    "model-exchange": "Model Exchange",
+}
 
 
 #: capability flags that cosim honours, in lower case (the versions of FMI differ in capitals)
@@ -55,17 +58,28 @@ _USED_CAPABILITIES = {
 @click.argument("fmu")
 @click.option("--locals", "with_locals", is_flag=True, help="Also list local variables.")
 @json_option(
-    "an object with properties and variables, a list of name, type, causality, variability, unit, shape, start, minimum, "
+    "an object with properties and variables, a list of name, type, causality, variability, unit, "
+    "shape, start, minimum, "
     "maximum, items and description"
 )
 def command(fmu: str, with_locals: bool, as_json: bool) -> None:
-    """Print the properties and variables of FMU: version, capabilities, platforms, inputs, outputs and parameters.
+    """Print the properties and variables of FMU.
 
-    FMU is a file, the name of a shipped FMU such as multirotor_controller, or its path as in scenarios ("cosim:fmus/..."). It
-    may also be file.py:Class, which is imported and constructed, or file.mo:Model, which is compiled.
+    Version, capabilities, platforms, inputs, outputs and parameters.
+
+    FMU is a file, the name of a shipped FMU such as multirotor_controller, or its path as in
+    scenarios ("cosim:fmus/..."). It may also be file.py:Class, which is imported and constructed,
+    or file.mo:Model, which is compiled.
     """
     found, all_variables = _describe(fmu)
-    groups = ["input", "output", "structuralParameter", "parameter", "calculatedParameter", *(["local"] if with_locals else [])]
+    groups = [
+        "input",
+        "output",
+        "structuralParameter",
+        "parameter",
+        "calculatedParameter",
+        *(["local"] if with_locals else []),
+    ]
     variables = {kind: [v for v in all_variables if v.causality == kind] for kind in groups}
     properties = {name: value for name, value in found.items() if value}
     if as_json:
@@ -111,7 +125,10 @@ def _describe_class(reference: str) -> tuple[dict[str, str], Sequence[Variable]]
         "state can be saved and restored": component.has_state,
         "inputs can be linear within a step": component.interpolates_inputs,
     }
-    return {"class": reference, "capabilities": ", ".join(name for name, has in used.items() if has)}, component.variables
+    return {
+        "class": reference,
+        "capabilities": ", ".join(name for name, has in used.items() if has),
+    }, component.variables
 
 
 def _find_fmu(fmu: str) -> Path:
@@ -145,7 +162,10 @@ def _properties(file: FmuFile) -> dict[str, str]:
         "model": about.model_name,
         "source": _source_name(file),
         "description": about.description,
-        "FMI version": f"{about.fmi_version} {' and '.join(_INTERFACE_NAMES[name] for name in about.interfaces)}",
+        "FMI version": (
+            f"{about.fmi_version} "
+            f"{' and '.join(_INTERFACE_NAMES[name] for name in about.interfaces)}"
+        ),
         "made by": about.generation_tool,
         "platforms": ", ".join(about.platforms),
         "step size": f"{float(experiment.step_size):g} s" if experiment.step_size else "",
@@ -160,10 +180,21 @@ def _properties(file: FmuFile) -> dict[str, str]:
 
 
 def _source_name(file: FmuFile) -> str:
-    """Return the name of the Modelica or Python file from which `cosim build` made the FMU; "" if it is not in the FMU."""
+    """Return the name of the Modelica or Python file from which `cosim build` made the FMU.
+
+    "" if it is not in the FMU.
+    """
     name = file.description.model_name.replace("_", "").lower()
-    sources = (Path(member) for member in file.examination.members if member.startswith("resources/") and member.count("/") == 1)
-    own = (each.name for each in sources if each.suffix in (".mo", ".py") and each.stem.replace("_", "").lower() == name)
+    sources = (
+        Path(member)
+        for member in file.examination.members
+        if member.startswith("resources/") and member.count("/") == 1
+    )
+    own = (
+        each.name
+        for each in sources
+        if each.suffix in (".mo", ".py") and each.stem.replace("_", "").lower() == name
+    )
     return next(own, "")
 
 
@@ -177,9 +208,23 @@ def _needed_tool(about: FmuDescription) -> str:
 
 
 def _variable_as_json(variable: Variable) -> dict[str, Any]:
-    names = ("name", "type", "causality", "variability", "shape", "start", "minimum", "maximum", "description")
+    names = (
+        "name",
+        "type",
+        "causality",
+        "variability",
+        "shape",
+        "start",
+        "minimum",
+        "maximum",
+        "description",
+    )
     unit = variable.unit.name if variable.unit else None
-    return {**{name: getattr(variable, name) for name in names}, "unit": unit, "items": dict(variable.items)}
+    return {
+        **{name: getattr(variable, name) for name in names},
+        "unit": unit,
+        "items": dict(variable.items),
+    }
 
 
 def _print_variables(causality: str, variables: list[Variable]) -> None:
@@ -187,14 +232,21 @@ def _print_variables(causality: str, variables: list[Variable]) -> None:
         return
     click.echo(f"\n{causality}s ({len(variables)})")
     width = min(40, max(len(variable.name) for variable in variables))
-    starts = ["" if variable.start is None else f"start = {_start_text(variable.start)}" for variable in variables]
+    starts = [
+        "" if variable.start is None else f"start = {_start_text(variable.start)}"
+        for variable in variables
+    ]
     start_width = min(_START_WIDTH, max(map(len, starts)))
     for variable, start in zip(variables, starts, strict=True):
         dimensions = f"[{','.join(map(str, variable.shape))}]" if variable.shape else ""
         unit = variable.unit.name if variable.unit else "-"
         items = ", ".join(f"{number}: {name}" for number, name in variable.items)
         text = "; ".join(filter(None, (variable.description, items)))
-        columns = (f"{variable.name:{width}} {variable.type + dimensions:12} {unit:8}", f"{start:{start_width}}", text)
+        columns = (
+            f"{variable.name:{width}} {variable.type + dimensions:12} {unit:8}",
+            f"{start:{start_width}}",
+            text,
+        )
         print_line(f"  {' '.join(filter(None, columns))}".rstrip())
 
 

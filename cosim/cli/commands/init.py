@@ -42,7 +42,9 @@ def command(directory: Path, force: bool) -> int:
 
     Runs the scenario to write the reference. The new project passes its tests.
     """
-    present = [directory / name for name in (*_PROJECT_FILES, _PLANT) if (directory / name).exists()]
+    present = [
+        directory / name for name in (*_PROJECT_FILES, _PLANT) if (directory / name).exists()
+    ]
     if present and not force:
         raise InputError([Problem("exists; --force overwrites it", str(path)) for path in present])
     untouched = _other_entries(directory)
@@ -50,14 +52,21 @@ def command(directory: Path, force: bool) -> int:
     if untouched:
         click.echo(f"left as they are: {abbreviate_names(untouched)}")
     with forked_commands(1) as run_command:
-        outcome = Regression(directory / "scenarios/course.json", directory / "runs/course", True, run_command).run()
+        outcome = Regression(
+            directory / "scenarios/course.json", directory / "runs/course", True, run_command
+        ).run()
     for folder in {(directory / name).parent for name in _PROJECT_FILES}:
         shutil.rmtree(folder / "__pycache__", ignore_errors=True)
     if outcome.code:
         click.echo("\n".join([f"course: {outcome.summary}", *outcome.details]), err=True)
         return outcome.code
     click.echo(f"{directory / 'scenarios/references/course.csv'}\n\nNext:")
-    commands = ("pip install -r requirements.txt", "cosim run scenarios/course.json", "cosim regress", "python -m pytest")
+    commands = (
+        "pip install -r requirements.txt",
+        "cosim run scenarios/course.json",
+        "cosim regress",
+        "python -m pytest",
+    )
     click.echo("\n".join(f"  {line}" for line in (f"cd {shlex.quote(str(directory))}", *commands)))
     return 0
 
@@ -67,19 +76,27 @@ def _other_entries(directory: Path) -> list[str]:
     own = {Path(name) for name in (*_PROJECT_FILES, _PLANT)}
     folders = {parent for path in own for parent in path.parents}
     found = [
-        path for folder in sorted(folders) if (directory / folder).is_dir() for path in sorted((directory / folder).iterdir())
+        path
+        for folder in sorted(folders)
+        if (directory / folder).is_dir()
+        for path in sorted((directory / folder).iterdir())
     ]
     names = [(path.relative_to(directory), "/" if path.is_dir() else "") for path in found]
     return [f"{name.as_posix()}{end}" for name, end in names if name not in own | folders]
 
 
 def _write_project(directory: Path) -> None:
-    placeholders = {"README.md": ("NAME", directory.resolve().name), "requirements.txt": ("COSIM", pip_requirement(pip_origin()))}
+    placeholders = {
+        "README.md": ("NAME", directory.resolve().name),
+        "requirements.txt": ("COSIM", pip_requirement(pip_origin())),
+    }
     for file, template in _PROJECT_FILES.items():
         path = directory / file
         text = template.read_text(encoding="utf-8")
         path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text.replace(*placeholders[file]) if file in placeholders else text, encoding="utf-8")
+        path.write_text(
+            text.replace(*placeholders[file]) if file in placeholders else text, encoding="utf-8"
+        )
         click.echo(path)
     plant = directory / _PLANT
     plant.parent.mkdir(exist_ok=True)
@@ -88,9 +105,17 @@ def _write_project(directory: Path) -> None:
 
 
 def pip_origin() -> Mapping[str, Any] | None:
-    """Return the origin of the installed cosim from its direct_url.json (PEP 610); None if it is from an index."""
-    texts = (distribution.read_text("direct_url.json") for distribution in distributions(name="fmi-cosim"))
-    return next((json.loads(text) for text in texts if text), None)  # a checkout is a second distribution, without origin
+    """Return the origin of the installed cosim from its direct_url.json (PEP 610).
+
+    None if it is from an index.
+    """
+    texts = (
+        distribution.read_text("direct_url.json")
+        for distribution in distributions(name="fmi-cosim")
+    )
+    return next(
+        (json.loads(text) for text in texts if text), None
+    )  # a checkout is a second distribution, without origin
 
 
 def pip_requirement(source: Mapping[str, Any] | None) -> str:

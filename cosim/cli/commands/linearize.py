@@ -8,7 +8,13 @@ from typing import TYPE_CHECKING
 import click
 
 from ...core.text import count_noun
-from ..analysis_options import print_notes, scenario_options, split_names, time_options, write_figures
+from ..analysis_options import (
+    print_notes,
+    scenario_options,
+    split_names,
+    time_options,
+    write_figures,
+)
 from ..messages import print_json, print_log
 from ..output_options import json_option
 from ..study_options import print_table
@@ -19,19 +25,50 @@ if TYPE_CHECKING:
 
 @click.command()
 @scenario_options
-@click.option("--inputs", multiple=True, required=True, metavar="NAME,...", help="Input, tunable parameter or connected output.")
-@click.option("--outputs", multiple=True, required=True, metavar="NAME,...", help="Output, vector or pattern of outputs.")
+@click.option(
+    "--inputs",
+    multiple=True,
+    required=True,
+    metavar="NAME,...",
+    help="Input, tunable parameter or connected output.",
+)
+@click.option(
+    "--outputs",
+    multiple=True,
+    required=True,
+    metavar="NAME,...",
+    help="Output, vector or pattern of outputs.",
+)
 @time_options
 @click.option(
-    "--component", "components", multiple=True, metavar="NAME", help="Component that steps; the others hold their outputs."
+    "--component",
+    "components",
+    multiple=True,
+    metavar="NAME",
+    help="Component that steps; the others hold their outputs.",
 )
 @click.option("--continuous", is_flag=True, help="Convert the model to continuous time.")
-@click.option("--order", type=click.IntRange(min=0), help="Largest number of states; default: as many as the responses show.")
 @click.option(
-    "--output", "files", multiple=True, type=click.Path(path_type=Path), help="File for the model: .json, .csv or .mat."
+    "--order",
+    type=click.IntRange(min=0),
+    help="Largest number of states; default: as many as the responses show.",
 )
-@click.option("--figures", type=click.Path(path_type=Path), help="Folder for a Bode diagram, the poles and step responses.")
-@json_option("an object with time, step (s; null: continuous), inputs, outputs, states, notes, A, B, C, D and poles")
+@click.option(
+    "--output",
+    "files",
+    multiple=True,
+    type=click.Path(path_type=Path),
+    help="File for the model: .json, .csv or .mat.",
+)
+@click.option(
+    "--figures",
+    type=click.Path(path_type=Path),
+    help="Folder for a Bode diagram, the poles and step responses.",
+)
+@json_option(
+    "an object with time, step (s; null: continuous), inputs, outputs, states, notes, A, B, C, D "
+    "and poles"
+)
 def command(
     scenario: str,
     settings: tuple[str, ...],
@@ -48,9 +85,10 @@ def command(
 ) -> None:
     """Linearise SCENARIO, or some of its components, at a point in time.
 
-    SCENARIO is a JSON file or the name of a shipped scenario. The model is discrete with the common step of all components, or
-    continuous. If the outputs are enough, its states are outputs in the given order. A component that cannot return to a saved
-    state (FMI: canGetAndSetFMUState) is refused.
+    SCENARIO is a JSON file or the name of a shipped scenario. The model is discrete with the common
+    step of all components, or continuous. If the outputs are enough, its states are outputs in the
+    given order. A component that cannot return to a saved state (FMI: canGetAndSetFMUState) is
+    refused.
     """
     from ...analysis.linearization import linearize
     from ...scenario.settings import parse_settings
@@ -84,7 +122,11 @@ def _print_model(model: LinearModel) -> None:
     kind = "continuous" if model.step is None else f"step {model.step:g} s"
     sizes = [
         count_noun(len(names), noun)
-        for names, noun in ((model.states, "state"), (model.inputs, "input"), (model.outputs, "output"))
+        for names, noun in (
+            (model.states, "state"),
+            (model.inputs, "input"),
+            (model.outputs, "output"),
+        )
     ]
     click.echo(f"t = {model.time:g} s, {kind}: {', '.join(sizes)}\n")
     rows = []

@@ -18,12 +18,15 @@ from ..shipped import CATALOGUE, Entry
 @click.argument("kinds", metavar="[KIND...]", nargs=-1, type=click.Choice(list(CATALOGUE)))
 @json_option("an object with a list of entries (name, description, file, arguments) for each KIND")
 def command(kinds: tuple[str, ...], as_json: bool) -> None:
-    """List what cosim ships, with one line each, scenarios in groups; KIND: scenarios, sweeps, models, controllers, roles, kpis.
+    """List what cosim ships, with one line each, scenarios in groups.
 
-    Scenarios, sweeps, tunings and roles are given to commands by name: `cosim run NAME`, `cosim sweep NAME`, `cosim tune NAME`,
-    `cosim bench-controller --role NAME`. Models are the vehicles of the plant. Controllers are FMUs, which
-    `cosim info NAME` describes. KPIs are functions for the key "kpis" of scenarios; -v also prints their arguments. The JSON
-    output also contains the file of each entry.
+    KIND: scenarios, sweeps, models, controllers, roles, kpis.
+
+    Scenarios, sweeps, tunings and roles are given to commands by name: `cosim run NAME`, `cosim
+    sweep NAME`, `cosim tune NAME`, `cosim bench-controller --role NAME`. Models are the vehicles of
+    the plant. Controllers are FMUs, which `cosim info NAME` describes. KPIs are functions for the
+    key "kpis" of scenarios; -v also prints their arguments. The JSON output also contains the file
+    of each entry.
     """
     entries = {kind: list(CATALOGUE[kind]()) for kind in kinds or CATALOGUE}
     if as_json:

@@ -10,7 +10,13 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ...core.errors import InputError
-from ..analysis_options import print_notes, scenario_options, split_names, time_options, write_figures
+from ..analysis_options import (
+    print_notes,
+    scenario_options,
+    split_names,
+    time_options,
+    write_figures,
+)
 from ..messages import print_json, print_log
 from ..output_options import json_option
 from ..study_options import print_table
@@ -22,15 +28,37 @@ if TYPE_CHECKING:
 
 @click.command()
 @scenario_options
-@click.option("--component", "components", multiple=True, required=True, metavar="NAME", help="Controller; repeat for several.")
-@click.option("--loop", "loops", multiple=True, metavar="NAME,...", help="Signal to break the loop at; default: all.")
+@click.option(
+    "--component",
+    "components",
+    multiple=True,
+    required=True,
+    metavar="NAME",
+    help="Controller; repeat for several.",
+)
+@click.option(
+    "--loop",
+    "loops",
+    multiple=True,
+    metavar="NAME,...",
+    help="Signal to break the loop at; default: all.",
+)
 @time_options
 @click.option(
-    "--estimate", type=click.Choice(["sines", "chirp"]), help="Also estimate the response of one --loop, with --amplitude."
+    "--estimate",
+    type=click.Choice(["sines", "chirp"]),
+    help="Also estimate the response of one --loop, with --amplitude.",
 )
-@click.option("--amplitude", type=float, help="Largest value that --estimate adds, in the unit of the signal.")
-@click.option("--figures", type=click.Path(path_type=Path), help="Folder for a Bode and a Nyquist diagram.")
-@json_option("an object with time, step, and loops: objects with the margins; phases in rad, gains as factors")
+@click.option(
+    "--amplitude", type=float, help="Largest value that --estimate adds, in the unit of the signal."
+)
+@click.option(
+    "--figures", type=click.Path(path_type=Path), help="Folder for a Bode and a Nyquist diagram."
+)
+@json_option(
+    "an object with time, step, and loops: objects with the margins; phases in rad, gains as "
+    "factors"
+)
 def command(
     scenario: str,
     settings: tuple[str, ...],
@@ -54,11 +82,19 @@ def command(
     from ...scenario.settings import parse_settings
 
     print_log()
-    parameters, names, chosen = parse_settings(settings), split_names(components), split_names(loops)
-    measured = measure_loops(scenario, names, at, loops=chosen, parameters=parameters, duration=duration)
+    parameters, names, chosen = (
+        parse_settings(settings),
+        split_names(components),
+        split_names(loops),
+    )
+    measured = measure_loops(
+        scenario, names, at, loops=chosen, parameters=parameters, duration=duration
+    )
     found = [loop_margins(each) for each in measured]
     if as_json:
-        times = {"time": measured[0].closed.time, "step": measured[0].closed.step} if measured else {}
+        times = (
+            {"time": measured[0].closed.time, "step": measured[0].closed.step} if measured else {}
+        )
         print_json({**times, "loops": [vars(each) for each in found]})
     elif found:
         _print_margins(found)
@@ -79,7 +115,16 @@ def _decibels(factor: float) -> str:
 
 
 def _print_margins(found: Sequence[LoopMargins]) -> None:
-    header = ["loop", "gain up (dB)", "gain down (dB)", "phase (deg)", "delay (s)", "disk", "crossover (rad/s)", "stable"]
+    header = [
+        "loop",
+        "gain up (dB)",
+        "gain down (dB)",
+        "phase (deg)",
+        "delay (s)",
+        "disk",
+        "crossover (rad/s)",
+        "stable",
+    ]
     rows = [
         [
             each.loop,
@@ -113,26 +158,45 @@ def _print_estimate(
 
     crossover = loop_margins(loop).crossover
     if not crossover == crossover:
-        raise InputError("--estimate: the gain of the loop is 1 at no frequency, expected a loop with a crossover")
+        raise InputError(
+            "--estimate: the gain of the loop is 1 at no frequency, expected a loop with a "
+            "crossover"
+        )
     wanted = crossover * 10 ** (np.arange(-3, 2) / 3)
     frequencies, estimated = estimate_loop(
-        scenario, components, loop.name, wanted, at, amplitude=amplitude, excitation=excitation, parameters=parameters
+        scenario,
+        components,
+        loop.name,
+        wanted,
+        at,
+        amplitude=amplitude,
+        excitation=excitation,
+        parameters=parameters,
     )
     linear = loop.open_loop(frequencies)
     click.echo()
     rows = [
         [
             f"{w:.4g}",
-            *(text for value in (a, b) for text in (_decibels(abs(value)), f"{np.degrees(np.angle(value)):.2f}")),
+            *(
+                text
+                for value in (a, b)
+                for text in (_decibels(abs(value)), f"{np.degrees(np.angle(value)):.2f}")
+            ),
             f"{abs(a / b - 1):.2%}",
         ]
         for w, a, b in zip(frequencies.tolist(), estimated.tolist(), linear.tolist(), strict=True)
     ]
-    print_table(["frequency (rad/s)", "estimated (dB)", "(deg)", "linear (dB)", "(deg)", "difference"], rows)
+    print_table(
+        ["frequency (rad/s)", "estimated (dB)", "(deg)", "linear (dB)", "(deg)", "difference"], rows
+    )
 
 
 def _draw(loops: Sequence[LoopResponse], folder: Path) -> None:
     from ...analysis import figures
 
-    draw = {"bode": lambda: figures.draw_loop_bode(loops), "nyquist": lambda: figures.draw_nyquist(loops)}
+    draw = {
+        "bode": lambda: figures.draw_loop_bode(loops),
+        "nyquist": lambda: figures.draw_nyquist(loops),
+    }
     write_figures(draw.items(), folder)

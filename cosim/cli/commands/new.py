@@ -29,7 +29,8 @@ class Role:
     """Template of the controllers of a role: its folder below `TEMPLATES` has the name of the role.
 
     Attributes:
-        snake: name of the controller in the template, in files and scenarios; the new controller's name replaces it.
+        snake: name of the controller in the template, in files and scenarios; the new controller's
+            name replaces it.
         camel: the same name as a class.
         plants: FMUs of the plant in the scenario.
     """
@@ -58,11 +59,17 @@ class Language:
 
 ROLES = {
     "vessel_autopilot": Role("waypoint_follower", "WaypointFollower", ("fmus/strider.fmu",)),
-    "uav_controller": Role("deck_follower", "DeckFollower", ("fmus/ar_drone.fmu", "fmus/strider.fmu")),
+    "uav_controller": Role(
+        "deck_follower", "DeckFollower", ("fmus/ar_drone.fmu", "fmus/strider.fmu")
+    ),
 }
 #: role of a controller from a Modelica library (`--library`)
 LIBRARY_ROLE = "vessel_speed"
-_ALL_ROLES = ROLES | {LIBRARY_ROLE: Role("speed_pid", "SpeedPid", ("fmus/waypoint_guidance.fmu", "fmus/heading_controller.fmu"))}
+_ALL_ROLES = ROLES | {
+    LIBRARY_ROLE: Role(
+        "speed_pid", "SpeedPid", ("fmus/waypoint_guidance.fmu", "fmus/heading_controller.fmu")
+    )
+}
 LANGUAGES = {
     "python": Language("python", "SNAKE.py:CAMEL", "SNAKE.py"),
     "modelica": Language("modelica", "CAMEL.mo:CAMEL", "CAMEL.mo"),
@@ -83,12 +90,18 @@ command.add_command(new_vehicle.command, "vehicle")
 @click.argument("name")
 @click.option("--language", help=f"Language of the controller: {', '.join(LANGUAGES)}.")
 @click.option(
-    "--role", default=next(iter(ROLES)), show_default=True, help=f"Role, which determines the variables: {', '.join(ROLES)}."
+    "--role",
+    default=next(iter(ROLES)),
+    show_default=True,
+    help=f"Role, which determines the variables: {', '.join(ROLES)}.",
 )
 @click.option(
     "--library",
     is_flag=True,
-    help="With --language modelica: a speed controller of a vessel around the Standard Library's LimPID.",
+    help=(
+        "With --language modelica: a speed controller of a vessel around the Standard Library's "
+        "LimPID."
+    ),
 )
 @click.option(
     "--directory",
@@ -97,17 +110,21 @@ command.add_command(new_vehicle.command, "vehicle")
     help="Parent of the folder NAME; default: the working directory.",
 )
 @click.option("--force", is_flag=True, help="Overwrite existing files.")
-def controller(name: str, language: str | None, role: str, library: bool, directory: Path, force: bool) -> None:
+def controller(
+    name: str, language: str | None, role: str, library: bool, directory: Path, force: bool
+) -> None:
     """Create the folder NAME with a controller, a scenario in which it runs, and a test.
 
-    A vessel_autopilot passes waypoints. A uav_controller is a quadcopter controller that follows the deck of a vessel. The
-    scenario checks it. Change the controller and run the scenario again.
+    A vessel_autopilot passes waypoints. A uav_controller is a quadcopter controller that follows
+    the deck of a vessel. The scenario checks it. Change the controller and run the scenario again.
     """
     if language is None:
         raise click.UsageError(f"Missing option '--language': {', '.join(LANGUAGES)}")
     for kind, chosen, known in (("language", language, LANGUAGES), ("role", role, ROLES)):
         if chosen not in known:
-            raise InputError(f'there is no template for the {kind} "{chosen}"{did_you_mean(chosen, known)}')
+            raise InputError(
+                f'there is no template for the {kind} "{chosen}"{did_you_mean(chosen, known)}'
+            )
     if library and language != "modelica":
         raise InputError(f"--library needs --language modelica, found --language {language}")
     role = LIBRARY_ROLE if library else role
@@ -116,7 +133,9 @@ def controller(name: str, language: str | None, role: str, library: bool, direct
     if folder.is_file():
         raise InputError(Problem("is a file, expected the name of a new folder", str(folder)))
     _write_files(
-        {folder / file: text for file, text in texts.items()}, [folder / plant for plant in _ALL_ROLES[role].plants], force
+        {folder / file: text for file, text in texts.items()},
+        [folder / plant for plant in _ALL_ROLES[role].plants],
+        force,
     )
     _print_next_steps(LANGUAGES[language], folder, names)
 
@@ -128,9 +147,13 @@ def _controller_files(name: str, role: str, language: str) -> tuple[dict[str, st
     test = texts.pop("test_controller.py")
     names = _controller_names(name, template, texts.values())
     replaced = {template.snake: names["SNAKE"], template.camel: names["CAMEL"]}
-    files = {_substitute(file, replaced): _substitute(text, replaced) for file, text in texts.items()}
+    files = {
+        _substitute(file, replaced): _substitute(text, replaced) for file, text in texts.items()
+    }
     source = {"SOURCE": chosen.key, "FILE": _substitute(chosen.component, names)}
-    files[f"{names['SNAKE']}.json"] = _substitute((TEMPLATES / role / "scenario.json").read_text(), replaced | source)
+    files[f"{names['SNAKE']}.json"] = _substitute(
+        (TEMPLATES / role / "scenario.json").read_text(), replaced | source
+    )
     files[f"test_{names['SNAKE']}.py"] = _substitute(test, {_TEST_NAME: names["SNAKE"]})
     if (TEMPLATES / role / _FIGURES_FILE).exists():
         files[_FIGURES_FILE] = (TEMPLATES / role / _FIGURES_FILE).read_text()
@@ -143,14 +166,22 @@ def _read_texts(folder: Path) -> dict[str, str]:
 
 
 def _controller_names(name: str, template: Role, texts: Iterable[str]) -> dict[str, str]:
-    """Return the names of the controller; raise InputError if a language does not allow one of them."""
+    """Return the names of the controller.
+
+    Raise InputError if a language does not allow one of them.
+    """
     from ...export.sources import snake_case
 
     if not re.fullmatch(r"[A-Za-z][A-Za-z0-9_]*", name):
-        raise InputError(f'"{name}" is not a valid name of a controller: expected a letter, then letters, digits and underscores')
+        raise InputError(
+            f'"{name}" is not a valid name of a controller: expected a letter, then letters, '
+            "digits and underscores"
+        )
     snake = snake_case(name)
     camel = "".join(word[:1].upper() + word[1:] for word in snake.split("_"))
-    taken = {*_MODELICA_TYPES, *(word for text in texts for word in re.findall(r"\w+", text))} - {template.camel}
+    taken = {*_MODELICA_TYPES, *(word for text in texts for word in re.findall(r"\w+", text))} - {
+        template.camel
+    }
     modules = {*sys.stdlib_module_names, "pythonfmu", Path(_FIGURES_FILE).stem}
     if camel in taken or snake in modules or keyword.iskeyword(snake) or keyword.iskeyword(camel):
         raise InputError(f'"{name}" is already used for something else; choose another name')
@@ -181,5 +212,7 @@ def _print_next_steps(language: Language, folder: Path, names: Mapping[str, str]
     source, fmu = folder / _substitute(language.source, names), folder / f"{name}.fmu"
     build = shlex.join(["cosim", "build", str(source), "--output", str(fmu)])
     click.echo(
-        f"\nBuild and run it:\n  {build}\n  {run}" if language.key == "fmu" else f"\nRun it:\n  {run}\nAs an FMU:\n  {build}"
+        f"\nBuild and run it:\n  {build}\n  {run}"
+        if language.key == "fmu"
+        else f"\nRun it:\n  {run}\nAs an FMU:\n  {build}"
     )

@@ -14,15 +14,27 @@ from ...core.errors import InputError, Problem
 
 @click.command()
 @click.argument("name")
-@click.option("--from", "base", required=True, metavar="SCENARIO", help="Scenario file, or name of a shipped scenario.")
 @click.option(
-    "--directory", type=click.Path(path_type=Path), default=Path(), help="Folder of the file; default: the working directory."
+    "--from",
+    "base",
+    required=True,
+    metavar="SCENARIO",
+    help="Scenario file, or name of a shipped scenario.",
+)
+@click.option(
+    "--directory",
+    type=click.Path(path_type=Path),
+    default=Path(),
+    help="Folder of the file; default: the working directory.",
 )
 @click.option("--force", is_flag=True, help="Overwrite an existing file.")
 def command(name: str, base: str, directory: Path, force: bool) -> None:
-    """Create NAME.json, a scenario that extends SCENARIO. It runs at once; add the keys that differ.
+    """Create NAME.json, a scenario that extends SCENARIO.
 
-    A shipped scenario is extended by its name, so that the new file runs wherever cosim is installed.
+    It runs at once; add the keys that differ.
+
+    A shipped scenario is extended by its name, so that the new file runs wherever cosim is
+    installed.
     """
     from ...scenario.extending_file import extending_scenario
     from ...scenario.file_paths import find_scenario
@@ -30,7 +42,10 @@ def command(name: str, base: str, directory: Path, force: bool) -> None:
     from ...scenario.schema import SCENARIO_NAME
 
     if not re.match(SCENARIO_NAME, name):
-        raise InputError(f'"{name}" is not a name of a scenario: expected letters, digits, "_", ".", "-" and spaces')
+        raise InputError(
+            f'"{name}" is not a name of a scenario: expected letters, digits, "_", ".", "-" and '
+            "spaces"
+        )
     file, found = directory / f"{name}.json", find_scenario(base)
     if file.exists() and not force:
         raise InputError([Problem("exists; --force overwrites it", str(file))])
@@ -41,4 +56,7 @@ def command(name: str, base: str, directory: Path, force: bool) -> None:
         file.unlink()
         raise InputError(problems)
     path = shlex.quote(str(file))
-    click.echo(f"{file}\n\nPrint all keys that it can change:\n  cosim check {path} --expanded\nRun it:\n  cosim run {path}")
+    click.echo(
+        f"{file}\n\nPrint all keys that it can change:\n  cosim check {path} --expanded\nRun it:\n "
+        f" cosim run {path}"
+    )

@@ -18,14 +18,25 @@ from ...scenario.json_document import Document, read_document
 
 @click.command()
 @click.argument("name")
-@click.option("--from", "base", required=True, metavar="VEHICLE", help="Vehicle file, or name of a shipped vehicle.")
 @click.option(
-    "--directory", type=click.Path(path_type=Path), default=Path(), help="Folder of the file; default: the working directory."
+    "--from",
+    "base",
+    required=True,
+    metavar="VEHICLE",
+    help="Vehicle file, or name of a shipped vehicle.",
+)
+@click.option(
+    "--directory",
+    type=click.Path(path_type=Path),
+    default=Path(),
+    help="Folder of the file; default: the working directory.",
 )
 @click.option(
     "--urdf",
     type=click.Path(path_type=Path),
-    help="URDF file with the mass, inertia and collision shape, unless the file of --from has them.",
+    help=(
+        "URDF file with the mass, inertia and collision shape, unless the file of --from has them."
+    ),
 )
 @click.option(
     "--mesh",
@@ -33,13 +44,28 @@ from ...scenario.json_document import Document, read_document
     help="STL, OBJ or GLB file with the shape: inertia for an even density, convex collision pieces, appearance. "
     "Requires the extra mesh.",
 )
-@click.option("--mesh-scale", default=1.0, help="Factor on the coordinates of --mesh, for example 0.001 for mm.")
+@click.option(
+    "--mesh-scale",
+    default=1.0,
+    help="Factor on the coordinates of --mesh, for example 0.001 for mm.",
+)
 @click.option("--force", is_flag=True, help="Overwrite an existing file.")
-def command(name: str, base: str, directory: Path, urdf: Path | None, mesh: Path | None, mesh_scale: float, force: bool) -> None:
-    """Create NAME.json, a copy of a vehicle file. Change its numbers, and name it in a scenario as "model".
+def command(
+    name: str,
+    base: str,
+    directory: Path,
+    urdf: Path | None,
+    mesh: Path | None,
+    mesh_scale: float,
+    force: bool,
+) -> None:
+    """Create NAME.json, a copy of a vehicle file.
 
-    The file contains geometry, mass and coefficients with their units and sources. No compiler is needed. With --urdf, the
-    rotors, thrusters or propellers in the file of --from may have a "link" of the URDF file in place of position and axis.
+    Change its numbers, and name it in a scenario as "model".
+
+    The file contains geometry, mass and coefficients with their units and sources. No compiler is
+    needed. With --urdf, the rotors, thrusters or propellers in the file of --from may have a "link"
+    of the URDF file in place of position and axis.
     """
     if not re.fullmatch(r"[A-Za-z_]\w*", name):
         raise InputError(f'"{name}" is not a name of a vehicle: expected letters, digits and "_"')
@@ -53,11 +79,17 @@ def command(name: str, base: str, directory: Path, urdf: Path | None, mesh: Path
     for warning in vehicle.warnings:
         click.echo(f"WARNING {warning}", err=True)
     build = shlex.join(["cosim", "build", str(file), "--output", str(file.with_suffix(".fmu"))])
-    click.echo(f"{file}: {vehicle.balance}\n\n{_use(file, base, vehicle, bool(urdf or mesh))}As an FMU:\n  {build}")
+    click.echo(
+        f"{file}: {vehicle.balance}\n\n{_use(file, base, vehicle, bool(urdf or mesh))}As an FMU:\n "
+        f" {build}"
+    )
 
 
 class _Vehicle(NamedTuple):
-    """Data of a vehicle; mass, inertia, centre of mass and performance in words; parameters of its controller; mistakes."""
+    """Data of a vehicle; mass, inertia, centre of mass and performance in words.
+
+    Parameters of its controller; mistakes.
+    """
 
     data: Mapping[str, Any]
     balance: str
@@ -65,35 +97,52 @@ class _Vehicle(NamedTuple):
     warnings: Sequence[str]
 
 
-def _vehicle(source: Document, name: str, urdf: Path | None, mesh: Path | None, mesh_scale: float) -> _Vehicle:
+def _vehicle(
+    source: Document, name: str, urdf: Path | None, mesh: Path | None, mesh_scale: float
+) -> _Vehicle:
     """Return the data of a vehicle file with those of a URDF file or mesh.
 
     Raises:
-        InputError: A scenario would refuse the data; each problem names the file and the place in it.
+        InputError: A scenario would refuse the data; each problem names the file and the place in
+            it.
     """
     from ...export.vehicle_files import examine_vehicle, vehicle_from_mesh, vehicle_from_urdf
 
     if source.problems or not isinstance(source.value, dict):
-        raise InputError(source.problems or [Problem("expected a JSON object with the data of a vehicle", str(source.file))])
+        raise InputError(
+            source.problems
+            or [Problem("expected a JSON object with the data of a vehicle", str(source.file))]
+        )
     data, balance, warnings = source.value, "", list[str]()
     try:
         for file in filter(None, (urdf, mesh)):
-            read = vehicle_from_urdf(file, data) if file is urdf else vehicle_from_mesh(file, data, mesh_scale)
+            read = (
+                vehicle_from_urdf(file, data)
+                if file is urdf
+                else vehicle_from_mesh(file, data, mesh_scale)
+            )
             data, warnings = read[0], [*warnings, *read[2]]
             centre = ", ".join(f"{round(coordinate, 9) + 0.0:.4g}" for coordinate in read[1])
             balance += f", centre of mass [{centre}] m in {file.name}"
         mass, inertia, parameters, found, performance = examine_vehicle(data, name)
     except InputError as error:
         raise InputError(
-            [_located(problem, source, _imported(data, source, urdf or mesh)) for problem in error.problems]
+            [
+                _located(problem, source, _imported(data, source, urdf or mesh))
+                for problem in error.problems
+            ]
         ) from None
-    located = (_located(problem, source, _imported(data, source, urdf or mesh)) for problem in found)
+    located = (
+        _located(problem, source, _imported(data, source, urdf or mesh)) for problem in found
+    )
     balance = f"mass {mass:.4g} kg, inertia {inertia} kg.m2{balance}"
     balance += "".join(f"\n  {key:<12} {text}" for key, text in performance.items())
     return _Vehicle(data, balance, parameters, [*warnings, *map(str, located)])
 
 
-def _imported(data: Mapping[str, Any], source: Document, file: Path | None) -> Mapping[str, Path | None]:
+def _imported(
+    data: Mapping[str, Any], source: Document, file: Path | None
+) -> Mapping[str, Path | None]:
     """Return the keys of the data that the vehicle file does not have, each with the file from which it was imported."""
     return dict.fromkeys(data.keys() - source.value.keys(), file)
 
@@ -109,18 +158,26 @@ def _located(problem: Problem, source: Document, imported: Mapping[str, Path | N
 
 
 def _use(file: Path, base: str, vehicle: _Vehicle, has_imported_shape: bool) -> str:
-    """Return how to use the vehicle in a scenario; the controllers of Demo 1 fly multirotors like the AR.Drone only."""
+    """Return how to use the vehicle in a scenario.
+
+    The controllers of Demo 1 fly multirotors like the AR.Drone only.
+    """
     family = vehicle.data["family"]
     if base == "ar_drone":
         setting = f"/components/plant/arguments/vehicles/uav/model={file}"
         return f"Fly Demo 1 with it:\n  cosim run demo1_box --set {shlex.quote(setting)}\n"
     text = f'Name it in a scenario, as a vehicle of the plant:\n  {{"model": "{file}", ...}}\n'
     if vehicle.parameters:
-        lines = ",\n".join(f'    "{key}": {json.dumps(value)}' for key, value in vehicle.parameters.items())
+        lines = ",\n".join(
+            f'    "{key}": {json.dumps(value)}' for key, value in vehicle.parameters.items()
+        )
         text += "multirotor_controller.fmu flies it with these parameters (see crazyflie_square):\n"
         text += f'  "parameters": {{\n{lines}}}\n'
     if family == "surface_vessel" and has_imported_shape:
-        text += 'The imported shape is drawn and collides. Buoyancy, waves and drag act on the dimensions in "hull".\n'
+        text += (
+            "The imported shape is drawn and collides. Buoyancy, waves and drag act on the "
+            'dimensions in "hull".\n'
+        )
     return text
 
 
@@ -133,8 +190,12 @@ def _find_vehicle(base: str) -> Path:
             raise InputError(f'file "{base}" does not exist')
         return path
     if Path(base).is_file():
-        raise InputError(Problem("expected a vehicle file (.json); --urdf and --mesh read other files", base))
+        raise InputError(
+            Problem("expected a vehicle file (.json); --urdf and --mesh read other files", base)
+        )
     files = vehicle_files(resources.root())
     if base not in files:
-        raise InputError(f'no vehicle file and no shipped vehicle "{base}"{did_you_mean(base, files)}')
+        raise InputError(
+            f'no vehicle file and no shipped vehicle "{base}"{did_you_mean(base, files)}'
+        )
     return files[base]

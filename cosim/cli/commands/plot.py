@@ -13,8 +13,14 @@ FORMATS = ("png", "svg")
 
 
 @click.command()
-@click.argument("results", nargs=-1, required=True, metavar="RESULT...", type=click.Path(path_type=Path))
-@click.option("--output-dir", type=click.Path(path_type=Path), help="Folder for the figures; default: that of the result.")
+@click.argument(
+    "results", nargs=-1, required=True, metavar="RESULT...", type=click.Path(path_type=Path)
+)
+@click.option(
+    "--output-dir",
+    type=click.Path(path_type=Path),
+    help="Folder for the figures; default: that of the result.",
+)
 @click.option(
     "--format",
     "formats",
@@ -23,17 +29,33 @@ FORMATS = ("png", "svg")
     default=FORMATS,
     help="File format of the figures; default: both.",
 )
-@click.option("--timings", is_flag=True, help="Also draw a comparison of the real-time factors of all RESULTs.")
-@click.option("--video", is_flag=True, help='Also render a video of each run, CAMERA.mp4 (extra "video").')
+@click.option(
+    "--timings",
+    is_flag=True,
+    help="Also draw a comparison of the real-time factors of all RESULTs.",
+)
+@click.option(
+    "--video", is_flag=True, help='Also render a video of each run, CAMERA.mp4 (extra "video").'
+)
 @csv_options
-@click.option("--camera", default="chase", help="Camera of the video: overview, chase (default), deck or landing.")
+@click.option(
+    "--camera",
+    default="chase",
+    help="Camera of the video: overview, chase (default), deck or landing.",
+)
 def command(
-    results: tuple[Path, ...], output_dir: Path | None, formats: tuple[str, ...], timings: bool, video: bool, camera: str
+    results: tuple[Path, ...],
+    output_dir: Path | None,
+    formats: tuple[str, ...],
+    timings: bool,
+    video: bool,
+    camera: str,
 ) -> None:
     """Draw the figures of finished runs again; RESULT is a folder written by `cosim run`.
 
-    Each figure of the scenario is written to NAME.png and NAME.svg, with its data in NAME.csv. Several RESULTs have separate
-    folders in the output directory; the figure of --timings is written next to these.
+    Each figure of the scenario is written to NAME.png and NAME.svg, with its data in NAME.csv.
+    Several RESULTs have separate folders in the output directory; the figure of --timings is
+    written next to these.
     """
     from ...report.figures import draw_figures
     from ...report.runs import load_figures, read_run
@@ -43,7 +65,13 @@ def command(
     suffixes = [f".{name}" for name in formats]
     runs = {directory: read_run(directory) for directory in results}
     for directory, result in runs.items():
-        target = directory if output_dir is None else output_dir / directory.name if len(runs) > 1 else output_dir
+        target = (
+            directory
+            if output_dir is None
+            else output_dir / directory.name
+            if len(runs) > 1
+            else output_dir
+        )
         _print_paths(draw_figures(result, load_figures(result), target, suffixes, write_data=True))
         if video:
             with progress_bar(f"{camera}.mp4") as progress:
@@ -52,7 +80,13 @@ def command(
     if timings:
         figure = ("timings", draw_timings, {"others": list(runs.values())[1:]})
         _print_paths(
-            draw_figures(next(iter(runs.values())), [figure], output_dir or results[0].parent, suffixes, write_data=True)
+            draw_figures(
+                next(iter(runs.values())),
+                [figure],
+                output_dir or results[0].parent,
+                suffixes,
+                write_data=True,
+            )
         )
 
 

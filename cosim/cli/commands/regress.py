@@ -27,26 +27,54 @@ EXIT_CODE_SEVERITY = (130, 70, 2, 1, 3, 0)
 
 @click.command()
 @click.argument(
-    "scenarios", nargs=-1, metavar="[DIR|SCENARIO...]", type=click.Path(path_type=Path), shell_complete=complete_scenario
+    "scenarios",
+    nargs=-1,
+    metavar="[DIR|SCENARIO...]",
+    type=click.Path(path_type=Path),
+    shell_complete=complete_scenario,
 )
 @click.option("--update", is_flag=True, help="Write new references from these runs.")
-@click.option("--junit", type=click.Path(path_type=Path), metavar="FILE.xml", help="Also write the outcomes as JUnit XML.")
 @click.option(
-    "--output-dir", type=click.Path(path_type=Path), default=Path("runs"), show_default=True, help="Folder for the results."
+    "--junit",
+    type=click.Path(path_type=Path),
+    metavar="FILE.xml",
+    help="Also write the outcomes as JUnit XML.",
 )
-@click.option("--jobs", type=click.IntRange(min=1), help="Number of scenarios at a time; default: one per processor.")
-@json_option("an object with failed, their number, and scenarios, a list of name, code, summary, details, seconds and accept")
+@click.option(
+    "--output-dir",
+    type=click.Path(path_type=Path),
+    default=Path("runs"),
+    show_default=True,
+    help="Folder for the results.",
+)
+@click.option(
+    "--jobs",
+    type=click.IntRange(min=1),
+    help="Number of scenarios at a time; default: one per processor.",
+)
+@json_option(
+    "an object with failed, their number, and scenarios, a list of name, code, summary, details, "
+    "seconds and accept"
+)
 def command(
-    scenarios: tuple[Path, ...], update: bool, junit: Path | None, output_dir: Path, jobs: int | None, as_json: bool
+    scenarios: tuple[Path, ...],
+    update: bool,
+    junit: Path | None,
+    output_dir: Path,
+    jobs: int | None,
+    as_json: bool,
 ) -> int:
     """Run all scenarios that have checks or a reference, and compare their results with these.
 
-    SCENARIO is a file or the name of a shipped scenario; DIR stands for its files *.json; default: the folder scenarios/, or
-    without it the shipped ones. Each scenario runs as with `cosim run --no-report`. FMUs are taken as they are: export a changed
-    controller first. --update writes the references: the signals matched by the patterns of their tolerances, with as few rows
-    as necessary, and a JSON file with their origin. A run that fails its checks does not become a reference.
+    SCENARIO is a file or the name of a shipped scenario; DIR stands for its files *.json; default:
+    the folder scenarios/, or without it the shipped ones. Each scenario runs as with `cosim run
+    --no-report`. FMUs are taken as they are: export a changed controller first. --update writes the
+    references: the signals matched by the patterns of their tolerances, with as few rows as
+    necessary, and a JSON file with their origin. A run that fails its checks does not become a
+    reference.
 
-    Exit code 0: all passed; 1: a component failed; 2: a scenario was refused; 3: a check or comparison failed.
+    Exit code 0: all passed; 1: a component failed; 2: a scenario was refused; 3: a check or
+    comparison failed.
     """
     folders = scenarios or [default_folder()]
     if not scenarios and folders != [Path("scenarios")]:
@@ -65,7 +93,10 @@ def command(
     if as_json:
         print_json({"failed": failed, "scenarios": [asdict(outcome) for outcome in outcomes]})
     else:
-        click.echo(f"{count_noun(len(outcomes), 'scenario')}, {f'{failed} failed' if failed else 'all passed'}")
+        click.echo(
+            f"{count_noun(len(outcomes), 'scenario')}, "
+            f"{f'{failed} failed' if failed else 'all passed'}"
+        )
         if accepted := [outcome.accept for outcome in outcomes if outcome.accept]:
             click.echo(accept_command(accepted))
     return min((outcome.code for outcome in outcomes), key=EXIT_CODE_SEVERITY.index)

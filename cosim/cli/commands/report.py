@@ -13,17 +13,24 @@ from ..messages import print_log
 @click.command()
 @click.argument("result", type=click.Path(path_type=Path))
 @click.option(
-    "--output-file", type=click.Path(path_type=Path), help="File of the page; default: report.html in the folder of RESULT."
+    "--output-file",
+    type=click.Path(path_type=Path),
+    help="File of the page; default: report.html in the folder of RESULT.",
 )
 @click.option(
     "--reference",
     type=click.Path(path_type=Path),
     shell_complete=complete_scenario,
     metavar="RESULT|SCENARIO",
-    help="Also show the signals with the largest deviations from this result, or from the reference of this scenario.",
+    help=(
+        "Also show the signals with the largest deviations from this result, or from the reference "
+        "of this scenario."
+    ),
 )
 @click.option("--open", "open_page", is_flag=True, help="Open the page in the browser.")
-def command(result: Path, output_file: Path | None, reference: Path | None, open_page: bool) -> None:
+def command(
+    result: Path, output_file: Path | None, reference: Path | None, open_page: bool
+) -> None:
     """Write the report of a finished run again: KPIs, figures, system and 3-D replay.
 
     RESULT is a folder written by `cosim run`. The page is a single file and needs no network.

@@ -30,12 +30,25 @@ if TYPE_CHECKING:
     from ...report.drawing_process import DrawingProcess
     from ...scenario import PreparedRun
 
-RESULT_FILES = ("result.csv", "result.parquet", "result.mcap", "kpis.json", "run.json", "report.html", "replay.html", "tubes.png")
+RESULT_FILES = (
+    "result.csv",
+    "result.parquet",
+    "result.mcap",
+    "kpis.json",
+    "run.json",
+    "report.html",
+    "replay.html",
+    "tubes.png",
+)
 
 
 @click.command(cls=strict_sandbox.SandboxCommand)
 @click.argument("scenario", shell_complete=complete_scenario)
-@click.option("--output-dir", type=click.Path(path_type=Path), help="Folder for the results; default: runs/NAME.")
+@click.option(
+    "--output-dir",
+    type=click.Path(path_type=Path),
+    help="Folder for the results; default: runs/NAME.",
+)
 @click.option("--stop-time", help="Stop time (s), instead of the scenario's.")
 @click.option("--step-size", help="Macro step size (s), instead of the scenario's.")
 @click.option(
@@ -61,23 +74,31 @@ RESULT_FILES = ("result.csv", "result.parquet", "result.mcap", "kpis.json", "run
     help="Reaction to a real-time run that is more than one step late.",
 )
 @click.option("--parquet", is_flag=True, help="Also write result.parquet (extra `parquet`).")
-@click.option("--mcap", is_flag=True, help="Also write result.mcap, for Foxglove and ROS 2 (extra `mcap`).")
+@click.option(
+    "--mcap", is_flag=True, help="Also write result.mcap, for Foxglove and ROS 2 (extra `mcap`)."
+)
 @click.option("--no-report", is_flag=True, help="Write neither figures nor report.html.")
 @json_option(
-    "an object with name, exit_code, failure, termination, start_time and end_time (s), loop_seconds, kpis, checks, warnings, "
+    "an object with name, exit_code, failure, termination, start_time and end_time (s), "
+    "loop_seconds, kpis, checks, warnings, "
     "folder and files"
 )
 @csv_options
 @live.view_options
 @supervision.supervision_options
-def command(isolation: str, sandbox: str | None, view: bool, wait: bool, view_port: int, **options: Any) -> int:
+def command(
+    isolation: str, sandbox: str | None, view: bool, wait: bool, view_port: int, **options: Any
+) -> int:
     """Run SCENARIO and write results, figures and a report.
 
-    SCENARIO is a JSON file or the name of a shipped scenario. Writes result.csv, kpis.json, run.json, figures and report.html
-    to the output directory. Exit code 0: the run ended and all checks passed; 1: a component failed, the results until then
-    are kept; 2: the scenario was refused; 3: a check failed, or a condition with the outcome "crash" ended the run.
+    SCENARIO is a JSON file or the name of a shipped scenario. Writes result.csv, kpis.json,
+    run.json, figures and report.html to the output directory. Exit code 0: the run ended and all
+    checks passed; 1: a component failed, the results until then are kept; 2: the scenario was
+    refused; 3: a check failed, or a condition with the outcome "crash" ended the run.
     """
-    run_options = RunOptions(**options, isolation="fmu" if isolation == "fmu" else "none", sandbox=bool(sandbox))
+    run_options = RunOptions(
+        **options, isolation="fmu" if isolation == "fmu" else "none", sandbox=bool(sandbox)
+    )
     if wait and not view:
         raise click.UsageError("--wait requires --view")
     if view:
@@ -87,8 +108,16 @@ def command(isolation: str, sandbox: str | None, view: bool, wait: bool, view_po
     save = partial(save_after_crash, options=run_options)
     with LockKeeper() as locks:
         if view:
-            return live.run_with_view(lambda link: _run_scenario(run_options, locks, link), isolation, save, view_port, wait=wait)
-        return supervision.run_supervised_command(lambda: _run_scenario(run_options, locks), isolation, save)
+            return live.run_with_view(
+                lambda link: _run_scenario(run_options, locks, link),
+                isolation,
+                save,
+                view_port,
+                wait=wait,
+            )
+        return supervision.run_supervised_command(
+            lambda: _run_scenario(run_options, locks), isolation, save
+        )
 
 
 def _sandbox_paths(options: RunOptions) -> tuple[list[Path], Path | None]:
@@ -97,7 +126,9 @@ def _sandbox_paths(options: RunOptions) -> tuple[list[Path], Path | None]:
     from ...scenario.settings import parse_settings
 
     loaded = load_scenario(options.scenario, parse_settings(options.settings))
-    return loaded.files(), None if loaded.problems else options.output_folder(loaded.spec.name).absolute()
+    return loaded.files(), None if loaded.problems else options.output_folder(
+        loaded.spec.name
+    ).absolute()
 
 
 def _run_scenario(options: RunOptions, locks: LockKeeper, link: Connection | None = None) -> int:
@@ -115,13 +146,18 @@ def _run_scenario(options: RunOptions, locks: LockKeeper, link: Connection | Non
     warnings = messages.print_log()
     _require_packages(options)
     began = time.perf_counter()
-    with _drawing_process(options) as drawing, _load(options, None if link else options.real_time) as simulation:
+    with (
+        _drawing_process(options) as drawing,
+        _load(options, None if link else options.real_time) as simulation,
+    ):
         prepared = simulation.prepared
         folder = options.output_folder(prepared.spec.name).absolute()
         _prepare_folder(prepared, options, locks)
         control = live.create_control(prepared, link, options.real_time) if link else None
         with (
-            keeping_run_files(OutputFiles.of_folder(folder).unfinished, folder / "result.csv", prepared.metadata),
+            keeping_run_files(
+                OutputFiles.of_folder(folder).unfinished, folder / "result.csv", prepared.metadata
+            ),
             _progress_observers(prepared) as observers,
             default_float_mode(),
             simulation,
@@ -130,12 +166,17 @@ def _run_scenario(options: RunOptions, locks: LockKeeper, link: Connection | Non
             execution.result.metadata["warnings"] = warnings
             if control:
                 execution.result.metadata["live_events"] = control.finish()
-            return supervision.results_written(write_outputs(RunOutcome(options, prepared, execution, began, drawing)))
+            return supervision.results_written(
+                write_outputs(RunOutcome(options, prepared, execution, began, drawing))
+            )
 
 
 @contextmanager
 def _drawing_process(options: RunOptions) -> Iterator[DrawingProcess | None]:
-    """Yield a process that prepares to draw the figures of the scenario; None without a report or a supervisor."""
+    """Yield a process that prepares to draw the figures of the scenario.
+
+    None without a report or a supervisor.
+    """
     from ...process.journal import current_journal
 
     if options.no_report or current_journal() is None:
@@ -196,10 +237,21 @@ def _prepare_folder(prepared: PreparedRun, options: RunOptions, locks: LockKeepe
     check_writable(folder)
     locks.lock(OutputFiles.of_folder(folder).lock, shown)
     warn_overwriting(shown, "run.json", "scenario", prepared.document.file.resolve())
-    replaced = sum((folder / name).stat().st_size for name in RESULT_FILES if (folder / name).is_file())
+    replaced = sum(
+        (folder / name).stat().st_size for name in RESULT_FILES if (folder / name).is_file()
+    )
     if problems := find_space_problems(prepared.plan, folder, csv=True, replaced=replaced):
-        raise InputError([Problem(problem.message, prepared.root.where(*problem.subject)) for problem in problems])
-    figures = (f"{figure.name}{suffix}" for figure in prepared.spec.figures for suffix in (".png", ".svg", ".csv"))
+        raise InputError(
+            [
+                Problem(problem.message, prepared.root.where(*problem.subject))
+                for problem in problems
+            ]
+        )
+    figures = (
+        f"{figure.name}{suffix}"
+        for figure in prepared.spec.figures
+        for suffix in (".png", ".svg", ".csv")
+    )
     remove_files(folder, *RESULT_FILES, *figures)
 
 

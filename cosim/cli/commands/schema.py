@@ -12,7 +12,9 @@ import click
 @click.option("--nested", "kind", flag_value="nested", help="Print the schema of nested systems.")
 @click.option("--sweep", "kind", flag_value="sweep", help="Print the schema of sweeps.")
 @click.option("--tune", "kind", flag_value="tune", help="Print the schema of tunings.")
-@click.option("--worst", "kind", flag_value="worst", help="Print the schema of searches for the worst case.")
+@click.option(
+    "--worst", "kind", flag_value="worst", help="Print the schema of searches for the worst case."
+)
 @click.option("--vehicle", "kind", flag_value="vehicle", help="Print the schema of vehicle files.")
 def command(kind: str | None) -> None:
     """Print the JSON Schema of scenarios, sweeps, tunings or vehicle files.

@@ -25,24 +25,48 @@ if TYPE_CHECKING:
 @click.command(cls=strict_sandbox.SandboxCommand)
 @click.argument("fmu", type=click.Path(path_type=Path))
 @click.option(
-    "--output-file", type=click.Path(path_type=Path), help="CSV file for the outputs; default: print their final values."
+    "--output-file",
+    type=click.Path(path_type=Path),
+    help="CSV file for the outputs; default: print their final values.",
 )
 @click.option("--stop-time", help="Stop time (s); default: the FMU's, else 1 s after the start.")
-@click.option("--step-size", help="Communication step size (s); default: the FMU's, else a hundredth of the duration.")
 @click.option(
-    "--start-value", "start_values", multiple=True, metavar="name=value", help="Set a parameter or the start value of a variable."
+    "--step-size",
+    help="Communication step size (s); default: the FMU's, else a hundredth of the duration.",
 )
 @click.option(
-    "--input-file", type=click.Path(path_type=Path), help='CSV file with the column "time" and columns named like inputs.'
+    "--start-value",
+    "start_values",
+    multiple=True,
+    metavar="name=value",
+    help="Set a parameter or the start value of a variable.",
+)
+@click.option(
+    "--input-file",
+    type=click.Path(path_type=Path),
+    help='CSV file with the column "time" and columns named like inputs.',
 )
 @click.option(
     "--solver",
     type=click.Choice(["euler", "rk4", "cvode"]),
-    help="Simulate by Model Exchange with this method; default: by Co-Simulation if the FMU has it, else with cvode.",
+    help=(
+        "Simulate by Model Exchange with this method; default: by Co-Simulation if the FMU has it, "
+        "else with cvode."
+    ),
 )
-@click.option("--solver-step-size", help="Largest step size (s) of euler and rk4; default: the FMU's, else --step-size.")
-@click.option("--tolerance", type=click.FloatRange(0, min_open=True), help="Relative tolerance; default: the FMU's.")
-@json_option("an object with time (s) and the final values of the outputs by name; nothing with --output-file")
+@click.option(
+    "--solver-step-size",
+    help="Largest step size (s) of euler and rk4; default: the FMU's, else --step-size.",
+)
+@click.option(
+    "--tolerance",
+    type=click.FloatRange(0, min_open=True),
+    help="Relative tolerance; default: the FMU's.",
+)
+@json_option(
+    "an object with time (s) and the final values of the outputs by name; nothing with "
+    "--output-file"
+)
 @csv_options
 @supervision.supervision_options
 def command(isolation: str, sandbox: str | None, output_file: Path | None, **options: Any) -> int:
@@ -50,12 +74,20 @@ def command(isolation: str, sandbox: str | None, output_file: Path | None, **opt
     output = output_file.absolute() if output_file else None
     if strict_sandbox.must_rerun(sandbox):
         return strict_sandbox.rerun_in_bubblewrap(
-            [path for path in (options["fmu"], options["input_file"]) if path], output and output.parent
+            [path for path in (options["fmu"], options["input_file"]) if path],
+            output and output.parent,
         )
     with temporary_run_folder() as folder, LockKeeper() as locks:
         unfinished = OutputFiles.of_file(output).unfinished if output else Path(folder) / "run"
         return supervision.run_supervised_command(
-            lambda: _simulate(locks, unfinished, output, output_file, _isolation(isolation, bool(sandbox)), **options),
+            lambda: _simulate(
+                locks,
+                unfinished,
+                output,
+                output_file,
+                _isolation(isolation, bool(sandbox)),
+                **options,
+            ),
             isolation,
             lambda outcome: _save_after_crash(outcome, output, output_file),
         )
@@ -98,7 +130,9 @@ def _simulate(
     plan, warnings = compile_fmu(fmu, *times, input_file, values, None, fmu_isolation, settings)
     messages.log_problems(map(Problem, warnings))
     if output and shown:
-        if (run_lock := output.parent / LOCK_FILE).exists():  # the folder of a run, whose files are locked together
+        if (
+            run_lock := output.parent / LOCK_FILE
+        ).exists():  # the folder of a run, whose files are locked together
             locks.lock(run_lock, shown.parent)
         locks.lock(OutputFiles.of_file(output).lock, shown)
         replaced = output.stat().st_size if output.is_file() else 0
@@ -130,7 +164,9 @@ def _save_after_crash(outcome: SupervisedOutcome, output: Path | None, shown: Pa
     _write_recording(recording, output, shown, outcome.journal.folder)
 
 
-def _write_recording(recording: Recording, output: Path | None, shown: Path | None, unfinished: Path | None) -> None:
+def _write_recording(
+    recording: Recording, output: Path | None, shown: Path | None, unfinished: Path | None
+) -> None:
     from ...results import Result
 
     if output and shown and len(recording.time):
@@ -142,13 +178,22 @@ def _write_recording(recording: Recording, output: Path | None, shown: Path | No
 
 def _print_final_values(recording: Recording, as_json: bool) -> None:
     """Print the last row: numbers with six significant digits, as JSON with all digits."""
-    time, last = recording.time.tolist()[-1], {name: values.tolist()[-1] for name, values in recording.columns.items()}
+    time, last = (
+        recording.time.tolist()[-1],
+        {name: values.tolist()[-1] for name, values in recording.columns.items()},
+    )
     if as_json:
         print_json({"time": time, "values": last})
         return
     click.echo(f"time = {time:.6g} s")
     for name, value in last.items():
-        text = f"{value:.6g}" if isinstance(value, float) else value.hex() if isinstance(value, bytes) else repr(value)
+        text = (
+            f"{value:.6g}"
+            if isinstance(value, float)
+            else value.hex()
+            if isinstance(value, bytes)
+            else repr(value)
+        )
         unit = "" if recording.units[name] == "1" else recording.units[name]
         print_line(f"{name} = {text} {unit}".rstrip())
 

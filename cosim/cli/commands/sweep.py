@@ -31,22 +31,33 @@ _MAX_PRINTED = 20
 
 @click.command()
 @click.argument("sweep", shell_complete=complete_study)
-@click.option("--output-dir", type=click.Path(path_type=Path), help="Folder for the results; default: runs/NAME.")
+@click.option(
+    "--output-dir",
+    type=click.Path(path_type=Path),
+    help="Folder for the results; default: runs/NAME.",
+)
 @click.option("--parquet", is_flag=True, help="Also write table.parquet (extra `parquet`).")
-@click.option("--replays", is_flag=True, help="Also write the 3-D replay of one run of each cell of the maps.")
+@click.option(
+    "--replays", is_flag=True, help="Also write the 3-D replay of one run of each cell of the maps."
+)
 @json_option(
-    "an object with name, folder, runs, finished, failed, units (by KPI), failure_causes (cause, runs, first_run), "
-    "missed_criteria (kpi, limits, runs, first_run, command) and groups, whose entries have labels, runs, distinct, passed, "
+    "an object with name, folder, runs, finished, failed, units (by KPI), failure_causes (cause, "
+    "runs, first_run), "
+    "missed_criteria (kpi, limits, runs, first_run, command) and groups, whose entries have "
+    "labels, runs, distinct, passed, "
     "success_rate, interval (95 %) and kpis; the first group is all runs and has the kpis"
 )
 @study_options.study_options
-def command(sweep: str, output_dir: Path | None, parquet: bool, replays: bool, as_json: bool, **study: Any) -> int:
+def command(
+    sweep: str, output_dir: Path | None, parquet: bool, replays: bool, as_json: bool, **study: Any
+) -> int:
     """Run a scenario at many points: parameter studies and Monte Carlo.
 
-    SWEEP is a JSON file or the name of a shipped sweep. Each run has its own child process. Writes table.csv (one row per
-    run), aggregates.csv, success.csv, unsuccessful.csv (criteria that a run misses, and the command that repeats it),
-    failures.csv, sweep.json, sweep.html and success maps to the output directory. Called again, the command continues an
-    interrupted sweep. Exit code 0: all runs reached their end; 1: some failed; 2: the sweep was refused; 130: interrupted, the
+    SWEEP is a JSON file or the name of a shipped sweep. Each run has its own child process. Writes
+    table.csv (one row per run), aggregates.csv, success.csv, unsuccessful.csv (criteria that a run
+    misses, and the command that repeats it), failures.csv, sweep.json, sweep.html and success maps
+    to the output directory. Called again, the command continues an interrupted sweep. Exit code 0:
+    all runs reached their end; 1: some failed; 2: the sweep was refused; 130: interrupted, the
     finished runs are written.
     """
     from ...results.parquet_files import require_parquet
@@ -99,16 +110,27 @@ def _run_sweep(
         print_json(_summary_as_json(sweep, summary, folder))
     else:
         _print_summary(sweep, summary)
-        new = f"{summary.finished - done} made now in {study_options.format_duration(time.monotonic() - began)}"
+        new = (
+            f"{summary.finished - done} made now in "
+            f"{study_options.format_duration(time.monotonic() - began)}"
+        )
         runs = count_noun(len(sweep), "run")
-        click.echo(f"{summary.finished} of {runs}, {new}, {summary.failed} failed; table.csv and others in {folder}")
+        click.echo(
+            f"{summary.finished} of {runs}, {new}, {summary.failed} failed; table.csv and others "
+            f"in {folder}"
+        )
     if interrupted:
         raise KeyboardInterrupt
     return 1 if summary.failed else 0
 
 
 def _write_maps_and_page(
-    sweep: Sweep, run_store: RunStore, summary: SweepSummary, folder: Path, replays: bool, workers: int | None
+    sweep: Sweep,
+    run_store: RunStore,
+    summary: SweepSummary,
+    folder: Path,
+    replays: bool,
+    workers: int | None,
 ) -> None:
     """Write the maps, the replays of their cells if required, and the page."""
     from ...studies.summary.page import write_sweep_page
@@ -118,8 +140,15 @@ def _write_maps_and_page(
     maps = success_maps(sweep, sweep.rows(run_store))
     remove_foreign_replays(sweep, folder)
     if replays:
-        runs = [cell.representative_run.number for each in maps for cell in each.cells.values() if cell.representative_run]
-        for run, cause in write_replays(sweep, runs, folder, workers or available_processors()).items():
+        runs = [
+            cell.representative_run.number
+            for each in maps
+            for cell in each.cells.values()
+            if cell.representative_run
+        ]
+        for run, cause in write_replays(
+            sweep, runs, folder, workers or available_processors()
+        ).items():
             click.echo(f"no replay of run {run}: {cause}", err=True)
     write_sweep_page(sweep, sweep.rows(run_store), summary, maps, folder)
 
@@ -129,19 +158,29 @@ def _print_summary(sweep: Sweep, summary: SweepSummary) -> None:
         return
     numbers = summary.groups[0].shown_statistics()
     columns = ("mean", "std", "min", "median", "max")
-    kpis = [[name, summary.units.get(name, ""), *(found[key] for key in columns)] for name, found in numbers]
+    kpis = [
+        [name, summary.units.get(name, ""), *(found[key] for key in columns)]
+        for name, found in numbers
+    ]
     if kpis:
         study_options.print_table(["KPI", "unit", *columns], kpis)
     if sweep.criteria or summary.failed:
         study_options.print_table(
-            ["runs", "n", "success", "95 % interval"], [_success_row(group) for group in _first(summary.groups, "success.csv")]
+            ["runs", "n", "success", "95 % interval"],
+            [_success_row(group) for group in _first(summary.groups, "success.csv")],
         )
         if summary.groups[0].distinct < summary.groups[0].runs:
             runs = count_noun(summary.groups[0].runs, "run")
-            click.echo(f"{summary.groups[0].distinct} of {runs} are distinct; only these count in the intervals")
+            click.echo(
+                f"{summary.groups[0].distinct} of {runs} are distinct; only these count in the "
+                "intervals"
+            )
     for each in _first(summary.missed_criteria, "sweep.html"):
         runs = f"{each.runs} of {count_noun(summary.finished, 'run')}"
-        click.echo(f"{each.kpi} {each.limits}: missed by {runs}; the first is run {each.first_run}:\n  {each.command}")
+        click.echo(
+            f"{each.kpi} {each.limits}: missed by {runs}; the first is run {each.first_run}:\n  "
+            f"{each.command}"
+        )
     for cause, count, first in _first(summary.failure_causes, "failures.csv"):
         click.echo(f"{count} failed, first run {first}: {cause}", err=True)
 
@@ -174,7 +213,10 @@ def _summary_as_json(sweep: Sweep, summary: SweepSummary, folder: Path) -> dict[
         "finished": summary.finished,
         "failed": summary.failed,
         "units": dict(summary.units),
-        "failure_causes": [{"cause": cause, "runs": count, "first_run": first} for cause, count, first in summary.failure_causes],
+        "failure_causes": [
+            {"cause": cause, "runs": count, "first_run": first}
+            for cause, count, first in summary.failure_causes
+        ],
         "missed_criteria": [each._asdict() for each in summary.missed_criteria],
         "groups": groups,
     }
@@ -183,4 +225,9 @@ def _summary_as_json(sweep: Sweep, summary: SweepSummary, folder: Path) -> dict[
 def _success_row(group: RunGroup) -> list[str]:
     label = ", ".join(f"{name} = {value}" for name, value in group.labels.items()) or "all"
     low, high = group.interval
-    return [label, str(group.runs), f"{100 * group.success_rate:.1f} %", f"{100 * low:.1f} ... {100 * high:.1f} %"]
+    return [
+        label,
+        str(group.runs),
+        f"{100 * group.success_rate:.1f} %",
+        f"{100 * low:.1f} ... {100 * high:.1f} %",
+    ]

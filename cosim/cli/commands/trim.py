@@ -27,10 +27,19 @@ if TYPE_CHECKING:
     metavar="NAME,...",
     help="Input, parameter, initial state or JSON pointer to be found.",
 )
-@click.option("--steady", multiple=True, metavar="NAME,...", help="Signal that does not change during the first macro step.")
-@click.option("--require", multiple=True, metavar="NAME=value", help="Value of a signal at the start time.")
 @click.option(
-    "--output", type=click.Path(path_type=Path), help="Scenario file to write; it extends SCENARIO by the found values."
+    "--steady",
+    multiple=True,
+    metavar="NAME,...",
+    help="Signal that does not change during the first macro step.",
+)
+@click.option(
+    "--require", multiple=True, metavar="NAME=value", help="Value of a signal at the start time."
+)
+@click.option(
+    "--output",
+    type=click.Path(path_type=Path),
+    help="Scenario file to write; it extends SCENARIO by the found values.",
 )
 @json_option("an object with found, parameters, residuals and evaluations")
 def command(
@@ -44,20 +53,27 @@ def command(
 ) -> int:
     """Find values with which SCENARIO starts in equilibrium.
 
-    SCENARIO is a JSON file or the name of a shipped scenario. It is started again and again with changed values of the --free
-    names, and makes one macro step, until the --steady signals do not change and the --require signals have their values.
-    Exit code 0: an equilibrium was found; 2: the scenario was refused; 3: the best values are no equilibrium.
+    SCENARIO is a JSON file or the name of a shipped scenario. It is started again and again with
+    changed values of the --free names, and makes one macro step, until the --steady signals do not
+    change and the --require signals have their values. Exit code 0: an equilibrium was found; 2:
+    the scenario was refused; 3: the best values are no equilibrium.
     """
     from ...analysis.trimming import trim
     from ...scenario.settings import parse_settings
 
     print_log()
     given = parse_settings(settings)
-    found = trim(scenario, split_names(free), split_names(steady), _numbers(require), parameters=given)
+    found = trim(
+        scenario, split_names(free), split_names(steady), _numbers(require), parameters=given
+    )
     if output:
         _write_scenario(output, scenario, {**given, **found.parameters})
     if as_json:
-        about = {"found": found.is_found, "parameters": found.parameters, "residuals": found.residuals}
+        about = {
+            "found": found.is_found,
+            "parameters": found.parameters,
+            "residuals": found.residuals,
+        }
         print_json({**about, "evaluations": found.evaluations})
     else:
         _print_trim(found, output)
@@ -68,7 +84,11 @@ def _numbers(texts: tuple[str, ...]) -> dict[str, float]:
     from ...scenario.settings import parse_settings
 
     values = parse_settings(texts)
-    if wrong := [name for name, value in values.items() if isinstance(value, bool) or not isinstance(value, int | float)]:
+    if wrong := [
+        name
+        for name, value in values.items()
+        if isinstance(value, bool) or not isinstance(value, int | float)
+    ]:
         raise InputError(f"--require {wrong[0]}={values[wrong[0]]}: expected a number")
     return values
 
@@ -91,9 +111,20 @@ def _print_trim(found: Trim, output: Path | None) -> None:
     }
     print_table(["free", "value"], [[name, f"{value:.9g}"] for name, value in values.items()])
     click.echo()
-    print_table(["signal", "residual"], [[name, f"{value:.2g}"] for name, value in found.residuals.items()])
+    print_table(
+        ["signal", "residual"], [[name, f"{value:.2g}"] for name, value in found.residuals.items()]
+    )
     if not found.is_found:
-        click.echo(f"no equilibrium: the residual of {found.largest} is {found.residuals[found.largest]:.3g}", err=True)
+        click.echo(
+            (
+                f"no equilibrium: the residual of {found.largest} is "
+                f"{found.residuals[found.largest]:.3g}"
+            ),
+            err=True,
+        )
     for name in found.without_effect:
         click.echo(f"NOTE {name} changes no residual", err=True)
-    click.echo(f"\n{count_noun(found.evaluations, 'evaluation')}" + (f"; values in {output}" if output else ""))
+    click.echo(
+        f"\n{count_noun(found.evaluations, 'evaluation')}"
+        + (f"; values in {output}" if output else "")
+    )

@@ -23,21 +23,32 @@ if TYPE_CHECKING:
 
 @click.command()
 @click.argument("tuning", metavar="TUNE", shell_complete=complete_study)
-@click.option("--output-dir", type=click.Path(path_type=Path), help="Folder for the results; default: runs/NAME.")
-@json_option(
-    "the object of best.json, with failure, the reason why no point is feasible, or null; with --worst that of worst.json"
+@click.option(
+    "--output-dir",
+    type=click.Path(path_type=Path),
+    help="Folder for the results; default: runs/NAME.",
 )
-@click.option("--worst", is_flag=True, help="Search for the run that breaks a controller; TUNE is then a file of such a search.")
+@json_option(
+    "the object of best.json, with failure, the reason why no point is feasible, or null; with "
+    "--worst that of worst.json"
+)
+@click.option(
+    "--worst",
+    is_flag=True,
+    help="Search for the run that breaks a controller; TUNE is then a file of such a search.",
+)
 @study_options.study_options
 def command(tuning: str, output_dir: Path | None, as_json: bool, worst: bool, **study: Any) -> int:
     """Find the parameters that minimise a KPI, or with --worst the run that breaks a controller.
 
-    TUNE is a JSON file or the name of a shipped tuning. Writes trials.csv (all evaluated points) and best.json to the output
-    directory. Called again, the command continues an interrupted tuning. Exit code 0: a point was found; 1: a run failed at
-    every point; 2: the tuning was refused; 3: no point meets the constraints, or none has a value; 130: interrupted.
+    TUNE is a JSON file or the name of a shipped tuning. Writes trials.csv (all evaluated points)
+    and best.json to the output directory. Called again, the command continues an interrupted
+    tuning. Exit code 0: a point was found; 1: a run failed at every point; 2: the tuning was
+    refused; 3: no point meets the constraints, or none has a value; 130: interrupted.
 
-    --worst searches wind, waves, faults and seeds for the run that misses its checks the most. Writes trials.csv, worst.json and
-    the worst runs as scenarios to the output directory. Exit code 0: the checks of all runs passed; 3: one failed.
+    --worst searches wind, waves, faults and seeds for the run that misses its checks the most.
+    Writes trials.csv, worst.json and the worst runs as scenarios to the output directory. Exit code
+    0: the checks of all runs passed; 3: one failed.
     """
     if worst:
         return _find_worst(tuning, output_dir, as_json, **study)
@@ -50,7 +61,12 @@ def command(tuning: str, output_dir: Path | None, as_json: bool, worst: bool, **
 
 
 def _run_tuning(
-    tuning: Tuning, run_store: RunStore, folder: Path, as_json: bool, workers: int | None, scheduler: str | None
+    tuning: Tuning,
+    run_store: RunStore,
+    folder: Path,
+    as_json: bool,
+    workers: int | None,
+    scheduler: str | None,
 ) -> int:
     from ...process.supervisor import interrupt_on_termination
     from ...studies.summary.tuning_files import describe_best, write_tuning_files
@@ -109,12 +125,17 @@ def _find_worst(
 def _print_worst(search: WorstCase, files: list[Path]) -> None:
     shown = search.counterexamples or [search.worst]
     names = list(shown[0].parameters)
-    rows = [[f"{each.severity:.3g}", *(f"{each.parameters[name]:.6g}" for name in names)] for each in shown]
+    rows = [
+        [f"{each.severity:.3g}", *(f"{each.parameters[name]:.6g}" for name in names)]
+        for each in shown
+    ]
     study_options.print_table(["severity", *names], rows)
     for each, file in zip(shown, files, strict=False):
         click.echo(f"{each.reason}\n  cosim run {file}")
     broken = sum(not each.passed for each in search.attempts)
-    verdict = f"a check of {broken} failed" if files else f"all checks passed; closest: {shown[0].reason}"
+    verdict = (
+        f"a check of {broken} failed" if files else f"all checks passed; closest: {shown[0].reason}"
+    )
     click.echo(f"{count_noun(len(search.attempts), 'run')}: {verdict}")
 
 
@@ -122,13 +143,23 @@ def _print_best(tuning: Tuning, best: Trial, folder: Path, failure: str | None) 
     from ...studies.summary.run_commands import format_run_command
 
     first = tuning.trials[0]
-    rows = [[name, f"{first.parameters[name]:.6g}", f"{value:.6g}"] for name, value in best.parameters.items()]
-    rows.append([tuning.objective.text, *("-" if math.isnan(each.value) else f"{each.value:.6g}" for each in (first, best))])
+    rows = [
+        [name, f"{first.parameters[name]:.6g}", f"{value:.6g}"]
+        for name, value in best.parameters.items()
+    ]
+    rows.append(
+        [
+            tuning.objective.text,
+            *("-" if math.isnan(each.value) else f"{each.value:.6g}" for each in (first, best)),
+        ]
+    )
     study_options.print_table(["", "start", "best"], rows)
     if failure:
         click.echo(failure, err=True)
     settings = {**tuning.spec.settings, **tuning.spec.cases[0], **tuning.settings(best.parameters)}
-    click.echo(f"{count_noun(len(tuning.trials), 'point')} evaluated; trials.csv and best.json in {folder}")
+    click.echo(
+        f"{count_noun(len(tuning.trials), 'point')} evaluated; trials.csv and best.json in {folder}"
+    )
     click.echo(format_run_command(tuning.study_file.scenario, settings))
 
 
@@ -137,5 +168,8 @@ def _failure_text(tuning: Tuning, best: Trial) -> str:
     if best.failure:
         return f"a run failed at every point; at the first one: {best.failure}"
     if not best.value < math.inf:
-        return f"{tuning.objective.text} has no {'finite ' if best.value == math.inf else ''}value at any point"
+        return (
+            f"{tuning.objective.text} has no {'finite ' if best.value == math.inf else ''}value at "
+            "any point"
+        )
     return f"no point meets the constraints: the best one violates them by {best.violation:.3g}"

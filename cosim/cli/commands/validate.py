@@ -21,13 +21,19 @@ if TYPE_CHECKING:
 def command(fmus: tuple[Path, ...], as_json: bool) -> int:
     """Validate FMUs against the FMI standard without running them.
 
-    Examines the archive, the model description and the binary for this machine. `cosim run` refuses FMUs with errors; warnings
-    are violations of the FMI standard that do not prevent a run. Results of the FMU are not examined. Exit code 0: no findings;
-    2: findings.
+    Examines the archive, the model description and the binary for this machine. `cosim run` refuses
+    FMUs with errors; warnings are violations of the FMI standard that do not prevent a run. Results
+    of the FMU are not examined. Exit code 0: no findings; 2: findings.
     """
     findings = {path: _validate_fmu(path) for path in fmus}
     if as_json:
-        print_json([_finding_as_json(path, finding) for path, found in findings.items() for finding in found])
+        print_json(
+            [
+                _finding_as_json(path, finding)
+                for path, found in findings.items()
+                for finding in found
+            ]
+        )
     else:
         _print_findings(findings)
     return 2 if any(findings.values()) else 0

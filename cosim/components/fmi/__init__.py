@@ -48,17 +48,20 @@ def create_component(
 ) -> FmuComponent:
     """Create a component for one instance of an FMU.
 
-    No code of the FMU runs here: its binary is loaded by `Component.instantiate`. `loggingOn`, which enables the FMU's debug
-    messages, is true if the logger "cosim.component" has the level DEBUG.
+    No code of the FMU runs here: its binary is loaded by `Component.instantiate`. `loggingOn`,
+    which enables the FMU's debug messages, is true if the logger "cosim.component" has the level
+    DEBUG.
 
     Args:
         file: The FMU; instances of the same FMU share one `FmuFile`.
         instance_name: Name of the FMU instance, used in messages too.
         settings: Tolerance and integration method.
-        isolation: Settings of a worker process for the FMU; None runs the FMU in the importer's process.
+        isolation: Settings of a worker process for the FMU; None runs the FMU in the importer's
+            process.
 
     Raises:
-        InputError: The FMU has no usable binary for this platform, or a worker process is not possible on it.
+        InputError: The FMU has no usable binary for this platform, or a worker process is not
+            possible on it.
     """
     description = file.description
     if description.interface == "model-exchange":

@@ -2,5 +2,6 @@
 
 #: address of the C function
 LOGGER: int
-#: address of the pointer to the function that receives environment, instance name, status and formatted text
+#: address of the pointer to the function that receives environment, instance name, status and
+#: formatted text
 RECEIVER: int

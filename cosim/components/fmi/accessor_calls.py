@@ -14,7 +14,8 @@ from ...core.component import NativeGetSet, Ports, PreparedCall, Variable
 from ...core.errors import InputError
 from .c_functions import FunctionTable, as_pointer, as_size, function_address
 
-#: ends of the names of the functions for slopes, by direction and by whether the FMI version is 3.0, which has none for inputs
+#: ends of the names of the functions for slopes, by direction and by whether the FMI version is
+#: 3.0, which has none for inputs
 _SLOPE_FUNCTIONS = {
     ("Get", False): "RealOutputDerivatives",
     ("Set", False): "RealInputDerivatives",
@@ -26,7 +27,8 @@ _SLOPE_FUNCTIONS = {
 class AccessorCallFactory:
     """Factory of the prepared get and set calls of one FMU instance.
 
-    Slopes are set by fmi*SetRealInputDerivatives, and got by fmi*GetRealOutputDerivatives or fmi3GetOutputDerivatives.
+    Slopes are set by fmi*SetRealInputDerivatives, and got by fmi*GetRealOutputDerivatives or
+    fmi3GetOutputDerivatives.
 
     Attributes:
         fmi_major: FMI major version.
@@ -51,12 +53,15 @@ class AccessorCallFactory:
         transfer_object: Callable[[str, np.ndarray, int], int],
         is_selected: Callable[[Variable], bool] = lambda _: True,
     ) -> list[PreparedCall]:
-        """Prepare calls for the selected bound variables: one for adjacent variables of the same accessor.
+        """Prepare calls for the selected bound variables.
+
+        One for adjacent variables of the same accessor.
 
         Args:
             verb: Direction of the transfer.
             ports: Bound variables and their arrays.
-            transfer_object: Transfers one String or Binary variable, given its name, its array and its index in the array.
+            transfer_object: Transfers one String or Binary variable, given its name, its array and
+                its index in the array.
             is_selected: Returns whether a variable is transferred.
         """
         calls: list[PreparedCall] = []
@@ -64,7 +69,8 @@ class AccessorCallFactory:
             begin = 0
             same_dtype = [variable for variable in ports.variables if variable.dtype == dtype]
             for (accessor, _, selected), group in groupby(
-                same_dtype, lambda v: (self.accessors[v.type], bool(v.derivative_of), is_selected(v))
+                same_dtype,
+                lambda v: (self.accessors[v.type], bool(v.derivative_of), is_selected(v)),
             ):
                 variables, function = list(group), f"{self.prefix}{verb}{accessor}"
                 end = begin + sum(len(variable.scalar_names) for variable in variables)
@@ -74,33 +80,60 @@ class AccessorCallFactory:
                     calls.append(self._prepare_slopes(verb, variables, array[begin:end]))
                 elif dtype.hasobject:
                     indexed = enumerate(variables, begin)
-                    calls += [PreparedCall(transfer_object, (v.name, array, index), function) for index, v in indexed]
+                    calls += [
+                        PreparedCall(transfer_object, (v.name, array, index), function)
+                        for index, v in indexed
+                    ]
                 else:
                     calls.append(self._prepare_numeric(function, variables, array[begin:end]))
                 begin = end
         return calls
 
-    def _prepare_slopes(self, verb: Literal["Get", "Set"], variables: Sequence[Variable], slopes: np.ndarray) -> PreparedCall:
+    def _prepare_slopes(
+        self, verb: Literal["Get", "Set"], variables: Sequence[Variable], slopes: np.ndarray
+    ) -> PreparedCall:
         """Prepare the call that gets the first time derivatives of outputs, or sets those of inputs.
 
         For the native executor it is a call with the arguments of FMI 3.0, whose last one has the size of a pointer. The function
         of FMI 3.0 has one more argument, and is called from Python.
         """
-        count, name = len(variables), f"{self.prefix}{verb}{_SLOPE_FUNCTIONS[verb, self.fmi_major > 2]}"
-        references = (ctypes.c_uint32 * count)(*(self.value_references[variable.derivative_of] for variable in variables))
+        count, name = (
+            len(variables),
+            f"{self.prefix}{verb}{_SLOPE_FUNCTIONS[verb, self.fmi_major > 2]}",
+        )
+        references = (ctypes.c_uint32 * count)(
+            *(self.value_references[variable.derivative_of] for variable in variables)
+        )
         orders = (ctypes.c_int32 * count)(*[1] * count)
         if name not in self.functions:
-            raise InputError(f"the library does not export {name}, which the capabilities of the FMU promise")
-        function, addresses = self.functions[name], [ctypes.addressof(references), ctypes.addressof(orders), slopes.ctypes.data]
+            raise InputError(
+                f"the library does not export {name}, which the capabilities of the FMU promise"
+            )
+        function, addresses = (
+            self.functions[name],
+            [ctypes.addressof(references), ctypes.addressof(orders), slopes.ctypes.data],
+        )
         pointers = [as_pointer(address) for address in addresses]
         arguments = (as_pointer(self.instance), pointers[0], as_size(count), *pointers[1:])
         if self.fmi_major > 2:
-            return PreparedCall(function, (*arguments, as_size(len(slopes))), name, None, (references, orders, slopes))
-        native = NativeGetSet(3, function_address(function), self.instance, addresses[0], count, *addresses[1:])
+            return PreparedCall(
+                function,
+                (*arguments, as_size(len(slopes))),
+                name,
+                None,
+                (references, orders, slopes),
+            )
+        native = NativeGetSet(
+            3, function_address(function), self.instance, addresses[0], count, *addresses[1:]
+        )
         return PreparedCall(function, arguments, name, native, (references, orders, slopes))
 
-    def _prepare_numeric(self, name: str, variables: Sequence[Variable], values: np.ndarray) -> PreparedCall:
-        references = (ctypes.c_uint32 * len(variables))(*(self.value_references[variable.name] for variable in variables))
+    def _prepare_numeric(
+        self, name: str, variables: Sequence[Variable], values: np.ndarray
+    ) -> PreparedCall:
+        references = (ctypes.c_uint32 * len(variables))(
+            *(self.value_references[variable.name] for variable in variables)
+        )
         function = self.functions[name]
         references_address, values_address = ctypes.addressof(references), values.ctypes.data
         arguments: tuple[Any, ...] = (

@@ -1,7 +1,7 @@
 """Fast ctypes calls of FMI functions.
 
-FMI functions return a status. ctypes assumes an int result when no `restype` is set, which takes a tenth less time per call than
-an explicit `restype`.
+FMI functions return a status. ctypes assumes an int result when no `restype` is set, which takes a
+tenth less time per call than an explicit `restype`.
 """
 
 from __future__ import annotations
@@ -10,7 +10,8 @@ import ctypes
 from _ctypes import FUNCFLAG_CDECL, FUNCFLAG_PYTHONAPI, CFuncPtr
 from functools import cache
 
-#: argument objects that ctypes passes on unchanged; converting arguments in each call would double its time
+#: argument objects that ctypes passes on unchanged; converting arguments in each call would double
+#: its time
 as_pointer = ctypes.c_void_p.from_param
 as_size, as_double = cache(ctypes.c_size_t.from_param), cache(ctypes.c_double.from_param)
 

@@ -26,24 +26,37 @@ _FMUS, _CONTROLLERS = "fmus", "controllers"
 def find_changed_sources(file: FmuFile) -> list[Path]:
     """Return the sources of an FMU that differ from the copies that `cosim build` put into it.
 
-    They are searched beside the FMU. For an FMU in the folder `fmus` of a project they are searched in `controllers`, its
-    subfolders and the project folder too.
+    They are searched beside the FMU. For an FMU in the folder `fmus` of a project they are searched
+    in `controllers`, its subfolders and the project folder too.
     """
     sources = _find_sources(file).items()
-    return [source for source, checksums in sources if not any(crc32(content) in checksums for content in _contents(source))]
+    return [
+        source
+        for source, checksums in sources
+        if not any(crc32(content) in checksums for content in _contents(source))
+    ]
 
 
 def changed_sources_warning(file: FmuFile) -> str:
-    """Return the warning about changed sources of an FMU with the command that builds it again; "" if there are none."""
+    """Return the warning about changed sources of an FMU with the command that builds it again.
+
+    "" if there are none.
+    """
     changed = [os.path.relpath(source) for source in find_changed_sources(file)]
     if not changed:
         return ""
     fmu = os.path.relpath(file.path)
-    return f'"{fmu}" {OTHER_VERSION} {", ".join(changed)}: `cosim build {_reference(file)} --output {fmu}` builds it again'
+    return (
+        f'"{fmu}" {OTHER_VERSION} {", ".join(changed)}: `cosim build {_reference(file)} --output '
+        f"{fmu}` builds it again"
+    )
 
 
 def _reference(file: FmuFile) -> str:
-    """Return the source of an FMU as `cosim build` needs it; MODEL or CLASS stands for a name that is not that of the file."""
+    """Return the source of an FMU as `cosim build` needs it.
+
+    MODEL or CLASS stands for a name that is not that of the file.
+    """
     sources = list(_find_sources(file))
     model = file.description.model_name.replace("_", "").lower()
     own = [source for source in sources if source.stem.replace("_", "").lower() == model]
@@ -60,7 +73,9 @@ def _find_sources(file: FmuFile) -> dict[Path, list[int]]:
         if folder in _FOLDERS and PurePosixPath(name).suffix in _SUFFIXES:
             copies.setdefault(name, []).append(checksum)
     for base in _source_folders(file.path.parent) if copies else ():
-        if found := {base / name: copies[name] for name in sorted(copies) if (base / name).is_file()}:
+        if found := {
+            base / name: copies[name] for name in sorted(copies) if (base / name).is_file()
+        }:
             return found
     return {}
 
@@ -71,11 +86,18 @@ def _source_folders(folder: Path) -> Iterator[Path]:
     project = folder.absolute().parent
     if folder.name == _FMUS:
         controllers = project / _CONTROLLERS
-        yield from (controllers, *sorted(each for each in controllers.glob("*") if each.is_dir()), project)
+        yield from (
+            controllers,
+            *sorted(each for each in controllers.glob("*") if each.is_dir()),
+            project,
+        )
 
 
 def _contents(source: Path) -> Iterator[bytes]:
-    """Yield what `cosim build` may have made of a source: the file, and a Python file with relative imports."""
+    """Yield what `cosim build` may have made of a source.
+
+    The file, and a Python file with relative imports.
+    """
     yield source.read_bytes()
     if source.suffix == ".py":
         with suppress(SyntaxError, ValueError):  # such a file has not been exported

@@ -1,4 +1,7 @@
-"""Event Mode of FMU instances: iteration of the discrete states, and discrete inputs, which change at events only."""
+"""Event Mode of FMU instances.
+
+Iteration of the discrete states, and discrete inputs, which change at events only.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,10 @@ MAX_EVENTS_PER_STEP = 10_000
 
 
 class EventModeInstance(FmuInstance):
-    """Base of the instances with Event Mode; another base of a subclass is the Co-Simulation instance of the FMI version."""
+    """Base of the instances with Event Mode.
+
+    Another base of a subclass is the Co-Simulation instance of the FMI version.
+    """
 
     #: name of FMPy's method that updates the discrete states
     _update_method: str
@@ -43,7 +49,8 @@ class EventModeInstance(FmuInstance):
         #: values of all bound inputs, and of those that change only at events, in the last step
         self._last_inputs: tuple[Any, Any] = (None, None)
 
-    # -- what differs between the interfaces -----------------------------------------------------------------------------
+    # -- what differs between the interfaces
+    # -----------------------------------------------------------------------------
 
     @property
     def _is_stepping(self) -> bool:
@@ -59,13 +66,15 @@ class EventModeInstance(FmuInstance):
     def _continuous_inputs_changed(self) -> None:
         """Take into account that continuous inputs are not those of the last step."""
 
-    # -- events ----------------------------------------------------------------------------------------------------------
+    # -- events
+    # ----------------------------------------------------------------------------------------------------------
 
     def _iterate_initial_event(self) -> None:
         """Iterate the event at the end of the initialization.
 
         Raises:
-            ComponentError: A call failed, the iteration did not end, or the FMU requested termination.
+            ComponentError: A call failed, the iteration did not end, or the FMU requested
+                termination.
         """
         self._iterate_event()
         if self._terminates:
@@ -80,7 +89,9 @@ class EventModeInstance(FmuInstance):
         for _ in range(MAX_EVENT_ITERATIONS):
             again, terminate, has_next, next_time = self._update_discrete_states()
             if has_next and math.isnan(next_time):
-                raise self._update_error("the next time event is at NaN, expected a time in seconds")
+                raise self._update_error(
+                    "the next time event is at NaN, expected a time in seconds"
+                )
             self._next_event_time = next_time if has_next else math.inf
             if terminate:
                 self._terminates = True
@@ -88,16 +99,21 @@ class EventModeInstance(FmuInstance):
             if not again:
                 self._enter_mode(self._continue_method)
                 return
-        raise self._update_error(f"the event iteration did not end after {MAX_EVENT_ITERATIONS} calls")
+        raise self._update_error(
+            f"the event iteration did not end after {MAX_EVENT_ITERATIONS} calls"
+        )
 
     def _update_error(self, reason: str) -> ComponentError:
-        return ComponentError(self.name, self._full_name(self._update_method), reason, self._current_time.value)
+        return ComponentError(
+            self.name, self._full_name(self._update_method), reason, self._current_time.value
+        )
 
     def _update_discrete_states(self) -> tuple[bool, bool, bool, float]:
         """Update the discrete states once.
 
         Returns:
-            Another update is needed, termination is requested, there is a next time event, and its time (s).
+            Another update is needed, termination is requested, there is a next time event, and its
+            time (s).
         """
         again, terminate, _, _, has_next, next_time = self.call_function(self._update_method)
         return again, terminate, has_next, next_time
@@ -106,11 +122,14 @@ class EventModeInstance(FmuInstance):
         """Enter a mode by FMPy's method."""
         self.call_function(method)
 
-    # -- inputs ----------------------------------------------------------------------------------------------------------
+    # -- inputs
+    # ----------------------------------------------------------------------------------------------------------
 
     def _prepare_transfers(self, factory: AccessorCallFactory) -> None:
         super()._prepare_transfers(factory)
-        self._continuous_calls = factory.prepare("Set", self._inputs, self._set_object, is_continuous)
+        self._continuous_calls = factory.prepare(
+            "Set", self._inputs, self._set_object, is_continuous
+        )
         self._discrete_calls = factory.prepare("Set", self._inputs, self._set_object, is_discrete)
 
     def set(self, name: str, value: Any) -> None:
@@ -141,7 +160,9 @@ class EventModeInstance(FmuInstance):
         if discrete == self._last_inputs[1]:
             self._execute_calls(self._continuous_calls)
         else:
-            self._handle_event(lambda: self._execute_calls([*self._continuous_calls, *self._discrete_calls]))
+            self._handle_event(
+                lambda: self._execute_calls([*self._continuous_calls, *self._discrete_calls])
+            )
         self._last_inputs = now
         return OK
 
@@ -158,13 +179,19 @@ class EventModeInstance(FmuInstance):
             begin = begins[variable.dtype]
             begins[variable.dtype] += len(variable.scalar_names)
             if is_discrete(variable):
-                elements.append((self._inputs.arrays[variable.dtype], slice(begin, begins[variable.dtype])))
+                elements.append(
+                    (self._inputs.arrays[variable.dtype], slice(begin, begins[variable.dtype]))
+                )
         return elements
 
 
 def is_continuous(variable: Variable) -> bool:
     """Return whether an input may be set outside of Event Mode."""
-    return variable.variability == "continuous" and variable.type in FLOAT_TYPES and not variable.derivative_of
+    return (
+        variable.variability == "continuous"
+        and variable.type in FLOAT_TYPES
+        and not variable.derivative_of
+    )
 
 
 def is_discrete(variable: Variable) -> bool:

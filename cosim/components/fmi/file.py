@@ -44,18 +44,25 @@ class _BorrowedFolder:
 class FmuFile:
     """FMU file with its extracted folder and its loaded library, shared by all instances.
 
-    Each instance calls `acquire` before it uses the folder and `release` afterwards. The last `release` unloads the library, and
-    keeps the folder for the next run in this process. The FMU passes the preflight check before anything is extracted. Neither
-    is repeated in a process while the content of the file is the same.
+    Each instance calls `acquire` before it uses the folder and `release` afterwards. The last
+    `release` unloads the library, and keeps the folder for the next run in this process. The FMU
+    passes the preflight check before anything is extracted. Neither is repeated in a process while
+    the content of the file is the same.
     """
 
-    def __init__(self, path: Path, limits: PreflightLimits = DEFAULT_LIMITS, interface: Interface | None = None):
+    def __init__(
+        self,
+        path: Path,
+        limits: PreflightLimits = DEFAULT_LIMITS,
+        interface: Interface | None = None,
+    ):
         """Prepare access to an FMU; the file is not opened yet.
 
         Args:
             path: The FMU.
             limits: Limits of the preflight check.
-            interface: Interface of all instances; by default Co-Simulation if the FMU has it, else Model Exchange.
+            interface: Interface of all instances; by default Co-Simulation if the FMU has it, else
+                Model Exchange.
         """
         self.path, self.limits, self._interface = path, limits, interface
         self._folder: LockedFolder | _BorrowedFolder | None = None
@@ -63,19 +70,24 @@ class FmuFile:
         self._reference_count = 0
         #: FMPy's slave object with the loaded library, None while no instance has loaded it
         self.library: Any = None
-        #: an instance returned fatal: no function of this FMU may be called any more (FMI 3.0 section 2.2.3)
+        #: an instance returned fatal: no function of this FMU may be called any more (FMI 3.0
+        #: section 2.2.3)
         self.has_fatal_error = False
 
     @cached_property
     def examination(self) -> Examination:
         """Result of the preflight check."""
-        examination: Examination = self._remember("examination", lambda: examine(self.path, self.limits))
+        examination: Examination = self._remember(
+            "examination", lambda: examine(self.path, self.limits)
+        )
         return examination
 
     @cached_property
     def description(self) -> FmuDescription:
         """Model description; InputError if the preflight check found errors."""
-        description: FmuDescription = self._remember(f"description {self._interface}", self._build_description)
+        description: FmuDescription = self._remember(
+            f"description {self._interface}", self._build_description
+        )
         return description
 
     def _remember(self, part: str, read: Callable[[], Any]) -> Any:
@@ -106,7 +118,9 @@ class FmuFile:
     @property
     def has_binary(self) -> bool:
         """True for an FMU with a binary for this platform."""
-        return current_platform().binary_folder(self.description.major) in self.description.platforms
+        return (
+            current_platform().binary_folder(self.description.major) in self.description.platforms
+        )
 
     @property
     def must_be_compiled(self) -> bool:
@@ -115,7 +129,10 @@ class FmuFile:
 
     @property
     def run_warning(self) -> str:
-        """The first finding that may change the results of a run, and the number of the others; "" if there are none."""
+        """The first finding that may change the results of a run, and the number of the others.
+
+        "" if there are none.
+        """
         found = [finding for finding in self.examination.findings if finding.rule in RUN_WARNINGS]
         if not found:
             return ""
@@ -134,7 +151,8 @@ class FmuFile:
         """Check that the FMU can be loaded on this platform.
 
         Raises:
-            InputError: The FMU has errors, no binary for this platform, or one that cannot be loaded.
+            InputError: The FMU has errors, no binary for this platform, or one that cannot be
+                loaded.
         """
         raise_errors(self.path, self.examination.findings)
         raise_errors(self.path, self.examination.binary_findings[self.description.interface])
@@ -147,8 +165,12 @@ class FmuFile:
         """
         if self._folder is None:
             self.check_binary()
-            with suspending_deadline():  # extracting a large archive must not count as time of the component
-                self._extracted = (file_cache.take_folder(self._key) if self._key else None) or self._extract()
+            with (
+                suspending_deadline()
+            ):  # extracting a large archive must not count as time of the component
+                self._extracted = (
+                    file_cache.take_folder(self._key) if self._key else None
+                ) or self._extract()
             self._folder = self._extracted.folder
         self._reference_count += 1
         return Path(self._folder.name)
@@ -160,21 +182,33 @@ class FmuFile:
             return ExtractedFolder(folder, file_cache.list_files(folder.name))
         except OSError as error:
             folder.cleanup()
-            raise InputError(f'"{self.path}" cannot be extracted: {error.strerror or error}') from None
+            raise InputError(
+                f'"{self.path}" cannot be extracted: {error.strerror or error}'
+            ) from None
         except InputError:
             folder.cleanup()
             raise
 
     def share(self) -> FmuFile:
-        """Return a copy for a worker process: it uses the same extracted folder but loads the library itself."""
+        """Return a copy for a worker process.
+
+        It uses the same extracted folder but loads the library itself.
+        """
         assert self._folder is not None
         other = copy(self)
-        other._folder, other._extracted, other._reference_count = _BorrowedFolder(self._folder.name), None, 0
+        other._folder, other._extracted, other._reference_count = (
+            _BorrowedFolder(self._folder.name),
+            None,
+            0,
+        )
         other.library, other.has_fatal_error = None, False
         return other
 
     def release(self) -> None:
-        """Give up one use of the folder; the last one unloads the library and keeps the folder for the next run."""
+        """Give up one use of the folder.
+
+        The last one unloads the library and keeps the folder for the next run.
+        """
         self._reference_count -= 1
         library = None
         if self._reference_count == 0 and self.library is not None and not self.has_fatal_error:

@@ -72,7 +72,8 @@ class ExtractedFolder(NamedTuple):
 
 #: description and findings of the preflight check, by the content of the file
 contents: RecentlyUsed[Any, Any] = RecentlyUsed(_MAX_CONTENTS)
-#: folders that no run uses; a run has a folder of its own, because a library that is loaded twice shares its static variables
+#: folders that no run uses; a run has a folder of its own, because a library that is loaded twice
+#: shares its static variables
 _idle_folders: RecentlyUsed[FileKey, ExtractedFolder] = RecentlyUsed(_MAX_FOLDERS)
 
 
@@ -89,7 +90,9 @@ def take_folder(key: FileKey) -> ExtractedFolder | None:
 
 def keep_folder(key: FileKey, extracted: ExtractedFolder, library: str) -> None:
     """Keep the folder for the next run, unless the operating system has kept the FMU's library with its static variables."""
-    if current_journal():  # no other run follows in a supervised process, which ends without finalizers
+    if (
+        current_journal()
+    ):  # no other run follows in a supervised process, which ends without finalizers
         extracted.folder.cleanup()
         return
     with suppress(OSError):

@@ -1,8 +1,8 @@
 """FMI 1.0 Co-Simulation instances.
 
-FMI 1.0 has no initialization mode: fmiInitializeSlave ends the initialization, and inputs can be set and outputs be read only
-afterwards. Therefore the start values of inputs are those of the FMU while it is initialized, and the values of connected
-outputs follow before the first step.
+FMI 1.0 has no initialization mode: fmiInitializeSlave ends the initialization, and inputs can be
+set and outputs be read only afterwards. Therefore the start values of inputs are those of the FMU
+while it is initialized, and the values of connected outputs follow before the first step.
 """
 
 from __future__ import annotations
@@ -76,7 +76,10 @@ class Fmi1Instance(FmuInstance):
             begins[variable.dtype] += 1
 
     def get(self, name: str) -> Any:
-        """Call the fmiGet... function of the variable's type; a negated alias has the opposite sign."""
+        """Call the fmiGet... function of the variable's type.
+
+        A negated alias has the opposite sign.
+        """
         value = super().get(name)
         if name not in self.description.negated:
             return value
@@ -85,15 +88,27 @@ class Fmi1Instance(FmuInstance):
     def _prepare_do_step(self, step_size: Any, seconds: float) -> list[PreparedCall]:
         do_step = self._fmu.functions[f"{self._c_prefix}DoStep"]
         native = NativeDoStep(2, function_address(do_step), self._handle, seconds)
-        return [PreparedCall(do_step, (self._instance, self._current_time, step_size, _TRUE), "fmi1DoStep", native)]
+        return [
+            PreparedCall(
+                do_step,
+                (self._instance, self._current_time, step_size, _TRUE),
+                "fmi1DoStep",
+                native,
+            )
+        ]
 
     def interpret_status(self, function: str, status: int) -> StepResult:
         """Raise the ComponentError for a bad status, with the time that a discarded step reached."""
         details = ""
         if function == "fmi1DoStep" and status == DISCARD:
             message = self._last_message
-            reached = self.call_function("getRealStatus", _LAST_SUCCESSFUL_TIME, unavailable_status=DISCARD)
-            details, self._last_message = "" if reached is None else f"; lastSuccessfulTime is {reached.value:.12g} s", message
+            reached = self.call_function(
+                "getRealStatus", _LAST_SUCCESSFUL_TIME, unavailable_status=DISCARD
+            )
+            details, self._last_message = (
+                "" if reached is None else f"; lastSuccessfulTime is {reached.value:.12g} s",
+                message,
+            )
         raise self.status_error(function, status, details)
 
     def _get_strings(self, reference: int, _count: int) -> Sequence[bytes | None]:

@@ -58,7 +58,9 @@ class Fmi2Instance(FmuInstance):
         return [PreparedCall(do_step, arguments, "fmi2DoStep", native)]
 
     def interpret_status(self, function: str, status: int) -> StepResult:
-        """Interpret a bad status: fmi2Discard with `terminated` ends the simulation (FMI 2.0 section 4.2.1).
+        """Interpret a bad status.
+
+        Fmi2Discard with `terminated` ends the simulation (FMI 2.0 section 4.2.1).
 
         Raises:
             ComponentError: For every other bad status.
@@ -67,11 +69,15 @@ class Fmi2Instance(FmuInstance):
             raise self.status_error(function, status)
         message, start = self._last_message, self._current_time.value
         terminated = self.call_function("getBooleanStatus", _TERMINATED, unavailable_status=DISCARD)
-        reached = self.call_function("getRealStatus", _LAST_SUCCESSFUL_TIME, unavailable_status=DISCARD)
+        reached = self.call_function(
+            "getRealStatus", _LAST_SUCCESSFUL_TIME, unavailable_status=DISCARD
+        )
         if terminated and (reached is None or reached >= start):
             return StepResult(start if reached is None else reached, terminate_requested=True)
         self._last_message = message
-        raise self.status_error(function, status, "" if reached is None else f"; lastSuccessfulTime is {reached:.12g} s")
+        raise self.status_error(
+            function, status, "" if reached is None else f"; lastSuccessfulTime is {reached:.12g} s"
+        )
 
     def _get_strings(self, reference: int, _count: int) -> Sequence[bytes | None]:
         texts: Sequence[bytes | None] = self.call_function("getString", [reference])

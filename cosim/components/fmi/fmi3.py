@@ -44,7 +44,9 @@ class Fmi3Instance(FmuInstance):
             self.log_message(status, text)
 
         try:
-            self._fmu.instantiate(loggingOn=logging_on, logMessage=log, **self._instantiation_options())
+            self._fmu.instantiate(
+                loggingOn=logging_on, logMessage=log, **self._instantiation_options()
+            )
         except Exception:
             raise self._instantiation_error() from None
 
@@ -71,14 +73,26 @@ class Fmi3Instance(FmuInstance):
         # three Booleans and one unused byte, so that one 32-bit read covers all flags
         self._step_flags, self._last_successful_time = (ctypes.c_bool * 4)(), ctypes.c_double()
         self._combined_flags = ctypes.c_uint32.from_buffer(self._step_flags)
-        flags, reached = ctypes.addressof(self._step_flags), ctypes.addressof(self._last_successful_time)
+        flags, reached = (
+            ctypes.addressof(self._step_flags),
+            ctypes.addressof(self._last_successful_time),
+        )
         results = [as_pointer(flags + i * ctypes.sizeof(ctypes.c_bool)) for i in range(3)]
-        arguments = (self._instance, self._current_time, step_size, _TRUE, *results, as_pointer(reached))
+        arguments = (
+            self._instance,
+            self._current_time,
+            step_size,
+            _TRUE,
+            *results,
+            as_pointer(reached),
+        )
         native = NativeDoStep(3, function_address(do_step), self._handle, seconds, flags, reached)
         keep_alive = (self._step_flags, self._last_successful_time)
         return [
             PreparedCall(do_step, arguments, "fmi3DoStep", native, keep_alive),
-            PreparedCall(self._check_step_flags, (), STEP_FLAGS_CHECK, NativeFlagCheck(flags), keep_alive),
+            PreparedCall(
+                self._check_step_flags, (), STEP_FLAGS_CHECK, NativeFlagCheck(flags), keep_alive
+            ),
         ]
 
     def _check_step_flags(self) -> int:
@@ -86,26 +100,43 @@ class Fmi3Instance(FmuInstance):
         return DISCARD if self._combined_flags.value else OK
 
     def _step_result(self, begin: float) -> StepResult:
-        """Return the result of fmi3DoStep from `begin` (s); a lastSuccessfulTime that is NaN or before it is an error."""
+        """Return the result of fmi3DoStep from `begin` (s).
+
+        A lastSuccessfulTime that is NaN or before it is an error.
+        """
         reached = self._last_successful_time.value
         if not reached >= begin:
             reason = f"lastSuccessfulTime is {reached!r} s, expected at least the start of the step"
             raise ComponentError(self.name, "fmi3DoStep", reason, begin)
         return StepResult(reached, self._step_flags[0], self._step_flags[1])
 
-    # FMPy's own methods fail on null pointers, on texts that are not UTF-8 and on sizes beyond the available memory
+    # FMPy's own methods fail on null pointers, on texts that are not UTF-8 and on sizes beyond the
+    # available memory
 
     def _get_strings(self, reference: int, count: int) -> Sequence[bytes | None]:
         texts = (ctypes.c_char_p * count)()
-        self.call_function("fmi3GetString", self._handle, (ctypes.c_uint32 * 1)(reference), 1, texts, count)
+        self.call_function(
+            "fmi3GetString", self._handle, (ctypes.c_uint32 * 1)(reference), 1, texts, count
+        )
         return list(texts)
 
     def _get_binaries(self, reference: int, count: int) -> list[bytes]:
         sizes, pointers = (ctypes.c_size_t * count)(), (ctypes.POINTER(ctypes.c_uint8) * count)()
-        self.call_function("fmi3GetBinary", self._handle, (ctypes.c_uint32 * 1)(reference), 1, sizes, pointers, count)
+        self.call_function(
+            "fmi3GetBinary",
+            self._handle,
+            (ctypes.c_uint32 * 1)(reference),
+            1,
+            sizes,
+            pointers,
+            count,
+        )
         for size, pointer in zip(sizes, pointers, strict=True):
             if size > MAX_BINARY_SIZE or (size and not pointer):
                 found = f"{size} bytes" if pointer else f"{size} bytes at a null pointer"
                 reason = f"found a binary of {found}, expected at most {MAX_BINARY_SIZE} bytes"
                 raise ComponentError(self.name, "fmi3GetBinary", reason, self._current_time.value)
-        return [ctypes.string_at(pointer, size) if size else b"" for size, pointer in zip(sizes, pointers, strict=True)]
+        return [
+            ctypes.string_at(pointer, size) if size else b""
+            for size, pointer in zip(sizes, pointers, strict=True)
+        ]

@@ -43,10 +43,16 @@ class Fmi3Slave(EventModeInstance, Fmi3Instance):
             InputError: The FMU has errors or no usable binary for this platform.
         """
         super().__init__(file, instance_name, settings)
-        self._uses_event_mode, self._may_return_early = self.description.has_event_mode, self.description.may_return_early
+        self._uses_event_mode, self._may_return_early = (
+            self.description.has_event_mode,
+            self.description.may_return_early,
+        )
 
     def _instantiation_options(self) -> dict[str, bool]:
-        return {"eventModeUsed": self._uses_event_mode, "earlyReturnAllowed": self._may_return_early}
+        return {
+            "eventModeUsed": self._uses_event_mode,
+            "earlyReturnAllowed": self._may_return_early,
+        }
 
     def _instantiate_fmu(self, logging_on: bool) -> None:
         """Call fmi3InstantiateCoSimulation, again without Event Mode and early return if the FMU refuses what it declares."""
@@ -57,7 +63,10 @@ class Fmi3Slave(EventModeInstance, Fmi3Instance):
                 raise
             self._uses_event_mode = self._may_return_early = False
             super()._instantiate_fmu(logging_on)
-            text = "declares hasEventMode or mightReturnEarlyFromDoStep, but could only be instantiated without them"
+            text = (
+                "declares hasEventMode or mightReturnEarlyFromDoStep, but could only be "
+                "instantiated without them"
+            )
             component_log.log_message(self.name, component_log.WARNING, text)
 
     @property
@@ -70,7 +79,9 @@ class Fmi3Slave(EventModeInstance, Fmi3Instance):
         if self._uses_event_mode:
             self._iterate_initial_event()
 
-    def prepare_step_calls(self, current_time: ctypes.c_double, step_size: float) -> Sequence[PreparedCall]:
+    def prepare_step_calls(
+        self, current_time: ctypes.c_double, step_size: float
+    ) -> Sequence[PreparedCall]:
         """Prepare the calls that set the inputs, make one step from `current_time` (s) and get the outputs."""
         calls = super().prepare_step_calls(current_time, step_size)
         if not (self._uses_event_mode and self._discrete_calls):
@@ -99,15 +110,27 @@ class Fmi3Slave(EventModeInstance, Fmi3Instance):
                 self._handle_event()
                 terminate = self._terminates
             elif reached <= begin and self._may_return_early and not terminate:
-                raise ComponentError(self.name, "fmi3DoStep", f"returned early at t = {reached!r} s without an event", start)
+                raise ComponentError(
+                    self.name,
+                    "fmi3DoStep",
+                    f"returned early at t = {reached!r} s without an event",
+                    start,
+                )
             if terminate or reached >= end - _TIME_TOLERANCE * self._step_size:
-                return StepResult(end if not terminate and reached < end else reached, event_needed, terminate)
+                return StepResult(
+                    end if not terminate and reached < end else reached, event_needed, terminate
+                )
             if not self._may_return_early and not self._accept_early_return(event_needed):
-                return StepResult(reached, event_needed, terminate)  # an error, which the caller reports
+                return StepResult(
+                    reached, event_needed, terminate
+                )  # an error, which the caller reports
             begin = reached
             if not self._continue_step(begin, end - begin):
                 return StepResult(end)
-        reason = f"more than {MAX_EVENTS_PER_STEP} events in one communication step, the last one at t = {begin:.12g} s"
+        reason = (
+            f"more than {MAX_EVENTS_PER_STEP} events in one communication step, the last one at t "
+            f"= {begin:.12g} s"
+        )
         raise ComponentError(self.name, "fmi3DoStep", reason, start)
 
     def _accept_early_return(self, event_needed: bool) -> bool:
@@ -115,7 +138,10 @@ class Fmi3Slave(EventModeInstance, Fmi3Instance):
         if not (event_needed and self._uses_event_mode):
             return False
         self._may_return_early = True
-        text = "returned early from fmi3DoStep at an event, without declaring mightReturnEarlyFromDoStep"
+        text = (
+            "returned early from fmi3DoStep at an event, without declaring "
+            "mightReturnEarlyFromDoStep"
+        )
         component_log.log_message(self.name, component_log.WARNING, text)
         return True
 
@@ -124,7 +150,9 @@ class Fmi3Slave(EventModeInstance, Fmi3Instance):
         call = self._do_step_call
         instance, _, _, *others = call.arguments
         with calling_component(self.name, call.name, self._deadline_name, begin):
-            status = call.function(instance, ctypes.c_double(begin), ctypes.c_double(duration), *others)
+            status = call.function(
+                instance, ctypes.c_double(begin), ctypes.c_double(duration), *others
+            )
         if status not in (OK, WARNING):
             raise self.status_error(call.name, status)
         return bool(self._combined_flags.value)
@@ -136,7 +164,11 @@ class Fmi3Slave(EventModeInstance, Fmi3Instance):
     def set_state(self, state: Any) -> None:
         """Restore a snapshot."""
         super().set_state(state.fmu_state)
-        self._last_inputs, self._terminates, self._next_event_time = (None, state.discrete_inputs), False, math.inf
+        self._last_inputs, self._terminates, self._next_event_time = (
+            (None, state.discrete_inputs),
+            False,
+            math.inf,
+        )
 
     def free_state(self, state: Any) -> None:
         """Free the FMU's part of a snapshot."""

@@ -47,7 +47,12 @@ def load_library(file: FmuFile, folder: Path, slave_class: type) -> Any:
 def _create_slave(slave_class: type, description: FmuDescription, folder: Path) -> Any:
     """Create FMPy's slave object without its constructor, which changes the working directory of all threads during the load."""
     machine = current_platform()
-    library = folder / "binaries" / machine.binary_folder(description.major) / f"{description.model_identifier}{machine.suffix}"
+    library = (
+        folder
+        / "binaries"
+        / machine.binary_folder(description.major)
+        / f"{description.model_identifier}{machine.suffix}"
+    )
     slave: Any = object.__new__(slave_class)
     vars(slave).update(
         guid=description.instantiation_token,
@@ -58,11 +63,14 @@ def _create_slave(slave_class: type, description: FmuDescription, folder: Path) 
         callbacks=None,
         component=None,
     )
-    slave._functions = _SlaveFunctions(slave_class, slave.dll, function_prefix(description.major, description.model_identifier))
+    slave._functions = _SlaveFunctions(
+        slave_class, slave.dll, function_prefix(description.major, description.model_identifier)
+    )
     return slave
 
 
-#: beginnings of names, without the prefix, and types of the results in C; the other functions return a status
+#: beginnings of names, without the prefix, and types of the results in C; the other functions
+#: return a status
 _RESULT_TYPES = {
     "Instantiate": ctypes.c_void_p,
     "Free": None,
@@ -74,14 +82,21 @@ _RESULT_TYPES = {
 
 
 def _result_type(name: str) -> Any:
-    """Return the type of a function's result; FMPy's annotations declare texts for statuses of FMI 1.0."""
-    return next((kind for begin, kind in reversed(_RESULT_TYPES.items()) if name.startswith(begin)), ctypes.c_int)
+    """Return the type of a function's result.
+
+    FMPy's annotations declare texts for statuses of FMI 1.0.
+    """
+    return next(
+        (kind for begin, kind in reversed(_RESULT_TYPES.items()) if name.startswith(begin)),
+        ctypes.c_int,
+    )
 
 
 class _SlaveFunctions(dict[str, Any]):
     """C functions as FMPy's slave object calls them, by name; each is created on first use.
 
-    FMPy itself creates all functions of the standard at once, which takes milliseconds and fails if one of them is missing.
+    FMPy itself creates all functions of the standard at once, which takes milliseconds and fails if
+    one of them is missing.
     """
 
     def __init__(self, slave_class: type, library: ctypes.CDLL, prefix: str):

@@ -16,7 +16,11 @@ from .fmpy_library import MissingFunctionError
 #: names of fmi2Status and fmi3Status by value; "pending" exists in FMI 2.0 only
 STATUS_NAMES = ("OK", "warning", "discard", "error", "fatal", "pending")
 OK, WARNING, DISCARD, ERROR, FATAL = range(5)
-_LOG_LEVELS = {OK: component_log.INFO, WARNING: component_log.WARNING, DISCARD: component_log.WARNING}
+_LOG_LEVELS = {
+    OK: component_log.INFO,
+    WARNING: component_log.WARNING,
+    DISCARD: component_log.WARNING,
+}
 
 
 class FunctionCaller:
@@ -32,17 +36,21 @@ class FunctionCaller:
         self._last_message = ""
         #: ignore messages with status OK
         self._hides_information = False
-        #: name of the deadline (see `Deadlines`) of the calls in the present phase of the life cycle
+        #: name of the deadline (see `Deadlines`) of the calls in the present phase of the life
+        #: cycle
         self._deadline_name = "initialization"
         #: communication point at which the next step starts (s); doStep reads it
         self._current_time = ctypes.c_double()
         self._float_mode = float_mode.FloatModeGuard()
 
-    def call_function(self, function: str, *arguments: Any, unavailable_status: int | None = None) -> Any:
+    def call_function(
+        self, function: str, *arguments: Any, unavailable_status: int | None = None
+    ) -> Any:
         """Call an FMI function outside the stepping loop.
 
         Args:
-            function: Name of FMPy's method, such as "getReal", or full name of a C function, such as "fmi3GetString".
+            function: Name of FMPy's method, such as "getReal", or full name of a C function, such
+                as "fmi3GetString".
             *arguments: Arguments of the function.
             unavailable_status: Status that means that no value is available.
 
@@ -65,13 +73,19 @@ class FunctionCaller:
             except MissingFunctionError:
                 if unavailable_status is not None:
                     return None
-                raise ComponentError(self.name, name, "the library does not export this function") from None
+                raise ComponentError(
+                    self.name, name, "the library does not export this function"
+                ) from None
         self.restore_float_mode(name)
         return result
 
     def _full_name(self, function: str) -> str:
         """Return the name of the C function for FMPy's method, such as "getReal", or for its own name."""
-        return function if function.startswith(self.prefix) else self.prefix + function[0].upper() + function[1:]
+        return (
+            function
+            if function.startswith(self.prefix)
+            else self.prefix + function[0].upper() + function[1:]
+        )
 
     def restore_float_mode(self, function: str) -> None:
         """Restore the default floating-point mode if the last call, which was a call of `function`, changed it."""
@@ -85,12 +99,23 @@ class FunctionCaller:
         """
         self._file.has_fatal_error = self._file.has_fatal_error or status == FATAL
         label = STATUS_NAMES[status] if 0 <= status < len(STATUS_NAMES) else "not defined by FMI"
-        reason = f"status {status} ({label})" + (f": {self._last_message}" if self._last_message else "") + details
-        return ComponentError(self.name, function, reason, None if isnan(self._current_time.value) else self._current_time.value)
+        reason = (
+            f"status {status} ({label})"
+            + (f": {self._last_message}" if self._last_message else "")
+            + details
+        )
+        return ComponentError(
+            self.name,
+            function,
+            reason,
+            None if isnan(self._current_time.value) else self._current_time.value,
+        )
 
     def log_message(self, status: int, text: bytes | None) -> None:
         """Forward a log message of the FMU to the log, and keep it as the reason of a later failure."""
         if status == OK and self._hides_information:
             return
         self._last_message = (text or b"").decode("utf-8", "replace").strip()
-        component_log.log_message(self.name, _LOG_LEVELS.get(status, component_log.ERROR), self._last_message)
+        component_log.log_message(
+            self.name, _LOG_LEVELS.get(status, component_log.ERROR), self._last_message
+        )

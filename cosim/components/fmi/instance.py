@@ -1,7 +1,8 @@
 """FMU instances that run in the importer's process; common base of FMI 2.0 and FMI 3.0.
 
-FMPy loads the library and makes the calls outside the stepping loop. In the stepping loop the C functions are called directly
-with prepared arguments, because FMPy's own methods take 3 to 30 times as long.
+FMPy loads the library and makes the calls outside the stepping loop. In the stepping loop the C
+functions are called directly with prepared arguments, because FMPy's own methods take 3 to 30 times
+as long.
 """
 
 from __future__ import annotations
@@ -34,7 +35,10 @@ from .preflight.library import EXPECTED_TEXTS
 
 
 class FmuInstance(FunctionCaller, Component):
-    """Base of the FMI 2.0 and FMI 3.0 instances; subclasses supply the C functions and their arguments."""
+    """Base of the FMI 2.0 and FMI 3.0 instances.
+
+    Subclasses supply the C functions and their arguments.
+    """
 
     binds_everything = False
     #: FMI major version
@@ -56,9 +60,14 @@ class FmuInstance(FunctionCaller, Component):
         """
         super().__init__(file, instance_name)
         self.shared_code = file
-        self.description = file.description.with_structural_parameters(settings.structural_parameters, file.limits)
+        self.description = file.description.with_structural_parameters(
+            settings.structural_parameters, file.limits
+        )
         self.variables = self.description.variables
-        self.has_state, self.variable_step = self.description.has_state, self.description.variable_step
+        self.has_state, self.variable_step = (
+            self.description.has_state,
+            self.description.variable_step,
+        )
         self.continuous_states = self.description.continuous_states
         self.dependencies = self.description.dependencies
         self.initial_dependencies = self.description.initial_dependencies
@@ -74,7 +83,8 @@ class FmuInstance(FunctionCaller, Component):
         self.tolerance = settings.tolerance or self.description.default_experiment.tolerance
         file.check_binary()
 
-    # -- what differs between the FMI versions ---------------------------------------------------------------------------
+    # -- what differs between the FMI versions
+    # ---------------------------------------------------------------------------
 
     def _fmpy_class(self) -> type:
         """Import FMPy's class of a slave of this FMI version."""
@@ -101,7 +111,8 @@ class FmuInstance(FunctionCaller, Component):
         """Prefix of the C functions."""
         return self.prefix
 
-    # -- life cycle ------------------------------------------------------------------------------------------------------
+    # -- life cycle
+    # ------------------------------------------------------------------------------------------------------
 
     def instantiate(self) -> None:
         """Load the library, instantiate the FMU and prepare the calls that transfer the bound arrays.
@@ -120,7 +131,10 @@ class FmuInstance(FunctionCaller, Component):
                 self._check_version()
         logs_only_errors = bool(self.description.error_categories) and not self._logging_on
         self._hides_information = logs_only_errors
-        with restoring_process_state(self.name), calling_component(self.name, self._instantiate_function, "load"):
+        with (
+            restoring_process_state(self.name),
+            calling_component(self.name, self._instantiate_function, "load"),
+        ):
             self._instantiate_fmu(self._logging_on or logs_only_errors)
         if logs_only_errors:
             self._limit_log_to_errors()
@@ -131,7 +145,9 @@ class FmuInstance(FunctionCaller, Component):
         self._set_structural_parameters()
         references, functions = self.description.value_references, self._fmu.functions
         self._prepare_transfers(
-            AccessorCallFactory(self.major, self._c_prefix, functions, self._handle, references, self.accessors)
+            AccessorCallFactory(
+                self.major, self._c_prefix, functions, self._handle, references, self.accessors
+            )
         )
 
     def _set_structural_parameters(self) -> None:
@@ -139,14 +155,22 @@ class FmuInstance(FunctionCaller, Component):
 
     def _prepare_transfers(self, factory: AccessorCallFactory) -> None:
         """Prepare the calls that transfer the bound arrays."""
-        self._set_calls = factory.prepare("Set", self._inputs, self._set_object, lambda v: not v.derivative_of)
+        self._set_calls = factory.prepare(
+            "Set", self._inputs, self._set_object, lambda v: not v.derivative_of
+        )
         self._slope_calls = self._prepare_input_slopes(factory)
-        self._get_calls = factory.prepare("Get", self._outputs, self._get_object, lambda v: not v.derivative_of)
-        self._output_slope_calls = factory.prepare("Get", self._outputs, self._get_object, lambda v: bool(v.derivative_of))
+        self._get_calls = factory.prepare(
+            "Get", self._outputs, self._get_object, lambda v: not v.derivative_of
+        )
+        self._output_slope_calls = factory.prepare(
+            "Get", self._outputs, self._get_object, lambda v: bool(v.derivative_of)
+        )
 
     def _prepare_input_slopes(self, factory: AccessorCallFactory) -> list[PreparedCall]:
         """Prepare the calls that set the time derivatives of inputs."""
-        return factory.prepare("Set", self._inputs, self._set_object, lambda v: bool(v.derivative_of))
+        return factory.prepare(
+            "Set", self._inputs, self._set_object, lambda v: bool(v.derivative_of)
+        )
 
     def _copy_fmpy_slave(self, folder: Path) -> Any:
         """Return FMPy's slave object for this instance, a copy because creating one takes milliseconds."""
@@ -159,7 +183,11 @@ class FmuInstance(FunctionCaller, Component):
     def _check_version(self) -> None:
         """Call fmi*GetVersion (and fmi2GetTypesPlatform), and log a warning about each unexpected return value."""
         texts = {}
-        for name in (name for name in EXPECTED_TEXTS if name.startswith(self.prefix) and hasattr(self._fmu.dll, name)):
+        for name in (
+            name
+            for name in EXPECTED_TEXTS
+            if name.startswith(self.prefix) and hasattr(self._fmu.dll, name)
+        ):
             function = self._fmu.dll[name]
             function.restype = ctypes.c_char_p
             with calling_component(self.name, name, "load"):
@@ -168,15 +196,23 @@ class FmuInstance(FunctionCaller, Component):
             component_log.log_message(self.name, component_log.WARNING, text)
 
     def _limit_log_to_errors(self) -> None:
-        """Call fmi*SetDebugLogging, so that the FMU gives the reason of an error; a refusal leaves its log as it is."""
+        """Call fmi*SetDebugLogging, so that the FMU gives the reason of an error.
+
+        A refusal leaves its log as it is.
+        """
         from fmpy.fmi1 import FMICallException
 
         name = f"{self.prefix}SetDebugLogging"
-        with calling_component(self.name, name, "load"), suppress(FMICallException, MissingFunctionError):
+        with (
+            calling_component(self.name, name, "load"),
+            suppress(FMICallException, MissingFunctionError),
+        ):
             self._fmu.setDebugLogging(True, self.description.error_categories)
 
     def _instantiation_error(self) -> ComponentError:
-        return ComponentError(self.name, self._instantiate_function, self._last_message or "the FMU gave no reason")
+        return ComponentError(
+            self.name, self._instantiate_function, self._last_message or "the FMU gave no reason"
+        )
 
     @property
     def has_fatal_error(self) -> bool:
@@ -195,7 +231,10 @@ class FmuInstance(FunctionCaller, Component):
 
     def terminate(self) -> None:
         """Call fmi*Terminate, unless an instance of the FMU has returned fatal."""
-        self._deadline_name, self._current_time = "end", ctypes.c_double(nan)  # messages after the last step contain no time
+        self._deadline_name, self._current_time = (
+            "end",
+            ctypes.c_double(nan),
+        )  # messages after the last step contain no time
         if not self._file.has_fatal_error:
             self.call_function("terminate")
 
@@ -212,13 +251,18 @@ class FmuInstance(FunctionCaller, Component):
             with calling_component(self.name, "unloading the binary", "end"):
                 self._file.release()
 
-    # -- access outside the stepping loop --------------------------------------------------------------------------------
+    # -- access outside the stepping loop
+    # --------------------------------------------------------------------------------
 
     def set(self, name: str, value: Any) -> None:
         """Call the fmi*Set... function of the variable's type."""
         variable = self._variables_by_name[name]
-        values = np.array(value, object).ravel().tolist() if variable.shape else [value]  # keeps all digits of 64-bit integers
-        self.call_function(f"set{self.accessors[variable.type]}", [self.description.value_references[name]], values)
+        values = (
+            np.array(value, object).ravel().tolist() if variable.shape else [value]
+        )  # keeps all digits of 64-bit integers
+        self.call_function(
+            f"set{self.accessors[variable.type]}", [self.description.value_references[name]], values
+        )
 
     def get(self, name: str) -> Any:
         """Call the fmi*Get... function of the variable's type."""
@@ -226,20 +270,29 @@ class FmuInstance(FunctionCaller, Component):
         reference, count = self.description.value_references[name], len(variable.scalar_names)
         values: Sequence[Any]
         if variable.type == "String":
-            values = [self._decode_string(name, text) for text in self._get_strings(reference, count)]
+            values = [
+                self._decode_string(name, text) for text in self._get_strings(reference, count)
+            ]
         elif variable.type == "Binary":
             values = self._get_binaries(reference, count)
         else:
-            values = self.call_function(f"get{self.accessors[variable.type]}", [reference], *((count,) if variable.shape else ()))
+            values = self.call_function(
+                f"get{self.accessors[variable.type]}",
+                [reference],
+                *((count,) if variable.shape else ()),
+            )
         return values if variable.shape else values[0]
 
     def _decode_string(self, name: str, text: bytes | None) -> str:
         if text is None:
             reason = f'the value of "{name}" is a null pointer, expected a text'
-            raise ComponentError(self.name, f"{self.prefix}GetString", reason, self._current_time.value)
+            raise ComponentError(
+                self.name, f"{self.prefix}GetString", reason, self._current_time.value
+            )
         return text.decode("utf-8", "replace")
 
-    # -- the stepping loop -----------------------------------------------------------------------------------------------
+    # -- the stepping loop
+    # -----------------------------------------------------------------------------------------------
 
     def bind(self, inputs: Ports, outputs: Ports) -> None:
         """Store the arrays; `instantiate` prepares the calls that transfer them."""
@@ -253,10 +306,17 @@ class FmuInstance(FunctionCaller, Component):
         array[index] = self.get(name)
         return OK
 
-    def prepare_step_calls(self, current_time: ctypes.c_double, step_size: float) -> Sequence[PreparedCall]:
+    def prepare_step_calls(
+        self, current_time: ctypes.c_double, step_size: float
+    ) -> Sequence[PreparedCall]:
         """Prepare the fmi*Set..., fmi*DoStep and fmi*Get... calls of one step from `current_time` (s)."""
         self._current_time = current_time
-        return [*self._set_calls, *self._slope_calls, *self._prepare_do_step(as_double(step_size), step_size), *self._get_calls]
+        return [
+            *self._set_calls,
+            *self._slope_calls,
+            *self._prepare_do_step(as_double(step_size), step_size),
+            *self._get_calls,
+        ]
 
     def set_inputs(self) -> None:
         """Call fmi*Set... for all bound inputs."""
@@ -265,18 +325,31 @@ class FmuInstance(FunctionCaller, Component):
     def do_step(self, time: float, step_size: float) -> StepResult | None:
         """Call fmi*DoStep."""
         self._current_time.value = time
-        return self._execute_calls([*self._slope_calls, *self._prepare_do_step(as_double(step_size), step_size)])
+        return self._execute_calls(
+            [*self._slope_calls, *self._prepare_do_step(as_double(step_size), step_size)]
+        )
 
     def get_outputs(self) -> None:
         """Call fmi*Get... for all bound outputs."""
         self._execute_calls(self._get_calls)
 
-    def get_directional_derivative(self, outputs: Sequence[str], input_name: str) -> Sequence[float] | None:
-        """Call fmi*GetDirectionalDerivative; None for an FMU that does not provide it and for elements of arrays."""
+    def get_directional_derivative(
+        self, outputs: Sequence[str], input_name: str
+    ) -> Sequence[float] | None:
+        """Call fmi*GetDirectionalDerivative.
+
+        None for an FMU that does not provide it and for elements of arrays.
+        """
         names = {input_name, *outputs}
-        if not self.description.directional_derivatives or not names <= self.description.value_references.keys():
+        if (
+            not self.description.directional_derivatives
+            or not names <= self.description.value_references.keys()
+        ):
             return None
-        unknowns, known = ([self.description.value_references[name] for name in group] for group in (outputs, [input_name]))
+        unknowns, known = (
+            [self.description.value_references[name] for name in group]
+            for group in (outputs, [input_name])
+        )
         found: Sequence[float] | None = self.call_function(
             "getDirectionalDerivative", unknowns, known, [1.0], unavailable_status=DISCARD
         )
@@ -284,7 +357,9 @@ class FmuInstance(FunctionCaller, Component):
 
     def _execute_calls(self, calls: Sequence[PreparedCall]) -> StepResult | None:
         for call in calls:
-            with calling_component(self.name, call.name, self._deadline_name, self._current_time.value):
+            with calling_component(
+                self.name, call.name, self._deadline_name, self._current_time.value
+            ):
                 status = call.function(*call.arguments)
             if status not in SUCCESS_STATUSES:
                 return self.interpret_status(call.name, status)

@@ -10,9 +10,11 @@ from typing import Any, Literal
 from .description import DefaultExperiment, FmuDescription
 from .preflight import Interface
 
-#: integration method: explicit Euler and Runge-Kutta of order 4 at fixed step size, or CVODE with variable step size
+#: integration method: explicit Euler and Runge-Kutta of order 4 at fixed step size, or CVODE with
+#: variable step size
 Method = Literal["euler", "rk4", "cvode"]
-#: relative tolerance of a solver with variable step size, if neither the settings nor the FMU have one
+#: relative tolerance of a solver with variable step size, if neither the settings nor the FMU have
+#: one
 DEFAULT_TOLERANCE = 1e-6
 
 
@@ -22,8 +24,9 @@ class SolverSettings:
 
     Attributes:
         method: The method.
-        step_size: Largest step size of a method with fixed step size (s); by default that of the default experiment, or else the
-            communication step size. The method uses the largest step size up to this one that divides the communication step.
+        step_size: Largest step size of a method with fixed step size (s); by default that of the
+            default experiment, or else the communication step size. The method uses the largest
+            step size up to this one that divides the communication step.
     """
 
     method: Method = "cvode"
@@ -35,9 +38,11 @@ class InstanceSettings:
     """Settings of one FMU instance.
 
     Attributes:
-        tolerance: Relative tolerance that the FMU receives, and that of a solver with variable step size; by default that of the
-            default experiment. Without any, the FMU receives none, and the solver uses 1e-6.
-        solver: Integration method, which selects Model Exchange; None: Co-Simulation, or cvode if the FMU does not offer it.
+        tolerance: Relative tolerance that the FMU receives, and that of a solver with variable step
+            size; by default that of the default experiment. Without any, the FMU receives none, and
+            the solver uses 1e-6.
+        solver: Integration method, which selects Model Exchange; None: Co-Simulation, or cvode if
+            the FMU does not offer it.
         structural_parameters: Values that are set in Configuration Mode, before the start values.
     """
 
@@ -45,10 +50,23 @@ class InstanceSettings:
     solver: SolverSettings | None = None
     structural_parameters: Mapping[str, int] = field(default_factory=dict)
 
-    def with_structural_parameters(self, description: FmuDescription, values: Mapping[str, Any]) -> InstanceSettings:
-        """Return the settings with those of the values that are valid sizes; the check of the start values refuses the others."""
-        names = {variable.name for variable in description.variables if variable.causality == "structuralParameter"}
-        sizes = {name: value for name, value in values.items() if name in names and type(value) is int and value > 0}
+    def with_structural_parameters(
+        self, description: FmuDescription, values: Mapping[str, Any]
+    ) -> InstanceSettings:
+        """Return the settings with those of the values that are valid sizes.
+
+        The check of the start values refuses the others.
+        """
+        names = {
+            variable.name
+            for variable in description.variables
+            if variable.causality == "structuralParameter"
+        }
+        sizes = {
+            name: value
+            for name, value in values.items()
+            if name in names and type(value) is int and value > 0
+        }
         return replace(self, structural_parameters=sizes)
 
     @property
@@ -66,7 +84,10 @@ class InstanceSettings:
         return self.tolerance or experiment.tolerance or DEFAULT_TOLERANCE
 
     def solver_step_size(self, experiment: DefaultExperiment) -> Fraction | None:
-        """Return the largest step size (s) of a solver with fixed step size; None: the communication step size."""
+        """Return the largest step size (s) of a solver with fixed step size.
+
+        None: the communication step size.
+        """
         return (self.solver and self.solver.step_size) or experiment.step_size
 
     def describe_solver(self, experiment: DefaultExperiment) -> dict[str, Any]:

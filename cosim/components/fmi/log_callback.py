@@ -53,14 +53,22 @@ def _dispatch(environment: int | None, name: bytes | None, status: int, text: by
     """Pass a message to the instance of the environment, or else of the name, or else to the newest one."""
     named = (handler for known, handler in reversed(_handlers.values()) if known == name)
     newest = (handler for _, handler in reversed(_handlers.values()))
-    handler = _handlers[environment][1] if environment in _handlers else next(named, None) or next(newest, None)
+    handler = (
+        _handlers[environment][1]
+        if environment in _handlers
+        else next(named, None) or next(newest, None)
+    )
     if handler:
         handler(status, text)
 
 
-_receiver = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p)(_dispatch)
-_UNFORMATTED = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p)(
-    lambda environment, name, status, _, text: _dispatch(environment, name, status, text)
+_receiver = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p)(
+    _dispatch
 )
+_UNFORMATTED = ctypes.CFUNCTYPE(
+    None, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p
+)(lambda environment, name, status, _, text: _dispatch(environment, name, status, text))
 if _logger:
-    ctypes.c_void_p.from_address(_logger.RECEIVER).value = ctypes.cast(_receiver, ctypes.c_void_p).value
+    ctypes.c_void_p.from_address(_logger.RECEIVER).value = ctypes.cast(
+        _receiver, ctypes.c_void_p
+    ).value

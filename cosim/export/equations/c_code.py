@@ -1,7 +1,10 @@
-"""C code generation for CasADi functions: one statement per operation, in static single assignment form.
+"""C code generation for CasADi functions.
 
-CasADi's own code generator also emits a large interface around each function. This one emits the function only. The code is
-readable, compiles without warnings and depends only on the C mathematical library.
+One statement per operation, in static single assignment form.
+
+CasADi's own code generator also emits a large interface around each function. This one emits the
+function only. The code is readable, compiles without warnings and depends only on the C
+mathematical library.
 """
 
 from __future__ import annotations
@@ -43,7 +46,10 @@ _OPERATIONS = {
 _TRIGONOMETRIC_FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh")
 _UNARY_FUNCTIONS = (*_TRIGONOMETRIC_FUNCTIONS, "sqrt", "exp", "log", "fabs", "floor", "ceil")
 _OPERATIONS |= {getattr(ca, f"OP_{name.upper()}"): f"{name}({{}})" for name in _UNARY_FUNCTIONS}
-_OPERATIONS |= {getattr(ca, f"OP_{name.upper()}"): f"{name}({{}}, {{}})" for name in ("atan2", "hypot", "fmod", "copysign")}
+_OPERATIONS |= {
+    getattr(ca, f"OP_{name.upper()}"): f"{name}({{}}, {{}})"
+    for name in ("atan2", "hypot", "fmod", "copysign")
+}
 
 _SIGNATURE = "void {}(const double *const in[], double *const out[])"
 
@@ -54,7 +60,8 @@ class Callee:
 
     #: the same function in CasADi, with one result
     function: ca.Function
-    #: C body, in braces: reads `in[i][j]` and writes `out[i][j]`, element j of argument i and of result i
+    #: C body, in braces: reads `in[i][j]` and writes `out[i][j]`, element j of argument i and of
+    #: result i
     body: str
     #: functions that the body calls
     required_functions: Sequence[ca.Function] = ()
@@ -82,12 +89,15 @@ class ElementAccess(NamedTuple):
 _POINTER_ACCESS = ElementAccess(lambda i, j: f"in[{i}][{j}]", lambda i, j: f"out[{i}][{j}]")
 
 
-def callee_definitions(functions: Iterable[ca.Function], callees: Sequence[Callee] = ()) -> dict[str, str]:
+def callee_definitions(
+    functions: Iterable[ca.Function], callees: Sequence[Callee] = ()
+) -> dict[str, str]:
     """Generate the C functions that the given functions call, directly or indirectly.
 
     Args:
         functions: The calling functions.
-        callees: The called functions with a hand-written C body; the body of all others is generated.
+        callees: The called functions with a hand-written C body; the body of all others is
+            generated.
 
     Returns:
         Function name -> C definition, each after the functions that it calls.
@@ -104,7 +114,9 @@ def callee_definitions(functions: Iterable[ca.Function], callees: Sequence[Calle
             for required in callee.required_functions if callee else ():
                 definitions |= callee_definitions([required], callees)
                 definitions |= {required.name(): function_definition("static", required)}
-            definitions[called.name()] = _callee_definition(callee) if callee else function_definition("static", called)
+            definitions[called.name()] = (
+                _callee_definition(callee) if callee else function_definition("static", called)
+            )
     return definitions
 
 
@@ -126,14 +138,20 @@ def function_definition(linkage: str, function: ca.Function) -> str:
 
 
 def function_body(function: ca.Function) -> str:
-    """Generate the C body of a function, which reads `in[i][j]` and writes `out[i][j]`: element j of argument and result i.
+    """Generate the C body of a function, which reads `in[i][j]` and writes `out[i][j]`.
+
+    Element j of argument and result i.
 
     Calls made by `call_in_c` remain calls; `callee_definitions` generates the called functions.
 
     Raises:
         ValueError: An operation has no counterpart in C.
     """
-    return "{\n" + "".join(f"    {statement};\n" for statement in StatementGenerator(densify(function))) + "}\n"
+    return (
+        "{\n"
+        + "".join(f"    {statement};\n" for statement in StatementGenerator(densify(function)))
+        + "}\n"
+    )
 
 
 def densify(function: ca.Function) -> ca.Function:
@@ -157,8 +175,11 @@ class StatementGenerator:
         self._values: dict[int, str] = {}
         self._constants: dict[str, float] = {}
         self._called = {called.name(): called for called in function.find_functions(0)}
-        # CasADi gives the name of the function that an instruction calls only in its listing of the algorithm
-        listing = function.str(True).partition("Algorithm:\n")[2].splitlines() if self._called else []
+        # CasADi gives the name of the function that an instruction calls only in its listing of the
+        # algorithm
+        listing = (
+            function.str(True).partition("Algorithm:\n")[2].splitlines() if self._called else []
+        )
         self._callee_names = [line.partition(" = ")[2].partition("(")[0] for line in listing]
 
     def __iter__(self) -> Iterator[str]:
@@ -176,7 +197,9 @@ class StatementGenerator:
 
     def _load_argument(self, k: int) -> None:
         argument, element = self._function.instruction_input(k)
-        self._values[self._function.instruction_output(k)[0]] = self._access.argument(argument, element)
+        self._values[self._function.instruction_output(k)[0]] = self._access.argument(
+            argument, element
+        )
 
     def _load_constant(self, k: int) -> None:
         value = self._function.instruction_constant(k)
@@ -184,7 +207,10 @@ class StatementGenerator:
         self._constants[text] = value
 
     def _assign(self, k: int, operation: int) -> str:
-        targets, operands = self._function.instruction_output(k), self._function.instruction_input(k)
+        targets, operands = (
+            self._function.instruction_output(k),
+            self._function.instruction_input(k),
+        )
         values = [self._values[index] for index in operands]
         if operation == ca.OP_OUTPUT:
             return f"{self._access.result(*targets)} = {values[0]}"
@@ -192,14 +218,20 @@ class StatementGenerator:
         return f"const double v{k} = {self._expression(operation, values)}"
 
     def _expression(self, operation: int, operands: list[str]) -> str:
-        """Return the C expression of an operation; a division by a constant becomes a multiplication, which is faster."""
+        """Return the C expression of an operation.
+
+        A division by a constant becomes a multiplication, which is faster.
+        """
         divisor = self._constants.get(operands[-1]) if operation == ca.OP_DIV else None
         if divisor and math.isfinite(1 / divisor):
             return f"{operands[0]} * {_literal(1 / divisor)}"
         return _operation(self._function, operation).format(*operands)
 
     def _call(self, k: int) -> Iterator[str]:
-        """Generate a call; arguments that are consecutive elements of an argument of this function are not copied."""
+        """Generate a call.
+
+        Arguments that are consecutive elements of an argument of this function are not copied.
+        """
         callee = self._called[self._callee_names[k]]
         operands, arguments = iter(self._function.instruction_input(k)), []
         for i in range(callee.n_in()):
@@ -211,7 +243,10 @@ class StatementGenerator:
         for i, size in enumerate(sizes):
             yield f"double r{k}_{i}[{size}]"
         results = [f"r{k}_{i}" for i in range(len(sizes))]
-        yield (f"{callee.name()}((const double *const[]){{{', '.join(arguments)}}}, (double *const[]){{{', '.join(results)}}})")
+        yield (
+            f"{callee.name()}((const double *const[]){{{', '.join(arguments)}}}, (double "
+            f"*const[]){{{', '.join(results)}}})"
+        )
         elements = [f"r{k}_{i}[{j}]" for i, size in enumerate(sizes) for j in range(size)]
         self._values |= dict(zip(self._function.instruction_output(k), elements, strict=True))
 
@@ -228,7 +263,9 @@ def _pointer(values: Sequence[str]) -> str | None:
 
 def _operation(function: ca.Function, operation: int) -> str:
     if operation not in _OPERATIONS:
-        raise ValueError(f"{function.name()}: the CasADi operation {operation} has no counterpart in C")
+        raise ValueError(
+            f"{function.name()}: the CasADi operation {operation} has no counterpart in C"
+        )
     return _OPERATIONS[operation]
 
 

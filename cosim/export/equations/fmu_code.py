@@ -1,4 +1,7 @@
-"""Conversion of a continuous model to a `Block`: generated functions and the functions of the block interface."""
+"""Conversion of a continuous model to a `Block`.
+
+Generated functions and the functions of the block interface.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,8 @@ def as_block(model: ContinuousModel, exported: Sequence[ca.Function] = ()) -> Bl
 
     Args:
         model: The model.
-        exported: Further CasADi functions that other programs can call in the FMU's binary (see `equations/model.py`).
+        exported: Further CasADi functions that other programs can call in the FMU's binary (see
+            `equations/model.py`).
 
     Raises:
         ValueError: An operation has no counterpart in C.
@@ -72,7 +76,10 @@ def _header_text(model: ContinuousModel) -> str:
     if any(flags):
         members.append(f"bool flag[{sum(flags)}]")
     lines = "\n".join(f"    {member};" for member in members)
-    return f"/* {model.description} */\n#include <stdbool.h>\n\ntypedef struct {{\n{lines}\n}} Model;\n"
+    return (
+        f"/* {model.description} */\n#include <stdbool.h>\n\ntypedef struct {{\n{lines}\n}} "
+        "Model;\n"
+    )
 
 
 def _source_text(model: ContinuousModel, exported: Sequence[ca.Function]) -> str:
@@ -85,8 +92,14 @@ def _source_text(model: ContinuousModel, exported: Sequence[ca.Function]) -> str
 
 
 def _casadi_functions(model: ContinuousModel) -> list[ca.Function]:
-    """Return the functions that the block interface calls: `observe` and, with states, `initial_state` and `sub_step`."""
-    parameters, constants = ca.SX.sym("parameters", len(model.elements("parameter"))), model.derived_parameter_symbols()
+    """Return the functions that the block interface calls.
+
+    `observe` and, with states, `initial_state` and `sub_step`.
+    """
+    parameters, constants = (
+        ca.SX.sym("parameters", len(model.elements("parameter"))),
+        model.derived_parameter_symbols(),
+    )
     inputs = ca.SX.sym("inputs", len(model.elements("input")))
     state = ca.SX.sym("state", len(model.states))
     step = ca.SX.sym("step")
@@ -97,11 +110,19 @@ def _casadi_functions(model: ContinuousModel) -> list[ca.Function]:
     observe = ca.Function("observe", [state, inputs, constants], [real_outputs, boolean_outputs])
     if not model.states:
         return [observe]
-    prepare = [ca.Function("prepare", [parameters], [model.derived_parameters(parameters)])] if model.derived_parameters else []
+    prepare = (
+        [ca.Function("prepare", [parameters], [model.derived_parameters(parameters)])]
+        if model.derived_parameters
+        else []
+    )
     return [
         *prepare,
         ca.Function("initial_state", [constants], [model.initial_state(constants)]),
-        ca.Function("sub_step", [state, inputs, constants, step], [model.integrate(state, inputs, constants, step)]),
+        ca.Function(
+            "sub_step",
+            [state, inputs, constants, step],
+            [model.integrate(state, inputs, constants, step)],
+        ),
         observe,
     ]
 
@@ -109,7 +130,9 @@ def _casadi_functions(model: ContinuousModel) -> list[ca.Function]:
 def _block_interface(model: ContinuousModel) -> str:
     """Return the C functions of the block interface."""
     messages = ",\n".join(f'    "the state {name} is not finite"' for name in model.states)
-    member = {kind: f"m->{kind}" if model.elements(kind) else "NULL" for kind in ("parameter", "input")}
+    member = {
+        kind: f"m->{kind}" if model.elements(kind) else "NULL" for kind in ("parameter", "input")
+    }
     flags = sum(model.boolean_outputs())
     real_outputs = "m->output" if flags < len(model.boolean_outputs()) else "NULL"
     return (_WITH_STATES if model.states else _WITHOUT_STATES) % {
@@ -121,18 +144,27 @@ def _block_interface(model: ContinuousModel) -> str:
         "input": member["input"],
         "output": real_outputs,
         "flag_slots": max(flags, 1),
-        "take_flags": f"    for (int i = 0; i < {flags}; ++i) m->flag[i] = flags[i] != 0;\n" if flags else "",
+        "take_flags": f"    for (int i = 0; i < {flags}; ++i) m->flag[i] = flags[i] != 0;\n"
+        if flags
+        else "",
         "starts": _start_assignments(model),
         "max_sub_step": repr(model.max_sub_step),
     }
 
 
 def _start_assignments(model: ContinuousModel) -> str:
-    """Return C assignments of the start values other than zero; `model_start` sets all other members to zero."""
+    """Return C assignments of the start values other than zero.
+
+    `model_start` sets all other members to zero.
+    """
     lines = []
     for kind in ("parameter", "input"):
-        values = [start for v in model.variables if v.causality == kind for start in _start_values(v)]
-        lines += [f"    m->{kind}[{k}] = {value!r};\n" for k, value in enumerate(values) if value != 0]
+        values = [
+            start for v in model.variables if v.causality == kind for start in _start_values(v)
+        ]
+        lines += [
+            f"    m->{kind}[{k}] = {value!r};\n" for k, value in enumerate(values) if value != 0
+        ]
     return "".join(lines)
 
 

@@ -1,15 +1,16 @@
 """Continuous models whose equations are CasADi expressions.
 
-A `ContinuousModel` describes x' = f(x, u, p) and y = g(x, u, p) with state x, inputs u, parameters p and outputs y. It may
-have no state (`static_model`). The generated `model_step` integrates it with the classical Runge-Kutta method of order 4, in
-sub-steps of at most `max_sub_step`.
+A `ContinuousModel` describes x' = f(x, u, p) and y = g(x, u, p) with state x, inputs u, parameters
+p and outputs y. It may have no state (`static_model`). The generated `model_step` integrates it
+with the classical Runge-Kutta method of order 4, in sub-steps of at most `max_sub_step`.
 
-Further CasADi functions can be exported from the FMU's binary for programs that use the equations without FMI. Each becomes
+Further CasADi functions can be exported from the FMU's binary for programs that use the equations
+without FMI. Each becomes
 
     void NAME(const double *const in[], double *const out[]);
 
-where `in[i]` and `out[i]` point to the elements of argument i and result i in column-major order. Arguments and results must
-not overlap in memory.
+where `in[i]` and `out[i]` point to the elements of argument i and result i in column-major order.
+Arguments and results must not overlap in memory.
 """
 
 from __future__ import annotations
@@ -28,8 +29,8 @@ from .c_code import Callee
 class ContinuousModel:
     """A continuous model with inputs that are constant during a step.
 
-    The callables take and return column vectors. A vector of inputs, parameters or outputs contains the elements of all
-    variables of this causality in the order of `variables`.
+    The callables take and return column vectors. A vector of inputs, parameters or outputs contains
+    the elements of all variables of this causality in the order of `variables`.
     """
 
     #: C identifier
@@ -53,7 +54,8 @@ class ContinuousModel:
     max_sub_step: float = 0.005
     #: name in the FMU's `resources/` folder -> file
     resources: Mapping[str, Path] = field(default_factory=dict)
-    #: parameters -> derived parameters, computed once at initialization; the other callables get these instead of `parameters`
+    #: parameters -> derived parameters, computed once at initialization; the other callables get
+    #: these instead of `parameters`
     derived_parameters: Callable[[ca.SX], ca.SX] | None = None
     #: functions with a hand-written C body that the expressions call
     callees: Sequence[Callee] = ()
@@ -61,9 +63,15 @@ class ContinuousModel:
     def derived_parameter_symbols(self) -> ca.SX:
         """Return symbols for the derived parameters, or for the parameters themselves if there are no derived ones."""
         parameters = ca.SX.sym("parameters", len(self.elements("parameter")))
-        return ca.SX.sym("constants", self.derived_parameters(parameters).numel()) if self.derived_parameters else parameters
+        return (
+            ca.SX.sym("constants", self.derived_parameters(parameters).numel())
+            if self.derived_parameters
+            else parameters
+        )
 
-    def integrate(self, state: ca.SX, inputs: ca.SX, parameters: ca.SX, step: ca.SX, sub_steps: int = 1) -> ca.SX:
+    def integrate(
+        self, state: ca.SX, inputs: ca.SX, parameters: ca.SX, step: ca.SX, sub_steps: int = 1
+    ) -> ca.SX:
         """Return the state after a step with constant inputs.
 
         Args:
@@ -74,12 +82,21 @@ class ContinuousModel:
             sub_steps: The number of equal Runge-Kutta steps.
         """
         for _ in range(sub_steps):
-            state = self.project(runge_kutta_4(lambda x: self.derivatives(x, inputs, parameters), state, step / sub_steps))
+            state = self.project(
+                runge_kutta_4(
+                    lambda x: self.derivatives(x, inputs, parameters), state, step / sub_steps
+                )
+            )
         return state
 
     def elements(self, causality: str) -> list[Variable]:
         """Return the variables of a causality, each repeated for every element of its array."""
-        return [variable for variable in self.variables if variable.causality == causality for _ in variable.scalar_names]
+        return [
+            variable
+            for variable in self.variables
+            if variable.causality == causality
+            for _ in variable.scalar_names
+        ]
 
     def boolean_outputs(self) -> list[bool]:
         """Return for each element of the output vector whether it is Boolean."""
@@ -87,7 +104,10 @@ class ContinuousModel:
 
 
 def static_model(
-    identifier: str, description: str, variables: Sequence[Variable], outputs: Callable[[ca.SX, ca.SX], ca.SX]
+    identifier: str,
+    description: str,
+    variables: Sequence[Variable],
+    outputs: Callable[[ca.SX, ca.SX], ca.SX],
 ) -> ContinuousModel:
     """Create a model without states, y = g(u, p).
 

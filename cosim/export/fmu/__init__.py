@@ -1,1 +1,4 @@
-"""Packaging of a block of C code as an FMU: model description, table of variables, compilation and archive."""
+"""Packaging of a block of C code as an FMU.
+
+Model description, table of variables, compilation and archive.
+"""

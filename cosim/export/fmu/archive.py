@@ -1,4 +1,7 @@
-"""Reproducible FMU archives: equal contents give equal bytes, and the instantiation token is a hash of the contents."""
+"""Reproducible FMU archives.
+
+Equal contents give equal bytes, and the instantiation token is a hash of the contents.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,8 @@ def write_archive(files: Mapping[str, bytes], target: Path) -> Path:
     """Write an FMU archive atomically.
 
     Args:
-        files: Name inside the archive -> contents. The members are written in the order of their names.
+        files: Name inside the archive -> contents. The members are written in the order of their
+            names.
         target: The file to write; its folder is created.
 
     Returns:
@@ -35,11 +39,18 @@ def write_archive(files: Mapping[str, bytes], target: Path) -> Path:
 
 def _member(name: str) -> ZipInfo:
     member = ZipInfo(name, _DATE)
-    member.create_system, member.external_attr, member.compress_type = _UNIX, _REGULAR_FILE, ZIP_DEFLATED
+    member.create_system, member.external_attr, member.compress_type = (
+        _UNIX,
+        _REGULAR_FILE,
+        ZIP_DEFLATED,
+    )
     return member
 
 
 def content_token(parts: Iterable[bytes]) -> str:
-    """Return the GUID (FMI 2.0) or instantiation token (FMI 3.0) of an FMU: a hash of its contents."""
+    """Return the GUID (FMI 2.0) or instantiation token (FMI 3.0) of an FMU.
+
+    A hash of its contents.
+    """
     digest = sha256(b"\0".join(parts)).hexdigest()
     return f"{{{digest[:8]}-{digest[8:12]}-{digest[12:16]}-{digest[16:20]}-{digest[20:32]}}}"

@@ -15,14 +15,25 @@ from pathlib import Path
 from ...core.errors import InputError, Problem
 
 #: -ffp-contract=off: fused multiply-add would make results depend on the processor
-COMPILER_OPTIONS = ("-std=c11", "-O2", "-fPIC", "-shared", "-fvisibility=hidden", "-ffp-contract=off", "-Wall", "-Wextra")
+COMPILER_OPTIONS = (
+    "-std=c11",
+    "-O2",
+    "-fPIC",
+    "-shared",
+    "-fvisibility=hidden",
+    "-ffp-contract=off",
+    "-Wall",
+    "-Wextra",
+)
 _COMPILER_NAMES = ("cc", "gcc", "clang")
 #: instructions that every processor of the architecture has, as with the other compilers
 _ZIG_OPTIONS = ("-mcpu=baseline",)
 
 
 def find_compiler() -> list[str]:
-    """Return the command of the C compiler: the environment variable CC, else cc, gcc, clang or that of ziglang.
+    """Return the command of the C compiler.
+
+    The environment variable CC, else cc, gcc, clang or that of ziglang.
 
     Raises:
         InputError: No compiler was found.
@@ -32,7 +43,9 @@ def find_compiler() -> list[str]:
     command = shlex.split(os.environ.get("CC", "")) or installed or (zig and [*zig, *_ZIG_OPTIONS])
     if not command or shutil.which(command[0]) is None:
         tried = command[0] if os.environ.get("CC") else ", ".join((*_COMPILER_NAMES, "ziglang"))
-        raise InputError(f"export needs a C compiler, but none was found (tried {tried}); install gcc or set CC")
+        raise InputError(
+            f"export needs a C compiler, but none was found (tried {tried}); install gcc or set CC"
+        )
     return command
 
 
@@ -61,9 +74,19 @@ def compile_library(folder: Path, sources: Sequence[str], library: Path) -> None
     """
     library.parent.mkdir(parents=True, exist_ok=True)
     linker_options = ["-Wl,--no-undefined"] if sys.platform == "linux" else []
-    command = [*find_compiler(), *COMPILER_OPTIONS, *linker_options, "-o", str(library.resolve()), *sources, "-lm"]
+    command = [
+        *find_compiler(),
+        *COMPILER_OPTIONS,
+        *linker_options,
+        "-o",
+        str(library.resolve()),
+        *sources,
+        "-lm",
+    ]
     process = subprocess.run(command, cwd=folder, capture_output=True, text=True, check=False)  # noqa: S603
     if process.returncode:
         lines = process.stderr.splitlines()
         errors = [line for line in lines if "error:" in line or "undefined reference" in line]
-        raise InputError([Problem(line, library.stem) for line in errors or lines or ["the C compiler failed"]])
+        raise InputError(
+            [Problem(line, library.stem) for line in errors or lines or ["the C compiler failed"]]
+        )

@@ -21,7 +21,10 @@ _DEFAULT_START = {"Float64": 0.0, "Int32": 0, "Boolean": False, "Enumeration": 1
 
 
 class TableRow(NamedTuple):
-    """A row of the table of variables; its index is the value reference in FMI 2.0 and the value reference - 1 in FMI 3.0."""
+    """A row of the table of variables.
+
+    Its index is the value reference in FMI 2.0 and the value reference - 1 in FMI 3.0.
+    """
 
     variable: BlockVariable
     #: index of the element in the array `variable.member`
@@ -31,7 +34,8 @@ class TableRow(NamedTuple):
 def variable_table(block: Block, fmi_version: int) -> list[TableRow]:
     """Return the table of variables for an FMI version.
 
-    In FMI 2.0 each element of an array is a scalar variable. In FMI 3.0 event indicators are variables.
+    In FMI 2.0 each element of an array is a scalar variable. In FMI 3.0 event indicators are
+    variables.
     """
     if fmi_version == 3:
         indicators = block.exchange.indicators if block.exchange else ()
@@ -40,7 +44,11 @@ def variable_table(block: Block, fmi_version: int) -> list[TableRow]:
 
 
 def _scalar_rows(variable: BlockVariable) -> Iterator[TableRow]:
-    inner = variable.name.removeprefix("der(").removesuffix(")") if variable.name.startswith("der(") else ""
+    inner = (
+        variable.name.removeprefix("der(").removesuffix(")")
+        if variable.name.startswith("der(")
+        else ""
+    )
     names = Variable(inner or variable.name, shape=variable.shape).scalar_names
     for element, (scalar, start) in enumerate(zip(names, start_values(variable), strict=True)):
         name = f"der({scalar})" if inner else scalar
@@ -88,13 +96,21 @@ def check_block(block: Block) -> None:
     Raises:
         InputError: The block has faults (one problem for each).
     """
-    problems = [] if block.identifier.isidentifier() else [f'"{block.identifier}" is not a C identifier']
+    problems = (
+        [] if block.identifier.isidentifier() else [f'"{block.identifier}" is not a C identifier']
+    )
     if not block.variables:
         problems.append("has no variables")
     counts = Counter(["time", *(variable.name for variable in block.variables)])
-    problems += [f'the variable name "{name}" is used {count} times' for name, count in counts.items() if count > 1]
+    problems += [
+        f'the variable name "{name}" is used {count} times'
+        for name, count in counts.items()
+        if count > 1
+    ]
     for variable in block.variables:
-        problems += [f'variable "{variable.name}": {problem}' for problem in _variable_problems(variable)]
+        problems += [
+            f'variable "{variable.name}": {problem}' for problem in _variable_problems(variable)
+        ]
     if problems:
         raise InputError([Problem(problem, block.identifier) for problem in problems])
 
@@ -104,7 +120,10 @@ def _variable_problems(variable: BlockVariable) -> Iterator[str]:
         yield f'unknown type "{variable.type}"{did_you_mean(variable.type, C_TYPES)}'
         return
     if variable.causality not in CAUSALITIES:
-        yield f'unknown causality "{variable.causality}"{did_you_mean(variable.causality, CAUSALITIES)}'
+        yield (
+            "unknown causality "
+            f'"{variable.causality}"{did_you_mean(variable.causality, CAUSALITIES)}'
+        )
     if variable.type != "Float64" and variable.variability == "continuous":
         yield f"found variability continuous for the type {variable.type}, expected discrete"
     if variable.type == "Enumeration" and not variable.enumeration:

@@ -16,16 +16,23 @@ ERROR_LOG_CATEGORY = {"name": "logStatusError", "description": "why a call faile
 _FMI2_TYPES = {"Float64": "Real", "Int32": "Integer"}
 
 
-def model_description_xml(block: Block, fmi_version: int, token: str, c_files: Sequence[str]) -> bytes:
+def model_description_xml(
+    block: Block, fmi_version: int, token: str, c_files: Sequence[str]
+) -> bytes:
     """Return the modelDescription.xml of a block.
 
     Args:
         block: The block.
         fmi_version: 2 or 3.
         token: The GUID (FMI 2.0) or instantiation token (FMI 3.0).
-        c_files: Names of the C files to compile. FMI 2.0 lists them here, FMI 3.0 in buildDescription.xml.
+        c_files: Names of the C files to compile. FMI 2.0 lists them here, FMI 3.0 in
+            buildDescription.xml.
     """
-    return to_bytes(_fmi2_description(block, token, c_files) if fmi_version == 2 else _fmi3_description(block, token))
+    return to_bytes(
+        _fmi2_description(block, token, c_files)
+        if fmi_version == 2
+        else _fmi3_description(block, token)
+    )
 
 
 def build_description_xml(block: Block, c_files: Sequence[str]) -> bytes:
@@ -45,7 +52,8 @@ def to_bytes(root: Element) -> bytes:
     return f'<?xml version="1.0" encoding="UTF-8"?>\n{text}\n'.encode()
 
 
-# -- FMI 2.0 ---------------------------------------------------------------------------------------------------------------
+# -- FMI 2.0
+# ---------------------------------------------------------------------------------------------------------------
 
 
 def _fmi2_description(block: Block, token: str, c_files: Sequence[str]) -> Element:
@@ -60,8 +68,12 @@ def _fmi2_description(block: Block, token: str, c_files: Sequence[str]) -> Eleme
     if block.exchange:
         root.set("numberOfEventIndicators", str(len(block.exchange.indicators)))
         unneeded = not block.exchange.stores_values
-        interfaces.append(_add_element(root, "ModelExchange", completedIntegratorStepNotNeeded=unneeded, **common))
-    interfaces.append(_add_element(root, "CoSimulation", canHandleVariableCommunicationStepSize=True, **common))
+        interfaces.append(
+            _add_element(root, "ModelExchange", completedIntegratorStepNotNeeded=unneeded, **common)
+        )
+    interfaces.append(
+        _add_element(root, "CoSimulation", canHandleVariableCommunicationStepSize=True, **common)
+    )
     for interface in interfaces:
         files = _add_element(interface, "SourceFiles")
         for name in c_files:
@@ -87,30 +99,57 @@ def _fmi2_description(block: Block, token: str, c_files: Sequence[str]) -> Eleme
 
 
 def _add_fmi2_variable(
-    parent: Element, reference: int, variable: BlockVariable, declared: dict[Any, str], state: int | None
+    parent: Element,
+    reference: int,
+    variable: BlockVariable,
+    declared: dict[Any, str],
+    state: int | None,
 ) -> None:
     scalar = _add_element(parent, "ScalarVariable", **_common_attributes(reference, variable))
     derivative = {"derivative": None if state is None else state + 1}
-    _add_element(scalar, _FMI2_TYPES.get(variable.type, variable.type), **_type_attributes(variable, declared), **derivative)
+    _add_element(
+        scalar,
+        _FMI2_TYPES.get(variable.type, variable.type),
+        **_type_attributes(variable, declared),
+        **derivative,
+    )
 
 
-# -- FMI 3.0 ---------------------------------------------------------------------------------------------------------------
+# -- FMI 3.0
+# ---------------------------------------------------------------------------------------------------------------
 
 
 def _fmi3_description(block: Block, token: str) -> Element:
     root = _root_element(block, "3.0", instantiationToken=token)
-    common = {"modelIdentifier": block.identifier, "canGetAndSetFMUState": True, "canSerializeFMUState": True}
+    common = {
+        "modelIdentifier": block.identifier,
+        "canGetAndSetFMUState": True,
+        "canSerializeFMUState": True,
+    }
     if block.exchange:
-        _add_element(root, "ModelExchange", needsCompletedIntegratorStep=block.exchange.stores_values, **common)
+        _add_element(
+            root,
+            "ModelExchange",
+            needsCompletedIntegratorStep=block.exchange.stores_values,
+            **common,
+        )
     _add_element(root, "CoSimulation", canHandleVariableCommunicationStepSize=True, **common)
     table, declared = variable_table(block, 3), _declared_types(block)
     states = _states_of_derivatives(block, table)
     _add_common_elements(root, block, 3)
     variables = _add_element(root, "ModelVariables")
-    time = {"name": "time", "valueReference": 0, "causality": "independent", "variability": "continuous", "unit": "s"}
+    time = {
+        "name": "time",
+        "valueReference": 0,
+        "causality": "independent",
+        "variability": "continuous",
+        "unit": "s",
+    }
     _add_element(variables, "Float64", **time)
     for index, row in enumerate(table):
-        attributes = _common_attributes(index + 1, row.variable) | _type_attributes(row.variable, declared)
+        attributes = _common_attributes(index + 1, row.variable) | _type_attributes(
+            row.variable, declared
+        )
         derivative = states[index] + 1 if index in states else None
         element = _add_element(variables, row.variable.type, **attributes, derivative=derivative)
         for size in row.variable.shape:
@@ -129,7 +168,8 @@ def _fmi3_description(block: Block, token: str) -> Element:
     return root
 
 
-# -- common to both versions -----------------------------------------------------------------------------------------------
+# -- common to both versions
+# -----------------------------------------------------------------------------------------------
 
 
 def _root_element(block: Block, fmi_version: str, **token: str) -> Element:
@@ -145,7 +185,11 @@ def _root_element(block: Block, fmi_version: str, **token: str) -> Element:
 
 
 def _add_common_elements(root: Element, block: Block, fmi_version: int) -> None:
-    names = {variable.unit for variable in block.variables if variable.type == "Float64" and variable.unit}
+    names = {
+        variable.unit
+        for variable in block.variables
+        if variable.type == "Float64" and variable.unit
+    }
     add_units(root, names | {"s"} if fmi_version == 3 else names)
     _add_enumerations(root, block, fmi_version)
     _add_element(_add_element(root, "LogCategories"), "Category", **ERROR_LOG_CATEGORY)
@@ -153,13 +197,20 @@ def _add_common_elements(root: Element, block: Block, fmi_version: int) -> None:
 
 
 def add_units(root: Element, names: Collection[str]) -> None:
-    """Append `UnitDefinitions` with the named units (Modelica syntax) to a model description; nothing if there are none."""
+    """Append `UnitDefinitions` with the named units (Modelica syntax) to a model description.
+
+    Nothing if there are none.
+    """
     if not names:
         return
     definitions = _add_element(root, "UnitDefinitions")
     for name in sorted(names):
         unit = units.parse_unit(name)
-        exponents = {base: exponent for base, exponent in zip(BASE_UNITS, unit.exponents, strict=True) if exponent}
+        exponents = {
+            base: exponent
+            for base, exponent in zip(BASE_UNITS, unit.exponents, strict=True)
+            if exponent
+        }
         scale = {"factor": unit.factor if unit.factor != 1 else None, "offset": unit.offset or None}
         _add_element(_add_element(definitions, "Unit", name=name), "BaseUnit", **exponents, **scale)
 
@@ -183,11 +234,15 @@ def _add_enumerations(root: Element, block: Block, fmi_version: int) -> None:
     definitions = _add_element(root, "TypeDefinitions")
     for literals, name in declared.items():
         if fmi_version == 2:
-            enumeration = _add_element(_add_element(definitions, "SimpleType", name=name), "Enumeration")
+            enumeration = _add_element(
+                _add_element(definitions, "SimpleType", name=name), "Enumeration"
+            )
         else:
             enumeration = _add_element(definitions, "EnumerationType", name=name)
         for value, (literal, description) in enumerate(literals, start=1):
-            _add_element(enumeration, "Item", name=literal, value=value, description=description or None)
+            _add_element(
+                enumeration, "Item", name=literal, value=value, description=description or None
+            )
 
 
 def _common_attributes(reference: int, variable: BlockVariable) -> dict[str, Any]:
@@ -204,7 +259,11 @@ def _common_attributes(reference: int, variable: BlockVariable) -> dict[str, Any
 def _initial(variable: BlockVariable) -> str | None:
     if variable.causality == "input":
         return None
-    return "exact" if variable.causality == "parameter" or variable.variability == "constant" else "calculated"
+    return (
+        "exact"
+        if variable.causality == "parameter" or variable.variability == "constant"
+        else "calculated"
+    )
 
 
 def _type_attributes(variable: BlockVariable, declared: dict[Any, str]) -> dict[str, Any]:
@@ -218,7 +277,9 @@ def _type_attributes(variable: BlockVariable, declared: dict[Any, str]) -> dict[
         "unit": variable.unit or None if variable.type == "Float64" else None,
         "min": None if minimum is None else number(minimum),
         "max": None if maximum is None else number(maximum),
-        "start": " ".join(_format_value(_cast(variable, value)) for value in start_values(variable)) if has_start else None,
+        "start": " ".join(_format_value(_cast(variable, value)) for value in start_values(variable))
+        if has_start
+        else None,
     }
 
 
@@ -235,7 +296,11 @@ def _initial_unknown_indices(table: Sequence[TableRow], states: Mapping[int, int
     return [
         reference
         for reference, (variable, _) in enumerate(table)
-        if (variable.causality in ("output", "calculatedParameter") and _initial(variable) == "calculated") or reference in others
+        if (
+            variable.causality in ("output", "calculatedParameter")
+            and _initial(variable) == "calculated"
+        )
+        or reference in others
     ]
 
 
@@ -247,7 +312,9 @@ def _states_of_derivatives(block: Block, table: Sequence[TableRow]) -> dict[int,
     members = {variable.name: variable.member for variable in block.variables}
     pairs = block.exchange.states.items() if block.exchange else ()
     return {
-        derivative: state for names in pairs for state, derivative in zip(*(rows[members[name]] for name in names), strict=True)
+        derivative: state
+        for names in pairs
+        for state, derivative in zip(*(rows[members[name]] for name in names), strict=True)
     }
 
 

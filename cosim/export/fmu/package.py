@@ -1,4 +1,7 @@
-"""Packaging of a block as an FMU: sources, model description, binary and resources in one archive."""
+"""Packaging of a block as an FMU.
+
+Sources, model description, binary and resources in one archive.
+"""
 
 from __future__ import annotations
 
@@ -44,8 +47,14 @@ def write_fmu(block: Block, fmi_version: int, target: Path) -> Path:
     check_block(block)
     files = _description_and_sources(block, fmi_version)
     files |= {f"resources/{name}": path.read_bytes() for name, path in block.resources.items()}
-    sources = {name.removeprefix("sources/"): text for name, text in files.items() if name.startswith("sources/")}
-    files |= compile_binary(block.identifier, fmi_version, sources, [*_c_files(sources), *block.archives])
+    sources = {
+        name.removeprefix("sources/"): text
+        for name, text in files.items()
+        if name.startswith("sources/")
+    }
+    files |= compile_binary(
+        block.identifier, fmi_version, sources, [*_c_files(sources), *block.archives]
+    )
     return write_archive(files, target)
 
 
@@ -53,12 +62,19 @@ def _description_and_sources(block: Block, fmi_version: int) -> dict[str, bytes]
     """Return model description and sources; their instantiation token is a hash of both."""
     sources = _collect_sources(block, fmi_version)
     c_files = _c_files(sources)
-    token = content_token([model_description_xml(block, fmi_version, "", c_files), *(sources[name] for name in sorted(sources))])
+    token = content_token(
+        [
+            model_description_xml(block, fmi_version, "", c_files),
+            *(sources[name] for name in sorted(sources)),
+        ]
+    )
     sources["variables.h"] += f'\n#define TOKEN "{token}"\n'.encode()
     if fmi_version == 3:
         sources["buildDescription.xml"] = build_description_xml(block, c_files)
     description = model_description_xml(block, fmi_version, token, c_files)
-    return {"modelDescription.xml": description} | {f"sources/{name}": text for name, text in sources.items()}
+    return {"modelDescription.xml": description} | {
+        f"sources/{name}": text for name, text in sources.items()
+    }
 
 
 def _collect_sources(block: Block, fmi_version: int) -> dict[str, bytes]:
@@ -80,7 +96,10 @@ def fmi_headers(fmi_version: int) -> dict[str, bytes]:
     """
     fmpy = find_spec("fmpy")
     if fmpy is None or fmpy.origin is None:
-        raise InputError('export needs the FMI headers of FMPy, which is not installed: pip install "fmi-cosim[build]"')
+        raise InputError(
+            "export needs the FMI headers of FMPy, which is not installed: pip install "
+            '"fmi-cosim[build]"'
+        )
     folder = Path(fmpy.origin).parent / "c-code"
     return {name: (folder / name).read_bytes() for name in _FMI_HEADERS[fmi_version]}
 
@@ -89,7 +108,9 @@ def _c_files(sources: Mapping[str, bytes]) -> list[str]:
     return sorted(name for name in sources if name.endswith(".c"))
 
 
-def compile_binary(identifier: str, fmi_version: int, sources: Mapping[str, bytes], c_files: Sequence[str]) -> dict[str, bytes]:
+def compile_binary(
+    identifier: str, fmi_version: int, sources: Mapping[str, bytes], c_files: Sequence[str]
+) -> dict[str, bytes]:
     """Compile the shared library of an FMU for this platform.
 
     Args:
@@ -112,4 +133,8 @@ def compile_binary(identifier: str, fmi_version: int, sources: Mapping[str, byte
         for source, text in sources.items():
             (folder / source).write_bytes(text)
         compile_library(folder, c_files, folder / name)
-        return {f"binaries/{platform if fmi_version == 2 else platform_tuple}/{name}": (folder / name).read_bytes()}
+        return {
+            f"binaries/{platform if fmi_version == 2 else platform_tuple}/{name}": (
+                folder / name
+            ).read_bytes()
+        }

@@ -14,8 +14,8 @@ DESCRIPTION_FILE = "modelDescription.xml"
 def validate_description(description: bytes, source: Path) -> None:
     """Validate a modelDescription.xml with FMPy.
 
-    FMPy's XML parser is not protected against entity expansion. Therefore the preflight parser, which rejects such documents,
-    reads the description first.
+    FMPy's XML parser is not protected against entity expansion. Therefore the preflight parser,
+    which rejects such documents, reads the description first.
 
     Args:
         description: The contents of the file.

@@ -1,4 +1,7 @@
-"""Export of C controllers that implement FMI 2.0: a folder with C files and a modelDescription.xml."""
+"""Export of C controllers that implement FMI 2.0.
+
+A folder with C files and a modelDescription.xml.
+"""
 
 from __future__ import annotations
 
@@ -15,8 +18,9 @@ def write_c_fmu(description: Path, target: Path) -> list[Path]:
     """Write the FMI 2.0 Co-Simulation FMU of a C controller.
 
     Args:
-        description: A hand-written modelDescription.xml. Its `<SourceFiles>` name the files beside it that are compiled
-            together with the FMI headers. All .c and .h files beside it are packed into the FMU's `sources/`.
+        description: A hand-written modelDescription.xml. Its `<SourceFiles>` name the files beside
+            it that are compiled together with the FMI headers. All .c and .h files beside it are
+            packed into the FMU's `sources/`.
         target: The FMU to write.
 
     Returns:
@@ -26,10 +30,14 @@ def write_c_fmu(description: Path, target: Path) -> list[Path]:
         InputError: The description or the C code is faulty.
     """
     identifier, c_files = _read_co_simulation_element(description)
-    source_files = sorted(path for path in description.parent.iterdir() if path.suffix in (".c", ".h"))
+    source_files = sorted(
+        path for path in description.parent.iterdir() if path.suffix in (".c", ".h")
+    )
     _check_files(description, c_files, {path.name for path in source_files})
     sources = fmi_headers(2) | {path.name: path.read_bytes() for path in source_files}
-    files = {DESCRIPTION_FILE: description.read_bytes()} | {f"sources/{name}": text for name, text in sources.items()}
+    files = {DESCRIPTION_FILE: description.read_bytes()} | {
+        f"sources/{name}": text for name, text in sources.items()
+    }
     write_archive(files | compile_binary(identifier, 2, sources, c_files), target)
     return [description, *source_files]
 
@@ -48,12 +56,18 @@ def _read_co_simulation_element(description: Path) -> tuple[str, list[str]]:
     interface = root.find("CoSimulation")
     if interface is None:
         raise InputError(Problem("has no <CoSimulation>", str(description)))
-    return interface.get("modelIdentifier", ""), [file.get("name", "") for file in interface.iterfind("SourceFiles/File")]
+    return interface.get("modelIdentifier", ""), [
+        file.get("name", "") for file in interface.iterfind("SourceFiles/File")
+    ]
 
 
 def _check_files(description: Path, c_files: list[str], present: set[str]) -> None:
     if not c_files:
         raise InputError(Problem("names no file in <CoSimulation><SourceFiles>", str(description)))
-    problems = [f'<File name="{name}"> does not exist{did_you_mean(name, present)}' for name in c_files if name not in present]
+    problems = [
+        f'<File name="{name}"> does not exist{did_you_mean(name, present)}'
+        for name in c_files
+        if name not in present
+    ]
     if problems:
         raise InputError([Problem(problem, str(description)) for problem in problems])

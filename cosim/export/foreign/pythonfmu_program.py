@@ -1,7 +1,10 @@
-"""Program that builds an FMU of a Python source with PythonFMU; it runs in its own process, because it imports the source.
+"""Program that builds an FMU of a Python source with PythonFMU.
 
-Arguments: the folder with all files, the name of the package that the folder becomes, the name of the source in it, the
-folder for the FMU and for `units.json`, the attribute `units` of the class, and the name of the class if it is not the only one.
+It runs in its own process, because it imports the source.
+
+Arguments: the folder with all files, the name of the package that the folder becomes, the name of
+the source in it, the folder for the FMU and for `units.json`, the attribute `units` of the class,
+and the name of the class if it is not the only one.
 """
 
 from __future__ import annotations
@@ -46,13 +49,19 @@ def main(folder: Path, package: str, source: str, target: Path, class_name: str 
 
 
 def _select_class(module: str, name: str) -> type:
-    """Return the named subclass of `Fmi2Slave` of a module; without a name the one that PythonFMU selects.
+    """Return the named subclass of `Fmi2Slave` of a module.
+
+    Without a name the one that PythonFMU selects.
 
     Raises:
         ValueError: There is no such class, or PythonFMU cannot select one of several.
     """
     members = vars(import_module(module))
-    classes = {key: each for key, each in sorted(members.items()) if isinstance(each, type) and issubclass(each, Fmi2Slave)}
+    classes = {
+        key: each
+        for key, each in sorted(members.items())
+        if isinstance(each, type) and issubclass(each, Fmi2Slave)
+    }
     classes.pop(Fmi2Slave.__name__, None)
     if name in classes:
         return classes[name]
@@ -64,7 +73,10 @@ def _select_class(module: str, name: str) -> type:
     except ValueError:
         if len(classes) > 1:
             source = f"{module.rpartition('.')[2]}.py"
-            text = f"the file has several PythonFMU classes ({found}); write {source}:{next(iter(classes))}"
+            text = (
+                f"the file has several PythonFMU classes ({found}); write "
+                f"{source}:{next(iter(classes))}"
+            )
             raise ValueError(text) from None
         raise
     return selected

@@ -1,4 +1,7 @@
-"""FMUs that contain sources but no binary for this machine: they are compiled when they are used, into the user's cache."""
+"""FMUs that contain sources but no binary for this machine.
+
+They are compiled when they are used, into the user's cache.
+"""
 
 from __future__ import annotations
 
@@ -28,13 +31,22 @@ from .windows_fmus import find_wine, has_windows_binary, windows_fmu
 
 _SOURCES, _BUILD_DESCRIPTION = "sources/", "sources/buildDescription.xml"
 _C_SUFFIX, _CPP_SUFFIXES = ".c", (".cpp", ".cc", ".cxx")
-#: the FMU's own names of the FMI functions have no prefix; some tools add one unless these macros are defined
-_NO_PREFIX = ("-DFMI2_FUNCTION_PREFIX=", "-DFMI2_OVERRIDE_FUNCTION_PREFIX", "-DFMI3_OVERRIDE_FUNCTION_PREFIX")
+#: the FMU's own names of the FMI functions have no prefix; some tools add one unless these macros
+#: are defined
+_NO_PREFIX = (
+    "-DFMI2_FUNCTION_PREFIX=",
+    "-DFMI2_OVERRIDE_FUNCTION_PREFIX",
+    "-DFMI3_OVERRIDE_FUNCTION_PREFIX",
+)
 _OPTIONS = ("-O2", "-fPIC", "-shared", "-ffp-contract=off", "-w", *_NO_PREFIX)
 #: raised when an FMU has to be compiled again
 _RECIPE = 2
 #: headers of Windows that portable sources include (FMU SDK 2.0.4)
-_WINDOWS_HEADERS = {"minmax.h": "#define max(a, b) ((a) > (b) ? (a) : (b))\n#define min(a, b) ((a) < (b) ? (a) : (b))\n"}
+_WINDOWS_HEADERS = {
+    "minmax.h": (
+        "#define max(a, b) ((a) > (b) ? (a) : (b))\n#define min(a, b) ((a) < (b) ? (a) : (b))\n"
+    )
+}
 #: headers of FMI 1.0, which FMPy does not contain
 _FMI1_HEADERS = ("fmiFunctions.h", "fmiModelFunctions.h", "fmiPlatformTypes.h", "fmiModelTypes.h")
 #: words of the compiler's lines that state a cause
@@ -83,8 +95,14 @@ def _compiled_fmu(file: FmuFile) -> Path:
         InputError: There is no C compiler, the sources are incomplete, or they cannot be compiled.
     """
     compiler = find_compiler()
-    recipe = json.dumps([file.sha256, compiler, compiler_version(tuple(compiler)), _OPTIONS, _RECIPE])
-    return cached_file(sha256(recipe.encode()).hexdigest()[:24], file.path.name, lambda target: _compile(file, compiler, target))
+    recipe = json.dumps(
+        [file.sha256, compiler, compiler_version(tuple(compiler)), _OPTIONS, _RECIPE]
+    )
+    return cached_file(
+        sha256(recipe.encode()).hexdigest()[:24],
+        file.path.name,
+        lambda target: _compile(file, compiler, target),
+    )
 
 
 def _compile(file: FmuFile, compiler: Sequence[str], target: Path) -> None:
@@ -108,14 +126,32 @@ def _compile(file: FmuFile, compiler: Sequence[str], target: Path) -> None:
     write_archive(members, target)
 
 
-def _compile_library(file: FmuFile, compiler: Sequence[str], configuration: _Configuration, sources: Path, library: Path) -> None:
+def _compile_library(
+    file: FmuFile,
+    compiler: Sequence[str],
+    configuration: _Configuration,
+    sources: Path,
+    library: Path,
+) -> None:
     command = list(compiler)
     if any(name.endswith(_CPP_SUFFIXES) for name in configuration.files):
-        command = [*compiler[:-2], "c++"] if "ziglang" in compiler else [shutil.which("c++") or shutil.which("g++") or "c++"]
+        command = (
+            [*compiler[:-2], "c++"]
+            if "ziglang" in compiler
+            else [shutil.which("c++") or shutil.which("g++") or "c++"]
+        )
     fmpy = find_spec("fmpy")
     headers = Path(fmpy.origin).parent / "c-code" if fmpy and fmpy.origin else sources
-    folders = [*(sources / name for name in ("", *configuration.include_folders)), headers, sources.parent]
-    options = [*_OPTIONS, *(f"-D{text}" for text in configuration.definitions), *(f"-I{folder}" for folder in folders)]
+    folders = [
+        *(sources / name for name in ("", *configuration.include_folders)),
+        headers,
+        sources.parent,
+    ]
+    options = [
+        *_OPTIONS,
+        *(f"-D{text}" for text in configuration.definitions),
+        *(f"-I{folder}" for folder in folders),
+    ]
     linker_options = ["-Wl,--no-undefined"] if sys.platform == "linux" else []
     files = [str(sources / name) for name in configuration.files]  # absolute: no name is an option
     process = subprocess.run(  # noqa: S603 - the compiler of the user
@@ -128,9 +164,16 @@ def _compile_library(file: FmuFile, compiler: Sequence[str], configuration: _Con
     )
     if process.returncode:
         lines = [line.replace(f"{sources}/", "") for line in process.stderr.splitlines()]
-        errors = [line for line in lines if any(words in line for words in _ERROR_WORDS) and "ld returned" not in line]
+        errors = [
+            line
+            for line in lines
+            if any(words in line for words in _ERROR_WORDS) and "ld returned" not in line
+        ]
         more = f" (and {len(errors) - 1} more)" if len(errors) > 1 else ""
-        raise InputError(f'the sources of "{file.path}" cannot be compiled: {(errors or lines[-1:] or ["no reason"])[0]}{more}')
+        raise InputError(
+            f'the sources of "{file.path}" cannot be compiled: '
+            f"{(errors or lines[-1:] or ['no reason'])[0]}{more}"
+        )
 
 
 def _read_configurations(file: FmuFile, members: Mapping[str, bytes]) -> list[_Configuration]:
@@ -147,11 +190,17 @@ def _read_configurations(file: FmuFile, members: Mapping[str, bytes]) -> list[_C
     for configuration in configurations:
         for name in configuration.files:
             if name not in sources:
-                text = f'"{file.path}": its source file "{name}" does not exist{did_you_mean(name, sources)}'
+                text = (
+                    f'"{file.path}": its source file "{name}" does not '
+                    f"exist{did_you_mean(name, sources)}"
+                )
                 raise InputError(text)
         if not configuration.files:
             others = sorted({PurePosixPath(name).suffix for name in sources} - {""})
-            raise InputError(f'"{file.path}": names no source files, and found no C files; found: {", ".join(others)}')
+            raise InputError(
+                f'"{file.path}": names no source files, and found no C files; found: '
+                f"{', '.join(others)}"
+            )
     return configurations
 
 
@@ -166,7 +215,10 @@ def _parse(file: FmuFile, members: Mapping[str, bytes], name: str) -> Any:
 def _read_build_description(root: Any) -> Iterator[_Configuration]:
     """Read the build configurations for all platforms or for this one (FMI 3.0.2 section 2.5.2)."""
     for element in root.iterfind("BuildConfiguration"):
-        if element.get("platform", current_platform().platform_tuple) != current_platform().platform_tuple:
+        if (
+            element.get("platform", current_platform().platform_tuple)
+            != current_platform().platform_tuple
+        ):
             continue
         yield _Configuration(
             element.get("modelIdentifier", ""),
@@ -181,18 +233,27 @@ def _read_build_description(root: Any) -> Iterator[_Configuration]:
 
 
 def _read_source_files(root: Any, members: Mapping[str, bytes]) -> Iterator[_Configuration]:
-    """Read the source files of FMI 2.0; without a list, as in FMI 1.0, these are all C files that no other one includes."""
+    """Read the source files of FMI 2.0.
+
+    Without a list, as in FMI 1.0, these are all C files that no other one includes.
+    """
     if root.get("fmiVersion", "").startswith("1"):
         definitions = () if root.find("Implementation") is None else ("FMI_COSIMULATION",)
-        yield _Configuration(root.get("modelIdentifier", ""), _independent_files(members), (), definitions)
+        yield _Configuration(
+            root.get("modelIdentifier", ""), _independent_files(members), (), definitions
+        )
         return
     found: dict[str, list[str]] = {}
     for interface in (*root.iterfind("CoSimulation"), *root.iterfind("ModelExchange")):
         names = [item.get("name", "") for item in interface.iterfind("SourceFiles/File")]
         found.setdefault(interface.get("modelIdentifier", ""), []).extend(names)
     for identifier, names in found.items():
-        compiled = [name for name in dict.fromkeys(names) if name.endswith((_C_SUFFIX, *_CPP_SUFFIXES))]
-        definitions = () if root.find("ModelExchange") is not None else ("FMI_COSIMULATION",)  # macro of the FMU SDK
+        compiled = [
+            name for name in dict.fromkeys(names) if name.endswith((_C_SUFFIX, *_CPP_SUFFIXES))
+        ]
+        definitions = (
+            () if root.find("ModelExchange") is not None else ("FMI_COSIMULATION",)
+        )  # macro of the FMU SDK
         yield _Configuration(identifier, compiled or _independent_files(members), (), definitions)
 
 

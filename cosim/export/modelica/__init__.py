@@ -1,6 +1,7 @@
 """Compiler from Modelica models to blocks of C code.
 
-The package rumoca parses, checks and flattens a model. The order of computation and the C code are generated here.
+The package rumoca parses, checks and flattens a model. The order of computation and the C code are
+generated here.
 
 | Folder       | Modules                                                                                                    |
 | ------------ | ---------------------------------------------------------------------------------------------------------- |
@@ -34,46 +35,57 @@ The package rumoca parses, checks and flattens a model. The order of computation
 
 Sampled models, in a communication step from t to t + h:
 
-- A clause `when sample(start, period)` is active at every tick t_k = start + k*period in [t, t + h), with constant inputs. The
-  first tick is the first one that is not before the start time. Ticks are counted as integers.
+- A clause `when sample(start, period)` is active at every tick t_k = start + k*period in [t, t +
+  h), with constant inputs. The first tick is the first one that is not before the start time. Ticks
+  are counted as integers.
 - All other equations and assertions are computed at every tick and at the initialization.
 - At the initialization, when-clauses are inactive unless their condition contains initial().
-- A when-clause with another condition is active at the tick at which this condition has become true.
+- A when-clause with another condition is active at the tick at which this condition has become
+  true.
 - A model without sample() is computed once per step, at t + h.
 - pre(x) is the value of x before the tick.
 - Declared minima and maxima are written to the model description; they are not enforced.
-- Real arithmetic is that of IEEE 754. The step fails, with the reason, if an output or a value used by pre() is not finite, and
-  on an Integer overflow, an Integer division by zero, a subscript outside its array or a violated assert().
+- Real arithmetic is that of IEEE 754. The step fails, with the reason, if an output or a value used
+  by pre() is not finite, and on an Integer overflow, an Integer division by zero, a subscript
+  outside its array or a violated assert().
 
 Models with continuous states (`der(x) = ...`):
 
-- The states advance from tick to tick, and from the last tick to t + h. All equations are computed once more at t + h, and the
-  outputs belong to this time.
-- The integration method is the classical Runge-Kutta method of order 4. The interval d between two events is divided into
-  ceil(d/0.005 - 1e-9) equal integration steps. Inputs and sampled values are constant between two events.
+- The states advance from tick to tick, and from the last tick to t + h. All equations are computed
+  once more at t + h, and the outputs belong to this time.
+- The integration method is the classical Runge-Kutta method of order 4. The interval d between two
+  events is divided into ceil(d/0.005 - 1e-9) equal integration steps. Inputs and sampled values are
+  constant between two events.
 - Assertions are evaluated at ticks and at t + h only.
-- The initial value of a state is its `start` value, whether `fixed` or not, unless initial equations determine it. They are
-  solved together with the other equations, by Newton's method where they are not linear.
+- The initial value of a state is its `start` value, whether `fixed` or not, unless initial
+  equations determine it. They are solved together with the other equations, by Newton's method
+  where they are not linear.
 
-Models with event iteration. These are all models with `pre()`, `edge()`, `change()` or `sample()` outside when-clauses, with
-`reinit()` or `delay()`, with continuous states and comparisons (outside `noEvent()`) of values that change with time, or with
-continuous states and a library, and library models with when-clauses whose conditions change with time:
+Models with event iteration. These are all models with `pre()`, `edge()`, `change()` or `sample()`
+outside when-clauses, with `reinit()` or `delay()`, with continuous states and comparisons (outside
+`noEvent()`) of values that change with time, or with continuous states and a library, and library
+models with when-clauses whose conditions change with time:
 
-- There is an event at t if an input has changed, at every tick, at t + h, and whenever a comparison changes its value. The time
-  of this change is located to 1e-10 s. Between events, comparisons keep their value.
-- In an event all equations are evaluated again with pre(x) = x, until the discrete variables and the comparisons do not change.
-- The states are integrated by the method of Dormand and Prince of order 5 with error control (relative tolerance 1e-7, absolute
-  tolerance 1e-9).
+- There is an event at t if an input has changed, at every tick, at t + h, and whenever a comparison
+  changes its value. The time of this change is located to 1e-10 s. Between events, comparisons keep
+  their value.
+- In an event all equations are evaluated again with pre(x) = x, until the discrete variables and
+  the comparisons do not change.
+- The states are integrated by the method of Dormand and Prince of order 5 with error control
+  (relative tolerance 1e-7, absolute tolerance 1e-9).
 - Without inputs, the ticks at the start time belong to the initialization.
 - delay() interpolates linearly between at most 2048 stored values.
 
 Equations in any form:
 
-- Linear equations are solved symbolically, systems of linear equations by elimination, all others by Newton's method from the
-  last values with symbolic derivatives. A step fails if there is no solution.
-- A variable x in der(x) that equations determine is not a state; its derivative is computed from the derivatives of equations.
-  An equation between states must be linear in this variable, and derivatives of inputs are refused.
-- At the initialization, systems with homotopy() are solved in ten steps from the simplified to the actual expressions.
+- Linear equations are solved symbolically, systems of linear equations by elimination, all others
+  by Newton's method from the last values with symbolic derivatives. A step fails if there is no
+  solution.
+- A variable x in der(x) that equations determine is not a state; its derivative is computed from
+  the derivatives of equations. An equation between states must be linear in this variable, and
+  derivatives of inputs are refused.
+- At the initialization, systems with homotopy() are solved in ten steps from the simplified to the
+  actual expressions.
 - Structural parameters (those that select equations or sizes) are constants of the FMU.
 """
 

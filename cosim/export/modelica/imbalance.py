@@ -1,7 +1,8 @@
 """Names of the variables and equations because of which a model has too few or too many equations.
 
-The front end only counts. Its counts agree for the model with as many equations `time = time`, or variables, as are missing. The
-matching of this model then shows which variables no equation determines, or which equations contradict others.
+The front end only counts. Its counts agree for the model with as many equations `time = time`, or
+variables, as are missing. The matching of this model then shows which variables no equation
+determines, or which equations contradict others.
 """
 
 from __future__ import annotations
@@ -34,7 +35,11 @@ def _explain(problem: Problem, analyse: Callable[[str], object]) -> Problem:
         return problem
     balance = int(found[1])
     try:
-        analyse(f"Real {_ADDED}[{balance}];" if balance > 0 else f"equation {'time = time; ' * -balance}")
+        analyse(
+            f"Real {_ADDED}[{balance}];"
+            if balance > 0
+            else f"equation {'time = time; ' * -balance}"
+        )
     except SingularError as singular:
         cause = _undetermined(singular) if balance < 0 else _surplus(singular)
         return replace(cause, message=f"{problem.message}: {cause.message}") if cause else problem
@@ -56,5 +61,9 @@ def _surplus(singular: SingularError) -> Problem | None:
     if not singular.surplus:
         return None
     where, names = singular.surplus[0]
-    others = f"the others determine {abbreviate_names(names)}" if names else "it contains no unknown variable"
+    others = (
+        f"the others determine {abbreviate_names(names)}"
+        if names
+        else "it contains no unknown variable"
+    )
     return Problem(f"this equation is one too many, {others}", str(where or ""))

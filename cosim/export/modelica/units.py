@@ -24,7 +24,10 @@ def check_units(variables: Sequence[tuple[Variable, FmiRole]]) -> set[str]:
     """
     unknown: dict[str, list[Variable]] = {}
     problems = []
-    errors = {unit: _unit_error(unit) for unit in {variable.unit for variable, _ in variables if variable.unit}}
+    errors = {
+        unit: _unit_error(unit)
+        for unit in {variable.unit for variable, _ in variables if variable.unit}
+    }
     for variable, (causality, _) in variables:
         error = errors.get(variable.unit)
         if error and causality in ("input", "output"):

@@ -5,7 +5,8 @@
 - `texts`: string signals, written when they change (see `engine.saving_recorder`)
 - `metadata.json`: description of the run
 
-If the results cannot be written, as on a full disk, the files are kept: `rows` becomes `rows.COUNT` (see `keep_rows`).
+If the results cannot be written, as on a full disk, the files are kept: `rows` becomes `rows.COUNT`
+(see `keep_rows`).
 """
 
 from __future__ import annotations
@@ -51,8 +52,9 @@ class Column:
 class RowsHeader:
     """Layout of the rows of an unfinished run.
 
-    Row k belongs to communication point n = k * `steps_per_row`. Its time is (`origin` + n * `stride`) / `denominator` (s); that
-    of the last point is `end`, because the last step may be shorter.
+    Row k belongs to communication point n = k * `steps_per_row`. Its time is (`origin` + n *
+    `stride`) / `denominator` (s); that of the last point is `end`, because the last step may be
+    shorter.
 
     Attributes:
         origin: See above.
@@ -81,7 +83,9 @@ class RowsHeader:
     @property
     def names(self) -> list[str]:
         """Names of all signals in recorded order."""
-        return self.merge_columns([column.name for column in self.columns], [name for _, name in self.texts])
+        return self.merge_columns(
+            [column.name for column in self.columns], [name for _, name in self.texts]
+        )
 
     def merge_columns(self, numbers: Iterable[Value], texts: Iterable[Value]) -> list[Value]:
         """Merge one value per numeric signal and one per string signal into recorded order."""
@@ -106,14 +110,21 @@ class RowsHeader:
 
     def time_at(self, n: int) -> float:
         """Return the time of communication point n (s)."""
-        return self.end if n == self.last_point else (self.origin + n * self.stride) / self.denominator
+        return (
+            self.end if n == self.last_point else (self.origin + n * self.stride) / self.denominator
+        )
 
     def times(self, rows: int) -> np.ndarray:
         """Return the times of the first `rows` rows (s), shape (rows,)."""
         from ...core.time_grid import TimeGrid
 
-        start, step = Fraction(self.origin, self.denominator), Fraction(self.stride, self.denominator)
-        grid = TimeGrid(start, step, rows * self.steps_per_row, self.denominator, self.origin, self.stride)
+        start, step = (
+            Fraction(self.origin, self.denominator),
+            Fraction(self.stride, self.denominator),
+        )
+        grid = TimeGrid(
+            start, step, rows * self.steps_per_row, self.denominator, self.origin, self.stride
+        )
         times = grid.times(range(0, rows * self.steps_per_row, self.steps_per_row))
         if rows and (rows - 1) * self.steps_per_row == self.last_point:
             times[-1] = self.end
@@ -167,7 +178,10 @@ class TextReader:
         return list(self._texts.values())
 
     def _parse_change(self, line: bytes) -> tuple[int, dict[str, Any]]:
-        """Return the row of a change and its texts; a line that foreign code has damaged changes nothing."""
+        """Return the row of a change and its texts.
+
+        A line that foreign code has damaged changes nothing.
+        """
         try:
             row, texts = json.loads(line, object_hook=decode_object)
             return int(row), {name: text for name, text in texts.items() if name in self._texts}
@@ -189,8 +203,12 @@ def read_metadata(folder: Path) -> dict[str, Any]:
 
 
 @contextmanager
-def keeping_run_files(folder: Path, csv: Path | None = None, metadata: Mapping[str, Any] | None = None) -> Iterator[None]:
-    """Keep the files of a run in `folder` during the block, if this process has a supervisor; remove them if it succeeds.
+def keeping_run_files(
+    folder: Path, csv: Path | None = None, metadata: Mapping[str, Any] | None = None
+) -> Iterator[None]:
+    """Keep the files of a run in `folder` during the block, if this process has a supervisor.
+
+    Remove them if it succeeds.
 
     Args:
         folder: Folder that is created; an existing one is replaced.
@@ -248,7 +266,10 @@ def keep_rows(folder: Path, rows: int, metadata: Mapping[str, Any]) -> None:
 
 
 def find_kept_rows(folder: Path) -> tuple[Path, int] | None:
-    """Return the file with the rows that were kept in the folder of a run, and their number; None if there is none."""
+    """Return the file with the rows that were kept in the folder of a run, and their number.
+
+    None if there is none.
+    """
     for file in folder.glob(f"{ROWS_FILE}.*"):
         if (count := file.suffix[1:]).isdecimal():
             return file, int(count)
@@ -270,7 +291,8 @@ def recover_recording(folder: Path | None, rows: int, rows_file: Path | None = N
         rows_file: File of the rows; None for `ROWS_FILE` in the folder.
 
     Returns:
-        A recording with fewer rows if foreign code has truncated the file, empty if there is no header.
+        A recording with fewer rows if foreign code has truncated the file, empty if there is no
+        header.
     """
     import numpy as np
 
@@ -283,7 +305,10 @@ def recover_recording(folder: Path | None, rows: int, rows_file: Path | None = N
     rows_file = rows_file or folder / ROWS_FILE
     columns, rows = header.columns, _count_readable_rows(rows_file, header, rows)
     data = read_rows(rows_file, header.dtype, rows)
-    numbers = [data[column.name].astype(bool) if column.boolean else data[column.name] for column in columns]
+    numbers = [
+        data[column.name].astype(bool) if column.boolean else data[column.name]
+        for column in columns
+    ]
     texts = np.empty((rows, len(header.texts)), object)
     with closing(TextReader(folder, header)) as reader:
         for row in range(rows if header.texts else 0):

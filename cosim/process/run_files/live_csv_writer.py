@@ -1,7 +1,8 @@
 """CSV file of a run in progress, which remains readable even if both processes are killed.
 
-The result file is complete at any time: new lines are appended to one of two copies, which then replaces it atomically; the next
-update uses the other copy. The final file replaces it at the end of the run.
+The result file is complete at any time: new lines are appended to one of two copies, which then
+replaces it atomically; the next update uses the other copy. The final file replaces it at the end
+of the run.
 """
 
 from __future__ import annotations
@@ -42,7 +43,10 @@ class LiveCsvWriter:
         self._lines: CsvLineReader | None = None
 
     def update(self) -> None:
-        """Append new rows if an update is due; stop updating after a write error, which the run itself reports."""
+        """Append new rows if an update is due.
+
+        Stop updating after a write error, which the run itself reports.
+        """
         now = time.monotonic()
         if not self._journal.in_loop or now < self._next_update:
             return
@@ -64,7 +68,9 @@ class LiveCsvWriter:
             return False
         self._target, self._rows_file = target, folder / ROWS_FILE
         self._lines = CsvLineReader(header, TextReader(folder, header))
-        self._front, self._back = (_CsvCopy(folder / f"{LIVE_COPY_PREFIX}{name}.csv") for name in "ab")
+        self._front, self._back = (
+            _CsvCopy(folder / f"{LIVE_COPY_PREFIX}{name}.csv") for name in "ab"
+        )
         self._front.path.write_bytes(self._lines.header_line())
         self._front.size = len(self._lines.header_line())
         self._back.path.touch()
@@ -87,7 +93,9 @@ class LiveCsvWriter:
             raise
         if published:
             self._front, self._back = self._back, self._front
-        self._next_update = time.monotonic() + (UPDATE_INTERVAL if self._lines.row_count == rows else 0)
+        self._next_update = time.monotonic() + (
+            UPDATE_INTERVAL if self._lines.row_count == rows else 0
+        )
 
     def _synchronize_back(self, target: IO[bytes]) -> None:
         """Append the lines that only the front copy has to the back copy, and undo an interrupted append."""
@@ -116,7 +124,9 @@ class CsvLineReader:
         self._header, self._texts = header, texts
         offsets = sorted({column.offset for column in header.columns})
         order = [offsets.index(column.offset) for column in header.columns]
-        self._order_columns = itemgetter(*order) if len(order) > 1 else lambda values: tuple(values[i] for i in order)
+        self._order_columns = (
+            itemgetter(*order) if len(order) > 1 else lambda values: tuple(values[i] for i in order)
+        )
         self._unpack = struct.Struct(_row_format(header)).iter_unpack
         #: number of rows that were converted
         self.row_count = 0
@@ -145,19 +155,31 @@ class CsvLineReader:
             raise OSError("rows are missing: foreign code has truncated their file")
         values = self._unpack(data) if header.row_size else [()] * count
         table = [
-            (header.time_at(n * header.steps_per_row), *self._order_columns(row)) for n, row in enumerate(values, start=first)
+            (header.time_at(n * header.steps_per_row), *self._order_columns(row))
+            for n, row in enumerate(values, start=first)
         ]
         lines = to_json(table, inf_nan_mode="constants")[2:-2].replace(b"],[", b"\n") + b"\n"
         self.row_count += len(table)
         return self._insert_texts(lines, first) if header.texts else lines
 
     def _insert_texts(self, lines: bytes, first: int) -> bytes:
-        """Insert the string signals into lines of numbers; `first` is the number of the first row."""
+        """Insert the string signals into lines of numbers.
+
+        `first` is the number of the first row.
+        """
         complete = []
         for row, line in enumerate(lines.decode().splitlines(), start=first):
             time, *numbers = line.split(",")
             complete.append(
-                ",".join([time, *self._header.merge_columns(numbers, map(quote_cell, self._texts.read_row(row)))]) + "\n"
+                ",".join(
+                    [
+                        time,
+                        *self._header.merge_columns(
+                            numbers, map(quote_cell, self._texts.read_row(row))
+                        ),
+                    ]
+                )
+                + "\n"
             )
         return "".join(complete).encode()
 
@@ -165,14 +187,18 @@ class CsvLineReader:
 def _row_format(header: RowsHeader) -> str:
     """Return the format of a row for the struct module, with columns in ascending order of their offsets."""
     parts, position = ["="], 0
-    for offset, kind in sorted({(column.offset, struct_format_character(column.dtype)) for column in header.columns}):
+    for offset, kind in sorted(
+        {(column.offset, struct_format_character(column.dtype)) for column in header.columns}
+    ):
         parts += [f"{offset - position}x", kind]
         position = offset + struct.calcsize(f"={kind}")
     return "".join([*parts, f"{header.row_size - position}x"])
 
 
 def struct_format_character(dtype: str) -> str:
-    """Return the format character of the struct module for a NumPy dtype; Booleans are unsigned bytes.
+    """Return the format character of the struct module for a NumPy dtype.
+
+    Booleans are unsigned bytes.
 
     >>> struct_format_character("<f8"), struct_format_character("|b1"), struct_format_character("<u4")
     ('d', 'B', 'I')

@@ -59,8 +59,9 @@ class RowStore:
 class FileRowStore(RowStore):
     """Rows in a file, which contains all recorded rows even if the process is killed.
 
-    Only the last chunk occupies memory. Disk space is allocated chunk by chunk, so that a full disk raises OutputError instead
-    of crashing the process (SIGBUS). A file given by its path is open only while a chunk is added, see `FileMapping`.
+    Only the last chunk occupies memory. Disk space is allocated chunk by chunk, so that a full disk
+    raises OutputError instead of crashing the process (SIGBUS). A file given by its path is open
+    only while a chunk is added, see `FileMapping`.
     """
 
     def __init__(self, dtype: np.dtype[Any], expected: int, file: Path | IO[bytes]):
@@ -92,7 +93,10 @@ class FileRowStore(RowStore):
                 chunk = _map_rows(file, self.dtype, begin, self.chunk_rows, writable=True)
         except OSError as error:
             where = self._file if isinstance(self._file, Path) else tempfile.gettempdir()
-            raise write_error(f"cannot write {size / 1e6:.3g} MB of recorded rows to {where}: {error.strerror}", error) from None
+            raise write_error(
+                f"cannot write {size / 1e6:.3g} MB of recorded rows to {where}: {error.strerror}",
+                error,
+            ) from None
         self._rows += self.chunk_rows
         return chunk
 
@@ -124,7 +128,12 @@ class FileMapping:
             number = ctypes.get_errno()
             raise OSError(number, os.strerror(number))
         address = self._address + begin - page
-        self.__array_interface__ = {"data": (address, not writable), "shape": (size,), "typestr": "|u1", "version": 3}
+        self.__array_interface__ = {
+            "data": (address, not writable),
+            "shape": (size,),
+            "typestr": "|u1",
+            "version": 3,
+        }
         finalize(self, library.munmap, ctypes.c_void_p(self._address), length).atexit = False
 
     def madvise(self, option: int) -> None:
@@ -139,11 +148,15 @@ def _c_library() -> Any:
     return library
 
 
-def _map_rows(file: IO[bytes], dtype: np.dtype[Any], begin: int, count: int, writable: bool) -> np.ndarray:
+def _map_rows(
+    file: IO[bytes], dtype: np.dtype[Any], begin: int, count: int, writable: bool
+) -> np.ndarray:
     """Map `count` rows from byte `begin` on."""
     if sys.platform == "win32":
         return np.memmap(file, dtype, "r+" if writable else "r", begin, (count,))
-    return np.asarray(FileMapping(file.fileno(), begin, count * dtype.itemsize, writable)).view(dtype)
+    return np.asarray(FileMapping(file.fileno(), begin, count * dtype.itemsize, writable)).view(
+        dtype
+    )
 
 
 def open_row_store(dtype: np.dtype[Any], expected: int, path: Path | None) -> RowStore:
@@ -159,7 +172,9 @@ def open_row_store(dtype: np.dtype[Any], expected: int, path: Path | None) -> Ro
     return FileRowStore(dtype, expected, path or TemporaryFile())
 
 
-def compute_in_chunks(count: int, fill: Callable[[range], np.ndarray], dtype: np.dtype[Any]) -> np.ndarray:
+def compute_in_chunks(
+    count: int, fill: Callable[[range], np.ndarray], dtype: np.dtype[Any]
+) -> np.ndarray:
     """Compute an array piece by piece; a large one is stored in a temporary file.
 
     Args:

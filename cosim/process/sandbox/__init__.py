@@ -1,6 +1,7 @@
 """Restrictions that a worker process imposes on itself before it loads foreign code.
 
-    enter_sandbox(SandboxSettings(readable=(fmu_folder, *interpreter_folders()), writable=(temporary,), confine="required"))
+    enter_sandbox(SandboxSettings(readable=(fmu_folder, *interpreter_folders()),
+    writable=(temporary,), confine="required"))
 
 Always in force:
 
@@ -14,11 +15,13 @@ With `confine` (Landlock, Linux 5.13, and a system call filter):
 - files are read only below `readable`
 - files are written only below `writable`
 - no network, no sockets, no new processes and programs, no signals to other processes
-- owners, modes, times and attributes of files, shared objects, keys, priorities and mounts stay as they are
+- owners, modes, times and attributes of files, shared objects, keys, priorities and mounts stay as
+  they are
 - all environment variables but a few are removed
 
-Not prevented: names, sizes and modes of files can be read. A worker can exhaust its limits and return wrong outputs.
-`bubblewrap_command` (strict mode) hides all other files and processes from a whole command.
+Not prevented: names, sizes and modes of files can be read. A worker can exhaust its limits and
+return wrong outputs. `bubblewrap_command` (strict mode) hides all other files and processes from a
+whole command.
 """
 
 from __future__ import annotations
@@ -32,7 +35,12 @@ from . import landlock, system_call_filter
 from .bubblewrap import bubblewrap_command, find_bubblewrap
 from .environment import KEPT_VARIABLES, clear_environment
 from .folders import interpreter_folders
-from .status import ActiveRestrictions, AvailableSandboxes, find_available_sandboxes, probe_restrictions
+from .status import (
+    ActiveRestrictions,
+    AvailableSandboxes,
+    find_available_sandboxes,
+    probe_restrictions,
+)
 
 __all__ = [
     "KEPT_VARIABLES",
@@ -63,7 +71,8 @@ class SandboxSettings:
         readable: Existing folders and files that may be read.
         writable: Existing folders and files that may be read and written.
         confine: Confine the process to the listed files and to itself.
-        parent: Process id of the parent, with which the worker ends; None for no check that it still exists.
+        parent: Process id of the parent, with which the worker ends; None for no check that it
+            still exists.
     """
 
     memory: int = 2 * GIBIBYTE
@@ -83,13 +92,15 @@ def enter_sandbox(settings: SandboxSettings) -> None:
         settings: The restrictions.
 
     Raises:
-        InputError: The process is to be confined, but a listed path does not exist, the process has several threads, or this
-            system does not support the confinement. Nothing was changed.
+        InputError: The process is to be confined, but a listed path does not exist, the process has
+            several threads, or this system does not support the confinement. Nothing was changed.
     """
     if settings.confine and (reason := _unmet_requirement(settings)):
         raise InputError(f"the sandbox cannot be entered: {reason}")
     limits.detach(settings.parent)
-    limits.set_limits(settings.memory, settings.open_files, settings.file_size, settings.cpu_seconds)
+    limits.set_limits(
+        settings.memory, settings.open_files, settings.file_size, settings.cpu_seconds
+    )
     if settings.confine:
         clear_environment()
         landlock.confine(settings.readable, settings.writable)
@@ -104,7 +115,10 @@ def _unmet_requirement(settings: SandboxSettings) -> str:
     if not landlock.abi_version():
         return "Landlock is needed (Linux 5.13 or newer, enabled); this kernel has none"
     if not system_call_filter.is_available():
-        return "a system call filter is needed (Linux with seccomp, on x86_64 or aarch64); this system has none"
+        return (
+            "a system call filter is needed (Linux with seccomp, on x86_64 or aarch64); this "
+            "system has none"
+        )
     if limits.thread_count() > 1:
         return "the process has more than one thread, and the others would not be confined"
     return ""

@@ -27,18 +27,25 @@ def find_bubblewrap() -> str:
 
 
 def bubblewrap_command(
-    arguments: Sequence[str], readable: Iterable[Path], writable: Iterable[Path] = (), *, status: int | None = None
+    arguments: Sequence[str],
+    readable: Iterable[Path],
+    writable: Iterable[Path] = (),
+    *,
+    status: int | None = None,
 ) -> list[str]:
     """Return a command line that runs a command in bubblewrap, in the current folder.
 
-    The command has no network, an empty /tmp, only the listed files under their usual paths, and ends with the caller. If one
-    listed folder contains another, the permission of the inner one applies to it.
+    The command has no network, an empty /tmp, only the listed files under their usual paths, and
+    ends with the caller. If one listed folder contains another, the permission of the inner one
+    applies to it.
 
     Args:
         arguments: Program and arguments.
         readable: Folders and files that may be read.
-        writable: Folders and files that may be read and written; they take precedence over `readable`.
-        status: Descriptor to which bubblewrap writes lines of JSON with "child-pid" and, at the end, "exit-code".
+        writable: Folders and files that may be read and written; they take precedence over
+            `readable`.
+        status: Descriptor to which bubblewrap writes lines of JSON with "child-pid" and, at the
+            end, "exit-code".
 
     Raises:
         InputError: bubblewrap is not installed or lacks permissions.
@@ -46,7 +53,8 @@ def bubblewrap_command(
     program = find_bubblewrap()
     if not program:
         raise InputError(
-            "the strict sandbox needs bubblewrap (program bwrap, package bubblewrap) and user namespaces; found none that works"
+            "the strict sandbox needs bubblewrap (program bwrap, package bubblewrap) and user "
+            "namespaces; found none that works"
         )
     command = [program, *_ISOLATION_OPTIONS, *_MOUNT_OPTIONS]
     bound = {**dict.fromkeys(readable, "--ro-bind"), **dict.fromkeys(writable, "--bind")}

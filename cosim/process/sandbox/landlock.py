@@ -38,14 +38,17 @@ def abi_version() -> int:
     """Return the Landlock version of this kernel; 0 if it has none."""
     if sys.platform != "linux":
         return 0
-    version: int = _LIBC.syscall(CREATE_RULESET, None, ctypes.c_size_t(0), ctypes.c_uint32(CREATE_RULESET_VERSION))
+    version: int = _LIBC.syscall(
+        CREATE_RULESET, None, ctypes.c_size_t(0), ctypes.c_uint32(CREATE_RULESET_VERSION)
+    )
     return max(version, 0)
 
 
 def confine(readable: Iterable[Path], writable: Iterable[Path]) -> None:
     """Confine this thread and its children to the listed files, irrevocably.
 
-    Open files stay open. The process must have set no_new_privs (see `limits.detach`) or be privileged.
+    Open files stay open. The process must have set no_new_privs (see `limits.detach`) or be
+    privileged.
 
     Args:
         readable: Folders and files that may be read and executed.
@@ -75,7 +78,13 @@ def _add_path_rule(ruleset: int, path: Path, rights: int) -> None:
         if not stat.S_ISDIR(os.fstat(descriptor).st_mode):
             rights &= FILE_ACCESS_RIGHTS
         rule = _PathBeneath(rights, descriptor)
-        _system_call(ADD_RULE, ctypes.c_int(ruleset), ctypes.c_int(RULE_PATH_BENEATH), ctypes.byref(rule), ctypes.c_uint32(0))
+        _system_call(
+            ADD_RULE,
+            ctypes.c_int(ruleset),
+            ctypes.c_int(RULE_PATH_BENEATH),
+            ctypes.byref(rule),
+            ctypes.c_uint32(0),
+        )
     finally:
         os.close(descriptor)
 

@@ -37,7 +37,8 @@ class ActiveRestrictions:
     """Restrictions in force for this process.
 
     Attributes:
-        files_confined: Landlock confines access to files; False in bubblewrap, which hides files instead.
+        files_confined: Landlock confines access to files; False in bubblewrap, which hides files
+            instead.
         network_closed: No socket can be opened.
         own_session: The process leads a session.
         no_new_privileges: The process cannot gain privileges.
@@ -59,7 +60,9 @@ class ActiveRestrictions:
 
 def find_available_sandboxes() -> AvailableSandboxes:
     """Return the sandboxes that this machine supports."""
-    return AvailableSandboxes(landlock.abi_version(), system_call_filter.is_available(), find_bubblewrap())
+    return AvailableSandboxes(
+        landlock.abi_version(), system_call_filter.is_available(), find_bubblewrap()
+    )
 
 
 def probe_restrictions() -> ActiveRestrictions:

@@ -1,8 +1,11 @@
-"""Control of a live run in the simulation process: commands that are carried out between macro steps.
+"""Control of a live run in the simulation process.
 
-A command is a JSON object: {"command": "pause"}, "resume", "step" (one macro step, then pause), {"command": "speed", "factor"}
-(simulated seconds per second, null for as fast as possible) or {"command": "set", "name", "value"}. The reply to each command
-is an object with "time" (s), "paused" and "speed", and with "error" if the command was refused.
+Commands that are carried out between macro steps.
+
+A command is a JSON object: {"command": "pause"}, "resume", "step" (one macro step, then pause),
+{"command": "speed", "factor"} (simulated seconds per second, null for as fast as possible) or
+{"command": "set", "name", "value"}. The reply to each command is an object with "time" (s),
+"paused" and "speed", and with "error" if the command was refused.
 """
 
 from __future__ import annotations
@@ -32,22 +35,33 @@ _Command = Callable[[int, Mapping[str, Any]], None]
 
 
 class LiveControl:
-    """Step hook (`cosim.engine.plan_run.StepHook`) that carries out commands; used in the main thread of the simulation process.
+    """Step hook (`cosim.engine.plan_run.StepHook`) that carries out commands.
+
+    Used in the main thread of the simulation process.
 
     Args:
         connection: The pipe to the supervising process.
         system: The system that is simulated.
         grid: The communication points.
         speed: Simulated seconds per second at the start; None for as fast as possible.
-        run_info: Description of the run, sent before the first step together with the variables that can be set.
+        run_info: Description of the run, sent before the first step together with the variables
+            that can be set.
     """
 
     def __init__(
-        self, connection: Connection, system: System, grid: TimeGrid, speed: float | None, run_info: Mapping[str, Any]
+        self,
+        connection: Connection,
+        system: System,
+        grid: TimeGrid,
+        speed: float | None,
+        run_info: Mapping[str, Any],
     ) -> None:
         self._connection, self._grid, self._run_info = connection, grid, run_info
         self._components = system.components
-        self._adjustable = {f"{name}.{variable.name}": (name, variable) for name, variable in settable_variables(system)}
+        self._adjustable = {
+            f"{name}.{variable.name}": (name, variable)
+            for name, variable in settable_variables(system)
+        }
         self._poller = select.poll()
         self._poller.register(connection.fileno(), select.POLLIN)
         self._speed, self._paused, self._steps = speed, False, 0
@@ -83,7 +97,10 @@ class LiveControl:
 
     def _handshake(self) -> None:
         """Describe the run and wait until the supervising process has opened its rows, which a short run soon removes."""
-        adjustable = [self._describe_variable(full_name, *owner) for full_name, owner in self._adjustable.items()]
+        adjustable = [
+            self._describe_variable(full_name, *owner)
+            for full_name, owner in self._adjustable.items()
+        ]
         with suspending_deadline():
             self._send({"about": {**self._run_info, "adjustable": adjustable}, **self._state(0)})
             self._connection.recv_bytes()
@@ -138,9 +155,12 @@ class LiveControl:
     def _set_speed(self, n: int, message: Mapping[str, Any]) -> None:
         factor = message.get("factor")
         is_number = isinstance(factor, int | float) and not isinstance(factor, bool)
-        if factor is not None and not (is_number and MIN_SPEED_FACTOR <= factor <= MAX_SPEED_FACTOR):
+        if factor is not None and not (
+            is_number and MIN_SPEED_FACTOR <= factor <= MAX_SPEED_FACTOR
+        ):
             raise InputError(
-                f"the speed must lie in {MIN_SPEED_FACTOR:g} ... {MAX_SPEED_FACTOR:g}, or be null; found {json.dumps(factor)}"
+                f"the speed must lie in {MIN_SPEED_FACTOR:g} ... {MAX_SPEED_FACTOR:g}, or be null; "
+                f"found {json.dumps(factor)}"
             )
         self._speed = factor
         self._restart_pacer(n)
@@ -155,10 +175,14 @@ class LiveControl:
         full_name, value = str(message.get("name")), message.get("value")
         if full_name not in self._adjustable:
             hint = did_you_mean(full_name, self._adjustable)
-            raise InputError(f'"{full_name}" is neither a tunable parameter nor an unconnected input{hint}')
+            raise InputError(
+                f'"{full_name}" is neither a tunable parameter nor an unconnected input{hint}'
+            )
         name, variable = self._adjustable[full_name]
         try:
-            for variable_name, checked in check_assignment(name, {variable.name: variable}, variable.name, value).items():
+            for variable_name, checked in check_assignment(
+                name, {variable.name: variable}, variable.name, value
+            ).items():
                 with calling_component(name, "set", "step", self._grid.time_at(n)):
                     self._components[name].set(variable_name, checked)
         except (ValueError, TypeError, OverflowError) as error:
@@ -170,7 +194,9 @@ class LiveControl:
         self._events.append({"time": self._event_time(n), "set": {name: value}})
         journal = current_journal()
         if journal and journal.folder:
-            write_metadata(journal.folder, {**read_metadata(journal.folder), "live_events": self._events})
+            write_metadata(
+                journal.folder, {**read_metadata(journal.folder), "live_events": self._events}
+            )
 
     def _event_time(self, n: int) -> float | str:
         """Return the time of communication point n in the form that a scenario file reads without rounding."""

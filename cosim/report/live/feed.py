@@ -15,12 +15,15 @@ MAX_VALUES = 4_000_000
 
 
 class RowFeed:
-    """Reader of the numeric signals of a running simulation; used by the request threads of the supervising process.
+    """Reader of the numeric signals of a running simulation.
+
+    Used by the request threads of the supervising process.
 
     Args:
         folder: The folder with the files of the run.
         header: The description of its rows.
-        expected_rows: The number of rows of the complete run. Only every `stride`-th row is read if there are many.
+        expected_rows: The number of rows of the complete run. Only every `stride`-th row is read if
+            there are many.
     """
 
     def __init__(self, folder: Path, header: RowsHeader, expected_rows: int):
@@ -42,7 +45,10 @@ class RowFeed:
         return (recorded - 1) // self.stride + 1 if recorded else 0
 
     def read(self, first: int, count: int) -> bytes:
-        """Return the bytes of `count` rows from `first` on, column by column: float32, shape (columns, count)."""
+        """Return the bytes of `count` rows from `first` on, column by column.
+
+        Float32, shape (columns, count).
+        """
         numbers = range(first * self.stride, (first + count) * self.stride, self.stride)
         table = np.empty((len(self.columns), count), "<f4")
         table[0] = [self._header.time_at(row * self._header.steps_per_row) for row in numbers]
@@ -56,7 +62,9 @@ class RowFeed:
     def _rows(self, numbers: range) -> np.ndarray:
         """Map rows into memory, because threads that read at the same time cannot share one file position."""
         size = self._dtype.itemsize
-        mapped = np.memmap(self._file, self._dtype, "r", numbers.start * size, (numbers[-1] - numbers.start + 1,))
+        mapped = np.memmap(
+            self._file, self._dtype, "r", numbers.start * size, (numbers[-1] - numbers.start + 1,)
+        )
         return mapped[:: self.stride]
 
     def close(self) -> None:

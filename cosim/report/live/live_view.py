@@ -81,25 +81,33 @@ class LiveView:
 
 def _wait_for_final_fetch(session: LiveSession) -> None:
     until = time.monotonic() + FINAL_FETCH_TIMEOUT
-    while time.monotonic() - session.last_viewed < FINAL_FETCH_TIMEOUT and not session.fully_viewed and time.monotonic() < until:
+    while (
+        time.monotonic() - session.last_viewed < FINAL_FETCH_TIMEOUT
+        and not session.fully_viewed
+        and time.monotonic() < until
+    ):
         time.sleep(0.02)
 
 
 def has_display() -> bool:
     """Return True if standard output is a terminal of a machine with a display."""
-    return sys.stdout.isatty() and (sys.platform == "darwin" or bool({"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys()))
+    return sys.stdout.isatty() and (
+        sys.platform == "darwin" or bool({"DISPLAY", "WAYLAND_DISPLAY"} & os.environ.keys())
+    )
 
 
 def open_browser(url: str, folder: Path) -> None:
     """Open the page in the browser.
 
-    The address is passed in a file in `folder` that only this user can read, because every user can read the arguments of a
-    process. The browser is started by an intermediate process that exits at once, because the children of a supervising process
-    are ended with it.
+    The address is passed in a file in `folder` that only this user can read, because every user can
+    read the arguments of a process. The browser is started by an intermediate process that exits at
+    once, because the children of a supervising process are ended with it.
     """
     file = folder / "open.html"
     with os.fdopen(os.open(file, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o600), "w") as target:
-        target.write(f'<!doctype html><meta http-equiv="refresh" content="0; url={url}"><title>cosim</title>')
+        target.write(
+            f'<!doctype html><meta http-equiv="refresh" content="0; url={url}"><title>cosim</title>'
+        )
     child = os.fork()
     if child == 0:
         try:

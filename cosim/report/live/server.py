@@ -42,7 +42,9 @@ _ACCEPT_RETRY_INTERVAL = 0.1
 LIVE_CONTENT_SECURITY_POLICY = f"{CONTENT_SECURITY_POLICY}; connect-src 'self'"
 
 _HEADERS = {
-    "Content-Security-Policy": f"{LIVE_CONTENT_SECURITY_POLICY}; base-uri 'none'; frame-ancestors 'none'",
+    "Content-Security-Policy": (
+        f"{LIVE_CONTENT_SECURITY_POLICY}; base-uri 'none'; frame-ancestors 'none'"
+    ),
     "Cross-Origin-Opener-Policy": "same-origin",
     "Cross-Origin-Resource-Policy": "same-origin",
     "Cache-Control": "no-store",
@@ -56,7 +58,9 @@ class RequestRefusedError(Exception):
 
 
 class LiveServer(ThreadingHTTPServer):
-    """Server in the supervising process: it accepts connections in one thread and handles each request in another.
+    """Server in the supervising process.
+
+    It accepts connections in one thread and handles each request in another.
 
     It listens as soon as it is created, and serves requests once `session` is set.
 
@@ -71,7 +75,8 @@ class LiveServer(ThreadingHTTPServer):
 
     def __init__(self, port: int, token: str) -> None:
         self.token = token
-        #: end of the admission (s, monotonic) of each open connection, oldest first; None for one that has sent the token
+        #: end of the admission (s, monotonic) of each open connection, oldest first; None for one
+        #: that has sent the token
         self._admissions: dict[socket.socket, float | None] = {}
         self._lock = Lock()
         super().__init__((HOST, port), _Handler)
@@ -94,7 +99,9 @@ class LiveServer(ThreadingHTTPServer):
         """Handle a connection in a thread; end the oldest one if there are too many."""
         with self._lock:
             if len(self._admissions) >= MAX_CONNECTIONS:
-                waiting = (connection for connection, end in self._admissions.items() if end is not None)
+                waiting = (
+                    connection for connection, end in self._admissions.items() if end is not None
+                )
                 self._end(next(waiting, next(iter(self._admissions))))
             self._admissions[request] = time.monotonic() + ADMISSION_TIMEOUT
         super().process_request(request, client_address)
@@ -106,10 +113,17 @@ class LiveServer(ThreadingHTTPServer):
                 self._admissions[connection] = None
 
     def service_actions(self) -> None:
-        """End the connections that have not sent the token in time; called twenty times per second."""
+        """End the connections that have not sent the token in time.
+
+        Called twenty times per second.
+        """
         now = time.monotonic()
         with self._lock:
-            for connection in [connection for connection, end in self._admissions.items() if end is not None and end < now]:
+            for connection in [
+                connection
+                for connection, end in self._admissions.items()
+                if end is not None and end < now
+            ]:
                 self._end(connection)
 
     def _end(self, connection: socket.socket) -> None:
@@ -184,7 +198,10 @@ class _Handler(BaseHTTPRequestHandler):
             self._send(refusal.args[0], "text/plain", refusal.args[0].phrase.encode())
 
     def _authorized_resource(self) -> str:
-        """Return the requested resource; refuse requests from other hosts, without the token, or from other pages."""
+        """Return the requested resource.
+
+        Refuse requests from other hosts, without the token, or from other pages.
+        """
         hosts, origins = (self.headers.get_all(name, []) for name in ("Host", "Origin"))
         if len(hosts) != 1 or hosts[0] not in self.server.allowed_hosts:
             raise RequestRefusedError(HTTPStatus.FORBIDDEN)
@@ -216,7 +233,9 @@ class _Handler(BaseHTTPRequestHandler):
         if first < 0:
             raise RequestRefusedError(HTTPStatus.BAD_REQUEST)
         state, rows = self.server.session.wait_for_rows(first, version)
-        self._send(HTTPStatus.OK, "application/octet-stream", json.dumps(state).encode() + b"\n" + rows)
+        self._send(
+            HTTPStatus.OK, "application/octet-stream", json.dumps(state).encode() + b"\n" + rows
+        )
 
     def _run_command(self) -> None:
         reply = self.server.session.send_command(self._read_message())
@@ -241,7 +260,11 @@ class _Handler(BaseHTTPRequestHandler):
 
     def _send(self, status: HTTPStatus, kind: str, body: bytes) -> None:
         self.send_response(status)
-        for name, value in {**_HEADERS, "Content-Type": kind, "Content-Length": str(len(body))}.items():
+        for name, value in {
+            **_HEADERS,
+            "Content-Type": kind,
+            "Content-Length": str(len(body)),
+        }.items():
             self.send_header(name, value)
         self.end_headers()
         self.wfile.write(body)
@@ -249,4 +272,6 @@ class _Handler(BaseHTTPRequestHandler):
 
 def _is_flat(value: Any) -> bool:
     """Return whether a JSON value is a scalar or a list of scalars, as all arguments of commands are."""
-    return not any(isinstance(part, dict | list) for part in (value if isinstance(value, list) else [value]))
+    return not any(
+        isinstance(part, dict | list) for part in (value if isinstance(value, list) else [value])
+    )

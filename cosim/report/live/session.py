@@ -1,4 +1,7 @@
-"""Session of a live view in the supervising process: state of the run, its rows, and commands to it."""
+"""Session of a live view in the supervising process.
+
+State of the run, its rows, and commands to it.
+"""
 
 from __future__ import annotations
 
@@ -26,14 +29,17 @@ MAX_ROWS = 2000
 
 
 class LiveSession:
-    """State of a live run and channel for commands; used by the request threads of the supervising process.
+    """State of a live run and channel for commands.
+
+    Used by the request threads of the supervising process.
 
     A separate thread receives the messages of the simulation process.
 
     Args:
         connection: The pipe to the simulation process.
         journal: The journal that the simulation process shares, with the number of recorded rows.
-        wait: Let the simulation begin when a page fetches rows for the first time; otherwise it begins at once.
+        wait: Let the simulation begin when a page fetches rows for the first time; otherwise it
+            begins at once.
     """
 
     def __init__(self, connection: Connection, journal: Journal, wait: bool = False) -> None:
@@ -44,9 +50,16 @@ class LiveSession:
         self._commands = 0
         self._values: dict[str, Any] = {}
         self._run_info: dict[str, Any] = {}
-        self._state: dict[str, Any] = {"version": 0, "paused": False, "speed": None, "time": 0.0, "ended": False}
+        self._state: dict[str, Any] = {
+            "version": 0,
+            "paused": False,
+            "speed": None,
+            "time": 0.0,
+            "ended": False,
+        }
         self.feed: RowFeed | None = None
-        #: time until which a page is considered open (s, monotonic), and whether it has fetched all rows
+        #: time until which a page is considered open (s, monotonic), and whether it has fetched all
+        #: rows
         self.last_viewed, self.fully_viewed = 0.0, False
         self._listener = Thread(target=self._listen, daemon=True)
 
@@ -55,7 +68,10 @@ class LiveSession:
         self._listener.start()
 
     def _listen(self) -> None:
-        """Receive messages until the simulation process closes the pipe; runs in a separate thread."""
+        """Receive messages until the simulation process closes the pipe.
+
+        Runs in a separate thread.
+        """
         try:
             while True:
                 self._handle_message(json.loads(self._connection.recv_bytes()))
@@ -69,7 +85,9 @@ class LiveSession:
             self.feed = RowFeed(folder, header, message["about"]["rows"])
             if not self._wait:
                 self._begin()
-        changes: dict[str, Any] = {key: message[key] for key in ("paused", "speed", "time", "ended") if key in message}
+        changes: dict[str, Any] = {
+            key: message[key] for key in ("paused", "speed", "time", "ended") if key in message
+        }
         with self._changed:
             self._run_info = message.get("about", self._run_info)
             self._state = {**self._state, **changes, "version": self._state["version"] + 1}
@@ -93,12 +111,22 @@ class LiveSession:
         self._replies.put({"id": None})
 
     def page_data(self) -> dict[str, Any] | None:
-        """Return the description of the run for the page; wait until there is one, and return None if the run ends before."""
+        """Return the description of the run for the page.
+
+        Wait until there is one, and return None if the run ends before.
+        """
         self._wait_until_started()
         if self.feed is None:
             return None
-        adjustable = [{**each, "value": self._values.get(each["name"], each["value"])} for each in self._run_info["adjustable"]]
-        layout = {"columns": self.feed.columns, "units": self.feed.units, "capacity": self.feed.capacity}
+        adjustable = [
+            {**each, "value": self._values.get(each["name"], each["value"])}
+            for each in self._run_info["adjustable"]
+        ]
+        layout = {
+            "columns": self.feed.columns,
+            "units": self.feed.units,
+            "capacity": self.feed.capacity,
+        }
         return {**self._run_info, **layout, "adjustable": adjustable}
 
     def _wait_until_started(self) -> None:
@@ -108,7 +136,8 @@ class LiveSession:
     def wait_for_rows(self, first: int, version: int) -> tuple[dict[str, Any], bytes]:
         """Return the state of the run and the rows from `first` on, as bytes (see `feed`).
 
-        Waits until there are such rows, the version of the state is not `version`, or LONG_POLL_TIMEOUT has passed.
+        Waits until there are such rows, the version of the state is not `version`, or
+        LONG_POLL_TIMEOUT has passed.
         """
         self._begin()
         self.last_viewed = until = time.monotonic() + LONG_POLL_TIMEOUT
@@ -135,7 +164,9 @@ class LiveSession:
             self._commands += 1
             try:
                 if not self._state["ended"]:
-                    self._connection.send_bytes(json.dumps({**message, "id": self._commands}).encode())
+                    self._connection.send_bytes(
+                        json.dumps({**message, "id": self._commands}).encode()
+                    )
             except OSError:
                 self.mark_ended()
             reply = self._wait_for_reply(self._commands)

@@ -1,4 +1,7 @@
-"""Comparison of a result with a reference: every signal has to stay in a tube around the reference."""
+"""Comparison of a result with a reference.
+
+Every signal has to stay in a tube around the reference.
+"""
 
 from .comparison import compare, needed_share
 from .tube import Tolerance, Tube

@@ -12,7 +12,15 @@ import numpy as np
 
 from ...core.errors import InputError, did_you_mean, pattern_hint
 from .. import Result
-from .tube import ComparisonPoints, TimeWindows, Tolerance, Tube, UniformTimeWindows, time_tolerance, uniform_spacing
+from .tube import (
+    ComparisonPoints,
+    TimeWindows,
+    Tolerance,
+    Tube,
+    UniformTimeWindows,
+    time_tolerance,
+    uniform_spacing,
+)
 from .verdict import Comparison, Verdict
 
 #: share of all points up to which it is faster to compute the tube only at these points
@@ -21,21 +29,24 @@ DENSE_FRACTION = 0.1
 SHARE_STEPS = 16
 #: a full turn in the units of angles
 TURNS = {"rad": 2 * math.pi, "deg": 360.0}
-#: largest range in turns of an angle that is kept within one turn; a little more than 1, because references are rounded
+#: largest range in turns of an angle that is kept within one turn; a little more than 1, because
+#: references are rounded
 MAX_WRAPPED_RANGE = 1.01
 
 
 def compare(result: Result, reference: Result, tolerances: Mapping[str, Tolerance]) -> Comparison:
     """Compare the signals of a reference that match a pattern with those of a result.
 
-    A signal fails if it leaves its tube (see `tube`), is missing, does not cover the time of the reference, or is NaN or infinite
-    in either. Strings fail if they differ. A pattern that matches no signal fails as well. Angles (rad, deg) that are kept within
-    one turn, such as -pi ... pi, differ by at most half a turn.
+    A signal fails if it leaves its tube (see `tube`), is missing, does not cover the time of the
+    reference, or is NaN or infinite in either. Strings fail if they differ. A pattern that matches
+    no signal fails as well. Angles (rad, deg) that are kept within one turn, such as -pi ... pi,
+    differ by at most half a turn.
 
     Args:
         result: The result.
         reference: The reference.
-        tolerances: Tolerance by pattern. "*" in a pattern matches any text, also dots. The last matching pattern counts.
+        tolerances: Tolerance by pattern. "*" in a pattern matches any text, also dots. The last
+            matching pattern counts.
 
     Raises:
         InputError: A tolerance is negative, NaN or infinite.
@@ -45,12 +56,27 @@ def compare(result: Result, reference: Result, tolerances: Mapping[str, Toleranc
     selected = match_tolerances(tolerances, list(reference))
     unmatched = [pattern for pattern in tolerances if not reference.signals(pattern)]
     general = [
-        Verdict(f'"{pattern}"', f"matches no signal of the reference{pattern_hint(pattern, reference)}") for pattern in unmatched
+        Verdict(
+            f'"{pattern}"', f"matches no signal of the reference{pattern_hint(pattern, reference)}"
+        )
+        for pattern in unmatched
     ]
     if not len(reference.time) or not len(result.time):
-        return Comparison((*general, Verdict("the reference" if not len(reference.time) else "the result", "has no rows")))
+        return Comparison(
+            (
+                *general,
+                Verdict(
+                    "the reference" if not len(reference.time) else "the result", "has no rows"
+                ),
+            )
+        )
     comparer = Comparer(result, reference)
-    return Comparison((*general, *(comparer.compare_signal(name, tolerance) for name, tolerance in selected.items())))
+    return Comparison(
+        (
+            *general,
+            *(comparer.compare_signal(name, tolerance) for name, tolerance in selected.items()),
+        )
+    )
 
 
 def needed_share(result: Result, reference: Result, tolerances: Mapping[str, Tolerance]) -> float:
@@ -67,7 +93,11 @@ def needed_share(result: Result, reference: Result, tolerances: Mapping[str, Tol
 
     def passes(step: int) -> bool:
         share = step / SHARE_STEPS
-        return compare(result, reference, {pattern: tolerance.scaled(share) for pattern, tolerance in tolerances.items()}).passed
+        return compare(
+            result,
+            reference,
+            {pattern: tolerance.scaled(share) for pattern, tolerance in tolerances.items()},
+        ).passed
 
     return bisect_left(range(SHARE_STEPS), True, key=passes) / SHARE_STEPS
 
@@ -76,20 +106,33 @@ def _find_tolerance_problems(tolerances: Mapping[str, Tolerance]) -> Iterator[st
     for pattern, tolerance in tolerances.items():
         for name, value in tolerance._asdict().items():
             if not 0 <= value < math.inf:
-                yield f'tolerance of "{pattern}": "{name}" is {value}, expected a finite number of at least 0'
+                yield (
+                    f'tolerance of "{pattern}": "{name}" is {value}, expected a finite number of '
+                    "at least 0"
+                )
 
 
 def match_tolerances(tolerances: Mapping[str, Tolerance], names: list[str]) -> dict[str, Tolerance]:
-    """Return the tolerance of each name that matches a pattern, in the order of `names`; the last matching pattern counts."""
+    """Return the tolerance of each name that matches a pattern, in the order of `names`.
+
+    The last matching pattern counts.
+    """
     patterns = [
-        (re.compile(".*".join(map(re.escape, pattern.split("*")))), tolerance) for pattern, tolerance in tolerances.items()
+        (re.compile(".*".join(map(re.escape, pattern.split("*")))), tolerance)
+        for pattern, tolerance in tolerances.items()
     ]
-    matching = ((name, [tolerance for pattern, tolerance in patterns if pattern.fullmatch(name)]) for name in names)
+    matching = (
+        (name, [tolerance for pattern, tolerance in patterns if pattern.fullmatch(name)])
+        for name in names
+    )
     return {name: matches[-1] for name, matches in matching if matches}
 
 
 class Comparer:
-    """Comparison of the signals of two results that have rows; everything that depends only on times is computed once."""
+    """Comparison of the signals of two results that have rows.
+
+    Everything that depends only on times is computed once.
+    """
 
     def __init__(self, result: Result, reference: Result):
         self._result, self._reference = result, reference
@@ -102,11 +145,15 @@ class Comparer:
     def series(self, name: str) -> tuple[np.ndarray, np.ndarray]:
         """Return a signal of the result at all `points` and that of the reference at its rows.
 
-        An angle that is kept within one turn is continued without jumps, and the reference is the nearest of its equal angles.
+        An angle that is kept within one turn is continued without jumps, and the reference is the
+        nearest of its equal angles.
         """
         result, reference = _to_floats(self._result, name), _to_floats(self._reference, name)
         turn = TURNS.get(self._unit(name))
-        if turn and turn / 2 < np.ptp(np.concatenate([result, reference])) <= MAX_WRAPPED_RANGE * turn:
+        if (
+            turn
+            and turn / 2 < np.ptp(np.concatenate([result, reference])) <= MAX_WRAPPED_RANGE * turn
+        ):
             result = np.unwrap(result, period=turn)
             distance = np.interp(self._reference.time, self._result.time, result) - reference
             reference = reference + turn * np.round(distance / turn)
@@ -114,9 +161,17 @@ class Comparer:
 
     def tube(self, name: str, tolerance: Tolerance, rows: slice | np.ndarray = slice(None)) -> Tube:
         """Return the tube around a signal of the reference, at all `points` or at those selected by `rows`."""
-        return self._tube(self.series(name)[1], self._half_width(name, tolerance), tolerance.time, rows)
+        return self._tube(
+            self.series(name)[1], self._half_width(name, tolerance), tolerance.time, rows
+        )
 
-    def _tube(self, reference: np.ndarray, half_width: float, reach: float, rows: slice | np.ndarray = slice(None)) -> Tube:
+    def _tube(
+        self,
+        reference: np.ndarray,
+        half_width: float,
+        reach: float,
+        rows: slice | np.ndarray = slice(None),
+    ) -> Tube:
         time = self.points.time[rows]
         if self._spacing and isinstance(rows, slice):
             lower, upper = UniformTimeWindows(self._spacing, reach).extremes(reference)
@@ -127,7 +182,11 @@ class Comparer:
     @cached_property
     def _spacing(self) -> float:
         """Distance between points (s) if they are the evenly spaced rows of the reference, else 0."""
-        return uniform_spacing(self.points.time) if np.array_equal(self.points.time, self._reference.time) else 0.0
+        return (
+            uniform_spacing(self.points.time)
+            if np.array_equal(self.points.time, self._reference.time)
+            else 0.0
+        )
 
     def _half_width(self, name: str, tolerance: Tolerance) -> float:
         return tolerance.half_width(_to_floats(self._reference, name))
@@ -159,9 +218,14 @@ class Comparer:
             yield Verdict(name, f"holds text in the {texts[0]}, and numbers in the other")
         if not texts:
             yield from self._find_non_finite(
-                name, "result", self.points.time, self.points.interpolate_result(_to_floats(self._result, name))
+                name,
+                "result",
+                self.points.time,
+                self.points.interpolate_result(_to_floats(self._result, name)),
             )
-            yield from self._find_non_finite(name, "reference", self._reference.time, _to_floats(self._reference, name))
+            yield from self._find_non_finite(
+                name, "reference", self._reference.time, _to_floats(self._reference, name)
+            )
 
     @cached_property
     def _coverage_problem(self) -> str:
@@ -170,30 +234,48 @@ class Comparer:
         margin = time_tolerance(expected)
         if time[0] - margin <= expected[0] and expected[-1] <= time[-1] + margin:
             return ""
-        return f"covers {time[0]:g} s to {time[-1]:g} s only, the reference {expected[0]:g} s to {expected[-1]:g} s"
+        return (
+            f"covers {time[0]:g} s to {time[-1]:g} s only, the reference {expected[0]:g} s to "
+            f"{expected[-1]:g} s"
+        )
 
     @staticmethod
-    def _find_non_finite(name: str, role: str, time: np.ndarray, values: np.ndarray) -> Iterator[Verdict]:
+    def _find_non_finite(
+        name: str, role: str, time: np.ndarray, values: np.ndarray
+    ) -> Iterator[Verdict]:
         """Yield a verdict on the first value that is NaN or infinite."""
         rows = np.flatnonzero(~np.isfinite(values))
         if rows.size:
             row = rows[0]
-            yield Verdict(name, f"is {values[row]} at t = {time[row]:g} s in the {role}", float(time[row]))
+            yield Verdict(
+                name, f"is {values[row]} at t = {time[row]:g} s in the {role}", float(time[row])
+            )
 
     def _compare_texts(self, name: str) -> Verdict:
         """Compare strings, which hold until the next row, at the rows of both runs."""
         own, other = self._result.time, self._reference.time
-        covered = own[(own >= other[0] - time_tolerance(other)) & (own <= other[-1] + time_tolerance(other))]
+        covered = own[
+            (own >= other[0] - time_tolerance(other)) & (own <= other[-1] + time_tolerance(other))
+        ]
         time = np.union1d(covered, other)
-        actual, expected = (_sample_and_hold(run, name, time) for run in (self._result, self._reference))
+        actual, expected = (
+            _sample_and_hold(run, name, time) for run in (self._result, self._reference)
+        )
         different = np.flatnonzero(actual != expected)
         if not different.size:
             return Verdict(name, excess=-math.inf)
         row = different[0]
-        return Verdict(name, f'is "{actual[row]}" at t = {time[row]:g} s, expected "{expected[row]}"', float(time[row]))
+        return Verdict(
+            name,
+            f'is "{actual[row]}" at t = {time[row]:g} s, expected "{expected[row]}"',
+            float(time[row]),
+        )
 
     def _compare_numbers(self, name: str, tolerance: Tolerance) -> Verdict:
-        """Compare numbers; the tube is computed only at points where the deviation exceeds the half height of the tube."""
+        """Compare numbers.
+
+        The tube is computed only at points where the deviation exceeds the half height of the tube.
+        """
         values, reference = self.series(name)
         half_width = self._half_width(name, tolerance)
         deviation = np.abs(values - self.points.interpolate_reference(reference))
@@ -203,21 +285,41 @@ class Comparer:
         distance = np.maximum(tube.lower - values[rows], values[rows] - tube.upper)
         if distance.max(initial=0) > 0:
             return self._tube_violation(name, tube, values[rows], distance, half_width)
-        return Verdict(name, time=math.inf, excess=_relative_excess(min(float(deviation.max()) - half_width, 0.0), half_width))
+        return Verdict(
+            name,
+            time=math.inf,
+            excess=_relative_excess(min(float(deviation.max()) - half_width, 0.0), half_width),
+        )
 
-    def _tube_violation(self, name: str, tube: Tube, values: np.ndarray, distance: np.ndarray, half_width: float) -> Verdict:
+    def _tube_violation(
+        self, name: str, tube: Tube, values: np.ndarray, distance: np.ndarray, half_width: float
+    ) -> Verdict:
         """Return the verdict on a signal whose `distance` outside the tube is positive at some points."""
         outside = np.flatnonzero(distance > 0)
         row, worst, unit = outside[0], int(distance.argmax()), self._unit_suffix(name)
         time, excess = float(tube.time[row]), _relative_excess(distance[worst], half_width)
         share = f"{outside.size} of {self.points.time.size} points outside"
         expected = float(np.interp(time, self._reference.time, _to_floats(self._reference, name)))
-        if half_width < 1 and self._is_discrete(name) and expected.is_integer() and float(values[row]).is_integer():
-            return Verdict(name, f"is {values[row]:g} at t = {time:g} s, expected {expected:g}; {share}", time, excess)
-        side, bound = ("above", tube.upper) if values[row] > tube.upper[row] else ("below", tube.lower)
+        if (
+            half_width < 1
+            and self._is_discrete(name)
+            and expected.is_integer()
+            and float(values[row]).is_integer()
+        ):
+            return Verdict(
+                name,
+                f"is {values[row]:g} at t = {time:g} s, expected {expected:g}; {share}",
+                time,
+                excess,
+            )
+        side, bound = (
+            ("above", tube.upper) if values[row] > tube.upper[row] else ("below", tube.lower)
+        )
         text = (
-            f"leaves its tube at t = {time:g} s: {values[row]:.6g}{unit} is {distance[row]:.3g}{unit} {side} "
-            f"its limit {bound[row]:.6g}{unit}; at most {distance[worst]:.3g}{unit} outside, at t = {tube.time[worst]:g} s; "
+            f"leaves its tube at t = {time:g} s: {values[row]:.6g}{unit} is "
+            f"{distance[row]:.3g}{unit} {side} "
+            f"its limit {bound[row]:.6g}{unit}; at most {distance[worst]:.3g}{unit} outside, at t "
+            f"= {tube.time[worst]:g} s; "
             f"{share}"
         )
         return Verdict(name, text, time, excess)
@@ -225,7 +327,9 @@ class Comparer:
     def _is_discrete(self, name: str) -> bool:
         """Return whether all values of both runs are integers without a unit, Booleans for example."""
         runs = (_to_floats(self._result, name), _to_floats(self._reference, name))
-        return not self._unit_suffix(name) and all(np.array_equal(values, np.round(values)) for values in runs)
+        return not self._unit_suffix(name) and all(
+            np.array_equal(values, np.round(values)) for values in runs
+        )
 
     def _unit_suffix(self, name: str) -> str:
         unit = self._unit(name)

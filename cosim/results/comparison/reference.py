@@ -24,7 +24,8 @@ MAX_ROW_DISTANCE = 64
 TOLERANCE_FRACTION = 0.25
 #: fraction of the half width of a tube to which values are rounded
 ROUNDING_FRACTION = 0.01
-#: largest number of Python files of a folder that have a hash each; those of larger folders have one
+#: largest number of Python files of a folder that have a hash each; those of larger folders have
+#: one
 MAX_SINGLE_MODULES = 5
 
 _PROVENANCE_KEYS = ("versions", "machine", "sha256")
@@ -44,35 +45,57 @@ def decimate(result: Result, tolerances: Mapping[str, Tolerance]) -> Result:
         CheckError: The run cannot be a reference: a pattern matches no signal, or a value is not finite.
     """
     if unmatched := [pattern for pattern in tolerances if not result.signals(pattern)]:
-        texts = (f'"{pattern}" matches no recorded signal{pattern_hint(pattern, result)}' for pattern in unmatched)
+        texts = (
+            f'"{pattern}" matches no recorded signal{pattern_hint(pattern, result)}'
+            for pattern in unmatched
+        )
         raise CheckError(f"this run is no reference: {'; '.join(texts)}")
     selected = match_tolerances(tolerances, list(result))
     rounded = {name: _round(result[name], tolerance) for name, tolerance in selected.items()}
-    source = Result(Recording(result.time, rounded, {name: result.units[name] for name in selected}))
+    source = Result(
+        Recording(result.time, rounded, {name: result.units[name] for name in selected})
+    )
     whole = _select_rows(np.arange(len(result.time)), source)
     comparison = compare(result, whole, tolerances)
     if not comparison.passed:
         raise CheckError(f"this run is no reference: {comparison}")
-    rows = np.unique(np.append(np.arange(0, len(result.time), MAX_ROW_DISTANCE), len(result.time) - 1))
-    while (outside := _find_rows_outside(result, reference := _select_rows(rows, source), selected, rows)).size:
+    rows = np.unique(
+        np.append(np.arange(0, len(result.time), MAX_ROW_DISTANCE), len(result.time) - 1)
+    )
+    while (
+        outside := _find_rows_outside(
+            result, reference := _select_rows(rows, source), selected, rows
+        )
+    ).size:
         gaps = np.searchsorted(rows, outside) - 1
         rows = np.union1d(rows, (rows[gaps] + rows[gaps + 1]) // 2)
     return reference
 
 
 def _round(values: np.ndarray, tolerance: Tolerance) -> np.ndarray:
-    """Round floating-point values to the decimal place below a hundredth of the tolerance; keep all others."""
+    """Round floating-point values to the decimal place below a hundredth of the tolerance.
+
+    Keep all others.
+    """
     half_width = tolerance.half_width(values) if values.dtype.kind == "f" else 0.0
     if not 0 < half_width < math.inf:
         return values
-    return np.round(values, -math.floor(math.log10(ROUNDING_FRACTION * half_width))) + 0.0  # no negative zeros
+    return (
+        np.round(values, -math.floor(math.log10(ROUNDING_FRACTION * half_width))) + 0.0
+    )  # no negative zeros
 
 
 def _select_rows(rows: np.ndarray, result: Result) -> Result:
-    return Result(Recording(result.time[rows], {name: result[name][rows] for name in result}, dict(result.units)))
+    return Result(
+        Recording(
+            result.time[rows], {name: result[name][rows] for name in result}, dict(result.units)
+        )
+    )
 
 
-def _find_rows_outside(result: Result, reference: Result, tolerances: Mapping[str, Tolerance], rows: np.ndarray) -> np.ndarray:
+def _find_rows_outside(
+    result: Result, reference: Result, tolerances: Mapping[str, Tolerance], rows: np.ndarray
+) -> np.ndarray:
     """Return the rows of the result outside a fraction of the tolerances around a reference that consists of `rows`."""
     comparer = Comparer(result, reference)
     last = np.searchsorted(reference.time, result.time, "right") - 1
@@ -87,7 +110,9 @@ def _find_rows_outside(result: Result, reference: Result, tolerances: Mapping[st
 
 
 def write_reference(result: Result, path: Path, tolerances: Mapping[str, Tolerance]) -> Result:
-    """Write a reference (CSV) and its provenance (JSON with the same name): versions, machine and hashes of all files.
+    """Write a reference (CSV) and its provenance (JSON with the same name).
+
+    Versions, machine and hashes of all files.
 
     Args:
         result: The run; the same run gives the same bytes.
@@ -104,7 +129,11 @@ def write_reference(result: Result, path: Path, tolerances: Mapping[str, Toleran
     """
     reference = decimate(result, tolerances)
     reference.to_csv(path)
-    about = {"name": result.metadata.get("name"), "signals": len(reference), "rows": len(reference.time)}
+    about = {
+        "name": result.metadata.get("name"),
+        "signals": len(reference),
+        "rows": len(reference.time),
+    }
     write_json({**about, **_provenance(result.metadata)}, path.with_suffix(".json"))
     return reference
 
@@ -115,12 +144,17 @@ def _provenance(metadata: Mapping[str, Any]) -> dict[str, Any]:
     counts = Counter(filter(None, map(_modules_of, hashes)))
     return {
         **{key: metadata.get(key) for key in _PROVENANCE_KEYS},
-        "sha256": _join_modules(hashes, {name for name, count in counts.items() if count > MAX_SINGLE_MODULES}),
+        "sha256": _join_modules(
+            hashes, {name for name, count in counts.items() if count > MAX_SINGLE_MODULES}
+        ),
     }
 
 
 def _modules_of(name: str) -> str:
-    """Return the pattern of the Python files in the folder of a Python file, such as "a/*.py"; "" for another file."""
+    """Return the pattern of the Python files in the folder of a Python file, such as "a/*.py".
+
+    "" for another file.
+    """
     return f"{name.rpartition('/')[0]}/*.py".lstrip("/") if name.endswith(".py") else ""
 
 
@@ -128,9 +162,12 @@ def _join_modules(hashes: Mapping[str, str], joined: Collection[str]) -> dict[st
     """Return the hashes of files, with one for all Python files that one of the patterns `joined` stands for."""
     lines: dict[str, list[str]] = defaultdict(list)
     for name in sorted(hashes):
-        lines[pattern if (pattern := _modules_of(name)) in joined else name].append(f"{name} {hashes[name]}\n")
+        lines[pattern if (pattern := _modules_of(name)) in joined else name].append(
+            f"{name} {hashes[name]}\n"
+        )
     return {
-        name: hashes[name] if name in hashes else sha256("".join(own).encode()).hexdigest() for name, own in sorted(lines.items())
+        name: hashes[name] if name in hashes else sha256("".join(own).encode()).hexdigest()
+        for name, own in sorted(lines.items())
     }
 
 
@@ -151,5 +188,8 @@ def describe_provenance_changes(
         if key == "sha256":
             new = _join_modules(new, old.keys())
         names = [name for name in {**old, **new} if old.get(name) != new.get(name)]
-        changes += [shown(name) if key == "sha256" else f"{name} {old.get(name)} -> {new.get(name)}" for name in names]
+        changes += [
+            shown(name) if key == "sha256" else f"{name} {old.get(name)} -> {new.get(name)}"
+            for name in names
+        ]
     return changes

@@ -1,14 +1,15 @@
 """Tube around a reference, and the points at which a result is compared with it.
 
-The reference is the polyline through its rows. The tube is the area covered by a rectangle whose centre moves along the polyline.
-Its half length is `time`; its half height is the larger of `absolute` and `relative` times the range (maximum - minimum) of the
-reference. Hence
+The reference is the polyline through its rows. The tube is the area covered by a rectangle whose
+centre moves along the polyline. Its half length is `time`; its half height is the larger of
+`absolute` and `relative` times the range (maximum - minimum) of the reference. Hence
 
-    lower(t) = min r(s) - half_width, upper(t) = max r(s) + half_width over all s of the reference with |s - t| <= time.
+    lower(t) = min r(s) - half_width, upper(t) = max r(s) + half_width over all s of the reference
+    with |s - t| <= time.
 
-Two rows with the same time are a jump, and the reference then includes all values between the two rows. This is the tube of
-funnel and pyfunnel
-(Lawrence Berkeley National Laboratory) without their tolerance relative to the local value.
+Two rows with the same time are a jump, and the reference then includes all values between the two
+rows. This is the tube of funnel and pyfunnel (Lawrence Berkeley National Laboratory) without their
+tolerance relative to the local value.
 """
 
 from __future__ import annotations
@@ -75,8 +76,9 @@ class TimeWindows:
     def _include_rows(self, choose: np.ufunc, extremes: np.ndarray, row: np.ndarray) -> np.ndarray:
         """Extend the extremes of the edges by all rows inside the windows.
 
-        The windows are processed in rounds by their number of rows. In round k, `row[i]` is the extreme of the 2**k rows from i
-        on. Two such pieces, which may overlap, cover each window of the round.
+        The windows are processed in rounds by their number of rows. In round k, `row[i]` is the
+        extreme of the 2**k rows from i on. Two such pieces, which may overlap, cover each window of
+        the round.
         """
         for k, (windows, left, right) in enumerate(self._levels):
             if k:
@@ -86,7 +88,9 @@ class TimeWindows:
         return extremes
 
 
-def _doubling_levels(first: np.ndarray, last: np.ndarray) -> Iterable[tuple[np.ndarray, np.ndarray, np.ndarray]]:
+def _doubling_levels(
+    first: np.ndarray, last: np.ndarray
+) -> Iterable[tuple[np.ndarray, np.ndarray, np.ndarray]]:
     """Yield for each k the windows of 2**k to 2**(k+1) - 1 rows, and the indices where their first and last 2**k rows begin."""
     exponents = np.frexp(np.maximum(last - first + 1, 0))[1] - 1
     for k in range(int(exponents.max(initial=-1)) + 1):
@@ -102,7 +106,9 @@ class _Interpolation:
         self._left = np.clip(np.searchsorted(time, moments, "right") - 1, 0, max(len(time) - 2, 0))
         self._right = np.minimum(self._left + 1, len(time) - 1)
         length = time[self._right] - time[self._left]
-        self._fraction = np.divide(moments - time[self._left], length, out=np.zeros(len(moments)), where=length > 0)
+        self._fraction = np.divide(
+            moments - time[self._left], length, out=np.zeros(len(moments)), where=length > 0
+        )
 
     def values(self, reference: np.ndarray) -> np.ndarray:
         """Return the values at the moments, shape (moments,)."""
@@ -111,7 +117,10 @@ class _Interpolation:
 
 
 class UniformTimeWindows:
-    """Windows like `TimeWindows` around every row of an evenly spaced reference; about nine times faster."""
+    """Windows like `TimeWindows` around every row of an evenly spaced reference.
+
+    About nine times faster.
+    """
 
     def __init__(self, spacing: float, reach: float):
         rows = reach / spacing
@@ -124,8 +133,13 @@ class UniformTimeWindows:
         padded = np.pad(reference, count + 1, mode="edge")
         begins = self._interpolate_edges(padded[1:], padded, rows)
         ends = self._interpolate_edges(padded[2 * count + 1 :], padded[2 * count + 2 :], rows)
-        lower, upper = (_sliding_extreme(choose, padded[1:-1], 2 * count + 1) for choose in (np.minimum, np.maximum))
-        return np.minimum(lower, np.minimum(begins, ends)), np.maximum(upper, np.maximum(begins, ends))
+        lower, upper = (
+            _sliding_extreme(choose, padded[1:-1], 2 * count + 1)
+            for choose in (np.minimum, np.maximum)
+        )
+        return np.minimum(lower, np.minimum(begins, ends)), np.maximum(
+            upper, np.maximum(begins, ends)
+        )
 
     def _interpolate_edges(self, last: np.ndarray, beyond: np.ndarray, rows: int) -> np.ndarray:
         """Interpolate between the last row inside each window and the next one outside."""
@@ -147,7 +161,9 @@ def uniform_spacing(time: np.ndarray) -> float:
         return 0.0
     spacing = float(time[-1] - time[0]) / (len(time) - 1)
     even = time[0] + spacing * np.arange(len(time))
-    return spacing if spacing > 0 and np.abs(even - time).max() < _SPACING_TOLERANCE * spacing else 0.0
+    return (
+        spacing if spacing > 0 and np.abs(even - time).max() < _SPACING_TOLERANCE * spacing else 0.0
+    )
 
 
 def time_tolerance(time: np.ndarray) -> float:
@@ -158,8 +174,8 @@ def time_tolerance(time: np.ndarray) -> float:
 class ComparisonPoints:
     """Points at which a result is compared with a reference.
 
-    These are the rows of the result within the span of the reference, and the times of the reference between them, at which the
-    result is interpolated linearly.
+    These are the rows of the result within the span of the reference, and the times of the
+    reference between them, at which the result is interpolated linearly.
 
     Attributes:
         time: Times of the points (s), shape (points,).
@@ -174,7 +190,9 @@ class ComparisonPoints:
         )
         self._reference_times = np.setdiff1d(reference_time, result_time)
         times = np.concatenate([result_time[self._rows], self._reference_times])
-        self._order = np.argsort(times, kind="stable") if self._reference_times.size else slice(None)
+        self._order = (
+            np.argsort(times, kind="stable") if self._reference_times.size else slice(None)
+        )
         self.time = times[self._order]
         self._reference_time = reference_time
 
@@ -189,4 +207,6 @@ class ComparisonPoints:
         own = result[self._rows]
         if not self._reference_times.size:
             return own
-        return np.concatenate([own, np.interp(self._reference_times, self._result_time, result)])[self._order]
+        return np.concatenate([own, np.interp(self._reference_times, self._result_time, result)])[
+            self._order
+        ]

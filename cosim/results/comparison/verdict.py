@@ -19,8 +19,9 @@ class Verdict(NamedTuple):
         signal: Name of the signal.
         problem: Description of the first deviation; "" if the signal passes.
         time: Time of the first deviation (s): -inf if it has no time, inf if there is none.
-        excess: Largest distance outside the tube in half heights of the tube; inf if nothing can be compared or the height is 0.
-            If no point is outside, a number from -1 (on the reference) to 0 (half a height from it).
+        excess: Largest distance outside the tube in half heights of the tube; inf if nothing can be
+            compared or the height is 0. If no point is outside, a number from -1 (on the reference)
+            to 0 (half a height from it).
     """
 
     signal: str
@@ -51,12 +52,18 @@ class Comparison:
     @property
     def failures(self) -> list[Verdict]:
         """Verdicts that failed, the earliest first."""
-        return sorted((verdict for verdict in self.verdicts if not verdict.passed), key=lambda verdict: verdict.time)
+        return sorted(
+            (verdict for verdict in self.verdicts if not verdict.passed),
+            key=lambda verdict: verdict.time,
+        )
 
     @property
     def worst(self) -> list[Verdict]:
         """Verdicts on all signals that were compared with a tube, the largest excess first."""
-        return sorted((verdict for verdict in self.verdicts if verdict.time > -math.inf), key=lambda verdict: -verdict.excess)
+        return sorted(
+            (verdict for verdict in self.verdicts if verdict.time > -math.inf),
+            key=lambda verdict: -verdict.excess,
+        )
 
     def __str__(self) -> str:
         """Return a summary in one line, and one line per failure."""
@@ -73,4 +80,8 @@ class Comparison:
         if not failures:
             return [f"{count_noun(len(self.verdicts), 'signal')} compared, none leaves its tube"]
         more = [f"... and {len(failures) - listed} more"] if len(failures) > listed else []
-        return [f"{len(failures)} of {count_noun(len(self.verdicts), 'signal')} failed", *map(str, failures[:listed]), *more]
+        return [
+            f"{len(failures)} of {count_noun(len(self.verdicts), 'signal')} failed",
+            *map(str, failures[:listed]),
+            *more,
+        ]

@@ -1,1 +1,4 @@
-"""Controller benchmark: a candidate replaces the shipped controller in every scenario with its role."""
+"""Controller benchmark.
+
+A candidate replaces the shipped controller in every scenario with its role.
+"""

@@ -1,4 +1,7 @@
-"""Candidate controller of a benchmark: its source, its interface, and the check of the interface against a role."""
+"""Candidate controller of a benchmark.
+
+Its source, its interface, and the check of the interface against a role.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,11 @@ from .role import Role
 
 _CANDIDATE = "candidate"
 _SOURCE_KINDS = {".fmu": "fmu", ".py": "python", ".mo": "modelica", ".json": "system"}
-_CAUSALITIES = {"inputs": ("input",), "outputs": ("output",), "parameters": ("parameter", "structuralParameter")}
+_CAUSALITIES = {
+    "inputs": ("input",),
+    "outputs": ("output",),
+    "parameters": ("parameter", "structuralParameter"),
+}
 
 
 @dataclass(frozen=True)
@@ -50,10 +57,14 @@ def parse_source(text: str) -> CandidateSource:
     path = Path(file)
     kind = _SOURCE_KINDS.get(path.suffix)
     if kind is None or bool(separator) != (kind in ("python", "modelica")):
-        raise InputError(f'expected my.fmu, my.py:Class, my.mo:Model or a nested system my.json, found "{text}"')
+        raise InputError(
+            f'expected my.fmu, my.py:Class, my.mo:Model or a nested system my.json, found "{text}"'
+        )
     if not path.is_file():
         raise InputError(f'there is no file "{file}"{nearest_file(path)}')
-    return CandidateSource({kind: f"{path.resolve()}{separator}{member}"}, member or path.stem, text)
+    return CandidateSource(
+        {kind: f"{path.resolve()}{separator}{member}"}, member or path.stem, text
+    )
 
 
 @dataclass(frozen=True)
@@ -64,7 +75,8 @@ class CandidateInterface:
         inputs: input variables.
         outputs: output variables.
         parameters: parameters, also structural ones.
-        inner_variables: variables of a nested system's own components, which scenarios may set and record, too.
+        inner_variables: variables of a nested system's own components, which scenarios may set and
+            record, too.
     """
 
     inputs: Mapping[str, Variable]
@@ -82,7 +94,9 @@ class CandidateInterface:
         head, star, tail = name.partition("*")
         if star:
             return any(each.startswith(head) and each.endswith(tail) for each in self.names)
-        return not name or any(each == name or each.startswith((f"{name}.", f"{name}[")) for each in self.names)
+        return not name or any(
+            each == name or each.startswith((f"{name}.", f"{name}[")) for each in self.names
+        )
 
 
 def read_interface(candidate: CandidateSource) -> CandidateInterface:
@@ -91,18 +105,27 @@ def read_interface(candidate: CandidateSource) -> CandidateInterface:
     Raises:
         InputError: if it cannot be loaded, with the problems of a scenario that contains it.
     """
-    scenario = {"name": _CANDIDATE, "stop_time": 1, "step_size": 1, "components": {_CANDIDATE: dict(candidate.entry)}}
+    scenario = {
+        "name": _CANDIDATE,
+        "stop_time": 1,
+        "step_size": 1,
+        "components": {_CANDIDATE: dict(candidate.entry)},
+    }
     with TemporaryDirectory(prefix="cosim-") as folder:
         file = Path(folder) / f"{_CANDIDATE}.json"
         file.write_text(json.dumps(scenario), encoding="utf-8")
         try:
             prepared = load(file, {"/step_size": _common_step(file)})
         except InputError as error:
-            raise InputError([_with_user_location(problem, file, candidate) for problem in error.problems]) from None
+            raise InputError(
+                [_with_user_location(problem, file, candidate) for problem in error.problems]
+            ) from None
     try:
         root, components = prepared.root, prepared.system.components
         return (
-            _system_interface(root, components) if _CANDIDATE in root.children else _component_interface(components[_CANDIDATE])
+            _system_interface(root, components)
+            if _CANDIDATE in root.children
+            else _component_interface(components[_CANDIDATE])
         )
     finally:
         prepared.free()
@@ -110,20 +133,31 @@ def read_interface(candidate: CandidateSource) -> CandidateInterface:
 
 def _with_user_location(problem: Problem, file: Path, candidate: CandidateSource) -> Problem:
     """Replace the position of a problem in the temporary scenario `file` by the user's own text."""
-    return replace(problem, where=candidate.text) if problem.where.startswith(str(file)) else problem
+    return (
+        replace(problem, where=candidate.text) if problem.where.startswith(str(file)) else problem
+    )
 
 
 def _common_step(file: Path) -> str:
     """Return the largest step size (s) that divides 1 s and the periods of all components."""
-    specs = (spec for node in load_scenario(file).root.walk() for spec in node.spec.components.values())
+    specs = (
+        spec for node in load_scenario(file).root.walk() for spec in node.spec.components.values()
+    )
     periods = [Fraction(1), *(spec.period for spec in specs if spec.period)]
     denominator = math.lcm(*(period.denominator for period in periods))
-    return fraction_text(Fraction(math.gcd(*(int(period * denominator) for period in periods)), denominator))
+    return fraction_text(
+        Fraction(math.gcd(*(int(period * denominator) for period in periods)), denominator)
+    )
 
 
 def _component_interface(component: Component) -> CandidateInterface:
     inputs, outputs, parameters = (
-        {slot: v for v in component.variables if v.causality in causalities for slot in v.scalar_names}
+        {
+            slot: v
+            for v in component.variables
+            if v.causality in causalities
+            for slot in v.scalar_names
+        }
         for causalities in _CAUSALITIES.values()
     )
     return CandidateInterface(inputs, outputs, parameters)
@@ -136,11 +170,15 @@ def _system_interface(root: Node, components: Mapping[str, Component]) -> Candid
         for v in c.variables
         for slot in v.scalar_names
     }
-    inputs, outputs, parameters = (dict(_port_variables(root, components, kind)) for kind in _CAUSALITIES)
+    inputs, outputs, parameters = (
+        dict(_port_variables(root, components, kind)) for kind in _CAUSALITIES
+    )
     return CandidateInterface(inputs, outputs, parameters, frozenset(inner))
 
 
-def _port_variables(root: Node, components: Mapping[str, Component], kind: str) -> Iterator[tuple[str, Variable]]:
+def _port_variables(
+    root: Node, components: Mapping[str, Component], kind: str
+) -> Iterator[tuple[str, Variable]]:
     """Yield the variables behind the ports of one kind by their names outside the nested system."""
     nested = cast(NestedSpec, root.children[_CANDIDATE].spec)
     for port in getattr(nested.ports, kind):
@@ -159,7 +197,9 @@ def _port_targets(root: Node, port: str, kind: str) -> list[Target]:
         raise InputError(str(error)) from None
 
 
-def interface_problems(role: Role, interface: CandidateInterface, settings: Iterable[str] = ()) -> list[Problem]:
+def interface_problems(
+    role: Role, interface: CandidateInterface, settings: Iterable[str] = ()
+) -> list[Problem]:
     """Return all problems for which a controller cannot take a role.
 
     Args:
@@ -170,10 +210,21 @@ def interface_problems(role: Role, interface: CandidateInterface, settings: Iter
     short = {short: role.parameters[name] for name, short in role.short_names.items()}
     expected = {**short, **role.inputs, **role.outputs, **role.parameters}
     return [
-        *(_missing_output(name, role, interface) for name in role.outputs if name not in interface.outputs),
-        *(_unexpected_input(name, role, interface) for name in interface.inputs if name not in role.inputs),
         *(
-            Problem(f'"{name}" has the unit "{variable.unit.name}", expected "{unit.name}" or a unit that converts to it')
+            _missing_output(name, role, interface)
+            for name in role.outputs
+            if name not in interface.outputs
+        ),
+        *(
+            _unexpected_input(name, role, interface)
+            for name in interface.inputs
+            if name not in role.inputs
+        ),
+        *(
+            Problem(
+                f'"{name}" has the unit "{variable.unit.name}", expected "{unit.name}" or a unit '
+                "that converts to it"
+            )
             for variables in (interface.inputs, interface.outputs, interface.parameters)
             for name, variable in variables.items()
             if (unit := expected.get(name) or role.parameters.get(name.partition("[")[0]))
@@ -189,7 +240,9 @@ def interface_problems(role: Role, interface: CandidateInterface, settings: Iter
 
 
 def _name_hint(name: str, interface: CandidateInterface) -> str:
-    return did_you_mean(name, {*interface.parameters, *interface.inner_variables, *interface.inputs})
+    return did_you_mean(
+        name, {*interface.parameters, *interface.inner_variables, *interface.inputs}
+    )
 
 
 def _missing_output(name: str, role: Role, interface: CandidateInterface) -> Problem:

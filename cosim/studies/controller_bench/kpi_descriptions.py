@@ -12,15 +12,19 @@ from ...scenario.evaluation_schema import FunctionSpec
 from ...scenario.function_definitions import function_definition
 from ...scenario.named_functions import definition_problem
 
-#: item of a docstring's list of values, such as "- `time[1]`, `time[2]`, ...: time of each (s)", with its continuation lines
-_ITEM = re.compile(r"^ *- ((?:`[\w\[\]]+`(?:, )?)+)(?:\.\.\.)?: (.+(?:\n +(?!- )\S.*)*)", re.MULTILINE)
+#: item of a docstring's list of values, such as "- `time[1]`, `time[2]`, ...: time of each (s)",
+#: with its continuation lines
+_ITEM = re.compile(
+    r"^ *- ((?:`[\w\[\]]+`(?:, )?)+)(?:\.\.\.)?: (.+(?:\n +(?!- )\S.*)*)", re.MULTILINE
+)
 _NAME = re.compile(r"`(\w+)")
 
 
 def describe_kpis(kpis: Iterable[Mapping[str, Any]], folder: Path) -> dict[str, str]:
     """Return the meaning of the KPI values of a scenario by name without indices.
 
-    A KPI's own name has the first line of the docstring and the arguments, for values that the docstring does not list.
+    A KPI's own name has the first line of the docstring and the arguments, for values that the
+    docstring does not list.
 
     Args:
         kpis: the KPIs as in the scenario.
@@ -28,8 +32,14 @@ def describe_kpis(kpis: Iterable[Mapping[str, Any]], folder: Path) -> dict[str, 
     """
     found: dict[str, str] = {}
     for spec in map(FunctionSpec.model_validate, kpis):
-        text = "" if definition_problem(spec, folder) else ast.get_docstring(function_definition(spec, folder)) or ""
-        found |= {f"{spec.name}.{value}": meaning for value, meaning in _value_meanings(text).items()}
+        text = (
+            ""
+            if definition_problem(spec, folder)
+            else ast.get_docstring(function_definition(spec, folder)) or ""
+        )
+        found |= {
+            f"{spec.name}.{value}": meaning for value, meaning in _value_meanings(text).items()
+        }
         if text:
             found[spec.name] = _function_meaning(text.partition("\n")[0], spec.arguments)
     return found
@@ -42,7 +52,9 @@ def kpi_description(name: str, descriptions: Mapping[str, str]) -> str:
 
 
 def _value_meanings(docstring: str) -> dict[str, str]:
-    items = ((names, " ".join(text.replace("`", "").split())) for names, text in _ITEM.findall(docstring))
+    items = (
+        (names, " ".join(text.replace("`", "").split())) for names, text in _ITEM.findall(docstring)
+    )
     return {name: text for names, text in items for name in _NAME.findall(names)}
 
 

@@ -1,4 +1,7 @@
-"""Controllers of a role beside those that the scenarios contain: their order, and the page `bench.html`."""
+"""Controllers of a role beside those that the scenarios contain.
+
+Their order, and the page `bench.html`.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +49,10 @@ class BenchedController:
 
 
 def order(controllers: Sequence[BenchedController]) -> list[BenchedController]:
-    """Return the controllers by checks passed, then scenarios passed, then goals; the best first."""
+    """Return the controllers by checks passed, then scenarios passed, then goals.
+
+    The best first.
+    """
 
     def key(each: BenchedController) -> list[int]:
         goals = [counts["better"] - counts["worse"] for counts in each.ranking.goals.values()]
@@ -56,12 +62,27 @@ def order(controllers: Sequence[BenchedController]) -> list[BenchedController]:
 
 
 def have_different_totals(controllers: Iterable[BenchedController]) -> bool:
-    """Return whether scenarios or checks count for some controllers only: some are not applicable, or their KPI is left out."""
-    return len({(each.ranking.candidate.scenarios, each.ranking.candidate.checks) for each in controllers}) > 1
+    """Return whether scenarios or checks count for some controllers only.
+
+    Some are not applicable, or their KPI is left out.
+    """
+    return (
+        len(
+            {
+                (each.ranking.candidate.scenarios, each.ranking.candidate.checks)
+                for each in controllers
+            }
+        )
+        > 1
+    )
 
 
 def write_bench_page(
-    role: str, controllers: Sequence[BenchedController], path: Path, reference: str = "", reference_cost: float = math.nan
+    role: str,
+    controllers: Sequence[BenchedController],
+    path: Path,
+    reference: str = "",
+    reference_cost: float = math.nan,
 ) -> None:
     """Write a page with ranks, costs per step, and the checked KPIs and goals in every scenario.
 
@@ -79,7 +100,10 @@ def write_bench_page(
     text = render_page(
         "bench.html",
         role=Path(role).stem,
-        counts=f"{count_noun(len(controllers), 'controller')} in {count_noun(len(controllers[0].scenarios), 'scenario')}",
+        counts=(
+            f"{count_noun(len(controllers), 'controller')} in "
+            f"{count_noun(len(controllers[0].scenarios), 'scenario')}"
+        ),
         reference=reference,
         reference_cost=1e6 * reference_cost,
         controllers=order(controllers),
@@ -110,7 +134,8 @@ class KpiRow(NamedTuple):
         unit: its unit.
         meaning: its description; "": unknown.
         limits: limits of its checks, such as "max 0.1"; "": it is not checked.
-        cells: text, `failed` and `limits` of the failed checks, of the scenario's own controller and of each controller.
+        cells: text, `failed` and `limits` of the failed checks, of the scenario's own controller
+            and of each controller.
     """
 
     name: str
@@ -129,9 +154,16 @@ def _kpi_rows(scenario: str, controllers: Sequence[BenchedController]) -> Iterat
         limits = ", ".join(dict.fromkeys(outcome.limits for outcome in _outcomes(name, {}, checks)))
         if limits or any(fnmatchcase(name, goal) for goal in controllers[0].goals):
             unit = next((run.units[name] for run in found if name in run.units), "")
-            meaning = next(filter(None, (kpi_description(name, run.descriptions) for run in runs)), "")
-            cells = [_cell(name, run.candidate, run.checks) if run.is_applicable else _NOT_APPLICABLE for run in runs]
-            yield KpiRow(name, unit, meaning, limits, [_cell(name, runs[0].shipped, runs[0].checks), *cells])
+            meaning = next(
+                filter(None, (kpi_description(name, run.descriptions) for run in runs)), ""
+            )
+            cells = [
+                _cell(name, run.candidate, run.checks) if run.is_applicable else _NOT_APPLICABLE
+                for run in runs
+            ]
+            yield KpiRow(
+                name, unit, meaning, limits, [_cell(name, runs[0].shipped, runs[0].checks), *cells]
+            )
 
 
 def _meanings(rows: Iterable[KpiRow]) -> dict[str, list[str]]:
@@ -148,9 +180,15 @@ def _cell(name: str, run: RunKpis | None, checks: Sequence[Mapping[str, Any]]) -
     if run is None or name not in run.kpis:
         return {"text": "", "failed": run is None, "limits": ""}
     failed = [outcome.limits for outcome in _outcomes(name, run.kpis, checks) if not outcome.passed]
-    return {"text": format_number(run.kpis[name]), "failed": bool(failed), "limits": ", ".join(failed)}
+    return {
+        "text": format_number(run.kpis[name]),
+        "failed": bool(failed),
+        "limits": ", ".join(failed),
+    }
 
 
-def _outcomes(name: str, kpis: Mapping[str, Number], checks: Sequence[Mapping[str, Any]]) -> list[CheckOutcome]:
+def _outcomes(
+    name: str, kpis: Mapping[str, Number], checks: Sequence[Mapping[str, Any]]
+) -> list[CheckOutcome]:
     """Return the outcomes of the checks of a KPI."""
     return evaluate_all_checks(kpis, [check for check in checks if check["kpi"] == name])

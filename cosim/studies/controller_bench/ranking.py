@@ -47,7 +47,9 @@ class Standing:
 
     def add(self, run: RunKpis | None, checks: Sequence[Mapping[str, Any]]) -> None:
         """Add a scenario."""
-        met = sum(outcome.passed for outcome in evaluate_all_checks(run.kpis if run else {}, checks))
+        met = sum(
+            outcome.passed for outcome in evaluate_all_checks(run.kpis if run else {}, checks)
+        )
         self.scenarios += 1
         self.passed += run is not None and met == len(checks)
         self.checks += len(checks)
@@ -58,8 +60,9 @@ class Standing:
 class Ranking:
     """Ranking of a candidate against the shipped controller.
 
-    Checks count first: a controller that meets fewer of them ranks below. If both meet the same number, the goals of the role
-    decide, the most important one first, by the number of values that are better and worse.
+    Checks count first: a controller that meets fewer of them ranks below. If both meet the same
+    number, the goals of the role decide, the most important one first, by the number of values that
+    are better and worse.
 
     Attributes:
         candidate: achievements of the candidate.
@@ -74,7 +77,10 @@ class Ranking:
     @property
     def verdict(self) -> Literal["above", "equal", "below"]:
         """Place of the candidate relative to the shipped controller."""
-        differences = [self.candidate.met - self.shipped.met, self.candidate.passed - self.shipped.passed]
+        differences = [
+            self.candidate.met - self.shipped.met,
+            self.candidate.passed - self.shipped.passed,
+        ]
         differences += [counts["better"] - counts["worse"] for counts in self.goals.values()]
         first = next((difference for difference in differences if difference), 0)
         return "above" if first > 0 else "below" if first < 0 else "equal"
@@ -96,9 +102,13 @@ def rank(scenarios: Sequence[ScenarioKpis], goals: Sequence[str]) -> Ranking:
     return ranking
 
 
-def _count_goals(ranking: Ranking, candidate: RunKpis, shipped: RunKpis, checks: Sequence[Mapping[str, Any]]) -> None:
+def _count_goals(
+    ranking: Ranking, candidate: RunKpis, shipped: RunKpis, checks: Sequence[Mapping[str, Any]]
+) -> None:
     senses = merge_senses(candidate.senses, list(checks))
     for goal, counts in ranking.goals.items():
         for name, value in candidate.kpis.items():
-            if fnmatchcase(name, goal) and (word := compare_values(value, shipped.kpis.get(name), senses.get(name))):
+            if fnmatchcase(name, goal) and (
+                word := compare_values(value, shipped.kpis.get(name), senses.get(name))
+            ):
                 counts[word] += 1

@@ -1,22 +1,31 @@
-"""Roles of controllers: the signals that a controller in a role receives and returns, and the shipped controllers with it.
+"""Roles of controllers.
 
-Each role is a JSON file; the shipped ones are in scenarios/roles/. Paths in it are relative to the file:
+The signals that a controller in a role receives and returns, and the shipped controllers with it.
+
+Each role is a JSON file; the shipped ones are in scenarios/roles/. Paths in it are relative to the
+file:
 
     {"description": "...",
-     "controllers": ["../../fmus/strider_autopilot.fmu"],                       components with one of these have the role
-     "inputs": {"vehicle": {"outputs_of": "../../fmus/strider.fmu"},            all outputs of an FMU, with this prefix
+     "controllers": ["../../fmus/strider_autopilot.fmu"],                       components with one
+     of these have the role "inputs": {"vehicle": {"outputs_of": "../../fmus/strider.fmu"},
+     all outputs of an FMU, with this prefix
                 "target": {"outputs_of": "../../fmus/strider.fmu", "below": "deck"},
-                "altitude_command": "m"},                                       a single variable and its unit
-     "outputs": {"thrust": {"unit": "N", "description": "Positive: forward"}, "rotor_speed[1]": "rad/s"},
-     "parameters": {"speed_command": "m/s",                                     optional: scenarios set them
-                    "vtol.landing_time": {"unit": "s", "start": 5, "description": "Earliest start of the approach"}},
-     "goals": ["waypoints.reached", "waypoints.time*"],                         KPIs that rank controllers, the first one first
-     "cost_reference": "../../fmus/ar_drone_geometric.fmu",                     costs per step are ratios to that of this FMU
-     "stand_ins": {"../../fmus/strider_autopilot.fmu": "../systems/strider_autopilot.json"}}
+                "altitude_command": "m"},                                       a single variable
+                and its unit
+     "outputs": {"thrust": {"unit": "N", "description": "Positive: forward"}, "rotor_speed[1]":
+     "rad/s"}, "parameters": {"speed_command": "m/s",                                     optional:
+     scenarios set them
+                    "vtol.landing_time": {"unit": "s", "start": 5, "description": "Earliest start of
+                    the approach"}},
+     "goals": ["waypoints.reached", "waypoints.time*"],                         KPIs that rank
+     controllers, the first one first "cost_reference": "../../fmus/ar_drone_geometric.fmu",
+     costs per step are ratios to that of this FMU "stand_ins": {"../../fmus/strider_autopilot.fmu":
+     "../systems/strider_autopilot.json"}}
 
-A controller declares the inputs and parameters that it uses; it must have all outputs. A parameter without an index stands for
-an array. A parameter with a prefix may also be declared without it: `landing_time` in place of `vtol.landing_time`.
-`stand_ins` maps a file to an equivalent nested system, so that a part of it can be replaced.
+A controller declares the inputs and parameters that it uses; it must have all outputs. A parameter
+without an index stands for an array. A parameter with a prefix may also be declared without it:
+`landing_time` in place of `vtol.landing_time`. `stand_ins` maps a file to an equivalent nested
+system, so that a part of it can be replaced.
 """
 
 from __future__ import annotations
@@ -50,7 +59,10 @@ class VariableSpec(Spec):
 
 
 class ParameterSpec(VariableSpec):
-    """Parameter that scenarios set; `start` is the value where no scenario sets it (None: each scenario sets it)."""
+    """Parameter that scenarios set.
+
+    `start` is the value where no scenario sets it (None: each scenario sets it).
+    """
 
     type: Literal["Real", "Integer", "Boolean"] = "Real"
     start: bool | float | None = None
@@ -78,9 +90,11 @@ class Role:
     inputs: dict[str, Unit | None]
     outputs: dict[str, Unit | None]
     parameters: dict[str, Unit | None]
-    #: patterns of the KPI values that rank controllers, the most important first; "*" matches any text
+    #: patterns of the KPI values that rank controllers, the most important first; "*" matches any
+    #: text
     goals: tuple[str, ...]
-    #: resolved paths of the shipped controllers, and of nested systems by the path of the file that they replace
+    #: resolved paths of the shipped controllers, and of nested systems by the path of the file that
+    #: they replace
     controllers: tuple[Path, ...]
     stand_ins: dict[Path, Path]
     #: costs per step are ratios to that of this FMU; None: to that of the first controller
@@ -93,7 +107,10 @@ class Role:
 
     @property
     def different_controllers(self) -> list[Path]:
-        """First shipped controller of each name: without the FMI 3.0, Python and nested versions of the same controller."""
+        """First shipped controller of each name.
+
+        Without the FMI 3.0, Python and nested versions of the same controller.
+        """
         return list({path.stem: path for path in reversed(self.controllers)}.values())[::-1]
 
 
@@ -105,7 +122,9 @@ def read_role(role: str) -> Role:
     """
     file, spec = read_role_file(role)
     folder = file.parent.resolve()
-    inputs = [item for name, source in spec.inputs.items() for item in _input_units(name, source, folder)]
+    inputs = [
+        item for name, source in spec.inputs.items() for item in _input_units(name, source, folder)
+    ]
     return Role(
         file.stem,
         spec.description,
@@ -114,13 +133,19 @@ def read_role(role: str) -> Role:
         {name: _parse_unit(source) for name, source in spec.parameters.items()},
         tuple(spec.goals),
         tuple((folder / path).resolve() for path in spec.controllers),
-        {(folder / path).resolve(): (folder / system).resolve() for path, system in spec.stand_ins.items()},
+        {
+            (folder / path).resolve(): (folder / system).resolve()
+            for path, system in spec.stand_ins.items()
+        },
         (folder / spec.cost_reference).resolve() if spec.cost_reference else None,
     )
 
 
 def read_role_file(role: str) -> tuple[Path, RoleSpec]:
-    """Return the path and the content of the file of a role, given as for `read_role`; the same errors are raised."""
+    """Return the path and the content of the file of a role, given as for `read_role`.
+
+    The same errors are raised.
+    """
     file = _find_role(role)
     return file, _validate_role(read_document(file))
 
@@ -134,7 +159,10 @@ def _find_role(role: str) -> Path:
     if role.endswith(".json"):
         return Path(role)
     if role not in role_names():
-        raise InputError(f'there is no role "{role}"{did_you_mean(role, role_names()) or "; valid: " + ", ".join(role_names())}')
+        raise InputError(
+            "there is no role "
+            f'"{role}"{did_you_mean(role, role_names()) or "; valid: " + ", ".join(role_names())}'
+        )
     return resources.root() / "scenarios/roles" / f"{role}.json"
 
 
@@ -144,13 +172,21 @@ def _validate_role(document: Document) -> RoleSpec:
     try:
         return TypeAdapter(RoleSpec).validate_python(document.value)
     except ValidationError as error:
-        raise InputError(Problem(found["msg"], document.where(found["loc"])) for found in error.errors()) from None
+        raise InputError(
+            Problem(found["msg"], document.where(found["loc"])) for found in error.errors()
+        ) from None
 
 
-def _input_units(name: str, source: str | VariableSpec | OutputsSpec, folder: Path) -> list[tuple[str, Unit | None]]:
+def _input_units(
+    name: str, source: str | VariableSpec | OutputsSpec, folder: Path
+) -> list[tuple[str, Unit | None]]:
     if not isinstance(source, OutputsSpec):
         return [(name, _parse_unit(source))]
-    outputs = (v for v in FmuFile(folder / source.outputs_of).description.variables if v.causality == "output")
+    outputs = (
+        v
+        for v in FmuFile(folder / source.outputs_of).description.variables
+        if v.causality == "output"
+    )
     prefix = f"{source.below}." if source.below else ""
     return [
         (f"{name}.{slot.removeprefix(prefix)}", variable.unit)

@@ -30,7 +30,10 @@ class RunKpis:
     def read(cls, directory: Path) -> RunKpis | None:
         """Read the KPIs from a folder written by `cosim run`; None if there is no complete run."""
         try:
-            kpis, about = (parse_object((directory / name).read_text(encoding="utf-8")) for name in ("kpis.json", "run.json"))
+            kpis, about = (
+                parse_object((directory / name).read_text(encoding="utf-8"))
+                for name in ("kpis.json", "run.json")
+            )
             numbers = {name: math.nan if value is None else value for name, value in kpis.items()}
             units, senses = dict(about["kpi_units"]), dict(about["kpi_senses"])
             return cls(numbers, units, senses) if all(map(is_number, numbers.values())) else None
@@ -39,18 +42,30 @@ class RunKpis:
 
 
 def is_current(directory: Path, scenario: Path) -> bool:
-    """Return whether the run in `directory` is up to date: the files of `scenario` and the version of cosim are unchanged."""
+    """Return whether the run in `directory` is up to date.
+
+    The files of `scenario` and the version of cosim are unchanged.
+    """
     try:
         about = parse_object((directory / "run.json").read_text(encoding="utf-8"))
-        files = {path_in(scenario.parent.resolve(), name): digest for name, digest in about["sha256"].items()}
-        same_files = all(sha256(file.read_bytes()).hexdigest() == digest for file, digest in files.items())
-        return same_files and scenario.resolve() in files and about["versions"]["cosim"] == __version__
+        files = {
+            path_in(scenario.parent.resolve(), name): digest
+            for name, digest in about["sha256"].items()
+        }
+        same_files = all(
+            sha256(file.read_bytes()).hexdigest() == digest for file, digest in files.items()
+        )
+        return (
+            same_files and scenario.resolve() in files and about["versions"]["cosim"] == __version__
+        )
     except (OSError, ValueError, KeyError, TypeError, AttributeError):
         return False
 
 
 def compare_values(value: Number | None, other: Number | None, sense: str | None) -> str:
-    """Return whether `value` is "better" or "worse" than `other`; "" if they are equal or not comparable.
+    """Return whether `value` is "better" or "worse" than `other`.
+
+    "" if they are equal or not comparable.
 
     Args:
         value: value of a KPI; None: missing.
@@ -69,7 +84,10 @@ def compare_values(value: Number | None, other: Number | None, sense: str | None
 
 
 def merge_senses(declared: Mapping[str, str], checks: list[Mapping[str, Any]]) -> dict[str, str]:
-    """Return the sense of each KPI: as its function declares it, else derived from its check ("max": lower is better)."""
+    """Return the sense of each KPI.
+
+    As its function declares it, else derived from its check ("max": lower is better).
+    """
     of_checks = {
         check["kpi"]: "lower" if "max" in check else "higher"
         for check in checks
@@ -80,7 +98,10 @@ def merge_senses(declared: Mapping[str, str], checks: list[Mapping[str, Any]]) -
 
 @dataclass(frozen=True)
 class KpiComparison:
-    """KPI in one scenario: values of the candidate, the shipped controller and the candidate's last run (None: missing)."""
+    """KPI in one scenario.
+
+    Values of the candidate, the shipped controller and the candidate's last run (None: missing).
+    """
 
     name: str
     unit: str
@@ -93,7 +114,10 @@ class KpiComparison:
 
 
 def compare_kpis(
-    candidate: RunKpis, shipped: RunKpis | None, last: RunKpis | None, checks: list[Mapping[str, Any]]
+    candidate: RunKpis,
+    shipped: RunKpis | None,
+    last: RunKpis | None,
+    checks: list[Mapping[str, Any]],
 ) -> list[KpiComparison]:
     """Compare each KPI of the candidate with those of the shipped controller and of the candidate's last run."""
     better = merge_senses(candidate.senses, checks)
@@ -101,10 +125,19 @@ def compare_kpis(
 
     def row(name: str, value: Number) -> KpiComparison:
         of_shipped, of_last = (run.kpis.get(name) if run else None for run in (shipped, last))
-        against_shipped, against_last = (compare_values(value, other, better.get(name)) for other in (of_shipped, of_last))
+        against_shipped, against_last = (
+            compare_values(value, other, better.get(name)) for other in (of_shipped, of_last)
+        )
         checked = tuple(outcome for outcome in outcomes if outcome.check["kpi"] == name)
         return KpiComparison(
-            name, candidate.units.get(name, ""), value, of_shipped, of_last, against_shipped, against_last, checked
+            name,
+            candidate.units.get(name, ""),
+            value,
+            of_shipped,
+            of_last,
+            against_shipped,
+            against_last,
+            checked,
         )
 
     return [row(name, value) for name, value in candidate.kpis.items()]

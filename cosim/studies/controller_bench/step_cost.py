@@ -47,14 +47,23 @@ def measure_step_costs(controllers: Sequence[MeasuredController], reference: str
     controller that fails is NaN, with a warning.
     """
     entry = parse_source(reference).entry
-    same = next((i for i, each in enumerate(controllers) if parse_source(each.source).entry == entry), None)
+    same = next(
+        (i for i, each in enumerate(controllers) if parse_source(each.source).entry == entry), None
+    )
     with ExitStack() as stack:
-        alone = [_enter(stack, each.source, partial(_load_with_inputs, each)) for each in controllers]
+        alone = [
+            _enter(stack, each.source, partial(_load_with_inputs, each)) for each in controllers
+        ]
         if same is None:
             alone.append(_enter(stack, reference, lambda: _load_alone(reference, Fraction(1, 100))))
         sources = [*(each.source for each in controllers), reference]
-        rounds = [[_step_seconds(*each) for each in zip(sources, alone, strict=False)] for _ in range(ROUNDS)]
-    costs = [float(np.min(column)) for column in zip(*rounds, strict=True)]  # NaN if a round has failed
+        rounds = [
+            [_step_seconds(*each) for each in zip(sources, alone, strict=False)]
+            for _ in range(ROUNDS)
+        ]
+    costs = [
+        float(np.min(column)) for column in zip(*rounds, strict=True)
+    ]  # NaN if a round has failed
     return [costs[-1 if same is None else same], *costs[: len(controllers)]]
 
 
@@ -72,7 +81,10 @@ def _warn(source: str, error: CosimError) -> None:
 
 
 def _load_alone(source: str, step: Fraction) -> Simulation:
-    times = {"stop_time": fraction_text((ROUNDS * STEPS + 1) * step), "step_size": fraction_text(step)}
+    times = {
+        "stop_time": fraction_text((ROUNDS * STEPS + 1) * step),
+        "step_size": fraction_text(step),
+    }
     components = {_NAME: dict(parse_source(source).entry)}
     return load({"name": _NAME, **times, "components": components, "record": {"signals": []}})
 
@@ -83,9 +95,17 @@ def _load_with_inputs(controller: MeasuredController) -> Simulation:
         flight.step(max(1, grid.count // 4))
         alone = _load_alone(controller.source, grid.step)
         for name, component in alone.prepared.system.components.items():
-            for slot in (slot for v in component.variables if v.causality == "input" for slot in v.scalar_names):
+            for slot in (
+                slot
+                for v in component.variables
+                if v.causality == "input"
+                for slot in v.scalar_names
+            ):
                 with suppress(InputError):  # another part of a nested system feeds this input
-                    alone.set(f"{name}.{slot}", flight.get(f"{controller.component}{name.removeprefix(_NAME)}.{slot}"))
+                    alone.set(
+                        f"{name}.{slot}",
+                        flight.get(f"{controller.component}{name.removeprefix(_NAME)}.{slot}"),
+                    )
     return alone
 
 

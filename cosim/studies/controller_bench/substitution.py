@@ -1,8 +1,9 @@
 """Scenarios in which a candidate replaces the shipped controller.
 
-Entries of a scenario that refer to variables which the candidate lacks (parameters, connections to inputs, KPIs of its signals)
-are removed and noted. A parameter of the role that the candidate declares without its prefix is renamed.
-References are removed, since another controller gives other trajectories.
+Entries of a scenario that refer to variables which the candidate lacks (parameters, connections to
+inputs, KPIs of its signals) are removed and noted. A parameter of the role that the candidate
+declares without its prefix is renamed. References are removed, since another controller gives other
+trajectories.
 """
 
 from __future__ import annotations
@@ -30,8 +31,10 @@ class NewName(NamedTuple):
 
     Attributes:
         name: the name.
-        lacking: variable of the candidate that does not exist, such as "vtol.landing_time"; "": the name is valid.
-        own: full name of the component that is the candidate, and its variable; None: the name is of something else.
+        lacking: variable of the candidate that does not exist, such as "vtol.landing_time"; "": the
+            name is valid.
+        own: full name of the component that is the candidate, and its variable; None: the name is
+            of something else.
     """
 
     name: str
@@ -50,9 +53,11 @@ class Omission:
     """Entry of a scenario that is left out because the candidate lacks a variable.
 
     Attributes:
-        entry: 'kpi "descent"' or 'figure "landing"'; "" for a value of the variable or a connection to it.
+        entry: 'kpi "descent"' or 'figure "landing"'; "" for a value of the variable or a connection
+            to it.
         variable: full name of the variable in the scenario, such as "demo1.landing_time".
-        lacking: name of the variable that the candidate would need for it, such as "vtol.landing_time".
+        lacking: name of the variable that the candidate would need for it, such as
+            "vtol.landing_time".
     """
 
     entry: str
@@ -74,9 +79,11 @@ class ControllerSubstitution:
         interface: the candidate's variables.
         file: the scenario's file.
         parameters: parameters of the candidate in addition to those of the scenario.
-        replaced_components: names of the replaced controllers, such as "ar_drone_cascaded", by the full names of the components.
+        replaced_components: names of the replaced controllers, such as "ar_drone_cascaded", by the
+            full names of the components.
         omissions: removed entries.
-        applied_settings: values that the candidate gets, by the full names of its components and its own variables.
+        applied_settings: values that the candidate gets, by the full names of its components and
+            its own variables.
     """
 
     role: Role
@@ -111,9 +118,12 @@ class ControllerSubstitution:
         write_json(self._prune_scenario(changed, renamed, origin), path)
         return path
 
-    # -- systems -------------------------------------------------------------------------------------------------------
+    # -- systems
+    # -------------------------------------------------------------------------------------------------------
 
-    def _substitute_system(self, value: Mapping[str, Any], folder: Path, prefix: str) -> tuple[dict[str, Any], NameMap]:
+    def _substitute_system(
+        self, value: Mapping[str, Any], folder: Path, prefix: str
+    ) -> tuple[dict[str, Any], NameMap]:
         """Return a system that contains the candidate, and a map of the names that exist in it."""
         maps: dict[str, NameMap] = {}
         components = {
@@ -134,25 +144,37 @@ class ControllerSubstitution:
             self._note_applied({maps[name](each).own: given[each] for each in given})
             self._note_applied({(f"{prefix}{name}", each): own[each] for each in own})
         connections = [
-            {**each, "to": new} for each in value.get("connections", []) if (new := self._kept_name(renamed, each["to"]))
+            {**each, "to": new}
+            for each in value.get("connections", [])
+            if (new := self._kept_name(renamed, each["to"]))
         ]
         return {**value, "components": components, "connections": connections}, renamed
 
     def _substitute_component(
-        self, spec: Mapping[str, Any], folder: Path, full_name: str, name: str, maps: dict[str, NameMap]
+        self,
+        spec: Mapping[str, Any],
+        folder: Path,
+        full_name: str,
+        name: str,
+        maps: dict[str, NameMap],
     ) -> dict[str, Any]:
         kind = next(source for source in SOURCES if source in spec)
         path = (folder / _reference_file(spec[kind])).resolve()
         if path in self.role.controllers:
             self.replaced_components[full_name] = path.stem
             maps[name] = partial(self._candidate_name, full_name)
-            return {**self.candidate.entry, **{key: spec[key] for key in ("period", "parameters") if key in spec}}
+            return {
+                **self.candidate.entry,
+                **{key: spec[key] for key in ("period", "parameters") if key in spec},
+            }
         system = self.role.stand_ins.get(path, path if kind == "system" else None)
         nested = self._substitute_nested(system, full_name) if system else None
         if nested is None:
             return {**spec, kind: absolute_reference(spec[kind], folder)}
         changed, maps[name] = nested
-        return {key: value for key, value in spec.items() if key not in (kind, "isolation")} | {"system": str(changed)}
+        return {key: value for key, value in spec.items() if key not in (kind, "isolation")} | {
+            "system": str(changed)
+        }
 
     def _note_applied(self, settings: Mapping[tuple[str, str] | None, Any]) -> None:
         for own, value in settings.items():
@@ -160,23 +182,38 @@ class ControllerSubstitution:
                 self.applied_settings.setdefault(own[0], {})[own[1]] = value
 
     def _candidate_name(self, component: str, name: str) -> NewName:
-        """Return the candidate's name of a variable: a parameter of the role may lack its prefix."""
+        """Return the candidate's name of a variable.
+
+        A parameter of the role may lack its prefix.
+        """
         if self.interface.has_variables(name):
             return NewName(name, own=(component, name))
         short = self.role.short_names.get(name, "")
-        return NewName(short, own=(component, short)) if short in self.interface.parameters else NewName(name, name)
+        return (
+            NewName(short, own=(component, short))
+            if short in self.interface.parameters
+            else NewName(name, name)
+        )
 
     def _substitute_nested(self, file: Path, full_name: str) -> tuple[Path, NameMap] | None:
-        """Write a nested system with the candidate; return its path and name map, or None if no component has the role."""
+        """Write a nested system with the candidate.
+
+        Return its path and name map, or None if no component has the role.
+        """
         before = len(self.replaced_components)
-        value, renamed = self._substitute_system(read_system_document(file).value, file.parent, f"{full_name}.")
+        value, renamed = self._substitute_system(
+            read_system_document(file).value, file.parent, f"{full_name}."
+        )
         if len(self.replaced_components) == before:
             return None
         ports, lost = self._prune_ports(value.get("ports", {}), renamed)
         path = self._folder / "systems" / f"{self.file.stem}.{full_name}.json"
         write_json({**value, "ports": ports}, path)
         shown = {
-            port: inner for kind, named in value.get("ports", {}).items() for port, inner in named.items() if port in ports[kind]
+            port: inner
+            for kind, named in value.get("ports", {}).items()
+            for port, inner in named.items()
+            if port in ports[kind]
         }
 
         def renamed_outside(name: str) -> NewName:
@@ -189,7 +226,9 @@ class ControllerSubstitution:
 
         return path, renamed_outside
 
-    def _prune_ports(self, ports: Mapping[str, Any], renamed: NameMap) -> tuple[dict[str, Any], dict[str, str]]:
+    def _prune_ports(
+        self, ports: Mapping[str, Any], renamed: NameMap
+    ) -> tuple[dict[str, Any], dict[str, str]]:
         """Return the ports that lead to a variable of the changed system, and what is lacking for the removed ports."""
         remaining: dict[str, dict[str, Any]] = {kind: {} for kind in ports}
         lost = {}
@@ -203,10 +242,17 @@ class ControllerSubstitution:
                     lost[port] = found[0].lacking
         return remaining, lost
 
-    # -- the scenario's own keys ---------------------------------------------------------------------------------------
+    # -- the scenario's own keys
+    # ---------------------------------------------------------------------------------------
 
-    def _prune_scenario(self, value: dict[str, Any], renamed: NameMap, folder: Path) -> dict[str, Any]:
-        signals = [name for name in value.get("record", {}).get("signals", ["*"]) if "*" in name or not renamed(name).lacking]
+    def _prune_scenario(
+        self, value: dict[str, Any], renamed: NameMap, folder: Path
+    ) -> dict[str, Any]:
+        signals = [
+            name
+            for name in value.get("record", {}).get("signals", ["*"])
+            if "*" in name or not renamed(name).lacking
+        ]
         functions = {
             key: [
                 {**each, "python": absolute_reference(each["python"], folder)}
@@ -216,35 +262,70 @@ class ControllerSubstitution:
             for key in ("kpis", "figures")
         }
         kpis = {each["name"] for each in functions["kpis"]}
-        events = [{**each, "set": self._known_settings(renamed, each["set"])} for each in value.get("events", [])]
-        inputs = [{**each, "file": absolute_reference(each["file"], folder)} for each in value.get("inputs", [])]
+        events = [
+            {**each, "set": self._known_settings(renamed, each["set"])}
+            for each in value.get("events", [])
+        ]
+        inputs = [
+            {**each, "file": absolute_reference(each["file"], folder)}
+            for each in value.get("inputs", [])
+        ]
         scene = value.get("scene")
         return {
             **{key: item for key, item in value.items() if key != "reference"},
             **functions,
             "record": {**value.get("record", {}), "signals": signals},
-            "checks": [each for each in value.get("checks", []) if each["kpi"].partition(".")[0] in kpis],
+            "checks": [
+                each for each in value.get("checks", []) if each["kpi"].partition(".")[0] in kpis
+            ],
             "events": [each for each in events if each["set"]],
             "inputs": inputs,
-            **({"scene": {**scene, "python": absolute_reference(scene["python"], folder)}} if scene else {}),
+            **(
+                {"scene": {**scene, "python": absolute_reference(scene["python"], folder)}}
+                if scene
+                else {}
+            ),
         }
 
-    def _known_settings(self, renamed: NameMap, settings: Mapping[str, Any], prefix: str = "") -> dict[str, Any]:
-        return {new: value for name, value in settings.items() if (new := self._kept_name(renamed, name, prefix))}
+    def _known_settings(
+        self, renamed: NameMap, settings: Mapping[str, Any], prefix: str = ""
+    ) -> dict[str, Any]:
+        return {
+            new: value
+            for name, value in settings.items()
+            if (new := self._kept_name(renamed, name, prefix))
+        }
 
-    def _all_known(self, renamed: NameMap, function: Mapping[str, Any], folder: Path, what: str) -> bool:
+    def _all_known(
+        self, renamed: NameMap, function: Mapping[str, Any], folder: Path, what: str
+    ) -> bool:
         spec = FunctionSpec.model_validate(function)
         groups = [[text] for text in _strings(spec.arguments)]
         if sources := [source for source in spec.sources if not source.startswith("/")]:
-            needed = [name for name, is_required in declared_arguments(spec, folder).items() if is_required]
-            groups += [[f"{source}.{name}" for source in sources] for name in needed if name not in spec.arguments]
-        missing = [(names[0], lacking[0]) for names in groups if all(lacking := [renamed(name).lacking for name in names])]
+            needed = [
+                name
+                for name, is_required in declared_arguments(spec, folder).items()
+                if is_required
+            ]
+            groups += [
+                [f"{source}.{name}" for source in sources]
+                for name in needed
+                if name not in spec.arguments
+            ]
+        missing = [
+            (names[0], lacking[0])
+            for names in groups
+            if all(lacking := [renamed(name).lacking for name in names])
+        ]
         if missing:
             self.omissions.append(Omission(what, *missing[0]))
         return not missing
 
     def _kept_name(self, renamed: NameMap, name: str, prefix: str = "") -> str | None:
-        """Return the new name of a variable that is set or fed; note it and return None if the candidate lacks it."""
+        """Return the new name of a variable that is set or fed.
+
+        Note it and return None if the candidate lacks it.
+        """
         new = renamed(name)
         if not new.lacking:
             return new.name
@@ -253,7 +334,10 @@ class ControllerSubstitution:
 
 
 def absolute_reference(reference: str, folder: Path) -> str:
-    """Return a reference to a file, or to an object in a file, with an absolute path; Python modules stay as they are."""
+    """Return a reference to a file, or to an object in a file, with an absolute path.
+
+    Python modules stay as they are.
+    """
     file = _reference_file(reference)
     is_module = file != reference and not file.endswith((".py", ".mo"))
     return reference if is_module else f"{(folder / file).resolve()}{reference.removeprefix(file)}"

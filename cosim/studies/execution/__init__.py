@@ -1,1 +1,4 @@
-"""Execution of the runs of a study: worker processes, the store of finished runs, cluster workers."""
+"""Execution of the runs of a study.
+
+Worker processes, the store of finished runs, cluster workers.
+"""

@@ -21,7 +21,10 @@ from ...scenario.nested_systems import Node
 
 
 def cosim_fingerprint() -> str:
-    """Return the version of cosim and a hash of its sources and shipped FMUs; equal results require equal fingerprints."""
+    """Return the version of cosim and a hash of its sources and shipped FMUs.
+
+    Equal results require equal fingerprints.
+    """
     package = resources.package_folder()
     sources = sorted(path for path in package.rglob("*.py") if "_bundle" not in path.parts)
     digest = sha256()
@@ -32,7 +35,10 @@ def cosim_fingerprint() -> str:
 
 @dataclass(frozen=True)
 class Bundle:
-    """Files of a scenario below their common folder `root`; `scenario` is the path of the scenario's sources file."""
+    """Files of a scenario below their common folder `root`.
+
+    `scenario` is the path of the scenario's sources file.
+    """
 
     root: Path
     scenario: PurePosixPath
@@ -42,7 +48,11 @@ class Bundle:
     @cached_property
     def digest(self) -> str:
         """Hash of the files, independent of `root`, and of the cosim that runs them."""
-        return sha256(json.dumps([cosim_fingerprint(), str(self.scenario), sorted(self.files.items())]).encode()).hexdigest()
+        return sha256(
+            json.dumps(
+                [cosim_fingerprint(), str(self.scenario), sorted(self.files.items())]
+            ).encode()
+        ).hexdigest()
 
     def read_contents(self, hashes: Iterable[str]) -> dict[str, bytes]:
         """Read file contents by their hash.
@@ -51,8 +61,14 @@ class Bundle:
             InputError: if a file has changed since its hash was computed.
         """
         requested = set(hashes)
-        contents = {sha: (self.root / path).read_bytes() for path, sha in self.files.items() if sha in requested}
-        if changed := [sha for sha, content in contents.items() if sha256(content).hexdigest() != sha]:
+        contents = {
+            sha: (self.root / path).read_bytes()
+            for path, sha in self.files.items()
+            if sha in requested
+        }
+        if changed := [
+            sha for sha, content in contents.items() if sha256(content).hexdigest() != sha
+        ]:
             names = [path for path, sha in self.files.items() if sha in changed]
             raise InputError(f'"{self.root / names[0]}" was changed while the sweep was running')
         return contents
@@ -63,7 +79,10 @@ def collect_bundle(scenario: Path, variants: Iterable[Mapping[str, Any]] = ({},)
     named = {path for settings in variants for path in _scenario_files(scenario, settings)}
     used = {path for file in named for path in _package_files(file)}
     root = Path(os.path.commonpath([path.parent for path in used]))
-    files = {path.relative_to(root).as_posix(): sha256(path.read_bytes()).hexdigest() for path in sorted(used)}
+    files = {
+        path.relative_to(root).as_posix(): sha256(path.read_bytes()).hexdigest()
+        for path in sorted(used)
+    }
     return Bundle(root, PurePosixPath(scenario.resolve().relative_to(root).as_posix()), files)
 
 
@@ -75,8 +94,16 @@ def fmu_paths(files: Iterable[str]) -> tuple[str, ...]:
 def absolute_paths(scenario: Path, settings: Mapping[str, Any]) -> list[Problem]:
     """Return a problem for each absolute path in the scenario, which another machine would not have."""
     return [
-        Problem(f'absolute path "{path}" cannot be shipped to a cluster; expected a path relative to this file', where)
-        for node in load_scenario(scenario, _pointer_settings(settings), scenario.parent).root.walk()
+        Problem(
+            (
+                f'absolute path "{path}" cannot be shipped to a cluster; expected a path relative '
+                "to this file"
+            ),
+            where,
+        )
+        for node in load_scenario(
+            scenario, _pointer_settings(settings), scenario.parent
+        ).root.walk()
         for path, where in _named_files(node)
         if Path(path).is_absolute() and paths.is_file(Path(path))
     ]
@@ -110,7 +137,9 @@ def _named_files(node: Node) -> Iterator[tuple[str, str]]:
         yield profile.file, node.where("inputs", i)
     for i, kpi in enumerate(getattr(node.spec, "kpis", ())):
         where = node.where("kpis", i)
-        yield from ((path, where) for path in (kpi.python.rpartition(":")[0], *_strings(kpi.arguments)))
+        yield from (
+            (path, where) for path in (kpi.python.rpartition(":")[0], *_strings(kpi.arguments))
+        )
 
 
 def _component_paths(component: ComponentSpec) -> Iterator[str]:
@@ -139,4 +168,6 @@ def _package_files(path: Path) -> Iterator[Path]:
         yield from package_files([path]) if path.suffix == ".py" else [path]
         return
     package = root / path.relative_to(root).parts[0]
-    yield from (each for each in package.rglob("*") if each.is_file() and "__pycache__" not in each.parts)
+    yield from (
+        each for each in package.rglob("*") if each.is_file() and "__pycache__" not in each.parts
+    )

@@ -1,4 +1,7 @@
-"""Functions that run on a worker of a Dask cluster: storage of files by content hash, and execution of jobs."""
+"""Functions that run on a worker of a Dask cluster.
+
+Storage of files by content hash, and execution of jobs.
+"""
 
 from __future__ import annotations
 
@@ -75,12 +78,14 @@ def store_contents(blobs: Mapping[str, bytes], dask_worker: Any) -> None:
             temporary.write_bytes(content)
 
 
-def run_job(package: StudyPackage, key: RunKey, settings: Mapping[str, Any], check: bool) -> dict[str, Any]:
+def run_job(
+    package: StudyPackage, key: RunKey, settings: Mapping[str, Any], check: bool
+) -> dict[str, Any]:
     """Run or check a job on this worker and return the answer.
 
     Returns:
-        {"record": ...} after a run and {"problems": ...} after a check; {"refused": fingerprint} if the worker has another
-        cosim, and {"missing": True} if it lacks files.
+        {"record": ...} after a run and {"problems": ...} after a check; {"refused": fingerprint} if
+        the worker has another cosim, and {"missing": True} if it lacks files.
     """
     from distributed import get_worker
 
@@ -105,7 +110,9 @@ def _worker_pool(package: StudyPackage, worker: Any) -> WorkerPool:
         study = (package.digest, package.deadline)
         if study not in _worker_pools:
             root = _link_study_files(package, worker)
-            context = StudyContext(root / package.scenario, root, package.deadline, fmu_paths(package.files))
+            context = StudyContext(
+                root / package.scenario, root, package.deadline, fmu_paths(package.files)
+            )
             _worker_pools[study] = WorkerPool(context)
         return _worker_pools[study]
 

@@ -1,8 +1,11 @@
-"""Fork server for the runs of a study on one machine: `python -m cosim.studies.execution.fork_server DESCRIPTOR`.
+"""Fork server for the runs of a study on one machine.
 
-It imports all modules that runs need, loads the scenario once, unpacks its FMUs and calls the function `warm` of component
-classes that have one. It never loads a library of an FMU and never starts a thread. For every file descriptor that it receives,
-it forks a worker process. A worker handles one job at a time, each in a separate child process.
+`python -m cosim.studies.execution.fork_server DESCRIPTOR`.
+
+It imports all modules that runs need, loads the scenario once, unpacks its FMUs and calls the
+function `warm` of component classes that have one. It never loads a library of an FMU and never
+starts a thread. For every file descriptor that it receives, it forks a worker process. A worker
+handles one job at a time, each in a separate child process.
 """
 
 from __future__ import annotations
@@ -39,7 +42,12 @@ def serve_forks(control: socket.socket) -> None:
     if not (message := control.recv(1 << 16)):
         return
     request = json.loads(message)
-    context = StudyContext(Path(request["scenario"]), Path(request["root"]), request["deadline"], tuple(request["fmus"]))
+    context = StudyContext(
+        Path(request["scenario"]),
+        Path(request["root"]),
+        request["deadline"],
+        tuple(request["fmus"]),
+    )
     with temporary_run_folder() as folder:
         tempfile.tempdir = os.environ["TMPDIR"] = folder
         for module in RUN_MODULES:
@@ -60,7 +68,10 @@ def serve_forks(control: socket.socket) -> None:
 
 
 def _preload(context: StudyContext) -> Iterator[tuple[Path, FmuFile]]:
-    """Import the code that the scenario uses and yield the unpacked FMUs by path; the runs report any problems."""
+    """Import the code that the scenario uses and yield the unpacked FMUs by path.
+
+    The runs report any problems.
+    """
     with suppress(CosimError):
         _preload_components(load_scenario(context.scenario))
     for path in context.fmus:
@@ -72,7 +83,10 @@ def _preload(context: StudyContext) -> Iterator[tuple[Path, FmuFile]]:
 
 
 def _preload_components(scenario: Scenario) -> None:
-    """Import the Python files of a scenario; a file that takes longer than its deadline ends this process."""
+    """Import the Python files of a scenario.
+
+    A file that takes longer than its deadline ends this process.
+    """
     for node, name in scenario.root.leaves():
         component = node.spec.components[name]
         if component.python:
@@ -96,7 +110,9 @@ def _ending_after(seconds: float) -> Iterator[None]:
         setitimer(ITIMER_REAL, 0)
 
 
-def _fork_worker(control: socket.socket, descriptor: int, context: StudyContext, fmu_files: FmuFiles) -> int:
+def _fork_worker(
+    control: socket.socket, descriptor: int, context: StudyContext, fmu_files: FmuFiles
+) -> int:
     fork_server = os.getpid()
     child = os.fork()
     if child:

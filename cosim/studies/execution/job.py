@@ -49,7 +49,9 @@ class Record:
 
     def to_json(self) -> str:
         """Return the record as one line of JSON without its empty fields."""
-        return json.dumps({name: value for name, value in vars(self).items() if value or name == "key"})
+        return json.dumps(
+            {name: value for name, value in vars(self).items() if value or name == "key"}
+        )
 
     @classmethod
     def from_json(cls, text: str | bytes) -> Record:
@@ -72,7 +74,14 @@ class Record:
         return record
 
 
-_FIELD_TYPES: Mapping[str, Any] = {"key": str, "kpis": dict, "failure": str, "seconds": float | int, "output": str, "units": dict}
+_FIELD_TYPES: Mapping[str, Any] = {
+    "key": str,
+    "kpis": dict,
+    "failure": str,
+    "seconds": float | int,
+    "output": str,
+    "units": dict,
+}
 
 
 @dataclass(frozen=True)
@@ -101,5 +110,8 @@ class Runner(Protocol):
 
 
 def run_key(digest: str, settings: Mapping[str, Any]) -> RunKey:
-    """Return the key of a run: a hash of its settings and of the `digest` of all files that it depends on."""
+    """Return the key of a run.
+
+    A hash of its settings and of the `digest` of all files that it depends on.
+    """
     return RunKey(sha256(json.dumps([digest, settings], sort_keys=True).encode()).hexdigest()[:32])

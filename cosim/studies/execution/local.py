@@ -29,7 +29,8 @@ class LocalRunner:
     def run_jobs(self, jobs: Iterable[Job]) -> Iterator[Record]:
         """Run the jobs and yield their records in the order in which the runs end.
 
-        Only a few jobs are taken from the iterable in advance. Each thread waits for a worker process.
+        Only a few jobs are taken from the iterable in advance. Each thread waits for a worker
+        process.
         """
         pending: set[Future[Record]] = set()
         pool = ThreadPoolExecutor(self._workers)

@@ -46,7 +46,9 @@ class ReplayRequest(NamedTuple):
     checks: list[dict[str, Any]]
 
 
-def supervised_run(context: StudyContext, job: Job, fmu_files: FmuFiles, replay: ReplayRequest | None = None) -> Record:
+def supervised_run(
+    context: StudyContext, job: Job, fmu_files: FmuFiles, replay: ReplayRequest | None = None
+) -> Record:
     """Run a job in a child process and return its record, whatever happens to the child.
 
     Args:
@@ -61,7 +63,9 @@ def supervised_run(context: StudyContext, job: Job, fmu_files: FmuFiles, replay:
     began = time.monotonic()
     os.ftruncate(2, 0)
     with tempfile.TemporaryFile("w+") as reply:
-        outcome = run_supervised(lambda: _run_reporting_failure(reply, lambda: work(context, job, fmu_files, reply)))
+        outcome = run_supervised(
+            lambda: _run_reporting_failure(reply, lambda: work(context, job, fmu_files, reply))
+        )
         record = _make_record(context, job, outcome, reply)
     record = replace(record, seconds=round(time.monotonic() - began, 4))
     return replace(record, output=_last_output()) if record.failure else record
@@ -74,20 +78,26 @@ def supervised_check(context: StudyContext, job: Job, fmu_files: FmuFiles) -> li
         ComponentError: if the child process crashes.
     """
     with tempfile.TemporaryFile("w+") as reply:
-        outcome = run_supervised(lambda: _run_reporting_failure(reply, lambda: _check_job(context, job, fmu_files, reply)))
+        outcome = run_supervised(
+            lambda: _run_reporting_failure(
+                reply, lambda: _check_job(context, job, fmu_files, reply)
+            )
+        )
         if outcome.failure:
             raise outcome.failure
         reply.seek(0)
         return [Problem(message, where) for message, where in json.load(reply)]
 
 
-# -- in the child ------------------------------------------------------------------------------------------------------------
+# -- in the child
+# ------------------------------------------------------------------------------------------------------------
 
 
 def _run_reporting_failure(reply: IO[str], work: Callable[[], None]) -> int:
     """Call `work` and return an exit code; write the text of an exception to `reply`.
 
-    The forked process first gets a random state of its own: otherwise unseeded noise would be the same in all runs.
+    The forked process first gets a random state of its own: otherwise unseeded noise would be the
+    same in all runs.
     """
     np.random.seed()  # noqa: NPY002  # the global state, which components may use
     try:
@@ -111,16 +121,23 @@ def _write_reply(reply: IO[str], value: Any) -> None:
 def _run_job(context: StudyContext, job: Job, fmu_files: FmuFiles, reply: IO[str]) -> None:
     _set_deadline(context)
     prepared = _prepare_job(context, job, fmu_files)
-    with keeping_run_files(Path(tempfile.gettempdir()) / "run"), simulating(prepared.plan) as outcome:
+    with (
+        keeping_run_files(Path(tempfile.gettempdir()) / "run"),
+        simulating(prepared.plan) as outcome,
+    ):
         if outcome.failure:
             raise outcome.failure
         result, functions = Result(outcome.recording, metadata=prepared.origin), prepared.kpis()
         kpis = evaluate_kpis(result, functions)
-        _write_reply(reply, {"kpis": kpis, "units": _known_units(kpi_units(functions, kpis, result.units))})
+        _write_reply(
+            reply, {"kpis": kpis, "units": _known_units(kpi_units(functions, kpis, result.units))}
+        )
         _results_written()
 
 
-def _run_with_replay(replay: ReplayRequest, context: StudyContext, job: Job, fmu_files: FmuFiles, reply: IO[str]) -> None:
+def _run_with_replay(
+    replay: ReplayRequest, context: StudyContext, job: Job, fmu_files: FmuFiles, reply: IO[str]
+) -> None:
     from ...api import Simulation
     from ...report.replay import write_judged_replay
 
@@ -130,10 +147,14 @@ def _run_with_replay(replay: ReplayRequest, context: StudyContext, job: Job, fmu
         execution = simulation.execute()
         result = execution.result
         named = replace(result, metadata={**result.metadata, "name": replay.title})
-        write_judged_replay(named, evaluate_all_checks(result.kpis, replay.checks), Path(replay.page))
+        write_judged_replay(
+            named, evaluate_all_checks(result.kpis, replay.checks), Path(replay.page)
+        )
         if execution.failure:
             raise execution.failure
-        _write_reply(reply, {"kpis": result.kpis, "units": _known_units(result.metadata["kpi_units"])})
+        _write_reply(
+            reply, {"kpis": result.kpis, "units": _known_units(result.metadata["kpi_units"])}
+        )
         _results_written()
 
 
@@ -149,11 +170,16 @@ def _set_deadline(context: StudyContext) -> None:
 
 def _prepare_job(context: StudyContext, job: Job, fmu_files: FmuFiles) -> PreparedRun:
     shared = {path: file.share() for path, file in fmu_files.items()}
-    return load(context.scenario, job.settings, settings_folder=context.scenario.parent, loaded_fmus=shared)
+    return load(
+        context.scenario, job.settings, settings_folder=context.scenario.parent, loaded_fmus=shared
+    )
 
 
 def _results_written() -> None:
-    """Record in the journal that all results are written: later failures of components no longer count."""
+    """Record in the journal that all results are written.
+
+    Later failures of components no longer count.
+    """
     signal.setitimer(signal.ITIMER_REAL, 0)
     if journal := current_journal():
         journal[EXIT_CODE] = 0
@@ -166,15 +192,22 @@ def _check_job(context: StudyContext, job: Job, fmu_files: FmuFiles, reply: IO[s
         _prepare_job(context, job, fmu_files).free()
     except InputError as error:
         problems = list(error.problems)
-    _write_reply(reply, [(problem.message, _without_root(context, problem.where)) for problem in problems])
+    _write_reply(
+        reply, [(problem.message, _without_root(context, problem.where)) for problem in problems]
+    )
 
 
-# -- in the supervisor -------------------------------------------------------------------------------------------------------
+# -- in the supervisor
+# -------------------------------------------------------------------------------------------------------
 
 
-def _make_record(context: StudyContext, job: Job, outcome: SupervisedOutcome, reply: IO[str]) -> Record:
+def _make_record(
+    context: StudyContext, job: Job, outcome: SupervisedOutcome, reply: IO[str]
+) -> Record:
     if outcome.failure:
-        return Record(job.key, failure=_without_root(context, _failure_cause(context, outcome.failure)))
+        return Record(
+            job.key, failure=_without_root(context, _failure_cause(context, outcome.failure))
+        )
     reply.seek(0)
     try:
         answer = parse_object(reply.read())
@@ -185,7 +218,10 @@ def _make_record(context: StudyContext, job: Job, outcome: SupervisedOutcome, re
 
 
 def _failure_cause(context: StudyContext, failure: ComponentError) -> str:
-    """Return the cause of a failure; the text for a missed deadline does not name the present call."""
+    """Return the cause of a failure.
+
+    The text for a missed deadline does not name the present call.
+    """
     if context.deadline and f"signal {signal.SIGALRM:d} " in failure.reason:
         return f"the run did not end within {context.deadline:g} s"
     return str(failure)

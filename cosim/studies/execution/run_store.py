@@ -1,7 +1,7 @@
 """Store of finished runs: a file with one line per record, so that no run is made twice.
 
-Lines are only appended. A kill at any moment loses at most the line that is being written; the file is synchronized with the
-disk every second. Unreadable lines are skipped.
+Lines are only appended. A kill at any moment loses at most the line that is being written; the file
+is synchronized with the disk every second. Unreadable lines are skipped.
 """
 
 from __future__ import annotations
@@ -28,7 +28,8 @@ _PENDING = -1
 class RunStore:
     """Records of finished runs by key, in a folder locked against other processes.
 
-    Only the positions of the records in the file are kept in memory. Records can be read inside the store's context.
+    Only the positions of the records in the file are kept in memory. Records can be read inside the
+    store's context.
     """
 
     def __init__(self, folder: Path, retry_failed: bool = False):
@@ -39,7 +40,8 @@ class RunStore:
             retry_failed: treat failed runs as not finished.
 
         Raises:
-            InputError: if the folder cannot be written, is used by another process, or holds a foreign file of that name.
+            InputError: if the folder cannot be written, is used by another process, or holds a
+                foreign file of that name.
             OutputError: if the disk is full or defective.
         """
         self.path = folder / RUN_STORE_FILE
@@ -69,9 +71,16 @@ class RunStore:
         with self.path.open("rb") as file:
             for line in file:
                 record = _parse_record(line)
-                if size == 0 and not record and not _LINE_PREFIX.startswith(line[: len(_LINE_PREFIX)]):
+                if (
+                    size == 0
+                    and not record
+                    and not _LINE_PREFIX.startswith(line[: len(_LINE_PREFIX)])
+                ):
                     os.close(self._file)
-                    raise InputError(f'"{self.path}" is not a file of finished runs; expected one, or no such file')
+                    raise InputError(
+                        f'"{self.path}" is not a file of finished runs; expected one, or no such '
+                        "file"
+                    )
                 if not line.endswith(b"\n"):
                     os.ftruncate(self._file, size)
                     break
@@ -101,7 +110,9 @@ class RunStore:
         Raises:
             OutputError: if it cannot be written, as on a full disk.
         """
-        new_units = {name: unit for name, unit in record.units.items() if self.units.get(name) != unit}
+        new_units = {
+            name: unit for name, unit in record.units.items() if self.units.get(name) != unit
+        }
         line = replace(record, units=new_units).to_json().encode() + b"\n"
         try:
             if os.write(self._file, line) != len(line):

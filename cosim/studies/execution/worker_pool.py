@@ -30,8 +30,11 @@ _STARTUP_TIMEOUT, _SHUTDOWN_TIMEOUT = 120.0, 5.0
 _STOP_CHECK_INTERVAL = 1.0
 #: number of FMUs unpacked in advance
 _MAX_PRELOADED_FMUS = 100
-#: one thread per process: many processes share the machine, and a process with threads cannot be forked safely
-_SINGLE_THREAD_ENVIRONMENT = dict.fromkeys(("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1")
+#: one thread per process: many processes share the machine, and a process with threads cannot be
+#: forked safely
+_SINGLE_THREAD_ENVIRONMENT = dict.fromkeys(
+    ("OPENBLAS_NUM_THREADS", "OMP_NUM_THREADS", "MKL_NUM_THREADS"), "1"
+)
 #: large pages (glibc on Linux) halve the cost of page faults in a forked process
 _LARGE_PAGES_ENVIRONMENT = {"GLIBC_TUNABLES": "glibc.malloc.hugetlb=1"}
 
@@ -56,7 +59,8 @@ class Worker:
         """Send a request and return the answer, a line of JSON.
 
         Raises:
-            WorkerLostError: if the process ends before it has answered, or is killed because it was stopped from outside.
+            WorkerLostError: if the process ends before it has answered, or is killed because it was
+                stopped from outside.
         """
         try:
             if self._process is None:
@@ -67,7 +71,9 @@ class Worker:
             raise WorkerLostError("a worker process ended") from None
 
     def _read_line(self) -> bytes:
-        """Return the next line; kill the worker, or the fork server before there is one, if it is stopped for too long.
+        """Return the next line.
+
+        Kill the worker, or the fork server before there is one, if it is stopped for too long.
 
         Raises:
             ConnectionError: if the process has ended.
@@ -80,9 +86,13 @@ class Worker:
                 line += data
                 continue
             process = self._process or self._fork_server
-            if has_ended(process):  # another process, which it has left behind, keeps the connection open
+            if has_ended(
+                process
+            ):  # another process, which it has left behind, keeps the connection open
                 raise ConnectionError
-            stopped_since = min(stopped_since, time.monotonic()) if is_stopped(process) else math.inf
+            stopped_since = (
+                min(stopped_since, time.monotonic()) if is_stopped(process) else math.inf
+            )
             if time.monotonic() - stopped_since > STOP_TIMEOUT:
                 os.kill(process, signal.SIGKILL)  # closes the connection
                 stopped_since = math.inf
@@ -96,18 +106,28 @@ class Worker:
 
 
 class _ForkServer:
-    """Process that forks workers; if preloading fails or starts threads in it, it is restarted without preloading."""
+    """Process that forks workers.
+
+    If preloading fails or starts threads in it, it is restarted without preloading.
+    """
 
     def __init__(self, context: StudyContext):
         if not self._start(context, preload=True):
             self.close()
             if not self._start(context, preload=False):
-                raise ComponentError("cosim", "the fork server", f"it ended with exit code {self._process.wait()}")
+                raise ComponentError(
+                    "cosim", "the fork server", f"it ended with exit code {self._process.wait()}"
+                )
 
     def _start(self, context: StudyContext, preload: bool) -> bool:
         self._control, other = socket.socketpair()
         with other:
-            command = [sys.executable, "-m", "cosim.studies.execution.fork_server", str(other.fileno())]
+            command = [
+                sys.executable,
+                "-m",
+                "cosim.studies.execution.fork_server",
+                str(other.fileno()),
+            ]
             self._process = subprocess.Popen(  # noqa: S603
                 command,
                 pass_fds=[other.fileno()],
@@ -165,8 +185,8 @@ class _ForkServer:
 class WorkerPool:
     """Pool of worker processes for the runs of a study.
 
-    Several threads may call it at the same time; each of them gets a separate worker. Killed workers and a killed fork server are
-    replaced.
+    Several threads may call it at the same time; each of them gets a separate worker. Killed
+    workers and a killed fork server are replaced.
     """
 
     def __init__(self, context: StudyContext):
@@ -190,7 +210,9 @@ class WorkerPool:
 
     def check(self, job: Job) -> list[Problem]:
         """Return the problems for which a job cannot be run."""
-        return [Problem(message, where) for message, where in json.loads(self._request(job, check=True))]
+        return [
+            Problem(message, where) for message, where in json.loads(self._request(job, check=True))
+        ]
 
     def replay(self, job: Job, request: ReplayRequest) -> Record:
         """Run a job again and write its 3-D replay; after a failure, the replay ends there."""

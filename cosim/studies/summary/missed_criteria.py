@@ -1,4 +1,7 @@
-"""Runs of a sweep that reached their end without success: the criteria that they miss, and the commands that repeat them."""
+"""Runs of a sweep that reached their end without success.
+
+The criteria that they miss, and the commands that repeat them.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +37,8 @@ class UnsuccessfulRun(NamedTuple):
     Attributes:
         run: number of the point.
         labels: labels of the factors.
-        missed: found values and limits, such as "landing.touchdown_speed is 0.61 m/s, expected at most 0.5 m/s".
+        missed: found values and limits, such as "landing.touchdown_speed is 0.61 m/s, expected at
+            most 0.5 m/s".
         command: command line that makes this run alone.
     """
 
@@ -49,8 +53,12 @@ def criterion_limits(outcome: CheckOutcome, units: Mapping[str, str]) -> str:
     return f"{outcome.limits} {units.get(outcome.check['kpi'], '')}".rstrip()
 
 
-def missed_criteria(sweep: Sweep, rows: Iterable[SweepRow], units: Mapping[str, str]) -> list[MissedCriterion]:
-    """Return the criteria that finished runs miss, the most frequent first; runs that failed are left out.
+def missed_criteria(
+    sweep: Sweep, rows: Iterable[SweepRow], units: Mapping[str, str]
+) -> list[MissedCriterion]:
+    """Return the criteria that finished runs miss, the most frequent first.
+
+    Runs that failed are left out.
 
     Args:
         sweep: the sweep.
@@ -60,13 +68,23 @@ def missed_criteria(sweep: Sweep, rows: Iterable[SweepRow], units: Mapping[str, 
     counts: dict[tuple[str, str], list[int]] = {}
     for row in rows:
         for outcome in () if row.record.failure else sweep.missed(row.record.kpis):
-            counts.setdefault((outcome.check["kpi"], criterion_limits(outcome, units)), [0, row.run])[0] += 1
+            counts.setdefault(
+                (outcome.check["kpi"], criterion_limits(outcome, units)), [0, row.run]
+            )[0] += 1
     found = sorted(counts.items(), key=lambda item: -item[1][0])
-    return [MissedCriterion(*criterion, runs, first, run_command(sweep, first)) for criterion, (runs, first) in found]
+    return [
+        MissedCriterion(*criterion, runs, first, run_command(sweep, first))
+        for criterion, (runs, first) in found
+    ]
 
 
-def unsuccessful_runs(sweep: Sweep, rows: Iterable[SweepRow], units: Mapping[str, str]) -> Iterator[UnsuccessfulRun]:
-    """Yield the runs that reached their end without success, in the order of the design; `units` are those of the KPIs."""
+def unsuccessful_runs(
+    sweep: Sweep, rows: Iterable[SweepRow], units: Mapping[str, str]
+) -> Iterator[UnsuccessfulRun]:
+    """Yield the runs that reached their end without success, in the order of the design.
+
+    `units` are those of the KPIs.
+    """
     for row in rows:
         if not row.passed and not row.record.failure:
             missed = [outcome.text(units) for outcome in sweep.missed(row.record.kpis)]

@@ -28,7 +28,11 @@ _MAX_LISTED_LEVELS = 12
 
 
 def write_sweep_page(
-    sweep: Sweep, rows: Iterable[SweepRow], summary: SweepSummary, maps: Sequence[SuccessMap], folder: Path
+    sweep: Sweep,
+    rows: Iterable[SweepRow],
+    summary: SweepSummary,
+    maps: Sequence[SuccessMap],
+    folder: Path,
 ) -> None:
     """Write every map as NAME.png and NAME.svg, and sweep.html with maps, success rates, KPIs, failures and the design.
 
@@ -45,7 +49,12 @@ def write_sweep_page(
     overall = summary.groups[0] if summary.groups else None
     drawn = {f"{each.name}{suffix}" for each in maps for suffix in (".png", ".svg")}
     remove_files(
-        folder, *(path.name for path in folder.glob(f"{MAP_NAME}*") if _MAP_FILE.fullmatch(path.name) and path.name not in drawn)
+        folder,
+        *(
+            path.name
+            for path in folder.glob(f"{MAP_NAME}*")
+            if _MAP_FILE.fullmatch(path.name) and path.name not in drawn
+        ),
     )
     statistics = overall.shown_statistics() if overall else ()
     cells = list(_shown_cells(sweep, rows, summary.units, maps, folder))
@@ -86,7 +95,9 @@ def _design_rows(sweep: Sweep) -> Iterator[tuple[str, str]]:
 def _level_summary(design: Design, number: int) -> str:
     """Return the levels of a factor as text: all of them, or the lowest and the highest."""
     factor = design.factors[number]
-    if factor.listed_levels or (design.unit_samples is None and len(factor.grid_levels) <= _MAX_LISTED_LEVELS):
+    if factor.listed_levels or (
+        design.unit_samples is None and len(factor.grid_levels) <= _MAX_LISTED_LEVELS
+    ):
         return ", ".join(str(level.label) for level in factor.grid_levels)
     if design.unit_samples is None:
         ends = factor.grid_levels[0], factor.grid_levels[-1]
@@ -103,7 +114,9 @@ def _write_map(sweep: Sweep, map_: SuccessMap, folder: Path) -> dict[str, Any]:
     text = figure_to_svg(figure).replace(' target="_blank"', "")
     with writing_atomically(folder / f"{map_.name}.svg") as temporary:
         temporary.write_text(text, encoding="utf-8", newline="\n")
-    in_page = text[text.index("<svg") :].replace(f'"{PAGE_FILE}#', '"#')  # a copy of the page may have another name
+    in_page = text[text.index("<svg") :].replace(
+        f'"{PAGE_FILE}#', '"#'
+    )  # a copy of the page may have another name
     return {"svg": safe_markup(in_page), "width": figure.get_figwidth()}
 
 
@@ -115,7 +128,11 @@ def _cell_link(sweep: Sweep, cell: MapCell, folder: Path) -> str:
 
 
 def _shown_cells(
-    sweep: Sweep, rows: Iterable[SweepRow], units: Mapping[str, str], maps: Iterable[SuccessMap], folder: Path
+    sweep: Sweep,
+    rows: Iterable[SweepRow],
+    units: Mapping[str, str],
+    maps: Iterable[SuccessMap],
+    folder: Path,
 ) -> Iterator[dict[str, Any]]:
     """Yield each run that represents a cell, once, with the reasons why it is no success and with its command."""
     shown = {
@@ -132,4 +149,8 @@ def _shown_cells(
 
 def _reasons(sweep: Sweep, row: SweepRow, units: Mapping[str, str]) -> list[str]:
     """Return why a run is no success: the failure, or the criteria that it misses."""
-    return [row.record.failure] if row.record.failure else [outcome.text(units) for outcome in sweep.missed(row.record.kpis)]
+    return (
+        [row.record.failure]
+        if row.record.failure
+        else [outcome.text(units) for outcome in sweep.missed(row.record.kpis)]
+    )

@@ -26,13 +26,23 @@ def run_settings(sweep: Sweep, run: int) -> dict[str, Any]:
 
 
 def format_run_command(scenario: Path, settings: Any) -> str:
-    """Return the command line that makes this run alone in the working directory; it refers to a shipped scenario by its name.
+    """Return the command line that makes this run alone in the working directory.
 
-    Paths in settings of a study start from the folder of the scenario, those of the option `--set` from the working directory.
+    It refers to a shipped scenario by its name.
+
+    Paths in settings of a study start from the folder of the scenario, those of the option `--set`
+    from the working directory.
     """
     change = _path_changes(scenario.parent, Path.cwd())
-    moved = {name: change_pointed(name, value, change) if name.startswith("/") else value for name, value in settings.items()}
-    words = [word for name, value in moved.items() for word in ("--set", f"{name}={_setting_text(value)}")]
+    moved = {
+        name: change_pointed(name, value, change) if name.startswith("/") else value
+        for name, value in settings.items()
+    }
+    words = [
+        word
+        for name, value in moved.items()
+        for word in ("--set", f"{name}={_setting_text(value)}")
+    ]
     return shlex.join(["cosim", "run", _scenario_text(scenario), *words])
 
 
@@ -43,7 +53,11 @@ def _path_changes(folder: Path, working: Path) -> PathChange:
 
     def change(text: str) -> str:
         shipped = to_shipped(text)
-        return to_working(text) if Path(shipped).is_absolute() or shipped.startswith("..") else f"{SHIPPED}{shipped}"
+        return (
+            to_working(text)
+            if Path(shipped).is_absolute() or shipped.startswith("..")
+            else f"{SHIPPED}{shipped}"
+        )
 
     return change
 

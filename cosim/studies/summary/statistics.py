@@ -1,4 +1,7 @@
-"""Statistics of many runs: distributions of KPIs and success rates, over all runs and by the levels of factors."""
+"""Statistics of many runs.
+
+Distributions of KPIs and success rates, over all runs and by the levels of factors.
+"""
 
 from __future__ import annotations
 
@@ -35,8 +38,12 @@ def wilson_interval(successes: float, count: int) -> ConfidenceInterval:
         return ConfidenceInterval(0.0, 1.0)
     rate, z2 = successes / count, _Z_95 * _Z_95
     center = (rate + z2 / (2 * count)) / (1 + z2 / count)
-    half = _Z_95 / (1 + z2 / count) * math.sqrt(rate * (1 - rate) / count + z2 / (4 * count * count))
-    return ConfidenceInterval(0.0 if successes == 0 else center - half, 1.0 if successes == count else center + half)
+    half = (
+        _Z_95 / (1 + z2 / count) * math.sqrt(rate * (1 - rate) / count + z2 / (4 * count * count))
+    )
+    return ConfidenceInterval(
+        0.0 if successes == 0 else center - half, 1.0 if successes == count else center + half
+    )
 
 
 @dataclass
@@ -88,24 +95,42 @@ class RunGroup:
         return wilson_interval(self.passed * self.distinct / self.runs, self.distinct)
 
     def statistics(self) -> Iterator[tuple[str, dict[str, float]]]:
-        """Yield (KPI, statistics): number of finite values, mean, standard deviation (n - 1) and quantiles."""
+        """Yield (KPI, statistics).
+
+        Number of finite values, mean, standard deviation (n - 1) and quantiles.
+        """
         for name, column in self.kpis.items():
             values = np.frombuffer(column, np.float64) if column else np.array([math.nan])
-            quantiles = dict(zip(QUANTILES, np.quantile(values, list(QUANTILES.values())).tolist(), strict=True))
+            quantiles = dict(
+                zip(QUANTILES, np.quantile(values, list(QUANTILES.values())).tolist(), strict=True)
+            )
             spread = float(values.std(ddof=1)) if len(column) > 1 else math.nan
-            yield name, {"count": len(column), "mean": float(values.mean()), "std": spread, **quantiles}
+            yield (
+                name,
+                {"count": len(column), "mean": float(values.mean()), "std": spread, **quantiles},
+            )
 
     def shown_statistics(self) -> Iterator[tuple[str, dict[str, str]]]:
-        """Yield (KPI, statistics as texts), "-" without a value; the mean of a Boolean is the share of true values."""
+        """Yield (KPI, statistics as texts), "-" without a value.
+
+        The mean of a Boolean is the share of true values.
+        """
         for name, numbers in self.statistics():
             shown = {key: format_number(value) for key, value in numbers.items()}
             if name in self.booleans:
-                shown = {**dict.fromkeys(shown, ""), "count": shown["count"], "mean": f"{100 * numbers['mean']:.3g} %"}
+                shown = {
+                    **dict.fromkeys(shown, ""),
+                    "count": shown["count"],
+                    "mean": f"{100 * numbers['mean']:.3g} %",
+                }
             yield name, shown
 
 
 def groupings(design: Design, by: Iterable[Sequence[str]]) -> list[tuple[str, ...]]:
-    """Return the groupings of runs by factors: none, each factor that has levels, and those in `by`."""
+    """Return the groupings of runs by factors.
+
+    None, each factor that has levels, and those in `by`.
+    """
     single = [
         (factor.name,)
         for factor in design.factors

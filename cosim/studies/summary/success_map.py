@@ -20,7 +20,10 @@ MAP_NAME = "success_map"
 
 
 class MapRun(NamedTuple):
-    """Run in a cell of a map; `value` is that of the KPI that ranks successes, `key` is equal for equal runs."""
+    """Run in a cell of a map.
+
+    `value` is that of the KPI that ranks successes, `key` is equal for equal runs.
+    """
 
     number: int
     passed: bool
@@ -55,7 +58,10 @@ class MapCell:
 
     @cached_property
     def representative_run(self) -> MapRun | None:
-        """Run shown for the cell: the first unsuccessful one, else the median success; None without runs."""
+        """Run shown for the cell: the first unsuccessful one, else the median success.
+
+        None without runs.
+        """
         if unsuccessful := [run for run in self.runs if not run.passed]:
             return unsuccessful[0]
         ranked = sorted(self.runs, key=lambda run: (run.value, run.number))
@@ -99,11 +105,18 @@ def success_maps(sweep: Sweep, rows: Iterable[SweepRow]) -> list[SuccessMap]:
     specs, kpi = sweep.study_file.spec.maps, ranking_kpi(sweep.criteria)
     cells_of_maps: list[dict[str, list[MapRun]]] = [{} for _ in specs]
     for row in rows if specs else ():
-        run = MapRun(row.run, row.passed, float(row.record.kpis.get(kpi, math.nan)), sweep.keys[row.run])
+        run = MapRun(
+            row.run, row.passed, float(row.record.kpis.get(kpi, math.nan)), sweep.keys[row.run]
+        )
         for spec, cells in zip(specs, cells_of_maps, strict=True):
-            cells.setdefault(_labels_key(row.point.labels[name] for name in spec.factors), []).append(run)
+            cells.setdefault(
+                _labels_key(row.point.labels[name] for name in spec.factors), []
+            ).append(run)
     names = [MAP_NAME if len(specs) == 1 else f"{MAP_NAME}_{i + 1}" for i in range(len(specs))]
-    return [_build_map(*each, sweep.design, kpi) for each in zip(names, specs, cells_of_maps, strict=True)]
+    return [
+        _build_map(*each, sweep.design, kpi)
+        for each in zip(names, specs, cells_of_maps, strict=True)
+    ]
 
 
 def ranking_kpi(criteria: Iterable[Mapping[str, Any]]) -> str:
@@ -115,10 +128,14 @@ def _labels_key(labels: Iterable[Any]) -> str:
     return json.dumps(list(labels))
 
 
-def _build_map(name: str, spec: MapSpec, runs: Mapping[str, Sequence[MapRun]], design: Design, kpi: str) -> SuccessMap:
+def _build_map(
+    name: str, spec: MapSpec, runs: Mapping[str, Sequence[MapRun]], design: Design, kpi: str
+) -> SuccessMap:
     levels = {factor: design.labels(factor) for factor in spec.factors}
     cells = {
-        _labels_key(labels): MapCell(dict(zip(levels, labels, strict=True)), runs.get(_labels_key(labels), ()), kpi)
+        _labels_key(labels): MapCell(
+            dict(zip(levels, labels, strict=True)), runs.get(_labels_key(labels), ()), kpi
+        )
         for labels in product(*levels.values())
     }
     return SuccessMap(name, spec, levels, cells)

@@ -1,4 +1,7 @@
-"""Files of a sweep: table, aggregates, success rates, runs without success, failures, and metadata."""
+"""Files of a sweep.
+
+Table, aggregates, success rates, runs without success, failures, and metadata.
+"""
 
 from __future__ import annotations
 
@@ -45,7 +48,11 @@ class SweepSummary:
     @property
     def unsuccessful(self) -> int:
         """Number of runs that reached their end without success."""
-        return self.groups[0].runs - self.groups[0].failed - self.groups[0].passed if self.groups else 0
+        return (
+            self.groups[0].runs - self.groups[0].failed - self.groups[0].passed
+            if self.groups
+            else 0
+        )
 
     @property
     def failed(self) -> int:
@@ -53,7 +60,9 @@ class SweepSummary:
         return self.groups[0].failed if self.groups else 0
 
 
-def write_sweep_files(sweep: Sweep, run_store: RunStore, folder: Path, parquet: bool) -> SweepSummary:
+def write_sweep_files(
+    sweep: Sweep, run_store: RunStore, folder: Path, parquet: bool
+) -> SweepSummary:
     """Write table.csv, aggregates.csv, success.csv, unsuccessful.csv, failures.csv and sweep.json, and return the summary.
 
     With `parquet`, table.parquet is written, too; else an older one is removed.
@@ -71,18 +80,30 @@ def write_sweep_files(sweep: Sweep, run_store: RunStore, folder: Path, parquet: 
     groups, statistics = [], []
     for names in groupings(sweep.design, sweep.study_file.spec.by):
         for group in group_rows(rows, names):
-            statistics += [_statistics_row(group, factors, kpi, numbers) for kpi, numbers in group.statistics()]
+            statistics += [
+                _statistics_row(group, factors, kpi, numbers) for kpi, numbers in group.statistics()
+            ]
             group.kpis = group.kpis if not names else {}
             groups.append(group)
     write_csv_rows([*factors, *AGGREGATE_COLUMNS], statistics, folder / "aggregates.csv")
-    write_csv_rows([*factors, *SUCCESS_COLUMNS], (_success_row(group, factors) for group in groups), folder / "success.csv")
+    write_csv_rows(
+        [*factors, *SUCCESS_COLUMNS],
+        (_success_row(group, factors) for group in groups),
+        folder / "success.csv",
+    )
     units = run_store.units
     unsuccessful = (
         [each.run, *each.labels.values(), "; ".join(each.missed), each.command]
         for each in unsuccessful_runs(sweep, rows(), units)
     )
-    write_csv_rows(["run", *factors, "missed", "command"], unsuccessful, folder / "unsuccessful.csv")
-    write_csv_rows(["run", *factors, "failure", "output", "command"], _failure_rows(sweep, rows()), folder / "failures.csv")
+    write_csv_rows(
+        ["run", *factors, "missed", "command"], unsuccessful, folder / "unsuccessful.csv"
+    )
+    write_csv_rows(
+        ["run", *factors, "failure", "output", "command"],
+        _failure_rows(sweep, rows()),
+        folder / "failures.csv",
+    )
     summary = SweepSummary(
         groups[0].runs if groups else 0,
         groups,
@@ -95,20 +116,38 @@ def write_sweep_files(sweep: Sweep, run_store: RunStore, folder: Path, parquet: 
     return summary
 
 
-def _statistics_row(group: RunGroup, factors: list[str], kpi: str, numbers: dict[str, float]) -> list[Any]:
+def _statistics_row(
+    group: RunGroup, factors: list[str], kpi: str, numbers: dict[str, float]
+) -> list[Any]:
     return [*(group.labels.get(name) for name in factors), kpi, *numbers.values()]
 
 
 def _success_row(group: RunGroup, factors: list[str]) -> list[Any]:
     labels = (group.labels.get(name) for name in factors)
-    return [*labels, group.runs, group.distinct, group.failed, group.passed, group.success_rate, *group.interval]
+    return [
+        *labels,
+        group.runs,
+        group.distinct,
+        group.failed,
+        group.passed,
+        group.success_rate,
+        *group.interval,
+    ]
 
 
 def _failure_rows(sweep: Sweep, rows: Iterator[SweepRow]) -> Iterator[list[Any]]:
     for row in rows:
         if row.record.failure:
-            command = format_run_command(sweep.study_file.scenario, sweep.study.job(row.point.settings).settings)
-            yield [row.run, *row.point.labels.values(), row.record.failure, row.record.output, command]
+            command = format_run_command(
+                sweep.study_file.scenario, sweep.study.job(row.point.settings).settings
+            )
+            yield [
+                row.run,
+                *row.point.labels.values(),
+                row.record.failure,
+                row.record.output,
+                command,
+            ]
 
 
 def _sweep_metadata(sweep: Sweep, summary: SweepSummary) -> dict[str, Any]:

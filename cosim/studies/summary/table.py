@@ -1,4 +1,7 @@
-"""Table of a sweep: one row per finished run in the order of the design, independent of how and where they were run."""
+"""Table of a sweep.
+
+One row per finished run in the order of the design, independent of how and where they were run.
+"""
 
 from __future__ import annotations
 
@@ -39,8 +42,13 @@ def row_values(row: SweepRow, factors: Sequence[str], kpis: Sequence[str]) -> li
 
 
 def write_csv(rows: RowSource, factors: Sequence[str], kpis: Sequence[str], path: Path) -> None:
-    """Write the table as CSV: booleans as 0 and 1, numbers that round-trip, nan and inf, and empty cells for missing values."""
-    write_csv_rows(table_header(factors, kpis), (row_values(row, factors, kpis) for row in rows()), path)
+    """Write the table as CSV.
+
+    Booleans as 0 and 1, numbers that round-trip, nan and inf, and empty cells for missing values.
+    """
+    write_csv_rows(
+        table_header(factors, kpis), (row_values(row, factors, kpis) for row in rows()), path
+    )
 
 
 def write_csv_rows(names: Sequence[str], lines: Iterable[Sequence[Any]], path: Path) -> None:
@@ -50,7 +58,10 @@ def write_csv_rows(names: Sequence[str], lines: Iterable[Sequence[Any]], path: P
         InputError: if the folder cannot be written.
         OutputError: if writing fails, as on a full disk.
     """
-    with writing_atomically(path) as temporary, temporary.open("w", newline="", encoding="utf-8") as file:
+    with (
+        writing_atomically(path) as temporary,
+        temporary.open("w", newline="", encoding="utf-8") as file,
+    ):
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(map(text_cell, names))
         writer.writerows([csv_value(value) for value in line] for line in lines)
@@ -70,10 +81,20 @@ def write_parquet(rows: RowSource, factors: Sequence[str], kpis: Sequence[str], 
     import pyarrow as pa
     from pyarrow.parquet import ParquetWriter
 
-    texts = {name for row in rows() for name, label in row.point.labels.items() if not isinstance(label, int | float)}
+    texts = {
+        name
+        for row in rows()
+        for name, label in row.point.labels.items()
+        if not isinstance(label, int | float)
+    }
     kinds = {"run": pa.int64(), "status": pa.string(), "passed": pa.bool_(), "failure": pa.string()}
     names = table_header(factors, kpis)
-    schema = pa.schema([(name, kinds.get(name) or (pa.string() if name in texts else pa.float64())) for name in names])
+    schema = pa.schema(
+        [
+            (name, kinds.get(name) or (pa.string() if name in texts else pa.float64()))
+            for name in names
+        ]
+    )
     with writing_atomically(path) as temporary, ParquetWriter(temporary, schema) as writer:
         lines = (row_values(row, factors, kpis) for row in rows())
         while batch := list(islice(lines, _BATCH_SIZE)):
@@ -85,5 +106,8 @@ def _arrow_columns(batch: list[list[Any]], schema: Any) -> Iterator[Any]:
 
     for field, column in zip(schema, zip(*batch, strict=True), strict=True):
         text, number = field.type == pa.string(), field.type == pa.float64()
-        plain = [str(csv_value(v)) if text else float(v) if number and v is not None else v for v in column]
+        plain = [
+            str(csv_value(v)) if text else float(v) if number and v is not None else v
+            for v in column
+        ]
         yield pa.array(plain, field.type)

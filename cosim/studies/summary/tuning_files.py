@@ -13,9 +13,15 @@ from .table import write_csv_rows
 
 
 def write_tuning_files(tuning: Tuning, folder: Path) -> Trial:
-    """Write trials.csv and best.json and return the best trial; there must be at least one trial."""
+    """Write trials.csv and best.json and return the best trial.
+
+    There must be at least one trial.
+    """
     names = [spec.name for spec in tuning.spec.parameters]
-    lines = ([*trial.parameters.values(), trial.value, trial.violation, trial.failure] for trial in tuning.trials)
+    lines = (
+        [*trial.parameters.values(), trial.value, trial.violation, trial.failure]
+        for trial in tuning.trials
+    )
     write_csv_rows([*names, *TRIAL_COLUMNS], lines, folder / "trials.csv")
     best = min(tuning.trials, key=lambda trial: trial.rank)
     write_json(describe_best(tuning, best), folder / "best.json")

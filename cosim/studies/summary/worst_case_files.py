@@ -19,7 +19,10 @@ def write_worst_case_files(search: WorstCase, folder: Path) -> list[Path]:
         The files of the counterexamples, the worst one first.
     """
     names = [spec.name for spec in search.spec.parameters]
-    rows = ([*each.parameters.values(), each.severity, each.passed, each.reason] for each in search.attempts)
+    rows = (
+        [*each.parameters.values(), each.severity, each.passed, each.reason]
+        for each in search.attempts
+    )
     write_csv_rows([*names, "severity", "passed", "reason"], rows, folder / "trials.csv")
     write_json(describe_worst_case(search), folder / "worst.json")
     files, scenario = [], search.study_file.scenario
@@ -28,7 +31,10 @@ def write_worst_case_files(search: WorstCase, folder: Path) -> list[Path]:
         file = folder / "counterexamples" / f"{name}.json"
         file.parent.mkdir(exist_ok=True)
         settings = search.settings(each)
-        write_json(extending_scenario(scenario, file.parent, name, each.reason, settings, scenario.parent), file)
+        write_json(
+            extending_scenario(scenario, file.parent, name, each.reason, settings, scenario.parent),
+            file,
+        )
         files.append(file)
     return files
 

@@ -1,4 +1,7 @@
-"""Force models between controllers and plant, the paper's "output processing"; each folder becomes an FMU.
+"""Force models between controllers and plant, the paper's "output processing".
 
-The models have no state and tunable parameters. They are stepped before the plant, with the delayed signals of the bus.
+Each folder becomes an FMU.
+
+The models have no state and tunable parameters. They are stepped before the plant, with the delayed
+signals of the bus.
 """

@@ -1,4 +1,7 @@
-"""Shared parts of the force models: inputs from the vessel's motion, parameters, outputs and the block of the FMU."""
+"""Shared parts of the force models.
+
+Inputs from the vessel's motion, parameters, outputs and the block of the FMU.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +33,9 @@ def planar_velocity(motion: ca.SX) -> ca.SX:
 
 def tunable_parameter(name: str, start: float, unit: str, description: str) -> Variable:
     """Declare a tunable real parameter."""
-    return Variable(name, "Float64", "parameter", "tunable", start, parse_unit(unit), description=description)
+    return Variable(
+        name, "Float64", "parameter", "tunable", start, parse_unit(unit), description=description
+    )
 
 
 def load_outputs(what: str) -> tuple[Variable, ...]:
@@ -42,7 +47,10 @@ def load_outputs(what: str) -> tuple[Variable, ...]:
 
 
 def force_model(
-    identifier: str, description: str, variables: Sequence[Variable], loads: Callable[[ca.SX, ca.SX], ca.SX]
+    identifier: str,
+    description: str,
+    variables: Sequence[Variable],
+    loads: Callable[[ca.SX, ca.SX], ca.SX],
 ) -> Block:
     """Return the block of a force model.
 

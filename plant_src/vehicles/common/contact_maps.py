@@ -51,8 +51,9 @@ IMPULSE_TOLERANCE = 1e-12
 class FreeContactMaps:
     """Contact functions of a free rigid body.
 
-    The state begins with position, quaternion, velocity (world frame) and rates (body frame); contact does not change its
-    further elements. The argument `principal_axes` is the orientation of Bullet's body in the body frame (quaternion x y z w).
+    The state begins with position, quaternion, velocity (world frame) and rates (body frame);
+    contact does not change its further elements. The argument `principal_axes` is the orientation
+    of Bullet's body in the body frame (quaternion x y z w).
 
     Attributes:
         model: Equations of the vehicle.
@@ -66,30 +67,52 @@ class FreeContactMaps:
 
     def functions(self) -> list[ca.Function]:
         """Return the functions to export."""
-        return [free_initialize_function(self.model), self._predict_function(), self._correct_function()]
+        return [
+            free_initialize_function(self.model),
+            self._predict_function(),
+            self._correct_function(),
+        ]
 
     def _predict_function(self) -> ca.Function:
         arguments = predict_symbols(self.model)
         state, end, step = arguments[0], predicted_state(self.model, *arguments[:5]), arguments[4]
         (axes,) = create_symbols(principal_axes=4)
         linear = (end[0:3] - state[0:3]) / step
-        angular = kinematics.rotation_vector(kinematics.quaternion_product(end[3:7], kinematics.conjugate(state[3:7]))) / step
+        angular = (
+            kinematics.rotation_vector(
+                kinematics.quaternion_product(end[3:7], kinematics.conjugate(state[3:7]))
+            )
+            / step
+        )
         # cancels the gyroscopic torque that Bullet adds to its body
-        torque = ca.cross(angular, self.rigid_body(arguments[3]).inertia_in_world(state[3:7]) @ angular)
+        torque = ca.cross(
+            angular, self.rigid_body(arguments[3]).inertia_in_world(state[3:7]) @ angular
+        )
         twist, endpoints = ca.vertcat(linear, angular), ca.vertcat(state[0:3], end[0:3])
-        may_fail = ca.logic_or(self._may_be_in_water(end, *arguments[2:5:2]), is_upside_down(end[3:7]))
+        may_fail = ca.logic_or(
+            self._may_be_in_water(end, *arguments[2:5:2]), is_upside_down(end[3:7])
+        )
         status = step_status(end, endpoints, arguments, may_fail)
         results = [state, end, twist, twist, torque, principal_pose(state, axes), endpoints, status]
         return ca.Function("contact_predict", [*arguments, axes], results)
 
     def _may_be_in_water(self, end: ca.SX, environment_inputs: ca.SX, step: ca.SX) -> ca.SX:
-        """Return whether the surface can reach the centre of mass in a step; its level is that at the start of the step."""
-        environment = [variable.name for variable in self.model.elements("input") if variable.name in ENVIRONMENT_INPUTS]
+        """Return whether the surface can reach the centre of mass in a step.
+
+        Its level is that at the start of the step.
+        """
+        environment = [
+            variable.name
+            for variable in self.model.elements("input")
+            if variable.name in ENVIRONMENT_INPUTS
+        ]
         level = environment_inputs[environment.index("water_level")]
         return end[2] < level + step * (MAX_SURFACE_SPEED + ca.norm_2(end[7:10]))
 
     def _correct_function(self) -> ca.Function:
-        start, predicted, twist, bullet_twist, constants, step = arguments = correct_symbols(self.model)
+        start, predicted, twist, bullet_twist, constants, step = arguments = correct_symbols(
+            self.model
+        )
         linear, angular = ca.vertsplit(bullet_twist - twist, 3)
         rigid, to_body = self.rigid_body(constants), kinematics.rotation_matrix(predicted[3:7]).T
         rates = rigid.inverse_inertia @ (to_body @ (rigid.inertia_in_world(start[3:7]) @ angular))
@@ -97,8 +120,15 @@ class FreeContactMaps:
         impulse = contact_impulse(rigid.mass * ca.norm_2(linear))
         rotation = kinematics.quaternion_from_rotation_vector(bullet_twist[3:6] * step)
         orientation = kinematics.quaternion_product(rotation, start[3:7])
-        pose = ca.vertcat(start[0:3] + bullet_twist[0:3] * step, kinematics.normalised_quaternion(orientation))
-        published = ca.vertcat(pose, bullet_twist[0:3], kinematics.rotation_matrix(orientation).T @ bullet_twist[3:6], others)
+        pose = ca.vertcat(
+            start[0:3] + bullet_twist[0:3] * step, kinematics.normalised_quaternion(orientation)
+        )
+        published = ca.vertcat(
+            pose,
+            bullet_twist[0:3],
+            kinematics.rotation_matrix(orientation).T @ bullet_twist[3:6],
+            others,
+        )
         corrected = ca.vertcat(pose, velocity, others)
         return correct_function(arguments, impulse, predicted, corrected, self.observe, published)
 
@@ -116,38 +146,56 @@ def free_initialize_function(model: ContinuousModel) -> ca.Function:
 def parameters_and_constants(model: ContinuousModel) -> tuple[ca.SX, ca.SX]:
     """Return symbols of the parameters, and the constants derived from them."""
     (parameters,) = create_symbols(parameters=len(model.elements("parameter")))
-    return parameters, model.derived_parameters(parameters) if model.derived_parameters else parameters
+    return parameters, model.derived_parameters(
+        parameters
+    ) if model.derived_parameters else parameters
 
 
 def predict_symbols(model: ContinuousModel) -> list[ca.SX]:
     """Return symbols of the arguments that every `contact_predict` has.
 
-    These are state, inputs, environment inputs, constants, step size (s), and centre and half edges (m, world frame) of the box
-    in which the vehicle cannot meet anything.
+    These are state, inputs, environment inputs, constants, step size (s), and centre and half edges
+    (m, world frame) of the box in which the vehicle cannot meet anything.
     """
     environment = sum(variable.name in ENVIRONMENT_INPUTS for variable in model.elements("input"))
     inputs = len(model.elements("input")) - environment
     vectors = create_symbols(state=len(model.states), inputs=inputs, environment_inputs=environment)
-    return [*vectors, model.derived_parameter_symbols(), *create_symbols(step_size=1, reference_position=3, safe_distance=3)]
+    return [
+        *vectors,
+        model.derived_parameter_symbols(),
+        *create_symbols(step_size=1, reference_position=3, safe_distance=3),
+    ]
 
 
 def correct_symbols(model: ContinuousModel) -> list[ca.SX]:
     """Return symbols of the arguments that every `contact_correct` has.
 
-    These are state at the start, predicted state at the end of the step, commanded twist, Bullet's twist, constants and step
-    size (s).
+    These are state at the start, predicted state at the end of the step, commanded twist, Bullet's
+    twist, constants and step size (s).
     """
     count = len(model.states)
-    vectors = create_symbols(start_state=count, predicted_state=count, commanded_twist=TWIST_SIZE, bullet_twist=TWIST_SIZE)
+    vectors = create_symbols(
+        start_state=count,
+        predicted_state=count,
+        commanded_twist=TWIST_SIZE,
+        bullet_twist=TWIST_SIZE,
+    )
     return [*vectors, model.derived_parameter_symbols(), *create_symbols(step_size=1)]
 
 
 def predicted_state(
-    model: ContinuousModel, state: ca.SX, inputs: ca.SX, environment_inputs: ca.SX, constants: ca.SX, step: ca.SX
+    model: ContinuousModel,
+    state: ca.SX,
+    inputs: ca.SX,
+    environment_inputs: ca.SX,
+    constants: ca.SX,
+    step: ca.SX,
 ) -> ca.SX:
     """Return the state after a step (s) without contact."""
     sub_steps = round(MAX_WORLD_STEP / model.max_sub_step)
-    return model.integrate(state, ca.vertcat(inputs, environment_inputs), constants, step, sub_steps)
+    return model.integrate(
+        state, ca.vertcat(inputs, environment_inputs), constants, step, sub_steps
+    )
 
 
 def correct_function(
@@ -159,9 +207,16 @@ def correct_function(
     published: ca.SX,
     *further_results: ca.SX,
 ) -> ca.Function:
-    """Return `contact_correct`: with contact it selects `corrected` and publishes `published`, else `predicted` for both."""
-    state, observed = (ca.if_else(impulse > 0, in_contact, predicted) for in_contact in (corrected, published))
-    return ca.Function("contact_correct", arguments, [state, impulse, observe(observed), *further_results])
+    """Return `contact_correct`.
+
+    With contact it selects `corrected` and publishes `published`, else `predicted` for both.
+    """
+    state, observed = (
+        ca.if_else(impulse > 0, in_contact, predicted) for in_contact in (corrected, published)
+    )
+    return ca.Function(
+        "contact_correct", arguments, [state, impulse, observe(observed), *further_results]
+    )
 
 
 def create_symbols(**sizes: int) -> list[ca.SX]:
@@ -188,7 +243,9 @@ def step_status(end: ca.SX, endpoints: ca.SX, arguments: list[ca.SX], may_fail: 
     valid = ca.logic_and(ca.sum1(magnitudes) < ca.inf, ca.norm_2(end) < MAX_STATE_NORM)
     distance = ca.fabs(endpoints - ca.vertcat(reference_position, reference_position))
     excess = distance - ca.vertcat(safe_distance, safe_distance)
-    return ca.if_else(valid, LEAVES_SAFE_BOX * (ca.mmax(excess) > 0) + MAY_FAIL * may_fail, INVALID_STATE)
+    return ca.if_else(
+        valid, LEAVES_SAFE_BOX * (ca.mmax(excess) > 0) + MAY_FAIL * may_fail, INVALID_STATE
+    )
 
 
 def contact_impulse(impulse: ca.SX) -> ca.SX:

@@ -9,7 +9,10 @@ MAX_POINTS = 64
 
 
 def outermost_points(points: np.ndarray) -> np.ndarray:
-    """Return at most MAX_POINTS of the points (n, 3): those farthest in directions that lie evenly on a sphere."""
+    """Return at most MAX_POINTS of the points (n, 3).
+
+    Those farthest in directions that lie evenly on a sphere.
+    """
     if len(points) <= MAX_POINTS:
         return points
     height = 1 - 2 * (np.arange(MAX_POINTS) + 0.5) / MAX_POINTS

@@ -1,7 +1,7 @@
 """Sine, cosine, arctangent, exponential and logarithm in plain arithmetic, as CasADi expressions.
 
-They are accurate to 1e-13 or better. Unlike those of the C library they are bit-identical on all machines, and the compiler
-vectorizes them.
+They are accurate to 1e-13 or better. Unlike those of the C library they are bit-identical on all
+machines, and the compiler vectorizes them.
 """
 
 from __future__ import annotations
@@ -22,14 +22,18 @@ _AREA_TANGENT = tuple(2 / (2 * k + 1) for k in range(11))
 _TWO_PI_HIGH = 6.28125
 _TWO_PI_LOW = 0.001935307179586476925286766559
 
-#: subtracting a number from this one rounds the number to an integer, because the last bit has the value 1
+#: subtracting a number from this one rounds the number to an integer, because the last bit has the
+#: value 1
 _ROUNDING_MAGIC = 1.5 * 2.0**52
 
 _SQUARINGS = 8
 
 
 def sine_and_cosine(angle: ca.SX) -> tuple[ca.SX, ca.SX]:
-    """Return sin and cos of |angle| < 1e6 rad: reduce modulo 2 pi, evaluate the series at a quarter, double twice."""
+    """Return sin and cos of |angle| < 1e6 rad.
+
+    Reduce modulo 2 pi, evaluate the series at a quarter, double twice.
+    """
     turns = _ROUNDING_MAGIC - (_ROUNDING_MAGIC - angle * (1 / (2 * math.pi)))
     quarter = ((angle - turns * _TWO_PI_HIGH) - turns * _TWO_PI_LOW) * 0.25
     square = quarter * quarter
@@ -48,7 +52,8 @@ def sine_of_right_angle_share(share: ca.SX) -> ca.SX:
 def arctangent(y: ca.SX, x: ca.SX) -> ca.SX:
     """Return atan2(y, x) (rad) for x >= 0, accurate to 1e-15, and 0 at the origin.
 
-    The angle is reduced to the nearest of 0, 45 and 90 degrees, and the series is evaluated for the difference.
+    The angle is reduced to the nearest of 0, 45 and 90 degrees, and the series is evaluated for the
+    difference.
     """
     size = ca.fabs(y)
     flat, steep = size <= (math.sqrt(2) - 1) * x, size > (math.sqrt(2) + 1) * x
@@ -60,7 +65,10 @@ def arctangent(y: ca.SX, x: ca.SX) -> ca.SX:
 
 
 def exponential(x: ca.SX) -> ca.SX:
-    """Return exp(x), accurate to 1e-13 for |x| < 3: evaluate the series at x / 256, square eight times."""
+    """Return exp(x), accurate to 1e-13 for |x| < 3.
+
+    Evaluate the series at x / 256, square eight times.
+    """
     power = _polynomial(_EXPONENTIAL, x * 2.0**-_SQUARINGS)
     for _ in range(_SQUARINGS):
         power = power * power
@@ -68,7 +76,10 @@ def exponential(x: ca.SX) -> ca.SX:
 
 
 def logarithm(x: ca.SX) -> ca.SX:
-    """Return ln(x) for 0.7 <= x <= 2^31, accurate to 1e-15: halve x to about 1, then evaluate the series of 2 artanh."""
+    """Return ln(x) for 0.7 <= x <= 2^31, accurate to 1e-15.
+
+    Halve x to about 1, then evaluate the series of 2 artanh.
+    """
     halvings = ca.SX(0)
     for power in (16, 8, 4, 2, 1):
         large = x > 2.0**power / math.sqrt(2)
@@ -81,6 +92,8 @@ def _polynomial(coefficients: Sequence[float], x: ca.SX) -> ca.SX:
     """Evaluate a polynomial, lowest power first, by Estrin's scheme, whose operations can run in parallel."""
     terms = [ca.SX(coefficient) for coefficient in coefficients]
     while len(terms) > 1:
-        terms = [low + high * x for low, high in zip_longest(terms[::2], terms[1::2], fillvalue=ca.SX(0))]
+        terms = [
+            low + high * x for low, high in zip_longest(terms[::2], terms[1::2], fillvalue=ca.SX(0))
+        ]
         x = x * x
     return terms[0]

@@ -12,18 +12,25 @@ from cosim.core.component import Variable
 from .interface import scalar_variable
 from .shapes import Body, Shape, quaternion_from_matrix
 
-#: function from the rotation matrix (3, 3) principal axes to body frame to the collision shape in principal axes
+#: function from the rotation matrix (3, 3) principal axes to body frame to the collision shape in
+#: principal axes
 Boxes = Callable[[np.ndarray], tuple[Shape, ...]]
 
 #: parameter -> row and column in the symmetric inertia tensor
-INERTIA_INDICES = {f"inertia.{'xyz'[i]}{'xyz'[j]}": (i, j) for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))}
+INERTIA_INDICES = {
+    f"inertia.{'xyz'[i]}{'xyz'[j]}": (i, j)
+    for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+}
 
 
 def inertia_variables(mass: float, inertia: np.ndarray, mass_text: str) -> tuple[Variable, ...]:
     """Return the parameters `mass` (kg) and `inertia.*` (kg m2, about the centre of mass, body frame)."""
     text = "inertia tensor about the centre of mass, body frame, rotors locked"
     elements = {name: float(inertia[place]) for name, place in INERTIA_INDICES.items()}
-    tensor = (scalar_variable(name, "kg.m2", f"{text}: {name[-2:]}", "parameter", value) for name, value in elements.items())
+    tensor = (
+        scalar_variable(name, "kg.m2", f"{text}: {name[-2:]}", "parameter", value)
+        for name, value in elements.items()
+    )
     return (scalar_variable("mass", "kg", mass_text, "parameter", mass), *tensor)
 
 
@@ -46,18 +53,28 @@ def inertia_problems(inertia: np.ndarray) -> Iterator[str]:
         moments, axes = np.linalg.eigh(tensor)  # in ascending order
         small, middle, large = moments.tolist()
         if small <= 0:
-            yield f"found the principal moments {_moments_text(moments, axes)}, expected all greater than 0"
+            yield (
+                f"found the principal moments {_moments_text(moments, axes)}, expected all greater "
+                "than 0"
+            )
         elif large > (small + middle) * (1 + 1e-9):
             text = _moments_text(moments, axes)
-            yield f"found the principal moments {text}, expected none greater than the sum of the other two"
+            yield (
+                f"found the principal moments {text}, expected none greater than the sum of the "
+                "other two"
+            )
 
 
 def _moments_text(moments: np.ndarray, axes: np.ndarray) -> str:
     """Return principal moments with their axes in words, in the order of the nearest body axes."""
     texts = []
-    for moment, axis in sorted(zip(moments, axes.T, strict=True), key=lambda pair: int(np.argmax(np.abs(pair[1])))):
+    for moment, axis in sorted(
+        zip(moments, axes.T, strict=True), key=lambda pair: int(np.argmax(np.abs(pair[1])))
+    ):
         largest = int(np.argmax(np.abs(axis)))
-        components = ", ".join(f"{round(component / np.sign(axis[largest]), 2) + 0.0:g}" for component in axis)
+        components = ", ".join(
+            f"{round(component / np.sign(axis[largest]), 2) + 0.0:g}" for component in axis
+        )
         name = "xyz"[largest] if abs(axis[largest]) > 1 - 1e-9 else f"[{components}]"
         texts.append(f"{moment:.4g} about {name}")
     return ", ".join(texts)
@@ -70,8 +87,9 @@ def principal_axes(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         inertia: Inertia tensor (kg m2, body frame), shape (3, 3).
 
     Returns:
-        Moments of inertia (kg m2), shape (3,), and the rotation matrix from the principal axes to the body frame, shape
-        (3, 3). Its angle is less than 120 degrees; subject to that, the moments ascend.
+        Moments of inertia (kg m2), shape (3,), and the rotation matrix from the principal axes to
+        the body frame, shape (3, 3). Its angle is less than 120 degrees; subject to that, the
+        moments ascend.
     """
     moments, axes = np.linalg.eigh(inertia)
     for order in permutations(range(3)):
@@ -80,7 +98,9 @@ def principal_axes(inertia: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
             to_body = ordered * signs[::-1]
             if np.linalg.det(to_body) > 0 and np.trace(to_body) > 0:
                 return moments[list(order)], to_body
-    raise AssertionError("one of the 24 frames of the principal axes is rotated by less than 63 degrees")
+    raise AssertionError(
+        "one of the 24 frames of the principal axes is rotated by less than 63 degrees"
+    )
 
 
 def principal_body(mass: float, inertia: np.ndarray, boxes: Boxes) -> Body:

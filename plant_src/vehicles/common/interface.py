@@ -1,7 +1,10 @@
-"""Variables that vehicles have in common: names, units and order, for the plant FMUs and for the world.
+"""Variables that vehicles have in common.
 
-World frame: x east, y north, z up. Body frame: x forward, y left, z up, origin at the centre of mass. Rotations follow the
-right-hand rule: positive roll lifts the left side, positive pitch lowers the nose, positive yaw is counter-clockwise from above.
+Names, units and order, for the plant FMUs and for the world.
+
+World frame: x east, y north, z up. Body frame: x forward, y left, z up, origin at the centre of
+mass. Rotations follow the right-hand rule: positive roll lifts the left side, positive pitch lowers
+the nose, positive yaw is counter-clockwise from above.
 """
 
 from __future__ import annotations
@@ -15,28 +18,57 @@ from cosim.core.units import parse_unit
 def vector_variables(
     name: str, axes: Sequence[str], unit: str, description: str, causality: Causality = "output"
 ) -> tuple[Variable, ...]:
-    """Return real scalar variables `name.axis`, one for each axis; inputs and parameters start at 0."""
+    """Return real scalar variables `name.axis`, one for each axis.
+
+    Inputs and parameters start at 0.
+    """
     variability: Variability = "fixed" if causality == "parameter" else "continuous"
     start = None if causality == "output" else 0.0
     return tuple(
         Variable(
-            f"{name}.{axis}", "Float64", causality, variability, start, parse_unit(unit), description=f"{description}: {axis}"
+            f"{name}.{axis}",
+            "Float64",
+            causality,
+            variability,
+            start,
+            parse_unit(unit),
+            description=f"{description}: {axis}",
         )
         for axis in axes
     )
 
 
-def scalar_variable(name: str, unit: str, description: str, causality: Causality = "input", start: float = 0.0) -> Variable:
+def scalar_variable(
+    name: str, unit: str, description: str, causality: Causality = "input", start: float = 0.0
+) -> Variable:
     """Return a real scalar variable."""
     variability: Variability = "fixed" if causality == "parameter" else "continuous"
-    return Variable(name, "Float64", causality, variability, start, parse_unit(unit), description=description)
+    return Variable(
+        name, "Float64", causality, variability, start, parse_unit(unit), description=description
+    )
 
 
 def parameter(
-    name: str, unit: str, start: float, description: str, minimum: float | None = None, maximum: float | None = None
+    name: str,
+    unit: str,
+    start: float,
+    description: str,
+    minimum: float | None = None,
+    maximum: float | None = None,
 ) -> Variable:
     """Return a real scalar parameter with a range."""
-    return Variable(name, "Float64", "parameter", "fixed", start, parse_unit(unit), (), description, minimum, maximum)
+    return Variable(
+        name,
+        "Float64",
+        "parameter",
+        "fixed",
+        start,
+        parse_unit(unit),
+        (),
+        description,
+        minimum,
+        maximum,
+    )
 
 
 EULER_ANGLES = ("roll", "pitch", "yaw")
@@ -53,34 +85,74 @@ MOTION_OUTPUTS = (
 
 #: motion of the landing deck of a vessel
 DECK_OUTPUTS = (
-    *vector_variables("deck.position", "xyz", "m", "centre of the top of the landing deck, world frame"),
-    *vector_variables("deck.velocity", "xyz", "m/s", "centre of the top of the landing deck, world frame"),
+    *vector_variables(
+        "deck.position", "xyz", "m", "centre of the top of the landing deck, world frame"
+    ),
+    *vector_variables(
+        "deck.velocity", "xyz", "m/s", "centre of the top of the landing deck, world frame"
+    ),
 )
 
 #: outputs that only a world computes: contact and failures; a plant FMU publishes 0 and false
 WORLD_OUTPUTS = (
-    Variable("contact.force", "Float64", "output", unit=parse_unit("N"), description="sum of normal forces, mean over the step"),
-    Variable("contact.touching", "Boolean", "output", "discrete", description="contact with anything"),
-    Variable("contact.vessel", "Boolean", "output", "discrete", description="contact with a vessel"),
-    Variable("crashed", "Boolean", "output", "discrete", description="collision above the crash speed or capsize; stays true"),
-    Variable("ditched", "Boolean", "output", "discrete", description="centre of mass below the water; stays true"),
+    Variable(
+        "contact.force",
+        "Float64",
+        "output",
+        unit=parse_unit("N"),
+        description="sum of normal forces, mean over the step",
+    ),
+    Variable(
+        "contact.touching", "Boolean", "output", "discrete", description="contact with anything"
+    ),
+    Variable(
+        "contact.vessel", "Boolean", "output", "discrete", description="contact with a vessel"
+    ),
+    Variable(
+        "crashed",
+        "Boolean",
+        "output",
+        "discrete",
+        description="collision above the crash speed or capsize; stays true",
+    ),
+    Variable(
+        "ditched",
+        "Boolean",
+        "output",
+        "discrete",
+        description="centre of mass below the water; stays true",
+    ),
 )
 
 #: external loads at the centre of mass
 EXTERNAL_LOADS = (
-    *vector_variables("external_force", "xyz", "N", "force at the centre of mass, world frame", "input"),
+    *vector_variables(
+        "external_force", "xyz", "N", "force at the centre of mass, world frame", "input"
+    ),
     *vector_variables("external_torque", "xyz", "N.m", "torque, world frame", "input"),
 )
 
 #: environment inputs, the last inputs of a model; in a world the environment writes them
-WIND_INPUTS = vector_variables("wind", "xyz", "m/s", "velocity of the air at the vehicle, world frame", "input")
-CURRENT_INPUTS = vector_variables("current", "xy", "m/s", "velocity of the water, world frame", "input")
-WAVE_GAIN_INPUT = (scalar_variable("wave_gain", "1", "factor on the amplitudes of all waves", start=1.0),)
-GROUND_DISTANCE_INPUT = (
-    scalar_variable("ground_distance", "m", "height of the rotor centre above the surface below", start=1e3),
+WIND_INPUTS = vector_variables(
+    "wind", "xyz", "m/s", "velocity of the air at the vehicle, world frame", "input"
 )
-GROUND_SHARE_INPUT = (scalar_variable("ground_share", "1", "share of the rotors' area above this surface", start=1.0),)
-WATER_LEVEL_INPUT = (scalar_variable("water_level", "m", "height of the water surface, world frame", start=-1e9),)
+CURRENT_INPUTS = vector_variables(
+    "current", "xy", "m/s", "velocity of the water, world frame", "input"
+)
+WAVE_GAIN_INPUT = (
+    scalar_variable("wave_gain", "1", "factor on the amplitudes of all waves", start=1.0),
+)
+GROUND_DISTANCE_INPUT = (
+    scalar_variable(
+        "ground_distance", "m", "height of the rotor centre above the surface below", start=1e3
+    ),
+)
+GROUND_SHARE_INPUT = (
+    scalar_variable("ground_share", "1", "share of the rotors' area above this surface", start=1.0),
+)
+WATER_LEVEL_INPUT = (
+    scalar_variable("water_level", "m", "height of the water surface, world frame", start=-1e9),
+)
 #: names of all environment inputs
 ENVIRONMENT_INPUTS = frozenset(
     variable.name
@@ -98,15 +170,19 @@ ENVIRONMENT_INPUTS = frozenset(
 #: upper limit of the number of wave components
 MAX_WAVE_COMPONENTS = 64
 
-#: elements of a row of the table of surfaces: half edges along forward and left (m), centre of the top (m, world frame) and
-#: orientation (quaternion w, x, y, z) of a rectangle
+#: elements of a row of the table of surfaces: half edges along forward and left (m), centre of the
+#: top (m, world frame) and orientation (quaternion w, x, y, z) of a rectangle
 SURFACE_COLUMNS = 9
 
 
-def _wave_parameter(name: str, unit: str, description: str, minimum: float | None = None) -> Variable:
+def _wave_parameter(
+    name: str, unit: str, description: str, minimum: float | None = None
+) -> Variable:
     start = (0.0,) * MAX_WAVE_COMPONENTS
     shape = (MAX_WAVE_COMPONENTS,)
-    return Variable(name, "Float64", "parameter", "fixed", start, parse_unit(unit), shape, description, minimum)
+    return Variable(
+        name, "Float64", "parameter", "fixed", start, parse_unit(unit), shape, description, minimum
+    )
 
 
 #: wave components; those after the first `wave.count` are not used
@@ -114,11 +190,16 @@ WAVE_PARAMETERS = (
     parameter("wave.count", "1", 0.0, "number of wave components", 0.0, float(MAX_WAVE_COMPONENTS)),
     _wave_parameter("wave.amplitude", "m", "amplitude of each wave component", 0.0),
     _wave_parameter("wave.frequency", "rad/s", "angular frequency of each wave component", 0.0),
-    _wave_parameter("wave.direction", "rad", "direction of propagation of each wave component, counter-clockwise from x"),
+    _wave_parameter(
+        "wave.direction",
+        "rad",
+        "direction of propagation of each wave component, counter-clockwise from x",
+    ),
     _wave_parameter("wave.phase", "rad", "phase of each wave component at the origin"),
 )
 
-#: states of a free rigid body: position and velocity in the world frame; actuator states follow them
+#: states of a free rigid body: position and velocity in the world frame; actuator states follow
+#: them
 FREE_STATES = (
     *(f"position.{axis}" for axis in "xyz"),
     *(f"orientation.{axis}" for axis in "wxyz"),
@@ -137,19 +218,53 @@ VESSEL_STATES = (
 
 #: initial deviation of a floating vessel from its equilibrium
 FLOATING_INITIAL_PARAMETERS = (
-    scalar_variable("initial.heave", "m", "initial height relative to the equilibrium", "parameter"),
-    scalar_variable("initial.roll", "rad", "initial roll angle relative to the equilibrium", "parameter"),
-    scalar_variable("initial.pitch", "rad", "initial pitch angle relative to the equilibrium", "parameter"),
-    scalar_variable("initial.time", "s", "time of the waves at the start of the simulation", "parameter"),
-    parameter("initial.on_waves", "1", 1.0, "1: start on the waves and with their velocity; 0: as in still water", 0.0, 1.0),
+    scalar_variable(
+        "initial.heave", "m", "initial height relative to the equilibrium", "parameter"
+    ),
+    scalar_variable(
+        "initial.roll", "rad", "initial roll angle relative to the equilibrium", "parameter"
+    ),
+    scalar_variable(
+        "initial.pitch", "rad", "initial pitch angle relative to the equilibrium", "parameter"
+    ),
+    scalar_variable(
+        "initial.time", "s", "time of the waves at the start of the simulation", "parameter"
+    ),
+    parameter(
+        "initial.on_waves",
+        "1",
+        1.0,
+        "1: start on the waves and with their velocity; 0: as in still water",
+        0.0,
+        1.0,
+    ),
 )
 
 
-def initial_variables(position_axes: str, velocity_axes: str, rate_axes: str) -> tuple[Variable, ...]:
-    """Return the parameters of the initial position, yaw angle, velocity and rates; roll and pitch start at 0."""
+def initial_variables(
+    position_axes: str, velocity_axes: str, rate_axes: str
+) -> tuple[Variable, ...]:
+    """Return the parameters of the initial position, yaw angle, velocity and rates.
+
+    Roll and pitch start at 0.
+    """
     return (
-        *vector_variables("initial.position", position_axes, "m", "initial centre of mass, world frame", "parameter"),
+        *vector_variables(
+            "initial.position",
+            position_axes,
+            "m",
+            "initial centre of mass, world frame",
+            "parameter",
+        ),
         scalar_variable("initial.yaw", "rad", "initial yaw angle", "parameter"),
-        *vector_variables("initial.velocity_body", velocity_axes, "m/s", "initial velocity, body frame", "parameter"),
-        *vector_variables("initial.rates", rate_axes, "rad/s", "initial angular velocity, body frame", "parameter"),
+        *vector_variables(
+            "initial.velocity_body",
+            velocity_axes,
+            "m/s",
+            "initial velocity, body frame",
+            "parameter",
+        ),
+        *vector_variables(
+            "initial.rates", rate_axes, "rad/s", "initial angular velocity, body frame", "parameter"
+        ),
     )

@@ -1,4 +1,7 @@
-"""Rotations as CasADi expressions. Quaternions are (w, x, y, z) and rotate body vectors into the world frame."""
+"""Rotations as CasADi expressions.
+
+Quaternions are (w, x, y, z) and rotate body vectors into the world frame.
+"""
 
 from __future__ import annotations
 
@@ -51,13 +54,20 @@ def quaternion_from_euler(roll: ca.SX, pitch: ca.SX, yaw: ca.SX) -> ca.SX:
 def euler_angles(q: ca.SX) -> ca.SX:
     """Return the ZYX Euler angles roll, pitch and yaw (rad), shape (3,)."""
     r = rotation_matrix(q)
-    return ca.vertcat(ca.atan2(r[2, 1], r[2, 2]), ca.asin(ca.fmin(1, ca.fmax(-1, -r[2, 0]))), ca.atan2(r[1, 0], r[0, 0]))
+    return ca.vertcat(
+        ca.atan2(r[2, 1], r[2, 2]),
+        ca.asin(ca.fmin(1, ca.fmax(-1, -r[2, 0]))),
+        ca.atan2(r[1, 0], r[0, 0]),
+    )
 
 
 def euler_to_body_rates(roll: ca.SX, pitch: ca.SX) -> ca.SX:
     """Return the matrix (3, 3) from the time derivatives of roll, pitch and yaw to the rates p, q, r in the body frame."""
     cos, sin = ca.cos(roll), ca.sin(roll)
-    about_y, about_z = ca.vertcat(0, cos, -sin), ca.vertcat(-ca.sin(pitch), sin * ca.cos(pitch), cos * ca.cos(pitch))
+    about_y, about_z = (
+        ca.vertcat(0, cos, -sin),
+        ca.vertcat(-ca.sin(pitch), sin * ca.cos(pitch), cos * ca.cos(pitch)),
+    )
     return ca.horzcat(ca.SX([1, 0, 0]), about_y, about_z)
 
 
@@ -74,7 +84,9 @@ def rotation_vector(q: ca.SX) -> ca.SX:
     shorter = ca.if_else(q[0] < 0, -1, 1) * q
     sine_squared = ca.dot(shorter[1:4], shorter[1:4])
     sine = ca.sqrt(sine_squared + 1e-300)
-    factor = ca.if_else(sine_squared < 1e-12, 2 * (1 + sine_squared / 6), 2 * ca.atan2(sine, shorter[0]) / sine)
+    factor = ca.if_else(
+        sine_squared < 1e-12, 2 * (1 + sine_squared / 6), 2 * ca.atan2(sine, shorter[0]) / sine
+    )
     return factor * shorter[1:4]
 
 
@@ -82,7 +94,11 @@ def quaternion_from_rotation_vector(vector: ca.SX) -> ca.SX:
     """Return the quaternion of a rotation vector (axis times angle, rad), by a series for tiny angles."""
     angle_squared = ca.dot(vector, vector)
     angle = ca.sqrt(angle_squared + 1e-300)
-    factor = ca.if_else(angle_squared < 1e-6, 0.5 - angle_squared / 48 + angle_squared**2 / 3840, ca.sin(angle / 2) / angle)
+    factor = ca.if_else(
+        angle_squared < 1e-6,
+        0.5 - angle_squared / 48 + angle_squared**2 / 3840,
+        ca.sin(angle / 2) / angle,
+    )
     return ca.vertcat(ca.cos(angle / 2), factor * vector)
 
 
@@ -96,4 +112,6 @@ def motion_outputs(position: ca.SX, orientation: ca.SX, velocity: ca.SX, rates: 
         rates: Angular velocity (rad/s, body frame).
     """
     velocity_body = ca.mtimes(rotation_matrix(orientation).T, velocity)
-    return ca.vertcat(position, orientation, euler_angles(orientation), velocity, velocity_body, rates)
+    return ca.vertcat(
+        position, orientation, euler_angles(orientation), velocity, velocity_body, rates
+    )

@@ -15,8 +15,8 @@ from cosim.core.component import Variable
 class NamedValues(Mapping[str, ca.SX]):
     """Expressions by name, in a fixed order.
 
-    The name of a group, for example "wind", returns its scalars "wind.x", "wind.y" and "wind.z" as one vector. Iteration
-    yields the single names only.
+    The name of a group, for example "wind", returns its scalars "wind.x", "wind.y" and "wind.z" as
+    one vector. Iteration yields the single names only.
     """
 
     def __init__(self, values: Mapping[str, ca.SX]):
@@ -25,7 +25,11 @@ class NamedValues(Mapping[str, ca.SX]):
     def __getitem__(self, name: str) -> ca.SX:
         if name in self._values:
             return self._values[name]
-        group = [value for key, value in self._values.items() if key.rpartition(".")[0] == name and value.is_scalar()]
+        group = [
+            value
+            for key, value in self._values.items()
+            if key.rpartition(".")[0] == name and value.is_scalar()
+        ]
         if not group:
             raise KeyError(name)
         return ca.vertcat(*group)
@@ -48,7 +52,9 @@ def variables_of(variables: Sequence[Variable], causality: str) -> list[Variable
 
 def values_by_name(vector: ca.SX, variables: Sequence[Variable]) -> NamedValues:
     """Return the parts of `vector` by name; it holds the values of `variables` in order."""
-    return _split(vector, {variable.name: (len(variable.scalar_names), 1) for variable in variables})
+    return _split(
+        vector, {variable.name: (len(variable.scalar_names), 1) for variable in variables}
+    )
 
 
 def initial_parameters(parameters: NamedValues) -> dict[str, ca.SX]:
@@ -58,8 +64,15 @@ def initial_parameters(parameters: NamedValues) -> dict[str, ca.SX]:
 
 def _split(vector: ca.SX, shapes: Mapping[str, tuple[int, int]]) -> NamedValues:
     """Cut a vector into consecutive matrices of these shapes."""
-    parts = ca.vertsplit(vector, [0, *accumulate(rows * columns for rows, columns in shapes.values())])
-    return NamedValues({name: ca.reshape(part, *shape) for (name, shape), part in zip(shapes.items(), parts, strict=True)})
+    parts = ca.vertsplit(
+        vector, [0, *accumulate(rows * columns for rows, columns in shapes.values())]
+    )
+    return NamedValues(
+        {
+            name: ca.reshape(part, *shape)
+            for (name, shape), part in zip(shapes.items(), parts, strict=True)
+        }
+    )
 
 
 @dataclass(frozen=True)
@@ -85,8 +98,13 @@ class ConstantsMap:
     @cached_property
     def shapes(self) -> dict[str, tuple[int, int]]:
         """Rows and columns of each constant."""
-        symbols = ca.SX.sym("parameters", sum(len(variable.scalar_names) for variable in self._parameters))
-        return {name: value.shape for name, value in self.derive(values_by_name(symbols, self._parameters)).items()}
+        symbols = ca.SX.sym(
+            "parameters", sum(len(variable.scalar_names) for variable in self._parameters)
+        )
+        return {
+            name: value.shape
+            for name, value in self.derive(values_by_name(symbols, self._parameters)).items()
+        }
 
     @property
     def _parameters(self) -> list[Variable]:

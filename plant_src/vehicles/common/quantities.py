@@ -1,6 +1,7 @@
 """Reader of the quantities of vehicle data.
 
-A quantity is a number, or a list of numbers, in SI units, or an object that also states unit and source:
+A quantity is a number, or a list of numbers, in SI units, or an object that also states unit and
+source:
 
     "mass": 0.5
     "mass": {"value": 500, "unit": "g", "source": "weighed"}
@@ -28,7 +29,9 @@ RADIANS_EXPECTED = 'radians expected; in degrees? Write {"value": 90, "unit": "d
 class QuantityReader(JsonReader):
     """Reader of vehicle data, which collects all problems."""
 
-    def read_data(self, value: Any, path: JsonPath, required: Sequence[str], optional: Sequence[str]) -> Mapping[str, Any]:
+    def read_data(
+        self, value: Any, path: JsonPath, required: Sequence[str], optional: Sequence[str]
+    ) -> Mapping[str, Any]:
         """Read an object with these keys, those of TEXT_KEYS and no others."""
         found = self.read_object(value, path, required, (*optional, *TEXT_KEYS))
         for key in TEXT_KEYS:
@@ -44,7 +47,9 @@ class QuantityReader(JsonReader):
         return value
 
     def si_value(self, value: Any, path: JsonPath, unit: str) -> Any:
-        """Return a quantity without its unit and source, in SI units; the numbers themselves are not checked.
+        """Return a quantity without its unit and source, in SI units.
+
+        The numbers themselves are not checked.
 
         Args:
             value: The quantity.
@@ -54,7 +59,11 @@ class QuantityReader(JsonReader):
         if not isinstance(value, Mapping):
             return value
         self.read_data(value, path, ("value",), ("unit",))
-        factor = self._factor(value["unit"], (*path, "unit"), parse_unit(unit)) if "unit" in value else 1.0
+        factor = (
+            self._factor(value["unit"], (*path, "unit"), parse_unit(unit))
+            if "unit" in value
+            else 1.0
+        )
         return _scaled(value.get("value", math.nan), factor)
 
     def _factor(self, name: Any, path: JsonPath, expected: Unit) -> float:
@@ -64,12 +73,20 @@ class QuantityReader(JsonReader):
             self.add_problem(path, f"found {name!r}, expected a unit such as {_offered(expected)}")
             return 1.0
         if found.exponents != expected.exponents or found.offset != expected.offset:
-            self.add_problem(path, f"found {name!r}, expected a unit that converts to {_offered(expected)}")
+            self.add_problem(
+                path, f"found {name!r}, expected a unit that converts to {_offered(expected)}"
+            )
             return 1.0
         return found.factor / expected.factor
 
     def quantity(
-        self, value: Any, path: JsonPath, unit: str, low: float = -math.inf, high: float = math.inf, above: float | None = None
+        self,
+        value: Any,
+        path: JsonPath,
+        unit: str,
+        low: float = -math.inf,
+        high: float = math.inf,
+        above: float | None = None,
     ) -> float:
         """Read a quantity from `low` to `high` (in SI units), and greater than `above`."""
         number = self.si_value(value, path, unit)
@@ -78,7 +95,9 @@ class QuantityReader(JsonReader):
             self.add_problem(path, f"found {number!r}, expected a number greater than {above:g}")
         return found
 
-    def vector_quantity(self, value: Any, path: JsonPath, unit: str, axes: Sequence[str]) -> Numbers:
+    def vector_quantity(
+        self, value: Any, path: JsonPath, unit: str, axes: Sequence[str]
+    ) -> Numbers:
         """Read a list of one quantity for each of `axes` (in SI units)."""
         return self.vector(self.si_value(value, path, unit), path, axes)
 
@@ -93,14 +112,23 @@ def _angle_hint(value: Any, unit: str) -> str:
 def _offered(unit: Unit) -> str:
     """Return the name of a unit, and those of the other known units of the same quantity."""
     prefixed = [f"{prefix}{unit.name}" for prefix in "mk" if unit.name in PREFIXED]
-    others = [name for name, known in KNOWN_UNITS.items() if known.exponents == unit.exponents and name != unit.name]
+    others = [
+        name
+        for name, known in KNOWN_UNITS.items()
+        if known.exponents == unit.exponents and name != unit.name
+    ]
     return abbreviate_names(map(repr, (unit.name, *prefixed, *others)))
 
 
 def _scaled(value: Any, factor: float) -> Any:
-    """Return a number, or nested lists of numbers, times a factor; anything else is returned as it is."""
+    """Return a number, or nested lists of numbers, times a factor.
+
+    Anything else is returned as it is.
+    """
     if factor == 1.0:
         return value
     if isinstance(value, list | tuple):
         return [_scaled(each, factor) for each in value]
-    return value * factor if isinstance(value, int | float) and not isinstance(value, bool) else value
+    return (
+        value * factor if isinstance(value, int | float) and not isinstance(value, bool) else value
+    )

@@ -1,7 +1,8 @@
 """Motion of a free rigid body as CasADi expressions.
 
-The state begins with position (m) and velocity (m/s) of the centre of mass in the world frame, a unit quaternion (body to world)
-and the angular velocity (rad/s, body frame), in the order of `interface.FREE_STATES`.
+The state begins with position (m) and velocity (m/s) of the centre of mass in the world frame, a
+unit quaternion (body to world) and the angular velocity (rad/s, body frame), in the order of
+`interface.FREE_STATES`.
 """
 
 from __future__ import annotations
@@ -33,7 +34,9 @@ class RigidBody(NamedTuple):
 
 def rigid_body(constants: NamedValues) -> RigidBody:
     """Return mass and inertia."""
-    return RigidBody(constants["mass"], symmetric_matrix(constants["inertia"]), constants["inverse_inertia"])
+    return RigidBody(
+        constants["mass"], symmetric_matrix(constants["inertia"]), constants["inverse_inertia"]
+    )
 
 
 def initial_rigid_state(initial: NamedValues) -> ca.SX:
@@ -49,7 +52,9 @@ def symmetric_matrix(elements: ca.SX) -> ca.SX:
     return ca.vertcat(ca.horzcat(xx, xy, xz), ca.horzcat(xy, yy, yz), ca.horzcat(xz, yz, zz))
 
 
-def rigid_body_rate(body: RigidBody, gravity: ca.SX, state: ca.SX, inputs: NamedValues, force: ca.SX, torque: ca.SX) -> ca.SX:
+def rigid_body_rate(
+    body: RigidBody, gravity: ca.SX, state: ca.SX, inputs: NamedValues, force: ca.SX, torque: ca.SX
+) -> ca.SX:
     """Return the time derivative of the rigid-body states.
 
     Args:
@@ -62,16 +67,27 @@ def rigid_body_rate(body: RigidBody, gravity: ca.SX, state: ca.SX, inputs: Named
     """
     orientation, velocity, rates = state[3:7], state[7:10], state[10:13]
     to_world = kinematics.rotation_matrix(orientation)
-    acceleration = (to_world @ force + inputs["external_force"]) / body.mass - ca.vertcat(0, 0, gravity)
+    acceleration = (to_world @ force + inputs["external_force"]) / body.mass - ca.vertcat(
+        0, 0, gravity
+    )
     moment = torque + to_world.T @ inputs["external_torque"] - ca.cross(rates, body.inertia @ rates)
-    return ca.vertcat(velocity, kinematics.quaternion_rate(orientation, rates), acceleration, body.inverse_inertia @ moment)
+    return ca.vertcat(
+        velocity,
+        kinematics.quaternion_rate(orientation, rates),
+        acceleration,
+        body.inverse_inertia @ moment,
+    )
 
 
 def normalised_state(state: ca.SX) -> ca.SX:
     """Return the rigid-body states with a unit quaternion."""
-    return ca.vertcat(state[0:3], kinematics.normalised_quaternion(state[3:7]), state[7:RIGID_BODY_STATE_COUNT])
+    return ca.vertcat(
+        state[0:3], kinematics.normalised_quaternion(state[3:7]), state[7:RIGID_BODY_STATE_COUNT]
+    )
 
 
 def motion_of_state(state: ca.SX) -> ca.SX:
     """Return the published motion (`interface.MOTION_OUTPUTS`)."""
-    return kinematics.motion_outputs(state[0:3], state[3:7], state[7:10], state[10:RIGID_BODY_STATE_COUNT])
+    return kinematics.motion_outputs(
+        state[0:3], state[3:7], state[7:10], state[10:RIGID_BODY_STATE_COUNT]
+    )

@@ -104,7 +104,8 @@ def level_box(to_body: np.ndarray, size: Vector, position: Vector, yaw: float = 
     """Return a box that is level in the body frame, in another frame.
 
     Args:
-        to_body: Rotation matrix from the frame of the result to the body frame, shape (3, 3); its angle is less than 120 degrees.
+        to_body: Rotation matrix from the frame of the result to the body frame, shape (3, 3); its
+            angle is less than 120 degrees.
         size: Edges (m).
         position: Centre (m, body frame).
         yaw: Angle of the box about the z axis of the body frame (rad).
@@ -116,7 +117,9 @@ def level_box(to_body: np.ndarray, size: Vector, position: Vector, yaw: float = 
     cos, sin = math.cos(quarter), math.sin(quarter)
     turned = np.array([[cos, -sin, 0.0], [sin, cos, 0.0], [0.0, 0.0, 1.0]])
     x, y, z = (to_body.T @ position).tolist()
-    return Box((length / 2, width / 2, height / 2), (x, y, z), quaternion_from_matrix(to_body.T @ turned))
+    return Box(
+        (length / 2, width / 2, height / 2), (x, y, z), quaternion_from_matrix(to_body.T @ turned)
+    )
 
 
 def quaternion_from_matrix(rotation: np.ndarray) -> Quaternion:

@@ -21,7 +21,10 @@ _Vehicle = TypeVar("_Vehicle")
 
 @dataclass(frozen=True)
 class CollisionBox:
-    """A box of the collision shape in the body frame: edges and centre (m), and its angle about the z axis (rad)."""
+    """A box of the collision shape in the body frame.
+
+    Edges and centre (m), and its angle about the z axis (rad).
+    """
 
     size: Vector
     position: Vector
@@ -75,7 +78,9 @@ def boxes_in(boxes: Sequence[Collision], to_body: np.ndarray) -> tuple[Shape, ..
 
 def edges_around(boxes: Sequence[Collision]) -> Vector:
     """Return the edges (m) of the box around all boxes; 1 m if there are none."""
-    corners = np.concatenate([box.corners() for box in boxes or (CollisionBox((1.0,) * 3, (0.0,) * 3, 0.0),)])
+    corners = np.concatenate(
+        [box.corners() for box in boxes or (CollisionBox((1.0,) * 3, (0.0,) * 3, 0.0),)]
+    )
     length, width, height = np.ptp(corners, axis=0).tolist()
     return length, width, height
 
@@ -103,9 +108,15 @@ class VehicleReader(QuantityReader):
     def read_inertia(self, value: Any) -> np.ndarray:
         """Read three moments of inertia, or three rows of a tensor."""
         numbers = self.si_value(value, ("inertia",), "kg.m2")
-        rows = isinstance(numbers, list) and len(numbers) == 3 and all(isinstance(row, list) for row in numbers)
+        rows = (
+            isinstance(numbers, list)
+            and len(numbers) == 3
+            and all(isinstance(row, list) for row in numbers)
+        )
         if rows:
-            return np.array([self.vector(row, ("inertia", str(i)), "xyz") for i, row in enumerate(numbers)])
+            return np.array(
+                [self.vector(row, ("inertia", str(i)), "xyz") for i, row in enumerate(numbers)]
+            )
         return np.diag(self.vector(numbers, ("inertia",), ("xx", "yy", "zz")))
 
     def read_axis(self, value: Any, path: JsonPath) -> Vector:
@@ -119,25 +130,41 @@ class VehicleReader(QuantityReader):
 
     def read_boxes(self, data: Mapping[str, Any]) -> tuple[Collision, ...]:
         """Read the collision shape."""
-        return tuple(self.read_box(box, ("boxes", str(i))) for i, box in self.elements(data, "boxes"))
+        return tuple(
+            self.read_box(box, ("boxes", str(i))) for i, box in self.elements(data, "boxes")
+        )
 
     def read_box(self, value: Any, path: JsonPath) -> Collision:
         """Read one box or convex piece of the collision shape."""
         if isinstance(value, Mapping) and "points" in value:
-            return self.read_piece(self.read_data(value, path, ("points",), ()).get("points"), (*path, "points"))
+            return self.read_piece(
+                self.read_data(value, path, ("points",), ()).get("points"), (*path, "points")
+            )
         data = self.read_data(value, path, ("size",), ("position", "yaw"))
-        length, width, height = self.vector_quantity(data.get("size", [1.0] * 3), (*path, "size"), "m", "xyz")
+        length, width, height = self.vector_quantity(
+            data.get("size", [1.0] * 3), (*path, "size"), "m", "xyz"
+        )
         if not min(length, width, height) > 0:
-            self.add_problem((*path, "size"), f"found {[length, width, height]}, expected edges greater than 0")
-        x, y, z = self.vector_quantity(data.get("position", [0.0] * 3), (*path, "position"), "m", "xyz")
+            self.add_problem(
+                (*path, "size"), f"found {[length, width, height]}, expected edges greater than 0"
+            )
+        x, y, z = self.vector_quantity(
+            data.get("position", [0.0] * 3), (*path, "position"), "m", "xyz"
+        )
         yaw = self.quantity(data.get("yaw", 0.0), (*path, "yaw"), "rad", -2 * math.pi, 2 * math.pi)
         return CollisionBox((length, width, height), (x, y, z), yaw)
 
     def read_piece(self, value: Any, path: JsonPath) -> CollisionPiece:
         """Read the points of a convex piece."""
         numbers = self.si_value(value, path, "m")
-        rows = [self.vector(row, (*path, str(i)), "xyz") for i, row in enumerate(numbers)] if isinstance(numbers, list) else []
+        rows = (
+            [self.vector(row, (*path, str(i)), "xyz") for i, row in enumerate(numbers)]
+            if isinstance(numbers, list)
+            else []
+        )
         if len(rows) < 4 or np.linalg.matrix_rank(np.array(rows) - rows[0], tol=1e-9) < 3:
-            self.add_problem(path, f"found {len(rows)} points, expected at least 4 that do not lie in a plane")
+            self.add_problem(
+                path, f"found {len(rows)} points, expected at least 4 that do not lie in a plane"
+            )
             rows = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
         return CollisionPiece(tuple((x, y, z) for x, y, z in rows))

@@ -34,15 +34,32 @@ def read_visual(data: Mapping[str, Any]) -> np.ndarray | None:
 
 
 def read_triangles(reader: JsonReader, value: Any, path: JsonPath) -> np.ndarray | None:
-    """Read {"vertices": [[x, y, z], ...], "faces": [[a, b, c], ...]}; return triangles (n, 3, 3), None if they are invalid."""
+    """Read {"vertices": [[x, y, z], ...], "faces": [[a, b, c], ...]}.
+
+    Return triangles (n, 3, 3), None if they are invalid.
+    """
     mesh = reader.read_object(value, path, ("vertices", "faces"), ("source", "note"))
     try:
-        vertices, faces = np.array(mesh.get("vertices"), np.float64), np.array(mesh.get("faces"), np.int64)
+        vertices, faces = (
+            np.array(mesh.get("vertices"), np.float64),
+            np.array(mesh.get("faces"), np.int64),
+        )
     except (TypeError, ValueError):
         vertices, faces = np.zeros(0), np.zeros(0, np.int64)
-    lists = vertices.ndim == faces.ndim == 2 and vertices.shape[1] == faces.shape[1] == 3 and np.isfinite(vertices).all()
-    text = f"expected vertices [[x, y, z], ...] and 1 to {MAX_TRIANGLES} faces [[a, b, c], ...] of them"
-    if not lists or not 0 < len(faces) <= MAX_TRIANGLES or not (0 <= faces.min() <= faces.max() < len(vertices)):
+    lists = (
+        vertices.ndim == faces.ndim == 2
+        and vertices.shape[1] == faces.shape[1] == 3
+        and np.isfinite(vertices).all()
+    )
+    text = (
+        f"expected vertices [[x, y, z], ...] and 1 to {MAX_TRIANGLES} faces [[a, b, c], ...] of "
+        "them"
+    )
+    if (
+        not lists
+        or not 0 < len(faces) <= MAX_TRIANGLES
+        or not (0 <= faces.min() <= faces.max() < len(vertices))
+    ):
         reader.add_problem(path, text)
         return None
     triangles: np.ndarray = vertices[faces]

@@ -12,12 +12,16 @@ from cosim.export.equations.simd_sum import sum_over_rows
 from .elementary_functions import sine_and_cosine
 from .interface import MAX_WAVE_COMPONENTS
 
-#: columns of the table of components: amplitude (m), wave number along x and y (rad/m), frequency (rad/s), phase (rad)
+#: columns of the table of components: amplitude (m), wave number along x and y (rad/m), frequency
+#: (rad/s), phase (rad)
 WAVE_COLUMNS = 5
 
 
 def _elevation_term() -> ca.Function:
-    """Return the function of one component: (x, y, time) and a row of the table to the elevation."""
+    """Return the function of one component.
+
+    (x, y, time) and a row of the table to the elevation.
+    """
     place, row = ca.SX.sym("place", 3), ca.SX.sym("row", WAVE_COLUMNS)
     amplitude, kx, ky, frequency, phase = ca.vertsplit(row)
     angle = kx * place[0] + ky * place[1] - frequency * place[2] + phase
@@ -30,5 +34,11 @@ SURFACE_SUM = sum_over_rows("surface", _elevation_term(), MAX_WAVE_COMPONENTS)
 
 def create_elevation_function() -> ca.Function:
     """Return the function from (x, y, time), number and table of components to the elevation (m)."""
-    place, count, rows = ca.SX.sym("place", 3), ca.SX.sym("count"), ca.SX.sym("rows", MAX_WAVE_COMPONENTS, WAVE_COLUMNS)
-    return ca.Function("water_elevation", [place, count, ca.vec(rows)], [SURFACE_SUM(place, count, rows)])
+    place, count, rows = (
+        ca.SX.sym("place", 3),
+        ca.SX.sym("count"),
+        ca.SX.sym("rows", MAX_WAVE_COMPONENTS, WAVE_COLUMNS),
+    )
+    return ca.Function(
+        "water_elevation", [place, count, ca.vec(rows)], [SURFACE_SUM(place, count, rows)]
+    )

@@ -1,4 +1,7 @@
-"""Vehicle files: one JSON file for each vehicle, whose name is that of the vehicle; `../README.md` describes them."""
+"""Vehicle files: one JSON file for each vehicle, whose name is that of the vehicle.
+
+`../README.md` describes them.
+"""
 
 from __future__ import annotations
 

@@ -43,7 +43,9 @@ class Rotor:
 
 @dataclass(frozen=True)
 class RotorEffects:
-    """Start values of the parameters of all effects beyond thrust and torque; zero switches an effect off.
+    """Start values of the parameters of all effects beyond thrust and torque.
+
+    Zero switches an effect off.
 
     Attributes:
         rotor_time_constant: Time constant of the first-order lag of the rotor speeds (s).
@@ -84,7 +86,8 @@ class Airframe:
     Attributes:
         name: Name of the model.
         mass: Total mass (kg).
-        inertia: Inertia tensor about the centre of mass with locked rotors (kg m2, body frame), shape (3, 3).
+        inertia: Inertia tensor about the centre of mass with locked rotors (kg m2, body frame),
+            shape (3, 3).
         rotors: All rotors, at most MAX_ROTORS.
         max_rotor_speed: Upper limit of the rotor speeds (rad/s); the lower limit is 0.
         rotor_radius: Radius of a rotor (m).
@@ -93,7 +96,8 @@ class Airframe:
         hull: The body in water.
 
     Raises:
-        InputError: For physically impossible values, all together; a problem's subject begins with the name of the attribute.
+        InputError: For physically impossible values, all together; a problem's subject begins with
+            the name of the attribute.
     """
 
     name: str
@@ -121,7 +125,9 @@ class Airframe:
     @property
     def lift(self) -> float:
         """Sum of the thrusts of all rotors at full speed along z (N, body frame)."""
-        return self.max_rotor_speed**2 * sum(rotor.thrust_coefficient * rotor.axis[2] for rotor in self.rotors)
+        return self.max_rotor_speed**2 * sum(
+            rotor.thrust_coefficient * rotor.axis[2] for rotor in self.rotors
+        )
 
     def _problem(self, text: str, *subject: str) -> Problem:
         return Problem(text, f"airframe {self.name}: {'.'.join(subject)}", subject)
@@ -130,29 +136,43 @@ class Airframe:
         positive = ("mass", "max_rotor_speed", "rotor_radius", "gravity")
         for name in positive:
             if not 0 < getattr(self, name) < math.inf:
-                yield self._problem(f"found {getattr(self, name)!r}, expected a finite number greater than 0", name)
+                yield self._problem(
+                    f"found {getattr(self, name)!r}, expected a finite number greater than 0", name
+                )
         for part in ("effects", "hull"):
             for name, value in vars(getattr(self, part)).items():
                 if not all(0 <= number < math.inf for number in np.ravel(value)):
-                    yield self._problem(f"found {value!r}, expected finite numbers of at least 0", part, name)
+                    yield self._problem(
+                        f"found {value!r}, expected finite numbers of at least 0", part, name
+                    )
 
     def _inertia_problems(self) -> Iterator[Problem]:
         return (self._problem(text, "inertia") for text in inertia_problems(self.inertia))
 
     def _rotor_problems(self) -> Iterator[Problem]:
         if not 1 <= len(self.rotors) <= MAX_ROTORS:
-            yield self._problem(f"found {len(self.rotors) or 'none'}, expected 1 to {MAX_ROTORS}", "rotors")
+            yield self._problem(
+                f"found {len(self.rotors) or 'none'}, expected 1 to {MAX_ROTORS}", "rotors"
+            )
         for number, rotor in enumerate(self.rotors, 1):
             name = f"rotors[{number}]"
             for coefficient in ("thrust_coefficient", "torque_coefficient"):
                 if not 0 <= (value := getattr(rotor, coefficient)) < math.inf:
-                    yield self._problem(f"found {value!r}, expected a finite number of at least 0", name, coefficient)
+                    yield self._problem(
+                        f"found {value!r}, expected a finite number of at least 0",
+                        name,
+                        coefficient,
+                    )
             if rotor.torque_sign not in (1, -1):
-                yield self._problem(f"found {rotor.torque_sign!r}, expected 1 or -1", name, "torque_sign")
+                yield self._problem(
+                    f"found {rotor.torque_sign!r}, expected 1 or -1", name, "torque_sign"
+                )
             if not math.isclose(math.hypot(*rotor.axis), 1, rel_tol=1e-9):
                 yield self._problem(f"found {rotor.axis}, expected a unit vector", name, "axis")
             if not all(map(math.isfinite, rotor.position)):
-                yield self._problem(f"found {rotor.position}, expected finite numbers", name, "position")
+                yield self._problem(
+                    f"found {rotor.position}, expected finite numbers", name, "position"
+                )
 
     def body(self, boxes: Boxes) -> Body:
         """Return the rigid body for Bullet, in the principal axes."""

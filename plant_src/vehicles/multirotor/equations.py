@@ -1,4 +1,7 @@
-"""Equations of motion of all multirotors: one binary for up to MAX_ROTORS rotors, whose values are all parameters."""
+"""Equations of motion of all multirotors.
+
+One binary for up to MAX_ROTORS rotors, whose values are all parameters.
+"""
 
 from __future__ import annotations
 

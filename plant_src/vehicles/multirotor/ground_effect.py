@@ -1,16 +1,19 @@
 """Ground effect of a multirotor by the method of images.
 
-A hovering rotor is modelled as a source at its hub; its image below the surface reduces its inflow (Cheeseman and Bennett, "The
-Effect of the Ground on a Helicopter Rotor in Forward Flight", ARC R&M 3021, 1955). At the height z a rotor of the radius R has
-1 / (1 - (R / 4z)^2) times the thrust far from the surface. The images of the other rotors act in the same way (Sanchez-Cuevas,
-Heredia and Ollero, "Characterization of the Aerodynamic Ground Effect and Its Influence in Multirotor Control", International
-Journal of Aerospace Engineering 2017, 1823056). An image at the lateral distance d reduces the inflow by
-(R^2 / 2) z / (d^2 + 4 z^2)^(3/2). For d = 0 this is Cheeseman and Bennett's (R / 4z)^2; the sum over the corners of a square is
-eq. 4 of Sanchez-Cuevas et al. Their empirical term for the flow between the rotors is neglected. The reduction is limited to
-one half, because the images of many close rotors would otherwise reverse the inflow.
+A hovering rotor is modelled as a source at its hub; its image below the surface reduces its inflow
+(Cheeseman and Bennett, "The Effect of the Ground on a Helicopter Rotor in Forward Flight", ARC R&M
+3021, 1955). At the height z a rotor of the radius R has 1 / (1 - (R / 4z)^2) times the thrust far
+from the surface. The images of the other rotors act in the same way (Sanchez-Cuevas, Heredia and
+Ollero, "Characterization of the Aerodynamic Ground Effect and Its Influence in Multirotor Control",
+International Journal of Aerospace Engineering 2017, 1823056). An image at the lateral distance d
+reduces the inflow by (R^2 / 2) z / (d^2 + 4 z^2)^(3/2). For d = 0 this is Cheeseman and Bennett's
+(R / 4z)^2; the sum over the corners of a square is eq. 4 of Sanchez-Cuevas et al. Their empirical
+term for the flow between the rotors is neglected. The reduction is limited to one half, because the
+images of many close rotors would otherwise reverse the inflow.
 
-Air that moves with the speed V in the plane of the rotor carries the wake away: the reduction is divided by 1 + (V / v)^2, with
-the induced velocity v = sqrt(T / (2 rho A)) of the hovering rotor (Cheeseman and Bennett, section on forward flight).
+Air that moves with the speed V in the plane of the rotor carries the wake away: the reduction is
+divided by 1 + (V / v)^2, with the induced velocity v = sqrt(T / (2 rho A)) of the hovering rotor
+(Cheeseman and Bennett, section on forward flight).
 """
 
 from __future__ import annotations
@@ -19,7 +22,8 @@ import casadi as ca
 
 from cosim.export.equations.c_code import Callee
 
-#: smallest height in rotor radii; smaller heights are replaced by it, because the method of images is not valid there
+#: smallest height in rotor radii; smaller heights are replaced by it, because the method of images
+#: is not valid there
 MIN_HEIGHT_RATIO = 0.5
 
 #: largest relative reduction of the inflow
@@ -41,13 +45,20 @@ def create_reductions(slots: int) -> Callee:
         Function of (height of the rotor centre above the surface, rotor radius, number of rotors) and x and y of the hubs (m),
         each of the shape (slots,). Its result has the shape (slots,); only the elements with a rotor are of use.
     """
-    arguments = common, x, y = [ca.SX.sym(name, size) for name, size in (("common", 3), ("x", slots), ("y", slots))]
+    arguments = common, x, y = [
+        ca.SX.sym(name, size) for name, size in (("common", 3), ("x", slots), ("y", slots))
+    ]
     height, radius, count = ca.vertsplit(common)
     z = ca.fmax(height, MIN_HEIGHT_RATIO * radius)
     reductions = []
     for i in range(slots):
         images = ((x[i] - x[j]) ** 2 + (y[i] - y[j]) ** 2 + 4 * z**2 for j in range(slots))
-        reductions.append(sum(ca.if_else(count > j, radius**2 / 2 * z / (d2 * ca.sqrt(d2)), 0) for j, d2 in enumerate(images)))
+        reductions.append(
+            sum(
+                ca.if_else(count > j, radius**2 / 2 * z / (d2 * ca.sqrt(d2)), 0)
+                for j, d2 in enumerate(images)
+            )
+        )
     function = ca.Function("inflow_reductions", arguments, [ca.vertcat(*reductions)])
     return Callee(function, _REDUCTIONS_C % {"slots": slots, "min_ratio": MIN_HEIGHT_RATIO})
 
@@ -65,7 +76,9 @@ _REDUCTIONS_C = """{
 """
 
 
-def thrust_factor(reduction: ca.SX, gain: ca.SX, thrust: ca.SX, air_speed_squared: ca.SX, wake: ca.SX) -> ca.SX:
+def thrust_factor(
+    reduction: ca.SX, gain: ca.SX, thrust: ca.SX, air_speed_squared: ca.SX, wake: ca.SX
+) -> ca.SX:
     """Return the ratio of a rotor's thrust to that in free air.
 
     Args:

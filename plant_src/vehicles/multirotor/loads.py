@@ -1,4 +1,7 @@
-"""Forces and torques of rotors and air on a multirotor, as CasADi expressions; `multirotor_equations.py` has the formulas."""
+"""Forces and torques of rotors and air on a multirotor, as CasADi expressions.
+
+`multirotor_equations.py` has the formulas.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +24,9 @@ def rotor_table(parameters: NamedValues, slots: int) -> ca.SX:
     """Return position, axis, thrust and torque coefficient of each rotor, shape (table_rows(slots), ROTOR_TABLE_COLUMNS)."""
     names = [f"{group}.{axis}" for group in ("rotor_position", "rotor_axis") for axis in "xyz"]
     columns = [parameters[name] for name in (*names, "thrust_coefficient", "torque_coefficient")]
-    return ca.vertcat(ca.horzcat(*columns), ca.SX.zeros(table_rows(slots) - slots, ROTOR_TABLE_COLUMNS))
+    return ca.vertcat(
+        ca.horzcat(*columns), ca.SX.zeros(table_rows(slots) - slots, ROTOR_TABLE_COLUMNS)
+    )
 
 
 def still_air_loads(table: ca.SX, slots: int) -> ca.SX:
@@ -40,9 +45,14 @@ def create_still_air_load(slots: int) -> Callee:
         slots: Number of elements of the arrays of rotors.
 
     Returns:
-        Function of the matrix of `still_air_loads`, the number of rotors and the speeds (rad/s). Its result has the shape (6,).
+        Function of the matrix of `still_air_loads`, the number of rotors and the speeds (rad/s).
+        Its result has the shape (6,).
     """
-    arguments = matrix, _, speed = ca.SX.sym("matrix", 6, slots), ca.SX.sym("count"), ca.SX.sym("speed", slots)
+    arguments = matrix, _, speed = (
+        ca.SX.sym("matrix", 6, slots),
+        ca.SX.sym("count"),
+        ca.SX.sym("speed", slots),
+    )
     return Callee(ca.Function("still_air_load", arguments, [matrix @ speed**2]), _STILL_AIR_LOAD_C)
 
 
@@ -56,18 +66,27 @@ _STILL_AIR_LOAD_C = """{
 """
 
 
-#: largest ratio of the air speed in the plane of a rotor to the speed of its tips for which the translational lift grows
+#: largest ratio of the air speed in the plane of a rotor to the speed of its tips for which the
+#: translational lift grows
 MAX_ADVANCE_RATIO = 0.5
 
 
 def _rotor_term() -> ca.Function:
     """Return the function of one rotor to its load.
 
-    Its arguments are (air velocity, rates, rotor drag, gain of the ground effect, 2 rho A, translational lift, rotor radius),
-    (speed, reduction of the inflow by the ground effect) and the row of the rotor.
+    Its arguments are (air velocity, rates, rotor drag, gain of the ground effect, 2 rho A,
+    translational lift, rotor radius), (speed, reduction of the inflow by the ground effect) and the
+    row of the rotor.
     """
-    common, moving, row = ca.SX.sym("common", 13), ca.SX.sym("moving", 2), ca.SX.sym("row", ROTOR_TABLE_COLUMNS)
-    (air, rates, drag), (gain, wake, lift, radius) = ca.vertsplit(common[0:9], 3), ca.vertsplit(common[9:13])
+    common, moving, row = (
+        ca.SX.sym("common", 13),
+        ca.SX.sym("moving", 2),
+        ca.SX.sym("row", ROTOR_TABLE_COLUMNS),
+    )
+    (air, rates, drag), (gain, wake, lift, radius) = (
+        ca.vertsplit(common[0:9], 3),
+        ca.vertsplit(common[9:13]),
+    )
     (speed, reduction), (position, axis) = ca.vertsplit(moving), ca.vertsplit(row[0:6], 3)
     squared = speed**2
     local_air = air + ca.cross(rates, position)
@@ -112,11 +131,20 @@ class RotorFunctions:
 
     def ground_reductions(self, inputs: NamedValues, constants: NamedValues) -> ca.SX:
         """Return the relative reduction of each hovering rotor's inflow by the surface below, shape (slots,)."""
-        common = ca.vertcat(inputs["ground_distance"], constants["rotor_radius"], constants["rotor_count"])
-        return self.inflow_reductions(common, constants["rotor_position.x"], constants["rotor_position.y"])
+        common = ca.vertcat(
+            inputs["ground_distance"], constants["rotor_radius"], constants["rotor_count"]
+        )
+        return self.inflow_reductions(
+            common, constants["rotor_position.x"], constants["rotor_position.y"]
+        )
 
     def aerodynamic_loads(
-        self, state: ca.SX, speed: ca.SX, reductions: ca.SX, inputs: NamedValues, constants: NamedValues
+        self,
+        state: ca.SX,
+        speed: ca.SX,
+        reductions: ca.SX,
+        inputs: NamedValues,
+        constants: NamedValues,
     ) -> tuple[ca.SX, ca.SX]:
         """Return force (N) and torque (N m) of rotors and body in moving air, body frame.
 
@@ -130,12 +158,17 @@ class RotorFunctions:
         air = kinematics.rotation_matrix(state[3:7]).T @ (state[7:10] - inputs["wind"])
         padding = ca.SX.zeros(table_rows(self.slots) - self.slots)
         moving = ca.vertcat(speed, padding, reductions, padding)
-        gain, radius = constants["ground_effect"] * inputs["ground_share"], constants["rotor_radius"]
+        gain, radius = (
+            constants["ground_effect"] * inputs["ground_share"],
+            constants["rotor_radius"],
+        )
         wake = 2 * math.pi * AIR_DENSITY * radius**2
         rotors = (gain, wake, constants["translational_lift"], radius)
         common = ca.vertcat(air, state[10:13], constants["rotor_drag"], *rotors)
         rows = table_rows(self.slots)
-        load = self.load_sum(common, constants["rotor_count"], ca.reshape(moving, rows, 2), constants["rotor_table"])
+        load = self.load_sum(
+            common, constants["rotor_count"], ca.reshape(moving, rows, 2), constants["rotor_table"]
+        )
         return load[0:3] - ca.norm_2(air) * constants["body_drag"] * air, load[3:6]
 
 

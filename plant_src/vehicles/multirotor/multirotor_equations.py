@@ -1,31 +1,36 @@
-"""Equations of motion of a multirotor: a rigid body in six degrees of freedom with any number of rotors.
+"""Equations of motion of a multirotor.
 
-State: position p (m) and velocity v (m/s) in the world frame, unit quaternion q (body to world), angular velocity w (rad/s, body
-frame) and rotor speeds n_i (rad/s). With all effects:
+A rigid body in six degrees of freedom with any number of rotors.
 
-    p' = v                                     u = R(q)^T (v - wind)                   air-relative velocity, body frame
-    q' = q * (0, w) / 2                        u_i = u + w x r_i                       air-relative velocity at rotor i
-    v' = (R F + F_ext) / m - g e_z             F = sum_i F_i - |u| diag(body_drag) u
-    w' = I^-1 (T + R^T T_ext - w x (I w + H) - H')
-    F_i = (g_i c_T,i n_i^2 + l_i) a_i - n_i diag(rotor_drag) u_i
-    T = sum_i (r_i x F_i + c_D,i n_i^2 a_i)    H = -J sum_i s_i n_i a_i                angular momentum of the rotors
-    n_i' = (command_i - n_i) / rotor_time_constant
+State: position p (m) and velocity v (m/s) in the world frame, unit quaternion q (body to world),
+angular velocity w (rad/s, body frame) and rotor speeds n_i (rad/s). With all effects:
 
-r_i is the position of rotor i, a_i its thrust axis, s_i the sign of its reaction torque c_D,i n_i^2 and g_i its ground-effect
-factor (`ground_effect.py`). l_i = translational_lift min(|u_p|^2, (R n_i / 2)^2) is the additional thrust by the air speed u_p
-in the plane of the rotor. Together with the rotor drag along the axis, which is the loss of thrust by axial inflow, it is the
-reduced blade-element momentum model of Svacha, Mohta and Kumar, "Improving Quadrotor Trajectory Tracking by Compensating for
-Aerodynamic Effects", ICUAS 2017, limited to the advance ratio 1/2. Rotor drag, applied at each hub, and body drag follow Folk,
-Paulos and Kumar, "RotorPy", 2023. The rotor drag is the lumped model of Faessler, Franchi and Scaramuzza, "Differential
-Flatness of Quadrotor Dynamics Subject to Rotor Drag", 2018, distributed over the rotors. With a rotor time constant of 0 the
-rotor speeds equal their commands, and H' is neglected.
+    p' = v                                     u = R(q)^T (v - wind)                   air-relative
+    velocity, body frame q' = q * (0, w) / 2                        u_i = u + w x r_i
+    air-relative velocity at rotor i v' = (R F + F_ext) / m - g e_z             F = sum_i F_i - |u|
+    diag(body_drag) u w' = I^-1 (T + R^T T_ext - w x (I w + H) - H') F_i = (g_i c_T,i n_i^2 + l_i)
+    a_i - n_i diag(rotor_drag) u_i T = sum_i (r_i x F_i + c_D,i n_i^2 a_i)    H = -J sum_i s_i n_i
+    a_i                angular momentum of the rotors n_i' = (command_i - n_i) / rotor_time_constant
 
-The rotor speeds are the exact solution for held commands. The rigid body is integrated by the classical Runge-Kutta method,
-which evaluates the rotor speeds at the times of its stages; a short time constant therefore does not limit the step. If all
-effects are off, a shorter compiled function is called. A step that begins or ends with a part of the vehicle in the water is
-divided into shorter ones with the loads of `water.py`.
+r_i is the position of rotor i, a_i its thrust axis, s_i the sign of its reaction torque c_D,i n_i^2
+and g_i its ground-effect factor (`ground_effect.py`). l_i = translational_lift min(|u_p|^2, (R n_i
+/ 2)^2) is the additional thrust by the air speed u_p in the plane of the rotor. Together with the
+rotor drag along the axis, which is the loss of thrust by axial inflow, it is the reduced
+blade-element momentum model of Svacha, Mohta and Kumar, "Improving Quadrotor Trajectory Tracking by
+Compensating for Aerodynamic Effects", ICUAS 2017, limited to the advance ratio 1/2. Rotor drag,
+applied at each hub, and body drag follow Folk, Paulos and Kumar, "RotorPy", 2023. The rotor drag is
+the lumped model of Faessler, Franchi and Scaramuzza, "Differential Flatness of Quadrotor Dynamics
+Subject to Rotor Drag", 2018, distributed over the rotors. With a rotor time constant of 0 the rotor
+speeds equal their commands, and H' is neglected.
 
-All values are parameters. The equations are generated for a number of rotor slots; slots without a rotor have the coefficients 0.
+The rotor speeds are the exact solution for held commands. The rigid body is integrated by the
+classical Runge-Kutta method, which evaluates the rotor speeds at the times of its stages; a short
+time constant therefore does not limit the step. If all effects are off, a shorter compiled function
+is called. A step that begins or ends with a part of the vehicle in the water is divided into
+shorter ones with the loads of `water.py`.
+
+All values are parameters. The equations are generated for a number of rotor slots; slots without a
+rotor have the coefficients 0.
 """
 
 from __future__ import annotations
@@ -69,14 +74,18 @@ WATER_SUB_STEPS = 5
 
 
 class SpinningRotors(NamedTuple):
-    """Rotors at one time: speeds (rad/s) that act on air, angular momentum (N m s) and its rate (N m), body frame."""
+    """Rotors at one time.
+
+    Speeds (rad/s) that act on air, angular momentum (N m s) and its rate (N m), body frame.
+    """
 
     aerodynamic_speed: ca.SX
     momentum: ca.SX
     momentum_rate: ca.SX
 
 
-#: function of (state, rotors, reductions of the inflow, inputs, constants) to the rate of the rigid-body states
+#: function of (state, rotors, reductions of the inflow, inputs, constants) to the rate of the
+#: rigid-body states
 BodyRate = Callable[[ca.SX, SpinningRotors, ca.SX, NamedValues, NamedValues], ca.SX]
 
 
@@ -123,7 +132,9 @@ class MultirotorEquations:
             "rotor_table": table,
             "still_air_loads": still_air_loads(table, self.slots),
             "rotor_reach": ca.vertcat(ca.sqrt(ca.mmax(x**2 + y**2)), ca.mmax(ca.fabs(z))),
-            "momenta": -parameters["rotor_inertia"] * axes * ca.repmat(parameters["torque_sign"].T, 3, 1),
+            "momenta": -parameters["rotor_inertia"]
+            * axes
+            * ca.repmat(parameters["torque_sign"].T, 3, 1),
         }
 
     def _inputs(self, vector: ca.SX) -> NamedValues:
@@ -133,7 +144,10 @@ class MultirotorEquations:
         """Return the state at the start."""
         initial = self.constants.by_name(constants)
         rotors = ca.vertcat(
-            *(ca.if_else(initial["rotor_count"] > k, initial["initial_rotor_speed"], 0) for k in range(self.slots))
+            *(
+                ca.if_else(initial["rotor_count"] > k, initial["initial_rotor_speed"], 0)
+                for k in range(self.slots)
+            )
         )
         return ca.vertcat(initial_rigid_state(initial), rotors)
 
@@ -149,11 +163,15 @@ class MultirotorEquations:
             ca.if_else(lag > 0, (target - speed) / lag, 0),
         )
 
-    def step_without_effects(self, state: ca.SX, inputs: ca.SX, constants: ca.SX, step: ca.SX) -> ca.SX:
+    def step_without_effects(
+        self, state: ca.SX, inputs: ca.SX, constants: ca.SX, step: ca.SX
+    ) -> ca.SX:
         """Return the state after a step (s) with all effects off."""
         given, known = self._inputs(inputs), self.constants.by_name(constants)
         body, speed = rigid_body(known), self._commanded_speeds(given, known)
-        load = self.rotor_functions.still_air_load(known["still_air_loads"], known["rotor_count"], speed)
+        load = self.rotor_functions.still_air_load(
+            known["still_air_loads"], known["rotor_count"], speed
+        )
         end = runge_kutta_4(
             lambda x: rigid_body_rate(body, known["gravity"], x, given, load[0:3], load[3:6]),
             state[:RIGID_BODY_STATE_COUNT],
@@ -161,7 +179,9 @@ class MultirotorEquations:
         )
         return ca.vertcat(normalised_state(end), speed)
 
-    def step_with_effects(self, state: ca.SX, inputs: ca.SX, constants: ca.SX, step: ca.SX) -> ca.SX:
+    def step_with_effects(
+        self, state: ca.SX, inputs: ca.SX, constants: ca.SX, step: ca.SX
+    ) -> ca.SX:
         """Return the state after a step (s) in air with all effects."""
         return self._step(self._body_rate, state, inputs, constants, step)
 
@@ -169,16 +189,28 @@ class MultirotorEquations:
         """Return the state after a step (s) with all effects and the loads of water."""
         return self._step(self._rate_in_water, state, inputs, constants, step)
 
-    def _step(self, body_rate: BodyRate, state: ca.SX, inputs: ca.SX, constants: ca.SX, step: ca.SX) -> ca.SX:
+    def _step(
+        self, body_rate: BodyRate, state: ca.SX, inputs: ca.SX, constants: ca.SX, step: ca.SX
+    ) -> ca.SX:
         given, known = self._inputs(inputs), self.constants.by_name(constants)
         target, lag = self._commanded_speeds(given, known), known["rotor_time_constant"]
         start = ca.if_else(lag > 0, state[RIGID_BODY_STATE_COUNT:], target)
-        remaining = ca.exp(-step / 2 / lag)  # fraction of the difference left after half a step; 0 without a lag
-        middle, end = (target + fraction * (start - target) for fraction in (remaining, remaining**2))
+        remaining = ca.exp(
+            -step / 2 / lag
+        )  # fraction of the difference left after half a step; 0 without a lag
+        middle, end = (
+            target + fraction * (start - target) for fraction in (remaining, remaining**2)
+        )
         reductions = self.rotor_functions.ground_reductions(given, known)
-        first, second, last = (_spinning_rotors(speed, target, known) for speed in (start, middle, end))
+        first, second, last = (
+            _spinning_rotors(speed, target, known) for speed in (start, middle, end)
+        )
         stages = iter((first, second, second, last))
-        body = runge_kutta_4(lambda x: body_rate(x, next(stages), reductions, given, known), state[:RIGID_BODY_STATE_COUNT], step)
+        body = runge_kutta_4(
+            lambda x: body_rate(x, next(stages), reductions, given, known),
+            state[:RIGID_BODY_STATE_COUNT],
+            step,
+        )
         return ca.vertcat(normalised_state(body), end)
 
     def _commanded_speeds(self, inputs: NamedValues, constants: NamedValues) -> ca.SX:
@@ -186,15 +218,29 @@ class MultirotorEquations:
         return ca.fmin(ca.fmax(inputs["rotor_speed"], 0), constants["max_rotor_speed"])
 
     def _body_rate(
-        self, state: ca.SX, rotors: SpinningRotors, reductions: ca.SX, inputs: NamedValues, constants: NamedValues
+        self,
+        state: ca.SX,
+        rotors: SpinningRotors,
+        reductions: ca.SX,
+        inputs: NamedValues,
+        constants: NamedValues,
     ) -> ca.SX:
         """Return the time derivative of the rigid-body states in air with all effects."""
-        force, torque = self.rotor_functions.aerodynamic_loads(state, rotors.aerodynamic_speed, reductions, inputs, constants)
+        force, torque = self.rotor_functions.aerodynamic_loads(
+            state, rotors.aerodynamic_speed, reductions, inputs, constants
+        )
         torque += gyroscopic_torque(state[10:13], rotors.momentum, rotors.momentum_rate)
-        return rigid_body_rate(rigid_body(constants), constants["gravity"], state, inputs, force, torque)
+        return rigid_body_rate(
+            rigid_body(constants), constants["gravity"], state, inputs, force, torque
+        )
 
     def _rate_in_water(
-        self, state: ca.SX, rotors: SpinningRotors, reductions: ca.SX, inputs: NamedValues, constants: NamedValues
+        self,
+        state: ca.SX,
+        rotors: SpinningRotors,
+        reductions: ca.SX,
+        inputs: NamedValues,
+        constants: NamedValues,
     ) -> ca.SX:
         """Return the time derivative of the rigid-body states with all effects and the loads of water."""
         emerged = water.emerged_fractions(state, inputs, constants)
@@ -216,7 +262,9 @@ class Multirotor(ContinuousModel):
 
     free_step: ca.Function = field(kw_only=True)
 
-    def integrate(self, state: ca.SX, inputs: ca.SX, parameters: ca.SX, step: ca.SX, sub_steps: int = 1) -> ca.SX:
+    def integrate(
+        self, state: ca.SX, inputs: ca.SX, parameters: ca.SX, step: ca.SX, sub_steps: int = 1
+    ) -> ca.SX:
         """Return the state after `step` (s) with held inputs, in equal sub-steps."""
         for _ in range(sub_steps):
             state = self.free_step(state, inputs, parameters, step / sub_steps)
@@ -224,24 +272,52 @@ class Multirotor(ContinuousModel):
 
 
 def free_step(equations: MultirotorEquations) -> Callee:
-    """Return the function of one step; its C code calls the function for the effects that are on and the water."""
-    inputs = sum(len(variable.scalar_names) for variable in variables_of(equations.variables, "input"))
-    names = [name for name, (rows, columns) in equations.constants.shapes.items() for _ in range(rows * columns)]
-    sizes = {"state": len(states(equations.slots)), "inputs": inputs, "constants": len(names), "step": 1}
+    """Return the function of one step.
+
+    Its C code calls the function for the effects that are on and the water.
+    """
+    inputs = sum(
+        len(variable.scalar_names) for variable in variables_of(equations.variables, "input")
+    )
+    names = [
+        name
+        for name, (rows, columns) in equations.constants.shapes.items()
+        for _ in range(rows * columns)
+    ]
+    sizes = {
+        "state": len(states(equations.slots)),
+        "inputs": inputs,
+        "constants": len(names),
+        "step": 1,
+    }
     arguments = [ca.SX.sym(name, size) for name, size in sizes.items()]
     plain = ca.Function("plain_step", arguments, [equations.step_without_effects(*arguments)])
     full = ca.Function("step_with_effects", arguments, [equations.step_with_effects(*arguments)])
     wet = ca.Function("step_in_water", arguments, [equations.step_in_water(*arguments)])
     either = ca.Function("free_step", arguments, [full(*arguments)], {"never_inline": True})
     effects = [k for k, name in enumerate(names) if name.partition(".")[0] in _EFFECTS]
-    input_names = [slot for variable in variables_of(equations.variables, "input") for slot in variable.scalar_names]
-    indices = {"height": names.index("hull_size.z"), "reach": names.index("rotor_reach"), "radius": names.index("rotor_radius")}
-    values = {"first": effects[0], "end": effects[-1] + 1, "level": input_names.index("water_level"), **indices}
+    input_names = [
+        slot
+        for variable in variables_of(equations.variables, "input")
+        for slot in variable.scalar_names
+    ]
+    indices = {
+        "height": names.index("hull_size.z"),
+        "reach": names.index("rotor_reach"),
+        "radius": names.index("rotor_radius"),
+    }
+    values = {
+        "first": effects[0],
+        "end": effects[-1] + 1,
+        "level": input_names.index("water_level"),
+        **indices,
+    }
     body = _FREE_STEP_C % {**values, "states": sizes["state"], "sub_steps": WATER_SUB_STEPS}
     return Callee(either, body, [plain, full, wet])
 
 
-#: the lowest point is not above the bottom of the hull or a quarter turn of the rotors' discs below their hubs
+#: the lowest point is not above the bottom of the hull or a quarter turn of the rotors' discs below
+#: their hubs
 _FREE_STEP_C = """{
     const double *const ends[2] = {in[0], out[0]}, *const constants = in[2];
     int effects = 0, wet = 0;
@@ -267,7 +343,9 @@ _FREE_STEP_C = """{
 
 
 def multirotor_block(airframe: Airframe, description: str, rotor_slots: int | None = None) -> Block:
-    """Return a multirotor for export: its FMU in free flight and the contact functions of the world.
+    """Return a multirotor for export.
+
+    Its FMU in free flight and the contact functions of the world.
 
     Args:
         airframe: Airframe with the start values.
@@ -284,10 +362,14 @@ def multirotor_block(airframe: Airframe, description: str, rotor_slots: int | No
         states(equations.slots),
         equations.initial_state,
         equations.rate,
-        lambda state, _inputs, _constants: ca.vertcat(motion_of_state(state), ca.SX.zeros(len(WORLD_OUTPUTS))),
+        lambda state, _inputs, _constants: ca.vertcat(
+            motion_of_state(state), ca.SX.zeros(len(WORLD_OUTPUTS))
+        ),
         derived_parameters=equations.constants.vector,
         callees=[step, *functions.callees, surroundings_callee, SURFACE_SUM],
         free_step=step.function,
     )
-    maps = contact_maps.FreeContactMaps(model, lambda c: rigid_body(equations.constants.by_name(c)), motion_of_state)
+    maps = contact_maps.FreeContactMaps(
+        model, lambda c: rigid_body(equations.constants.by_name(c)), motion_of_state
+    )
     return as_block(model, [*maps.functions(), surroundings])

@@ -32,27 +32,51 @@ def create_surroundings_function() -> tuple[ca.Function, Callee]:
     Its arguments are:
 
     - pose: position and quaternion of the multirotor, shape (7,).
-    - disc: centre of the rotors (m, body frame), radius of the disc of the rotors (m), and distance (m) above all crests within
-      which the vehicle needs the water level, shape (5,).
-    - sea: time of the waves (s), factor on all amplitudes (1), number of components, and height that no crest exceeds (m).
-    - waves: table of the components, shape (MAX_WAVE_COMPONENTS, WAVE_COLUMNS), see `environment.sea.Sea.component_table`.
+    - disc: centre of the rotors (m, body frame), radius of the disc of the rotors (m), and distance
+      (m) above all crests within which the vehicle needs the water level, shape (5,).
+    - sea: time of the waves (s), factor on all amplitudes (1), number of components, and height
+      that no crest exceeds (m).
+    - waves: table of the components, shape (MAX_WAVE_COMPONENTS, WAVE_COLUMNS), see
+      `environment.sea.Sea.component_table`.
     - count: number of surfaces.
-    - surfaces: table of surfaces, one row after the other. It may have any number of rows in C, and one in CasADi.
+    - surfaces: table of surfaces, one row after the other. It may have any number of rows in C, and
+      one in CasADi.
 
-    Its result has the shape (3,): distance (m) from the centre of the rotors to the surface below, 0 under water; share (1) of
-    the disc that is above this surface; height of the water (m) at the centre of mass, or below all crests if it is not needed.
+    Its result has the shape (3,): distance (m) from the centre of the rotors to the surface below,
+    0 under water; share (1) of the disc that is above this surface; height of the water (m) at the
+    centre of mass, or below all crests if it is not needed.
     """
-    sizes = {"pose": 7, "disc": 5, "sea": 4, "waves": MAX_WAVE_COMPONENTS * WAVE_COLUMNS, "count": 1, "surfaces": SURFACE_COLUMNS}
-    arguments = pose, disc, sea, waves, count, row = [ca.SX.sym(name, size) for name, size in sizes.items()]
-    elevation, point, surface = create_elevation_function(), _disc_centre_function(), _surface_function()
+    sizes = {
+        "pose": 7,
+        "disc": 5,
+        "sea": 4,
+        "waves": MAX_WAVE_COMPONENTS * WAVE_COLUMNS,
+        "count": 1,
+        "surfaces": SURFACE_COLUMNS,
+    }
+    arguments = pose, disc, sea, waves, count, row = [
+        ca.SX.sym(name, size) for name, size in sizes.items()
+    ]
+    elevation, point, surface = (
+        create_elevation_function(),
+        _disc_centre_function(),
+        _surface_function(),
+    )
     centre = point(pose, disc)
     height, share = ca.vertsplit(surface(centre, disc[3], row))
     hidden = ca.logic_and(ca.logic_and(count > 0, share > 0), height <= centre[2])
-    level, level_here = (sea[1] * elevation(ca.vertcat(place[0:2], sea[0]), sea[2], waves) for place in (centre, pose))
+    level, level_here = (
+        sea[1] * elevation(ca.vertcat(place[0:2], sea[0]), sea[2], waves)
+        for place in (centre, pose)
+    )
     water = ca.if_else(centre[2] < MAX_WAVE_EFFECT_HEIGHT, level, 0)
-    below = ca.if_else(hidden, ca.vertcat(centre[2] - height, share), ca.vertcat(ca.fmax(centre[2] - water, 0), 1))
+    below = ca.if_else(
+        hidden, ca.vertcat(centre[2] - height, share), ca.vertcat(ca.fmax(centre[2] - water, 0), 1)
+    )
     needed = ca.if_else(pose[2] - disc[4] < sea[3], level_here, -sea[3])
-    reference = ca.Function("multirotor_surroundings", arguments, [ca.vertcat(below, needed)], {"never_inline": True})
+    reference = ca.Function(
+        "multirotor_surroundings", arguments, [ca.vertcat(below, needed)], {"never_inline": True}
+    )
     body = _SURROUNDINGS_C % {"columns": SURFACE_COLUMNS, "wave_height": MAX_WAVE_EFFECT_HEIGHT}
     callee = Callee(reference, body, [elevation, point, surface])
     return ca.Function("surroundings", arguments, call_in_c(reference, *arguments)), callee
@@ -61,7 +85,9 @@ def create_surroundings_function() -> tuple[ca.Function, Callee]:
 def _disc_centre_function() -> ca.Function:
     """Return the function from pose and disc to the centre of the rotors (m, world frame)."""
     pose, disc = ca.SX.sym("pose", 7), ca.SX.sym("disc", 5)
-    return ca.Function("disc_centre", [pose, disc], [pose[0:3] + kinematics.rotation_matrix(pose[3:7]) @ disc[0:3]])
+    return ca.Function(
+        "disc_centre", [pose, disc], [pose[0:3] + kinematics.rotation_matrix(pose[3:7]) @ disc[0:3]]
+    )
 
 
 def _surface_function() -> ca.Function:
@@ -69,7 +95,11 @@ def _surface_function() -> ca.Function:
 
     The share is 0 if the rectangle is beside the disc or upside down.
     """
-    point, radius, row = ca.SX.sym("point", 3), ca.SX.sym("radius"), ca.SX.sym("row", SURFACE_COLUMNS)
+    point, radius, row = (
+        ca.SX.sym("point", 3),
+        ca.SX.sym("radius"),
+        ca.SX.sym("row", SURFACE_COLUMNS),
+    )
     rotation, offset = kinematics.rotation_matrix(row[5:9]), point[0:2] - row[2:4]
     normal = rotation[:, 2]
     upright = normal[2] > 0
@@ -77,7 +107,11 @@ def _surface_function() -> ca.Function:
     along = rotation[:, 0:2].T @ ca.vertcat(offset, rise)
     limited = ca.fmax(radius, _SMALLEST_RADIUS)
     share = _share_of_strip(row[0], along[0], limited) * _share_of_strip(row[1], along[1], limited)
-    return ca.Function("surface_below", [point, radius, row], [ca.vertcat(row[4] + rise, ca.if_else(upright, share, 0))])
+    return ca.Function(
+        "surface_below",
+        [point, radius, row],
+        [ca.vertcat(row[4] + rise, ca.if_else(upright, share, 0))],
+    )
 
 
 def _share_of_strip(half_width: ca.SX, position: ca.SX, radius: ca.SX) -> ca.SX:

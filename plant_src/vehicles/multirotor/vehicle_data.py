@@ -15,12 +15,19 @@ from ..common.shapes import BODY_UP, Body, Shape
 from ..common.vehicle_reader import Collision, VehicleReader, boxes_in, edges_around
 from .airframe import Airframe, Hull, Rotor, RotorEffects
 
-#: sense of rotation seen from the tip of the thrust's axis -> sign of the reaction torque about this axis
+#: sense of rotation seen from the tip of the thrust's axis -> sign of the reaction torque about
+#: this axis
 TORQUE_SIGNS = {"clockwise": 1.0, "counter-clockwise": -1.0}
 
 #: required keys of the file
 KEYS = ("mass", "inertia", "rotor", "rotors", "boxes", "crash_speed")
-_OPTIONAL_KEYS = ("body_drag", "ground_effect", "gravity", "displaced_volume", "water_drag_coefficient")
+_OPTIONAL_KEYS = (
+    "body_drag",
+    "ground_effect",
+    "gravity",
+    "displaced_volume",
+    "water_drag_coefficient",
+)
 _COEFFICIENTS = {"thrust_coefficient": "N.s2/rad2", "torque_coefficient": "N.m.s2/rad2"}
 #: required and optional keys of all rotors
 ROTOR_KEYS, _ROTOR_OPTIONAL_KEYS = (
@@ -41,7 +48,10 @@ class MultirotorData:
     crash_speed: float
 
     def body_with(self, mass: float, inertia: np.ndarray) -> Body:
-        """Return the rigid body for Bullet with another mass (kg) and inertia tensor (kg m2). Raises InputError."""
+        """Return the rigid body for Bullet with another mass (kg) and inertia tensor (kg m2).
+
+        Raises InputError.
+        """
         return replace(self.airframe, mass=mass, inertia=inertia).body(self.boxes_in)
 
     def boxes_in(self, to_body: np.ndarray) -> tuple[Shape, ...]:
@@ -75,15 +85,24 @@ class _MultirotorReader(VehicleReader):
         values: dict[str, Any] = {
             "mass": self.quantity(data.get("mass", 1.0), ("mass",), "kg", above=0.0),
             "inertia": self.read_inertia(data.get("inertia", [1.0] * 3)),
-            "rotors": [self.read_rotor(common, rotor, ("rotors", str(i))) for i, rotor in self.elements(data, "rotors")],
-            "max_rotor_speed": self.quantity(common.get("max_speed", 1.0), ("rotor", "max_speed"), "rad/s", above=0.0),
-            "rotor_radius": self.quantity(common.get("radius", 1.0), ("rotor", "radius"), "m", above=0.0),
+            "rotors": [
+                self.read_rotor(common, rotor, ("rotors", str(i)))
+                for i, rotor in self.elements(data, "rotors")
+            ],
+            "max_rotor_speed": self.quantity(
+                common.get("max_speed", 1.0), ("rotor", "max_speed"), "rad/s", above=0.0
+            ),
+            "rotor_radius": self.quantity(
+                common.get("radius", 1.0), ("rotor", "radius"), "m", above=0.0
+            ),
             "gravity": self.quantity(data.get("gravity", 9.81), ("gravity",), "m/s2", above=0.0),
             "effects": self.read_effects(data, common),
         }
         boxes = self.read_boxes(data)
         values["hull"] = self.read_hull(data, boxes, values["mass"])
-        crash_speed = self.quantity(data.get("crash_speed", 1.0), ("crash_speed",), "m/s", above=0.0)
+        crash_speed = self.quantity(
+            data.get("crash_speed", 1.0), ("crash_speed",), "m/s", above=0.0
+        )
         if self.problems:
             return None
         airframe = self.construct(lambda: Airframe(name, **values))
@@ -93,7 +112,10 @@ class _MultirotorReader(VehicleReader):
         return MultirotorData(airframe, boxes, crash_speed)
 
     def check_lift(self, airframe: Airframe) -> None:
-        """Report a multirotor that cannot fly: the thrust of all rotors at full speed along z is less than its weight."""
+        """Report a multirotor that cannot fly.
+
+        The thrust of all rotors at full speed along z is less than its weight.
+        """
         weight = airframe.mass * airframe.gravity
         if airframe.lift < weight:
             path = ("rotors", "0", "axis") if airframe.lift < 0 else ("mass",)
@@ -102,11 +124,23 @@ class _MultirotorReader(VehicleReader):
             self.add_problem(path, f"it cannot fly: {thrust}, its weight {weight:.4g} N{hint}")
 
     def read_hull(self, data: Mapping[str, Any], boxes: Sequence[Collision], mass: float) -> Hull:
-        """Read what water acts on: the box around all boxes, the displaced volume and the drag coefficient."""
+        """Read what water acts on.
+
+        The box around all boxes, the displaced volume and the drag coefficient.
+        """
         length, width, height = edges_around(boxes)
-        volume = self.quantity(data.get("displaced_volume", mass / DEFAULT_DENSITY), ("displaced_volume",), "m3", low=0.0)
+        volume = self.quantity(
+            data.get("displaced_volume", mass / DEFAULT_DENSITY),
+            ("displaced_volume",),
+            "m3",
+            low=0.0,
+        )
         drag = data.get("water_drag_coefficient", 1.0)
-        return Hull((length, width, height), volume, self.quantity(drag, ("water_drag_coefficient",), "1", low=0.0))
+        return Hull(
+            (length, width, height),
+            volume,
+            self.quantity(drag, ("water_drag_coefficient",), "1", low=0.0),
+        )
 
     def read_rotor(self, common: Mapping[str, Any], value: Any, path: JsonPath) -> Rotor:
         """Read one rotor; its coefficients replace those of all rotors."""
@@ -117,7 +151,9 @@ class _MultirotorReader(VehicleReader):
             if key not in source:
                 self.add_missing(path, key, "rotor")
             coefficients[key] = self.quantity(source.get(key, 1.0), place, unit, low=0.0)
-        x, y, z = self.vector_quantity(data.get("position", [0.0] * 3), (*path, "position"), "m", "xyz")
+        x, y, z = self.vector_quantity(
+            data.get("position", [0.0] * 3), (*path, "position"), "m", "xyz"
+        )
         turns = self.choice(data.get("turns", "clockwise"), (*path, "turns"), tuple(TORQUE_SIGNS))
         label = self.text(data.get("label", f"rotor {int(path[-1]) + 1}"), (*path, "label"))
         axis = self.read_axis(data["axis"], (*path, "axis")) if "axis" in data else BODY_UP
@@ -126,16 +162,25 @@ class _MultirotorReader(VehicleReader):
     def read_effects(self, data: Mapping[str, Any], common: Mapping[str, Any]) -> RotorEffects:
         """Read the effects beyond thrust and torque; those that are missing are off."""
         zero = [0.0] * 3
-        rotor_drag = self.vector_quantity(common.get("drag", zero), ("rotor", "drag"), "kg/rad", "xyz")
+        rotor_drag = self.vector_quantity(
+            common.get("drag", zero), ("rotor", "drag"), "kg/rad", "xyz"
+        )
         body_drag = self.vector_quantity(data.get("body_drag", zero), ("body_drag",), "kg/m", "xyz")
         for path, drag in ((("rotor", "drag"), rotor_drag), (("body_drag",), body_drag)):
             if min(drag) < 0:
                 self.add_problem(path, f"found {list(drag)}, expected numbers of at least 0")
         return RotorEffects(
-            self.quantity(common.get("time_constant", 0.0), ("rotor", "time_constant"), "s", low=0.0),
+            self.quantity(
+                common.get("time_constant", 0.0), ("rotor", "time_constant"), "s", low=0.0
+            ),
             self.quantity(common.get("inertia", 0.0), ("rotor", "inertia"), "kg.m2", low=0.0),
             (rotor_drag[0], rotor_drag[1], rotor_drag[2]),
             (body_drag[0], body_drag[1], body_drag[2]),
             self.quantity(data.get("ground_effect", 0.0), ("ground_effect",), "1", 0.0, 1.0),
-            self.quantity(common.get("translational_lift", 0.0), ("rotor", "translational_lift"), "kg/m", low=0.0),
+            self.quantity(
+                common.get("translational_lift", 0.0),
+                ("rotor", "translational_lift"),
+                "kg/m",
+                low=0.0,
+            ),
         )

@@ -1,15 +1,20 @@
-"""Forces of water on a multirotor: buoyancy, drag and added mass of its body, and rotors without thrust below the surface.
+"""Forces of water on a multirotor.
 
-With the height d of the surface above the centre of mass and the edges l, b, h of the box around the body, the immersed fraction
-is s = clamp(d / h + 1/2, 0, 1) at every attitude. u is the velocity relative to the current, body frame:
+Buoyancy, drag and added mass of its body, and rotors without thrust below the surface.
+
+With the height d of the surface above the centre of mass and the edges l, b, h of the box around
+the body, the immersed fraction is s = clamp(d / h + 1/2, 0, 1) at every attitude. u is the velocity
+relative to the current, body frame:
 
     F = rho g V s e_z - s R(q) (|u| D u)       D = rho C_D / 2 diag(b h, l h, l b)
     T = -s |w| K w                             K = rho C_D / 64 diag(l b^4, b l^4, h (l^4 + b^4))
-    m_a = 0.68 s rho l b h                     added mass, that of a cube in all directions (DNV-RP-H103, table A-2)
+    m_a = 0.68 s rho l b h                     added mass, that of a cube in all directions
+    (DNV-RP-H103, table A-2)
 
-The buoyancy acts at the centre of mass. K is the integral of the drag of flat plates that turn about their centre lines. Added
-inertia and the pressure peak of the impact on the surface are neglected. The aerodynamic loads of a rotor are those of the speed
-n_i e_i, with e_i = clamp((z_i - level) / R + 1/2, 0, 1) of the height z_i of its hub.
+The buoyancy acts at the centre of mass. K is the integral of the drag of flat plates that turn
+about their centre lines. Added inertia and the pressure peak of the impact on the surface are
+neglected. The aerodynamic loads of a rotor are those of the speed n_i e_i, with e_i = clamp((z_i -
+level) / R + 1/2, 0, 1) of the height z_i of its hub.
 """
 
 from __future__ import annotations
@@ -33,7 +38,9 @@ def emerged_fractions(state: ca.SX, inputs: NamedValues, constants: NamedValues)
     return _clamp((heights - inputs["water_level"]) / constants["rotor_radius"] + 0.5)
 
 
-def add_water_loads(rate: ca.SX, state: ca.SX, inputs: NamedValues, constants: NamedValues) -> ca.SX:
+def add_water_loads(
+    rate: ca.SX, state: ca.SX, inputs: NamedValues, constants: NamedValues
+) -> ca.SX:
     """Return the rate of the rigid-body states with the loads of the water.
 
     Args:
@@ -52,9 +59,14 @@ def add_water_loads(rate: ca.SX, state: ca.SX, inputs: NamedValues, constants: N
     buoyancy = WATER_DENSITY * constants["displaced_volume"] * constants["gravity"]
     force = ca.vertcat(0, 0, buoyancy) - to_world @ (ca.norm_2(flow) * pressure * areas * flow)
     torque = -ca.norm_2(rates) * pressure * moments * rates
-    mass, added = constants["mass"], immersed * _ADDED_MASS_COEFFICIENT * WATER_DENSITY * length * width * height
+    mass, added = (
+        constants["mass"],
+        immersed * _ADDED_MASS_COEFFICIENT * WATER_DENSITY * length * width * height,
+    )
     acceleration = (mass * rate[7:10] + immersed * force) / (mass + added)
-    return ca.vertcat(rate[0:7], acceleration, rate[10:13] + constants["inverse_inertia"] @ (immersed * torque))
+    return ca.vertcat(
+        rate[0:7], acceleration, rate[10:13] + constants["inverse_inertia"] @ (immersed * torque)
+    )
 
 
 def _clamp(value: ca.SX) -> ca.SX:

@@ -1,4 +1,7 @@
-"""Equations of motion of the Otter in six degrees of freedom; README.md has the loads, `vehicles/README.md` the rest."""
+"""Equations of motion of the Otter in six degrees of freedom.
+
+README.md has the loads, `vehicles/README.md` the rest.
+"""
 
 from __future__ import annotations
 
@@ -14,12 +17,27 @@ from ..common import kinematics
 from ..common.named_values import NamedValues, initial_parameters
 from ..vessel import floating_maps, vessel_equations
 from ..vessel.hull import Frame, Hull, LoadArguments, rigid_body_mass_matrix
-from ..vessel.hydrostatics import Ballast, attitude_at, improved_equilibrium, upward_axis, weight_and_buoyancy
+from ..vessel.hydrostatics import (
+    Ballast,
+    attitude_at,
+    improved_equilibrium,
+    upward_axis,
+    weight_and_buoyancy,
+)
 from ..vessel.strips import STRIP_COUNT, immersion
 from . import parameters as p
 from .geometry import BODY
 from .interface import PROPELLER_STATES, VARIABLES
-from .loads import added_mass, cross_flow_drag, damping, linear_damping, mass_properties, otter_model, propulsion, wind
+from .loads import (
+    added_mass,
+    cross_flow_drag,
+    damping,
+    linear_damping,
+    mass_properties,
+    otter_model,
+    propulsion,
+    wind,
+)
 from .pontoons import STRIPS, resting_pontoons, station_draughts
 
 #: steps of the iteration for the equilibrium
@@ -32,7 +50,10 @@ _MOMENTS = ca.SX([p.TRANSVERSE_MOMENT, p.LONGITUDINAL_MOMENT])
 def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
     """Return the constants of the equations."""
     own = mass_properties(parameters)
-    ballast, volume = Ballast(own.mass, own.centre, ca.SX(p.WATER_DENSITY)), own.mass / p.WATER_DENSITY
+    ballast, volume = (
+        Ballast(own.mass, own.centre, ca.SX(p.WATER_DENSITY)),
+        own.mass / p.WATER_DENSITY,
+    )
     equilibrium = _equilibrium(ballast)
     to_level = attitude_at(equilibrium)
     centre, inertia = to_level @ own.centre, to_level @ own.inertia @ to_level.T
@@ -40,7 +61,9 @@ def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
     buoyancy = _centre_of_buoyancy(equilibrium, draughts, mean_draught)
     added = added_mass(own.inertia)
     mass_matrix = rigid_body_mass_matrix(own.mass, centre, inertia) + ca.diag(added)
-    stiffness = _WEIGHT_DENSITY * ca.vertcat(p.WATERPLANE_AREA, _MOMENTS + volume * (buoyancy[2] - centre[2]))
+    stiffness = _WEIGHT_DENSITY * ca.vertcat(
+        p.WATERPLANE_AREA, _MOMENTS + volume * (buoyancy[2] - centre[2])
+    )
     pontoons = resting_pontoons(draughts, mean_draught)
     return {
         **initial_parameters(parameters),
@@ -71,7 +94,11 @@ def _equilibrium(ballast: Ballast) -> ca.SX:
     lever = mass / p.WATER_DENSITY * (p.HULL_CENTRE_OF_BUOYANCY[2] - centre[2])
     stiffness = _WEIGHT_DENSITY * ca.vertcat(p.WATERPLANE_AREA, _MOMENTS + lever)
     pontoons = resting_pontoons(ca.SX(p.STATION_DRAUGHTS), ca.SX(p.MEAN_DRAUGHT))
-    improve = ca.Function("otter_equilibrium", [state, mass, centre], [improved_equilibrium(state, pontoons, given, stiffness)])
+    improve = ca.Function(
+        "otter_equilibrium",
+        [state, mass, centre],
+        [improved_equilibrium(state, pontoons, given, stiffness)],
+    )
     result = ca.SX.zeros(3)
     for _ in range(_EQUILIBRIUM_STEPS):
         result = call_in_c(improve, result, ballast.mass, ballast.centre_of_mass)[0]
@@ -81,12 +108,17 @@ def _equilibrium(ballast: Ballast) -> ca.SX:
 def _centre_of_buoyancy(equilibrium: ca.SX, draughts: ca.SX, mean_draught: ca.SX) -> ca.SX:
     """Return the centre of the displaced water at rest from O (m, level axes), shape (3,)."""
     pontoons = resting_pontoons(draughts, mean_draught)
-    under_water = immersion(pontoons, upward_axis(equilibrium), equilibrium[0], ca.SX.zeros(STRIP_COUNT))
+    under_water = immersion(
+        pontoons, upward_axis(equilibrium), equilibrium[0], ca.SX.zeros(STRIP_COUNT)
+    )
     return attitude_at(equilibrium) @ (under_water.moment / under_water.volume)
 
 
 def frame(to_level: ca.SX, orientation: ca.SX) -> Frame:
-    """Return the rotations: velocities are expressed in axes fixed in the hull that are level when it is at rest."""
+    """Return the rotations.
+
+    Velocities are expressed in axes fixed in the hull that are level when it is at rest.
+    """
     attitude = kinematics.rotation_matrix(orientation)
     to_world = attitude @ to_level.T
     return Frame(attitude, to_world, to_level.T, to_world.T)
@@ -114,22 +146,40 @@ def hull(constants: NamedValues) -> Hull:
 
 
 def water_loads(constants: NamedValues, now: LoadArguments) -> ca.SX:
-    """Return the load tau (6) of weight and water; that of the moving water shrinks as the pontoons leave it."""
-    pontoons, up = resting_pontoons(constants["station_draughts"], constants["mean_draught"]), now.frame.attitude[2, :].T
+    """Return the load tau (6) of weight and water.
+
+    That of the moving water shrinks as the pontoons leave it.
+    """
+    pontoons, up = (
+        resting_pontoons(constants["station_draughts"], constants["mean_draught"]),
+        now.frame.attitude[2, :].T,
+    )
     under_water = immersion(pontoons, up, now.height, now.water.elevations)
     ballast = Ballast(constants["mass"], constants["centre_of_mass"], ca.SX(p.WATER_DENSITY))
     static = weight_and_buoyancy(under_water, up, ballast)
     to_level = constants["to_level"]
-    moving = damping(constants, now) + now.froude_krylov_load(constants["mass"], constants["centre_of_buoyancy"], STRIPS)
+    moving = damping(constants, now) + now.froude_krylov_load(
+        constants["mass"], constants["centre_of_buoyancy"], STRIPS
+    )
     return ca.vertcat(to_level @ static[0:3], to_level @ static[3:6]) + under_water.wetness * moving
 
 
 VESSEL = vessel_equations.VesselModel(
-    "otter", "Maritime Robotics Otter with a landing deck, afloat", VARIABLES, derive_constants, hull, PROPELLER_STATES
+    "otter",
+    "Maritime Robotics Otter with a landing deck, afloat",
+    VARIABLES,
+    derive_constants,
+    hull,
+    PROPELLER_STATES,
 )
 
 
 def block() -> Block:
     """Return the Otter for export."""
     model = otter_model(VESSEL)
-    return as_block(model, floating_maps.FloatingContactMaps(model, VESSEL, floating_maps.constant_body(BODY)).functions())
+    return as_block(
+        model,
+        floating_maps.FloatingContactMaps(
+            model, VESSEL, floating_maps.constant_body(BODY)
+        ).functions(),
+    )

@@ -35,7 +35,9 @@ PAYLOAD_PARAMETERS = (
     parameter("payload_position.y", "m", 0.0, "payload to port of the centre line", -0.5, 0.5),
     parameter("payload_position.z", "m", 0.35, "payload above the waterline", -0.2, 1.0),
 )
-PROPELLER_TIME_CONSTANT = parameter("propeller_time_constant", "s", 0.1, "time constant of the propeller speeds; 0: no lag", 0.0)
+PROPELLER_TIME_CONSTANT = parameter(
+    "propeller_time_constant", "s", 0.1, "time constant of the propeller speeds; 0: no lag", 0.0
+)
 
 PARAMETERS = (
     *initial_variables("xy", "uvw", "pqr"),

@@ -1,4 +1,7 @@
-"""Mass, damping, propellers and wind of the Otter, which both of its models have; README.md has the loads."""
+"""Mass, damping, propellers and wind of the Otter, which both of its models have.
+
+README.md has the loads.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +37,11 @@ class MassProperties:
 
 def mass_properties(parameters: NamedValues) -> MassProperties:
     """Return the mass of the hull with the payload of these parameters."""
-    payload, position, hull_centre = parameters["payload_mass"], parameters["payload_position"], ca.SX(p.HULL_CENTRE)
+    payload, position, hull_centre = (
+        parameters["payload_mass"],
+        parameters["payload_position"],
+        ca.SX(p.HULL_CENTRE),
+    )
     mass = p.HULL_MASS + payload
     centre = (p.HULL_MASS * hull_centre + payload * position) / mass
     inertia = p.HULL_MASS * ca.diag(ca.SX(p.RADII_OF_GYRATION) ** 2)
@@ -91,7 +98,12 @@ def propulsion(constants: NamedValues, now: LoadArguments) -> ca.SX:
 
 def wind(now: LoadArguments) -> ca.SX:
     """Return the load tau of the wind relative to still air, whose drag is part of the surge damping."""
-    coefficients = ca.SX([p.AIR_DENSITY / 2 * a * c for a, c in zip(p.PROJECTED_AREAS, p.WIND_COEFFICIENTS, strict=True)])
+    coefficients = ca.SX(
+        [
+            p.AIR_DENSITY / 2 * a * c
+            for a, c in zip(p.PROJECTED_AREAS, p.WIND_COEFFICIENTS, strict=True)
+        ]
+    )
     still, air = now.velocity[0:2], now.air_relative_velocity[0:2]
     force = coefficients * (ca.fabs(still) * still - ca.fabs(air) * air)
     return load_of_force_at(ca.SX([0, 0, p.WIND_HEIGHT]), ca.vertcat(force, 0))
@@ -107,14 +119,25 @@ class OtterModel(ContinuousModel):
 
     vessel: VesselModel
 
-    def integrate(self, state: ca.SX, inputs: ca.SX, parameters: ca.SX, step: ca.SX, sub_steps: int = 1) -> ca.SX:
-        """Return the state after `step` (s): one Runge-Kutta step of the vessel and one Euler step of the shafts."""
+    def integrate(
+        self, state: ca.SX, inputs: ca.SX, parameters: ca.SX, step: ca.SX, sub_steps: int = 1
+    ) -> ca.SX:
+        """Return the state after `step` (s).
+
+        One Runge-Kutta step of the vessel and one Euler step of the shafts.
+        """
         del sub_steps  # always one, as in MSS
         end = super().integrate(state, inputs, parameters, step)
         first = len(VESSEL_STATES)
-        lag, shafts = self.vessel.constants.by_name(parameters)["propeller_time_constant"], end[first:]
+        lag, shafts = (
+            self.vessel.constants.by_name(parameters)["propeller_time_constant"],
+            end[first:],
+        )
         commands = values_by_name(inputs, variables_of(VARIABLES, "input"))["propeller_speed"]
-        return ca.vertcat(end[:first], shafts + ca.fmin(1, ca.if_else(lag > 0, step / lag, 1)) * (commands - shafts))
+        return ca.vertcat(
+            end[:first],
+            shafts + ca.fmin(1, ca.if_else(lag > 0, step / lag, 1)) * (commands - shafts),
+        )
 
 
 def otter_model(vessel: VesselModel) -> ContinuousModel:

@@ -9,7 +9,9 @@ from ..vessel.strips import STATION_COUNT, Box, TwinHull, equivalent_strips
 from . import parameters as p
 
 STRIPS = equivalent_strips(
-    ca.SX(p.CENTRE_OF_FLOTATION), (ca.SX(p.TRANSVERSE_MOMENT), ca.SX(p.LONGITUDINAL_MOMENT)), ca.SX(p.WATERPLANE_AREA)
+    ca.SX(p.CENTRE_OF_FLOTATION),
+    (ca.SX(p.TRANSVERSE_MOMENT), ca.SX(p.LONGITUDINAL_MOMENT)),
+    ca.SX(p.WATERPLANE_AREA),
 )
 
 #: smallest draught at rest of a station (m), for payloads that lift it out of the water
@@ -30,13 +32,27 @@ def resting_pontoons(draughts: ca.SX, mean_draught: ca.SX) -> TwinHull:
     weights = STATION_COUNT / ca.sum1(positive) * positive
     boxes = [
         Box(ca.SX(depth), ca.SX(p.PONTOON_TOP - depth / 2), draught, depth / _MEAN_DEPTH, weight)
-        for depth, draught, weight in zip(_DEPTHS, ca.vertsplit(positive), ca.vertsplit(weights), strict=True)
+        for depth, draught, weight in zip(
+            _DEPTHS, ca.vertsplit(positive), ca.vertsplit(weights), strict=True
+        )
     ]
-    return TwinHull(STRIPS, ca.SX(p.PONTOON_BEAM), mean_draught, ca.SX(_MEAN_DEPTH), ca.SX(p.WATERPLANE_AREA), boxes)
+    return TwinHull(
+        STRIPS,
+        ca.SX(p.PONTOON_BEAM),
+        mean_draught,
+        ca.SX(_MEAN_DEPTH),
+        ca.SX(p.WATERPLANE_AREA),
+        boxes,
+    )
 
 
 def station_draughts(equilibrium: ca.SX) -> ca.SX:
     """Return the draughts of the stations (m) for height of O (m), roll and pitch (rad) at rest."""
     up = upward_axis(equilibrium)
     bottoms = zip(STRIPS.stations, p.STATION_DRAUGHTS, strict=True)
-    return ca.vertcat(*(up[2] * draught - equilibrium[0] - up[0] * (STRIPS.centre[0] + x) for x, draught in bottoms))
+    return ca.vertcat(
+        *(
+            up[2] * draught - equilibrium[0] - up[0] * (STRIPS.centre[0] + x)
+            for x, draught in bottoms
+        )
+    )

@@ -1,4 +1,7 @@
-"""Equations of motion of the Otter exactly as in MSS; README.md has the loads, `vehicles/README.md` the rest."""
+"""Equations of motion of the Otter exactly as in MSS.
+
+README.md has the loads, `vehicles/README.md` the rest.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +17,16 @@ from ..common.named_values import NamedValues, initial_parameters
 from ..otter import parameters as p
 from ..otter.geometry import BODY
 from ..otter.interface import PROPELLER_STATES, VARIABLES
-from ..otter.loads import added_mass, cross_flow_drag, damping, linear_damping, mass_properties, otter_model, propulsion, wind
+from ..otter.loads import (
+    added_mass,
+    cross_flow_drag,
+    damping,
+    linear_damping,
+    mass_properties,
+    otter_model,
+    propulsion,
+    wind,
+)
 from ..vessel import floating_maps, vessel_equations
 from ..vessel import hull as vessel
 from ..vessel.hull import Frame, Hull, LoadArguments, load_of_force_at, transformation_matrix
@@ -23,7 +35,9 @@ from . import hydrostatics
 
 _CENTRE_OF_FLOTATION = ca.SX(p.CENTRE_OF_FLOTATION)
 _STRIPS = equivalent_strips(
-    _CENTRE_OF_FLOTATION, (ca.SX(p.TRANSVERSE_MOMENT), ca.SX(p.MSS_LONGITUDINAL_MOMENT)), ca.SX(p.WATERPLANE_AREA)
+    _CENTRE_OF_FLOTATION,
+    (ca.SX(p.TRANSVERSE_MOMENT), ca.SX(p.MSS_LONGITUDINAL_MOMENT)),
+    ca.SX(p.WATERPLANE_AREA),
 )
 
 
@@ -71,7 +85,10 @@ def _equilibrium(constants: Mapping[str, ca.SX]) -> ca.SX:
 
 
 def frame(constants: NamedValues, orientation: ca.SX) -> Frame:
-    """Return the rotations: as in MSS, velocities are expressed in the frame with the Euler angles of the hull minus the trim.
+    """Return the rotations.
+
+    As in MSS, velocities are expressed in the frame with the Euler angles of the hull minus the
+    trim.
 
     The current is rotated by the yaw angle only, as in MSS.
     """
@@ -81,7 +98,9 @@ def frame(constants: NamedValues, orientation: ca.SX) -> Frame:
     level = roll - roll_at_rest, pitch - pitch_at_rest
     to_world = kinematics.rotation_matrix(kinematics.quaternion_from_euler(*level, yaw))
     spin = kinematics.euler_to_body_rates(roll, pitch) @ kinematics.body_to_euler_rates(*level)
-    return Frame(attitude, to_world, spin, kinematics.rotation_matrix(kinematics.quaternion_about_z(yaw)).T)
+    return Frame(
+        attitude, to_world, spin, kinematics.rotation_matrix(kinematics.quaternion_about_z(yaw)).T
+    )
 
 
 def hull(constants: NamedValues) -> Hull:
@@ -112,7 +131,13 @@ def hull(constants: NamedValues) -> Hull:
 
 def _twin_hull(draught: ca.SX) -> TwinHull:
     """Return the pontoons for a mean draught (m)."""
-    return TwinHull(_STRIPS, ca.SX(p.PONTOON_BEAM), draught, ca.SX(p.PONTOON_TOP - p.PONTOON_BOTTOM), ca.SX(p.WATERPLANE_AREA))
+    return TwinHull(
+        _STRIPS,
+        ca.SX(p.PONTOON_BEAM),
+        draught,
+        ca.SX(p.PONTOON_TOP - p.PONTOON_BOTTOM),
+        ca.SX(p.WATERPLANE_AREA),
+    )
 
 
 def restoring(constants: NamedValues, now: LoadArguments) -> ca.SX:
@@ -126,11 +151,21 @@ def restoring(constants: NamedValues, now: LoadArguments) -> ca.SX:
 
 
 VESSEL = vessel_equations.VesselModel(
-    "otter_mss", "Maritime Robotics Otter of MSS with linear restoring", VARIABLES, derive_constants, hull, PROPELLER_STATES
+    "otter_mss",
+    "Maritime Robotics Otter of MSS with linear restoring",
+    VARIABLES,
+    derive_constants,
+    hull,
+    PROPELLER_STATES,
 )
 
 
 def block() -> Block:
     """Return the Otter of MSS for export."""
     model = otter_model(VESSEL)
-    return as_block(model, floating_maps.FloatingContactMaps(model, VESSEL, floating_maps.constant_body(BODY)).functions())
+    return as_block(
+        model,
+        floating_maps.FloatingContactMaps(
+            model, VESSEL, floating_maps.constant_body(BODY)
+        ).functions(),
+    )

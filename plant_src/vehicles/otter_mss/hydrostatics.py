@@ -16,8 +16,10 @@ class Hydrostatics:
 
     Attributes:
         draught: Draught (m).
-        stiffness: Restoring stiffness of heave (N/m), roll and pitch (N m/rad) at the centre of flotation, shape (3,).
-        compliance: Heave (m), roll and pitch (rad) over heave force (N), roll and pitch moment (N m) at O, shape (3, 3).
+        stiffness: Restoring stiffness of heave (N/m), roll and pitch (N m/rad) at the centre of
+            flotation, shape (3,).
+        compliance: Heave (m), roll and pitch (rad) over heave force (N), roll and pitch moment (N
+            m) at O, shape (3, 3).
         mean_draught: Volume over waterplane (m).
     """
 

@@ -1,1 +1,4 @@
-"""Modules of planar vessels that are given by data: vessel, interface, equations, reader of vehicle files."""
+"""Modules of planar vessels that are given by data.
+
+Vessel, interface, equations, reader of vehicle files.
+"""

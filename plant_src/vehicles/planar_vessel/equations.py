@@ -1,4 +1,7 @@
-"""Equations of all planar vessels that are given by data: one binary, whose values are all parameters."""
+"""Equations of all planar vessels that are given by data.
+
+One binary, whose values are all parameters.
+"""
 
 from __future__ import annotations
 

@@ -21,15 +21,25 @@ from ..vessel.boat import boat_parameters, matrix_parameter
 from .planar_vessel import PlanarVessel
 
 _INITIAL_PARAMETERS = initial_variables("xy", "uv", "r")
-_RIGID_BODY_STATES = ("position.x", "position.y", "attitude.yaw", "velocity_body.u", "velocity_body.v", "rates.r")
+_RIGID_BODY_STATES = (
+    "position.x",
+    "position.y",
+    "attitude.yaw",
+    "velocity_body.u",
+    "velocity_body.v",
+    "rates.r",
+)
 
 
 def variables(vessel: PlanarVessel, slots: tuple[int, int] | None = None) -> tuple[Variable, ...]:
-    """Return parameters, inputs and outputs; parameters other than `initial.*` start at the values of the vessel.
+    """Return parameters, inputs and outputs.
+
+    Parameters other than `initial.*` start at the values of the vessel.
 
     Args:
         vessel: Data of the vessel.
-        slots: Numbers of elements of the arrays of propellers and rudders. None means the numbers of the vessel.
+        slots: Numbers of elements of the arrays of propellers and rudders. None means the numbers
+            of the vessel.
     """
     slots = slots or vessel.slots
     return (
@@ -57,18 +67,33 @@ def variables(vessel: PlanarVessel, slots: tuple[int, int] | None = None) -> tup
 
 
 def _damping_parameters(vessel: PlanarVessel) -> Iterator[Variable]:
-    for letter, matrix, value in zip("uvr", vessel.quadratic_damping, vessel.cubic_damping, strict=True):
-        yield matrix_parameter(f"quadratic_damping.{letter}", f"load over |{letter}| times velocity, for u, v, r", matrix)
-        yield parameter(f"cubic_damping.{letter}", "1", value, f"load over {letter} cubed, SI units", 0.0)
+    for letter, matrix, value in zip(
+        "uvr", vessel.quadratic_damping, vessel.cubic_damping, strict=True
+    ):
+        yield matrix_parameter(
+            f"quadratic_damping.{letter}",
+            f"load over |{letter}| times velocity, for u, v, r",
+            matrix,
+        )
+        yield parameter(
+            f"cubic_damping.{letter}", "1", value, f"load over {letter} cubed, SI units", 0.0
+        )
 
 
 def states(propeller_slots: int) -> tuple[str, ...]:
     """Return the names of the states: those of a planar body, then the propeller speeds."""
-    return (*_RIGID_BODY_STATES, *(f"propeller_speed[{number}]" for number in range(1, propeller_slots + 1)))
+    return (
+        *_RIGID_BODY_STATES,
+        *(f"propeller_speed[{number}]" for number in range(1, propeller_slots + 1)),
+    )
 
 
 def constant_count(slots: tuple[int, int]) -> int:
     """Return the number of constants that the equations derive from the parameters (`planar_equations.derive_constants`)."""
     boat = 3 + 1 + 3 * 9 + 2 + 3 + 3
-    rudders = slots[0] * slots[1] - slots[1] if slots[1] else 0  # the matrix of the races replaces `rudder_propeller`
-    return len(_INITIAL_PARAMETERS) + 2 + boat + 3 * 10 + 1 + parameter_count(slots) + rudders + 9 + 9
+    rudders = (
+        slots[0] * slots[1] - slots[1] if slots[1] else 0
+    )  # the matrix of the races replaces `rudder_propeller`
+    return (
+        len(_INITIAL_PARAMETERS) + 2 + boat + 3 * 10 + 1 + parameter_count(slots) + rudders + 9 + 9
+    )

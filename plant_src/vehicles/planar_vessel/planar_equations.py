@@ -1,11 +1,12 @@
 """Equations of motion of a vessel in the horizontal plane that is given by data.
 
-State: position of the centre of mass (m, world frame), yaw angle, surge and sway velocity of the centre of mass, yaw rate, and
-propeller speeds. With nu = (u, v, r) of the origin O, the current nu_c in body axes and nu_r = nu - nu_c (Fossen 2021, Handbook
-of Marine Craft Hydrodynamics and Motion Control, 2nd edition, chapters 3 and 6, in the axes forward-left-up):
+State: position of the centre of mass (m, world frame), yaw angle, surge and sway velocity of the
+centre of mass, yaw rate, and propeller speeds. With nu = (u, v, r) of the origin O, the current
+nu_c in body axes and nu_r = nu - nu_c (Fossen 2021, Handbook of Marine Craft Hydrodynamics and
+Motion Control, 2nd edition, chapters 3 and 6, in the axes forward-left-up):
 
-    (M_RB + M_A) (nu' - nu_c') = tau - C_RB nu_r - C_A(nu_r) nu_r - D nu_r - (|u_r| D_u + |v_r| D_v + |r| D_r) nu_r - d nu_r^3
-    nu_c' = (r v_c, -r u_c, 0)
+    (M_RB + M_A) (nu' - nu_c') = tau - C_RB nu_r - C_A(nu_r) nu_r - D nu_r - (|u_r| D_u + |v_r| D_v
+    + |r| D_r) nu_r - d nu_r^3 nu_c' = (r v_c, -r u_c, 0)
 
 tau are the loads of propellers, rudders and air, and the external load at the centre of mass.
 """
@@ -44,7 +45,9 @@ class PlanarEquations:
         description: Description of the FMU.
     """
 
-    def __init__(self, vessel: PlanarVessel, slots: tuple[int, int], identifier: str, description: str):
+    def __init__(
+        self, vessel: PlanarVessel, slots: tuple[int, int], identifier: str, description: str
+    ):
         self.variables: tuple[Variable, ...] = variables(vessel, slots)
         self.slots, self.identifier, self.description = slots, identifier, description
 
@@ -63,9 +66,13 @@ class PlanarEquations:
             states(self.slots[0]),
             lambda constants: initial_state(self.constants.by_name(constants), self.slots[0]),
             lambda state, inputs, constants: rate(
-                state, values_by_name(inputs, variables_of(self.variables, "input")), self.constants.by_name(constants)
+                state,
+                values_by_name(inputs, variables_of(self.variables, "input")),
+                self.constants.by_name(constants),
             ),
-            lambda state, _inputs, constants: ca.vertcat(self.observe(state, constants), ca.SX.zeros(len(WORLD_OUTPUTS))),
+            lambda state, _inputs, constants: ca.vertcat(
+                self.observe(state, constants), ca.SX.zeros(len(WORLD_OUTPUTS))
+            ),
             derived_parameters=self.constants.vector,
             callees=(propulsion.PROPELLER_SUM, *([propulsion.RUDDER_SUM] if self.slots[1] else [])),
         )
@@ -79,7 +86,9 @@ class PlanarEquations:
 
         def body(constants: ca.SX) -> planar_maps.PlanarBody:
             known = self.constants.by_name(constants)
-            return planar_maps.PlanarBody(known["mass"], known["yaw_inertia"], known["height"] + known["centre_of_mass"][2])
+            return planar_maps.PlanarBody(
+                known["mass"], known["yaw_inertia"], known["height"] + known["centre_of_mass"][2]
+            )
 
         model = with_called_rate(self.model)
         return as_block(model, planar_maps.PlanarContactMaps(model, body, self.observe).functions())
@@ -119,12 +128,16 @@ def rate(state: ca.SX, inputs: NamedValues, constants: NamedValues) -> ca.SX:
     load = water_loads(actuators, relative, inputs, constants) + air_load(air, constants)
     load += _load_at(constants["centre_of_mass"], to_body @ inputs["external_force"][0:2])
     load += ca.vertcat(0, 0, inputs["external_torque.z"])
-    load -= coriolis(constants["rigid_body_mass"], relative) + coriolis(_matrix(constants["coriolis_added_mass"]), relative)
+    load -= coriolis(constants["rigid_body_mass"], relative) + coriolis(
+        _matrix(constants["coriolis_added_mass"]), relative
+    )
     acceleration = constants["inverse_mass_matrix"] @ load + current_rate(current, r)
     yaw_acceleration = acceleration[2]
     centre = acceleration[0:2] + yaw_acceleration * ca.vertcat(-y, x)
     kinematic = ca.vertcat(to_body.T @ ca.vertcat(u, v), r)
-    return ca.vertcat(kinematic, centre, yaw_acceleration, propulsion.speed_rates(actuators, inputs, constants))
+    return ca.vertcat(
+        kinematic, centre, yaw_acceleration, propulsion.speed_rates(actuators, inputs, constants)
+    )
 
 
 def current_rate(current: ca.SX, r: ca.SX) -> ca.SX:
@@ -135,18 +148,26 @@ def current_rate(current: ca.SX, r: ca.SX) -> ca.SX:
 def coriolis(mass: ca.SX, nu: ca.SX) -> ca.SX:
     """Return C(nu) nu of a mass matrix (3, 3)."""
     momentum = mass @ nu
-    return ca.vertcat(-nu[2] * momentum[1], nu[2] * momentum[0], nu[0] * momentum[1] - nu[1] * momentum[0])
+    return ca.vertcat(
+        -nu[2] * momentum[1], nu[2] * momentum[0], nu[0] * momentum[1] - nu[1] * momentum[0]
+    )
 
 
-def water_loads(actuators: ca.SX, relative: ca.SX, inputs: NamedValues, constants: NamedValues) -> ca.SX:
+def water_loads(
+    actuators: ca.SX, relative: ca.SX, inputs: NamedValues, constants: NamedValues
+) -> ca.SX:
     """Return the load (X, Y, N) about O of water, propellers and rudders."""
     load = _matrix(constants["linear_damping"]) @ relative
     for k, letter in enumerate("uvr"):
-        load += ca.fabs(relative[k]) * (_matrix(constants[f"quadratic_damping.{letter}"]) @ relative)
+        load += ca.fabs(relative[k]) * (
+            _matrix(constants[f"quadratic_damping.{letter}"]) @ relative
+        )
     load += ca.vertcat(*(constants[f"cubic_damping.{letter}"] for letter in "uvr")) * relative**3
     speed = propulsion.speeds(actuators, inputs, constants)
     flow = ca.vertcat(relative[0:2], 0, 0, 0, relative[2])
-    driving = propulsion.propeller_loads(speed, flow, ca.SX(_FAR_BELOW), ca.SX.zeros(3), inputs, constants)
+    driving = propulsion.propeller_loads(
+        speed, flow, ca.SX(_FAR_BELOW), ca.SX.zeros(3), inputs, constants
+    )
     driving += propulsion.rudder_loads(speed, flow, inputs, constants)
     return ca.vertcat(driving[0:2], driving[5]) - load
 
@@ -162,7 +183,9 @@ def _load_at(point: ca.SX, force: ca.SX) -> ca.SX:
 
 def initial_state(constants: NamedValues, slots: int) -> ca.SX:
     """Return the state at the start; the propellers rest."""
-    initial = ca.vertcat(constants["initial.position"], constants["initial.yaw"], constants["initial.velocity_body"])
+    initial = ca.vertcat(
+        constants["initial.position"], constants["initial.yaw"], constants["initial.velocity_body"]
+    )
     return ca.vertcat(initial, constants["initial.rates"], ca.SX.zeros(slots))
 
 
@@ -179,7 +202,9 @@ def observe(state: ca.SX, constants: NamedValues) -> ca.SX:
     return ca.vertcat(kinematics.motion_outputs(position, orientation, velocity, rates), deck)
 
 
-def planar_vessel_block(vessel: PlanarVessel, description: str, slots: tuple[int, int] | None = None) -> Block:
+def planar_vessel_block(
+    vessel: PlanarVessel, description: str, slots: tuple[int, int] | None = None
+) -> Block:
     """Return a planar vessel for export.
 
     Args:

@@ -1,7 +1,8 @@
 """Equations of motion of the catamaran in the horizontal plane: surge, sway and yaw.
 
-They are eqs. 9, 12 and 13 of the paper (`parameters.py`); README.md has them in the project's notation. Loads (X, Y, N) are surge
-and sway force (N) and yaw moment (N m), body frame forward-left-up.
+They are eqs. 9, 12 and 13 of the paper (`parameters.py`); README.md has them in the project's
+notation. Loads (X, Y, N) are surge and sway force (N) and yaw moment (N m), body frame
+forward-left-up.
 """
 
 from __future__ import annotations
@@ -27,14 +28,24 @@ from .resistance import resistance
 
 
 def rate(state: ca.SX, inputs: NamedValues, constants: NamedValues) -> ca.SX:
-    """Return the time derivative of the state (x, y, yaw, u, v, r); u, v and r are surge, sway and yaw rate."""
+    """Return the time derivative of the state (x, y, yaw, u, v, r).
+
+    U, v and r are surge, sway and yaw rate.
+    """
     yaw, u, v, r = ca.vertsplit(state[2:6])
     external_force, wind, current = inputs["external_force"], inputs["wind"], inputs["current"]
     sin, cos = sine_and_cosine(yaw)
-    u_water, v_water = u - (cos * current[0] + sin * current[1]), v - (cos * current[1] - sin * current[0])
+    u_water, v_water = (
+        u - (cos * current[0] + sin * current[1]),
+        v - (cos * current[1] - sin * current[0]),
+    )
     u_air, v_air = u - (cos * wind[0] + sin * wind[1]), v - (cos * wind[1] - sin * wind[0])
     race = race_velocity_squared(inputs["thrust"], constants["race_factor"])
-    loads = hull_loads(v_water, r) + air_drag(u_air, v_air) + rudder_loads(u_water, v_water, r, race, inputs["rudder_angle"])
+    loads = (
+        hull_loads(v_water, r)
+        + air_drag(u_air, v_air)
+        + rudder_loads(u_water, v_water, r, race, inputs["rudder_angle"])
+    )
     loads[0] += constants["resistance"] * resistance(u_water)
     surge_force = loads[0] + inputs["thrust"] + cos * external_force[0] + sin * external_force[1]
     side_force = loads[1] - sin * external_force[0] + cos * external_force[1]
@@ -56,7 +67,10 @@ def air_drag(u: ca.SX, v: ca.SX) -> ca.SX:
 
 def hull_constants(parameters: NamedValues) -> dict[str, ca.SX]:
     """Return the constants of resistance and propeller race."""
-    return {"resistance": parameters["resistance"], "race_factor": race_factor(parameters["propeller_diameter"])}
+    return {
+        "resistance": parameters["resistance"],
+        "race_factor": race_factor(parameters["propeller_diameter"]),
+    }
 
 
 def race_factor(diameter: ca.SX) -> ca.SX:
@@ -78,7 +92,9 @@ def race_velocity_squared(thrust: ca.SX, factor: ca.SX) -> ca.SX:
 
 
 def rudder_loads(u: ca.SX, v: ca.SX, r: ca.SX, race: ca.SX, rudder_angle: ca.SX) -> ca.SX:
-    """Return (X, Y, N) of the rudder; the lift is a sine of the angle of attack up to the stall angle.
+    """Return (X, Y, N) of the rudder.
+
+    The lift is a sine of the angle of attack up to the stall angle.
 
     Args:
         u: Surge velocity relative to the water (m/s); the lift changes its sign when going astern.
@@ -89,12 +105,17 @@ def rudder_loads(u: ca.SX, v: ca.SX, r: ca.SX, race: ca.SX, rudder_angle: ca.SX)
     """
     turn = ca.sin(rudder_angle), ca.cos(rudder_angle)
     pressure_area = ca.SX(p.WATER_DENSITY / 2 * p.RUDDER_MAX_LIFT_COEFFICIENT * p.RUDDER_AREA)
-    ahead, abeam = rudder_force(u, v - p.RUDDER_ARM * r, race, rudder_angle, turn, pressure_area, ca.SX(p.STALL_ANGLE))
+    ahead, abeam = rudder_force(
+        u, v - p.RUDDER_ARM * r, race, rudder_angle, turn, pressure_area, ca.SX(p.STALL_ANGLE)
+    )
     return ca.vertcat(ahead, abeam, -p.RUDDER_ARM * abeam)
 
 
 def initial_state(constants: ca.SX) -> ca.SX:
-    """Return the state: the first constants are position, yaw angle, velocity and yaw rate in the order of the state."""
+    """Return the state.
+
+    The first constants are position, yaw angle, velocity and yaw rate in the order of the state.
+    """
     return constants[: len(STATES)]
 
 
@@ -111,7 +132,9 @@ def observe(state: ca.SX) -> ca.SX:
 
 
 #: map from the parameters to the constants of the equations
-CONSTANTS = ConstantsMap(VARIABLES, lambda parameters: {**initial_parameters(parameters), **hull_constants(parameters)})
+CONSTANTS = ConstantsMap(
+    VARIABLES, lambda parameters: {**initial_parameters(parameters), **hull_constants(parameters)}
+)
 
 
 def model() -> ContinuousModel:
@@ -122,8 +145,12 @@ def model() -> ContinuousModel:
         VARIABLES,
         STATES,
         initial_state,
-        lambda state, inputs, constants: rate(state, values_by_name(inputs, INPUTS), CONSTANTS.by_name(constants)),
-        lambda state, _inputs, _constants: ca.vertcat(observe(state), ca.SX.zeros(len(WORLD_OUTPUTS))),
+        lambda state, inputs, constants: rate(
+            state, values_by_name(inputs, INPUTS), CONSTANTS.by_name(constants)
+        ),
+        lambda state, _inputs, _constants: ca.vertcat(
+            observe(state), ca.SX.zeros(len(WORLD_OUTPUTS))
+        ),
         derived_parameters=CONSTANTS.vector,
     )
 
@@ -131,6 +158,10 @@ def model() -> ContinuousModel:
 def block() -> Block:
     """Return the catamaran for export."""
     equations = model()
-    body = planar_maps.PlanarBody(ca.SX(p.MASS), ca.SX(p.INERTIA[2]), ca.SX(p.CENTRE_OF_MASS_HEIGHT))
-    maps = planar_maps.PlanarContactMaps(equations, lambda _constants: body, lambda state, _constants: observe(state))
+    body = planar_maps.PlanarBody(
+        ca.SX(p.MASS), ca.SX(p.INERTIA[2]), ca.SX(p.CENTRE_OF_MASS_HEIGHT)
+    )
+    maps = planar_maps.PlanarContactMaps(
+        equations, lambda _constants: body, lambda state, _constants: observe(state)
+    )
     return as_block(equations, maps.functions())

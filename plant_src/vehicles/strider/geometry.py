@@ -37,7 +37,14 @@ def _plate_box() -> Box:
 
 def _housing_box() -> Box:
     x, y, z = HOUSING_SIZE
-    return Box((x / 2, y / 2, z / 2), (DECK_CENTRE[0], DECK_CENTRE[1], DECK_TOP - PLATE_THICKNESS - z / 2))
+    return Box(
+        (x / 2, y / 2, z / 2), (DECK_CENTRE[0], DECK_CENTRE[1], DECK_TOP - PLATE_THICKNESS - z / 2)
+    )
 
 
-BODY = Body(MASS, INERTIA, (_plate_box(), _hull_box(+1.0), _hull_box(-1.0), _housing_box()), CENTRE_OF_MASS_HEIGHT)
+BODY = Body(
+    MASS,
+    INERTIA,
+    (_plate_box(), _hull_box(+1.0), _hull_box(-1.0), _housing_box()),
+    CENTRE_OF_MASS_HEIGHT,
+)

@@ -2,8 +2,9 @@
 
 Body frame: x forward, y left, z up, origin at the centre of mass.
 
-Sources: [model] the simulation model published with the paper "An Open Simulation Strategy for Rapid Control Design in Aerial
-and Maritime Drone Teams" (github.com/OmarVelascoAnrar/UAV_USV_Simulator, commit 1eee757); [paper] its Table 2.
+Sources: [model] the simulation model published with the paper "An Open Simulation Strategy for
+Rapid Control Design in Aerial and Maritime Drone Teams"
+(github.com/OmarVelascoAnrar/UAV_USV_Simulator, commit 1eee757); [paper] its Table 2.
 """
 
 from __future__ import annotations
@@ -19,7 +20,8 @@ INERTIA = (0.4957, 0.2478, 0.6391)
 #: height of the centre of mass above the water [model] (m)
 CENTRE_OF_MASS_HEIGHT = 0.1245
 
-#: change of velocity by a collision that counts as a crash [assumed]: twice the 0.3 m/s of a fast berthing (m/s)
+#: change of velocity by a collision that counts as a crash [assumed]: twice the 0.3 m/s of a fast
+#: berthing (m/s)
 CRASH_SPEED = 0.6
 
 HULL_COUNT = 2
@@ -28,7 +30,8 @@ HULL_COUNT = 2
 HULL_LENGTH, HULL_BEAM, HULL_OFFSET = 0.979, 0.126, 0.533
 HULL_BOTTOM, HULL_TOP = -0.144, -0.109
 
-#: hydrodynamic derivatives of sway force Y and yaw moment N of one hull at about 1 m/s [model, paper]
+#: hydrodynamic derivatives of sway force Y and yaw moment N of one hull at about 1 m/s [model,
+#: paper]
 Y_V = -3.899501881  # kg/s
 Y_R = 1.774273356  # kg m/s
 N_V = -1.774273356  # kg m/s
@@ -57,9 +60,9 @@ WETTED_SURFACE = HULL_COUNT * HULL_LENGTH * (WATERPLANE_COEFFICIENT * HULL_BEAM 
 #: Reynolds number below which the friction coefficient is constant; here the hull moves at 0.01 m/s
 MIN_REYNOLDS_NUMBER = 1e4
 
-#: maximum of the residuary coefficient and its Froude number [estimated]: Michell's integral for one wall-sided hull of these
-#: dimensions with waterlines 1 - |2 x / L|^6, within 12 % for Froude numbers of 0.4 to 1.2. Below them the theory of thin ships
-#: exaggerates the waves of blunt ends.
+#: maximum of the residuary coefficient and its Froude number [estimated]: Michell's integral for
+#: one wall-sided hull of these dimensions with waterlines 1 - |2 x / L|^6, within 12 % for Froude
+#: numbers of 0.4 to 1.2. Below them the theory of thin ships exaggerates the waves of blunt ends.
 RESIDUARY_PEAK, RESIDUARY_PEAK_FROUDE_NUMBER = 4.6e-3, 0.4
 RUDDER_AREA = 0.0064  # m2 [paper]
 

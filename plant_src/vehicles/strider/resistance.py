@@ -1,7 +1,7 @@
 """Resistance of the catamaran's hulls to motion ahead and astern through the water.
 
-The friction is that of the ITTC-57 line on the wetted surface (ITTC 1957, 8th conference, Madrid). The residuary part is a smooth
-curve over the Froude number (`parameters.py`).
+The friction is that of the ITTC-57 line on the wetted surface (ITTC 1957, 8th conference, Madrid).
+The residuary part is a smooth curve over the Froude number (`parameters.py`).
 """
 
 from __future__ import annotations
@@ -29,6 +29,9 @@ def friction_coefficient(u: ca.SX) -> ca.SX:
 
 
 def residuary_coefficient(square: ca.SX) -> ca.SX:
-    """Return the residuary coefficient for a squared speed (m2/s2): it rises with Fn^2 to its maximum and falls with Fn^-2."""
+    """Return the residuary coefficient for a squared speed (m2/s2).
+
+    It rises with Fn^2 to its maximum and falls with Fn^-2.
+    """
     share = square * (1 / (p.GRAVITY * p.HULL_LENGTH * p.RESIDUARY_PEAK_FROUDE_NUMBER**2))
     return p.RESIDUARY_PEAK * 2 * share / (1 + share * share)

@@ -1,4 +1,7 @@
-"""Equations of motion of the catamaran in six degrees of freedom; README.md has the loads, `vehicles/README.md` the rest."""
+"""Equations of motion of the catamaran in six degrees of freedom.
+
+README.md has the loads, `vehicles/README.md` the rest.
+"""
 
 from __future__ import annotations
 
@@ -9,9 +12,22 @@ from cosim.export.equations.fmu_code import as_block
 from cosim.export.fmu.block import Block
 
 from ..common.named_values import NamedValues, initial_parameters
-from ..strider.equations import air_drag, hull_constants, hull_loads, race_velocity_squared, rudder_loads
+from ..strider.equations import (
+    air_drag,
+    hull_constants,
+    hull_loads,
+    race_velocity_squared,
+    rudder_loads,
+)
 from ..strider.geometry import DECK_CENTRE
-from ..strider.parameters import CENTRE_OF_MASS_HEIGHT, GRAVITY, HULL_BEAM, INERTIA, MASS, WATER_DENSITY
+from ..strider.parameters import (
+    CENTRE_OF_MASS_HEIGHT,
+    GRAVITY,
+    HULL_BEAM,
+    INERTIA,
+    MASS,
+    WATER_DENSITY,
+)
 from ..strider.resistance import resistance
 from ..vessel import floating_maps, vessel_equations
 from ..vessel.hull import Hull, LoadArguments, load_of_force_at
@@ -22,10 +38,16 @@ from .interface import VARIABLES
 
 _ORIGIN = ca.SX.zeros(3)  # of the body frame; the centre of mass
 _STRIPS = equivalent_strips(
-    ca.SX([0, 0, -CENTRE_OF_MASS_HEIGHT]), (ca.SX(p.TRANSVERSE_MOMENT), ca.SX(p.LONGITUDINAL_MOMENT)), ca.SX(p.WATERPLANE_AREA)
+    ca.SX([0, 0, -CENTRE_OF_MASS_HEIGHT]),
+    (ca.SX(p.TRANSVERSE_MOMENT), ca.SX(p.LONGITUDINAL_MOMENT)),
+    ca.SX(p.WATERPLANE_AREA),
 )
 _TWIN_HULL = TwinHull(
-    _STRIPS, beam=ca.SX(HULL_BEAM), draught=ca.SX(p.MEAN_DRAUGHT), depth=ca.SX(p.HULL_DEPTH), area=ca.SX(p.WATERPLANE_AREA)
+    _STRIPS,
+    beam=ca.SX(HULL_BEAM),
+    draught=ca.SX(p.MEAN_DRAUGHT),
+    depth=ca.SX(p.HULL_DEPTH),
+    area=ca.SX(p.WATERPLANE_AREA),
 )
 _CENTRE_OF_BUOYANCY = ca.SX([0, 0, -CENTRE_OF_MASS_HEIGHT - p.MEAN_DRAUGHT / 2])
 _WEIGHT_DENSITY = WATER_DENSITY * GRAVITY  # N/m3
@@ -68,7 +90,10 @@ def hull(constants: NamedValues) -> Hull:
 
 
 def water_loads(constants: NamedValues, now: LoadArguments) -> ca.SX:
-    """Return the load tau (6) of weight and water; that of the moving water shrinks as the hulls leave it."""
+    """Return the load tau (6) of weight and water.
+
+    That of the moving water shrinks as the hulls leave it.
+    """
     u, v, r = now.relative_velocity[0], now.relative_velocity[1], now.relative_velocity[5]
     up = now.frame.attitude[2, :].T
     under_water = immersion(_TWIN_HULL, up, now.height, now.water.elevations)
@@ -84,7 +109,10 @@ def water_loads(constants: NamedValues, now: LoadArguments) -> ca.SX:
 
 
 def buoyancy_and_weight(under_water: Immersion, up: ca.SX) -> ca.SX:
-    """Return the load tau (6) of buoyancy and weight for the vertical axis in the body frame; O is the centre of mass."""
+    """Return the load tau (6) of buoyancy and weight for the vertical axis in the body frame.
+
+    O is the centre of mass.
+    """
     force = _WEIGHT_DENSITY * under_water.volume - MASS * GRAVITY
     return ca.vertcat(force * up, ca.cross(_WEIGHT_DENSITY * under_water.moment, up))
 
@@ -95,13 +123,17 @@ def damping(now: LoadArguments) -> ca.SX:
     load = -ca.vertcat(0, 0, ca.SX(p.DAMPING) * ca.vertcat(w, roll_rate, pitch_rate), 0)
     for x, y in p.DRAG_POINTS:
         speed = w + y * roll_rate - x * pitch_rate
-        load += load_of_force_at(ca.SX([x, y, 0]), ca.vertcat(0, 0, -p.POINT_DRAG * ca.fabs(speed) * speed))
+        load += load_of_force_at(
+            ca.SX([x, y, 0]), ca.vertcat(0, 0, -p.POINT_DRAG * ca.fabs(speed) * speed)
+        )
     return load
 
 
 def wind_loads(now: LoadArguments) -> ca.SX:
     """Return the load tau of the air, which acts at the centre of mass."""
-    return load_from_planar(air_drag(now.air_relative_velocity[0], now.air_relative_velocity[1]), 0.0)
+    return load_from_planar(
+        air_drag(now.air_relative_velocity[0], now.air_relative_velocity[1]), 0.0
+    )
 
 
 def load_from_planar(load: ca.SX, height: float) -> ca.SX:
@@ -110,11 +142,20 @@ def load_from_planar(load: ca.SX, height: float) -> ca.SX:
 
 
 VESSEL = vessel_equations.VesselModel(
-    "strider_6dof", "Strider V1.0 catamaran afloat, in six degrees of freedom", VARIABLES, derive_constants, hull
+    "strider_6dof",
+    "Strider V1.0 catamaran afloat, in six degrees of freedom",
+    VARIABLES,
+    derive_constants,
+    hull,
 )
 
 
 def block() -> Block:
     """Return the catamaran for export."""
     model = VESSEL.create_continuous_model()
-    return as_block(model, floating_maps.FloatingContactMaps(model, VESSEL, floating_maps.constant_body(BODY)).functions())
+    return as_block(
+        model,
+        floating_maps.FloatingContactMaps(
+            model, VESSEL, floating_maps.constant_body(BODY)
+        ).functions(),
+    )

@@ -18,7 +18,12 @@ from ..common.interface import (
 from ..strider.interface import HULL_PARAMETERS, RUDDER_ANGLE, THRUST
 
 HYDRODYNAMICS_PARAMETER = parameter(
-    "hydrodynamics", "1", 1.0, "1: loads of water, air and weight act; 0: the vessel is a free rigid body", 0.0, 1.0
+    "hydrodynamics",
+    "1",
+    1.0,
+    "1: loads of water, air and weight act; 0: the vessel is a free rigid body",
+    0.0,
+    1.0,
 )
 
 PARAMETERS = (

@@ -1,6 +1,7 @@
 """Data of a submerged vehicle: a rigid body in water with thrusters.
 
-Body frame: x forward, y left, z up, origin at the centre of mass. SI units. Matrices (6, 6) belong to (u, v, w, p, q, r).
+Body frame: x forward, y left, z up, origin at the centre of mass. SI units. Matrices (6, 6) belong
+to (u, v, w, p, q, r).
 """
 
 from __future__ import annotations
@@ -32,8 +33,8 @@ class Thruster:
         axis: Unit vector of the thrust at a positive speed (body frame).
         thrust_coefficient: Thrust over squared speed at positive speeds (N s2/rad2).
         reverse_thrust_coefficient: The same at negative speeds.
-        torque_coefficient: Reaction torque on the body about the axis over squared speed (N m s2/rad2), with its sign at positive
-            speeds.
+        torque_coefficient: Reaction torque on the body about the axis over squared speed (N m
+            s2/rad2), with its sign at positive speeds.
     """
 
     label: str
@@ -54,10 +55,12 @@ class Craft:
         inertia: Inertia tensor about the centre of mass (kg m2, body frame), shape (3, 3).
         displaced_volume: Volume of water that the submerged vehicle displaces (m3).
         centre_of_buoyancy: Centre of this volume (m, body frame).
-        size: Edges of the box over which this volume is distributed (m); it matters at the surface only.
+        size: Edges of the box over which this volume is distributed (m); it matters at the surface
+            only.
         added_mass: Added mass about the centre of mass, shape (6, 6).
         linear_damping: Matrix D_l of the load -D_l nu_r, shape (6, 6).
-        quadratic_damping: Matrix D_q of the load -D_q (|nu_r| nu_r), products by elements, shape (6, 6).
+        quadratic_damping: Matrix D_q of the load -D_q (|nu_r| nu_r), products by elements, shape
+            (6, 6).
         thrusters: All thrusters, at most MAX_THRUSTERS.
         max_thruster_speed: Largest magnitude of the thruster speeds (rad/s).
         thruster_radius: Radius of the propellers (m).
@@ -67,7 +70,8 @@ class Craft:
         water_density: Density of the water (kg/m3).
 
     Raises:
-        InputError: For physically impossible values, all together; a problem's subject begins with the name of the attribute.
+        InputError: For physically impossible values, all together; a problem's subject begins with
+            the name of the attribute.
     """
 
     name: str
@@ -88,7 +92,11 @@ class Craft:
     water_density: float = 1025.0
 
     def __post_init__(self) -> None:
-        if problems := [*self._inertia_problems(), *self._matrix_problems(), *self._thruster_problems()]:
+        if problems := [
+            *self._inertia_problems(),
+            *self._matrix_problems(),
+            *self._thruster_problems(),
+        ]:
             raise InputError(problems)
 
     def _problem(self, text: str, *subject: str) -> Problem:
@@ -96,7 +104,9 @@ class Craft:
 
     def _inertia_problems(self) -> Iterator[Problem]:
         if not 0 < self.mass < math.inf:
-            yield self._problem(f"found {self.mass!r}, expected a finite number greater than 0", "mass")
+            yield self._problem(
+                f"found {self.mass!r}, expected a finite number greater than 0", "mass"
+            )
         yield from (self._problem(text, "inertia") for text in inertia_problems(self.inertia))
 
     def _matrix_problems(self) -> Iterator[Problem]:
@@ -105,15 +115,28 @@ class Craft:
             yield self._problem("expected a symmetric matrix", "added_mass")
         for name in ("added_mass", "linear_damping"):
             matrix = getattr(self, name)
-            if (lowest := float(np.linalg.eigvalsh((matrix + matrix.T) / 2)[0])) < -_SYMMETRY_TOLERANCE * np.abs(matrix).max():
-                yield self._problem(f"found the eigenvalue {lowest:g}, expected none below 0: energy is not generated", name)
+            if (
+                lowest := float(np.linalg.eigvalsh((matrix + matrix.T) / 2)[0])
+            ) < -_SYMMETRY_TOLERANCE * np.abs(matrix).max():
+                yield self._problem(
+                    (
+                        f"found the eigenvalue {lowest:g}, expected none below 0: energy is not "
+                        "generated"
+                    ),
+                    name,
+                )
         if (np.diag(self.quadratic_damping) < 0).any():
             diagonal = np.diag(self.quadratic_damping).tolist()
-            yield self._problem(f"found the diagonal {diagonal}, expected numbers of at least 0", "quadratic_damping")
+            yield self._problem(
+                f"found the diagonal {diagonal}, expected numbers of at least 0",
+                "quadratic_damping",
+            )
 
     def _thruster_problems(self) -> Iterator[Problem]:
         if not 1 <= len(self.thrusters) <= MAX_THRUSTERS:
-            yield self._problem(f"found {len(self.thrusters) or 'none'}, expected 1 to {MAX_THRUSTERS}", "thrusters")
+            yield self._problem(
+                f"found {len(self.thrusters) or 'none'}, expected 1 to {MAX_THRUSTERS}", "thrusters"
+            )
 
     def body(self, boxes: Boxes) -> Body:
         """Return the rigid body for Bullet, in the principal axes."""

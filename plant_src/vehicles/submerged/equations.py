@@ -1,4 +1,7 @@
-"""Equations of all submerged vehicles: one binary for up to MAX_THRUSTERS thrusters, whose values are all parameters."""
+"""Equations of all submerged vehicles.
+
+One binary for up to MAX_THRUSTERS thrusters, whose values are all parameters.
+"""
 
 from __future__ import annotations
 
@@ -9,7 +12,8 @@ from cosim.export.fmu.block import Block
 from .craft import MAX_THRUSTERS, Craft, Thruster
 from .submerged_equations import submerged_block
 
-#: neutrally buoyant vehicle of 10.25 kg with four horizontal thrusters at 45 degrees; the start values of the FMU
+#: neutrally buoyant vehicle of 10.25 kg with four horizontal thrusters at 45 degrees; the start
+#: values of the FMU
 CRAFT = Craft(
     name="submerged",
     mass=10.25,
@@ -22,7 +26,12 @@ CRAFT = Craft(
     quadratic_damping=np.diag([20.0, 40.0, 40.0, 1.0, 1.0, 1.0]),
     thrusters=tuple(
         Thruster(label, (0.15 * x, 0.1 * y, 0.0), (0.5**0.5, -x * y * 0.5**0.5, 0.0), 4e-4, 3e-4)
-        for label, x, y in (("front left", 1, 1), ("front right", 1, -1), ("rear left", -1, 1), ("rear right", -1, -1))
+        for label, x, y in (
+            ("front left", 1, 1),
+            ("front right", 1, -1),
+            ("rear left", -1, 1),
+            ("rear right", -1, -1),
+        )
     ),
     max_thruster_speed=300.0,
     thruster_radius=0.04,
@@ -31,4 +40,6 @@ CRAFT = Craft(
 
 def block() -> Block:
     """Return the submerged vehicle for export."""
-    return submerged_block(CRAFT, "Submerged vehicle with up to 16 thrusters in open water", MAX_THRUSTERS)
+    return submerged_block(
+        CRAFT, "Submerged vehicle with up to 16 thrusters in open water", MAX_THRUSTERS
+    )

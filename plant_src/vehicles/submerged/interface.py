@@ -1,7 +1,8 @@
 """Variables of a submerged vehicle, in the order of the equations.
 
-The arrays of the thrusters have as many elements as the vehicle has thrusters, or more: the equations of all submerged vehicles
-in a world are compiled once, for MAX_THRUSTERS thrusters. Elements without a thruster are 0.
+The arrays of the thrusters have as many elements as the vehicle has thrusters, or more: the
+equations of all submerged vehicles in a world are compiled once, for MAX_THRUSTERS thrusters.
+Elements without a thruster are 0.
 """
 
 from __future__ import annotations
@@ -40,11 +41,14 @@ OCTANTS = 8
 
 
 def variables(craft: Craft, thruster_slots: int | None = None) -> tuple[Variable, ...]:
-    """Return parameters, inputs and outputs; parameters other than `initial.*` start at the values of the craft.
+    """Return parameters, inputs and outputs.
+
+    Parameters other than `initial.*` start at the values of the craft.
 
     Args:
         craft: Data of the vehicle.
-        thruster_slots: Number of elements of the arrays of the thrusters. None means the number of thrusters.
+        thruster_slots: Number of elements of the arrays of the thrusters. None means the number of
+            thrusters.
     """
     slots = len(craft.thrusters) if thruster_slots is None else thruster_slots
     return (
@@ -68,8 +72,17 @@ def states(thruster_slots: int) -> tuple[str, ...]:
 
 def constant_count(craft: Craft, thruster_slots: int) -> int:
     """Return the number of constants that the equations derive from the parameters (`submerged_equations.derive_constants`)."""
-    parameters = (variable for variable in variables(craft, thruster_slots) if variable.causality == "parameter")
-    return sum(len(variable.scalar_names) for variable in parameters) + 9 + 3 * OCTANTS + 6 * thruster_slots
+    parameters = (
+        variable
+        for variable in variables(craft, thruster_slots)
+        if variable.causality == "parameter"
+    )
+    return (
+        sum(len(variable.scalar_names) for variable in parameters)
+        + 9
+        + 3 * OCTANTS
+        + 6 * thruster_slots
+    )
 
 
 def _water_parameters(craft: Craft) -> Iterator[Variable]:
@@ -78,9 +91,17 @@ def _water_parameters(craft: Craft) -> Iterator[Variable]:
     text = "volume of water that the submerged vehicle displaces"
     yield _parameter("displaced_volume", "m3", text, craft.displaced_volume, 0.0)
     for axis, value in zip("xyz", craft.centre_of_buoyancy, strict=True):
-        yield _parameter(f"centre_of_buoyancy.{axis}", "m", f"centre of this volume: {axis}, body frame", value)
+        yield _parameter(
+            f"centre_of_buoyancy.{axis}", "m", f"centre of this volume: {axis}, body frame", value
+        )
     for axis, value in zip("xyz", craft.size, strict=True):
-        yield _parameter(f"hull_size.{axis}", "m", f"edge of the box of this volume: {axis}, body frame", value, 0.0)
+        yield _parameter(
+            f"hull_size.{axis}",
+            "m",
+            f"edge of the box of this volume: {axis}, body frame",
+            value,
+            0.0,
+        )
     for name, text in MATRICES.items():
         start = tuple(np.ravel(getattr(craft, name)).tolist())
         text = f"{text}, for u, v, w, p, q, r, SI units"
@@ -89,27 +110,57 @@ def _water_parameters(craft: Craft) -> Iterator[Variable]:
 
 def _thruster_parameters(craft: Craft, slots: int) -> Iterator[Variable]:
     thrusters = craft.thrusters
-    for name, unit, text in (("position", "m", "centres of the propellers"), ("axis", "1", "unit vectors of the thrusts")):
+    for name, unit, text in (
+        ("position", "m", "centres of the propellers"),
+        ("axis", "1", "unit vectors of the thrusts"),
+    ):
         for k, axis in enumerate("xyz"):
             values = [getattr(thruster, name)[k] for thruster in thrusters]
-            yield _thruster_array(f"thruster_{name}.{axis}", unit, f"{text}: {axis}, body frame", values, slots)
+            yield _thruster_array(
+                f"thruster_{name}.{axis}", unit, f"{text}: {axis}, body frame", values, slots
+            )
     for name, unit, text in (
         ("thrust_coefficient", "N.s2/rad2", "thrust over squared speed at positive speeds"),
         ("reverse_thrust_coefficient", "N.s2/rad2", "thrust over squared speed at negative speeds"),
-        ("torque_coefficient", "N.m.s2/rad2", "reaction torque on the body about the axis over squared speed"),
+        (
+            "torque_coefficient",
+            "N.m.s2/rad2",
+            "reaction torque on the body about the axis over squared speed",
+        ),
     ):
-        yield _thruster_array(name, unit, text, [getattr(thruster, name) for thruster in thrusters], slots)
-    yield _parameter("max_thruster_speed", "rad/s", "largest magnitude of the speeds", craft.max_thruster_speed, 0.0)
+        yield _thruster_array(
+            name, unit, text, [getattr(thruster, name) for thruster in thrusters], slots
+        )
+    yield _parameter(
+        "max_thruster_speed",
+        "rad/s",
+        "largest magnitude of the speeds",
+        craft.max_thruster_speed,
+        0.0,
+    )
     yield _parameter("thruster_radius", "m", "radius of the propellers", craft.thruster_radius, 0.0)
     lag = craft.thruster_time_constant
-    yield _parameter("thruster_time_constant", "s", "time constant of the thruster speeds; 0: no lag", lag, 0.0)
+    yield _parameter(
+        "thruster_time_constant", "s", "time constant of the thruster speeds; 0: no lag", lag, 0.0
+    )
     text = "loss of thrust over speed and axial velocity of the water"
     yield _parameter("advance_coefficient", "kg/rad", text, craft.advance_coefficient, 0.0)
 
 
-def _thruster_array(name: str, unit: str, description: str, values: Sequence[float], slots: int) -> Variable:
+def _thruster_array(
+    name: str, unit: str, description: str, values: Sequence[float], slots: int
+) -> Variable:
     start = (*values, *[0.0] * (slots - len(values)))
-    return Variable(name, "Float64", "parameter", "fixed", start, parse_unit(unit), (slots,), f"thrusters: {description}")
+    return Variable(
+        name,
+        "Float64",
+        "parameter",
+        "fixed",
+        start,
+        parse_unit(unit),
+        (slots,),
+        f"thrusters: {description}",
+    )
 
 
 def _thruster_speed_variable(craft: Craft, slots: int) -> Variable:
@@ -117,8 +168,18 @@ def _thruster_speed_variable(craft: Craft, slots: int) -> Variable:
     limit = f"{craft.max_thruster_speed:.4g}"
     text = f"commanded thruster speeds ({labels}), limited to -{limit} ... {limit} rad/s"
     unit, start = parse_unit("rad/s"), (0.0,) * slots
-    return Variable("thruster_speed", "Float64", "input", start=start, unit=unit, shape=(slots,), description=text)
+    return Variable(
+        "thruster_speed",
+        "Float64",
+        "input",
+        start=start,
+        unit=unit,
+        shape=(slots,),
+        description=text,
+    )
 
 
-def _parameter(name: str, unit: str, description: str, start: float, minimum: float | None = None) -> Variable:
+def _parameter(
+    name: str, unit: str, description: str, start: float, minimum: float | None = None
+) -> Variable:
     return replace(scalar_variable(name, unit, description, "parameter", start), minimum=minimum)

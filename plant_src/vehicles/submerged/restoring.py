@@ -1,4 +1,7 @@
-"""Weight, buoyancy and mass matrix of a submerged vehicle, as CasADi expressions; `submerged_equations.py` has the formulas."""
+"""Weight, buoyancy and mass matrix of a submerged vehicle, as CasADi expressions.
+
+`submerged_equations.py` has the formulas.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +30,10 @@ def restoring_load(up: ca.SX, depth: ca.SX, constants: NamedValues) -> ca.SX:
 
 
 def immersed_fraction(up: ca.SX, depth: ca.SX, constants: NamedValues) -> ca.SX:
-    """Return the immersed fraction of the displaced volume; the arguments are those of `restoring_load`."""
+    """Return the immersed fraction of the displaced volume.
+
+    The arguments are those of `restoring_load`.
+    """
     return ca.sum1(_octant_fractions(up, depth, constants))
 
 
@@ -40,7 +46,9 @@ def _octant_fractions(up: ca.SX, depth: ca.SX, constants: NamedValues) -> ca.SX:
 def mass_matrix(constants: NamedValues, immersed: ca.SX) -> ca.SX:
     """Return the mass matrix (6, 6) about the centre of mass with the added mass of the immersed fraction."""
     body = rigid_body(constants)
-    return ca.diagcat(body.mass * ca.SX.eye(3), body.inertia) + immersed * matrix_of(constants["added_mass"])
+    return ca.diagcat(body.mass * ca.SX.eye(3), body.inertia) + immersed * matrix_of(
+        constants["added_mass"]
+    )
 
 
 def matrix_of(elements: ca.SX) -> ca.SX:

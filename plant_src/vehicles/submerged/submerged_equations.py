@@ -1,24 +1,27 @@
 """Equations of motion of a submerged vehicle: a rigid body in water with any number of thrusters.
 
-State: position p (m) and velocity v (m/s) of the centre of mass in the world frame, unit quaternion q (body to world, R = R(q)),
-angular velocity w (rad/s, body frame) and thruster speeds n_i (rad/s). With the acceleration a = R^T v' and the velocity relative
-to the current c, nu_r = (u_r; w) with u_r = R^T (v - c):
+State: position p (m) and velocity v (m/s) of the centre of mass in the world frame, unit quaternion
+q (body to world, R = R(q)), angular velocity w (rad/s, body frame) and thruster speeds n_i (rad/s).
+With the acceleration a = R^T v' and the velocity relative to the current c, nu_r = (u_r; w) with
+u_r = R^T (v - c):
 
-    (M_RB + s M_A) (a; w') = tau - (0; w x I w) + s M_A (w x u_r; 0) - s C_A(nu_r) nu_r - s (D_l nu_r + D_q (|nu_r| nu_r))
-    tau = restoring loads + sum_i (a_i; r_i x a_i) T_i + (0; a_i) Q_i + (R^T F_ext; R^T T_ext)
-    T_i = e_i (c_i n_i |n_i| - k |n_i| u_i)     Q_i = e_i q_i n_i |n_i|                u_i = a_i . (u_r + w x r_i)
-    n_i' = (command_i - n_i) / thruster_time_constant
+    (M_RB + s M_A) (a; w') = tau - (0; w x I w) + s M_A (w x u_r; 0) - s C_A(nu_r) nu_r - s (D_l
+    nu_r + D_q (|nu_r| nu_r)) tau = restoring loads + sum_i (a_i; r_i x a_i) T_i + (0; a_i) Q_i +
+    (R^T F_ext; R^T T_ext) T_i = e_i (c_i n_i |n_i| - k |n_i| u_i)     Q_i = e_i q_i n_i |n_i|
+    u_i = a_i . (u_r + w x r_i) n_i' = (command_i - n_i) / thruster_time_constant
 
-These are equations 8.2 and 6.48 of Fossen, "Handbook of Marine Craft Hydrodynamics and Motion Control", 2nd edition, 2021,
-about the centre of mass and in a steady uniform current. With (a_1; a_2) = M_A nu_r, the load C_A nu_r is
-(w x a_1; u_r x a_1 + w x a_2). c_i is the coefficient of the sense of rotation. k |n_i| u_i is the loss of thrust by axial
-inflow (Fossen, chapter 9).
+These are equations 8.2 and 6.48 of Fossen, "Handbook of Marine Craft Hydrodynamics and Motion
+Control", 2nd edition, 2021, about the centre of mass and in a steady uniform current. With (a_1;
+a_2) = M_A nu_r, the load C_A nu_r is (w x a_1; u_r x a_1 + w x a_2). c_i is the coefficient of the
+sense of rotation. k |n_i| u_i is the loss of thrust by axial inflow (Fossen, chapter 9).
 
-The displaced volume consists of eight equal parts in the octants of a box. The part k at r_k is immersed by the fraction f_k,
-which is linear over its vertical extent. It has the buoyancy rho g V f_k / 8 at r_k. s is the mean of f_k: hydrodynamic loads
-are those of the submerged vehicle times s. e_i is the immersed fraction of the height of a propeller. Slamming is neglected.
+The displaced volume consists of eight equal parts in the octants of a box. The part k at r_k is
+immersed by the fraction f_k, which is linear over its vertical extent. It has the buoyancy rho g V
+f_k / 8 at r_k. s is the mean of f_k: hydrodynamic loads are those of the submerged vehicle times s.
+e_i is the immersed fraction of the height of a propeller. Slamming is neglected.
 
-The rigid body is integrated by the classical Runge-Kutta method; the thruster speeds are the exact solution for held commands.
+The rigid body is integrated by the classical Runge-Kutta method; the thruster speeds are the exact
+solution for held commands.
 """
 
 from __future__ import annotations
@@ -49,12 +52,21 @@ from ..common.rigid_body import (
 from .contact_maps import SubmergedContactMaps
 from .craft import Craft
 from .interface import states, variables
-from .restoring import clamp, immersed_fraction, mass_matrix, matrix_of, restoring_load, solve_symmetric
+from .restoring import (
+    clamp,
+    immersed_fraction,
+    mass_matrix,
+    matrix_of,
+    restoring_load,
+    solve_symmetric,
+)
 
 
 @dataclass(frozen=True)
 class SubmergedEquations:
-    """Equations of a submerged vehicle; the vectors hold the variables of `interface.variables` in order.
+    """Equations of a submerged vehicle.
+
+    The vectors hold the variables of `interface.variables` in order.
 
     Attributes:
         craft: Craft with the start values.
@@ -77,14 +89,20 @@ class SubmergedEquations:
     def derive_constants(self, parameters: NamedValues) -> dict[str, ca.SX]:
         """Return the parameters, the inverse of the inertia tensor, the centres of the octants and the loads of unit thrusts."""
         positions, axes = (
-            ca.horzcat(*(parameters[f"thruster_{name}.{axis}"] for axis in "xyz")) for name in ("position", "axis")
+            ca.horzcat(*(parameters[f"thruster_{name}.{axis}"] for axis in "xyz"))
+            for name in ("position", "axis")
         )
-        loads = [ca.vertcat(axes[i, :].T, ca.cross(positions[i, :].T, axes[i, :].T)) for i in range(self.slots)]
+        loads = [
+            ca.vertcat(axes[i, :].T, ca.cross(positions[i, :].T, axes[i, :].T))
+            for i in range(self.slots)
+        ]
         centre, quarter = parameters["centre_of_buoyancy"], parameters["hull_size"] / 4
         return {
             **parameters,
             "inverse_inertia": ca.inv(symmetric_matrix(parameters["inertia"])),
-            "octants": ca.horzcat(*(centre + quarter * ca.vertcat(*signs) for signs in product((-1, 1), repeat=3))),
+            "octants": ca.horzcat(
+                *(centre + quarter * ca.vertcat(*signs) for signs in product((-1, 1), repeat=3))
+            ),
             "unit_loads": ca.horzcat(*loads),
         }
 
@@ -93,14 +111,20 @@ class SubmergedEquations:
 
     def initial_state(self, constants: ca.SX) -> ca.SX:
         """Return the state at the start; the thrusters rest."""
-        return ca.vertcat(initial_rigid_state(self.constants.by_name(constants)), ca.SX.zeros(self.slots))
+        return ca.vertcat(
+            initial_rigid_state(self.constants.by_name(constants)), ca.SX.zeros(self.slots)
+        )
 
     def rate(self, state: ca.SX, inputs: ca.SX, constants: ca.SX) -> ca.SX:
         """Return the time derivative of the state of a vehicle whose thrusters lag."""
         speed, known = state[RIGID_BODY_STATE_COUNT:], self.constants.by_name(constants)
         lag = known["thruster_time_constant"]
-        speed_rate = ca.if_else(lag > 0, (self._commanded_speeds(self._inputs(inputs), known) - speed) / lag, 0)
-        return ca.vertcat(self.body_rate(state[:RIGID_BODY_STATE_COUNT], speed, inputs, constants), speed_rate)
+        speed_rate = ca.if_else(
+            lag > 0, (self._commanded_speeds(self._inputs(inputs), known) - speed) / lag, 0
+        )
+        return ca.vertcat(
+            self.body_rate(state[:RIGID_BODY_STATE_COUNT], speed, inputs, constants), speed_rate
+        )
 
     def _commanded_speeds(self, inputs: NamedValues, constants: NamedValues) -> ca.SX:
         """Return the commanded thruster speeds (rad/s) within their limits."""
@@ -125,20 +149,33 @@ class SubmergedEquations:
         added = immersed * matrix_of(known["added_mass"])
         momentum = added @ relative
         load += added @ ca.vertcat(ca.cross(rates, flow), ca.SX.zeros(3))
-        load -= ca.vertcat(ca.cross(rates, momentum[0:3]), ca.cross(flow, momentum[0:3]) + ca.cross(rates, momentum[3:6]))
+        load -= ca.vertcat(
+            ca.cross(rates, momentum[0:3]),
+            ca.cross(flow, momentum[0:3]) + ca.cross(rates, momentum[3:6]),
+        )
         damping = matrix_of(known["linear_damping"]) @ relative
         damping += matrix_of(known["quadratic_damping"]) @ (ca.fabs(relative) * relative)
-        load += self._thruster_load(to_world[2, :], state[2], speed, relative, given, known) - immersed * damping
+        load += (
+            self._thruster_load(to_world[2, :], state[2], speed, relative, given, known)
+            - immersed * damping
+        )
         load += ca.vertcat(
             to_world.T @ given["external_force"],
-            to_world.T @ given["external_torque"] - ca.cross(rates, rigid_body(known).inertia @ rates),
+            to_world.T @ given["external_torque"]
+            - ca.cross(rates, rigid_body(known).inertia @ rates),
         )
         acceleration = solve_symmetric(mass_matrix(known, immersed), load)
         turning = kinematics.quaternion_rate(state[3:7], rates)
         return ca.vertcat(state[7:10], turning, to_world @ acceleration[0:3], acceleration[3:6])
 
     def _thruster_load(
-        self, up: ca.SX, height: ca.SX, speed: ca.SX, relative: ca.SX, inputs: NamedValues, constants: NamedValues
+        self,
+        up: ca.SX,
+        height: ca.SX,
+        speed: ca.SX,
+        relative: ca.SX,
+        inputs: NamedValues,
+        constants: NamedValues,
     ) -> ca.SX:
         """Return force and torque (6) of all thrusters."""
         hubs = ca.horzcat(*(constants[f"thruster_position.{axis}"] for axis in "xyz"))
@@ -146,7 +183,12 @@ class SubmergedEquations:
         immersed = clamp(below / (2 * constants["thruster_radius"]) + 0.5)
         squared = immersed * speed * ca.fabs(speed)
         forward, reverse = constants["thrust_coefficient"], constants["reverse_thrust_coefficient"]
-        loss = constants["advance_coefficient"] * immersed * ca.fabs(speed) * (constants["unit_loads"].T @ relative)
+        loss = (
+            constants["advance_coefficient"]
+            * immersed
+            * ca.fabs(speed)
+            * (constants["unit_loads"].T @ relative)
+        )
         load = constants["unit_loads"] @ (ca.if_else(speed > 0, forward, reverse) * squared - loss)
         reaction = constants["unit_loads"][0:3, :] @ (constants["torque_coefficient"] * squared)
         return load + ca.vertcat(ca.SX.zeros(3), reaction)
@@ -154,20 +196,44 @@ class SubmergedEquations:
     @cached_property
     def step_function(self) -> ca.Function:
         """Function of (state, inputs, constants, step size in s) to the state after the step."""
-        inputs = sum(len(variable.scalar_names) for variable in variables_of(self.variables, "input"))
+        inputs = sum(
+            len(variable.scalar_names) for variable in variables_of(self.variables, "input")
+        )
         constants = sum(rows * columns for rows, columns in self.constants.shapes.values())
-        sizes = {"state": RIGID_BODY_STATE_COUNT, "speed": self.slots, "inputs": inputs, "constants": constants}
+        sizes = {
+            "state": RIGID_BODY_STATE_COUNT,
+            "speed": self.slots,
+            "inputs": inputs,
+            "constants": constants,
+        }
         body, speed, given, known = (ca.SX.sym(name, size) for name, size in sizes.items())
-        rate = ca.Function("body_rate", [body, speed, given, known], [self.body_rate(body, speed, given, known)])
+        rate = ca.Function(
+            "body_rate", [body, speed, given, known], [self.body_rate(body, speed, given, known)]
+        )
         state, step = ca.SX.sym("state", RIGID_BODY_STATE_COUNT + self.slots), ca.SX.sym("step")
         names = self.constants.by_name(known)
-        target, lag = self._commanded_speeds(self._inputs(given), names), names["thruster_time_constant"]
+        target, lag = (
+            self._commanded_speeds(self._inputs(given), names),
+            names["thruster_time_constant"],
+        )
         start = ca.if_else(lag > 0, state[RIGID_BODY_STATE_COUNT:], target)
-        remaining = ca.exp(-step / 2 / lag)  # fraction of the difference left after half a step; 0 without a lag
-        middle, end = (target + fraction * (start - target) for fraction in (remaining, remaining**2))
+        remaining = ca.exp(
+            -step / 2 / lag
+        )  # fraction of the difference left after half a step; 0 without a lag
+        middle, end = (
+            target + fraction * (start - target) for fraction in (remaining, remaining**2)
+        )
         stages = iter((start, middle, middle, end))
-        moved = runge_kutta_4(lambda x: call_in_c(rate, x, next(stages), given, known)[0], state[:RIGID_BODY_STATE_COUNT], step)
-        return ca.Function("submerged_step", [state, given, known, step], [ca.vertcat(normalised_state(moved), end)])
+        moved = runge_kutta_4(
+            lambda x: call_in_c(rate, x, next(stages), given, known)[0],
+            state[:RIGID_BODY_STATE_COUNT],
+            step,
+        )
+        return ca.Function(
+            "submerged_step",
+            [state, given, known, step],
+            [ca.vertcat(normalised_state(moved), end)],
+        )
 
 
 @dataclass(frozen=True)
@@ -176,7 +242,9 @@ class SubmergedModel(ContinuousModel):
 
     step: ca.Function = field(kw_only=True)
 
-    def integrate(self, state: ca.SX, inputs: ca.SX, parameters: ca.SX, step: ca.SX, sub_steps: int = 1) -> ca.SX:
+    def integrate(
+        self, state: ca.SX, inputs: ca.SX, parameters: ca.SX, step: ca.SX, sub_steps: int = 1
+    ) -> ca.SX:
         """Return the state after `step` (s) with held inputs, in equal sub-steps."""
         for _ in range(sub_steps):
             state = call_in_c(self.step, state, inputs, parameters, step / sub_steps)[0]
@@ -184,7 +252,9 @@ class SubmergedModel(ContinuousModel):
 
 
 def submerged_block(craft: Craft, description: str, thruster_slots: int | None = None) -> Block:
-    """Return a submerged vehicle for export: its FMU in open water and the contact functions of the world.
+    """Return a submerged vehicle for export.
+
+    Its FMU in open water and the contact functions of the world.
 
     Args:
         craft: Craft with the start values.
@@ -199,7 +269,9 @@ def submerged_block(craft: Craft, description: str, thruster_slots: int | None =
         states(equations.slots),
         equations.initial_state,
         equations.rate,
-        lambda state, _inputs, _constants: ca.vertcat(motion_of_state(state), ca.SX.zeros(len(WORLD_OUTPUTS))),
+        lambda state, _inputs, _constants: ca.vertcat(
+            motion_of_state(state), ca.SX.zeros(len(WORLD_OUTPUTS))
+        ),
         derived_parameters=equations.constants.vector,
         step=equations.step_function,
     )

@@ -1,1 +1,4 @@
-"""Modules of floating vessels that are given by data: hull form, interface, equations, reader of vehicle files."""
+"""Modules of floating vessels that are given by data.
+
+Hull form, interface, equations, reader of vehicle files.
+"""

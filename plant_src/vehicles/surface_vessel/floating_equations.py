@@ -1,4 +1,7 @@
-"""Loads of a floating vessel that is given by data; `vessel/hull.py` has the equations of motion, README.md the loads."""
+"""Loads of a floating vessel that is given by data.
+
+`vessel/hull.py` has the equations of motion, README.md the loads.
+"""
 
 from __future__ import annotations
 
@@ -30,13 +33,30 @@ DRAG_STATIONS = 21
 _EQUILIBRIUM_STEPS = 40
 
 #: parameters that are no constants of the equations, because others are derived from them
-_REPLACED = ("rudder_propeller", *(f"wave.{name}" for name in ("amplitude", "frequency", "direction", "phase")))
+_REPLACED = (
+    "rudder_propeller",
+    *(f"wave.{name}" for name in ("amplitude", "frequency", "direction", "phase")),
+)
 
 
 #: constants that determine the equilibrium
 _HYDROSTATICS = (
-    *("mass", "water_density", "centre_of_mass.x", "centre_of_mass.y", "centre_of_mass.z", "transverse_moment"),
-    *("longitudinal_moment", "waterplane_area", "waterplane_centre", "strip_beam", "hull_depth", "hull_bottom"),
+    *(
+        "mass",
+        "water_density",
+        "centre_of_mass.x",
+        "centre_of_mass.y",
+        "centre_of_mass.z",
+        "transverse_moment",
+    ),
+    *(
+        "longitudinal_moment",
+        "waterplane_area",
+        "waterplane_centre",
+        "strip_beam",
+        "hull_depth",
+        "hull_bottom",
+    ),
     *("strip_spacing", "strip_offset", "draught"),
 )
 
@@ -51,7 +71,9 @@ class FloatingEquations:
         description: Description of the FMU.
     """
 
-    def __init__(self, vessel: SurfaceVessel, slots: tuple[int, int], identifier: str, description: str):
+    def __init__(
+        self, vessel: SurfaceVessel, slots: tuple[int, int], identifier: str, description: str
+    ):
         self.variables: tuple[Variable, ...] = variables(vessel, slots)
         self.slots, self.identifier, self.description = slots, identifier, description
 
@@ -77,7 +99,9 @@ class FloatingEquations:
             known = self.model.constants.by_name(constants)
             return floating_maps.BulletBody(known["mass"], ca.diag(known["inertia_tensor"]))
 
-        return as_block(model, floating_maps.FloatingContactMaps(model, self.model, body).functions())
+        return as_block(
+            model, floating_maps.FloatingContactMaps(model, self.model, body).functions()
+        )
 
 
 def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
@@ -98,7 +122,8 @@ def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
         "strip_spacing": strips.spacing,
         "strip_offset": strips.offset,
         "draught": draught(parameters),
-        "centre_of_buoyancy": _waterplane_centre(parameters) - ca.vertcat(0, 0, draught(parameters) / 2),
+        "centre_of_buoyancy": _waterplane_centre(parameters)
+        - ca.vertcat(0, 0, draught(parameters) / 2),
     }
     named = NamedValues(constants)
     table = vessel_equations.wave_table_of(parameters, twin_hull(named))
@@ -111,7 +136,9 @@ def draught(parameters: NamedValues) -> ca.SX:
 
 
 def _waterplane_centre(parameters: NamedValues) -> ca.SX:
-    return ca.vertcat(parameters["waterplane_centre"], 0, parameters["hull_bottom"] + draught(parameters))
+    return ca.vertcat(
+        parameters["waterplane_centre"], 0, parameters["hull_bottom"] + draught(parameters)
+    )
 
 
 def square_matrix(elements: ca.SX) -> ca.SX:
@@ -122,16 +149,26 @@ def square_matrix(elements: ca.SX) -> ca.SX:
 
 def twin_hull(constants: NamedValues) -> TwinHull:
     """Return the strips with their dimensions."""
-    centre = ca.vertcat(constants["waterplane_centre"], 0, constants["hull_bottom"] + constants["draught"])
+    centre = ca.vertcat(
+        constants["waterplane_centre"], 0, constants["hull_bottom"] + constants["draught"]
+    )
     strips = Strips(centre, constants["strip_spacing"], constants["strip_offset"])
-    return TwinHull(strips, constants["strip_beam"], constants["draught"], constants["hull_depth"], constants["waterplane_area"])
+    return TwinHull(
+        strips,
+        constants["strip_beam"],
+        constants["draught"],
+        constants["hull_depth"],
+        constants["waterplane_area"],
+    )
 
 
 def _equilibrium(constants: NamedValues) -> ca.SX:
     """Return height of O (m), roll and pitch (rad) at rest, by Newton's method with the stiffness of the upright hull."""
     symbols = NamedValues({name: ca.SX.sym(name) for name in _HYDROSTATICS})
     state = ca.SX.sym("state", 3)
-    improve = ca.Function("equilibrium", [state, symbols.vector()], [_improved_equilibrium(state, symbols)])
+    improve = ca.Function(
+        "equilibrium", [state, symbols.vector()], [_improved_equilibrium(state, symbols)]
+    )
     known = ca.vertcat(*(constants[name] for name in _HYDROSTATICS))
     result = ca.vertcat(-constants["hull_bottom"] - constants["draught"], 0, 0)
     for _ in range(_EQUILIBRIUM_STEPS):
@@ -145,7 +182,9 @@ def _improved_equilibrium(state: ca.SX, constants: NamedValues) -> ca.SX:
     area, volume = constants["waterplane_area"], constants["mass"] / constants["water_density"]
     lever = form.strips.centre[2] - constants["draught"] / 2 - constants["centre_of_mass"][2]
     moments = ca.vertcat(constants["transverse_moment"], constants["longitudinal_moment"])
-    return improved_equilibrium(state, form, ballast(constants), weight_density * ca.vertcat(area, moments + volume * lever))
+    return improved_equilibrium(
+        state, form, ballast(constants), weight_density * ca.vertcat(area, moments + volume * lever)
+    )
 
 
 def ballast(constants: NamedValues) -> Ballast:
@@ -172,7 +211,10 @@ def hull(constants: NamedValues) -> Hull:
 
 
 def water_loads(constants: NamedValues, now: LoadArguments) -> ca.SX:
-    """Return the load tau (6) of weight, water and propellers; that of the moving water shrinks as the hulls leave it."""
+    """Return the load tau (6) of weight, water and propellers.
+
+    That of the moving water shrinks as the hulls leave it.
+    """
     form, up = twin_hull(constants), now.frame.attitude[2, :].T
     under_water = immersion(form, up, now.height, now.water.elevations)
     speed = propulsion.speeds(now.actuators, now.inputs, constants)
@@ -186,25 +228,43 @@ def water_loads(constants: NamedValues, now: LoadArguments) -> ca.SX:
     )
     surface = ca.vertcat(-now.water.slopes[1], now.water.slopes[0], 0)
     depth = now.water.heave - ca.dot(surface, form.strips.centre) - now.height
-    thrust = propulsion.propeller_loads(speed, now.relative_velocity, depth, up - surface, now.inputs, constants)
-    return weight_and_buoyancy(under_water, up, ballast(constants)) + under_water.wetness * moving + thrust
+    thrust = propulsion.propeller_loads(
+        speed, now.relative_velocity, depth, up - surface, now.inputs, constants
+    )
+    return (
+        weight_and_buoyancy(under_water, up, ballast(constants))
+        + under_water.wetness * moving
+        + thrust
+    )
 
 
 def damping(constants: NamedValues, flow: ca.SX) -> ca.SX:
     """Return tau of the linear and quadratic damping for the velocity relative to the water, shape (6,)."""
-    linear, quadratic = (square_matrix(constants[f"{name}_damping"]) for name in ("linear", "quadratic"))
+    linear, quadratic = (
+        square_matrix(constants[f"{name}_damping"]) for name in ("linear", "quadratic")
+    )
     return -(linear @ flow + quadratic @ (ca.fabs(flow) * flow))
 
 
 def vertical_drag(constants: NamedValues, flow: ca.SX) -> ca.SX:
     """Return tau of the drag of the bottoms, which acts at four points around the centre of the waterplane."""
-    coefficient = constants["water_density"] / 8 * constants["vertical_drag_coefficient"] * constants["waterplane_area"]
+    coefficient = (
+        constants["water_density"]
+        / 8
+        * constants["vertical_drag_coefficient"]
+        * constants["waterplane_area"]
+    )
     load = ca.SX.zeros(6)
     for ahead in (-1, 1):
         for side in (-1, 1):
-            x, y = constants["waterplane_centre"] + ahead * constants["drag_point.x"], side * constants["drag_point.y"]
+            x, y = (
+                constants["waterplane_centre"] + ahead * constants["drag_point.x"],
+                side * constants["drag_point.y"],
+            )
             speed = flow[2] + y * flow[3] - x * flow[4]
-            load += load_of_force_at(ca.vertcat(x, y, 0), ca.vertcat(0, 0, -coefficient * ca.fabs(speed) * speed))
+            load += load_of_force_at(
+                ca.vertcat(x, y, 0), ca.vertcat(0, 0, -coefficient * ca.fabs(speed) * speed)
+            )
     return load
 
 
@@ -212,7 +272,9 @@ def cross_flow_drag(constants: NamedValues, flow: ca.SX) -> ca.SX:
     """Return tau of the cross-flow drag along the hull, at half of the draught (Fossen 2021, section 6.4)."""
     length, depth = constants["hull_length"], constants["draught"]
     spacing = length / (DRAG_STATIONS - 1)
-    coefficient = constants["water_density"] / 2 * depth * constants["cross_flow_drag_coefficient"] * spacing
+    coefficient = (
+        constants["water_density"] / 2 * depth * constants["cross_flow_drag_coefficient"] * spacing
+    )
     force, moment = ca.SX(0), ca.SX(0)
     for share in np.linspace(-0.5, 0.5, DRAG_STATIONS).tolist():
         x = constants["waterplane_centre"] + share * length
@@ -226,10 +288,14 @@ def cross_flow_drag(constants: NamedValues, flow: ca.SX) -> ca.SX:
 def wind_loads(constants: NamedValues, now: LoadArguments) -> ca.SX:
     """Return tau of the air."""
     air = now.air_relative_velocity[0:2]
-    return load_of_force_at(constants["air_centre"], ca.vertcat(-constants["air_drag"] * ca.fabs(air) * air, 0))
+    return load_of_force_at(
+        constants["air_centre"], ca.vertcat(-constants["air_drag"] * ca.fabs(air) * air, 0)
+    )
 
 
-def surface_vessel_block(vessel: SurfaceVessel, description: str, slots: tuple[int, int] | None = None) -> Block:
+def surface_vessel_block(
+    vessel: SurfaceVessel, description: str, slots: tuple[int, int] | None = None
+) -> Block:
     """Return a floating vessel for export.
 
     Args:

@@ -28,16 +28,20 @@ from .surface_vessel import SurfaceVessel
 
 _INITIAL_PARAMETERS = (*initial_variables("xy", "uvw", "pqr"), *FLOATING_INITIAL_PARAMETERS)
 
-#: constants that the equations derive: inertia, inverse mass matrix, waterplane, equilibrium, wave table
+#: constants that the equations derive: inertia, inverse mass matrix, waterplane, equilibrium, wave
+#: table
 _DERIVED = 9 + 36 + 2 + 1 + 3 + 3 + 8 * MAX_WAVE_COMPONENTS
 
 
 def variables(vessel: SurfaceVessel, slots: tuple[int, int] | None = None) -> tuple[Variable, ...]:
-    """Return parameters, inputs and outputs; parameters other than `initial.*` start at the values of the vessel.
+    """Return parameters, inputs and outputs.
+
+    Parameters other than `initial.*` start at the values of the vessel.
 
     Args:
         vessel: Data of the vessel.
-        slots: Numbers of elements of the arrays of propellers and rudders. None means the numbers of the vessel.
+        slots: Numbers of elements of the arrays of propellers and rudders. None means the numbers
+            of the vessel.
     """
     slots = slots or vessel.slots
     velocities = "u, v, w, p, q, r"
@@ -46,7 +50,9 @@ def variables(vessel: SurfaceVessel, slots: tuple[int, int] | None = None) -> tu
         *inertia_variables(vessel.mass, vessel.inertia, "total mass"),
         *boat_parameters(vessel, velocities),
         matrix_parameter(
-            "quadratic_damping", f"load over squared velocity relative to the water, for {velocities}", vessel.quadratic_damping
+            "quadratic_damping",
+            f"load over squared velocity relative to the water, for {velocities}",
+            vessel.quadratic_damping,
         ),
         *_hull_parameters(vessel),
         *actuator_parameters(vessel.propellers, vessel.rudders, slots),
@@ -66,33 +72,68 @@ def _hull_parameters(vessel: SurfaceVessel) -> Iterator[Variable]:
     hull = vessel.hull
     x, y = hull.drag_point
     yield parameter("waterplane_area", "m2", hull.area, "area of the waterplane of all hulls", 0.0)
-    yield parameter("transverse_moment", "m4", hull.transverse_moment, "second moment of the waterplane about the x axis", 0.0)
+    yield parameter(
+        "transverse_moment",
+        "m4",
+        hull.transverse_moment,
+        "second moment of the waterplane about the x axis",
+        0.0,
+    )
     text = "second moment of the waterplane about the y axis through its centre"
     yield parameter("longitudinal_moment", "m4", hull.longitudinal_moment, text, 0.0)
-    yield parameter("waterplane_centre", "m", hull.waterplane_centre, "centre of the waterplane ahead of O")
     yield parameter(
-        "strip_beam", "m", hull.strip_beam, "beam of a strip: of each of two hulls, half of that of a single one", 0.0
+        "waterplane_centre", "m", hull.waterplane_centre, "centre of the waterplane ahead of O"
+    )
+    yield parameter(
+        "strip_beam",
+        "m",
+        hull.strip_beam,
+        "beam of a strip: of each of two hulls, half of that of a single one",
+        0.0,
     )
     yield parameter("hull_length", "m", hull.length, "length of the waterline", 0.0)
-    yield parameter("hull_depth", "m", hull.depth, "height of the hulls from the bottom to the deck edge", 0.0)
+    yield parameter(
+        "hull_depth", "m", hull.depth, "height of the hulls from the bottom to the deck edge", 0.0
+    )
     yield parameter("hull_bottom", "m", hull.bottom, "height of the bottom of the hulls above O")
     yield parameter(
-        "drag_point.x", "m", x, "distance of the points of the bottom drag ahead and aft of the waterplane's centre", 0.0
+        "drag_point.x",
+        "m",
+        x,
+        "distance of the points of the bottom drag ahead and aft of the waterplane's centre",
+        0.0,
     )
-    yield parameter("drag_point.y", "m", y, "distance of the points of the bottom drag from the centre line", 0.0)
-    yield parameter("vertical_drag_coefficient", "1", hull.vertical_drag_coefficient, "drag coefficient of the bottoms", 0.0)
+    yield parameter(
+        "drag_point.y",
+        "m",
+        y,
+        "distance of the points of the bottom drag from the centre line",
+        0.0,
+    )
+    yield parameter(
+        "vertical_drag_coefficient",
+        "1",
+        hull.vertical_drag_coefficient,
+        "drag coefficient of the bottoms",
+        0.0,
+    )
     text = "drag coefficient of the immersed sides in cross-flow"
     yield parameter("cross_flow_drag_coefficient", "1", hull.cross_flow_drag_coefficient, text, 0.0)
 
 
 def states(propeller_slots: int) -> tuple[str, ...]:
     """Return the names of the states: those of a vessel, then the propeller speeds."""
-    return (*VESSEL_STATES, *(f"propeller_speed[{number}]" for number in range(1, propeller_slots + 1)))
+    return (
+        *VESSEL_STATES,
+        *(f"propeller_speed[{number}]" for number in range(1, propeller_slots + 1)),
+    )
 
 
 def constant_count(slots: tuple[int, int]) -> int:
     """Return the number of constants that the equations derive from the parameters (`equations.derive_constants`)."""
     initial = len(_INITIAL_PARAMETERS)
     boat = 3 + 1 + 3 * 36 + 2 + 3 + 3
-    rudders = slots[0] * slots[1] - slots[1] if slots[1] else 0  # the matrix of the races replaces `rudder_propeller`
+    rudders = (
+        slots[0] * slots[1] - slots[1] if slots[1] else 0
+    )  # the matrix of the races replaces `rudder_propeller`
     return initial + 7 + boat + 36 + 12 + parameter_count(slots) + rudders + 1 + _DERIVED

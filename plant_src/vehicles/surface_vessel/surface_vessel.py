@@ -1,4 +1,7 @@
-"""Data of a floating vessel in six degrees of freedom: one hull or two, whose strips the surface of the water cuts."""
+"""Data of a floating vessel in six degrees of freedom.
+
+One hull or two, whose strips the surface of the water cuts.
+"""
 
 from __future__ import annotations
 
@@ -70,7 +73,8 @@ class SurfaceVessel(Boat):
 
     Attributes:
         inertia: Inertia tensor about the centre of mass (kg m2, body frame), shape (3, 3).
-        quadratic_damping: Matrix D_q of the load -D_q (|nu_r| nu_r), products by elements, shape (6, 6).
+        quadratic_damping: Matrix D_q of the load -D_q (|nu_r| nu_r), products by elements, shape
+            (6, 6).
         hull: Form of the hulls.
     """
 
@@ -88,7 +92,10 @@ class SurfaceVessel(Boat):
         """Transverse and longitudinal metacentric height (m)."""
         volume = self.mass / self.water_density
         lever = self.hull.bottom + self.draught / 2 - self.centre_of_mass[2]
-        return lever + self.hull.transverse_moment / volume, lever + self.hull.longitudinal_moment / volume
+        return (
+            lever + self.hull.transverse_moment / volume,
+            lever + self.hull.longitudinal_moment / volume,
+        )
 
     def problems(self) -> Iterator[Problem]:
         """Yield what is physically impossible."""
@@ -96,9 +103,15 @@ class SurfaceVessel(Boat):
         yield from (self.problem(text, "inertia") for text in inertia_problems(self.inertia))
         if (np.diag(self.quadratic_damping) < 0).any():
             diagonal = np.diag(self.quadratic_damping).tolist()
-            yield self.problem(f"found the diagonal {diagonal}, expected numbers of at least 0", "quadratic_damping")
+            yield self.problem(
+                f"found the diagonal {diagonal}, expected numbers of at least 0",
+                "quadratic_damping",
+            )
         if not self.draught < self.hull.depth:
-            text = f"found {self.hull.depth:g}: the vessel sinks, because its draught at rest is {self.draught:.4g} m"
+            text = (
+                f"found {self.hull.depth:g}: the vessel sinks, because its draught at rest is "
+                f"{self.draught:.4g} m"
+            )
             yield self.problem(text, "hull", "depth")
         elif not min(self.metacentric_heights) > 0:
             yield self.problem(self._instability(), "centre_of_mass")
@@ -108,10 +121,16 @@ class SurfaceVessel(Boat):
     def _instability(self) -> str:
         """Return the height of the centre of mass, or else the moment of the waterplane, that would make the vessel stable."""
         heights, z = self.metacentric_heights, self.centre_of_mass[2]
-        key = "transverse_moment (beam, offset)" if heights[0] == min(heights) else "longitudinal_moment (length)"
+        key = (
+            "transverse_moment (beam, offset)"
+            if heights[0] == min(heights)
+            else "longitudinal_moment (length)"
+        )
         return (
-            f"found z = {z:g} m: the vessel is not stable: its metacentric heights (transverse, longitudinal) are "
-            f"{heights[0]:.4g}, {heights[1]:.4g} m, expected > 0: z must be below {z + min(heights):.4g} m, or hull.{key} larger"
+            f"found z = {z:g} m: the vessel is not stable: its metacentric heights (transverse, "
+            "longitudinal) are "
+            f"{heights[0]:.4g}, {heights[1]:.4g} m, expected > 0: z must be below "
+            f"{z + min(heights):.4g} m, or hull.{key} larger"
         )
 
     def _imbalance(self) -> str:
@@ -119,15 +138,24 @@ class SurfaceVessel(Boat):
         x, y, _ = self.centre_of_mass
         if x == self.hull.waterplane_centre and y == 0:
             return ""
-        found = f"found {x - self.hull.waterplane_centre:g} m ahead of the centre of the waterplane and {y:g} m to port"
+        found = (
+            f"found {x - self.hull.waterplane_centre:g} m ahead of the centre of the waterplane "
+            f"and {y:g} m to port"
+        )
         if (attitude := rest(self)) is None:
             return f"{found}: the vessel capsizes"
         if attitude.freeboard > 0:
             return ""
         heel, trim = math.degrees(attitude.heel), math.degrees(attitude.trim)
-        return f"{found}: at rest it heels by {heel:.3g} and trims by {trim:.3g} degrees, a deck edge is under water"
+        return (
+            f"{found}: at rest it heels by {heel:.3g} and trims by {trim:.3g} degrees, a deck edge "
+            "is under water"
+        )
 
     def body(self, boxes: tuple[Shape, ...]) -> Body:
-        """Return the rigid body for Bullet, whose frame has its origin in O; products of inertia have no influence on contact."""
+        """Return the rigid body for Bullet, whose frame has its origin in O.
+
+        Products of inertia have no influence on contact.
+        """
         x, y, z = np.diag(self.inertia).tolist()
         return Body(self.mass, (x, y, z), boxes)

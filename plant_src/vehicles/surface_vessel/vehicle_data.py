@@ -22,7 +22,13 @@ _OPTIONAL_KEYS = (*boat_data.OPTIONAL_KEYS, "quadratic_damping")
 #: required and optional keys of "hull"
 HULL_KEYS = ("count", "length", "beam", "depth", "bottom")
 _HULL_OPTIONAL_KEYS = (
-    *("offset", "waterplane_centre", "waterplane_coefficient", "transverse_moment", "longitudinal_moment"),
+    *(
+        "offset",
+        "waterplane_centre",
+        "waterplane_coefficient",
+        "transverse_moment",
+        "longitudinal_moment",
+    ),
     *("vertical_drag_coefficient", "cross_flow_drag_coefficient"),
 )
 _VELOCITIES = ("u", "v", "w", "p", "q", "r")
@@ -37,11 +43,18 @@ class SurfaceVesselData:
     crash_speed: float
 
     def body_with(self, mass: float, inertia: np.ndarray) -> Body:
-        """Return the rigid body for Bullet with another mass (kg) and inertia tensor (kg m2). Raises InputError."""
-        return replace(self.vessel, mass=mass, inertia=inertia).body(boxes_in(self.boxes, np.eye(3)))
+        """Return the rigid body for Bullet with another mass (kg) and inertia tensor (kg m2).
+
+        Raises InputError.
+        """
+        return replace(self.vessel, mass=mass, inertia=inertia).body(
+            boxes_in(self.boxes, np.eye(3))
+        )
 
 
-def read_surface_vessel(name: str, data: Mapping[str, Any], keys: tuple[str, ...]) -> SurfaceVesselData:
+def read_surface_vessel(
+    name: str, data: Mapping[str, Any], keys: tuple[str, ...]
+) -> SurfaceVesselData:
     """Read the data of a floating vessel.
 
     Args:
@@ -67,26 +80,49 @@ class _SurfaceVesselReader(BoatReader):
         values: dict[str, Any] = {
             **self.read_boat(data, boxes),
             "inertia": self.read_inertia(data.get("inertia", [1.0] * 3)),
-            "quadratic_damping": self.read_matrix(data.get("quadratic_damping", [0.0] * 6), ("quadratic_damping",)),
+            "quadratic_damping": self.read_matrix(
+                data.get("quadratic_damping", [0.0] * 6), ("quadratic_damping",)
+            ),
             "hull": self.read_hull(data.get("hull")),
         }
-        crash_speed = self.quantity(data.get("crash_speed", 1.0), ("crash_speed",), "m/s", above=0.0)
+        crash_speed = self.quantity(
+            data.get("crash_speed", 1.0), ("crash_speed",), "m/s", above=0.0
+        )
         if self.problems:
             return None
-        return self.construct(lambda: SurfaceVesselData(SurfaceVessel(name=name, **values), boxes, crash_speed))
+        return self.construct(
+            lambda: SurfaceVesselData(SurfaceVessel(name=name, **values), boxes, crash_speed)
+        )
 
     def read_hull(self, value: Any) -> HullForm:
         """Read the form of the hulls."""
         data = self.read_data(value, path := ("hull",), HULL_KEYS, _HULL_OPTIONAL_KEYS)
-        length, beam, depth = (self.quantity(data.get(key, 1.0), (*path, key), "m", above=0.0) for key in HULL_KEYS[1:4])
+        length, beam, depth = (
+            self.quantity(data.get(key, 1.0), (*path, key), "m", above=0.0)
+            for key in HULL_KEYS[1:4]
+        )
         count = self.integer(data.get("count", 1), (*path, "count"), 1, 2)
         if count == 2 and "offset" not in data:
             self.add_problem(path, '"offset" is missing: two hulls have a distance from the middle')
-        offset = self.quantity(data.get("offset", 0.0), (*path, "offset"), "m", low=0.0) if count == 2 else 0.0
-        fullness = self.quantity(data.get("waterplane_coefficient", 1.0), (*path, "waterplane_coefficient"), "1", 0.01, 1.0)
+        offset = (
+            self.quantity(data.get("offset", 0.0), (*path, "offset"), "m", low=0.0)
+            if count == 2
+            else 0.0
+        )
+        fullness = self.quantity(
+            data.get("waterplane_coefficient", 1.0),
+            (*path, "waterplane_coefficient"),
+            "1",
+            0.01,
+            1.0,
+        )
         if count == 2 and "offset" in data and 2 * offset < beam:
             self.add_problem(
-                (*path, "offset"), f"found {offset:g}: the hulls overlap, expected at least half of the beam, {beam / 2:g}"
+                (*path, "offset"),
+                (
+                    f"found {offset:g}: the hulls overlap, expected at least half of the beam, "
+                    f"{beam / 2:g}"
+                ),
             )
         area = count * fullness * length * beam
         moments = {
@@ -97,7 +133,10 @@ class _SurfaceVesselReader(BoatReader):
         for key, reach in reaches.items():
             moments[key] = self.quantity(data.get(key, moments[key]), (*path, key), "m4", above=0.0)
             if not self.problems and moments[key] > (limit := area * reach**2):
-                text = f"found {moments[key]:g}, expected at most {limit:.4g}: area of the waterplane times squared half extent"
+                text = (
+                    f"found {moments[key]:g}, expected at most {limit:.4g}: area of the waterplane "
+                    "times squared half extent"
+                )
                 self.add_problem((*path, key), text)
         return HullForm(
             count=count,
@@ -106,8 +145,13 @@ class _SurfaceVesselReader(BoatReader):
             offset=offset,
             depth=depth,
             bottom=self.quantity(data.get("bottom", 0.0), (*path, "bottom"), "m"),
-            waterplane_centre=self.quantity(data.get("waterplane_centre", 0.0), (*path, "waterplane_centre"), "m"),
+            waterplane_centre=self.quantity(
+                data.get("waterplane_centre", 0.0), (*path, "waterplane_centre"), "m"
+            ),
             waterplane_coefficient=fullness,
             **moments,
-            **{key: self.quantity(data.get(key, 0.0), (*path, key), "1", low=0.0) for key in _HULL_OPTIONAL_KEYS[5:]},
+            **{
+                key: self.quantity(data.get(key, 0.0), (*path, key), "1", low=0.0)
+                for key in _HULL_OPTIONAL_KEYS[5:]
+            },
         )

@@ -1,10 +1,11 @@
 """Contact functions (`common/contact_maps.py`) of vessels in six degrees of freedom.
 
-A floating vessel responds to a load differently from a free rigid body: the water adds mass, restoring and damping. Therefore the
-contact impulse of the previous step acts as a constant force while the equations predict, and Bullet receives the predicted
-twist without its effect. Bullet then finds the whole impulse again, and the difference to the previous one is added to the
-velocity. In steady contact both are equal, so that the motion is that of the equations with the contact force included. The force
-is constant in world axes, which conserves momentum.
+A floating vessel responds to a load differently from a free rigid body: the water adds mass,
+restoring and damping. Therefore the contact impulse of the previous step acts as a constant force
+while the equations predict, and Bullet receives the predicted twist without its effect. Bullet then
+finds the whole impulse again, and the difference to the previous one is added to the velocity. In
+steady contact both are equal, so that the motion is that of the equations with the contact force
+included. The force is constant in world axes, which conserves momentum.
 """
 
 from __future__ import annotations
@@ -58,10 +59,11 @@ def constant_body(body: Body) -> Callable[[ca.SX], BulletBody]:
 class FloatingContactMaps:
     """Contact functions of a vessel with the states `interface.VESSEL_STATES`.
 
-    Bullet's body has its centre of mass in the origin O of the body frame, and mass and inertia of `body`. The
-    impulse that Bullet finds does not depend on them, because the previous impulse is taken into account; they should not exceed
-    those of the vessel. Poses and twists in Bullet are those of O. The argument `contact_impulse` is the impulse on O in the last
-    step (N s, N m s about O, world frame), shape (6,).
+    Bullet's body has its centre of mass in the origin O of the body frame, and mass and inertia of
+    `body`. The impulse that Bullet finds does not depend on them, because the previous impulse is
+    taken into account; they should not exceed those of the vessel. Poses and twists in Bullet are
+    those of O. The argument `contact_impulse` is the impulse on O in the last step (N s, N m s
+    about O, world frame), shape (6,).
 
     Attributes:
         model: Equations of the vessel as they are exported.
@@ -75,24 +77,43 @@ class FloatingContactMaps:
 
     def functions(self) -> list[ca.Function]:
         """Return the functions to export."""
-        return [self._initialize_function(), self._predict_function(), self._correct_function(), create_elevation_function()]
+        return [
+            self._initialize_function(),
+            self._predict_function(),
+            self._correct_function(),
+            create_elevation_function(),
+        ]
 
     def _initialize_function(self) -> ca.Function:
         parameters, constants = parameters_and_constants(self.model)
         state = self.model.initial_state(constants)
         frame = self.vessel.hull_with(constants).frame(state[3:7])
-        twist = ca.vertcat(frame.to_world @ state[7:10], frame.attitude @ (frame.rates_to_angular_velocity @ state[10:13]))
-        return ca.Function("contact_initialize", [parameters], [constants, state, twist, twist, _bullet_pose(state)])
+        twist = ca.vertcat(
+            frame.to_world @ state[7:10],
+            frame.attitude @ (frame.rates_to_angular_velocity @ state[10:13]),
+        )
+        return ca.Function(
+            "contact_initialize",
+            [parameters],
+            [constants, state, twist, twist, _bullet_pose(state)],
+        )
 
     def _predict_function(self) -> ca.Function:
         arguments = predict_symbols(self.model)
         state, inputs, environment_inputs, constants, step = arguments[:5]
         (impulse,) = create_symbols(contact_impulse=6)
         hull, attitude = self.vessel.hull_with(constants), kinematics.rotation_matrix(state[3:7])
-        loaded = self._inputs_with_contact_force(inputs, _impulse_about_centre(hull, attitude, impulse), step)
+        loaded = self._inputs_with_contact_force(
+            inputs, _impulse_about_centre(hull, attitude, impulse), step
+        )
         end = predicted_state(self.model, state, loaded, environment_inputs, constants, step)
         linear = (end[0:3] - state[0:3]) / step
-        angular = kinematics.rotation_vector(kinematics.quaternion_product(end[3:7], kinematics.conjugate(state[3:7]))) / step
+        angular = (
+            kinematics.rotation_vector(
+                kinematics.quaternion_product(end[3:7], kinematics.conjugate(state[3:7]))
+            )
+            / step
+        )
         body = self.body(constants)
         inertia = _inertia_in_world(body, attitude)
         twist = ca.vertcat(linear, angular) - ca.vertcat(
@@ -101,7 +122,17 @@ class FloatingContactMaps:
         torque = ca.cross(twist[3:6], inertia @ twist[3:6])
         endpoints = ca.vertcat(state[0:3], end[0:3])
         status = step_status(end, endpoints, arguments, is_upside_down(end[3:7]))
-        results = [state, end, twist, twist, torque, _bullet_pose(state), impulse, endpoints, status]
+        results = [
+            state,
+            end,
+            twist,
+            twist,
+            torque,
+            _bullet_pose(state),
+            impulse,
+            endpoints,
+            status,
+        ]
         return ca.Function("contact_predict", [*arguments, impulse], results)
 
     def _correct_function(self) -> ca.Function:
@@ -112,7 +143,9 @@ class FloatingContactMaps:
         change, body = bullet_twist - twist, self.body(constants)
         linear, angular = body.mass * change[0:3], _inertia_in_world(body, attitude) @ change[3:6]
         magnitude = contact_impulse(ca.norm_2(linear))
-        impulse = ca.if_else(magnitude > 0, ca.vertcat(linear, angular), ca.SX.zeros(6)) + 0 * magnitude
+        impulse = (
+            ca.if_else(magnitude > 0, ca.vertcat(linear, angular), ca.SX.zeros(6)) + 0 * magnitude
+        )
         in_contact = ca.logic_or(magnitude > 0, ca.norm_2(previous) > 0)
         surplus = _impulse_about_centre(hull, attitude, impulse - previous)
         pose = _integrate_pose(start, bullet_twist, step)
@@ -126,15 +159,23 @@ class FloatingContactMaps:
             ca.inv(frame.rates_to_angular_velocity) @ (frame.attitude.T @ bullet_twist[3:6]),
         )
         state = ca.if_else(in_contact, corrected, predicted)
-        published = ca.vertcat(state[0:7], ca.if_else(magnitude > 0, mean_nu, state[7:13]), state[13:])
-        return ca.Function("contact_correct", [*arguments, previous], [state, magnitude, hull.observe(published), impulse])
+        published = ca.vertcat(
+            state[0:7], ca.if_else(magnitude > 0, mean_nu, state[7:13]), state[13:]
+        )
+        return ca.Function(
+            "contact_correct",
+            [*arguments, previous],
+            [state, magnitude, hull.observe(published), impulse],
+        )
 
     def _inputs_with_contact_force(self, inputs: ca.SX, impulse: _Impulse, step: ca.SX) -> ca.SX:
         """Return the inputs with the contact force, constant over the step, added to the external loads."""
         names = [variable.name for variable in self.model.elements("input")]
         first = names.index("external_force.x")
         load = ca.vertcat(impulse.linear, impulse.angular) / step
-        return ca.vertcat(inputs[:first], inputs[first : first + TWIST_SIZE] + load, inputs[first + TWIST_SIZE :])
+        return ca.vertcat(
+            inputs[:first], inputs[first : first + TWIST_SIZE] + load, inputs[first + TWIST_SIZE :]
+        )
 
 
 def _inertia_in_world(body: BulletBody, attitude: ca.SX) -> ca.SX:
@@ -148,18 +189,24 @@ def _angular_velocity_change(body: BulletBody, attitude: ca.SX, impulse: ca.SX) 
 
 def _impulse_about_centre(hull: Hull, attitude: ca.SX, impulse: ca.SX) -> _Impulse:
     """Move an impulse (6) on O to the centre of mass."""
-    return _Impulse(impulse[0:3], impulse[3:6] - ca.cross(attitude @ hull.centre_of_mass, impulse[0:3]))
+    return _Impulse(
+        impulse[0:3], impulse[3:6] - ca.cross(attitude @ hull.centre_of_mass, impulse[0:3])
+    )
 
 
 def _impulse_load(hull: Hull, frame: Frame, impulse: _Impulse) -> ca.SX:
     """Return the impulse as a generalised impulse (6) about O in the equations of motion."""
     lever = frame.attitude @ hull.centre_of_mass
-    return frame.generalised_force(impulse.linear, impulse.angular + ca.cross(lever, impulse.linear))
+    return frame.generalised_force(
+        impulse.linear, impulse.angular + ca.cross(lever, impulse.linear)
+    )
 
 
 def _integrate_pose(start: ca.SX, twist: ca.SX, step: ca.SX) -> ca.SX:
     """Return position and quaternion after a step (s) with a constant twist."""
-    orientation = kinematics.quaternion_product(kinematics.quaternion_from_rotation_vector(twist[3:6] * step), start[3:7])
+    orientation = kinematics.quaternion_product(
+        kinematics.quaternion_from_rotation_vector(twist[3:6] * step), start[3:7]
+    )
     return ca.vertcat(start[0:3] + twist[0:3] * step, kinematics.normalised_quaternion(orientation))
 
 

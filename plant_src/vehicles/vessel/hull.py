@@ -1,11 +1,15 @@
-"""Equations of motion of a floating vessel in six degrees of freedom; `vehicles/README.md` has them with their sources.
+"""Equations of motion of a floating vessel in six degrees of freedom.
 
-Fossen (2021), Handbook of Marine Craft Hydrodynamics and Motion Control, 2nd edition, chapters 3, 6 and 10, converted to world
-frame ENU and body frame forward-left-up. The origin O of the body frame is fixed in the hull and need not be the centre of mass.
-nu = (u, v, w, p, q, r) holds surge, sway and heave velocity of O (m/s) and roll, pitch and yaw rate (rad/s), body frame. Loads
-tau = (X, Y, Z, K, M, N) are forces (N) and moments about O (N m), body frame.
+`vehicles/README.md` has them with their sources.
 
-State: position of O (m, world frame), unit quaternion, nu, time (s), and the states of the actuators.
+Fossen (2021), Handbook of Marine Craft Hydrodynamics and Motion Control, 2nd edition, chapters 3, 6
+and 10, converted to world frame ENU and body frame forward-left-up. The origin O of the body frame
+is fixed in the hull and need not be the centre of mass. nu = (u, v, w, p, q, r) holds surge, sway
+and heave velocity of O (m/s) and roll, pitch and yaw rate (rad/s), body frame. Loads tau = (X, Y,
+Z, K, M, N) are forces (N) and moments about O (N m), body frame.
+
+State: position of O (m, world frame), unit quaternion, nu, time (s), and the states of the
+actuators.
 """
 
 from __future__ import annotations
@@ -26,14 +30,16 @@ from .wave_loads import WaterMotion, water_motion
 class Frame:
     """Rotations between body, velocity and world frame.
 
-    The velocity frame, in which nu is expressed, is the body frame for most vessels. The Otter's velocity frame is level when the
-    trimmed vessel is at rest.
+    The velocity frame, in which nu is expressed, is the body frame for most vessels. The Otter's
+    velocity frame is level when the trimmed vessel is at rest.
 
     Attributes:
         attitude: Rotation matrix body to world frame, shape (3, 3).
         to_world: Rotation matrix velocity frame to world frame, shape (3, 3).
-        rates_to_angular_velocity: Matrix from (p, q, r) to the angular velocity in the body frame, shape (3, 3).
-        world_to_current_axes: Matrix from the current in the world frame to that in the velocity frame, shape (3, 3).
+        rates_to_angular_velocity: Matrix from (p, q, r) to the angular velocity in the body frame,
+            shape (3, 3).
+        world_to_current_axes: Matrix from the current in the world frame to that in the velocity
+            frame, shape (3, 3).
     """
 
     attitude: ca.SX
@@ -43,7 +49,9 @@ class Frame:
 
     def generalised_force(self, force: ca.SX, torque: ca.SX) -> ca.SX:
         """Return the load tau, shape (6,), of a force at O (N) and a torque about O (N m), both in the world frame."""
-        return ca.vertcat(self.to_world.T @ force, self.rates_to_angular_velocity.T @ (self.attitude.T @ torque))
+        return ca.vertcat(
+            self.to_world.T @ force, self.rates_to_angular_velocity.T @ (self.attitude.T @ torque)
+        )
 
 
 @dataclass(frozen=True)
@@ -86,7 +94,9 @@ class LoadArguments:
             strips: Strips of the hull.
         """
         load = load_of_force_at(centre, mass * (self.frame.to_world.T @ self.water.acceleration))
-        return load + ca.vertcat(0, 0, 0, mass * strips.radii_squared * self.water.angular_acceleration, 0)
+        return load + ca.vertcat(
+            0, 0, 0, mass * strips.radii_squared * self.water.angular_acceleration, 0
+        )
 
 
 def level_frame(orientation: ca.SX) -> Frame:
@@ -97,14 +107,17 @@ def level_frame(orientation: ca.SX) -> Frame:
 
 @dataclass(frozen=True)
 class Hull:
-    """Rigid body, added mass and loads of one vessel with given constants; positions are in the body frame from O.
+    """Rigid body, added mass and loads of one vessel with given constants.
+
+    Positions are in the body frame from O.
 
     Attributes:
         mass: Mass (kg).
         centre_of_mass: Centre of mass r_g (m), shape (3,).
         inertia: Inertia about the centre of mass I_g (kg m2), shape (3, 3).
         added_mass: M_A, shape (6, 6).
-        coriolis_added_mass: Part of M_A whose Coriolis and centripetal loads C_A are not contained in `loads`, shape (6, 6).
+        coriolis_added_mass: Part of M_A whose Coriolis and centripetal loads C_A are not contained
+            in `loads`, shape (6, 6).
         inverse_mass_matrix: Inverse of M_RB + M_A, shape (6, 6).
         deck_centre: Centre of the top of the landing deck (m), shape (3,).
         equilibrium: Height of O (m), roll and pitch (rad) of the vessel afloat at rest, shape (3,).
@@ -113,8 +126,8 @@ class Hull:
         wave_table: Wave components, see `wave_loads.wave_table`.
         loads: Function for the load tau (6) of water, air and propulsion, without added mass.
         frame: Function from the orientation to the rotations.
-        centre_in_velocity_axes: Centre of mass in the velocity frame (m), shape (3,); None: `centre_of_mass`. The inertia is in
-            the velocity frame as well.
+        centre_in_velocity_axes: Centre of mass in the velocity frame (m), shape (3,); None:
+            `centre_of_mass`. The inertia is in the velocity frame as well.
     """
 
     mass: ca.SX
@@ -135,28 +148,52 @@ class Hull:
     @property
     def velocity_centre(self) -> ca.SX:
         """Centre of mass in the velocity frame (m), shape (3,)."""
-        return self.centre_of_mass if self.centre_in_velocity_axes is None else self.centre_in_velocity_axes
+        return (
+            self.centre_of_mass
+            if self.centre_in_velocity_axes is None
+            else self.centre_in_velocity_axes
+        )
 
     def initial_state(self, initial: NamedValues, actuators: int = 0) -> ca.SX:
         """Return the state from the parameters `initial.*`, with `actuators` further states of 0.
 
-        With `initial.on_waves` the vessel is displaced with the plane of the surface, and moves with the water.
+        With `initial.on_waves` the vessel is displaced with the plane of the surface, and moves
+        with the water.
         """
-        displacement = self.equilibrium + ca.vertcat(*(initial[f"initial.{name}"] for name in ("heave", "roll", "pitch")))
+        displacement = self.equilibrium + ca.vertcat(
+            *(initial[f"initial.{name}"] for name in ("heave", "roll", "pitch"))
+        )
         yaw, time = initial["initial.yaw"], initial["initial.time"]
         level = self.frame(kinematics.quaternion_from_euler(displacement[1], displacement[2], yaw))
-        centre = initial["initial.position"] + (level.attitude @ (self.strips.centre - self.centre_of_mass))[0:2]
-        water = water_motion(
-            centre, level.attitude, time, self.strips, initial["initial.on_waves"], self.wave_count, self.wave_table
+        centre = (
+            initial["initial.position"]
+            + (level.attitude @ (self.strips.centre - self.centre_of_mass))[0:2]
         )
-        rise = water.heave + ca.dot(water.slopes, ca.vertcat(-self.strips.centre[1], self.strips.centre[0]))
+        water = water_motion(
+            centre,
+            level.attitude,
+            time,
+            self.strips,
+            initial["initial.on_waves"],
+            self.wave_count,
+            self.wave_table,
+        )
+        rise = water.heave + ca.dot(
+            water.slopes, ca.vertcat(-self.strips.centre[1], self.strips.centre[0])
+        )
         height, roll, pitch = ca.vertsplit(displacement + ca.vertcat(rise, water.slopes))
         orientation = kinematics.quaternion_from_euler(roll, pitch, yaw)
         frame = self.frame(orientation)
         origin = initial["initial.position"] - (frame.attitude @ self.centre_of_mass)[0:2]
         rates = initial["initial.rates"] + ca.vertcat(water.rates, 0)
-        velocity = initial["initial.velocity_body"] + frame.to_world.T @ water.velocity - ca.cross(rates, self.velocity_centre)
-        return ca.vertcat(origin, height, orientation, velocity, rates, time, ca.SX.zeros(actuators))
+        velocity = (
+            initial["initial.velocity_body"]
+            + frame.to_world.T @ water.velocity
+            - ca.cross(rates, self.velocity_centre)
+        )
+        return ca.vertcat(
+            origin, height, orientation, velocity, rates, time, ca.SX.zeros(actuators)
+        )
 
     def rate(self, state: ca.SX, inputs: NamedValues) -> ca.SX:
         """Return the time derivative of position, quaternion, nu and time (`vehicles/README.md`)."""
@@ -165,31 +202,60 @@ class Hull:
         rates = nu[3:6]
         centre = state[0:2] + (frame.attitude @ self.strips.centre)[0:2]
         water = water_motion(
-            centre, frame.attitude, state[13], self.strips, inputs["wave_gain"], self.wave_count, self.wave_table
+            centre,
+            frame.attitude,
+            state[13],
+            self.strips,
+            inputs["wave_gain"],
+            self.wave_count,
+            self.wave_table,
         )
         current = frame.world_to_current_axes @ ca.vertcat(inputs["current"], 0)
-        wave_velocity, wave_acceleration = frame.to_world.T @ water.velocity, frame.to_world.T @ water.acceleration
+        wave_velocity, wave_acceleration = (
+            frame.to_world.T @ water.velocity,
+            frame.to_world.T @ water.acceleration,
+        )
         nu_without_current = ca.vertcat(nu[0:3] - current, rates)
         nu_r = ca.vertcat(nu_without_current[0:3] - wave_velocity, rates)
         air = nu[0:3] - frame.to_world.T @ inputs["wind"]
-        now = LoadArguments(frame, orientation, nu_r, air, nu[0:3], state[2], water, inputs, state[len(VESSEL_STATES) :])
+        now = LoadArguments(
+            frame,
+            orientation,
+            nu_r,
+            air,
+            nu[0:3],
+            state[2],
+            water,
+            inputs,
+            state[len(VESSEL_STATES) :],
+        )
         tau = self.loads(now) + self._external_load(frame, inputs)
         linear = wave_acceleration - ca.cross(rates, wave_velocity)
         tau += self.added_mass @ ca.vertcat(linear, water.angular_acceleration, 0)
-        tau -= self._rigid_body_coriolis(nu_without_current) + coriolis_load(self.coriolis_added_mass, nu_r)
-        acceleration = self.inverse_mass_matrix @ tau - ca.vertcat(ca.cross(rates, current), ca.SX.zeros(3))
-        quaternion_rate = kinematics.quaternion_rate(orientation, frame.rates_to_angular_velocity @ rates)
+        tau -= self._rigid_body_coriolis(nu_without_current) + coriolis_load(
+            self.coriolis_added_mass, nu_r
+        )
+        acceleration = self.inverse_mass_matrix @ tau - ca.vertcat(
+            ca.cross(rates, current), ca.SX.zeros(3)
+        )
+        quaternion_rate = kinematics.quaternion_rate(
+            orientation, frame.rates_to_angular_velocity @ rates
+        )
         return ca.vertcat(frame.to_world @ nu[0:3], quaternion_rate, acceleration, 1)
 
     def _rigid_body_coriolis(self, nu: ca.SX) -> ca.SX:
         """Return C_RB(nu) nu in terms of the angular velocity (Fossen 2021, section 3.3)."""
         velocity, rates = nu[0:3], nu[3:6]
         force = self.mass * ca.cross(rates, velocity + ca.cross(rates, self.velocity_centre))
-        return ca.vertcat(force, ca.cross(rates, self.inertia @ rates) + ca.cross(self.velocity_centre, force))
+        return ca.vertcat(
+            force, ca.cross(rates, self.inertia @ rates) + ca.cross(self.velocity_centre, force)
+        )
 
     def _external_load(self, frame: Frame, inputs: NamedValues) -> ca.SX:
         force, torque = inputs["external_force"], inputs["external_torque"]
-        return frame.generalised_force(force, torque + ca.cross(frame.attitude @ self.centre_of_mass, force))
+        return frame.generalised_force(
+            force, torque + ca.cross(frame.attitude @ self.centre_of_mass, force)
+        )
 
     def observe(self, state: ca.SX) -> ca.SX:
         """Return the motion of the centre of mass (`interface.MOTION_OUTPUTS`) and the deck (`interface.DECK_OUTPUTS`)."""

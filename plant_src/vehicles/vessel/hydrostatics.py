@@ -53,7 +53,9 @@ def improved_equilibrium(state: ca.SX, hull: TwinHull, ballast: Ballast, stiffne
 
 def attitude_at(state: ca.SX) -> ca.SX:
     """Return the rotation matrix body to world frame for height, roll and pitch with the yaw angle 0."""
-    return kinematics.rotation_matrix(kinematics.quaternion_from_euler(state[1], state[2], ca.SX(0)))
+    return kinematics.rotation_matrix(
+        kinematics.quaternion_from_euler(state[1], state[2], ca.SX(0))
+    )
 
 
 def upward_axis(state: ca.SX) -> ca.SX:

@@ -35,13 +35,16 @@ class PlanarBody(NamedTuple):
 class PlanarContactMaps:
     """Contact functions of a vessel in the horizontal plane.
 
-    The state begins with x, y, yaw, surge, sway and yaw rate of the centre of mass; contact does not change its further elements.
+    The state begins with x, y, yaw, surge, sway and yaw rate of the centre of mass; contact does
+    not change its further elements.
 
-    Bullet's body cannot roll or pitch, but it can heave. A load presses it down; the lift that cancels this is predicted from the
-    impulses of the last two steps, and Bullet receives it as an upward velocity. If Bullet finds the same impulse again, the
-    body keeps its height. Of two unequal impulses the weaker one is used, so that an impact does not lift the vessel.
+    Bullet's body cannot roll or pitch, but it can heave. A load presses it down; the lift that
+    cancels this is predicted from the impulses of the last two steps, and Bullet receives it as an
+    upward velocity. If Bullet finds the same impulse again, the body keeps its height. Of two
+    unequal impulses the weaker one is used, so that an impact does not lift the vessel.
 
-    The argument `vertical_load` holds the downward impulses of the last two steps (N s) and the heave in Bullet (m).
+    The argument `vertical_load` holds the downward impulses of the last two steps (N s) and the
+    heave in Bullet (m).
 
     Attributes:
         model: Equations of the vessel.
@@ -62,31 +65,60 @@ class PlanarContactMaps:
         state = self.model.initial_state(constants)
         twist = _planar_twist(_planar_rotation(state[2]) @ state[3:5], ca.SX(0), state[5])
         return ca.Function(
-            "contact_initialize", [parameters], [constants, state, twist, twist, _bullet_pose(state, self.body(constants))]
+            "contact_initialize",
+            [parameters],
+            [constants, state, twist, twist, _bullet_pose(state, self.body(constants))],
         )
 
     def _predict_function(self) -> ca.Function:
         arguments = predict_symbols(self.model)
-        state, end, constants, step = arguments[0], predicted_state(self.model, *arguments[:5]), *arguments[3:5]
+        state, end, constants, step = (
+            arguments[0],
+            predicted_state(self.model, *arguments[:5]),
+            *arguments[3:5],
+        )
         body = self.body(constants)
         (vertical_load,) = create_symbols(vertical_load=3)
         rates = (end[0:3] - state[0:3]) / step
-        twist = _planar_twist(rates[0:2], _minmod(vertical_load[0], vertical_load[1]) / body.mass, rates[2])
-        endpoints = ca.vertcat(self.observe(state, constants)[0:3], self.observe(end, constants)[0:3])
+        twist = _planar_twist(
+            rates[0:2], _minmod(vertical_load[0], vertical_load[1]) / body.mass, rates[2]
+        )
+        endpoints = ca.vertcat(
+            self.observe(state, constants)[0:3], self.observe(end, constants)[0:3]
+        )
         previous_load = ca.vertcat(vertical_load[0], vertical_load[2])
         status = step_status(end, endpoints, arguments, ca.SX(0))
-        results = [state, end, twist, twist, _bullet_pose(state, body), previous_load, endpoints, status]
+        results = [
+            state,
+            end,
+            twist,
+            twist,
+            _bullet_pose(state, body),
+            previous_load,
+            endpoints,
+            status,
+        ]
         return ca.Function("contact_predict", [*arguments, vertical_load], results)
 
     def _correct_function(self) -> ca.Function:
-        start, predicted, twist, bullet_twist, constants, step = arguments = correct_symbols(self.model)
+        start, predicted, twist, bullet_twist, constants, step = arguments = correct_symbols(
+            self.model
+        )
         (previous_load,) = create_symbols(previous_vertical_load=2)
         change, body = bullet_twist - twist, self.body(constants)
-        velocity = predicted[3:6] + ca.vertcat(_planar_rotation(predicted[2]).T @ change[0:2], change[5])
-        impulse = contact_impulse(ca.norm_2(ca.vertcat(body.mass * change[0:3], body.yaw_inertia * change[5])))
+        velocity = predicted[3:6] + ca.vertcat(
+            _planar_rotation(predicted[2]).T @ change[0:2], change[5]
+        )
+        impulse = contact_impulse(
+            ca.norm_2(ca.vertcat(body.mass * change[0:3], body.yaw_inertia * change[5]))
+        )
         pose = start[0:3] + step * ca.vertcat(bullet_twist[0:2], bullet_twist[5])
-        published = ca.vertcat(pose, _planar_rotation(pose[2]).T @ bullet_twist[0:2], bullet_twist[5], predicted[6:])
-        vertical_load = ca.vertcat(-body.mass * change[2], previous_load[0], previous_load[1] + bullet_twist[2] * step)
+        published = ca.vertcat(
+            pose, _planar_rotation(pose[2]).T @ bullet_twist[0:2], bullet_twist[5], predicted[6:]
+        )
+        vertical_load = ca.vertcat(
+            -body.mass * change[2], previous_load[0], previous_load[1] + bullet_twist[2] * step
+        )
         corrected = ca.vertcat(pose, velocity, predicted[6:])
         return correct_function(
             [*arguments, previous_load],

@@ -8,12 +8,21 @@ from ..common.elementary_functions import arctangent, sine_of_right_angle_share
 
 
 def rudder_force(
-    u: ca.SX, v: ca.SX, race: ca.SX, angle: ca.SX, turn: tuple[ca.SX, ca.SX], pressure_area: ca.SX, stall_angle: ca.SX
+    u: ca.SX,
+    v: ca.SX,
+    race: ca.SX,
+    angle: ca.SX,
+    turn: tuple[ca.SX, ca.SX],
+    pressure_area: ca.SX,
+    stall_angle: ca.SX,
 ) -> tuple[ca.SX, ca.SX]:
-    """Return surge and sway force (N); the lift is a sine of the angle of attack up to the stall angle.
+    """Return surge and sway force (N).
+
+    The lift is a sine of the angle of attack up to the stall angle.
 
     Args:
-        u: Surge velocity relative to the water at the rudder (m/s); the lift changes its sign when going astern.
+        u: Surge velocity relative to the water at the rudder (m/s); the lift changes its sign when
+            going astern.
         v: Sway velocity relative to the water at the rudder (m/s).
         race: What a propeller adds to the squared velocity at the rudder (m2/s2).
         angle: Rudder angle (rad).

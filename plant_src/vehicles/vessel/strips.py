@@ -1,9 +1,10 @@
 """Strips of a twin hull: buoyancy of boxes cut by the surface of the water.
 
-Each hull is divided into `STATION_COUNT` boxes of equal length. Their spacing and their distance from the centre line are those
-of points with the moments of inertia of the waterplane, so that the static stiffness is exact. A hull that leaves the water loses
-its buoyancy, so that the righting moment has a limit, and the vessel can capsize. The bottoms are level, or each station has its
-own (`TwinHull.boxes`).
+Each hull is divided into `STATION_COUNT` boxes of equal length. Their spacing and their distance
+from the centre line are those of points with the moments of inertia of the waterplane, so that the
+static stiffness is exact. A hull that leaves the water loses its buoyancy, so that the righting
+moment has a limit, and the vessel can capsize. The bottoms are level, or each station has its own
+(`TwinHull.boxes`).
 """
 
 from __future__ import annotations
@@ -23,7 +24,9 @@ _MEAN_SQUARE = sum(station**2 for station in _STATIONS) / STATION_COUNT
 
 @dataclass(frozen=True)
 class Strips:
-    """Positions of the strips: those of the port hull from bow to stern, then those of the starboard hull.
+    """Positions of the strips.
+
+    Those of the port hull from bow to stern, then those of the starboard hull.
 
     Attributes:
         centre: Centre of the waterplane (m, body frame), shape (3,).
@@ -55,7 +58,9 @@ class Strips:
         port, starboard = ca.vertsplit(elevations, STATION_COUNT)
         both = port + starboard
         roll = ca.sum1(port - starboard) / (STRIP_COUNT * self.offset)
-        pitch = -sum(station * both[k] for k, station in enumerate(_STATIONS)) / (STRIP_COUNT * _MEAN_SQUARE * self.spacing)
+        pitch = -sum(station * both[k] for k, station in enumerate(_STATIONS)) / (
+            STRIP_COUNT * _MEAN_SQUARE * self.spacing
+        )
         return ca.sum1(both) / STRIP_COUNT, ca.vertcat(roll, pitch)
 
 
@@ -94,7 +99,8 @@ class TwinHull:
         draught: Mean draught at rest (m).
         depth: Mean height of the boxes (m).
         area: Area of the waterplane of both hulls (m2).
-        stations: Boxes from bow to stern if they differ; otherwise their bottoms are `draught` below the waterplane.
+        stations: Boxes from bow to stern if they differ; otherwise their bottoms are `draught`
+            below the waterplane.
     """
 
     strips: Strips
@@ -118,7 +124,8 @@ class Immersion:
     Attributes:
         volume: Displaced volume (m3).
         moment: Volume times its centre (m4, body frame), shape (3,).
-        wetness: Mean share of the strips with water at their bottoms: 1 from half of the draught at rest on, 0 in the air.
+        wetness: Mean share of the strips with water at their bottoms: 1 from half of the draught at
+            rest on, 0 in the air.
     """
 
     volume: ca.SX
@@ -129,8 +136,9 @@ class Immersion:
 def immersion(hull: TwinHull, up: ca.SX, height: ca.SX, elevations: ca.SX) -> Immersion:
     """Return the part of the boxes below the surface.
 
-    A box is cut level at the elevation of its strip. The immersed share grows linearly over the largest of its three vertical
-    extents, which is exact for a box that is not heeled beyond 45 degrees.
+    A box is cut level at the elevation of its strip. The immersed share grows linearly over the
+    largest of its three vertical extents, which is exact for a box that is not heeled beyond 45
+    degrees.
 
     Args:
         hull: Dimensions.
@@ -147,11 +155,17 @@ def immersion(hull: TwinHull, up: ca.SX, height: ca.SX, elevations: ca.SX) -> Im
         heights = base + up[0] * x + up[1] * offset, base + up[0] * x - up[1] * offset
         levels = elevations[k] - heights[0], elevations[k + STATION_COUNT] - heights[1]
         port, starboard = (ca.fmin(1, ca.fmax(0, 0.5 + scale * level)) for level in levels)
-        # sums and differences of both hulls, so that a symmetric vessel has no moment at all about its long axis
-        part, difference = box.volume_share * (port + starboard), box.volume_share * (port - starboard)
+        # sums and differences of both hulls, so that a symmetric vessel has no moment at all about
+        # its long axis
+        part, difference = (
+            box.volume_share * (port + starboard),
+            box.volume_share * (port - starboard),
+        )
         raised = box.volume_share * lowest_shift * (port * (port - 1) + starboard * (starboard - 1))
         total += part
-        moment += ca.vertcat(part * x, difference * offset, part * (box.middle - reference) + raised)
+        moment += ca.vertcat(
+            part * x, difference * offset, part * (box.middle - reference) + raised
+        )
         wet = [ca.fmin(1, share * (2 * box.depth / box.draught)) for share in (port, starboard)]
         wetness += box.wet_share * sum(share * (2 - share) for share in wet)
     volume = hull.area * hull.depth / STRIP_COUNT
@@ -162,7 +176,10 @@ def immersion(hull: TwinHull, up: ca.SX, height: ca.SX, elevations: ca.SX) -> Im
 def _cut(hull: TwinHull, box: Box, up: ca.SX, height: ca.SX) -> tuple[ca.SX, ca.SX, ca.SX]:
     """Return immersed share over water level (1/m), lever of the share's centre (m), height (m) of a box at the centre line."""
     centre, depth = hull.strips.centre, box.depth
-    extent = ca.fmax(depth * ca.fabs(up[2]), ca.fmax(hull.beam * ca.fabs(up[1]), hull.strips.spacing * ca.fabs(up[0])))
+    extent = ca.fmax(
+        depth * ca.fabs(up[2]),
+        ca.fmax(hull.beam * ca.fabs(up[1]), hull.strips.spacing * ca.fabs(up[0])),
+    )
     scale = 1 / extent
     base = height + up[0] * centre[0] + up[1] * centre[1] + up[2] * box.middle
     return scale, depth * depth * up[2] * scale / 2, base

@@ -27,7 +27,10 @@ MAX_STEP = 0.01
 
 def wave_table_of(parameters: NamedValues, hull: TwinHull) -> ca.SX:
     """Return the table of wave components (`wave_loads.wave_table`) from the parameters `wave.*`."""
-    return wave_table(hull, *(parameters[f"wave.{name}"] for name in ("amplitude", "frequency", "direction", "phase")))
+    return wave_table(
+        hull,
+        *(parameters[f"wave.{name}"] for name in ("amplitude", "frequency", "direction", "phase")),
+    )
 
 
 @dataclass(frozen=True)
@@ -38,11 +41,12 @@ class VesselModel:
         identifier: Name of the FMU.
         description: Description of the FMU.
         variables: Parameters, inputs and outputs.
-        derive_constants: Function from the parameters to the constants, which holds everything that depends on parameters only.
+        derive_constants: Function from the parameters to the constants, which holds everything that
+            depends on parameters only.
         hull: Function from the constants to the vessel.
         actuators: Names of the actuator states.
-        actuator_rate: Function from actuator states, inputs and constants to the rates of these states. None means that the kind
-            of the exported model moves them after each step.
+        actuator_rate: Function from actuator states, inputs and constants to the rates of these
+            states. None means that the kind of the exported model moves them after each step.
         callees: Further functions that the equations call.
     """
 
@@ -64,7 +68,9 @@ class VesselModel:
         """Return the vessel for a vector of constants."""
         return self.hull(self.constants.by_name(constants))
 
-    def create_continuous_model(self, kind: type[ContinuousModel] = ContinuousModel, **options: Any) -> ContinuousModel:
+    def create_continuous_model(
+        self, kind: type[ContinuousModel] = ContinuousModel, **options: Any
+    ) -> ContinuousModel:
         """Return the model to export; its contact outputs are 0.
 
         Args:
@@ -78,8 +84,12 @@ class VesselModel:
             self.variables,
             (*VESSEL_STATES, *self.actuators),
             lambda c: self.hull_with(c).initial_state(self.constants.by_name(c), actuators),
-            lambda x, u, c: ca.vertcat(self.hull_with(c).rate(x, values_by_name(u, inputs)), self._actuator_rates(x, u, c)),
-            lambda x, _u, c: ca.vertcat(self.hull_with(c).observe(x), ca.SX.zeros(len(WORLD_OUTPUTS))),
+            lambda x, u, c: ca.vertcat(
+                self.hull_with(c).rate(x, values_by_name(u, inputs)), self._actuator_rates(x, u, c)
+            ),
+            lambda x, _u, c: ca.vertcat(
+                self.hull_with(c).observe(x), ca.SX.zeros(len(WORLD_OUTPUTS))
+            ),
             normalised_state,
             derived_parameters=self.constants.vector,
             max_sub_step=MAX_STEP,
@@ -91,7 +101,9 @@ class VesselModel:
         if self.actuator_rate is None:
             return ca.SX.zeros(len(self.actuators))
         given = values_by_name(inputs, variables_of(self.variables, "input"))
-        return self.actuator_rate(state[len(VESSEL_STATES) :], given, self.constants.by_name(constants))
+        return self.actuator_rate(
+            state[len(VESSEL_STATES) :], given, self.constants.by_name(constants)
+        )
 
 
 def normalised_state(state: ca.SX) -> ca.SX:

@@ -2,9 +2,10 @@
 
     python ring_PEER.py FMU SIZE STEPS
 
-steps a ring of SIZE instances of a lag: output y1 of each feeds input u1 of the next, the step size is 0.01 s, one value is
-recorded. It prints one line of JSON: CPU and wall time (us) per step, and the last value. A correct importer ends at 1; without
-propagation of the initial outputs the value is 0.98.
+steps a ring of SIZE instances of a lag: output y1 of each feeds input u1 of the next, the step size
+is 0.01 s, one value is recorded. It prints one line of JSON: CPU and wall time (us) per step, and
+the last value. A correct importer ends at 1; without propagation of the initial outputs the value
+is 0.98.
 """
 
 from __future__ import annotations
@@ -54,9 +55,11 @@ Outcome = tuple[float, float, float]
 
 
 def time_whole_runs(simulate: Callable[[int], float], steps: int) -> Outcome:
-    """Measure an importer that only offers whole runs: the difference of a long and a short run, so that the start cancels.
+    """Measure an importer that only offers whole runs: the difference of a long and a short run, so
+    that the start cancels.
 
-    The long run has twice the steps, since the start of a large ring takes longer than its steps, and its duration varies.
+    The long run has twice the steps, since the start of a large ring takes longer than its steps,
+    and its duration varies.
     """
     simulate(2)  # imports and caches
     with Clock() as short:
@@ -69,4 +72,7 @@ def time_whole_runs(simulate: Callable[[int], float], steps: int) -> Outcome:
 def main(run: Callable[[Ring], Outcome]) -> None:
     ring = Ring(sys.argv[1], int(sys.argv[2]), int(sys.argv[3]))
     cpu, wall, last = run(ring)
-    print(json.dumps({"cpu": cpu / ring.steps * 1e6, "wall": wall / ring.steps * 1e6, "last": last}), flush=True)
+    print(
+        json.dumps({"cpu": cpu / ring.steps * 1e6, "wall": wall / ring.steps * 1e6, "last": last}),
+        flush=True,
+    )

@@ -1,4 +1,5 @@
-"""FMU Manipulation Toolbox: `fmucontainer` packs the ring into one FMU, which the program of the C limit steps.
+"""FMU Manipulation Toolbox: `fmucontainer` packs the ring into one FMU, which the program of the C
+limit steps.
 
 python pack_fmt.py FMU SIZE CONTAINER
 """

@@ -1,4 +1,6 @@
-"""Ecos: one batch step, a CSV writer of one variable. The library needs libtbb, which the package tbb provides."""
+"""Ecos: one batch step, a CSV writer of one variable. The library needs libtbb, which the package
+tbb provides.
+"""
 
 import ctypes
 import sys

@@ -10,7 +10,9 @@ from fmpy.fmi2 import FMU2Slave
 def run(ring: Ring) -> Outcome:
     folder = fmpy.extract(ring.fmu)
     description = fmpy.read_model_description(folder)
-    reference = {variable.name: [variable.valueReference] for variable in description.modelVariables}
+    reference = {
+        variable.name: [variable.valueReference] for variable in description.modelVariables
+    }
     instances = [_initialize_fmu(description, folder, name) for name in ring.names]
     record = []
     with Clock() as clock:
@@ -30,7 +32,9 @@ def run(ring: Ring) -> Outcome:
 
 def _initialize_fmu(description, folder, name):
     identifier = description.coSimulation.modelIdentifier
-    fmu = FMU2Slave(guid=description.guid, modelIdentifier=identifier, unzipDirectory=folder, instanceName=name)
+    fmu = FMU2Slave(
+        guid=description.guid, modelIdentifier=identifier, unzipDirectory=folder, instanceName=name
+    )
     fmu.instantiate()
     fmu.setupExperiment(startTime=0.0)
     fmu.enterInitializationMode()

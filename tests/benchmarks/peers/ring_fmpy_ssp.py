@@ -16,7 +16,9 @@ COMPONENT = """<ssd:Component name="{}" type="application/x-fmu-sharedlibrary" s
 <ssd:Connector name="u1" kind="input"><ssc:Real/></ssd:Connector>
 <ssd:Connector name="y1" kind="output"><ssc:Real/></ssd:Connector>
 </ssd:Connectors></ssd:Component>"""
-CONNECTION = '<ssd:Connection startElement="{}" startConnector="y1" endElement="{}" endConnector="u1"/>'
+CONNECTION = (
+    '<ssd:Connection startElement="{}" startConnector="y1" endElement="{}" endConnector="u1"/>'
+)
 
 
 def run(ring: Ring) -> Outcome:
@@ -25,7 +27,9 @@ def run(ring: Ring) -> Outcome:
         components = "".join(COMPONENT.format(name) for name in ring.names)
         connections = "".join(CONNECTION.format(*pair) for pair in ring.pairs)
         with ZipFile(ssp, "w") as archive:
-            archive.writestr("SystemStructure.ssd", SYSTEM.format(components=components, connections=connections))
+            archive.writestr(
+                "SystemStructure.ssd", SYSTEM.format(components=components, connections=connections)
+            )
             archive.write(ring.fmu, "resources/Lag.fmu")
 
         def simulate(steps: int) -> float:

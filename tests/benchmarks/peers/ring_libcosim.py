@@ -1,6 +1,7 @@
 """libcosim: an OSP system structure, one batch step, a time series observer.
 
-CosimExecution.add_local_slave of version 0.0.6 crashes the process, so the system is read from a file.
+CosimExecution.add_local_slave of version 0.0.6 crashes the process, so the system is read from a
+file.
 """
 
 import shutil
@@ -20,9 +21,7 @@ SYSTEM = """<?xml version="1.0" encoding="utf-8" ?>
 <BaseStepSize>{step}</BaseStepSize><Algorithm>fixedStep</Algorithm><Simulators>{simulators}</Simulators>
 <Connections>{connections}</Connections></OspSystemStructure>"""
 SIMULATOR = '<Simulator name="{}" source="Lag.fmu"/>'
-CONNECTION = (
-    """<VariableConnection><Variable simulator="{}" name="y1"/><Variable simulator="{}" name="u1"/></VariableConnection>"""
-)
+CONNECTION = """<VariableConnection><Variable simulator="{}" name="y1"/><Variable simulator="{}" name="u1"/></VariableConnection>"""
 
 
 def run(ring: Ring) -> Outcome:
@@ -35,7 +34,10 @@ def run(ring: Ring) -> Outcome:
         text = SYSTEM.format(step=STEP, simulators=simulators, connections=connections)
         Path(folder, "OspSystemStructure.xml").write_text(text)
         execution = CosimExecution.from_osp_config_file(folder)
-        series, last = CosimObserver.create_time_series(ring.steps + 10), CosimObserver.create_last_value()
+        series, last = (
+            CosimObserver.create_time_series(ring.steps + 10),
+            CosimObserver.create_last_value(),
+        )
         execution.add_observer(series)
         series.start_time_series(0, reference, CosimVariableType.REAL)
         execution.step()
@@ -49,7 +51,11 @@ def run(ring: Ring) -> Outcome:
 def _reference(fmu: str, name: str) -> int:
     with ZipFile(fmu) as archive:
         root = ElementTree.fromstring(archive.read("modelDescription.xml"))  # noqa: S314 - written by lag_fmus.py
-    return next(int(v.attrib["valueReference"]) for v in root.iter("ScalarVariable") if v.get("name") == name)
+    return next(
+        int(v.attrib["valueReference"])
+        for v in root.iter("ScalarVariable")
+        if v.get("name") == name
+    )
 
 
 if __name__ == "__main__":

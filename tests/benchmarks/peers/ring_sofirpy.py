@@ -6,7 +6,13 @@ from sofirpy import simulate
 
 def run(ring: Ring) -> Outcome:
     connections = {
-        target: [{"parameter_name": "u1", "connect_to_system": source, "connect_to_external_parameter": "y1"}]
+        target: [
+            {
+                "parameter_name": "u1",
+                "connect_to_system": source,
+                "connect_to_external_parameter": "y1",
+            }
+        ]
         for source, target in ring.pairs
     }
 

@@ -8,5 +8,7 @@ import sys
 import fmpy
 
 path, start, stop, step = sys.argv[1], *map(float, sys.argv[2:])
-result = fmpy.simulate_fmu(path, validate=False, start_time=start, stop_time=stop, output_interval=step)
+result = fmpy.simulate_fmu(
+    path, validate=False, start_time=start, stop_time=stop, output_interval=step
+)
 print(len(result))

@@ -1,4 +1,6 @@
-"""Structural parameters, arrays of several dimensions, binaries and 64-bit integers, from their text to the recording."""
+"""Structural parameters, arrays of several dimensions, binaries and 64-bit integers, from their
+text to the recording.
+"""
 
 from __future__ import annotations
 
@@ -57,13 +59,25 @@ def test_arrays_are_connected_with_their_new_sizes(shapes, tmp_path):
 @pytest.mark.parametrize(
     ("values", "message"),
     [
-        ({"n": 0}, '"n" is a structural parameter, which is set before the start to a positive integer: it stays 3, found 0'),
+        (
+            {"n": 0},
+            (
+                '"n" is a structural parameter, which is set before the start to a positive '
+                "integer: it stays 3, found 0"
+            ),
+        ),
         ({"n": "2"}, 'it stays 3, found "2"'),
         ({"n": 10**9}, 'found 2 000 000 000 elements of "m", expected at most 1 000 000'),
         ({"n": 2, "m": [[1, 2]]}, '"m" is an array of 2 x 2 values, found [[1, 2]]'),
-        ({"m": [[1, 2], [3], [4, 5]]}, '"m" is an array of 3 x 2 values, found [[1, 2], [3], [4, 5]]'),
+        (
+            {"m": [[1, 2], [3], [4, 5]]},
+            '"m" is an array of 3 x 2 values, found [[1, 2], [3], [4, 5]]',
+        ),
         ({"m": [[[1], [2]]] * 3}, '"m" is an array of 3 x 2 values, found'),
-        ({"b_in": "0g"}, "\"b_in\" is of type Binary: found '0g', expected two hexadecimal digits per byte"),
+        (
+            {"b_in": "0g"},
+            "\"b_in\" is of type Binary: found '0g', expected two hexadecimal digits per byte",
+        ),
         ({"b_in": "123"}, "found '123', expected two hexadecimal digits per byte"),
         ({"b_in": 5}, '"b_in" is of type Binary, found 5'),
     ],
@@ -92,14 +106,23 @@ def test_binaries_are_hexadecimal_digits(shapes, tmp_path, isolation):
 
 
 def test_the_command_line_reads_and_prints_hexadecimal_digits(shapes):
-    options = ("--isolation", "none", "--start-value", "b_in=0aff", "--start-value", "m=[[1,0],[0,0],[0,0]]")
+    options = (
+        "--isolation",
+        "none",
+        "--start-value",
+        "b_in=0aff",
+        "--start-value",
+        "m=[[1,0],[0,0],[0,0]]",
+    )
     done = run_cosim("simulate", shapes, *options, "--json")
     values = json.loads(done.stdout)["values"]
     assert (values["b_out"], values["y[1]"]) == ("0aff", 1.0)
     assert "b_out = 0aff" in run_cosim("simulate", shapes, *options).stdout.splitlines()
 
 
-@pytest.mark.parametrize(("kind", "value"), [("uint64", LARGEST - 1), ("int64", SMALLEST), ("int64", 2**53 + 1)])
+@pytest.mark.parametrize(
+    ("kind", "value"), [("uint64", LARGEST - 1), ("int64", SMALLEST), ("int64", 2**53 + 1)]
+)
 def test_no_digit_of_an_integer_is_lost(probes, tmp_path, kind, value):
     table = tmp_path / "in.csv"
     table.write_text(f"time,{kind}_in\n0,{value}\n2,{value}\n")

@@ -25,7 +25,9 @@ def work(monkeypatch):
     calls = []
     for name in ("examine", "extract"):
         function = getattr(fmu_file, name)
-        monkeypatch.setattr(fmu_file, name, lambda *args, f=function, n=name: (calls.append(n), f(*args))[1])
+        monkeypatch.setattr(
+            fmu_file, name, lambda *args, f=function, n=name: (calls.append(n), f(*args))[1]
+        )
     return calls
 
 
@@ -69,7 +71,12 @@ def only_file(simulation):
 
 
 def test_simulations_at_the_same_time_have_folders_of_their_own(fmu):
-    document = {"name": "two", "stop_time": 0.05, "step_size": 0.01, "components": {"a": {"fmu": str(fmu)}}}
+    document = {
+        "name": "two",
+        "stop_time": 0.05,
+        "step_size": 0.01,
+        "components": {"a": {"fmu": str(fmu)}},
+    }
     with cosim.load(document) as first, cosim.load(document) as second:
         first.step()
         second.step()
@@ -78,7 +85,14 @@ def test_simulations_at_the_same_time_have_folders_of_their_own(fmu):
 
 
 def test_a_library_that_stays_loaded_is_loaded_from_another_folder(fmu):
-    with cosim.load({"name": "one", "stop_time": 0.05, "step_size": 0.01, "components": {"a": {"fmu": str(fmu)}}}) as simulation:
+    with cosim.load(
+        {
+            "name": "one",
+            "stop_time": 0.05,
+            "step_size": 0.01,
+            "components": {"a": {"fmu": str(fmu)}},
+        }
+    ) as simulation:
         simulation.step()
         library = only_file(simulation).library.dll._name
         kept = ctypes.CDLL(library)

@@ -1,4 +1,6 @@
-"""FMI 1.0 Co-Simulation, with an FMU of our own (the tests of Model Exchange cover its other interface)."""
+"""FMI 1.0 Co-Simulation, with an FMU of our own (the tests of Model Exchange cover its other
+interface).
+"""
 
 from __future__ import annotations
 
@@ -35,9 +37,15 @@ def test_a_slave_makes_its_steps(slave, isolation):
 
 
 def test_a_discarded_step_names_the_time_that_was_reached(slave):
-    built = make_system({"ball": create_component(FmuFile(slave), "ball")}, start_values={"ball": {"fault": 6}})
-    outcome = simulate(built, Settings(Fraction(0), Fraction(1), Fraction(1, 10), {"ball.x": endpoint("ball.x")}))
-    expected = "ball: fmi1DoStep failed at t = 0.6 s: status 2 (discard); lastSuccessfulTime is 0.6 s"
+    built = make_system(
+        {"ball": create_component(FmuFile(slave), "ball")}, start_values={"ball": {"fault": 6}}
+    )
+    outcome = simulate(
+        built, Settings(Fraction(0), Fraction(1), Fraction(1, 10), {"ball.x": endpoint("ball.x")})
+    )
+    expected = (
+        "ball: fmi1DoStep failed at t = 0.6 s: status 2 (discard); lastSuccessfulTime is 0.6 s"
+    )
     assert (str(outcome.failure), len(outcome.recording.time)) == (expected, 7)
 
 

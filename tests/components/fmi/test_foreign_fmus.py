@@ -21,7 +21,9 @@ pytestmark = pytest.mark.usefixtures("executor")
 
 @pytest.fixture(params=[None, Isolation()], ids=["in process", "isolated"])
 def make_instances(request):
-    """Function that creates instances of an FMU by name, all in this process or each in a worker process."""
+    """Function that creates instances of an FMU by name, all in this process or each in a worker
+    process.
+    """
 
     def make(path, *names):
         file = FmuFile(path)
@@ -41,14 +43,23 @@ def test_a_lag_equals_fmpy_and_the_closed_form(make_instances, probe):
     from fmpy import simulate_fmu
 
     recording = run_system(make_system(make_instances(probe, "a")), 2, 0.01, ["a.y"])
-    expected = simulate_fmu(str(probe), stop_time=2, output_interval=0.01, step_size=0.01, output=["y"])
+    expected = simulate_fmu(
+        str(probe), stop_time=2, output_interval=0.01, step_size=0.01, output=["y"]
+    )
     np.testing.assert_allclose(recording.columns["a.y"], expected["y"], rtol=1e-12)
-    np.testing.assert_allclose(recording.columns["a.y"], (1 - 0.01 / 0.5) ** np.arange(201), rtol=1e-12)
+    np.testing.assert_allclose(
+        recording.columns["a.y"], (1 - 0.01 / 0.5) ** np.arange(201), rtol=1e-12
+    )
 
 
 def test_every_type_is_set_and_read(make_instances, probe):
     a = make_instances(probe, "a")["a"]
-    values = {"b_in": True, "s_in": "hello", "e_in": 2, ("i_in" if a.description.major == 2 else "int32_in"): 41}
+    values = {
+        "b_in": True,
+        "s_in": "hello",
+        "e_in": 2,
+        ("i_in" if a.description.major == 2 else "int32_in"): 41,
+    }
     outputs = [v.name for v in a.variables if v.causality == "output" and not v.shape]
     built = make_system({"a": a}, start_values={"a": values})
     recording = run_system(built, 0.01, 0.01, [f"a.{name}" for name in outputs])
@@ -61,14 +72,28 @@ def test_every_type_is_set_and_read(make_instances, probe):
 def test_every_type_is_connected(make_instances, probe):
     components = make_instances(probe, "a", "b")
     pairs = [("b_out", "b_in"), ("s_out", "s_in"), ("e_out", "e_in"), ("y", "u")]
-    pairs.append(("i_out", "i_in") if components["a"].description.major == 2 else ("int64_out", "int64_in"))
+    pairs.append(
+        ("i_out", "i_in") if components["a"].description.major == 2 else ("int64_out", "int64_in")
+    )
     wires = ", ".join(f"a.{source} > b.{target}" for source, target in pairs)
-    built = make_system(components, wires, [("a",), ("b",)], start_values={"a": {"s_in": "x", "e_in": 2}})
-    recording = run_system(built, 0.02, 0.01, ["b.b_out", "b.s_out", "b.e_out", f"b.{pairs[-1][0]}"])
+    built = make_system(
+        components, wires, [("a",), ("b",)], start_values={"a": {"s_in": "x", "e_in": 2}}
+    )
+    recording = run_system(
+        built, 0.02, 0.01, ["b.b_out", "b.s_out", "b.e_out", f"b.{pairs[-1][0]}"]
+    )
     assert [column[-1] for column in recording.columns.values()] == [False, "<<x>>", 2, 2]
 
 
-INTEGERS = {"int8": -8, "uint8": 200, "int16": -300, "uint16": 60000, "uint32": 4 * 10**9, "int64": -(2**62), "uint64": 2**63}
+INTEGERS = {
+    "int8": -8,
+    "uint8": 200,
+    "int16": -300,
+    "uint16": 60000,
+    "uint32": 4 * 10**9,
+    "int64": -(2**62),
+    "uint64": 2**63,
+}
 
 
 def test_integers_of_all_widths_keep_every_bit(make_instances, probes):
@@ -81,7 +106,11 @@ def test_integers_of_all_widths_keep_every_bit(make_instances, probes):
 
 
 def test_arrays_are_set_whole_and_connected_by_element(make_instances, probes):
-    built = make_system({**make_instances(probes[3], "a"), "count": counter()}, "count.y > a.v_in[2]", [("count",), ("a",)])
+    built = make_system(
+        {**make_instances(probes[3], "a"), "count": counter()},
+        "count.y > a.v_in[2]",
+        [("count",), ("a",)],
+    )
     recording = run_system(built, 0.02, 0.01, ["a.v_out[1]", "a.v_out[2]", "a.v_out[3]"])
     assert [column[-1] for column in recording.columns.values()] == [0.0, 4.0, 0.0]
 
@@ -92,28 +121,45 @@ def test_a_failure_names_component_function_status_time_and_the_fmus_message(mak
     with pytest.raises(ComponentError) as failure:
         run_system(built, 1, 0.01)
     end = ", 0.0 s" if major == 2 else ""
-    words = f"lag: fmi{major}DoStep failed at t = 0.03 s: status 3 (error): told to fail, 100%s sure{end}"
+    words = (
+        f"lag: fmi{major}DoStep failed at t = 0.03 s: status 3 (error): told to fail, 100%s "
+        f"sure{end}"
+    )
     assert str(failure.value) == words
 
 
-def test_log_messages_of_fmi_2_are_formatted_and_those_of_fmi_3_unchanged(make_instances, probe, caplog):
+def test_log_messages_of_fmi_2_are_formatted_and_those_of_fmi_3_unchanged(
+    make_instances, probe, caplog
+):
     built = make_system(make_instances(probe, "lag"), start_values={"lag": {"fail_time": 0.0}})
     with caplog.at_level(logging.INFO, "cosim"), pytest.raises(ComponentError):
         run_system(built, 1, 0.01)
     end = ", 0.0 s" if "2" in probe.name else ""
-    assert [(r.levelname, r.getMessage()) for r in caplog.records] == [("ERROR", f"lag: told to fail, 100%s sure{end}")]
+    assert [(r.levelname, r.getMessage()) for r in caplog.records] == [
+        ("ERROR", f"lag: told to fail, 100%s sure{end}")
+    ]
 
 
 def test_messages_go_to_the_instance_that_sends_them(make_instances, probes, caplog):
-    built = make_system(make_instances(probes[2], "one", "two"), start_values={"two": {"fail_time": 0.0}})
-    with caplog.at_level(logging.INFO, "cosim"), pytest.raises(ComponentError, match=r"two: fmi2DoStep failed.*sure, 0.0 s"):
+    built = make_system(
+        make_instances(probes[2], "one", "two"), start_values={"two": {"fail_time": 0.0}}
+    )
+    with (
+        caplog.at_level(logging.INFO, "cosim"),
+        pytest.raises(ComponentError, match=r"two: fmi2DoStep failed.*sure, 0.0 s"),
+    ):
         run_system(built, 1, 0.01)
     assert [r.getMessage().split(":")[0] for r in caplog.records] == ["two"]
 
 
 def test_rows_until_a_failure_are_kept(make_instances, probe):
     built = make_system(make_instances(probe, "a"), start_values={"a": {"fail_time": 0.035}})
-    outcome = simulate(built, Settings(exact_fraction(0), exact_fraction(1), exact_fraction(0.01), {"a.y": endpoint("a.y")}))
+    outcome = simulate(
+        built,
+        Settings(
+            exact_fraction(0), exact_fraction(1), exact_fraction(0.01), {"a.y": endpoint("a.y")}
+        ),
+    )
     assert outcome.recording.time.tolist() == [0, 0.01, 0.02, 0.03]
 
 
@@ -121,7 +167,10 @@ def test_rows_until_a_failure_are_kept(make_instances, probe):
 def test_free_instance_is_not_called_after_fatal(make_instances, probes, caplog, status, freed):
     start = {"fail_time": 0.0, "fail_status": status, "i_in": 9}
     built = make_system(make_instances(probes[2], "a"), start_values={"a": start})
-    with caplog.at_level(logging.INFO, "cosim"), pytest.raises(ComponentError, match=f"status {status}"):
+    with (
+        caplog.at_level(logging.INFO, "cosim"),
+        pytest.raises(ComponentError, match=f"status {status}"),
+    ):
         run_system(built, 1, 0.01)
     assert ("a: freed" in caplog.messages) is freed
 
@@ -129,19 +178,32 @@ def test_free_instance_is_not_called_after_fatal(make_instances, probes, caplog,
 def test_an_fmu_may_end_the_simulation(make_instances, probe):
     major = 2 if probe.stem.endswith("2") else 3
     request = {"i_in": 7, "fail_status": 2} if major == 2 else {"b_in": True}
-    built = make_system(make_instances(probe, "a"), start_values={"a": {"fail_time": 0.025, **request}})
-    outcome = simulate(built, Settings(exact_fraction(0), exact_fraction(1), exact_fraction(0.01), {"a.y": endpoint("a.y")}))
+    built = make_system(
+        make_instances(probe, "a"), start_values={"a": {"fail_time": 0.025, **request}}
+    )
+    outcome = simulate(
+        built,
+        Settings(
+            exact_fraction(0), exact_fraction(1), exact_fraction(0.01), {"a.y": endpoint("a.y")}
+        ),
+    )
     assert outcome.failure is None
     assert outcome.termination.component == "a"
-    assert len(outcome.recording.time) == {2: 3, 3: 4}[major]  # FMI 2.0: a step that was discarded does not count
+    assert (
+        len(outcome.recording.time) == {2: 3, 3: 4}[major]
+    )  # FMI 2.0: a step that was discarded does not count
 
 
 def test_a_restored_fmu_state_repeats_the_results_bit_for_bit(make_instances, probe):
     from cosim.engine import Recorder, compile_plan, executor_class
     from cosim.engine.initialization import instantiate_components
 
-    built = make_system(make_instances(probe, "a", "b"), "a.y > b.u", start_values={"a": {"u": 3.0}})
-    settings = Settings(exact_fraction(0), exact_fraction(3), exact_fraction(0.01), {"b.y": endpoint("b.y")})
+    built = make_system(
+        make_instances(probe, "a", "b"), "a.y > b.u", start_values={"a": {"u": 3.0}}
+    )
+    settings = Settings(
+        exact_fraction(0), exact_fraction(3), exact_fraction(0.01), {"b.y": endpoint("b.y")}
+    )
     plan = compile_plan(built, settings)
     recorder = Recorder(plan)
     executor = executor_class("auto")(plan, recorder)
@@ -161,7 +223,9 @@ def test_a_restored_fmu_state_repeats_the_results_bit_for_bit(make_instances, pr
         component.free()
 
 
-def test_an_fmu_is_extracted_once_and_leaves_nothing_behind(make_instances, probe, tmp_path, monkeypatch):
+def test_an_fmu_is_extracted_once_and_leaves_nothing_behind(
+    make_instances, probe, tmp_path, monkeypatch
+):
     monkeypatch.setenv("TMPDIR", str(tmp_path))
     monkeypatch.setattr("tempfile.tempdir", None)
     folder_counts = []
@@ -192,16 +256,24 @@ def test_other_files_are_refused(tmp_path):
 @pytest.mark.parametrize(
     ("change", "words"),
     [
-        ((b'fmiVersion="2.0"', b'fmiVersion="1.1"'), r"is an FMI 1\.1 FMU; FMI 1\.0, 2\.0 and 3\.0 are supported"),
+        (
+            (b'fmiVersion="2.0"', b'fmiVersion="1.1"'),
+            r"is an FMI 1\.1 FMU; FMI 1\.0, 2\.0 and 3\.0 are supported",
+        ),
         ((b'guid="probe"', b""), "lacks the attribute guid"),
         ((b"<CoSimulation", b"<CoSimulation><"), "is not well-formed XML: "),
-        ((b'start="1" min', b'start="one" min'), 'start value "one" of variable "y_start" is not a valid Float64'),
+        (
+            (b'start="1" min', b'start="one" min'),
+            'start value "one" of variable "y_start" is not a valid Float64',
+        ),
     ],
 )
 def test_an_invalid_description_is_refused(probes, tmp_path, change, words):
     changed = tmp_path / "changed.fmu"
     with ZipFile(probes[2]) as source, ZipFile(changed, "w") as target:
-        target.writestr("modelDescription.xml", source.read("modelDescription.xml").replace(*change))
+        target.writestr(
+            "modelDescription.xml", source.read("modelDescription.xml").replace(*change)
+        )
     with pytest.raises(InputError, match=words):
         _ = FmuFile(changed).description
 

@@ -1,7 +1,9 @@
-"""Generation of docs/modelica_blocks.md: the state of each public block of the Modelica Standard Library.
+"""Generation of docs/modelica_blocks.md: the state of each public block of the Modelica Standard
+Library.
 
-`MODELICAPATH=... python tests/export/modelica/block_list.py` flattens, translates and compiles every block of `Modelica.Blocks`.
-This takes about 5 s for each block that the cache does not contain.
+`MODELICAPATH=... python tests/export/modelica/block_list.py` flattens, translates and compiles
+every block of `Modelica.Blocks`. This takes about 5 s for each block that the cache does not
+contain.
 """
 
 from __future__ import annotations
@@ -74,8 +76,10 @@ ARGUMENTS = {
     "Tables.CombiTable2Ds": _TABLE_2D,
     "Tables.CombiTable2Dv": _TABLE_2D,
 }
-#: inputs of blocks with pre(), edge() or change() of an input, which the front end refuses for inputs of the model itself, or
-#: with an input that has a value; such a block is a component, and an equation sets each of its inputs
+#: inputs of blocks with pre(), edge() or change() of an input, which the front end refuses for
+#: inputs of the model itself, or with an input that has a value; such a block is a component, and
+#: an equation sets each of its
+#: inputs
 INPUTS = {
     "Discrete.UnitDelay": ("Real u",),
     "Interaction.Show.BooleanValue": ("Boolean activePort",),
@@ -95,9 +99,12 @@ INPUTS = {
     "Routing.Extractor": ("Integer index", "Real u[1]"),
     "Sources.RadioButtonSource": ("Boolean reset[1]",),
 }
-#: further declarations and the equations of blocks that are only determined together with other blocks
+#: further declarations and the equations of blocks that are only determined together with other
+#: blocks
 CIRCUITS = {
-    "Math.InverseBlockConstraints": "Modelica.Blocks.Math.Gain g(k=2); equation b.u1 = u; g.u = b.y2; b.u2 = g.y;",
+    "Math.InverseBlockConstraints": (
+        "Modelica.Blocks.Math.Gain g(k=2); equation b.u1 = u; g.u = b.y2; b.u2 = g.y;"
+    ),
 }
 
 _TEXT = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:[^"\\]|\\.)*"', re.DOTALL)
@@ -117,9 +124,13 @@ class State:
 
 
 def public_blocks(library: Library) -> list[str]:
-    """Return the names, below PACKAGE, of all blocks that are neither partial nor in internal packages."""
+    """Return the names, below PACKAGE, of all blocks that are neither partial nor in internal
+    packages.
+    """
     names = (name for file in library.files if file.suffix == ".mo" for name in _blocks_in(file))
-    return sorted(name.removeprefix(f"{PACKAGE}.") for name in names if name.startswith(f"{PACKAGE}."))
+    return sorted(
+        name.removeprefix(f"{PACKAGE}.") for name in names if name.startswith(f"{PACKAGE}.")
+    )
 
 
 def _blocks_in(file: Path) -> Iterator[str]:
@@ -163,8 +174,13 @@ def _model(name: str, block: str) -> str:
         return f"block {name}\n  extends {PACKAGE}.{block}{arguments};\nend {name};\n"
     inputs = [declaration.split() for declaration in INPUTS[block]]
     declarations = "".join(f"  {PACKAGE}.Interfaces.{kind}Input {port};\n" for kind, port in inputs)
-    equations = "".join(f"  b.{port} = {port};\n" for port in (port.partition("[")[0] for _, port in inputs))
-    return f"block {name}\n{declarations}  {PACKAGE}.{block} b{arguments};\nequation\n{equations}end {name};\n"
+    equations = "".join(
+        f"  b.{port} = {port};\n" for port in (port.partition("[")[0] for _, port in inputs)
+    )
+    return (
+        f"block {name}\n{declarations}  {PACKAGE}.{block} b{arguments};\nequation\n{equations}end "
+        f"{name};\n"
+    )
 
 
 def _shorten(message: str, folder: Path) -> str:
@@ -183,21 +199,36 @@ def page(library: Library, states: Sequence[State]) -> str:
     lines = [
         "# Blocks of the Modelica Standard Library",
         "",
-        f"State of each public block of `{PACKAGE}` in Modelica {library.version}, {date.today().isoformat()}: "
+        f"State of each public block of `{PACKAGE}` in Modelica {library.version}, "
+        f"{date.today().isoformat()}: "
         f"{len(good)} of {len(states)} blocks build.",
         "",
-        "A block builds if cosim exports an FMU of a model that extends it with default parameters or with those in parentheses.",
-        "Blocks with `pre()`, `edge()` or `change()` of an input, or with an input that has a value, are components `b` with an "
+        (
+            "A block builds if cosim exports an FMU of a model that extends it with default "
+            "parameters or with those in parentheses."
+        ),
+        "Blocks with `pre()`, `edge()` or `change()` of an input, or with an input that has a "
+        "value, are components `b` with an "
         "equation `b.u = u` for each input.",
-        "`InverseBlockConstraints` is built around a gain, because it is only determined together with another block.",
+        (
+            "`InverseBlockConstraints` is built around a gain, because it is only determined "
+            "together with another block."
+        ),
         "[Modelica](modelica.md) explains what to write instead of blocks that do not build.",
         "",
         "This page is generated by `MODELICAPATH=... python tests/export/modelica/block_list.py`.",
     ]
     for group, members in groups.items():
         refused = [state for state in members if state.reason]
-        lines += ["", f"## {group}", "", f"{len(members) - len(refused)} of {len(members)} blocks build: "]
-        lines[-1] += ", ".join(_entry(state.block, group) for state in members if not state.reason) + "."
+        lines += [
+            "",
+            f"## {group}",
+            "",
+            f"{len(members) - len(refused)} of {len(members)} blocks build: ",
+        ]
+        lines[-1] += (
+            ", ".join(_entry(state.block, group) for state in members if not state.reason) + "."
+        )
         if refused:
             lines += ["", "| block | reason |", "|---|---|"]
             lines += [f"| {_entry(state.block, group)} | {state.reason} |" for state in refused]

@@ -1,4 +1,6 @@
-"""Execution of Modelica models by the generated C code (ctypes) and by the interpreter, with bitwise comparison."""
+"""Execution of Modelica models by the generated C code (ctypes) and by the interpreter, with
+bitwise comparison.
+"""
 
 from __future__ import annotations
 
@@ -19,7 +21,12 @@ from cosim.export.modelica.causality.interpreter import Interpreter
 from cosim.export.modelica.frontend import rumoca_client
 from cosim.export.modelica.frontend.rumoca_frontend import DEFAULT_OPTIONS
 
-CTYPES = {"Float64": ctypes.c_double, "Int32": ctypes.c_int32, "Enumeration": ctypes.c_int32, "Boolean": ctypes.c_bool}
+CTYPES = {
+    "Float64": ctypes.c_double,
+    "Int32": ctypes.c_int32,
+    "Enumeration": ctypes.c_int32,
+    "Boolean": ctypes.c_bool,
+}
 GCC = [
     "gcc",
     "-std=c11",
@@ -39,15 +46,21 @@ TICKS = 500  # default number of steps with random inputs
 
 
 class CompiledBlock:
-    """An instance of a compiled block, which is accessed like by the FMI shells: struct offsets and four functions."""
+    """An instance of a compiled block, which is accessed like by the FMI shells: struct offsets and
+    four functions.
+    """
 
     def __init__(self, block: Block, folder: Path):
         self.block = block
         self.variables: Mapping[str, BlockVariable] = {v.name: v for v in block.variables}
         for name, text in block.files.items():
             (folder / name).write_text(text)
-        layout = ", ".join(["sizeof(Model)", *(f"offsetof(Model, {v.member})" for v in block.variables)])
-        (folder / "layout.c").write_text(f'#include <stddef.h>\n#include "model.h"\nsize_t layout[] = {{{layout}}};\n')
+        layout = ", ".join(
+            ["sizeof(Model)", *(f"offsetof(Model, {v.member})" for v in block.variables)]
+        )
+        (folder / "layout.c").write_text(
+            f'#include <stddef.h>\n#include "model.h"\nsize_t layout[] = {{{layout}}};\n'
+        )
         library = folder / "block.so"
         sources = [name for name in (*block.files, "layout.c") if name.endswith(".c")]
         foreign = [name for name in sources if name not in GENERATED]
@@ -56,7 +69,9 @@ class CompiledBlock:
         objects = [name.replace(".c", ".o") if name in foreign else name for name in sources]
         subprocess.run([*GCC, "-o", str(library), *objects, "-lm"], check=True, cwd=folder)
         self._library = ctypes.CDLL(str(library))
-        size, *offsets = (ctypes.c_size_t * (1 + len(block.variables))).in_dll(self._library, "layout")
+        size, *offsets = (ctypes.c_size_t * (1 + len(block.variables))).in_dll(
+            self._library, "layout"
+        )
         self._offsets = dict(zip(self.variables, offsets, strict=True))
         self._memory = ctypes.create_string_buffer(size)
         for function in (self._library.model_initialize, self._library.model_step):
@@ -84,7 +99,11 @@ class CompiledBlock:
 
     def step(self, time: float, step_size: float) -> str | None:
         """Step the block; return None or the reason for its failure."""
-        return self._reason(self._library.model_step(self._memory, ctypes.c_double(time), ctypes.c_double(step_size)))
+        return self._reason(
+            self._library.model_step(
+                self._memory, ctypes.c_double(time), ctypes.c_double(step_size)
+            )
+        )
 
     @staticmethod
     def _reason(text: bytes | None) -> str | None:
@@ -92,11 +111,15 @@ class CompiledBlock:
 
 
 class CompiledAndInterpreted:
-    """The compiled block and the interpreter of one model, stepped together and compared bit for bit."""
+    """The compiled block and the interpreter of one model, stepped together and compared bit for
+    bit.
+    """
 
     def __init__(self, c: CompiledBlock, python: Interpreter):
         self.c, self.python = c, python
-        self.outputs = [v.name for v in c.block.variables if v.causality in ("output", "calculatedParameter")]
+        self.outputs = [
+            v.name for v in c.block.variables if v.causality in ("output", "calculatedParameter")
+        ]
         self.inputs = [v for v in c.block.variables if v.causality == "input"]
 
     def set(self, **values: Any) -> None:
@@ -122,7 +145,9 @@ class CompiledAndInterpreted:
     def get(self, name: str) -> Any:
         return self.c.get(name)
 
-    def randomize(self, seed: int, variables: list[BlockVariable] | None = None, scale: float = 3.0) -> dict[str, Any]:
+    def randomize(
+        self, seed: int, variables: list[BlockVariable] | None = None, scale: float = 3.0
+    ) -> dict[str, Any]:
         """Set all inputs (or the given variables) to random values and return these."""
         rng = np.random.default_rng(seed)
         values = {v.name: _random(rng, v, scale) for v in variables or self.inputs}
@@ -131,13 +156,17 @@ class CompiledAndInterpreted:
             self.python.set(name, value)
         return values
 
-    def simulate(self, ticks: int = TICKS, **parameters: Any) -> Iterator[tuple[int, dict[str, Any]]]:
+    def simulate(
+        self, ticks: int = TICKS, **parameters: Any
+    ) -> Iterator[tuple[int, dict[str, Any]]]:
         """Set parameters, initialize, and step like `run`."""
         self.set(**parameters)
         self.initialize()
         yield from self.run(ticks)
 
-    def run(self, ticks: int = TICKS, seed: int = 0, period: float = 0.01) -> Iterator[tuple[int, dict[str, Any]]]:
+    def run(
+        self, ticks: int = TICKS, seed: int = 0, period: float = 0.01
+    ) -> Iterator[tuple[int, dict[str, Any]]]:
         """Step with random inputs; yield the number of the tick and its inputs after each step."""
         for k in range(ticks):
             values = self.randomize(seed * 100_000 + k)
@@ -156,13 +185,19 @@ def _random(rng: np.random.Generator, variable: BlockVariable, scale: float) -> 
         return rng.integers(1, len(variable.enumeration) + 1, variable.shape or None)
     low, high = variable.minimum, variable.maximum
     if variable.type == "Int32":
-        return rng.integers(-5 if low is None else low, (5 if high is None else high) + 1, variable.shape or None)
-    return rng.uniform(-scale if low is None else low, scale if high is None else high, variable.shape or None)
+        return rng.integers(
+            -5 if low is None else low, (5 if high is None else high) + 1, variable.shape or None
+        )
+    return rng.uniform(
+        -scale if low is None else low, scale if high is None else high, variable.shape or None
+    )
 
 
 @pytest.fixture(autouse=True)
 def forked_front_end(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fork front ends from a process that has imported rumoca, except in the tests of their processes."""
+    """Fork front ends from a process that has imported rumoca, except in the tests of their
+    processes.
+    """
     if request.path.stem != "test_frontend_process":
         monkeypatch.setattr(rumoca_client, "_run_process", run_forked)
 
@@ -198,6 +233,8 @@ def compile_both(
         with monkeypatch.context() as patch:
             flat = assemble._flatten(path, model, DEFAULT_OPTIONS)
             patch.setattr(assemble, "_flatten", lambda *_arguments: flat)
-            return CompiledAndInterpreted(CompiledBlock(load_block(path, model), folder), load_interpreter(path, model))
+            return CompiledAndInterpreted(
+                CompiledBlock(load_block(path, model), folder), load_interpreter(path, model)
+            )
 
     return open_model

@@ -1,4 +1,6 @@
-"""Bad models end in one line each, with file, line and reason; no error of the front end or of this compiler has a traceback."""
+"""Bad models end in one line each, with file, line and reason; no error of the front end or of this
+compiler has a traceback.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,10 @@ from cosim.export.modelica.causality.interpreter import Interpreter
 
 def in_model(declarations: str, equations: str = "y = u;") -> str:
     """Return the text of a model with one input and one output."""
-    return f"model M\n  input Real u;\n  output Real y;\n  {declarations}\nequation\n  {equations}\nend M;\n"
+    return (
+        f"model M\n  input Real u;\n  output Real y;\n  {declarations}\nequation\n  {equations}\n"
+        "end M;\n"
+    )
 
 
 #: name -> text of the file, beginning of the message
@@ -35,7 +40,10 @@ BAD = {
     ),
     "keyword as member": (
         in_model("", "y = u.model;"),
-        "M.mo:6: `model` is a reserved keyword in Modelica (MLS §2.3.3) and cannot be used as an id",
+        (
+            "M.mo:6: `model` is a reserved keyword in Modelica (MLS §2.3.3) and cannot be used as "
+            "an id"
+        ),
     ),
     "missing semicolon before a class": (
         in_model("partial model B\n  end B;\n  extends B\n  model A\n  end A;"),
@@ -51,14 +59,20 @@ BAD = {
     "only a comment": ("// nothing\n", "M.mo:1: the file contains no model with the name M"),
     "not Modelica": ("int main(void) { return 0; }\n", "M.mo:1: unexpected `int`"),
     "garbage bytes": ("model M\n  \x01\x02\nend M;\n", "M.mo:1: unexpected `M`"),
-    "unknown variable": (in_model("", "y = u + speeed;"), "M.mo:6: unresolved component reference: 'speeed'"),
+    "unknown variable": (
+        in_model("", "y = u + speeed;"),
+        "M.mo:6: unresolved component reference: 'speeed'",
+    ),
     "unknown type": (in_model("Reel a;"), "M.mo:4: unresolved type reference: 'Reel'"),
     "unknown function": (in_model("", "y = sine(u);"), "M.mo:6: unresolved function call: 'sine'"),
     "unknown component member": (
         in_model("record R\n    Real a;\n  end R;\n  R r;", "r.a = u;\n  y = r.b;"),
         "M.mo:10: unresolved component reference: 'r.b'",
     ),
-    "unknown base class": (in_model("extends Base;"), "M.mo:4: unresolved extends base class: 'Base'"),
+    "unknown base class": (
+        in_model("extends Base;"),
+        "M.mo:4: unresolved extends base class: 'Base'",
+    ),
     "unknown modifier": (
         in_model("Real a(starrt = 1);", "a = u;\n  y = a;"),
         "M.mo:4: unknown modifier `starrt` for builtin component `a` of type",
@@ -75,8 +89,14 @@ BAD = {
         in_model("type E = enumeration(a, b);\n  parameter E e = E.c;"),
         "M.mo:5: unresolved component reference: 'E.c'",
     ),
-    "unknown package": (in_model("import Missing.Package;"), "M.mo:4: unresolved import: 'Missing.Package'"),
-    "recursive class": (in_model("M inner_model;"), "M.mo:1: cyclic class instantiation detected: M () -> M (inner_model)"),
+    "unknown package": (
+        in_model("import Missing.Package;"),
+        "M.mo:4: unresolved import: 'Missing.Package'",
+    ),
+    "recursive class": (
+        in_model("M inner_model;"),
+        "M.mo:1: cyclic class instantiation detected: M () -> M (inner_model)",
+    ),
     "other model name": (
         "model N\n  Real x;\nequation\n  x = 1;\nend N;\n",
         "M.mo:1: the file contains no model with the name M",
@@ -89,13 +109,22 @@ BAD = {
         "function M\n  input Real u;\n  output Real y;\nalgorithm\n  y := u;\nend M;\n",
         "M.mo:1: the file contains no model with the name M",
     ),
-    "a package as a model": ("package M\n  constant Real a = 1;\nend M;\n", "M.mo:1: the file contains no model with the name M"),
-    "Boolean plus Real": (in_model("", "y = u + true;"), "M.mo:6: operator `+` expects Real or Integer operand(s), found"),
+    "a package as a model": (
+        "package M\n  constant Real a = 1;\nend M;\n",
+        "M.mo:1: the file contains no model with the name M",
+    ),
+    "Boolean plus Real": (
+        in_model("", "y = u + true;"),
+        "M.mo:6: operator `+` expects Real or Integer operand(s), found",
+    ),
     "Real as a condition": (
         in_model("", "y = if u then 1 else 2;"),
         "M.mo:6: operator `if` expects Boolean operand(s), found `Real` (MLS",
     ),
-    "String to Real": (in_model("", 'y = "text";'), "M.mo:6: type mismatch: expected `Real`, found `String`"),
+    "String to Real": (
+        in_model("", 'y = "text";'),
+        "M.mo:6: type mismatch: expected `Real`, found `String`",
+    ),
     "Real to Integer": (
         in_model("Integer n;", "n = u;\n  y = n;"),
         "M.mo:6: discrete-valued definition is not a discrete-time expressi",
@@ -116,18 +145,30 @@ BAD = {
         in_model("", "y = if not u then 1 else 2;"),
         "M.mo:6: operator `not` expects Boolean operand(s), found `Real`",
     ),
-    "too many arguments": (in_model("", "y = sin(u, u);"), "M.mo:6: sin() expects 1 argument(s), found 2"),
-    "too few arguments": (in_model("", "y = atan2(u);"), "M.mo:6: atan2() expects 2 argument(s), found 1"),
+    "too many arguments": (
+        in_model("", "y = sin(u, u);"),
+        "M.mo:6: sin() expects 1 argument(s), found 2",
+    ),
+    "too few arguments": (
+        in_model("", "y = atan2(u);"),
+        "M.mo:6: atan2() expects 2 argument(s), found 1",
+    ),
     "function with wrong argument type": (
         in_model(
-            "function f\n    input Boolean b;\n    output Real r;\n  algorithm\n    r := if b then 1 else 2;\n  end f;",
+            (
+                "function f\n    input Boolean b;\n    output Real r;\n  algorithm\n    r := if b "
+                "then 1 else 2;\n  end f;"
+            ),
             "y = f(u);",
         ),
         "M.mo:11: type mismatch: expected `Boolean`, found `Real`",
     ),
     "function with missing argument": (
         in_model(
-            "function f\n    input Real a;\n    input Real b;\n    output Real r;\n  algorithm\n    r := a + b;\n  end f;",
+            (
+                "function f\n    input Real a;\n    input Real b;\n    output Real r;\n  "
+                "algorithm\n    r := a + b;\n  end f;"
+            ),
             "y = f(u);",
         ),
         "M.mo:12: invalid call of function `f`: input `b` has no argument an",
@@ -170,12 +211,17 @@ BAD = {
     "loop beyond the size of a column": (
         in_model(
             "Real v[3, 2];",
-            "y = v[1, 1];\n  for i in 1:3 loop\n    for j in 1:3 loop\n      v[i, j] = u;\n    end for;\n  end for;",
+            (
+                "y = v[1, 1];\n  for i in 1:3 loop\n    for j in 1:3 loop\n      v[i, j] = u;\n    "
+                "end for;\n  end for;"
+            ),
         ),
         "M.mo:7: subscript 3 for `v` is out of bounds for dimension of size 2",
     ),
     "loop of an algorithm beyond the size": (
-        in_model("Real v[3];", "y = v[1];\nalgorithm\n  for i in 1:4 loop\n    v[i] := i*u;\n  end for;"),
+        in_model(
+            "Real v[3];", "y = v[1];\nalgorithm\n  for i in 1:4 loop\n    v[i] := i*u;\n  end for;"
+        ),
         "M.mo:8: the range of a loop in an algorithm differs from the",
     ),
     "Real subscript": (
@@ -188,8 +234,10 @@ BAD = {
     ),
     "shape in a function that a function calls": (
         in_model(
-            "function f\n    input Real a;\n    output Real r;\n  algorithm\n    r := g(a);\n  end f;\n"
-            "  function g\n    input Real a;\n    output Real r;\n  protected\n    Real c[2];\n  algorithm\n"
+            "function f\n    input Real a;\n    output Real r;\n  algorithm\n    r := g(a);\n  "
+            "end f;\n"
+            "  function g\n    input Real a;\n    output Real r;\n  protected\n    Real c[2];\n  "
+            "algorithm\n"
             "    c := {a, 2};\n    r := c*{1, 2, 3};\n  end g;",
             "y = f(u);",
         ),
@@ -198,8 +246,10 @@ BAD = {
     "loop in the second algorithm": (
         in_model(
             "discrete Real a(start = 0);\n  discrete Real z[3](each start = 0);",
-            "y = z[1] + a;\nalgorithm\n  when sample(0, 0.1) then\n    a := pre(a) + u;\n  end when;\nalgorithm\n"
-            "  when sample(0, 0.1) then\n    for i in 1:3 loop\n      z[i] := z[i] + u;\n    end for;\n  end when;",
+            "y = z[1] + a;\nalgorithm\n  when sample(0, 0.1) then\n    a := pre(a) + u;\n  end "
+            "when;\nalgorithm\n"
+            "  when sample(0, 0.1) then\n    for i in 1:3 loop\n      z[i] := z[i] + u;\n    end "
+            "for;\n  end when;",
         ),
         "M.mo:15: unsupported model algorithm",
     ),
@@ -207,8 +257,14 @@ BAD = {
         in_model("Real v[3];", "v = {1, 2, 3};\n  y = v[1, 2];"),
         "M.mo:7: `v` has 1 dimension(s) but is subscripted with 2",
     ),
-    "subscript of a scalar": (in_model("", "y = u[1];"), "M.mo:6: `u` has 0 dimension(s) but is subscripted with 1"),
-    "size depends on an input": (in_model("Real v[integer(u)];"), "M.mo:4: unresolved component dimension for v: integer(u)"),
+    "subscript of a scalar": (
+        in_model("", "y = u[1];"),
+        "M.mo:6: `u` has 0 dimension(s) but is subscripted with 1",
+    ),
+    "size depends on an input": (
+        in_model("Real v[integer(u)];"),
+        "M.mo:4: unresolved component dimension for v: integer(u)",
+    ),
     "negative size": (
         in_model("parameter Integer n = -1;\n  Real v[n];"),
         "M.mo:5: invalid array dimensions for 'v': dimension expression",
@@ -227,17 +283,26 @@ BAD = {
     ),
     "too few equations": (
         in_model("Real a;"),
-        "M.mo:4: unbalanced model: 1 equations, 2 unknowns (balance = -1): no equation determines a",
+        (
+            "M.mo:4: unbalanced model: 1 equations, 2 unknowns (balance = -1): no equation "
+            "determines a"
+        ),
     ),
     "too many equations": (
         in_model("", "y = u;\n  y = 2*u;"),
-        "M.mo:7: unbalanced model: 2 equations, 1 unknowns (balance = 1): this equation is one too many, the others determine y",
+        (
+            "M.mo:7: unbalanced model: 2 equations, 1 unknowns (balance = 1): this equation is one "
+            "too many, the others determine y"
+        ),
     ),
     "singular: variable in no equation": (
         in_model("Real a;\n  Real b;", "a = u;\n  a = y;\n  y = 1;"),
         "M.mo:9: the equations do not determine b, and this equation",
     ),
-    "input is defined": (in_model("", "u = 1;\n  y = 2;"), "M.mo:6: unbalanced model: 2 equations, 1 unknowns (balance = 1)"),
+    "input is defined": (
+        in_model("", "u = 1;\n  y = 2;"),
+        "M.mo:6: unbalanced model: 2 equations, 1 unknowns (balance = 1)",
+    ),
     "parameter is defined": (
         in_model("parameter Real k;", "k = 2*u;\n  y = u;"),
         "M.mo:6: unbalanced model: 2 equations, 1 unknowns (balance = 1)",
@@ -247,8 +312,13 @@ BAD = {
         "M.mo:6: unbalanced model: 2 equations, 1 unknowns (balance = 1)",
     ),
     "constraint between states": (
-        in_model("Real a(start=1);\n  Real b;", "der(a) = u;\n  der(b) = u;\n  a + b = 1;\n  y = a;"),
-        "M.mo:9: unbalanced model: 4 equations, 3 unknowns (balance = 1): this equation is one too many",
+        in_model(
+            "Real a(start=1);\n  Real b;", "der(a) = u;\n  der(b) = u;\n  a + b = 1;\n  y = a;"
+        ),
+        (
+            "M.mo:9: unbalanced model: 4 equations, 3 unknowns (balance = 1): this equation is one "
+            "too many"
+        ),
     ),
     "dependent parameters in a circle": (
         in_model("parameter Real a = b;\n  parameter Real b = a;"),
@@ -264,7 +334,11 @@ BAD = {
     ),
     "assigned in two whens": (
         in_model(
-            "discrete Real d;", "when u > 0 then\n    d = 1;\n  end when;\n  when u < 0 then\n    d = 2;\n  end when;\n  y = d;"
+            "discrete Real d;",
+            (
+                "when u > 0 then\n    d = 1;\n  end when;\n  when u < 0 then\n    d = 2;\n  end "
+                "when;\n  y = d;"
+            ),
         ),
         "M.mo:6: duplicate discrete Real when owner definition for identity",
     ),
@@ -277,8 +351,14 @@ BAD = {
         "M.mo:7: invalid Appendix B discrete solved form: `a` participates ",
     ),
     "different variables in branches": (
-        in_model("Real a;\n  Real b;", "if u > 0 then\n    a = 1;\n  else\n    b = 1;\n  end if;\n  y = a;"),
-        "M.mo:4: unbalanced model: 2 equations, 3 unknowns (balance = -1): no equation determines a",
+        in_model(
+            "Real a;\n  Real b;",
+            "if u > 0 then\n    a = 1;\n  else\n    b = 1;\n  end if;\n  y = a;",
+        ),
+        (
+            "M.mo:4: unbalanced model: 2 equations, 3 unknowns (balance = -1): no equation "
+            "determines a"
+        ),
     ),
     "if-equation without else": (
         in_model("", "if u > 0 then\n    y = 1;\n  end if;"),
@@ -292,7 +372,10 @@ BAD = {
         in_model("Integer n;", "n = 1;\n  y = der(n);"),
         "M.mo:7: der() argument must have type `Real`, found `Integer`",
     ),
-    "der of an input": (in_model("", "y = der(u);"), "M.mo:6: der() needs a variable with a derivative: inputs, "),
+    "der of an input": (
+        in_model("", "y = der(u);"),
+        "M.mo:6: der() needs a variable with a derivative: inputs, ",
+    ),
     "pre of a continuous variable": (
         in_model("Real x;", "der(x) = u;\n  y = pre(x);"),
         "M.mo:7: pre(`x`) names a continuous coordinate where the read is n",
@@ -314,7 +397,13 @@ BAD = {
         "M.mo:7: reinit() can only be used inside when-equations (MLS \u00a78.3.6)",
     ),
     "nested when": (
-        in_model("discrete Real d;", "when u > 0 then\n    when u > 1 then\n      d = 1;\n    end when;\n  end when;\n  y = d;"),
+        in_model(
+            "discrete Real d;",
+            (
+                "when u > 0 then\n    when u > 1 then\n      d = 1;\n    end when;\n  end when;\n  "
+                "y = d;"
+            ),
+        ),
         "M.mo:6: when-equations cannot be nested (MLS §8.3.5)",
     ),
     "when with a Real": (
@@ -327,15 +416,25 @@ BAD = {
     ),
     "connect of unlike connectors": (
         in_model(
-            "connector C\n    Real e;\n    flow Real f;\n  end C;\n  connector D\n    Real g;\n    flow Real h;"
+            "connector C\n    Real e;\n    flow Real f;\n  end C;\n  connector D\n    Real g;\n   "
+            " flow Real h;"
             "\n  end D;\n  C c;\n  D d;",
             "connect(c, d);\n  y = u;",
         ),
         "M.mo:6: this equation is superfluous: the others determine all its",
     ),
-    "connect of unknown": (in_model("", "connect(y, z);"), "M.mo:6: connect argument 'y' must be a connector, but has builtin "),
+    "connect of unknown": (
+        in_model("", "connect(y, z);"),
+        "M.mo:6: connect argument 'y' must be a connector, but has builtin ",
+    ),
     "endless function": (
-        in_model("function f\n    input Real a;\n    output Real r;\n  algorithm\n    r := f(a);\n  end f;", "y = f(u);"),
+        in_model(
+            (
+                "function f\n    input Real a;\n    output Real r;\n  algorithm\n    r := f(a);\n  "
+                "end f;"
+            ),
+            "y = f(u);",
+        ),
         "M.mo:8: the recursive function M.f is not supported",
     ),
     "missing library": (
@@ -348,7 +447,13 @@ BAD = {
         "M.mo:4: uses the library Modelica, which is not found; add its",
     ),
     "external language": (
-        in_model('function f\n    input Real a;\n    output Real r;\n  external "FORTRAN 77" r = f(a);\n  end f;', "y = f(u);"),
+        in_model(
+            (
+                'function f\n    input Real a;\n    output Real r;\n  external "FORTRAN 77" r = '
+                "f(a);\n  end f;"
+            ),
+            "y = f(u);",
+        ),
         "M.mo:4: found the language FORTRAN 77 of an external function,",
     ),
     "external include is missing": (
@@ -397,7 +502,8 @@ def test_a_bad_model_is_refused_with_file_line_and_reason(tmp_path, monkeypatch,
 FAILING = {
     "events without end": (
         in_model(
-            "Boolean a(start=false);\n  Boolean b(start=false);", "a = not pre(b);\n  b = pre(a);\n  y = if a then 1 else 0;"
+            "Boolean a(start=false);\n  Boolean b(start=false);",
+            "a = not pre(b);\n  b = pre(a);\n  y = if a then 1 else 0;",
         ),
         "the event iteration does not end",
     ),

@@ -1,4 +1,6 @@
-"""Closed loop of the exported continuous PID controller and the FMU of a vessel, compared with the same loop in SciPy."""
+"""Closed loop of the exported continuous PID controller and the FMU of a vessel, compared with the
+same loop in SciPy.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,11 @@ import cosim
 FMUS = Path(__file__).parents[3] / "fmus"
 GAINS = {"P": 8.0, "I": 2.0, "D": 1.5, "N": 40.0, "tracking_time": 0.7, "u_min": -5.0, "u_max": 5.0}
 HULL = {"resistance": 0.0, "propeller_diameter": 0.0}  # of the published simulator
-STEP, MASS, DRAG = 0.01, 4.11, 0.1  # s, kg, kg/m: surge of the vessel by the fact sheet of the published simulator
+STEP, MASS, DRAG = (
+    0.01,
+    4.11,
+    0.1,
+)  # s, kg, kg/m: surge of the vessel by the fact sheet of the published simulator
 
 
 def fly(folder: Path, controller: str, **changes: float) -> cosim.Result:
@@ -24,8 +30,14 @@ def fly(folder: Path, controller: str, **changes: float) -> cosim.Result:
         "stop_time": 20.0,
         "step_size": STEP,
         "components": {
-            "pid": {"fmu": str(FMUS / controller), "parameters": GAINS | {"reference": 1.5} | changes},
-            "vessel": {"fmu": str(FMUS / "strider.fmu"), "parameters": HULL | {"initial.velocity_body.u": 0.2}},
+            "pid": {
+                "fmu": str(FMUS / controller),
+                "parameters": GAINS | {"reference": 1.5} | changes,
+            },
+            "vessel": {
+                "fmu": str(FMUS / "strider.fmu"),
+                "parameters": HULL | {"initial.velocity_body.u": 0.2},
+            },
         },
         "connections": [
             {"from": "vessel.velocity_body.u", "to": "pid.measurement"},
@@ -38,7 +50,9 @@ def fly(folder: Path, controller: str, **changes: float) -> cosim.Result:
     return cosim.run(path)
 
 
-def limited(reference: float, speed: float, integral: float, filtered: float) -> tuple[float, float]:
+def limited(
+    reference: float, speed: float, integral: float, filtered: float
+) -> tuple[float, float]:
     """Return the controller output and the amount by which the limits reduce it."""
     error, g = reference - speed, GAINS
     unlimited = g["P"] * error + integral + g["D"] * g["N"] * (error - filtered)
@@ -60,9 +74,14 @@ def expected(duration: float) -> np.ndarray:
     """Return speed and thrust at every communication point; the controller steps before the vessel."""
 
     def over_a_step(rate, state, *held):
-        return solve_ivp(rate, (0, STEP), state, "DOP853", args=held, rtol=1e-11, atol=1e-12).y[:, -1]
+        return solve_ivp(rate, (0, STEP), state, "DOP853", args=held, rtol=1e-11, atol=1e-12).y[
+            :, -1
+        ]
 
-    speed, controller = np.array([0.2]), np.array([0.0, 1.3])  # the filter starts with the error 1.5 - 0.2
+    speed, controller = (
+        np.array([0.2]),
+        np.array([0.0, 1.3]),
+    )  # the filter starts with the error 1.5 - 0.2
     rows = [(speed[0], limited(1.5, speed[0], *controller)[0])]
     for k in range(round(duration / STEP)):
         reference = 1.5 if k < 1000 else 0.5
@@ -82,7 +101,9 @@ def test_the_closed_loop_agrees_with_scipy(flight):
     reference = expected(12.0)
     rows = len(reference)
     assert flight["vessel.velocity_body.u"][:rows] == pytest.approx(reference[:, 0], abs=1e-5)
-    assert flight["pid.u"][:rows] == pytest.approx(reference[:, 1], abs=1e-4)  # most where the limits begin to act inside a step
+    assert flight["pid.u"][:rows] == pytest.approx(
+        reference[:, 1], abs=1e-4
+    )  # most where the limits begin to act inside a step
 
 
 def test_both_fmi_versions_give_the_same_results(flight, tmp_path):

@@ -1,4 +1,6 @@
-"""Front end of Modelica in a child process: a crash, a hang and excessive memory are one error that names the file."""
+"""Front end of Modelica in a child process: a crash, a hang and excessive memory are one error that
+names the file.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,10 @@ pytest.importorskip("rumoca")
 
 def model(folder: Path, equation: str, declarations: str = "", name: str = "m") -> Path:
     path = folder / f"{name}.mo"
-    path.write_text(f"model {name}\n  input Real u;\n  output Real y;\n{declarations}equation\n{equation}\nend {name};\n")
+    path.write_text(
+        f"model {name}\n  input Real u;\n  output Real y;\n{declarations}equation\n{equation}\nend "
+        f"{name};\n"
+    )
     return path
 
 
@@ -38,7 +43,10 @@ def nested(count: int, begin: str, end: str) -> str:
 @pytest.mark.parametrize("equation", [nested(20_000, "(", ")"), nested(20_000, "-(", ")")])
 def test_a_crash_of_the_front_end_names_the_file(tmp_path, equation):
     path = model(tmp_path, equation)
-    words = "the Modelica front end failed on this file: the process was ended by signal 11 (SIGSEGV, segmentation fault)"
+    words = (
+        "the Modelica front end failed on this file: the process was ended by signal 11 (SIGSEGV, "
+        "segmentation fault)"
+    )
     assert refusal(path) == f"{path}: {words}"
 
 
@@ -52,10 +60,15 @@ def test_a_crash_over_a_package_names_the_file_of_the_model(tmp_path):
     assert refusal(path).startswith(f"{path}: the Modelica front end failed on this file")
 
 
-@pytest.mark.parametrize("equation", [nested(500, "-(", ")"), nested(500, "abs(", ")"), "  y = u" + "+u" * 500 + ";"])
+@pytest.mark.parametrize(
+    "equation", [nested(500, "-(", ")"), nested(500, "abs(", ")"), "  y = u" + "+u" * 500 + ";"]
+)
 def test_an_expression_too_deep_for_the_compiler_is_refused(tmp_path, equation):
     path = model(tmp_path, equation)
-    assert refusal(path) == f"{path}: an expression or statement is nested too deeply; divide it into several"
+    assert (
+        refusal(path)
+        == f"{path}: an expression or statement is nested too deeply; divide it into several"
+    )
 
 
 def test_ordinary_depth_is_compiled(tmp_path):
@@ -64,13 +77,23 @@ def test_ordinary_depth_is_compiled(tmp_path):
 
 def test_a_hang_ends_at_the_deadline(tmp_path, monkeypatch):
     monkeypatch.setattr(rumoca_client, "CPU_LIMIT", 1)
-    path = model(tmp_path, "  y = a[1];\n  for i in 1:1000000 loop a[i] = u; end for;", "  Real a[1000000];\n")
-    assert re.search(r"failed on this file: (it did not end within 1 s|.* signal \d+ )", refusal(path))
+    path = model(
+        tmp_path,
+        "  y = a[1];\n  for i in 1:1000000 loop a[i] = u; end for;",
+        "  Real a[1000000];\n",
+    )
+    assert re.search(
+        r"failed on this file: (it did not end within 1 s|.* signal \d+ )", refusal(path)
+    )
 
 
 def test_excessive_memory_is_refused(tmp_path, monkeypatch):
     monkeypatch.setattr(rumoca_client, "MEMORY_LIMIT", 100 << 20)
-    path = model(tmp_path, "  y = a[1];\n  for i in 1:100000000 loop a[i] = u; end for;", "  Real a[100000000];\n")
+    path = model(
+        tmp_path,
+        "  y = a[1];\n  for i in 1:100000000 loop a[i] = u; end for;",
+        "  Real a[100000000];\n",
+    )
     assert "the Modelica front end failed on this file: it needs more than" in refusal(path)
 
 
@@ -88,21 +111,27 @@ def test_a_model_with_too_many_values_is_refused(tmp_path, size):
 def test_a_file_that_is_too_large_or_no_text_is_refused(tmp_path, monkeypatch):
     path = model(tmp_path, "  y = u;")
     path.write_bytes(b"model m // \xe9\nend m;")
-    assert refusal(path) == f"{path}: the file is not UTF-8 text: invalid continuation byte at byte 11"
+    assert (
+        refusal(path) == f"{path}: the file is not UTF-8 text: invalid continuation byte at byte 11"
+    )
     monkeypatch.setattr(rumoca_frontend, "MAX_SOURCE_SIZE", 10)
     assert refusal(path) == f"{path}: the file has 19 bytes, expected at most 10"
 
 
 def test_a_package_that_is_no_text_is_refused(tmp_path):
     (tmp_path / "P").mkdir()
-    (tmp_path / "P" / "package.mo").write_bytes(b"package P // \xe9\n constant Real k = 2;\nend P;\n")
+    (tmp_path / "P" / "package.mo").write_bytes(
+        b"package P // \xe9\n constant Real k = 2;\nend P;\n"
+    )
     message = refusal(model(tmp_path, "  y = P.k*u;"))
     assert message.startswith(f"{tmp_path}/P/package.mo:1: the file cannot be read: 'utf-8' codec")
 
 
 def test_models_are_compiled_in_threads_and_after_a_fork(tmp_path):
     path, found = model(tmp_path, "  y = u;"), []
-    threads = [threading.Thread(target=lambda: found.append(load_block(path).identifier)) for _ in range(3)]
+    threads = [
+        threading.Thread(target=lambda: found.append(load_block(path).identifier)) for _ in range(3)
+    ]
     for thread in threads:
         thread.start()
     for thread in threads:

@@ -60,14 +60,22 @@ def own_cache(tmp_path, monkeypatch):
 @pytest.fixture
 def library(tmp_path) -> Path:
     return write(
-        tmp_path / "library", {"Blocks/package.mo": BLOCKS, "Blocks/Gain.mo": GAIN, "Constants 1.0/package.mo": CONSTANTS}
+        tmp_path / "library",
+        {
+            "Blocks/package.mo": BLOCKS,
+            "Blocks/Gain.mo": GAIN,
+            "Constants 1.0/package.mo": CONSTANTS,
+        },
     )
 
 
 @pytest.fixture
 def model(tmp_path):
     def create(annotation: str = "") -> Path:
-        return write(tmp_path / "model", {"Doubled.mo": MODEL.format(annotation=annotation)}) / "Doubled.mo"
+        return (
+            write(tmp_path / "model", {"Doubled.mo": MODEL.format(annotation=annotation)})
+            / "Doubled.mo"
+        )
 
     return create
 
@@ -100,18 +108,24 @@ def test_the_environment_variable_lists_folders(model, library, monkeypatch):
 
 def test_given_folders_are_searched_first(model, library, tmp_path, monkeypatch):
     monkeypatch.setenv("MODELICAPATH", str(library))
-    other = write(tmp_path / "other", {"Constants.mo": CONSTANTS.replace("factor = 2", "factor = 5")})
+    other = write(
+        tmp_path / "other", {"Constants.mo": CONSTANTS.replace("factor = 2", "factor = 5")}
+    )
     assert gain_of(model(), other) == 5
 
 
 def test_a_folder_may_be_a_library_itself(model, library):
-    assert found(model(), library / "Blocks", library / "Constants 1.0") == ["Blocks 2.1.0", "Constants 1.0"]
+    assert found(model(), library / "Blocks", library / "Constants 1.0") == [
+        "Blocks 2.1.0",
+        "Constants 1.0",
+    ]
 
 
 def test_a_record_in_a_file_of_its_own_is_found_by_its_name(library, tmp_path):
     write(library, {"Phasor.mo": "record Phasor\n  Real re;\n  Real im;\nend Phasor;\n"})
     text = (
-        "model Rotation\n  input Real u;\n  output Real y;\n  Phasor p = Phasor(u, 0);\nequation\n  y = 2*p.re;\nend Rotation;\n"
+        "model Rotation\n  input Real u;\n  output Real y;\n  Phasor p = Phasor(u, 0);\nequation\n "
+        " y = 2*p.re;\nend Rotation;\n"
     )
     assert gain_of(write(tmp_path / "model", {"Rotation.mo": text}) / "Rotation.mo", library) == 2
 
@@ -119,21 +133,35 @@ def test_a_record_in_a_file_of_its_own_is_found_by_its_name(library, tmp_path):
 def test_the_required_version_is_selected(model, library):
     write(
         library,
-        {"Blocks 3.0.0/package.mo": BLOCKS.replace("2.1.0", "3.0.0"), "Blocks 10.0.0/package.mo": "package Blocks end Blocks;"},
+        {
+            "Blocks 3.0.0/package.mo": BLOCKS.replace("2.1.0", "3.0.0"),
+            "Blocks 10.0.0/package.mo": "package Blocks end Blocks;",
+        },
     )
-    assert [str(each) for each in libraries_in([library])][:3] == ["Blocks 2.1.0", "Blocks 10.0.0", "Blocks 3.0.0"]
+    assert [str(each) for each in libraries_in([library])][:3] == [
+        "Blocks 2.1.0",
+        "Blocks 10.0.0",
+        "Blocks 3.0.0",
+    ]
     assert found(model('annotation(uses(Blocks(version="3.0.0")));'), library)[0] == "Blocks 3.0.0"
-    assert found(model('annotation(uses(Blocks(version = "2.0.0")));'), library)[0] == "Blocks 2.1.0"
+    assert (
+        found(model('annotation(uses(Blocks(version = "2.0.0")));'), library)[0] == "Blocks 2.1.0"
+    )
 
 
 def test_a_version_that_does_not_fit_is_refused(model, library):
     path = model('annotation(uses(Blocks(version="1.0")));')
-    assert problems_of(path, library) == [f'{path}:5: uses the library Blocks 1.0, found Blocks 2.1.0 in "{library / "Blocks"}"']
+    assert problems_of(path, library) == [
+        f'{path}:5: uses the library Blocks 1.0, found Blocks 2.1.0 in "{library / "Blocks"}"'
+    ]
 
 
 def test_a_missing_library_is_named(model, library):
     path = model('annotation(uses(Block(version="1.0")));')
-    text = 'which is not found; add its folder to MODELICAPATH or pass --library; did you mean "Blocks"?'
+    text = (
+        "which is not found; add its folder to MODELICAPATH or pass --library; did you mean "
+        '"Blocks"?'
+    )
     assert problems_of(path, library) == [f"{path}:9: uses the library Block 1.0, {text}"]
 
 
@@ -143,14 +171,19 @@ def test_the_standard_library_is_missed_without_an_annotation(tmp_path):
 
 
 def test_a_missing_folder_is_named(model, tmp_path):
-    assert problems_of(model(), tmp_path / "none") == [f"{tmp_path / 'none'}: no such folder of Modelica libraries"]
+    assert problems_of(model(), tmp_path / "none") == [
+        f"{tmp_path / 'none'}: no such folder of Modelica libraries"
+    ]
 
 
 def test_a_package_beside_the_model_hides_a_library(model, library):
     path = model()
     write(
         path.parent,
-        {"Blocks/package.mo": "package Blocks end Blocks;", "Blocks/Gain.mo": GAIN.replace("Constants.factor*u", "7*u")},
+        {
+            "Blocks/package.mo": "package Blocks end Blocks;",
+            "Blocks/Gain.mo": GAIN.replace("Constants.factor*u", "7*u"),
+        },
     )
     write(path.parent, {"Constants/package.mo": CONSTANTS})
     assert gain_of(path, library) == 7
@@ -159,7 +192,9 @@ def test_a_package_beside_the_model_hides_a_library(model, library):
 def test_a_model_is_flattened_again_only_after_a_change(model, library, monkeypatch):
     path, calls = model(), []
     run = rumoca_frontend.run_rumoca
-    monkeypatch.setattr(rumoca_frontend, "run_rumoca", lambda *arguments: calls.append(1) or run(*arguments))
+    monkeypatch.setattr(
+        rumoca_frontend, "run_rumoca", lambda *arguments: calls.append(1) or run(*arguments)
+    )
     assert [gain_of(path, library), gain_of(path, library), len(calls)] == [2, 2, 1]
     write(library, {"Constants 1.0/package.mo": CONSTANTS.replace("factor = 2", "factor = 4")})
     assert [gain_of(path, library), gain_of(path, library), len(calls)] == [4, 4, 2]
@@ -176,15 +211,27 @@ def test_an_error_in_a_library_is_reported(model, library):
 
 def test_an_fmu_with_a_library_is_built(model, library, tmp_path):
     target = tmp_path / "doubled.fmu"
-    done = CliRunner().invoke(cli, ["build", str(model()), "--library", str(library), "--output", str(target)])
+    done = CliRunner().invoke(
+        cli, ["build", str(model()), "--library", str(library), "--output", str(target)]
+    )
     assert done.exit_code == 0, done.output
     assert simulate_fmu(str(target), stop_time=0.1, start_values={"u": 4.0})["y"][-1] == 8
 
 
 @pytest.mark.usefixtures("library")
 def test_a_scenario_names_libraries(model, tmp_path):
-    component = {"modelica": f"{model()}:Doubled", "libraries": ["library"], "parameters": {"u": 1.5}}
-    scenario = {"name": "s", "stop_time": 0.1, "step_size": 0.01, "components": {"a": component}, "record": {"signals": ["a.*"]}}
+    component = {
+        "modelica": f"{model()}:Doubled",
+        "libraries": ["library"],
+        "parameters": {"u": 1.5},
+    }
+    scenario = {
+        "name": "s",
+        "stop_time": 0.1,
+        "step_size": 0.01,
+        "components": {"a": component},
+        "record": {"signals": ["a.*"]},
+    }
     path = write(tmp_path, {"s.json": json.dumps(scenario)}) / "s.json"
     assert cosim.run(path)["a.y"][-1] == 3
 
@@ -225,15 +272,24 @@ package Vectors "return is a word in a text"
   end both;
 end Vectors;
 """,
-    "Search/Block.mo": "within Search;\nblock Block\n  input Real u;\n  output Real y = Vectors.first(u);\nend Block;",
+    "Search/Block.mo": (
+        "within Search;\nblock Block\n  input Real u;\n  output Real y = Vectors.first(u);\nend "
+        "Block;"
+    ),
 }
 
 
 @pytest.mark.parametrize(
     ("text", "place"),
     [
-        ("extends Search.Block;", "Search/Vectors.mo:11: return inside a loop or a branch is not supported"),
-        ("input Real u; output Real y = Search.Vectors.both(u);", "Search/Vectors.mo:16: break inside a loop is not supported"),
+        (
+            "extends Search.Block;",
+            "Search/Vectors.mo:11: return inside a loop or a branch is not supported",
+        ),
+        (
+            "input Real u; output Real y = Search.Vectors.both(u);",
+            "Search/Vectors.mo:16: break inside a loop is not supported",
+        ),
     ],
 )
 def test_an_error_in_a_library_names_its_place(tmp_path, text, place):

@@ -30,7 +30,9 @@ end M;""")
     a = np.arange(6.0).reshape(2, 3) * 0.7 - 1.1
     for _, inputs in model.simulate(A=a):
         x = inputs["x"]
-        assert list(model.get("y")) == [a[i, 0] * x[0] + a[i, 1] * x[1] + a[i, 2] * x[2] for i in range(2)]
+        assert list(model.get("y")) == [
+            a[i, 0] * x[0] + a[i, 1] * x[1] + a[i, 2] * x[2] for i in range(2)
+        ]
         assert model.get("s") == x[0] * x[0] + x[1] * x[1] + x[2] * x[2]
         assert list(model.get("v")) == [1 * a[0, j] + 2 * a[1, j] + 2 * x[j] for j in range(3)]
 
@@ -74,11 +76,21 @@ equation
 end M;""")
     for _, inputs in model.simulate():
         x, k = inputs["x"], [int(i) for i in inputs["k"]]
-        expected = [x[0] + x[1] + x[2] + x[3], x[0] * x[1] * x[2] * x[3], max(x), min(x), x[1] * x[1], math.pow(x[0], 3)]
+        expected = [
+            x[0] + x[1] + x[2] + x[3],
+            x[0] * x[1] * x[2] * x[3],
+            max(x),
+            min(x),
+            x[1] * x[1],
+            math.pow(x[0], 3),
+        ]
         assert list(model.get("y")) == expected
         assert list(model.get("n")) == [sum(k), max(k), min(k), 4]
         np.testing.assert_allclose(
-            model.get("c"), np.cross(x[:3], [1, 2, 3]) + np.array([x[3], 0.5, 0.5]), rtol=1e-13, atol=1e-14
+            model.get("c"),
+            np.cross(x[:3], [1, 2, 3]) + np.array([x[3], 0.5, 0.5]),
+            rtol=1e-13,
+            atol=1e-14,
         )
 
 
@@ -147,7 +159,9 @@ end M;""")
     model.set(k=4)
     model.initialize()
     assert model.c.step(0.0, 0.01) == "wx: subscript outside 1..3 (M.mo:7)"
-    with pytest.raises(ComponentError, match=r"M: step failed at t = 0 s: wx: subscript outside 1..3 \(M.mo:7\)"):
+    with pytest.raises(
+        ComponentError, match=r"M: step failed at t = 0 s: wx: subscript outside 1..3 \(M.mo:7\)"
+    ):
         model.python.step(0.0, 0.01)
 
 
@@ -165,7 +179,10 @@ equation
 end M;""")
     for _, inputs in model.simulate():
         inside = 1 <= inputs["k"] <= 3
-        assert (model.get("y"), model.get("b")) == (inputs["k"] if inside else -1, inside and inputs["k"] > 1.5)
+        assert (model.get("y"), model.get("b")) == (
+            inputs["k"] if inside else -1,
+            inside and inputs["k"] > 1.5,
+        )
 
 
 def test_array_valued_choices_and_functions_inside_expressions(compile_both):

@@ -1,4 +1,6 @@
-"""Clocked equations with inferred clocks against loops in Python; C code and interpreter are equal bit for bit."""
+"""Clocked equations with inferred clocks against loops in Python; C code and interpreter are equal
+bit for bit.
+"""
 
 from __future__ import annotations
 
@@ -137,8 +139,12 @@ equation
   peak = hold(m);
 end Integral;""")
     values = random_values()
-    assert outputs(model, values) == pytest.approx(np.repeat(np.cumsum(values[::5]) * 0.05, 5), abs=1e-12)
-    assert outputs(model, values - 2, "peak") == pytest.approx(np.repeat(np.maximum.accumulate(values[::5] - 2), 5))
+    assert outputs(model, values) == pytest.approx(
+        np.repeat(np.cumsum(values[::5]) * 0.05, 5), abs=1e-12
+    )
+    assert outputs(model, values - 2, "peak") == pytest.approx(
+        np.repeat(np.maximum.accumulate(values[::5] - 2), 5)
+    )
 
 
 def test_a_clocked_controller_drives_a_continuous_plant(compile_both):
@@ -197,8 +203,14 @@ BAD = {
         "s = sample(u, c); x = previous(x) + s; t = x; c2 = d; c2 = c;",
         "Bad.mo:8: unresolved clock schedule for `c2 = c`",
     ),
-    "input": ("s = sample(u, c); x = previous(x) + s*u; t = x;", "Bad.mo:8: u belongs to no clock; write sample() of it"),
-    "time": ("s = sample(u, c); x = previous(x) + s*time; t = x;", "Bad.mo:8: time belongs to no clock; write sample() of it"),
+    "input": (
+        "s = sample(u, c); x = previous(x) + s*u; t = x;",
+        "Bad.mo:8: u belongs to no clock; write sample() of it",
+    ),
+    "time": (
+        "s = sample(u, c); x = previous(x) + s*time; t = x;",
+        "Bad.mo:8: time belongs to no clock; write sample() of it",
+    ),
     "before the start": (
         "s = sample(u, c); t = backSample(s, 1, 2); x = t;",
         "Bad.mo:8: backSample would start the clock before",
@@ -256,7 +268,9 @@ end Jumps;""")
         found.append((model.get("y"), model.get("b"), model.get("before")))
     ticks = [0.0, 0.1, 0.2, 0.3, 5.4, 5.5]
     assert [row[0] for row in found] == pytest.approx(np.repeat(ticks, 10), abs=1e-9)
-    assert [row[1] for row in found] == list(np.repeat([False, False, False, False, True, True], 10))
+    assert [row[1] for row in found] == list(
+        np.repeat([False, False, False, False, True, True], 10)
+    )
     assert [row[2] for row in found] == pytest.approx([-1] * 29 + [0.3] * 31, abs=1e-9)
 
 
@@ -285,7 +299,9 @@ end Loop;""")
     assert outputs(model, values) == pytest.approx(expected, abs=1e-9)
 
 
-def test_a_fixed_start_value_of_a_clocked_variable_is_its_previous_value_at_the_first_tick(compile_both):
+def test_a_fixed_start_value_of_a_clocked_variable_is_its_previous_value_at_the_first_tick(
+    compile_both,
+):
     model = compile_both("""model Counter
   input Real u;
   output Real y;
@@ -298,7 +314,9 @@ equation
   y = hold(n);
 end Counter;""")
     values = random_values(20)
-    assert outputs(model, values) == pytest.approx(np.repeat(3 + np.cumsum(values[::2]), 2), abs=1e-12)
+    assert outputs(model, values) == pytest.approx(
+        np.repeat(3 + np.cumsum(values[::2]), 2), abs=1e-12
+    )
 
 
 def test_a_clock_with_a_condition_can_act_on_its_condition(compile_both):
@@ -318,4 +336,6 @@ end Distance;""")
     for k in range(90):
         model.step(k * STEP, STEP)
         found.append(model.get("y"))
-    assert found == pytest.approx([0.25 * math.floor((k + 1) * STEP / 0.25 + 1e-9) for k in range(90)], abs=1e-8)
+    assert found == pytest.approx(
+        [0.25 * math.floor((k + 1) * STEP / 0.25 + 1e-9) for k in range(90)], abs=1e-8
+    )

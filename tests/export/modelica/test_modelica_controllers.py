@@ -1,4 +1,5 @@
-"""Complete controllers: generated C code compared with the interpreter, and a cascade compared with a NumPy reference.
+"""Complete controllers: generated C code compared with the interpreter, and a cascade compared with
+a NumPy reference.
 
 Inputs are random, parameters are random or default, and all outputs must be bit-identical.
 """
@@ -24,7 +25,9 @@ def test_shipped_controllers_agree_with_the_interpreter(compile_both, path):
     rng = np.random.default_rng(1)
     for parameter in model.c.block.variables:
         if parameter.causality == "parameter" and parameter.type == "Float64":
-            value = np.asarray(parameter.start, float).reshape(parameter.shape) * rng.uniform(0.7, 1.4)
+            value = np.asarray(parameter.start, float).reshape(parameter.shape) * rng.uniform(
+                0.7, 1.4
+            )
             model.c.set(parameter.name, value)
             model.python.set(parameter.name, value)
     model.initialize()
@@ -120,7 +123,9 @@ class Pid:
         self.filtered = error if reset else self.filtered + self.alpha * (error - self.filtered)
         unlimited = self.kp * error + self.integral + self.kd * self.nd * (error - self.filtered)
         saturated = abs(unlimited) > self.limit and unlimited * error > 0
-        self.integral = 0.0 if reset else self.integral if saturated else self.integral + self.ki * 0.01 * error
+        self.integral = (
+            0.0 if reset else self.integral if saturated else self.integral + self.ki * 0.01 * error
+        )
         return min(self.limit, max(-self.limit, unlimited))
 
 
@@ -139,7 +144,9 @@ def test_a_cascade_of_pid_controllers_against_numpy(compile_both):
         model.step(tick * 0.01)
         for k in range(3):
             speed = outer[k](inputs["reference"][k] - inputs["position"][k], inputs["reset"])
-            assert model.get("command")[k] == inner[k](speed - inputs["velocity"][k], inputs["reset"])
+            assert model.get("command")[k] == inner[k](
+                speed - inputs["velocity"][k], inputs["reset"]
+            )
 
 
 GUIDANCE = """package P
@@ -198,5 +205,7 @@ def test_waypoint_guidance_against_numpy(compile_both, repeat):
             active = active + 1 if active < 5 else 0 if repeat else 5
         bearing = math.atan2(wy[active] - i["y"], wx[active] - i["x"]) - i["psi"]
         assert (model.get("active"), model.get("finished")) == (active + 1, finished)
-        assert model.get("error") == (0 if finished else math.atan2(math.sin(bearing), math.cos(bearing)))
+        assert model.get("error") == (
+            0 if finished else math.atan2(math.sin(bearing), math.cos(bearing))
+        )
     assert switches > 5 if repeat else finished

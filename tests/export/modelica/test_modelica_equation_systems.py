@@ -1,4 +1,6 @@
-"""Equations in any form: algebraic loops, implicit equations, initial equations and derivatives of dependent variables."""
+"""Equations in any form: algebraic loops, implicit equations, initial equations and derivatives of
+dependent variables.
+"""
 
 from __future__ import annotations
 
@@ -77,7 +79,9 @@ equation
   y^2 + y*u + 1 = 0;
 end None;""")
     assert model.c.initialize() == "a system of equations has no solution (None.mo:5)"
-    with pytest.raises(ComponentError, match=r"a system of equations has no solution \(None.mo:5\)"):
+    with pytest.raises(
+        ComponentError, match=r"a system of equations has no solution \(None.mo:5\)"
+    ):
         model.python.initialize()
 
 
@@ -204,7 +208,9 @@ end Largest;""")
             assert model.get("rate") == (2 if time > 0.5 else -2)
 
 
-def test_homotopy_leads_from_the_solution_of_the_simplified_equation_to_the_actual_one(compile_both):
+def test_homotopy_leads_from_the_solution_of_the_simplified_equation_to_the_actual_one(
+    compile_both,
+):
     """Newton's method alone finds the root -2 of x^2 = 4 from the start value -3."""
     model = compile_both("""model Root
   input Real u;
@@ -220,7 +226,9 @@ end Root;""")
 
 
 def test_a_steady_state_start_follows_homotopy(compile_both):
-    """The state balances atan(8 (x - 3)) + x/10 = 0; at the start value 0 the arc tangent is nearly constant."""
+    """The state balances atan(8 (x - 3)) + x/10 = 0; at the start value 0 the arc tangent is nearly
+    constant.
+    """
     model = compile_both("""model Steady
   Real x(start = 0);
   output Real y;
@@ -238,7 +246,9 @@ end Steady;""")
 
 
 def test_inertias_joined_by_a_gear_have_one_degree_of_freedom(compile_both):
-    """A torque on the first inertia (2 kg.m2) also accelerates the second one (3 kg.m2) behind a gear with the ratio 4."""
+    """A torque on the first inertia (2 kg.m2) also accelerates the second one (3 kg.m2) behind a
+    gear with the ratio 4.
+    """
     model = compile_both("""model Gear
   input Real tau;
   output Real w;
@@ -269,11 +279,19 @@ equation
   der(vy) = f*y - 9.81;
   x^2 + y^2 = 1;
 end Pendulum;""")
-    with pytest.raises(InputError, match=r"Pendulum.mo:9: this equation relates the states x, y, and it is not linear in x"):
+    with pytest.raises(
+        InputError,
+        match=r"Pendulum.mo:9: this equation relates the states x, y, and it is not linear in x",
+    ):
         load_block(path)
 
 
 def test_the_derivative_of_an_input_is_refused_by_its_name(write_model):
-    path = write_model("block M\n  input Real u;\n  output Real y;\n  Real x = 2*u;\nequation\n  y = der(x);\nend M;")
-    with pytest.raises(InputError, match=r"M.mo:2: the derivative of the input u is needed; filter the input"):
+    path = write_model(
+        "block M\n  input Real u;\n  output Real y;\n  Real x = 2*u;\nequation\n  y = der(x);\nend "
+        "M;"
+    )
+    with pytest.raises(
+        InputError, match=r"M.mo:2: the derivative of the input u is needed; filter the input"
+    ):
         load_block(path)

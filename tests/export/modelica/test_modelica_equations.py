@@ -83,7 +83,9 @@ equation
 end M;""")
     for _, inputs in model.simulate(100):
         u = inputs["u"]
-        assert (model.get("y"), model.get("z")) == ((1, 2) if u > 1 else (3 * u, 3) if u < -1 else (u, 0))
+        assert (model.get("y"), model.get("z")) == (
+            (1, 2) if u > 1 else (3 * u, 3) if u < -1 else (u, 0)
+        )
 
 
 def test_if_equations_on_parameters_outside_when(compile_both):

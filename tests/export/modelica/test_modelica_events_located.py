@@ -1,4 +1,6 @@
-"""Models with event iteration: located crossings, values before events, delays; C code and interpreter are equal bit for bit."""
+"""Models with event iteration: located crossings, values before events, delays; C code and
+interpreter are equal bit for bit.
+"""
 
 from __future__ import annotations
 
@@ -84,7 +86,11 @@ end Chain;""")
     for _, inputs in model.run():
         rises += inputs["u"] > 1 and not before
         before = inputs["u"] > 1
-        assert (model.get("first"), model.get("second"), model.get("third")) == (rises, rises * (rises + 1) // 2, rises)
+        assert (model.get("first"), model.get("second"), model.get("third")) == (
+            rises,
+            rises * (rises + 1) // 2,
+            rises,
+        )
     assert rises > 10
 
 
@@ -163,13 +169,20 @@ equation
 end Endless;""")
     model.initialize()
     model.set(u=1.0)
-    assert model.c.step(0.0, 0.01) == "the event iteration does not end: b changes in each evaluation (Endless.mo:2)"
-    with pytest.raises(ComponentError, match="the event iteration does not end: b changes in each evaluation"):
+    assert (
+        model.c.step(0.0, 0.01)
+        == "the event iteration does not end: b changes in each evaluation (Endless.mo:2)"
+    )
+    with pytest.raises(
+        ComponentError, match="the event iteration does not end: b changes in each evaluation"
+    ):
         model.python.step(0.0, 0.01)
 
 
 def test_rounded_values_change_at_located_events(compile_both):
-    """Integrals of rounded values of a rising and a falling time, against their exact sums; modulo and rest have both signs."""
+    """Integrals of rounded values of a rising and a falling time, against their exact sums; modulo
+    and rest have both signs.
+    """
     model = compile_both("""model Rounded
   Real x(start = 0, fixed = true);
   output Real y[6](each start = 0, each fixed = true);

@@ -1,4 +1,6 @@
-"""Modelica models as Model Exchange FMUs: FMPy and cosim integrate them to the results of Co-Simulation."""
+"""Modelica models as Model Exchange FMUs: FMPy and cosim integrate them to the results of
+Co-Simulation.
+"""
 
 from __future__ import annotations
 
@@ -15,7 +17,8 @@ from cosim.export.modelica import load_block
 
 STOP, STEP = 1.2, 0.01
 
-#: state events with reinit(), time events, a relation with the time, an array of states, delay() and an input
+#: state events with reinit(), time events, a relation with the time, an array of states, delay()
+#: and an input
 MODEL = """block Bouncer
   parameter Real e = 0.7 "Restitution";
   input Real push(unit = "m/s2", start = 0);
@@ -62,18 +65,28 @@ def simulate_with_fmpy(fmu: Path, interface: str) -> np.ndarray:
 def simulate_with_cosim(fmu: Path, solver: str | None) -> cosim.Result:
     settings = {"tolerance": 1e-9} if solver else {}
     return cosim.simulate(
-        fmu, stop_time=STOP, step_size=STEP, start_values={"push": 1.0}, output=OUTPUTS, solver=solver, **settings
+        fmu,
+        stop_time=STOP,
+        step_size=STEP,
+        start_values={"push": 1.0},
+        output=OUTPUTS,
+        solver=solver,
+        **settings,
     )
 
 
 def assert_equal_results(found, expected) -> None:
     assert max(expected["count"]) == 2
     for name in OUTPUTS:
-        assert np.array(found[name], float) == pytest.approx(np.array(expected[name], float), abs=2e-5), name
+        assert np.array(found[name], float) == pytest.approx(
+            np.array(expected[name], float), abs=2e-5
+        ), name
 
 
 def test_fmpy_simulates_both_kinds_alike(fmu):
-    assert_equal_results(simulate_with_fmpy(fmu, "ModelExchange"), simulate_with_fmpy(fmu, "CoSimulation"))
+    assert_equal_results(
+        simulate_with_fmpy(fmu, "ModelExchange"), simulate_with_fmpy(fmu, "CoSimulation")
+    )
 
 
 def test_cosim_simulates_both_kinds_alike(fmu):
@@ -84,7 +97,11 @@ def test_the_model_description_is_valid_and_complete(fmu):
     assert validate_fmu(str(fmu)) == []
     description = fmpy.read_model_description(str(fmu))
     assert description.numberOfEventIndicators == 3
-    assert {v.name: v.derivative.name for v in description.modelVariables if v.derivative and "x" not in v.name} == {
+    assert {
+        v.name: v.derivative.name
+        for v in description.modelVariables
+        if v.derivative and "x" not in v.name
+    } == {
         "der(h)": "h",
         "der(v)": "v",
     }
@@ -94,5 +111,9 @@ def test_the_model_description_is_valid_and_complete(fmu):
 def test_a_changing_input_changes_the_derivatives(fmu):
     """Between events the input is continuous in Model Exchange: h(1) of push = 9.81 + 6*t is 2."""
     values = np.array([(0.0, 9.81), (1.0, 15.81)], dtype=[("time", float), ("push", float)])
-    result = fmpy.simulate_fmu(str(fmu), fmi_type="ModelExchange", stop_time=1.0, input=values, relative_tolerance=1e-8)
-    assert result["h"][-1] == pytest.approx(2.0, abs=2e-3)  # FMPy holds the input over its integration steps
+    result = fmpy.simulate_fmu(
+        str(fmu), fmi_type="ModelExchange", stop_time=1.0, input=values, relative_tolerance=1e-8
+    )
+    assert result["h"][-1] == pytest.approx(
+        2.0, abs=2e-3
+    )  # FMPy holds the input over its integration steps

@@ -47,9 +47,23 @@ end M;""")
     for _, inputs in model.simulate():
         x, k = inputs["x"], int(inputs["k"])
         quotient = math.trunc(x / 0.7)
-        real = [math.floor(x), math.ceil(x), x - math.floor(x / 0.7) * 0.7, x - quotient * 0.7, quotient, np.sign(x)]
+        real = [
+            math.floor(x),
+            math.ceil(x),
+            x - math.floor(x / 0.7) * 0.7,
+            x - quotient * 0.7,
+            quotient,
+            np.sign(x),
+        ]
         assert list(model.get("r")) == real
-        assert list(model.get("n")) == [math.floor(x), k % 3, int(math.fmod(k, 3)), int(k / 3), k % -3, abs(k)]
+        assert list(model.get("n")) == [
+            math.floor(x),
+            k % 3,
+            int(math.fmod(k, 3)),
+            int(k / 3),
+            k % -3,
+            abs(k),
+        ]
 
 
 def test_grouping_and_precedence_are_those_of_modelica(compile_both):
@@ -69,8 +83,20 @@ equation
 end M;""")
     for _, i in model.simulate():
         a, b, c, p, q = i["a"], i["b"], i["c"], i["p"], i["q"]
-        assert list(model.get("y")) == [a - (b - c), (a - b) - c, a / (b * c), (a / b) * c, -(a + b) * c, -(a * a)]
-        assert list(model.get("l")) == [p or (q and not p), (p or q) and not p, (a < b) == (b < c), (not (p and q)) != p]
+        assert list(model.get("y")) == [
+            a - (b - c),
+            (a - b) - c,
+            a / (b * c),
+            (a / b) * c,
+            -(a + b) * c,
+            -(a * a),
+        ]
+        assert list(model.get("l")) == [
+            p or (q and not p),
+            (p or q) and not p,
+            (a < b) == (b < c),
+            (not (p and q)) != p,
+        ]
 
 
 def test_integer_quotients_are_real(compile_both):
@@ -161,8 +187,14 @@ algorithm
 end M;""")
     for _, inputs in model.simulate():
         a, b = inputs["a"], inputs["b"]
-        assert list(model.get("y")) == [0.0 + a[0] * 1 + a[1] * 2, 0.0 + b[0] + b[1] * 2 + b[2] * 3 + b[3] * 4]
-        assert (model.get("r"), model.get("angle")) == (math.sqrt(a[0] * a[0] + a[1] * a[1]), math.atan2(a[1], a[0]))
+        assert list(model.get("y")) == [
+            0.0 + a[0] * 1 + a[1] * 2,
+            0.0 + b[0] + b[1] * 2 + b[2] * 3 + b[3] * 4,
+        ]
+        assert (model.get("r"), model.get("angle")) == (
+            math.sqrt(a[0] * a[0] + a[1] * a[1]),
+            math.atan2(a[1], a[0]),
+        )
         assert list(model.get("d")) == list(2 * a)
         assert list(model.get("e")) == list(2 * (2 * b) + b)
 
@@ -174,7 +206,9 @@ end M;""")
         ({"d": 0}, "division by zero in div(), mod() or rem()"),
         ({"x": -1.0}, "y is not a finite number"),
         ({"x": 1e12}, "Integer overflow"),
-        pytest.param({"k": 2**31 - 1, "x": -1.0}, "Integer overflow", id="the first failure counts"),
+        pytest.param(
+            {"k": 2**31 - 1, "x": -1.0}, "Integer overflow", id="the first failure counts"
+        ),
     ],
 )
 def test_an_undefined_arithmetic_result_is_a_failure(compile_both, inputs, reason):
@@ -193,5 +227,8 @@ end M;""")
     model.set(**inputs)
     model.initialize()
     assert model.c.step(0.0, 0.01) == reason
-    with pytest.raises(ComponentError, match=f"M: step failed at t = 0 s: {reason.replace('(', '.').replace(')', '.')}"):
+    with pytest.raises(
+        ComponentError,
+        match=f"M: step failed at t = 0 s: {reason.replace('(', '.').replace(')', '.')}",
+    ):
         model.python.step(0.0, 0.01)

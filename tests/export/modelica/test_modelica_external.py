@@ -1,4 +1,6 @@
-"""External C functions and objects: compiled into the FMU, and called by the interpreter with the same results."""
+"""External C functions and objects: compiled into the FMU, and called by the interpreter with the
+same results.
+"""
 
 from __future__ import annotations
 
@@ -120,12 +122,16 @@ def test_modelica_error_ends_the_step_with_its_text(compile_both):
 def test_modelica_warning_is_written_to_the_log_of_the_fmu(tmp_path, write_model, capfd):
     fmu = write_fmu(load_block(write_model(MODEL)), 2, tmp_path / "M.fmu")
     description, folder = read_model_description(str(fmu)), extract(str(fmu), tmp_path / "unpacked")
-    instance = FMU2Slave(guid=description.guid, unzipDirectory=folder, modelIdentifier="M", instanceName="m")
+    instance = FMU2Slave(
+        guid=description.guid, unzipDirectory=folder, modelIdentifier="M", instanceName="m"
+    )
     instance.instantiate(loggingOn=True)
     instance.setupExperiment()
     instance.enterInitializationMode()
     instance.exitInitializationMode()
-    instance.setReal([next(v.valueReference for v in description.modelVariables if v.name == "u")], [12.0])
+    instance.setReal(
+        [next(v.valueReference for v in description.modelVariables if v.name == "u")], [12.0]
+    )
     instance.doStep(0.0, 0.01)
     instance.freeInstance()
     assert "[WARNING] the argument 15 is large" in capfd.readouterr().out
@@ -213,7 +219,9 @@ def tables(tmp_path, monkeypatch):
 
 
 @pytest.mark.usefixtures("tables")
-def test_an_external_object_follows_its_parameters_and_is_constructed_again_for_a_restored_state(compile_both):
+def test_an_external_object_follows_its_parameters_and_is_constructed_again_for_a_restored_state(
+    compile_both,
+):
     model = compile_both(TABLE_MODEL)
     for _ in model.simulate(3):
         pass
@@ -224,7 +232,9 @@ def test_an_external_object_follows_its_parameters_and_is_constructed_again_for_
     assert model.get("y") == 81.0
 
     library, memory = model.c._library, model.c._memory
-    assert ctypes.c_int.in_dll(library, "open_tables").value == 1, "the object of the old parameters is deleted"
+    assert ctypes.c_int.in_dll(library, "open_tables").value == 1, (
+        "the object of the old parameters is deleted"
+    )
     other = ctypes.create_string_buffer(memory.raw, len(memory))
     library.model_free(memory)
     assert ctypes.c_int.in_dll(library, "open_tables").value == 0
@@ -239,9 +249,15 @@ def test_an_external_object_follows_its_parameters_and_is_constructed_again_for_
 @pytest.mark.parametrize(
     ("change", "message"),
     [
-        (("signals.h", "missing.h"), r'M.mo:2: mean: the file "missing.h" of its Include annotation is not found'),
+        (
+            ("signals.h", "missing.h"),
+            r'M.mo:2: mean: the file "missing.h" of its Include annotation is not found',
+        ),
         (('external "C" split', 'external "FORTRAN 77" split'), r"M.mo:7: .*FORTRAN 77"),
-        (("mean(u, size(u, 1))", "mean(u, 2 * size(u, 1))"), "M.mo:2: mean: an argument of a C function must be a variable"),
+        (
+            ("mean(u, size(u, 1))", "mean(u, 2 * size(u, 1))"),
+            "M.mo:2: mean: an argument of a C function must be a variable",
+        ),
     ],
 )
 def test_a_faulty_declaration_is_refused(write_model, change, message):
@@ -254,15 +270,22 @@ def test_a_faulty_declaration_is_refused(write_model, change, message):
     ("change", "message"),
     [
         (("return x * x * x", "return x * x * z"), "M.mo:.*error: .z. undeclared"),
-        (("checked_root(x)", "checked_rot(x)"), "implicit declaration|undefined reference.*checked_rot"),
+        (
+            ("checked_root(x)", "checked_rot(x)"),
+            "implicit declaration|undefined reference.*checked_rot",
+        ),
     ],
 )
-def test_code_that_does_not_compile_is_refused_with_the_place(tmp_path, write_model, change, message):
+def test_code_that_does_not_compile_is_refused_with_the_place(
+    tmp_path, write_model, change, message
+):
     with pytest.raises(InputError, match=message):
         write_fmu(load_block(write_model(MODEL.replace(*change))), 2, tmp_path / "M.fmu")
 
 
-@pytest.mark.skipif(not os.environ.get("MODELICAPATH"), reason="needs the Modelica Standard Library in MODELICAPATH")
+@pytest.mark.skipif(
+    not os.environ.get("MODELICAPATH"), reason="needs the Modelica Standard Library in MODELICAPATH"
+)
 def test_tables_of_the_standard_library(compile_both):
     model = compile_both("""model T
   input Real u;
@@ -275,7 +298,9 @@ end T;
 """)
     for _, values in model.simulate(50):
         if -1 <= values["u"] <= 2:
-            assert model.get("y") == pytest.approx(np.interp(values["u"], [-1, 0, 1, 2], [2, 0, 3, 3.5]), abs=1e-14)
+            assert model.get("y") == pytest.approx(
+                np.interp(values["u"], [-1, 0, 1, 2], [2, 0, 3, 3.5]), abs=1e-14
+            )
 
 
 PREBUILT = """model M
@@ -294,8 +319,16 @@ def test_a_static_library_is_linked(tmp_path, monkeypatch, write_model):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
     (tmp_path / "lib" / "linux64").mkdir(parents=True)
     (tmp_path / "thirds.c").write_text("double third(double x) { return x / 3; }\n")
-    subprocess.run(["/usr/bin/env", "gcc", "-c", "-fPIC", "thirds.c", "-o", "thirds.o"], cwd=tmp_path, check=True)
-    subprocess.run(["/usr/bin/env", "ar", "rcs", "lib/linux64/libthirds.a", "thirds.o"], cwd=tmp_path, check=True)
+    subprocess.run(
+        ["/usr/bin/env", "gcc", "-c", "-fPIC", "thirds.c", "-o", "thirds.o"],
+        cwd=tmp_path,
+        check=True,
+    )
+    subprocess.run(
+        ["/usr/bin/env", "ar", "rcs", "lib/linux64/libthirds.a", "thirds.o"],
+        cwd=tmp_path,
+        check=True,
+    )
     model = write_model(PREBUILT)
     fmu = write_fmu(load_block(model), 3, tmp_path / "M.fmu")
     result = simulate_fmu(str(fmu), start_values={"u": 6.0}, stop_time=0.1, output=["y"])
@@ -308,5 +341,10 @@ def test_a_static_library_is_linked(tmp_path, monkeypatch, write_model):
 
 
 def test_a_library_that_is_not_found_is_refused(write_model):
-    with pytest.raises(InputError, match=r"M.mo:2: third: no file of its Library annotation \(thirds.c, libthirds.a\) is found"):
+    with pytest.raises(
+        InputError,
+        match=(
+            r"M.mo:2: third: no file of its Library annotation \(thirds.c, libthirds.a\) is found"
+        ),
+    ):
         load_block(write_model(PREBUILT))

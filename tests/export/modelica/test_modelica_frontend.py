@@ -63,22 +63,35 @@ def test_files_beside_the_model_are_not_read(folder):
 
 def test_a_file_with_within_is_loaded_as_a_member_of_its_package(folder):
     block = load_block(folder / "Lib" / "Double.mo")
-    assert (block.identifier, sorted(block.resources)) == ("Double", ["Lib/Double.mo", "Lib/package.mo"])
+    assert (block.identifier, sorted(block.resources)) == (
+        "Double",
+        ["Lib/Double.mo", "Lib/package.mo"],
+    )
 
 
 def test_an_fmu_contains_only_the_files_that_the_model_needs(folder):
     (folder / "Other").mkdir()
     (folder / "Other/package.mo").write_text("package Other end Other;")
-    (folder / "Lib/Unused.mo").write_text(MEMBER.replace("Double", "Unused").replace("Lib;", "Lib; // Double, Third", 1))
+    (folder / "Lib/Unused.mo").write_text(
+        MEMBER.replace("Double", "Unused").replace("Lib;", "Lib; // Double, Third", 1)
+    )
     (folder / "Lib/Third.mo").write_text("within Lib; package Third end Third;")
     (folder / "Lib/Double.mo").write_text(MEMBER.replace("2*u", "Half.half(4*u)"))
     (folder / "Lib/Half").mkdir()
     (folder / "Lib/Half/package.mo").write_text("within Lib; package Half end Half;")
     (folder / "Lib/Half/Third.mo").write_text("within Lib.Half; package Third end Third;")
-    half = "within Lib.Half; function half input Real u; output Real y; algorithm y := u/2; end half;"
+    half = (
+        "within Lib.Half; function half input Real u; output Real y; algorithm y := u/2; end half;"
+    )
     (folder / "Lib/Half/half.mo").write_text(half)
     block = load_block(folder / "Top.mo")
-    needed = ["Lib/Double.mo", "Lib/Half/half.mo", "Lib/Half/package.mo", "Lib/package.mo", "Top.mo"]
+    needed = [
+        "Lib/Double.mo",
+        "Lib/Half/half.mo",
+        "Lib/Half/package.mo",
+        "Lib/package.mo",
+        "Top.mo",
+    ]
     assert sorted(block.resources) == needed
     alone = folder / "alone"
     for name, file in block.resources.items():
@@ -88,16 +101,21 @@ def test_an_fmu_contains_only_the_files_that_the_model_needs(folder):
 
 
 def test_a_model_in_a_package_file_uses_the_other_files_of_its_package(folder):
-    (folder / "Lib/package.mo").write_text(PACKAGE.replace("end Lib", "block Own extends Double; end Own;\nend Lib"))
+    (folder / "Lib/package.mo").write_text(
+        PACKAGE.replace("end Lib", "block Own extends Double; end Own;\nend Lib")
+    )
     block = load_block(folder / "Lib/package.mo", "Lib.Own")
     assert sorted(block.resources) == ["Lib/Double.mo", "Lib/package.mo"]
-    with pytest.raises(InputError, match=r"no model with the name Lib; write .*Lib/package\.mo:Lib\.Own"):
+    with pytest.raises(
+        InputError, match=r"no model with the name Lib; write .*Lib/package\.mo:Lib\.Own"
+    ):
         load_block(folder / "Lib/package.mo")
 
 
 def test_a_model_of_a_file_is_selected_by_name(write_model):
     path = write_model(
-        "model A\n  output Real y;\nequation\n  y = 1;\nend A;\nmodel B\n  output Real z;\nequation\n  z = 2;\nend B;"
+        "model A\n  output Real y;\nequation\n  y = 1;\nend A;\nmodel B\n  output Real z;\n"
+        "equation\n  z = 2;\nend B;"
     )
     assert [v.name for v in load_block(path, "A").variables] == ["y"]
     assert [v.name for v in load_block(path).variables] == ["z"]
@@ -114,7 +132,9 @@ def test_syntax_errors_come_with_file_and_line(folder):
 
 def test_unknown_names_come_with_file_and_line(folder):
     (folder / "Lib" / "Double.mo").write_text(MEMBER.replace("2*u", "2*velocity"))
-    with pytest.raises(InputError, match=r"Double.mo:7: unresolved component reference: 'velocity'"):
+    with pytest.raises(
+        InputError, match=r"Double.mo:7: unresolved component reference: 'velocity'"
+    ):
         load_block(folder / "Top.mo")
 
 
@@ -179,9 +199,16 @@ end Typed;""")
     for version, enumeration in ((2, "SimpleType"), (3, "EnumerationType")):
         root = etree.fromstring(model_description_xml(block, version, "token", ["model.c"]))
         variables = {element.get("name"): element for element in root.find("ModelVariables")}
-        attributes = [variables[name] if version == 3 else variables[name][0] for name in ("m", "y", "mode")]
+        attributes = [
+            variables[name] if version == 3 else variables[name][0] for name in ("m", "y", "mode")
+        ]
         for mass in attributes[:2]:
-            assert [mass.get(key) for key in ("quantity", "unit", "min", "max")] == ["Mass", "kg", "0.0", "10.0"]
+            assert [mass.get(key) for key in ("quantity", "unit", "min", "max")] == [
+                "Mass",
+                "kg",
+                "0.0",
+                "10.0",
+            ]
         assert variables["m"].get("description") == "Load"
         (type_name,) = [element.get("name") for element in root.iter(enumeration)]
         assert attributes[2].get("declaredType") == type_name == "Mode"
@@ -215,9 +242,22 @@ algorithm
   end when;
 end Reset;"""
 UNSUPPORTED = [
-    ("Machine", MACHINE, 12, "state machines (initialState, transition) are not supported; write the state as a variable of an "),
+    (
+        "Machine",
+        MACHINE,
+        12,
+        (
+            "state machines (initialState, transition) are not supported; write the state as a "
+            "variable of an "
+        ),
+    ),
     ("Reset", RESET, 11, "reinit() is not supported in algorithms; write it in a when-equation "),
-    ("Reset", RESET.replace("reinit(y, 0)", 'terminate("end")'), 11, "terminate() is not supported in algorithms of packages; "),
+    (
+        "Reset",
+        RESET.replace("reinit(y, 0)", 'terminate("end")'),
+        11,
+        "terminate() is not supported in algorithms of packages; ",
+    ),
 ]
 
 

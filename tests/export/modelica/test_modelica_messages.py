@@ -80,10 +80,14 @@ def test_terminate_in_an_algorithm_is_that_of_an_equation(write_model, tmp_path,
 @pytest.mark.parametrize("version", [2, 3])
 @pytest.mark.parametrize("solver", [None, "cvode"])
 def test_terminate_ends_the_run_without_an_error(write_model, tmp_path, caplog, version, solver):
-    """Co-Simulation ends after the communication step, Model Exchange before the one with the located event."""
+    """Co-Simulation ends after the communication step, Model Exchange before the one with the
+    located event.
+    """
     fmu = build_to(write_model(TIMER), None, tmp_path / f"timer{version}.fmu", version)
     with caplog.at_level("WARNING", "cosim.component"):
-        result = cosim.simulate(fmu, stop_time=1.0, step_size=0.01, **({"solver": solver} if solver else {}))
+        result = cosim.simulate(
+            fmu, stop_time=1.0, step_size=0.01, **({"solver": solver} if solver else {})
+        )
     assert result.time[-1] == pytest.approx(0.26 if solver is None else 0.25, abs=1e-6)
     assert result["y"][-1] == pytest.approx(2 * result.time[-1], abs=1e-6)
     assert caplog.messages == ["timer: y has reached 0.513 (Timer.mo:5)"]

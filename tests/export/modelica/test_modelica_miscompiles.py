@@ -1,4 +1,6 @@
-"""Valid Modelica models that rumoca's own code generator silently miscompiles; cosim must translate or refuse them."""
+"""Valid Modelica models that rumoca's own code generator silently miscompiles; cosim must translate
+or refuse them.
+"""
 
 from __future__ import annotations
 
@@ -76,8 +78,13 @@ end M;"""
         'y = x; if hold then assert(x < 1, "large"); end if;',
     ],
 )
-def test_a_parameter_that_selects_the_branch_of_an_if_equation_is_a_constant_of_the_fmu(write_model, equations):
-    variables = {variable.name: variable for variable in load_block(write_model(FOLDED.format(equations))).variables}
+def test_a_parameter_that_selects_the_branch_of_an_if_equation_is_a_constant_of_the_fmu(
+    write_model, equations
+):
+    variables = {
+        variable.name: variable
+        for variable in load_block(write_model(FOLDED.format(equations))).variables
+    }
     assert (variables["hold"].causality, variables["hold"].variability) == ("local", "constant")
 
 
@@ -85,7 +92,10 @@ def test_a_parameter_that_selects_the_branch_of_an_if_equation_is_a_constant_of_
     "equations",
     [
         "if hold or x > 0 then y = pre(y) + x; else y = x; end if;",
-        "if x > (if x > 2 then 1 else 0) then y = if hold then 1 else 2; else y = x; end if; // if hold then",
+        (
+            "if x > (if x > 2 then 1 else 0) then y = if hold then 1 else 2; else y = x; end if; "
+            "// if hold then"
+        ),
     ],
 )
 def test_other_if_equations_on_parameters_are_accepted(write_model, equations):
@@ -140,7 +150,9 @@ end M;""")
     assert (described.minimum, described.maximum) == (-2.0, 2.0)
 
 
-def test_functions_of_the_same_short_name_are_refused_because_the_front_end_confuses_them(write_model):
+def test_functions_of_the_same_short_name_are_refused_because_the_front_end_confuses_them(
+    write_model,
+):
     path = write_model("""package A
   function f
     input Real x;

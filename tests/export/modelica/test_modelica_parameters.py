@@ -92,12 +92,27 @@ def test_parameters_take_effect_between_steps(compile_both):
 def test_variables_have_description_unit_limits_and_start(write_model):
     block = load_block(write_model(OWNERS))
     variables = {v.name: v for v in block.variables}
-    assert (block.identifier, block.description, block.step_size) == ("M", "a model of owners", 0.01)
+    assert (block.identifier, block.description, block.step_size) == (
+        "M",
+        "a model of owners",
+        0.01,
+    )
     base, gain, matrix, n = variables["base"], variables["c.k"], variables["A"], variables["n"]
-    assert (base.type, base.unit, base.description, base.start) == ("Float64", "m/s", "owner of a.k", 3.0)
+    assert (base.type, base.unit, base.description, base.start) == (
+        "Float64",
+        "m/s",
+        "owner of a.k",
+        3.0,
+    )
     assert (gain.minimum, gain.maximum, gain.member) == (0.0, None, "c_k")
     assert (matrix.shape, matrix.start) == ((2, 2), (1.0, 2.0, 3.0, 2.5))
-    assert (n.type, n.minimum, n.maximum, n.start, n.variability) == ("Int32", 1.0, 3.0, 2, "tunable")
+    assert (n.type, n.minimum, n.maximum, n.start, n.variability) == (
+        "Int32",
+        1.0,
+        3.0,
+        2,
+        "tunable",
+    )
     assert (variables["u"].variability, variables["y"].variability) == ("continuous", "discrete")
 
 
@@ -164,7 +179,9 @@ end M;""")
     assert [v.name for v in model.c.block.variables] == ["u", "y", "s"]
     model.initialize()
     for _, inputs in model.run(20):
-        assert model.get("s") == inputs["u"] + 2 * inputs["u"] + (inputs["u"] + inputs["u"] + inputs["u"] + inputs["u"])
+        assert model.get("s") == inputs["u"] + 2 * inputs["u"] + (
+            inputs["u"] + inputs["u"] + inputs["u"] + inputs["u"]
+        )
 
 
 def test_struct_members_are_unique_and_not_reserved_in_c(compile_both):
@@ -224,7 +241,9 @@ end Structure;"""
 
 
 def test_parameters_can_be_set_when_building(write_model, tmp_path):
-    """Also structural ones, those of components and arrays; the model keeps its name and its other values."""
+    """Also structural ones, those of components and arrays; the model keeps its name and its other
+    values.
+    """
     values = {"n": 3, "single.twice": True, "single.gains": [2.5, 1]}
     fmu = build_to(write_model(STRUCTURE), None, tmp_path / "structure.fmu", values=values)
     result = cosim.simulate(fmu, stop_time=0.02, start_values={"u": 2.0})
@@ -235,7 +254,10 @@ def test_parameters_can_be_set_when_building(write_model, tmp_path):
     ("values", "message"),
     [
         ({"m": 3}, 'the model Structure has no parameter "m"; valid: '),
-        ({"single.twise": 1}, 'the model Structure has no parameter "single.twise"; did you mean "single.twice"?'),
+        (
+            {"single.twise": 1},
+            'the model Structure has no parameter "single.twise"; did you mean "single.twice"?',
+        ),
         ({"n; end": 3}, "n; end: expected the name of a parameter"),
         ({"n": {"a": 1}}, "n: found {'a': 1}, expected a number, true, false, a text or a list"),
     ],
@@ -249,8 +271,14 @@ def test_values_reach_a_member_of_a_package(tmp_path):
     (tmp_path / "Lib").mkdir()
     (tmp_path / "Lib" / "package.mo").write_text("package Lib end Lib;")
     member = tmp_path / "Lib" / "Wide.mo"
-    member.write_text("within Lib; block Wide parameter Integer n = 1; output Real y[n] = fill(1.0, n); end Wide;")
-    sizes = [v.shape for v in load_block(member, options=ModelicaOptions(values={"n": 4})).variables if v.name == "y"]
+    member.write_text(
+        "within Lib; block Wide parameter Integer n = 1; output Real y[n] = fill(1.0, n); end Wide;"
+    )
+    sizes = [
+        v.shape
+        for v in load_block(member, options=ModelicaOptions(values={"n": 4})).variables
+        if v.name == "y"
+    ]
     assert sizes == [(4,)]
 
 
@@ -260,7 +288,9 @@ def test_only_models_have_values_when_building(tmp_path):
         build_to(tmp_path / "a.py", None, tmp_path / "a.fmu", values={"n": 3})
 
 
-def test_an_unknown_unit_of_a_parameter_is_left_out_with_a_warning_that_names_the_line(write_model, caplog):
+def test_an_unknown_unit_of_a_parameter_is_left_out_with_a_warning_that_names_the_line(
+    write_model, caplog
+):
     path = write_model("""model M
   parameter Real gain(unit = "dB") = 3;
   parameter Real current(unit = "mA") = 4;
@@ -271,7 +301,9 @@ equation
 end M;""")
     units = {variable.name: variable.unit for variable in load_block(path).variables}
     assert (units["gain"], units["current"], units["y"]) == ("", "mA", "kHz")
-    assert [record.getMessage() for record in caplog.records] == [f'{path}:2: gain: the FMU states no unit: unknown unit "dB"']
+    assert [record.getMessage() for record in caplog.records] == [
+        f'{path}:2: gain: the FMU states no unit: unknown unit "dB"'
+    ]
 
 
 def test_an_unknown_unit_of_an_input_or_output_is_refused_with_its_line(write_model):

@@ -1,4 +1,6 @@
-"""Continuous states: order and accuracy of the integration, constant inputs, ticks inside a step, start values."""
+"""Continuous states: order and accuracy of the integration, constant inputs, ticks inside a step,
+start values.
+"""
 
 from __future__ import annotations
 
@@ -80,7 +82,9 @@ def pendulum(_t, x, torque, w=20.0, damping=0.3):
 
 
 def reference(x, torque, duration):
-    return solve_ivp(pendulum, (0, duration), x, "DOP853", args=(torque,), rtol=1e-13, atol=1e-13).y[:, -1]
+    return solve_ivp(
+        pendulum, (0, duration), x, "DOP853", args=(torque,), rtol=1e-13, atol=1e-13
+    ).y[:, -1]
 
 
 def state(model):
@@ -111,8 +115,12 @@ def test_the_method_has_order_four(compile_both):
     assert orders == pytest.approx([4, 4], abs=0.25)
 
 
-@pytest.mark.parametrize(("step_size", "count"), [(0.002, 1), (0.005, 1), (0.0051, 2), (0.01, 2), (0.033, 7)])
-def test_steps_are_split_into_equal_parts_of_at_most_five_milliseconds(compile_both, step_size, count):
+@pytest.mark.parametrize(
+    ("step_size", "count"), [(0.002, 1), (0.005, 1), (0.0051, 2), (0.01, 2), (0.033, 7)]
+)
+def test_steps_are_split_into_equal_parts_of_at_most_five_milliseconds(
+    compile_both, step_size, count
+):
     model = compile_both(PENDULUM)
     model.initialize()
     model.step(0.0, step_size)
@@ -133,7 +141,9 @@ def test_inputs_are_constant_during_a_step_and_outputs_belong_to_its_end(compile
         x = reference(x, inputs["torque"], 0.01)
         assert state(model) == pytest.approx(x, abs=2e-4), k
     angle, rate = state(model)
-    assert model.get("energy") == pytest.approx(rate**2 / 2 + 400 * (1 - math.cos(angle)), rel=1e-14)
+    assert model.get("energy") == pytest.approx(
+        rate**2 / 2 + 400 * (1 - math.cos(angle)), rel=1e-14
+    )
 
 
 def test_time_is_that_of_each_runge_kutta_stage(compile_both):
@@ -144,7 +154,9 @@ equation
 end M;""")
     model.initialize(1.0)
     model.step(1.0, 1.0)
-    assert model.get("x") == pytest.approx(2**4 - 1, rel=1e-14)  # Simpson's rule is exact for cubics
+    assert model.get("x") == pytest.approx(
+        2**4 - 1, rel=1e-14
+    )  # Simpson's rule is exact for cubics
 
 
 def test_c_and_interpreter_are_bit_identical_for_a_mixed_model(compile_both):
@@ -243,7 +255,9 @@ end Chain;""")
     model.initialize()
     for k in range(100):
         model.step(k * 0.01)
-    assert model.get("chain") == pytest.approx([math.exp(-1) / math.factorial(k) for k in range(4)], abs=1e-9)
+    assert model.get("chain") == pytest.approx(
+        [math.exp(-1) / math.factorial(k) for k in range(4)], abs=1e-9
+    )
     assert model.get("ramp") == pytest.approx([1, 2, 3, 4], abs=1e-12)
     rates = -0.1 * np.outer(range(5, 0, -1), range(1, 4))
     assert model.get("grid") == pytest.approx(np.exp(rates), abs=1e-9)
@@ -292,7 +306,9 @@ end M;""")
         x += 0.005 * (fast + slow)
         if k % 4 == 3:
             model.step((k - 3) * 0.005, 0.02)
-            assert (model.get("x"), model.get("fast"), model.get("slow")) == pytest.approx((x, fast, slow), rel=1e-12)
+            assert (model.get("x"), model.get("fast"), model.get("slow")) == pytest.approx(
+                (x, fast, slow), rel=1e-12
+            )
 
 
 def test_an_unused_clock_has_no_effect(compile_both):
@@ -322,7 +338,11 @@ def test_shorter_steps_execute_the_same_ticks(compile_both):
 
 def test_outputs_of_a_model_with_states_are_continuous(compile_both):
     variables = compile_both(PLANT).c.variables
-    assert [variables[name].variability for name in ("q", "a", "ticks")] == ["continuous", "continuous", "discrete"]
+    assert [variables[name].variability for name in ("q", "a", "ticks")] == [
+        "continuous",
+        "continuous",
+        "discrete",
+    ]
     assert {v.causality for name, v in variables.items() if name.startswith("der(")} <= {"local"}
 
 

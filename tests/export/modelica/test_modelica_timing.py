@@ -1,4 +1,6 @@
-"""Timing of sampled models: ticks in [t, t + h), start times, several rates, models without a clock."""
+"""Timing of sampled models: ticks in [t, t + h), start times, several rates, models without a
+clock.
+"""
 
 from __future__ import annotations
 
@@ -49,7 +51,9 @@ def test_a_step_shorter_than_the_period_runs_a_tick_only_if_it_contains_one(comp
     assert counts == [1, 1, 2, 2, 2, 3, 3, 4]
 
 
-@pytest.mark.parametrize(("start", "first"), [(3.0, 3.0), (0.005, 0.01), (7.28, 7.28), (-0.025, 0.0)])
+@pytest.mark.parametrize(
+    ("start", "first"), [(3.0, 3.0), (0.005, 0.01), (7.28, 7.28), (-0.025, 0.0)]
+)
 def test_the_first_tick_is_the_first_one_not_before_the_start_time(compile_both, start, first):
     model = compile_both(COUNTER)
     model.initialize(start)
@@ -107,7 +111,12 @@ end M;""")
     held = 0.0
     for k, inputs in model.run(300):
         held = inputs["u"] if k % 3 == 0 else held
-        assert [model.get(name) for name in ("fast", "slow", "seen", "held")] == [k + 1, k // 3 + 1, k // 3 + 1, held]
+        assert [model.get(name) for name in ("fast", "slow", "seen", "held")] == [
+            k + 1,
+            k // 3 + 1,
+            k // 3 + 1,
+            held,
+        ]
 
 
 def test_a_long_step_keeps_the_order_of_two_rates(compile_both):
@@ -136,7 +145,10 @@ equation
   y = k*u + time;
 end M;""")
     assert model.c.block.step_size == 0.01
-    assert (model.c.variables["u"].variability, model.c.variables["y"].variability) == ("continuous", "continuous")
+    assert (model.c.variables["u"].variability, model.c.variables["y"].variability) == (
+        "continuous",
+        "continuous",
+    )
     model.set(u=1.0)
     model.initialize(5.0)
     assert model.get("y") == 7.0
@@ -146,7 +158,9 @@ end M;""")
 
 
 def test_a_step_after_a_failed_step_can_succeed(compile_both):
-    model = compile_both(COUNTER.replace("    t = time;", '    t = time;\n    assert(u < 1, "too large");'))
+    model = compile_both(
+        COUNTER.replace("    t = time;", '    t = time;\n    assert(u < 1, "too large");')
+    )
     model.initialize()
     model.set(u=5.0)
     assert model.c.step(0.0, 0.01) == "too large (Counter.mo:11)"

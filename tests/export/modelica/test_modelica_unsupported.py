@@ -8,8 +8,16 @@ from cosim.core.errors import InputError
 from cosim.export.modelica import load_block
 
 CASES = {
-    "der of an expression": ("Real x;", "der(2*x) = u;\n  y = x;", r"M.mo:8: der\(...\) must have exactly one resolved variable"),
-    "der of an input": ("", "y = der(u);", r"M.mo:8: der\(\) needs a variable with a derivative: inputs"),
+    "der of an expression": (
+        "Real x;",
+        "der(2*x) = u;\n  y = x;",
+        r"M.mo:8: der\(...\) must have exactly one resolved variable",
+    ),
+    "der of an input": (
+        "",
+        "y = der(u);",
+        r"M.mo:8: der\(\) needs a variable with a derivative: inputs",
+    ),
     "der of an Integer": ("Integer n;", "n = 1;\n  y = der(n);", "M.mo:9: .*n"),
     "parameter of a variable": (
         "parameter Real p = u;",
@@ -26,7 +34,11 @@ CASES = {
         "v = {u, u, u};\n  y = sum(v[1:n]);",
         "M.mo:10: the bounds of a range must be",
     ),
-    "text": ("String name;", 'name = "x";\n  y = u;', "M.mo:6: name: variables of type String are not supported"),
+    "text": (
+        "String name;",
+        'name = "x";\n  y = u;',
+        "M.mo:6: name: variables of type String are not supported",
+    ),
     "unknown name": ("", "y = u + speeed;", "M.mo:8: unresolved component reference: 'speeed'"),
     "too few equations": ("Real a;", "y = u;", "unbalanced model"),
 }
@@ -103,7 +115,9 @@ equation
 end M;""")
     json, sources = flatten_model(path, None)
     json["structured_equations"][0]["first_equation_index"] = 1
-    with pytest.raises(InputError, match=r"M.mo:\d: this for-equation was not unrolled by the front end"):
+    with pytest.raises(
+        InputError, match=r"M.mo:\d: this for-equation was not unrolled by the front end"
+    ):
         ModelReader(json, sources).read_model("M")
 
 

@@ -1,4 +1,6 @@
-"""Export by OpenModelica: the script for omc, and errors. A shell script replaces omc; OpenModelica itself is not tested."""
+"""Export by OpenModelica: the script for omc, and errors. A shell script replaces omc; OpenModelica
+itself is not tested.
+"""
 
 from __future__ import annotations
 
@@ -14,7 +16,9 @@ MODEL = "model M\n  output Real x;\nequation\n  der(x) = 1;\nend M;\n"
 
 @pytest.fixture
 def omc(tmp_path, monkeypatch):
-    """Return a function that puts a shell script with the given commands on PATH under the name omc."""
+    """Return a function that puts a shell script with the given commands on PATH under the name
+    omc.
+    """
 
     def install(commands: str) -> Path:
         script = tmp_path / "bin" / "omc"
@@ -27,7 +31,9 @@ def omc(tmp_path, monkeypatch):
     return install
 
 
-def test_the_command_loads_packages_and_file_and_builds_a_co_simulation_fmu(omc, write_model, tmp_path):
+def test_the_command_loads_packages_and_file_and_builds_a_co_simulation_fmu(
+    omc, write_model, tmp_path
+):
     path = write_model(MODEL)
     (tmp_path / "Library").mkdir()
     (tmp_path / "Library" / "package.mo").write_text("package Library\nend Library;\n")
@@ -56,10 +62,16 @@ def test_a_member_of_a_package_is_loaded_with_its_package(omc, tmp_path):
 
 def test_errors_are_reported_with_file_and_line(omc, write_model, tmp_path):
     path = write_model(MODEL)
-    omc(f'echo "true"; echo "[{path}:4:3-4:13:writable] Error: Variable y not found in scope M."; echo "Error: no code"; exit 1')
+    omc(
+        f'echo "true"; echo "[{path}:4:3-4:13:writable] Error: Variable y not found in scope M."; '
+        'echo "Error: no code"; exit 1'
+    )
     with pytest.raises(InputError) as refused:
         export_with_omc(path, tmp_path / "m.fmu")
-    assert str(refused.value).splitlines() == [f"{path}:4: Variable y not found in scope M.", f"{path}: no code"]
+    assert str(refused.value).splitlines() == [
+        f"{path}:4: Variable y not found in scope M.",
+        f"{path}: no code",
+    ]
     assert not (tmp_path / "m.fmu").exists()
 
 

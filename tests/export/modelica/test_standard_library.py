@@ -1,4 +1,6 @@
-"""Blocks of the Modelica Standard Library against closed forms and scipy.signal; needs the library in MODELICAPATH."""
+"""Blocks of the Modelica Standard Library against closed forms and scipy.signal; needs the library
+in MODELICAPATH.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,10 @@ from scipy import signal
 
 pytestmark = [
     pytest.mark.long,
-    pytest.mark.skipif(not os.environ.get("MODELICAPATH"), reason="needs the Modelica Standard Library in MODELICAPATH"),
+    pytest.mark.skipif(
+        not os.environ.get("MODELICAPATH"),
+        reason="needs the Modelica Standard Library in MODELICAPATH",
+    ),
 ]
 
 STEP, COUNT = 0.01, 200
@@ -23,7 +28,10 @@ LINEAR = {
     "second order": ("Continuous.SecondOrder b(k=1.5, w=4, D=0.3)", [1.5], [1 / 16, 0.15, 1]),
     "PI": ("Continuous.PI b(k=2, T=0.5)", [1, 2], [0.5, 0]),
     "transfer function": ("Continuous.TransferFunction b(b={1,2}, a={1,3,5})", [1, 2], [1, 3, 5]),
-    "Butterworth": ("Continuous.LowpassButterworth b(n=3, f=2)", *signal.butter(3, 4 * np.pi, analog=True)),
+    "Butterworth": (
+        "Continuous.LowpassButterworth b(n=3, f=2)",
+        *signal.butter(3, 4 * np.pi, analog=True),
+    ),
 }
 
 
@@ -63,7 +71,9 @@ def test_a_linear_block_agrees_with_its_transfer_function(compile_both, kind):
     for value in values:
         state = discrete_a @ state + discrete_b[:, 0] * value
         expected.append((c @ state + d[:, 0] * value)[0])
-    assert outputs(compile_both(block_model(declaration)), values) == pytest.approx(np.array(expected), abs=1e-6)
+    assert outputs(compile_both(block_model(declaration)), values) == pytest.approx(
+        np.array(expected), abs=1e-6
+    )
 
 
 @pytest.mark.parametrize(
@@ -76,11 +86,15 @@ def test_a_linear_block_agrees_with_its_transfer_function(compile_both, kind):
 )
 def test_a_static_block_agrees_with_its_function(compile_both, declaration, function):
     values = random_input()
-    assert outputs(compile_both(block_model(declaration)), values) == pytest.approx(function(values), abs=1e-12)
+    assert outputs(compile_both(block_model(declaration)), values) == pytest.approx(
+        function(values), abs=1e-12
+    )
 
 
 def test_a_discrete_transfer_function_is_exact(compile_both):
     values = random_input()
     declaration = "Discrete.TransferFunction b(b={1, 0.5}, a={1, -0.6, 0.2}, samplePeriod=0.05)"
     expected = np.repeat(signal.lfilter([0, 1, 0.5], [1, -0.6, 0.2], values[::5]), 5)
-    assert outputs(compile_both(block_model(declaration)), values) == pytest.approx(expected, abs=1e-14)
+    assert outputs(compile_both(block_model(declaration)), values) == pytest.approx(
+        expected, abs=1e-14
+    )

@@ -10,7 +10,13 @@ from plant_validation import MeasurementCheck
 from scipy.signal import welch
 
 from plant_src.environment.coloured_noise import GRID_STEP, Channel, ColouredNoise
-from plant_src.environment.wind import DrydenGusts, Turbulence, Wind, turbulence_intensities, turbulence_scale_lengths
+from plant_src.environment.wind import (
+    DrydenGusts,
+    Turbulence,
+    Wind,
+    turbulence_intensities,
+    turbulence_scale_lengths,
+)
 
 DRYDEN = "Dryden, MIL-F-8785C"
 COUNT = 200_000
@@ -45,9 +51,19 @@ def test_noise_has_its_deviation(first_order, second_order):
 
 @pytest.mark.parametrize("lag", [1, 2, 4])
 def test_first_order_noise_is_discretised_exactly(first_order, lag, measured: MeasurementCheck):
-    """exp(-t / T), also where the grid is as coarse as half a time constant: Euler's method would have 0.5 at the first lag."""
+    """exp(-t / T), also where the grid is as coarse as half a time constant: Euler's method would
+    have 0.5 at the first lag.
+    """
     found, expected = correlation(first_order[0], lag), math.exp(-lag * GRID_STEP / FAST)
-    measured("Wind and current", "correlation of first-order noise", found, expected, "1", "exp(-t/T)", within=0.01)
+    measured(
+        "Wind and current",
+        "correlation of first-order noise",
+        found,
+        expected,
+        "1",
+        "exp(-t/T)",
+        within=0.01,
+    )
 
 
 @pytest.mark.parametrize("lag", [1, 2, 4])
@@ -55,7 +71,15 @@ def test_second_order_noise_is_discretised_exactly(second_order, lag, measured: 
     """The transform of (1 + 3 (T w)^2) / (1 + (T w)^2)^2 is (1 - t / (2 T)) exp(-t / T)."""
     t = lag * GRID_STEP / FAST
     found, expected = correlation(second_order[0], lag), (1 - t / 2) * math.exp(-t)
-    measured("Wind and current", "correlation of transverse gusts", found, expected, "1", "(1 - t/2T) exp(-t/T)", within=0.01)
+    measured(
+        "Wind and current",
+        "correlation of transverse gusts",
+        found,
+        expected,
+        "1",
+        "(1 - t/2T) exp(-t/T)",
+        within=0.01,
+    )
 
 
 def test_noise_is_continuous_across_blocks(first_order):
@@ -76,12 +100,19 @@ def test_noise_is_a_function_of_its_index():
 
 
 def test_other_names_and_seeds_give_independent_noise():
-    noises = [ColouredNoise(seed, [name], [Channel(1.0, 0.3)]) for seed, name in ((1, "uav"), (1, "usv"), (2, "uav"))]
+    noises = [
+        ColouredNoise(seed, [name], [Channel(1.0, 0.3)])
+        for seed, name in ((1, "uav"), (1, "usv"), (2, "uav"))
+    ]
     assert len({noise[100] for noise in noises}) == 3
 
 
-def dryden(omega: np.ndarray, deviation: float, length: float, speed: float, transverse: bool) -> np.ndarray:
-    """MIL-F-8785C, 3.7.2.2: one-sided spectra over the angular frequency, whose area is the variance."""
+def dryden(
+    omega: np.ndarray, deviation: float, length: float, speed: float, transverse: bool
+) -> np.ndarray:
+    """MIL-F-8785C, 3.7.2.2: one-sided spectra over the angular frequency, whose area is the
+    variance.
+    """
     x = (length * omega / speed) ** 2
     if transverse:
         return deviation**2 * length / (math.pi * speed) * (1 + 3 * x) / (1 + x) ** 2
@@ -104,8 +135,21 @@ def test_turbulence_has_drydens_spectrum(gusts, axis, transverse, measured: Meas
     expected = dryden(omega, turbulence.intensities[axis], length, 5.0, transverse)
     for low, high in ((0.15, 0.6), (0.6, 2.5), (2.5, 10.0), (10.0, 40.0)):
         band = (omega > low) & (omega < high)
-        found, wanted, case = (density[band] / (2 * math.pi)).mean(), expected[band].mean(), "uvw"[axis]
-        measured("Wind and current", "spectrum of gusts, 4 bands", found, wanted, "m2/s", DRYDEN, relative=0.1, case=case)
+        found, wanted, case = (
+            (density[band] / (2 * math.pi)).mean(),
+            expected[band].mean(),
+            "uvw"[axis],
+        )
+        measured(
+            "Wind and current",
+            "spectrum of gusts, 4 bands",
+            found,
+            wanted,
+            "m2/s",
+            DRYDEN,
+            relative=0.1,
+            case=case,
+        )
 
 
 def test_turbulence_has_drydens_deviations(gusts, measured: MeasurementCheck):
@@ -113,18 +157,31 @@ def test_turbulence_has_drydens_deviations(gusts, measured: MeasurementCheck):
     _, values = gusts
     level = 0.5 / (0.177 + 0.000823 * 20) ** 0.4
     deviation = values.std(axis=1)
-    measured("Wind and current", "standard deviations of gusts", deviation, [level, level, 0.5], "m/s", DRYDEN, relative=0.05)
+    measured(
+        "Wind and current",
+        "standard deviations of gusts",
+        deviation,
+        [level, level, 0.5],
+        "m/s",
+        DRYDEN,
+        relative=0.05,
+    )
 
 
 def test_scales_are_those_of_the_standard():
     """Both forms meet at 1000 ft, where all scales are 1000 ft and all deviations 0.1 W20."""
     assert turbulence_scale_lengths(304.8) == pytest.approx((304.8, 304.8))
     assert turbulence_intensities(10.0, 304.8) == pytest.approx((1.0, 1.0, 1.0))
-    assert turbulence_scale_lengths(6.096)[0] == pytest.approx(20 / (0.177 + 0.01646) ** 1.2 * 0.3048)
+    assert turbulence_scale_lengths(6.096)[0] == pytest.approx(
+        20 / (0.177 + 0.01646) ** 1.2 * 0.3048
+    )
 
 
 def test_gusts_lie_along_the_wind():
     """Turned by the wind's direction, the same noise: u along it, v to the left."""
     turbulence = Turbulence((1.0, 0.3, 0.2), 10.0, 5.0)
-    east, north = (DrydenGusts(Wind(velocity, turbulence), turbulence, 1, ["uav"])[40] for velocity in ((5.0, 0, 0), (0, 5.0, 0)))
+    east, north = (
+        DrydenGusts(Wind(velocity, turbulence), turbulence, 1, ["uav"])[40]
+        for velocity in ((5.0, 0, 0), (0, 5.0, 0))
+    )
     assert north == pytest.approx((-east[1], east[0], east[2]))

@@ -1,4 +1,6 @@
-"""Worlds with wind, waves, current and ground effect: inputs of the vehicles, outputs and saved states."""
+"""Worlds with wind, waves, current and ground effect: inputs of the vehicles, outputs and saved
+states.
+"""
 
 from __future__ import annotations
 
@@ -10,7 +12,15 @@ from typing import Any
 import numpy as np
 import pytest
 from plant_validation import MeasurementCheck
-from world_harness import DECK_TOP, PLATFORM, PLATFORM_TOP, REST_HEIGHT, WorldHarness, quadcopter_settings, vessel_settings
+from world_harness import (
+    DECK_TOP,
+    PLATFORM,
+    PLATFORM_TOP,
+    REST_HEIGHT,
+    WorldHarness,
+    quadcopter_settings,
+    vessel_settings,
+)
 
 import cosim
 from cosim.core.errors import ComponentError, InputError
@@ -18,7 +28,11 @@ from plant_src.environment import sea
 from plant_src.physics.body import ContactBody
 from plant_src.world import World
 
-DRAG = {f"{name}_drag.{axis}": value for name, value in (("rotor", 2e-5), ("body", 0.02)) for axis in "xyz"}
+DRAG = {
+    f"{name}_drag.{axis}": value
+    for name, value in (("rotor", 2e-5), ("body", 0.02))
+    for axis in "xyz"
+}
 AGAIN = "60 steps from flight, touchdown and rest, repeated"
 HOVER = [345.0, 346.0, 344.0, 345.0]
 GUSTY = {
@@ -35,12 +49,16 @@ GUSTY = {
 def test_a_calm_world_has_no_environment() -> None:
     names = [
         variable.name
-        for variable in World("plant", {"uav": quadcopter_settings([0, 0, 2]), "usv": vessel_settings([0, 0])}).variables
+        for variable in World(
+            "plant", {"uav": quadcopter_settings([0, 0, 2]), "usv": vessel_settings([0, 0])}
+        ).variables
     ]
     assert not [name for name in names if "environment" in name or "wind" in name or "wave" in name]
 
 
-def test_a_vessel_drifting_with_air_and_water_moves_as_in_calm_conditions(measured: MeasurementCheck) -> None:
+def test_a_vessel_drifting_with_air_and_water_moves_as_in_calm_conditions(
+    measured: MeasurementCheck,
+) -> None:
     """Galilean invariance: water, air and vessel with the same velocity on top."""
     drift = np.array([0.4, -0.3])
     start = np.array([0.5, 0.1])  # through the water, world frame at yaw 0
@@ -55,15 +73,35 @@ def test_a_vessel_drifting_with_air_and_water_moves_as_in_calm_conditions(measur
     expected = calm.vector("usv.position", "xy") + 10.0 * drift
     assert np.abs(calm.vector("usv.position", "xy")).max() > 1.0
     error = moving.vector("usv.position", "xy") - expected
-    measured("Wind and current", "Strider that drifts with both, 10 s", error, 0.0, "m", "calm, Galilean", within=1e-8)
+    measured(
+        "Wind and current",
+        "Strider that drifts with both, 10 s",
+        error,
+        0.0,
+        "m",
+        "calm, Galilean",
+        within=1e-8,
+    )
     assert moving["usv.attitude.yaw"] == pytest.approx(calm["usv.attitude.yaw"], abs=1e-9)
 
 
-def test_a_multirotor_drifting_with_the_air_flies_as_in_calm_air(measured: MeasurementCheck) -> None:
+def test_a_multirotor_drifting_with_the_air_flies_as_in_calm_air(
+    measured: MeasurementCheck,
+) -> None:
     drift = np.array([3.0, -2.0, 0.5])
-    calm = WorldHarness({"uav": quadcopter_settings([0.0, 0.0, 50.0], parameters=DRAG, velocity_body=[4.0, 1.0, 0.0])})
+    calm = WorldHarness(
+        {
+            "uav": quadcopter_settings(
+                [0.0, 0.0, 50.0], parameters=DRAG, velocity_body=[4.0, 1.0, 0.0]
+            )
+        }
+    )
     moving = WorldHarness(
-        {"uav": quadcopter_settings([0.0, 0.0, 50.0], parameters=DRAG, velocity_body=[7.0, -1.0, 0.5])},
+        {
+            "uav": quadcopter_settings(
+                [0.0, 0.0, 50.0], parameters=DRAG, velocity_body=[7.0, -1.0, 0.5]
+            )
+        },
         environment={"wind": {"velocity": [*drift]}},
     )
     for trial in (calm, moving):
@@ -71,12 +109,21 @@ def test_a_multirotor_drifting_with_the_air_flies_as_in_calm_air(measured: Measu
         trial.step(300)
     expected = calm.vector("uav.position") + 3.0 * drift
     error = moving.vector("uav.position") - expected
-    measured("Wind and current", "AR.Drone that drifts with the air, 3 s", error, 0.0, "m", "calm, Galilean", within=1e-8)
+    measured(
+        "Wind and current",
+        "AR.Drone that drifts with the air, 3 s",
+        error,
+        0.0,
+        "m",
+        "calm, Galilean",
+        within=1e-8,
+    )
 
 
 def test_the_wind_at_a_vehicle_is_published() -> None:
     trial = WorldHarness(
-        {"uav": quadcopter_settings([0.0, 0.0, 2.5])}, environment={"wind": {"speed": 6.0, "profile": {"exponent": 0.5}}}
+        {"uav": quadcopter_settings([0.0, 0.0, 2.5])},
+        environment={"wind": {"speed": 6.0, "profile": {"exponent": 0.5}}},
     )
     assert trial.vector("uav.wind") == pytest.approx([3.0, 0.0, 0.0])
 
@@ -84,16 +131,20 @@ def test_the_wind_at_a_vehicle_is_published() -> None:
 def test_gusts_of_different_vehicles_are_independent() -> None:
     wind = {"speed": 5.0, "turbulence": {}}
     trial = WorldHarness(
-        {"a": quadcopter_settings([0, 0, 20]), "b": quadcopter_settings([0, 9, 20])}, environment={"wind": wind}
+        {"a": quadcopter_settings([0, 0, 20]), "b": quadcopter_settings([0, 9, 20])},
+        environment={"wind": wind},
     ).step(50)
     assert trial["a.wind.y"] != trial["b.wind.y"]
-    alone = WorldHarness({"b": quadcopter_settings([0, 9, 20])}, environment={"wind": wind}).step(50)
+    alone = WorldHarness({"b": quadcopter_settings([0, 9, 20])}, environment={"wind": wind}).step(
+        50
+    )
     assert alone["b.wind.y"] == trial["b.wind.y"]
 
 
 def test_wind_and_current_can_be_changed_at_any_time() -> None:
     trial = WorldHarness(
-        {"usv": vessel_settings([0.0, 0.0], yaw=math.pi / 2)}, environment={"wind": {"speed": 0}, "current": {"speed": 0}}
+        {"usv": vessel_settings([0.0, 0.0], yaw=math.pi / 2)},
+        environment={"wind": {"speed": 0}, "current": {"speed": 0}},
     )
     assert np.abs(trial.step(100).vector("usv.position", "xy")).max() == 0.0
     trial["environment.current.x"] = 0.5
@@ -104,18 +155,27 @@ def test_wind_and_current_can_be_changed_at_any_time() -> None:
 
 
 def test_an_input_that_is_not_finite_is_named() -> None:
-    trial = WorldHarness({"usv": vessel_settings([0.0, 0.0])}, environment={"current": {"speed": 0}})
+    trial = WorldHarness(
+        {"usv": vessel_settings([0.0, 0.0])}, environment={"current": {"speed": 0}}
+    )
     trial["environment.current.y"] = math.nan
     with pytest.raises(ComponentError, match=r"usv.current.y is nan, expected a finite number"):
         trial.step()
 
 
-def landing(environment: dict[str, Any], motion: str = "planar", height: float = 0.15) -> WorldHarness:
-    """Drop from a height (m) in ground effect onto a moving, turning deck in gusts: flight, touchdown, rest."""
+def landing(
+    environment: dict[str, Any], motion: str = "planar", height: float = 0.15
+) -> WorldHarness:
+    """Drop from a height (m) in ground effect onto a moving, turning deck in gusts: flight,
+    touchdown, rest.
+    """
     uav = quadcopter_settings(
-        [-0.0135, 0.002, DECK_TOP + REST_HEIGHT + height], parameters=DRAG | {"ground_effect": 1.0, "rotor_time_constant": 0.05}
+        [-0.0135, 0.002, DECK_TOP + REST_HEIGHT + height],
+        parameters=DRAG | {"ground_effect": 1.0, "rotor_time_constant": 0.05},
     )
-    usv = vessel_settings([0.0, 0.0], velocity_body=[0.2, 0.0, 0.0], rates=[0.0, 0.0, 0.2], motion=motion)
+    usv = vessel_settings(
+        [0.0, 0.0], velocity_body=[0.2, 0.0, 0.0], rates=[0.0, 0.0, 0.2], motion=motion
+    )
     trial = WorldHarness({"uav": uav, "usv": usv}, environment=environment)
     trial["uav.rotor_speed"], trial["usv.thrust"] = [120.0, 121.0, 119.0, 120.0], 1.0
     return trial
@@ -124,11 +184,22 @@ def landing(environment: dict[str, Any], motion: str = "planar", height: float =
 @pytest.mark.parametrize("steps", [0, 5, 18, 22, 30, 120, 255, 256, 300])
 def test_a_state_is_restored_bit_for_bit_in_gusts(steps: int, measured: MeasurementCheck) -> None:
     differing = returned_to(landing(GUSTY).step(steps))
-    measured("Determinism and saved states", "steps that differ after a return, in gusts", differing, 0, "1", AGAIN)
+    measured(
+        "Determinism and saved states",
+        "steps that differ after a return, in gusts",
+        differing,
+        0,
+        "1",
+        AGAIN,
+    )
 
 
-def test_a_state_just_before_a_touchdown_is_restored_bit_for_bit(measured: MeasurementCheck) -> None:
-    """Bullet keeps contact points of later steps; whether they matter depends on the way of the first contact."""
+def test_a_state_just_before_a_touchdown_is_restored_bit_for_bit(
+    measured: MeasurementCheck,
+) -> None:
+    """Bullet keeps contact points of later steps; whether they matter depends on the way of the
+    first contact.
+    """
     differing = 0
     for height in np.linspace(0.05, 0.25, 12):
         steps = 0
@@ -136,7 +207,14 @@ def test_a_state_just_before_a_touchdown_is_restored_bit_for_bit(measured: Measu
             steps += 1
         del trial
         differing += returned_to(landing(GUSTY, height=height).step(steps - 1))
-    measured("Determinism and saved states", "steps that differ after a return before touchdown", differing, 0, "1", AGAIN)
+    measured(
+        "Determinism and saved states",
+        "steps that differ after a return before touchdown",
+        differing,
+        0,
+        "1",
+        AGAIN,
+    )
 
 
 def returned_to(trial: WorldHarness) -> int:
@@ -180,21 +258,27 @@ def ground_distance(body: ContactBody) -> float:
 
 
 def test_the_ground_distance_counts_from_the_rotor_centre() -> None:
-    """Above a platform and a deck: from the centre of the rotors, 6 mm below the centre of mass, to the top."""
+    """Above a platform and a deck: from the centre of the rotors, 6 mm below the centre of mass, to
+    the top.
+    """
     on = {"parameters": {"ground_effect": 1.0}}
     vehicles = {
         "a": quadcopter_settings([0, 0, 1.0], **on),
         "b": quadcopter_settings([9, 0, 1.0], **on),
         "c": quadcopter_settings([20, 0, 1.0], **on),
     }
-    trial = WorldHarness(vehicles | {"usv": vessel_settings([9.0, 0.0])}, {"start": PLATFORM}, {"wind": {"speed": 0}})
+    trial = WorldHarness(
+        vehicles | {"usv": vessel_settings([9.0, 0.0])}, {"start": PLATFORM}, {"wind": {"speed": 0}}
+    )
     distances = [ground_distance(body) for body in trial.world._fleet.bodies[:3]]
     assert distances == pytest.approx([1.0 - PLATFORM_TOP, 1.0 - DECK_TOP, 1.0], abs=0.007)
     assert np.ptp(np.array(distances) - [1.0 - PLATFORM_TOP, 1.0 - DECK_TOP, 1.0]) < 1e-12
 
 
 def test_without_ground_effect_no_distance_is_computed() -> None:
-    trial = WorldHarness({"a": quadcopter_settings([0, 0, 1.0])}, {"start": PLATFORM}, {"wind": {"speed": 0}}).step()
+    trial = WorldHarness(
+        {"a": quadcopter_settings([0, 0, 1.0])}, {"start": PLATFORM}, {"wind": {"speed": 0}}
+    ).step()
     assert ground_distance(trial.world._fleet.bodies[0]) == 1e3
 
 
@@ -209,12 +293,21 @@ def test_wind_that_acts_on_no_vehicle_causes_a_warning(
     caplog: pytest.LogCaptureFixture, drag: dict[str, float], warned: bool
 ) -> None:
     with caplog.at_level(logging.WARNING):
-        World("plant", {"uav": quadcopter_settings([0, 0, 2], parameters=drag)}, environment={"wind": {"speed": 4.0}}).free()
+        World(
+            "plant",
+            {"uav": quadcopter_settings([0, 0, 2], parameters=drag)},
+            environment={"wind": {"speed": 4.0}},
+        ).free()
     assert ("the wind acts on no vehicle" in caplog.text) == warned
 
 
-def test_a_world_that_prepares_a_study_leaves_the_warnings_to_the_runs(caplog: pytest.LogCaptureFixture) -> None:
-    arguments: dict[str, Any] = {"vehicles": {"uav": quadcopter_settings([0, 0, 2])}, "environment": {"wind": {"speed": 4.0}}}
+def test_a_world_that_prepares_a_study_leaves_the_warnings_to_the_runs(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
+    arguments: dict[str, Any] = {
+        "vehicles": {"uav": quadcopter_settings([0, 0, 2])},
+        "environment": {"wind": {"speed": 4.0}},
+    }
     with caplog.at_level(logging.WARNING):
         World.warm(**arguments)
         assert not caplog.text
@@ -229,7 +322,10 @@ def test_a_world_that_prepares_a_study_leaves_the_warnings_to_the_runs(caplog: p
         ({"motion": 6}, "vehicles.usv.motion: found 6, expected one of: planar, 6dof"),
         (
             {"parameters": {"mas": 1.0}},
-            'vehicles.usv.parameters.mas: strider has no parameter "mas" to set; valid: resistance, propeller_diameter',
+            (
+                'vehicles.usv.parameters.mas: strider has no parameter "mas" to set; valid: '
+                "resistance, propeller_diameter"
+            ),
         ),
         ({"parameters": {"initial.yaw": 1.0}}, 'strider has no parameter "initial.yaw" to set'),
         ({"parameters": 3}, r"vehicles.usv.parameters: found 3, expected an object"),
@@ -243,10 +339,19 @@ def test_faulty_settings_of_a_vehicle_are_refused(spec: dict[str, Any], message:
 @pytest.mark.parametrize(
     ("parameters", "message"),
     [
-        ({"rotor_drg.x": 1.0}, r'parameters.rotor_drg.x: ar_drone has no parameter .*; did you mean "rotor_drag.x"\?'),
-        ({"ground_effect": 2.0}, "parameters.ground_effect: found 2.0, expected a number from 0 to 1"),
+        (
+            {"rotor_drg.x": 1.0},
+            r'parameters.rotor_drg.x: ar_drone has no parameter .*; did you mean "rotor_drag.x"\?',
+        ),
+        (
+            {"ground_effect": 2.0},
+            "parameters.ground_effect: found 2.0, expected a number from 0 to 1",
+        ),
         ({"body_drag.x": -1.0}, "parameters.body_drag.x: found -1.0, expected at least 0"),
-        ({"rotor_inertia": [1.0]}, r"parameters.rotor_inertia: found \[1.0\], expected a finite number"),
+        (
+            {"rotor_inertia": [1.0]},
+            r"parameters.rotor_inertia: found \[1.0\], expected a finite number",
+        ),
     ],
 )
 def test_faulty_parameters_are_refused(parameters: dict[str, Any], message: str) -> None:
@@ -257,15 +362,29 @@ def test_faulty_parameters_are_refused(parameters: dict[str, Any], message: str)
 def test_parameters_reach_the_equations(measured: MeasurementCheck) -> None:
     """Free fall with drag ends at sqrt(m g / body_drag)."""
     trial = WorldHarness(
-        {"uav": quadcopter_settings([0.0, 0.0, 300.0], parameters={f"body_drag.{axis}": 0.1 for axis in "xyz"})}
+        {
+            "uav": quadcopter_settings(
+                [0.0, 0.0, 300.0], parameters={f"body_drag.{axis}": 0.1 for axis in "xyz"}
+            )
+        }
     ).step(800)
     speed, terminal = -trial["uav.velocity.z"], math.sqrt(0.443892 * 9.81 / 0.1)
-    measured("AR.Drone 2.0", "terminal velocity with body drag", speed, terminal, "m/s", "closed form", relative=1e-4)
+    measured(
+        "AR.Drone 2.0",
+        "terminal velocity with body drag",
+        speed,
+        terminal,
+        "m/s",
+        "closed form",
+        relative=1e-4,
+    )
 
 
 def test_the_elevation_at_a_vessel_is_that_of_the_sea() -> None:
     environment = {"seed": 3, "waves": {"significant_height": 0.05, "peak_period": 2.0}}
-    trial = WorldHarness({"usv": vessel_settings([2.0, 1.0], motion="6dof")}, environment=environment)
+    trial = WorldHarness(
+        {"usv": vessel_settings([2.0, 1.0], motion="6dof")}, environment=environment
+    )
     waves = sea(environment)
     assert trial["usv.wave.elevation"] == pytest.approx(waves.elevation(2.0, 1.0, 0.0), abs=1e-13)
     trial["environment.wave_gain"] = 0.5
@@ -277,14 +396,29 @@ def test_the_elevation_at_a_vessel_is_that_of_the_sea() -> None:
 @pytest.mark.parametrize("steps", [0, 10, 22, 60, 300])
 def test_a_state_is_restored_bit_for_bit_in_waves(steps: int, measured: MeasurementCheck) -> None:
     differing = returned_to(landing(GUSTY | {"sea_state": 1}, "6dof").step(steps))
-    measured("Determinism and saved states", "steps that differ after a return, gusts and waves", differing, 0, "1", AGAIN)
+    measured(
+        "Determinism and saved states",
+        "steps that differ after a return, gusts and waves",
+        differing,
+        0,
+        "1",
+        AGAIN,
+    )
 
 
 def test_a_vessel_follows_the_waves_of_the_scenario() -> None:
     """Waves much longer than the vessel carry it up and down; half the gain, half the height."""
-    trial = WorldHarness({"usv": vessel_settings([0.0, 0.0], motion="6dof")}, environment={"sea_state": 3})
+    trial = WorldHarness(
+        {"usv": vessel_settings([0.0, 0.0], motion="6dof")}, environment={"sea_state": 3}
+    )
     trial["environment.wave_gain"] = 0.5
-    rows = np.array([(trial["usv.position.z"], trial["usv.wave.elevation"]) for _ in range(1500) if trial.step()])
+    rows = np.array(
+        [
+            (trial["usv.position.z"], trial["usv.wave.elevation"])
+            for _ in range(1500)
+            if trial.step()
+        ]
+    )
     heave, elevation = rows[500:].T - rows[500:].T.mean(axis=1, keepdims=True)
     assert np.abs(elevation).max() > 0.1
     assert np.abs(heave - elevation).max() < 0.2 * np.abs(elevation).max()
@@ -301,9 +435,13 @@ EVENTFUL = """
 
 
 def test_events_and_profiles_change_the_weather(tmp_path: Path) -> None:
-    """The wind is that of the step that ends at a row; waves that fade by a profile are gone at its end."""
+    """The wind is that of the step that ends at a row; waves that fade by a profile are gone at its
+    end.
+    """
     (tmp_path / "gain.csv").write_text('"time","gain"\n0,1\n1,1\n2,0\n3,0\n')
-    (tmp_path / "eventful.json").write_text(EVENTFUL.replace("ROOT", str(Path(__file__).parents[3])))
+    (tmp_path / "eventful.json").write_text(
+        EVENTFUL.replace("ROOT", str(Path(__file__).parents[3]))
+    )
     result = cosim.run(tmp_path / "eventful.json")
     wind, elevation = result["plant.usv.wind.x"], result["plant.usv.wave.elevation"]
     assert wind[[0, 100, 101, 200, 201, 300]].tolist() == [0.0, 0.0, 4.0, 4.0, -4.0, -4.0]
@@ -313,12 +451,31 @@ def test_events_and_profiles_change_the_weather(tmp_path: Path) -> None:
 
 @pytest.mark.parametrize("mass", [-1.0, 46.0])
 def test_a_payload_of_impossible_mass_is_refused_with_its_path(mass: float) -> None:
-    with pytest.raises(InputError, match=f"parameters.payload_mass: found {mass}, expected a number from 0 to 45") as caught:
-        World("plant", {"usv": {"model": "otter", "position": [0, 0], "parameters": {"payload_mass": mass}}})
-    assert caught.value.problems[0].subject == ("arguments", "vehicles", "usv", "parameters", "payload_mass")
+    with pytest.raises(
+        InputError, match=f"parameters.payload_mass: found {mass}, expected a number from 0 to 45"
+    ) as caught:
+        World(
+            "plant",
+            {"usv": {"model": "otter", "position": [0, 0], "parameters": {"payload_mass": mass}}},
+        )
+    assert caught.value.problems[0].subject == (
+        "arguments",
+        "vehicles",
+        "usv",
+        "parameters",
+        "payload_mass",
+    )
 
 
 def test_floating_vessels_may_not_start_inside_each_other() -> None:
     with pytest.raises(InputError, match="overlaps") as caught:
-        World("plant", {"a": vessel_settings([0.0, 0.0], motion="6dof"), "b": vessel_settings([0.3, 0.0], motion="6dof")})
-    assert caught.value.problems[0].subject in [("arguments", "vehicles", name, "position") for name in "ab"]
+        World(
+            "plant",
+            {
+                "a": vessel_settings([0.0, 0.0], motion="6dof"),
+                "b": vessel_settings([0.3, 0.0], motion="6dof"),
+            },
+        )
+    assert caught.value.problems[0].subject in [
+        ("arguments", "vehicles", name, "position") for name in "ab"
+    ]

@@ -26,38 +26,101 @@ def read_valid(**environment: Any) -> EnvironmentSettings:
 @pytest.mark.parametrize(
     ("environment", "message"),
     [
-        ({"sea_stat": 3}, r'environment.sea_stat: unknown key "sea_stat"; did you mean "sea_state"\?'),
+        (
+            {"sea_stat": 3},
+            r'environment.sea_stat: unknown key "sea_stat"; did you mean "sea_state"\?',
+        ),
         ({"seed": -1}, "environment.seed: found -1, expected an integer of at least 0"),
         ({"sea_state": 10}, "environment.sea_state: found 10, expected an integer from 0 to 9"),
         ({"sea_state": -1}, "environment.sea_state: found -1, expected an integer from 0 to 9"),
         ({"sea_state": 2.5}, "environment.sea_state: found 2.5, expected an integer from 0 to 9"),
-        ({"sea_state": 3, "waves": {"significant_height": 1}}, 'waves.significant_height: found beside "sea_state"'),
+        (
+            {"sea_state": 3, "waves": {"significant_height": 1}},
+            'waves.significant_height: found beside "sea_state"',
+        ),
         ({"waves": {}}, 'environment.waves: "significant_height" is missing'),
         ({"waves": 3}, r"environment.waves: found 3, expected an object \{...\}"),
-        ({"waves": {"significant_height": -0.1}}, "significant_height: found -0.1, expected a number from 0 to 30"),
-        ({"waves": {"significant_height": 1, "peak_period": 0}}, "peak_period: found 0, expected a number greater than 0"),
-        ({"sea_state": 3, "waves": {"spectrum": "jonswop"}}, r"""spectrum: found 'jonswop'; did you mean "jonswap"\?"""),
-        ({"sea_state": 3, "waves": {"gamma": 3}}, 'waves.gamma: a "pierson_moskowitz" spectrum has no peak enhancement'),
-        ({"sea_state": 3, "waves": {"spectrum": "jonswap", "gamma": 8}}, "gamma: found 8, expected a number from 1 to 7"),
-        ({"sea_state": 3, "waves": {"spreading": -1}}, "spreading: found -1, expected a number from 0 to 1000"),
-        ({"sea_state": 3, "waves": {"components": 65}}, "components: found 65, expected an integer from 1 to 64"),
+        (
+            {"waves": {"significant_height": -0.1}},
+            "significant_height: found -0.1, expected a number from 0 to 30",
+        ),
+        (
+            {"waves": {"significant_height": 1, "peak_period": 0}},
+            "peak_period: found 0, expected a number greater than 0",
+        ),
+        (
+            {"sea_state": 3, "waves": {"spectrum": "jonswop"}},
+            r"""spectrum: found 'jonswop'; did you mean "jonswap"\?""",
+        ),
+        (
+            {"sea_state": 3, "waves": {"gamma": 3}},
+            'waves.gamma: a "pierson_moskowitz" spectrum has no peak enhancement',
+        ),
+        (
+            {"sea_state": 3, "waves": {"spectrum": "jonswap", "gamma": 8}},
+            "gamma: found 8, expected a number from 1 to 7",
+        ),
+        (
+            {"sea_state": 3, "waves": {"spreading": -1}},
+            "spreading: found -1, expected a number from 0 to 1000",
+        ),
+        (
+            {"sea_state": 3, "waves": {"components": 65}},
+            "components: found 65, expected an integer from 1 to 64",
+        ),
         ({"wind": {}}, 'environment.wind: "speed" is missing'),
         ({"wind": {"speed": -1}}, "environment.wind.speed: found -1, expected at least 0"),
-        ({"wind": {"speed": 1, "velocity": [1, 0, 0]}}, 'environment.wind.speed: found beside "velocity"'),
-        ({"wind": {"velocity": [1, 0]}}, r"wind.velocity: found \[1, 0\], expected a list of 3 numbers \[x, y, z\]"),
-        ({"wind": {**WIND, "turbulance": {}}}, r'unknown key "turbulance"; did you mean "turbulence"\?'),
+        (
+            {"wind": {"speed": 1, "velocity": [1, 0, 0]}},
+            'environment.wind.speed: found beside "velocity"',
+        ),
+        (
+            {"wind": {"velocity": [1, 0]}},
+            r"wind.velocity: found \[1, 0\], expected a list of 3 numbers \[x, y, z\]",
+        ),
+        (
+            {"wind": {**WIND, "turbulance": {}}},
+            r'unknown key "turbulance"; did you mean "turbulence"\?',
+        ),
         ({"wind": {"speed": 0, "turbulence": {}}}, 'wind.turbulence: "airspeed" is missing'),
-        ({"wind": {**WIND, "turbulence": {"height": 1}}}, "turbulence.height: found 1, expected a number from 3.048 to 304.8"),
-        ({"wind": {**WIND, "turbulence": {"speed_20ft": -1}}}, "turbulence.speed_20ft: found -1, expected at least 0"),
-        ({"wind": {**WIND, "turbulence": {"intensity": [1, 1, -1]}}}, "expected standard deviations of at least 0"),
-        ({"wind": {**WIND, "turbulence": {"intensity": [1, 1, 1], "speed_20ft": 5}}}, 'found beside "intensity"'),
+        (
+            {"wind": {**WIND, "turbulence": {"height": 1}}},
+            "turbulence.height: found 1, expected a number from 3.048 to 304.8",
+        ),
+        (
+            {"wind": {**WIND, "turbulence": {"speed_20ft": -1}}},
+            "turbulence.speed_20ft: found -1, expected at least 0",
+        ),
+        (
+            {"wind": {**WIND, "turbulence": {"intensity": [1, 1, -1]}}},
+            "expected standard deviations of at least 0",
+        ),
+        (
+            {"wind": {**WIND, "turbulence": {"intensity": [1, 1, 1], "speed_20ft": 5}}},
+            'found beside "intensity"',
+        ),
         ({"wind": {**WIND, "profile": {}}}, 'profile: expected either "exponent" or "roughness"'),
-        ({"wind": {**WIND, "profile": {"roughness": 20}}}, "roughness: found 20, expected less than the reference height of 10"),
-        ({"current": {"speed": math.nan}}, "environment.current.speed: found nan, expected a finite number"),
+        (
+            {"wind": {**WIND, "profile": {"roughness": 20}}},
+            "roughness: found 20, expected less than the reference height of 10",
+        ),
+        (
+            {"current": {"speed": math.nan}},
+            "environment.current.speed: found nan, expected a finite number",
+        ),
         ({"current": {"velocity": [1, 0, 0]}}, "expected a list of 2 numbers"),
-        ({"current": {"speed": 1, "ramp": {"change": [1, 0]}}}, 'environment.current.ramp: "duration" is missing'),
-        ({"current": {"speed": 1, "ramp": {"change": [1, 0], "duration": 0}}}, "duration: found 0, expected a number greater"),
-        ({"current": {"speed": 1, "variation": {"standard_deviation": 1}}}, '"time_constant" is missing'),
+        (
+            {"current": {"speed": 1, "ramp": {"change": [1, 0]}}},
+            'environment.current.ramp: "duration" is missing',
+        ),
+        (
+            {"current": {"speed": 1, "ramp": {"change": [1, 0], "duration": 0}}},
+            "duration: found 0, expected a number greater",
+        ),
+        (
+            {"current": {"speed": 1, "variation": {"standard_deviation": 1}}},
+            '"time_constant" is missing',
+        ),
     ],
 )
 def test_a_faulty_environment_is_refused(environment: dict[str, Any], message: str) -> None:
@@ -69,7 +132,9 @@ def test_a_faulty_environment_is_refused(environment: dict[str, Any], message: s
 
 def test_all_problems_are_reported_together() -> None:
     with pytest.raises(InputError) as caught:
-        sea({"sea_state": 11, "waves": {"gama": 1}, "wind": {"speed": "x"}, "current": 3, "tide": 0})
+        sea(
+            {"sea_state": 11, "waves": {"gama": 1}, "wind": {"speed": "x"}, "current": 3, "tide": 0}
+        )
     assert [".".join(problem.subject[2:]) for problem in caught.value.problems] == [
         "tide",
         "sea_state",
@@ -84,7 +149,9 @@ def test_an_empty_environment_is_calm() -> None:
 
 
 def test_a_direction_is_that_of_the_flow() -> None:
-    found = read_valid(wind={"speed": 5.0, "direction": math.pi / 2}, current={"speed": 0.5, "direction": math.pi})
+    found = read_valid(
+        wind={"speed": 5.0, "direction": math.pi / 2}, current={"speed": 0.5, "direction": math.pi}
+    )
     assert found.wind
     assert found.current
     assert found.wind.velocity == pytest.approx((0.0, 5.0, 0.0))

@@ -11,7 +11,12 @@ from plant_validation import MeasurementCheck
 from scipy.integrate import quad
 
 from plant_src.environment import sea
-from plant_src.environment.spectrum import SIGNIFICANT_HEIGHTS, fully_developed_period, jonswap, pierson_moskowitz
+from plant_src.environment.spectrum import (
+    SIGNIFICANT_HEIGHTS,
+    fully_developed_period,
+    jonswap,
+    pierson_moskowitz,
+)
 
 HALF_HOUR = np.arange(0.0, 1800.0, 0.25)
 SWELL = {"significant_height": 2.0, "peak_period": 9.0}
@@ -22,7 +27,11 @@ def area(spectrum, *arguments, low=0.0, high=math.inf):
     """m0 by adaptive quadrature, in pieces of the peak frequency."""
     peak = 2 * math.pi / arguments[1]
     cuts = [peak * r for r in (0.3, 0.8, 1.0, 1.3, 2.0, 4.0, 10.0, 1000.0)]
-    cuts = [low, *(cut for cut in cuts if low < cut < high), *([high] if math.isfinite(high) else [])]
+    cuts = [
+        low,
+        *(cut for cut in cuts if low < cut < high),
+        *([high] if math.isfinite(high) else []),
+    ]
     density = lambda w: float(spectrum(np.array(max(w, 1e-9)), *arguments))  # noqa: E731
     return sum(quad(density, a, b, epsabs=1e-14)[0] for a, b in pairwise(cuts))
 
@@ -33,20 +42,45 @@ def realisation(seed: int = 0, **waves):
 
 def test_pierson_moskowitz_has_its_significant_height(measured: MeasurementCheck):
     height = 4 * math.sqrt(area(pierson_moskowitz, 2.5, 9.0))
-    measured("Waves", "4 sqrt(m0), ITTC-modified Pierson-Moskowitz", height, 2.5, "m", "Hs, quadrature", relative=1e-6)
+    measured(
+        "Waves",
+        "4 sqrt(m0), ITTC-modified Pierson-Moskowitz",
+        height,
+        2.5,
+        "m",
+        "Hs, quadrature",
+        relative=1e-6,
+    )
 
 
 @pytest.mark.parametrize("gamma", [1.0, 2.0, 3.3, 5.0, 7.0])
 def test_jonswap_has_its_significant_height(gamma, measured: MeasurementCheck):
     height, case = 4 * math.sqrt(area(jonswap, 2.5, 9.0, gamma)), f"gamma {gamma:g}"
-    measured("Waves", "4 sqrt(m0), JONSWAP (DNV-RP-C205)", height, 2.5, "m", "Hs, quadrature", relative=0.01, case=case)
+    measured(
+        "Waves",
+        "4 sqrt(m0), JONSWAP (DNV-RP-C205)",
+        height,
+        2.5,
+        "m",
+        "Hs, quadrature",
+        relative=0.01,
+        case=case,
+    )
 
 
 def test_pierson_moskowitz_is_that_of_the_ittc(measured: MeasurementCheck):
     """S = A / w^5 exp(-B / w^4), A = 487 Hs^2 / T0^4, B = 1949 / T0^4."""
     w = np.linspace(0.6, 4.0, 50)
     ittc = 487 * 2.5**2 / 9.0**4 / w**5 * np.exp(-1949 / 9.0**4 / w**4)
-    measured("Waves", "density from 0.6 to 4 rad/s", pierson_moskowitz(w, 2.5, 9.0), ittc, "m2.s", "ITTC formula", relative=2e-3)
+    measured(
+        "Waves",
+        "density from 0.6 to 4 rad/s",
+        pierson_moskowitz(w, 2.5, 9.0),
+        ittc,
+        "m2.s",
+        "ITTC formula",
+        relative=2e-3,
+    )
 
 
 def test_jonswap_is_peaked_by_gamma():
@@ -61,17 +95,37 @@ def test_amplitudes_hold_the_energy_between_the_cuts(seed, measured: Measurement
     part = math.exp(-1.25 / 4**4) - math.exp(-1.25 / 0.5**4)
     waves = realisation(seed, **SWELL)
     m0 = (waves.amplitude**2 / 2).sum()
-    measured("Waves", "m0 of 64 components", m0, part * 2.0**2 / 16, "m2", "integral between the cuts", relative=1e-5)
-    measured("Waves", "4 sqrt(m0) of 64 components", 4 * math.sqrt(m0), 2.0, "m", "Hs", relative=0.01)
+    measured(
+        "Waves",
+        "m0 of 64 components",
+        m0,
+        part * 2.0**2 / 16,
+        "m2",
+        "integral between the cuts",
+        relative=1e-5,
+    )
+    measured(
+        "Waves", "4 sqrt(m0) of 64 components", 4 * math.sqrt(m0), 2.0, "m", "Hs", relative=0.01
+    )
 
 
 @pytest.mark.parametrize("waves", [SWELL, {**SWELL, "spectrum": "jonswap", "spreading": 2}, CHOP])
 @pytest.mark.parametrize("seed", [0, 1, 2])
-def test_half_an_hour_at_a_point_has_the_significant_height(waves, seed, measured: MeasurementCheck):
+def test_half_an_hour_at_a_point_has_the_significant_height(
+    waves, seed, measured: MeasurementCheck
+):
     components = realisation(seed, **waves)
     heights = np.array([components.elevation(12.0, -7.0, time) for time in HALF_HOUR])
     found, expected = 4 * heights.std(), waves["significant_height"]
-    measured("Waves", "4 standard deviations of 30 min, 3 seas, 3 seeds", found, expected, "m", "Hs", relative=0.05)
+    measured(
+        "Waves",
+        "4 standard deviations of 30 min, 3 seas, 3 seeds",
+        found,
+        expected,
+        "m",
+        "Hs",
+        relative=0.05,
+    )
 
 
 def test_the_energy_is_distributed_as_in_the_spectrum():
@@ -97,22 +151,43 @@ def test_elevation_is_the_sum_of_travelling_waves(measured: MeasurementCheck):
     phases = wave_vector.real * x + wave_vector.imag * y - waves.frequency * t + waves.phase
     expected = (waves.amplitude * np.exp(1j * phases)).sum().real
     error = waves.elevation(x, y, t) - expected
-    measured("Waves", "elevation at a place and time", error, 0.0, "m", "complex sum of components", within=1e-12)
+    measured(
+        "Waves",
+        "elevation at a place and time",
+        error,
+        0.0,
+        "m",
+        "complex sum of components",
+        within=1e-12,
+    )
 
 
 def test_long_crests_run_one_way():
     """Equal phase means equal height: a step along the crest changes nothing."""
     waves = realisation(**SWELL, direction=math.pi / 2)
-    assert waves.elevation(50.0, 3.0, 8.0) == pytest.approx(waves.elevation(-20.0, 3.0, 8.0), abs=1e-9)
+    assert waves.elevation(50.0, 3.0, 8.0) == pytest.approx(
+        waves.elevation(-20.0, 3.0, 8.0), abs=1e-9
+    )
     assert set(waves.direction) == {math.pi / 2}
 
 
 @pytest.mark.parametrize("power", [1, 2, 10])
 def test_short_crests_spread_as_the_power_of_the_cosine(power, measured: MeasurementCheck):
-    """E[cos^2 d] = (n + 1) / (n + 2) for the density cos^n d; bins of equal energy keep the sampling error small."""
+    """E[cos^2 d] = (n + 1) / (n + 2) for the density cos^n d; bins of equal energy keep the
+    sampling error small.
+    """
     spread = realisation(**SWELL, direction=0.4, spreading=power).direction - 0.4
     found, expected, case = np.mean(np.cos(spread) ** 2), (power + 1) / (power + 2), f"n = {power}"
-    measured("Waves", "mean squared cosine of the spreading", found, expected, "1", "integral of cos^n", within=0.01, case=case)
+    measured(
+        "Waves",
+        "mean squared cosine of the spreading",
+        found,
+        expected,
+        "1",
+        "integral of cos^n",
+        within=0.01,
+        case=case,
+    )
     assert np.abs(spread).max() < math.pi / 2
     assert np.mean(np.sin(spread)) == pytest.approx(0.0, abs=0.01)
 
@@ -134,7 +209,9 @@ def test_other_seeds_give_other_seas():
 
 
 def test_the_sea_of_a_seed_is_reproducible():
-    """Earlier runs remain reproducible: these numbers may change only with a note in the change log."""
+    """Earlier runs remain reproducible: these numbers may change only with a note in the change
+    log.
+    """
     waves = realisation(1, **CHOP)
     assert waves.frequency[:2] == pytest.approx([2.199540, 2.404438], abs=1e-6)
 
@@ -152,7 +229,9 @@ def test_sea_states_are_those_of_the_wmo(state):
 def test_a_sea_state_is_fully_developed():
     """The peak of a Pierson-Moskowitz sea: wp = 0.877 g / V with Hs = 0.21 V^2 / g (Fossen 2021)."""
     speed = math.sqrt(9.81 * 1.875 / 0.21)
-    assert fully_developed_period(1.875) == pytest.approx(2 * math.pi / (0.877 * 9.81 / speed), rel=0.01)
+    assert fully_developed_period(1.875) == pytest.approx(
+        2 * math.pi / (0.877 * 9.81 / speed), rel=0.01
+    )
 
 
 def test_waves_may_add_to_a_sea_state():
@@ -161,7 +240,9 @@ def test_waves_may_add_to_a_sea_state():
     assert set(components.direction) == {1.0}
 
 
-@pytest.mark.parametrize("environment", [{}, {"sea_state": 0}, {"waves": {"significant_height": 0}}])
+@pytest.mark.parametrize(
+    "environment", [{}, {"sea_state": 0}, {"waves": {"significant_height": 0}}]
+)
 def test_without_waves_there_are_no_components(environment):
     assert sea(environment).amplitude.size == 0
     assert sea(environment).elevation(1.0, 2.0, 3.0) == 0.0

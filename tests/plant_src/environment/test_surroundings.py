@@ -16,7 +16,10 @@ from plant_src.environment.sea import CALM, Sea
 from plant_src.environment.surfaces import SurfaceTable
 from plant_src.physics.compiled_equations import bind_arrays, load_library
 from plant_src.placement import Platform
-from plant_src.vehicles.multirotor.surroundings import MAX_WAVE_EFFECT_HEIGHT, create_surroundings_function
+from plant_src.vehicles.multirotor.surroundings import (
+    MAX_WAVE_EFFECT_HEIGHT,
+    create_surroundings_function,
+)
 
 STRIDER = MODELS["strider"]
 PLATE = np.array([0.701, 0.602]) / 2  # m, half edges of the deck
@@ -42,18 +45,38 @@ def ray(point: np.ndarray, centre: np.ndarray, attitude: Rotation) -> float | No
 
 
 class Surroundings:
-    """Compiled function `surroundings` of a level multirotor whose rotors are at its centre of mass."""
+    """Compiled function `surroundings` of a level multirotor whose rotors are at its centre of
+    mass.
+    """
 
-    def __init__(self, vessels: list[Any], platforms: list[Platform], sea: Sea, radius: float = 0.0, reach: float = 0.0):
+    def __init__(
+        self,
+        vessels: list[Any],
+        platforms: list[Platform],
+        sea: Sea,
+        radius: float = 0.0,
+        reach: float = 0.0,
+    ):
         self.pose, self.result = np.array([0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0]), np.full(3, np.nan)
         self.disc = np.array([0.0, 0.0, 0.0, radius, reach])
         self.sea = np.array([0.0, 1.0, len(sea.phase), sea.highest_elevation])
         table = SurfaceTable(vessels, platforms)
         table.update()
-        self.arguments = [self.pose, self.disc, self.sea, sea.component_table(), table.count, table.rows]
-        self.call = bind_arrays(load_library("multirotor").surroundings, self.arguments, [self.result])
+        self.arguments = [
+            self.pose,
+            self.disc,
+            self.sea,
+            sea.component_table(),
+            table.count,
+            table.rows,
+        ]
+        self.call = bind_arrays(
+            load_library("multirotor").surroundings, self.arguments, [self.result]
+        )
 
-    def at(self, x: float, y: float, z: float, time: float = 0.0, gain: float = 1.0) -> tuple[float, float, float]:
+    def at(
+        self, x: float, y: float, z: float, time: float = 0.0, gain: float = 1.0
+    ) -> tuple[float, float, float]:
         """Return distance (m), share (1) and water level (m) at a place (m)."""
         self.pose[:3], self.sea[:2] = (x, y, z), (time, gain)
         self.call()
@@ -77,7 +100,13 @@ def test_a_tilting_deck_is_where_a_ray_meets_it(measured: MeasurementCheck) -> N
         met += height is not None
         error = below.distance(*point) - (point[2] - (height or 0.0))
         measured(
-            "Wind and current", "height above a tilting deck, for ground effect", error, 0.0, "m", "ray and plane", within=1e-12
+            "Wind and current",
+            "height above a tilting deck, for ground effect",
+            error,
+            0.0,
+            "m",
+            "ray and plane",
+            within=1e-12,
         )
     assert 50 < met < 250
 
@@ -103,17 +132,29 @@ def test_an_upside_down_vessel_has_no_deck() -> None:
 def test_the_water_has_waves_where_they_matter() -> None:
     waves = sea({"sea_state": 3})
     below = Surroundings([], [], waves)
-    assert below.distance(3.0, 4.0, 2.0, 5.0, 0.5) == pytest.approx(2.0 - 0.5 * waves.elevation(3.0, 4.0, 5.0))
-    assert below.distance(3.0, 4.0, MAX_WAVE_EFFECT_HEIGHT + 1.0, 5.0, 0.5) == MAX_WAVE_EFFECT_HEIGHT + 1.0
+    assert below.distance(3.0, 4.0, 2.0, 5.0, 0.5) == pytest.approx(
+        2.0 - 0.5 * waves.elevation(3.0, 4.0, 5.0)
+    )
+    assert (
+        below.distance(3.0, 4.0, MAX_WAVE_EFFECT_HEIGHT + 1.0, 5.0, 0.5)
+        == MAX_WAVE_EFFECT_HEIGHT + 1.0
+    )
     assert below.distance(3.0, 4.0, -5.0, 5.0, 1.0) == 0.0
 
 
-def test_a_deck_is_below_the_share_of_a_disc_that_its_edges_leave(measured: MeasurementCheck) -> None:
-    """The level deck turned by 0.7 rad under discs beside one edge or far from all; points at random in each disc."""
+def test_a_deck_is_below_the_share_of_a_disc_that_its_edges_leave(
+    measured: MeasurementCheck,
+) -> None:
+    """The level deck turned by 0.7 rad under discs beside one edge or far from all; points at
+    random in each disc.
+    """
     turned, random = Rotation.from_euler("z", 0.7), np.random.default_rng(3)
     radius = 0.25
     below = Surroundings([vessel((0.0, 0.0, 0.3), turned)], [], CALM, radius)
-    angles, lengths = random.uniform(0, 2 * np.pi, 200_000), radius * np.sqrt(random.uniform(0, 1, 200_000))
+    angles, lengths = (
+        random.uniform(0, 2 * np.pi, 200_000),
+        radius * np.sqrt(random.uniform(0, 1, 200_000)),
+    )
     disc = np.stack([lengths * np.cos(angles), lengths * np.sin(angles)])
     for forward in (0.0, 0.12, 0.25, 0.35, 0.5, 0.59):
         inside = (np.abs(forward + disc[0]) <= PLATE[0]) & (np.abs(disc[1]) <= PLATE[1])
@@ -121,13 +162,21 @@ def test_a_deck_is_below_the_share_of_a_disc_that_its_edges_leave(measured: Meas
         height, share, _ = below.at(x, y, 1.0)
         assert height == pytest.approx(0.7)
         measured(
-            "Wind and current", "share of a rotor disc above a deck", share, inside.mean(), "1", "points at random", within=3e-3
+            "Wind and current",
+            "share of a rotor disc above a deck",
+            share,
+            inside.mean(),
+            "1",
+            "points at random",
+            within=3e-3,
         )
     assert below.at(0.7, 0.7, 1.0)[:2] == (1.0, 1.0)
 
 
 def test_the_surface_counts_from_the_centre_of_the_rotors() -> None:
-    """A vehicle that is upside down: the rotors, 0.1 m above the centre of mass and 0.3 m ahead of it, are below."""
+    """A vehicle that is upside down: the rotors, 0.1 m above the centre of mass and 0.3 m ahead of
+    it, are below.
+    """
     below = Surroundings([], [PLATFORM], CALM)
     below.disc[:3] = 0.3, 0.0, 0.1
     below.pose[3:] = Rotation.from_euler("ZYX", [np.pi / 2, 0.0, np.pi]).as_quat(scalar_first=True)
@@ -137,7 +186,9 @@ def test_the_surface_counts_from_the_centre_of_the_rotors() -> None:
 def test_the_water_level_is_that_at_the_centre_of_mass_near_the_crests() -> None:
     waves = sea({"sea_state": 3})
     highest, below = waves.highest_elevation, Surroundings([], [], waves, reach=0.5)
-    assert below.at(3.0, 4.0, highest + 0.4, 5.0, 0.5)[2] == pytest.approx(0.5 * waves.elevation(3.0, 4.0, 5.0), rel=1e-9)
+    assert below.at(3.0, 4.0, highest + 0.4, 5.0, 0.5)[2] == pytest.approx(
+        0.5 * waves.elevation(3.0, 4.0, 5.0), rel=1e-9
+    )
     assert below.at(3.0, 4.0, highest + 0.6, 5.0, 0.5)[2] == -highest
 
 
@@ -145,7 +196,10 @@ def test_the_water_level_is_that_at_the_centre_of_mass_near_the_crests() -> None
 def test_the_c_code_and_its_casadi_function_agree(platforms: list[Platform]) -> None:
     """Both forms at random attitudes above, beside and below a platform, in waves and above them."""
     function, _ = create_surroundings_function()
-    random, below = np.random.default_rng(5), Surroundings([], platforms, sea({"sea_state": 3}), radius=0.2, reach=0.5)
+    random, below = (
+        np.random.default_rng(5),
+        Surroundings([], platforms, sea({"sea_state": 3}), radius=0.2, reach=0.5),
+    )
     below.disc[:3] = 0.05, -0.02, 0.1
     below.sea[:2] = 7.0, 0.8
     for _ in range(300):

@@ -18,7 +18,10 @@ class Places:
         self.endpoints, self.reference_position = np.zeros((count, 2, 3)), np.zeros((count, 3))
         self.safe_distance = np.zeros((count, 3))
         self.endpoints[:] = np.array(starts)[:, None]
-        arrays = (array.reshape(-1) for array in (self.endpoints, self.reference_position, self.safe_distance))
+        arrays = (
+            array.reshape(-1)
+            for array in (self.endpoints, self.reference_position, self.safe_distance)
+        )
         self.clearance = Clearance([CUBE] * count, platforms, *arrays)
 
     def near_vehicles(self) -> list[bool]:
@@ -26,7 +29,8 @@ class Places:
 
 
 @pytest.mark.parametrize(
-    ("gap", "near"), [(-0.3, True), (0.99 * NEAR_DISTANCE, True), (1.01 * NEAR_DISTANCE, False), (5.0, False)]
+    ("gap", "near"),
+    [(-0.3, True), (0.99 * NEAR_DISTANCE, True), (1.01 * NEAR_DISTANCE, False), (5.0, False)],
 )
 @pytest.mark.parametrize("axis", [0, 1, 2])
 def test_two_vehicles_are_near_each_other_or_not(gap: float, near: bool, axis: int) -> None:
@@ -64,13 +68,16 @@ def test_nothing_comes_near_within_the_safe_distances() -> None:
     random = np.random.default_rng(1)
     far = 0
     for _ in range(200):
-        places = Places(random.uniform(-3, 3, (4, 3)).tolist(), (BoundingBox((-1.0, -1.0, -4.0), (1.0, 1.0, -3.5)),))
+        places = Places(
+            random.uniform(-3, 3, (4, 3)).tolist(),
+            (BoundingBox((-1.0, -1.0, -4.0), (1.0, 1.0, -3.5)),),
+        )
         if any(places.near_vehicles()):
             continue
         reach = np.minimum(places.safe_distance, 10.0)
-        places.endpoints[:] = places.reference_position[:, None] + random.choice([-1, 0, 1], (4, 2, 3)) * reach[:, None] * (
-            1 - 1e-12
-        )
+        places.endpoints[:] = places.reference_position[:, None] + random.choice(
+            [-1, 0, 1], (4, 2, 3)
+        ) * reach[:, None] * (1 - 1e-12)
         assert not any(places.near_vehicles())
         far += 1
     assert far > 20
@@ -81,9 +88,13 @@ def test_a_search_is_valid_exactly_as_long_as_its_near_pairs_are_near() -> None:
     random, floor = np.random.default_rng(2), BoundingBox((-9.0, -9.0, -2.0), (9.0, 9.0, -1.0))
     seen = set()
     for _ in range(300):
-        places = Places([[0.0, 0.0, -0.5 + NEAR_DISTANCE / 2], [0.0, 0.0, 0.5 + NEAR_DISTANCE]], (floor,))
+        places = Places(
+            [[0.0, 0.0, -0.5 + NEAR_DISTANCE / 2], [0.0, 0.0, 0.5 + NEAR_DISTANCE]], (floor,)
+        )
         before = places.near_vehicles()
-        places.endpoints += random.uniform(-NEAR_DISTANCE / 2, NEAR_DISTANCE / 2, places.endpoints.shape)
+        places.endpoints += random.uniform(
+            -NEAR_DISTANCE / 2, NEAR_DISTANCE / 2, places.endpoints.shape
+        )
         valid = places.clearance.is_valid()
         pairs = places.clearance.near_pairs
         seen.add((valid, before == places.near_vehicles()))

@@ -29,20 +29,28 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 @pytest.mark.usefixtures("root")
 def test_a_missing_fmu_is_named() -> None:
-    with pytest.raises(InputError, match=r'vehicle model "ar_drone" cannot be read from ".*ar_drone.fmu": .*No such file'):
+    with pytest.raises(
+        InputError,
+        match=r'vehicle model "ar_drone" cannot be read from ".*ar_drone.fmu": .*No such file',
+    ):
         compiled_equations.load_library("ar_drone")
 
 
 def test_a_broken_fmu_is_named(root: Path) -> None:
     (root / "fmus" / "ar_drone.fmu").write_bytes(b"no archive")
-    with pytest.raises(InputError, match=r'cannot be read from ".*ar_drone.fmu": File is not a zip file'):
+    with pytest.raises(
+        InputError, match=r'cannot be read from ".*ar_drone.fmu": File is not a zip file'
+    ):
         compiled_equations.load_library("ar_drone")
 
 
 def test_an_fmu_for_other_platforms_is_named(root: Path) -> None:
     with ZipFile(root / "fmus" / "ar_drone.fmu", "w") as archive:
         archive.writestr("binaries/mars64/ar_drone.so", "")
-    with pytest.raises(InputError, match=r'"binaries/.*/ar_drone\..*"; build it on this platform with `cosim build`'):
+    with pytest.raises(
+        InputError,
+        match=r'"binaries/.*/ar_drone\..*"; build it on this platform with `cosim build`',
+    ):
         compiled_equations.load_library("ar_drone")
 
 
@@ -51,7 +59,9 @@ def test_a_binary_is_unpacked_once_and_completely(cache: Path) -> None:
         WorldHarness({"uav": quadcopter_settings([0.0, 0.0, 2.0])}).step()
     (library,) = cache.iterdir()
     with ZipFile(resources.root() / "fmus" / "multirotor.fmu") as archive:
-        (member,) = [name for name in archive.namelist() if name.endswith(f"/multirotor{library.suffix}")]
+        (member,) = [
+            name for name in archive.namelist() if name.endswith(f"/multirotor{library.suffix}")
+        ]
         assert library.read_bytes() == archive.read(member)
 
 

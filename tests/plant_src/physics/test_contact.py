@@ -8,7 +8,15 @@ import numpy as np
 import original_system_reference as reference
 import pytest
 from plant_validation import MeasurementCheck
-from world_harness import DECK_TOP, PLATFORM, PLATFORM_TOP, REST_HEIGHT, WorldHarness, quadcopter_settings, vessel_settings
+from world_harness import (
+    DECK_TOP,
+    PLATFORM,
+    PLATFORM_TOP,
+    REST_HEIGHT,
+    WorldHarness,
+    quadcopter_settings,
+    vessel_settings,
+)
 
 WEIGHT = reference.QUADCOPTER_MASS * reference.GRAVITY
 
@@ -19,7 +27,9 @@ def rotor_speed(share: float) -> list[float]:
 
 
 def on_deck(height: float = 0.001, **more: object) -> WorldHarness:
-    """A quadcopter above the middle of the deck of a vessel in the origin, whose hulls have no resistance."""
+    """A quadcopter above the middle of the deck of a vessel in the origin, whose hulls have no
+    resistance.
+    """
     uav = quadcopter_settings([-0.0135, 0.002, DECK_TOP + REST_HEIGHT + height], **more)
     return WorldHarness({"uav": uav, "usv": vessel_settings([0.0, 0.0], hull="paper")})
 
@@ -30,9 +40,19 @@ def parked() -> WorldHarness:
     return on_deck().step(200)
 
 
-def test_at_rest_the_contact_force_is_the_weight(parked: WorldHarness, measured: MeasurementCheck) -> None:
+def test_at_rest_the_contact_force_is_the_weight(
+    parked: WorldHarness, measured: MeasurementCheck
+) -> None:
     force = parked["uav.contact.force"]
-    measured("Contact", "force of an AR.Drone at rest on a planar deck", force, WEIGHT, "N", "weight", relative=1e-3)
+    measured(
+        "Contact",
+        "force of an AR.Drone at rest on a planar deck",
+        force,
+        WEIGHT,
+        "N",
+        "weight",
+        relative=1e-3,
+    )
     assert parked["usv.contact.force"] == parked["uav.contact.force"]
 
 
@@ -41,22 +61,40 @@ def test_thrust_reduces_the_contact_force(measured: MeasurementCheck) -> None:
     trial["uav.rotor_speed"] = rotor_speed(0.3)
     trial.step(200)
     force = trial["uav.contact.force"]
-    measured("Contact", "the same with 30 % of thrust", force, 0.7 * WEIGHT, "N", "weight less thrust", relative=1e-3)
+    measured(
+        "Contact",
+        "the same with 30 % of thrust",
+        force,
+        0.7 * WEIGHT,
+        "N",
+        "weight less thrust",
+        relative=1e-3,
+    )
 
 
-def test_at_rest_the_height_is_that_of_the_feet(parked: WorldHarness, measured: MeasurementCheck) -> None:
+def test_at_rest_the_height_is_that_of_the_feet(
+    parked: WorldHarness, measured: MeasurementCheck
+) -> None:
     height = parked["uav.position.z"]
-    measured("Contact", "its height", height, DECK_TOP + REST_HEIGHT, "m", "deck and feet", within=1e-4)
+    measured(
+        "Contact", "its height", height, DECK_TOP + REST_HEIGHT, "m", "deck and feet", within=1e-4
+    )
 
 
 def test_at_rest_velocities_read_zero(parked: WorldHarness, measured: MeasurementCheck) -> None:
-    """The predicted velocity at the end of the step is not zero: gravity gives 0.05 m/s in half a step."""
-    measured("Contact", "its velocity", parked.vector("uav.velocity"), 0.0, "m/s", "rest", within=1e-5)
+    """The predicted velocity at the end of the step is not zero: gravity gives 0.05 m/s in half a
+    step.
+    """
+    measured(
+        "Contact", "its velocity", parked.vector("uav.velocity"), 0.0, "m/s", "rest", within=1e-5
+    )
     assert np.abs(parked.vector("uav.rates", "pqr")).max() < 1e-4
 
 
 def test_contact_with_a_vessel_is_distinguished_from_a_platform(parked: WorldHarness) -> None:
-    on_platform = WorldHarness({"uav": quadcopter_settings([0.0, 0.0, PLATFORM_TOP + REST_HEIGHT])}, {"start": PLATFORM}).step(20)
+    on_platform = WorldHarness(
+        {"uav": quadcopter_settings([0.0, 0.0, PLATFORM_TOP + REST_HEIGHT])}, {"start": PLATFORM}
+    ).step(20)
     assert (parked["uav.contact.touching"], parked["uav.contact.vessel"]) == (True, True)
     assert (on_platform["uav.contact.touching"], on_platform["uav.contact.vessel"]) == (True, False)
     assert (parked["usv.contact.touching"], parked["usv.contact.vessel"]) == (True, False)
@@ -64,18 +102,26 @@ def test_contact_with_a_vessel_is_distinguished_from_a_platform(parked: WorldHar
 
 def test_in_flight_nothing_touches() -> None:
     trial = on_deck(height=0.3).step(10)
-    assert [trial[f"uav.contact.{name}"] for name in ("force", "touching", "vessel")] == [0.0, False, False]
+    assert [trial[f"uav.contact.{name}"] for name in ("force", "touching", "vessel")] == [
+        0.0,
+        False,
+        False,
+    ]
 
 
 def test_touchdown_stops_the_fall_within_a_step() -> None:
-    """Boxes touch when they overlap, so the impulse comes in the step after the one in which the feet arrive."""
+    """Boxes touch when they overlap, so the impulse comes in the step after the one in which the
+    feet arrive.
+    """
     height, trial = 0.05, on_deck(height=0.05)
     while not trial["uav.contact.touching"]:
         trial.step()
     arrival = math.sqrt(2 * height / reference.GRAVITY)
     assert arrival < trial.steps * 0.01 < arrival + 0.02
     fall = reference.GRAVITY * (trial.steps - 1) * 0.01
-    assert trial["uav.contact.force"] * 0.01 == pytest.approx(reference.QUADCOPTER_MASS * fall, rel=0.15)
+    assert trial["uav.contact.force"] * 0.01 == pytest.approx(
+        reference.QUADCOPTER_MASS * fall, rel=0.15
+    )
     assert abs(trial["uav.velocity.z"]) < 0.1 * fall
 
 
@@ -90,10 +136,21 @@ def test_contact_conserves_momentum(measured: MeasurementCheck) -> None:
     trial = on_deck(velocity_body=[1.0, 0.0, 0.0])
     trial["uav.rotor_speed"] = rotor_speed(0.3)
     trial.step(6)
-    momentum = reference.QUADCOPTER_MASS * trial["uav.velocity.x"] + reference.VESSEL_MASS * trial["usv.velocity.x"]
+    momentum = (
+        reference.QUADCOPTER_MASS * trial["uav.velocity.x"]
+        + reference.VESSEL_MASS * trial["usv.velocity.x"]
+    )
     assert trial["usv.velocity.x"] > 0.02
     before = reference.QUADCOPTER_MASS * 1.0
-    measured("Contact", "momentum while sliding onto a planar vessel", momentum, before, "kg.m/s", "conservation", relative=1e-5)
+    measured(
+        "Contact",
+        "momentum while sliding onto a planar vessel",
+        momentum,
+        before,
+        "kg.m/s",
+        "conservation",
+        relative=1e-5,
+    )
 
 
 def test_friction_drags_the_vessel_along() -> None:
@@ -107,12 +164,16 @@ def test_friction_drags_the_vessel_along() -> None:
 def test_the_deck_carries_the_quadcopter_along() -> None:
     start = {"velocity_body": [0.5, 0.0, 0.0]}
     uav = quadcopter_settings([-0.0135, 0.002, DECK_TOP + REST_HEIGHT + 0.001], **start)
-    trial = WorldHarness({"uav": uav, "usv": vessel_settings([0.0, 0.0], **start, rates=[0.0, 0.0, 0.1])})
+    trial = WorldHarness(
+        {"uav": uav, "usv": vessel_settings([0.0, 0.0], **start, rates=[0.0, 0.0, 0.1])}
+    )
     trial["usv.thrust"], trial["usv.rudder_angle"] = 0.5, 0.1
     places = [place_on_deck(trial.step(100)) for _ in range(5)]
     assert np.linalg.norm(trial.vector("usv.position")) > 2.0
     assert np.linalg.norm(places[-1] - places[0]) < 1e-3
-    assert trial.vector("uav.velocity") == pytest.approx(trial.vector("usv.deck.velocity"), abs=0.01)
+    assert trial.vector("uav.velocity") == pytest.approx(
+        trial.vector("usv.deck.velocity"), abs=0.01
+    )
 
 
 def place_on_deck(trial: WorldHarness) -> np.ndarray:
@@ -132,7 +193,10 @@ def test_take_off_from_the_deck() -> None:
     trial.step(100)
     speed = height = 0.0
     for share in (*ramp_share, *[0.1] * 100):
-        height, speed = height + speed * 0.01 + share * reference.GRAVITY * 0.01**2 / 2, speed + share * reference.GRAVITY * 0.01
+        height, speed = (
+            height + speed * 0.01 + share * reference.GRAVITY * 0.01**2 / 2,
+            speed + share * reference.GRAVITY * 0.01,
+        )
     assert not trial["uav.contact.touching"]
     assert trial["uav.position.z"] - start == pytest.approx(height, abs=0.01)
 
@@ -143,8 +207,18 @@ def test_two_pairs_do_not_affect_each_other(measured: MeasurementCheck) -> None:
     distant = {"uav2": quadcopter_settings([50.0, 0.0, 0.5]), "usv2": vessel_settings([50.0, 0.0])}
     alone, together = WorldHarness(pair).step(100), WorldHarness(pair | distant).step(100)
     names = [variable.name for variable in alone.world.variables]
-    change = max(np.max(np.abs(np.subtract(together[name], alone[name], dtype=float))) for name in names)
-    measured("Fleets", "change of a pair by a distant second pair", change, 0.0, "SI", "the pair alone", within=1e-9)
+    change = max(
+        np.max(np.abs(np.subtract(together[name], alone[name], dtype=float))) for name in names
+    )
+    measured(
+        "Fleets",
+        "change of a pair by a distant second pair",
+        change,
+        0.0,
+        "SI",
+        "the pair alone",
+        within=1e-9,
+    )
     assert together["uav2.contact.vessel"]
 
 
@@ -174,18 +248,23 @@ def test_a_vessel_stops_at_a_platform() -> None:
 
 
 def test_a_wet_platform_lets_the_quadcopter_slide_and_a_springy_one_lets_it_bounce() -> None:
-    """Coulomb friction stops it after v^2 / (2 mu g); restitution e gives back e times the speed of the impact.
+    """Coulomb friction stops it after v^2 / (2 mu g); restitution e gives back e times the speed of
+    the impact.
 
     Bullet's correction of the penetration in the step of the impact adds up to 13 % of the speed.
     """
     for friction in (0.1, 0.4):
         slippery = {"start": {**PLATFORM, "friction": friction}}
-        vehicle = quadcopter_settings([0.0, 0.0, PLATFORM_TOP + REST_HEIGHT], velocity_body=[0.8, 0.0, 0.0])
+        vehicle = quadcopter_settings(
+            [0.0, 0.0, PLATFORM_TOP + REST_HEIGHT], velocity_body=[0.8, 0.0, 0.0]
+        )
         trial = WorldHarness({"uav": vehicle}, slippery)
         trial.step(300)
         assert trial["uav.position.x"] == pytest.approx(0.8**2 / (2 * friction * 9.81), rel=0.1)
     for restitution in (0.0, 0.5):
-        vehicle = quadcopter_settings([0.0, 0.0, PLATFORM_TOP + REST_HEIGHT + 0.2], restitution=1.0, crash_speed=9.0)
+        vehicle = quadcopter_settings(
+            [0.0, 0.0, PLATFORM_TOP + REST_HEIGHT + 0.2], restitution=1.0, crash_speed=9.0
+        )
         trial = WorldHarness({"uav": vehicle}, {"start": {**PLATFORM, "restitution": restitution}})
         speeds = [trial.step()["uav.velocity.z"] for _ in range(40)]
         impact = np.sqrt(2 * 9.81 * 0.2)

@@ -7,7 +7,15 @@ import math
 from typing import Any
 
 import pytest
-from world_harness import DECK_TOP, PLATFORM, PLATFORM_TOP, REST_HEIGHT, WorldHarness, quadcopter_settings, vessel_settings
+from world_harness import (
+    DECK_TOP,
+    PLATFORM,
+    PLATFORM_TOP,
+    REST_HEIGHT,
+    WorldHarness,
+    quadcopter_settings,
+    vessel_settings,
+)
 
 from plant_src.catalogue import MODELS
 
@@ -26,12 +34,17 @@ def failures(trial: WorldHarness, vehicle: str = "uav") -> tuple[bool, bool]:
     return trial[f"{vehicle}.crashed"], trial[f"{vehicle}.ditched"]
 
 
-def test_a_fall_onto_a_platform_is_a_crash_from_the_height_of_the_crash_speed_on(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_fall_onto_a_platform_is_a_crash_from_the_height_of_the_crash_speed_on(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     assert failures(dropped(0.9 * CRASH_HEIGHT)) == (False, False)
     with caplog.at_level(logging.WARNING):
         assert failures(dropped(1.1 * CRASH_HEIGHT)) == (True, False)
     (message,) = caplog.messages
-    assert message == "plant: t = 0.35 s: uav crashed: collision with start at 3.38 m/s, limit 3.10 m/s"
+    assert (
+        message
+        == "plant: t = 0.35 s: uav crashed: collision with start at 3.38 m/s, limit 3.10 m/s"
+    )
 
 
 def test_the_scenario_sets_the_crash_speed_of_a_vehicle() -> None:
@@ -47,7 +60,9 @@ def test_a_vehicle_that_grazes_a_platform_at_speed_has_crashed() -> None:
 def test_upside_down_in_contact_is_a_crash_but_a_roll_in_flight_is_none() -> None:
     half_a_turn_until_contact = math.pi / math.sqrt(2 * 0.2 / 9.81)
     assert failures(dropped(0.2, rates=[half_a_turn_until_contact, 0.0, 0.0])) == (True, False)
-    flying = WorldHarness({"uav": quadcopter_settings([0.0, 0.0, 30.0], rates=[7.0, 0.0, 0.0])}).step(100)
+    flying = WorldHarness(
+        {"uav": quadcopter_settings([0.0, 0.0, 30.0], rates=[7.0, 0.0, 0.0])}
+    ).step(100)
     assert failures(flying) == (False, False)
 
 
@@ -75,7 +90,9 @@ def test_a_capsized_vessel_has_crashed() -> None:
     assert failures(trial.step(30), "usv") == (True, False)
 
 
-def test_a_quadcopter_below_the_still_water_is_ditched_for_good(caplog: pytest.LogCaptureFixture) -> None:
+def test_a_quadcopter_below_the_still_water_is_ditched_for_good(
+    caplog: pytest.LogCaptureFixture,
+) -> None:
     trial = WorldHarness({"uav": quadcopter_settings([0.0, 0.0, 0.5])})
     with caplog.at_level(logging.WARNING):
         while trial["uav.position.z"] >= 0:
@@ -95,7 +112,9 @@ def test_a_quadcopter_is_ditched_by_the_wave_at_its_place() -> None:
     vehicles = {"uav": quadcopter_settings([0.0, 0.0, height])}
     trial = WorldHarness(vehicles, environment={"seed": 3, "waves": waves})
     trial["uav.external_force.z"] = 0.443892 * 9.81
-    elevation = trial.world._environment.water_level  # the sea is tested in tests/plant_src/environment
+    elevation = (
+        trial.world._environment.water_level
+    )  # the sea is tested in tests/plant_src/environment
     while not trial.step()["uav.ditched"]:
         assert elevation(0.0, 0.0, trial.steps * 0.01) <= trial["uav.position.z"]
     assert elevation(0.0, 0.0, trial.steps * 0.01) > trial["uav.position.z"]
@@ -104,7 +123,9 @@ def test_a_quadcopter_is_ditched_by_the_wave_at_its_place() -> None:
 
 @pytest.mark.parametrize("steps", [20, 35, 60])
 def test_failures_are_part_of_the_saved_state(steps: int) -> None:
-    trial = WorldHarness({"uav": quadcopter_settings([0.0, 0.0, STAND + 0.6])}, {"start": PLATFORM}).step(steps)
+    trial = WorldHarness(
+        {"uav": quadcopter_settings([0.0, 0.0, STAND + 0.6])}, {"start": PLATFORM}
+    ).step(steps)
     state = trial.world.get_state()
     expected = [trial.step().bytes for _ in range(60)]
     assert trial["uav.crashed"]

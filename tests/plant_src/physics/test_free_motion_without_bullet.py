@@ -9,7 +9,15 @@ import original_system_reference as reference
 import pybullet
 import pytest
 from plant_validation import MeasurementCheck
-from world_harness import DECK_TOP, PLATFORM, PLATFORM_TOP, REST_HEIGHT, WorldHarness, quadcopter_settings, vessel_settings
+from world_harness import (
+    DECK_TOP,
+    PLATFORM,
+    PLATFORM_TOP,
+    REST_HEIGHT,
+    WorldHarness,
+    quadcopter_settings,
+    vessel_settings,
+)
 
 import cosim
 from cosim.results import Result
@@ -24,7 +32,9 @@ def landing() -> WorldHarness:
     start = {"velocity_body": [0.4, 0.0, 0.0], "rates": [0.3, -0.2, 0.5]}
     uav = quadcopter_settings([-0.0135, 0.002, DECK_TOP + REST_HEIGHT + 1.5], yaw=0.3, **start)
     usv = vessel_settings([0.0, 0.0], velocity_body=[0.4, 0.0, 0.0])
-    trial = WorldHarness({"uav": uav, "usv": usv}, {"far": {**PLATFORM, "position": [9.0, 9.0, 0.0]}})
+    trial = WorldHarness(
+        {"uav": uav, "usv": usv}, {"far": {**PLATFORM, "position": [9.0, 9.0, 0.0]}}
+    )
     trial["uav.rotor_speed"] = [200.0, 201.0, 199.0, 200.0]
     trial["usv.thrust"] = 0.5
     return trial
@@ -32,7 +42,12 @@ def landing() -> WorldHarness:
 
 def rows(trial: WorldHarness, steps: int) -> np.ndarray:
     """Return the outputs after each step."""
-    return np.array([np.concatenate([a.astype(float) for a in trial.step().outputs.arrays.values()]) for _ in range(steps)])
+    return np.array(
+        [
+            np.concatenate([a.astype(float) for a in trial.step().outputs.arrays.values()])
+            for _ in range(steps)
+        ]
+    )
 
 
 @pytest.fixture
@@ -48,7 +63,9 @@ def no_bullet(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(pybullet, "stepSimulation", step)
 
 
-def test_flight_is_the_same_bit_for_bit_and_landing_within_rounding(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_flight_is_the_same_bit_for_bit_and_landing_within_rounding(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     shortcut = rows(trial := landing(), 200)
     assert trial["uav.contact.vessel"]
     monkeypatch.setattr(clearance, "NEAR_DISTANCE", EVERYWHERE)
@@ -60,10 +77,16 @@ def test_flight_is_the_same_bit_for_bit_and_landing_within_rounding(monkeypatch:
 def error_of_bullet(trial: WorldHarness) -> float:
     """Return the largest difference between the poses in Bullet and the published ones (m, rad)."""
     bodies = [body.body_id for body in trial.world._fleet.bodies]
-    (uav, _), (usv, q) = (pybullet.getBasePositionAndOrientation(body, trial.world._client) for body in bodies)
+    (uav, _), (usv, q) = (
+        pybullet.getBasePositionAndOrientation(body, trial.world._client) for body in bodies
+    )
     in_bullet = [*uav, *usv, *pybullet.getEulerFromQuaternion(q)]
     published = np.concatenate(
-        [trial.vector("uav.position"), trial.vector("usv.position"), [0.0, 0.0, trial["usv.attitude.yaw"]]]
+        [
+            trial.vector("uav.position"),
+            trial.vector("usv.position"),
+            [0.0, 0.0, trial["usv.attitude.yaw"]],
+        ]
     )
     return float(np.abs(in_bullet - published).max())
 
@@ -95,7 +118,9 @@ def test_bullet_is_stepped_before_anything_touches(request: pytest.FixtureReques
 
 
 def test_after_take_off_bullet_is_no_longer_stepped(request: pytest.FixtureRequest) -> None:
-    trial = WorldHarness({"uav": quadcopter_settings([0.0, 0.0, PLATFORM_TOP + REST_HEIGHT])}, {"start": PLATFORM}).step(20)
+    trial = WorldHarness(
+        {"uav": quadcopter_settings([0.0, 0.0, PLATFORM_TOP + REST_HEIGHT])}, {"start": PLATFORM}
+    ).step(20)
     assert trial["uav.contact.touching"]
     trial["uav.rotor_speed"] = [reference.HOVER_SPEED * 1.05] * 4
     trial.step(150)
@@ -105,9 +130,14 @@ def test_after_take_off_bullet_is_no_longer_stepped(request: pytest.FixtureReque
 
 
 def test_an_inactive_body_is_no_obstacle() -> None:
-    """The first vehicle leaves the platform; the second lands at the last active pose of the first one in Bullet."""
+    """The first vehicle leaves the platform; the second lands at the last active pose of the first
+    one in Bullet.
+    """
     place = [0.0, 0.0, PLATFORM_TOP + REST_HEIGHT]
-    first, second = quadcopter_settings(place, velocity_body=[0.0, 0.0, 4.0]), quadcopter_settings([0.0, 0.0, 3.0])
+    first, second = (
+        quadcopter_settings(place, velocity_body=[0.0, 0.0, 4.0]),
+        quadcopter_settings([0.0, 0.0, 3.0]),
+    )
     trial = WorldHarness({"first": first, "second": second}, {"start": PLATFORM})
     trial["first.rotor_speed"] = [reference.HOVER_SPEED] * 4
     trial["first.external_force.x"] = 2.0
@@ -121,7 +151,9 @@ def flown(near: float | None, monkeypatch: pytest.MonkeyPatch) -> Result:
     with cosim.load("demo1_box") as simulation:
         if near is not None:
             world = simulation.prepared.system.components["plant"]
-            monkeypatch.setattr(sys.modules[type(world._fleet.clearance).__module__], "NEAR_DISTANCE", near)
+            monkeypatch.setattr(
+                sys.modules[type(world._fleet.clearance).__module__], "NEAR_DISTANCE", near
+            )
         return simulation.run()
 
 
@@ -132,4 +164,12 @@ def test_demo1_lands_at_the_same_place_with_bullet_in_every_step(
     assert np.array_equal(shortcut["uav.vtol.mode"], bullet["uav.vtol.mode"])
     for axis in "xyz":
         error = shortcut[f"plant.uav.position.{axis}"] - bullet[f"plant.uav.position.{axis}"]
-        measured("Contact", "Demo 1: place throughout", error, 0.0, "m", "Bullet in every step", within=1e-6)
+        measured(
+            "Contact",
+            "Demo 1: place throughout",
+            error,
+            0.0,
+            "m",
+            "Bullet in every step",
+            within=1e-6,
+        )

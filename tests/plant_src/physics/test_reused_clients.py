@@ -1,11 +1,21 @@
-"""Worlds in the Bullet client of a former world: the same bytes as in a new client, whatever the former world left."""
+"""Worlds in the Bullet client of a former world: the same bytes as in a new client, whatever the
+former world left.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Callable
 
 import pytest
-from world_harness import DECK_TOP, PLATFORM, PLATFORM_TOP, REST_HEIGHT, WorldHarness, quadcopter_settings, vessel_settings
+from world_harness import (
+    DECK_TOP,
+    PLATFORM,
+    PLATFORM_TOP,
+    REST_HEIGHT,
+    WorldHarness,
+    quadcopter_settings,
+    vessel_settings,
+)
 
 from plant_src.physics import client
 from plant_src.replica.world import World as Replica
@@ -18,8 +28,12 @@ def only_new_clients(monkeypatch: pytest.MonkeyPatch) -> None:
 
 def landing() -> bytes:
     """Touch down on a moving deck and stay for a second; all outputs of all steps."""
-    uav = quadcopter_settings([-0.0135, 0.002, DECK_TOP + REST_HEIGHT + 0.05], yaw=0.3, velocity_body=[0.3, 0.0, 0.0])
-    trial = WorldHarness({"uav": uav, "usv": vessel_settings([0.0, 0.0], velocity_body=[0.3, 0.0, 0.0])})
+    uav = quadcopter_settings(
+        [-0.0135, 0.002, DECK_TOP + REST_HEIGHT + 0.05], yaw=0.3, velocity_body=[0.3, 0.0, 0.0]
+    )
+    trial = WorldHarness(
+        {"uav": uav, "usv": vessel_settings([0.0, 0.0], velocity_body=[0.3, 0.0, 0.0])}
+    )
     history = b"".join(trial.step().bytes for _ in range(130))
     assert trial["uav.contact.vessel"]
     trial.world.free()
@@ -39,8 +53,13 @@ def leave_bodies_in_contact_and_saved_states() -> None:
     trial.world.free()
 
 
-@pytest.mark.parametrize("leave", [landing, leave_replica_with_gravity_and_small_steps, leave_bodies_in_contact_and_saved_states])
-def test_a_landing_in_a_used_client_has_the_bytes_of_one_in_a_new_client(leave: Callable[[], object]) -> None:
+@pytest.mark.parametrize(
+    "leave",
+    [landing, leave_replica_with_gravity_and_small_steps, leave_bodies_in_contact_and_saved_states],
+)
+def test_a_landing_in_a_used_client_has_the_bytes_of_one_in_a_new_client(
+    leave: Callable[[], object],
+) -> None:
     in_new_client = landing()
     client._spare_clients.clear()
     leave()

@@ -19,8 +19,17 @@ ROOT = Path(__file__).parents[3]
 
 def mission() -> WorldHarness:
     """Drop from 0.15 m onto a moving, turning deck: 17 steps of flight, touchdown, rest."""
-    uav = quadcopter_settings([-0.0135, 0.002, DECK_TOP + REST_HEIGHT + 0.15], yaw=0.3, velocity_body=[0.3, 0.0, 0.0])
-    trial = WorldHarness({"uav": uav, "usv": vessel_settings([0.0, 0.0], velocity_body=[0.3, 0.0, 0.0], rates=[0.0, 0.0, 0.2])})
+    uav = quadcopter_settings(
+        [-0.0135, 0.002, DECK_TOP + REST_HEIGHT + 0.15], yaw=0.3, velocity_body=[0.3, 0.0, 0.0]
+    )
+    trial = WorldHarness(
+        {
+            "uav": uav,
+            "usv": vessel_settings(
+                [0.0, 0.0], velocity_body=[0.3, 0.0, 0.0], rates=[0.0, 0.0, 0.2]
+            ),
+        }
+    )
     trial["uav.rotor_speed"] = [120.0, 121.0, 119.0, 120.0]
     trial["usv.thrust"] = 1.0
     return trial
@@ -29,7 +38,10 @@ def mission() -> WorldHarness:
 def visit() -> WorldHarness:
     """Drop from 0.6 m onto the deck, take-off: Bullet is active from the 34th step to the 81st."""
     trial = WorldHarness(
-        {"uav": quadcopter_settings([-0.0135, 0.002, DECK_TOP + REST_HEIGHT + 0.6]), "usv": vessel_settings([0.0, 0.0])}
+        {
+            "uav": quadcopter_settings([-0.0135, 0.002, DECK_TOP + REST_HEIGHT + 0.6]),
+            "usv": vessel_settings([0.0, 0.0]),
+        }
     )
     trial["uav.external_force.z"] = 1.0
     return trial
@@ -64,7 +76,14 @@ def test_a_saved_state_is_restored_bit_for_bit(steps: int, measured: Measurement
         trial.world.get_outputs()
         assert trial.bytes == before
         differing = sum(trial.step().bytes != row for row in expected)
-        measured("Determinism and saved states", "steps that differ after a return, planar", differing, 0, "1", AGAIN)
+        measured(
+            "Determinism and saved states",
+            "steps that differ after a return, planar",
+            differing,
+            0,
+            "1",
+            AGAIN,
+        )
     trial.world.free_state(state)
 
 
@@ -110,17 +129,30 @@ print(digest.hexdigest(), trial["uav.contact.vessel"])
 
 
 def test_two_processes_compute_the_same_bytes(measured: MeasurementCheck) -> None:
-    script = SCRIPT.format(paths=[str(ROOT), str(ROOT / "tests/support"), str(Path(__file__).parent)])
+    script = SCRIPT.format(
+        paths=[str(ROOT), str(ROOT / "tests/support"), str(Path(__file__).parent)]
+    )
     outcomes = [
         subprocess.run(
-            [sys.executable, "-c", script], capture_output=True, text=True, check=True, env={"PYTHONHASHSEED": seed}
+            [sys.executable, "-c", script],
+            capture_output=True,
+            text=True,
+            check=True,
+            env={"PYTHONHASHSEED": seed},
         ).stdout
         for seed in ("1", "2")
     ]
     digests, landed = zip(*(outcome.split() for outcome in outcomes), strict=True)
     assert landed == ("True", "True")
     others = len(set(digests)) - 1
-    measured("Determinism and saved states", "other SHA-256 of a landing, 2 processes", others, 0, "1", "other PYTHONHASHSEED")
+    measured(
+        "Determinism and saved states",
+        "other SHA-256 of a landing, 2 processes",
+        others,
+        0,
+        "1",
+        "other PYTHONHASHSEED",
+    )
 
 
 def test_worlds_in_one_process_do_not_disturb_each_other() -> None:

@@ -41,7 +41,9 @@ def test_an_integral_is_stepped_forward() -> None:
 
 
 @pytest.mark.parametrize(("clamping", "held"), [(True, 0.0), (False, 5.0)])
-def test_only_loops_with_clamping_stop_integrating_at_the_limit(clamping: bool, held: float) -> None:
+def test_only_loops_with_clamping_stop_integrating_at_the_limit(
+    clamping: bool, held: float
+) -> None:
     loop = Pid(2.0, I=1.0, upper=1.0, clamping=clamping)
     assert {loop.step(5.0, 0.01) for _ in range(100)} == {1.0}
     assert loop.integral == pytest.approx(held)
@@ -70,14 +72,27 @@ def test_the_bus_starts_with_zeros_and_is_one_sample_late() -> None:
         (9.0, 0.4, 0.11, 1.0),
     ],
 )
-def test_take_off_approach_landing_and_abort(time: float, altitude: float, distance: float, reference: float) -> None:
+def test_take_off_approach_landing_and_abort(
+    time: float, altitude: float, distance: float, reference: float
+) -> None:
     vtol = Vtol(instance_name="vtol")
-    values = step(vtol, time, altitude_command=2.0, vehicle__position__z=altitude, target__position__y=distance)
+    values = step(
+        vtol,
+        time,
+        altitude_command=2.0,
+        vehicle__position__z=altitude,
+        target__position__y=distance,
+    )
     assert values["altitude_reference"] == reference
 
 
 def test_without_landing_the_command_holds() -> None:
-    assert step(Vtol(instance_name="vtol"), 20.0, altitude_command=3.0, enabled=0.0)["altitude_reference"] == 3.0
+    assert (
+        step(Vtol(instance_name="vtol"), 20.0, altitude_command=3.0, enabled=0.0)[
+            "altitude_reference"
+        ]
+        == 3.0
+    )
 
 
 @pytest.mark.parametrize(
@@ -92,7 +107,10 @@ def test_without_landing_the_command_holds() -> None:
 def test_it_tilts_towards_the_target(psi: float, x: float, y: float, phi: int, theta: int) -> None:
     unit = PositionController(instance_name="position")
     values = step(unit, vehicle__attitude__psi=psi, target__position__x=x, target__position__y=y)
-    signs = [round(values[name], 9) and math.copysign(1, values[name]) for name in ("phi_command", "theta_command")]
+    signs = [
+        round(values[name], 9) and math.copysign(1, values[name])
+        for name in ("phi_command", "theta_command")
+    ]
     assert signs == [phi, theta]
 
 
@@ -102,7 +120,9 @@ def test_tilt_commands_end_at_15_degrees() -> None:
 
 
 def test_world_velocities_are_taken_for_body_velocities() -> None:
-    """With the nose to +y a velocity along +x is still fed to the loop of the forward velocity: the published flaw."""
+    """With the nose to +y a velocity along +x is still fed to the loop of the forward velocity: the
+    published flaw.
+    """
     unit = PositionController(instance_name="position")
     values = step(unit, vehicle__attitude__psi=-math.pi / 2, vehicle__velocity__x=0.5)
     assert values["theta_command"] > 0.1
@@ -126,29 +146,48 @@ def test_the_course_points_to_the_waypoint(x: float, y: float) -> None:
     unit = Waypoints(instance_name="waypoints")
     course = step(unit, **{"waypoint_x[1]": 10 * x, "waypoint_y[1]": 10 * y})["course_command"]
     assert 0 <= course < 2 * math.pi
-    assert (math.cos(course), math.sin(course)) == pytest.approx((x / math.sqrt(2), y / math.sqrt(2)))
+    assert (math.cos(course), math.sin(course)) == pytest.approx(
+        (x / math.sqrt(2), y / math.sqrt(2))
+    )
 
 
 def test_a_waypoint_is_switched_one_sample_late_and_the_last_one_stays() -> None:
     unit = Waypoints(instance_name="waypoints")
     unit.values |= {"waypoint_count": 2.0, "waypoint_x[1]": 10.0, "waypoint_x[2]": 20.0}
     places = (0.0, 9.4, 9.6, 9.6, 19.4, 19.6, 19.6, 19.7)
-    assert [step(unit, vehicle__position__x=x)["waypoint"] for x in places] == [1, 1, 1, 2, 2, 2, 2, 2]
+    assert [step(unit, vehicle__position__x=x)["waypoint"] for x in places] == [
+        1,
+        1,
+        1,
+        2,
+        2,
+        2,
+        2,
+        2,
+    ]
 
 
-@pytest.mark.parametrize(("yaw", "course", "sign"), [(0.1, 6.2, 1), (-0.1, 0.1, -1), (3.1, 3.3, -1), (-3.1, 3.0, 1)])
+@pytest.mark.parametrize(
+    ("yaw", "course", "sign"), [(0.1, 6.2, 1), (-0.1, 0.1, -1), (3.1, 3.3, -1), (-3.1, 3.0, 1)]
+)
 def test_the_rudder_takes_the_shorter_way(yaw: float, course: float, sign: int) -> None:
-    values = step(Autopilot(instance_name="autopilot"), vehicle__attitude__yaw=yaw, course_command=course)
+    values = step(
+        Autopilot(instance_name="autopilot"), vehicle__attitude__yaw=yaw, course_command=course
+    )
     assert math.copysign(1, values["rudder_angle"]) == sign
 
 
 def test_thrust_is_limited_to_three_newton_and_rudder_to_35_degrees() -> None:
-    values = step(Autopilot(instance_name="autopilot"), speed_command=1.0, vehicle__attitude__yaw=2.0)
+    values = step(
+        Autopilot(instance_name="autopilot"), speed_command=1.0, vehicle__attitude__yaw=2.0
+    )
     assert values["thrust"] == 3.0
     assert values["rudder_angle"] == pytest.approx(math.radians(35))
 
 
 def test_thrust_is_proportional_to_the_speed_along_the_hull() -> None:
     unit = Autopilot(instance_name="autopilot")
-    values = step(unit, speed_command=1.0, vehicle__attitude__yaw=math.pi / 2, vehicle__velocity__y=0.99)
+    values = step(
+        unit, speed_command=1.0, vehicle__attitude__yaw=math.pi / 2, vehicle__velocity__y=0.99
+    )
     assert values["thrust"] == pytest.approx(82.65 * 0.01)

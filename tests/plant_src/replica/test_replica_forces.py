@@ -1,4 +1,6 @@
-"""The force models of the published simulator, as FMUs of both versions, against its formulas written out with its numbers."""
+"""The force models of the published simulator, as FMUs of both versions, against its formulas
+written out with its numbers.
+"""
 
 from __future__ import annotations
 
@@ -28,9 +30,20 @@ def loads(request: pytest.FixtureRequest) -> Loads:
         connected = [Connection(Endpoint("in", slot), Endpoint("fmu", slot)) for slot in inputs]
         components = {"in": source, "fmu": create_component(file, "fmu")}
         wired = System(components, connected, (("in", "fmu"),), start_values={"fmu": parameters})
-        slots = [slot for v in file.description.variables if v.causality == "output" for slot in v.scalar_names]
+        slots = [
+            slot
+            for v in file.description.variables
+            if v.causality == "output"
+            for slot in v.scalar_names
+        ]
         recording = simulate(
-            wired, Settings(exact_fraction(0), exact_fraction(0.01), exact_fraction(0.01), {s: Endpoint("fmu", s) for s in slots})
+            wired,
+            Settings(
+                exact_fraction(0),
+                exact_fraction(0.01),
+                exact_fraction(0.01),
+                {s: Endpoint("fmu", s) for s in slots},
+            ),
         ).recording
         return {slot: float(recording.columns[slot][-1]) for slot in slots}
 
@@ -39,7 +52,9 @@ def loads(request: pytest.FixtureRequest) -> Loads:
 
 def rotors(loads: Loads, *throttles: float) -> list[tuple[float, float]]:
     """(thrust, torque) of each rotor."""
-    found = loads("rotor_map", {f"throttle[{i}]": throttle for i, throttle in enumerate(throttles, start=1)})
+    found = loads(
+        "rotor_map", {f"throttle[{i}]": throttle for i, throttle in enumerate(throttles, start=1)}
+    )
     return [(found[f"thrust[{i}]"], found[f"torque[{i}]"]) for i in range(1, len(throttles) + 1)]
 
 
@@ -54,7 +69,9 @@ def motion(u: float, v: float, r: float, yaw: float = 0.0) -> dict[str, float]:
     }
 
 
-def rudder(loads: Loads, u: float, v: float, r: float, angle: float, **parameters: float) -> tuple[float, float]:
+def rudder(
+    loads: Loads, u: float, v: float, r: float, angle: float, **parameters: float
+) -> tuple[float, float]:
     found = loads("rudder", {**motion(u, v, r), "rudder_angle": angle}, **parameters)
     return found["force.x"], found["force.y"]
 
@@ -65,7 +82,9 @@ def test_full_throttle_gives_the_published_maximum(loads: Loads) -> None:
 
 
 def test_hover_takes_65_88_percent(loads: Loads) -> None:
-    assert sum(thrust for thrust, _ in rotors(loads, *[65.88] * 4)) == pytest.approx(0.443892 * 9.81, rel=3e-4)
+    assert sum(thrust for thrust, _ in rotors(loads, *[65.88] * 4)) == pytest.approx(
+        0.443892 * 9.81, rel=3e-4
+    )
 
 
 def test_throttles_are_limited(loads: Loads) -> None:
@@ -100,8 +119,12 @@ def test_hulls_and_their_coefficients_are_parameters(loads: Loads) -> None:
 
 
 def test_air_drag_joins_the_load_of_the_water(loads: Loads) -> None:
-    found = loads("air_drag", {**motion(u=0.9, v=-0.2, r=0.3), "water.x": 1.0, "water.y": 2.0, "water.n": 3.0})
-    assert (found["load.x"], found["load.y"], found["load.n"]) == pytest.approx((1 - 0.1 * 0.81, 2 + 0.1 * 0.04, 3))
+    found = loads(
+        "air_drag", {**motion(u=0.9, v=-0.2, r=0.3), "water.x": 1.0, "water.y": 2.0, "water.n": 3.0}
+    )
+    assert (found["load.x"], found["load.y"], found["load.n"]) == pytest.approx(
+        (1 - 0.1 * 0.81, 2 + 0.1 * 0.04, 3)
+    )
 
 
 def test_without_a_coefficient_there_is_no_drag(loads: Loads) -> None:
@@ -124,19 +147,31 @@ def test_a_stalled_rudder_gives_3_83_newton_at_one_metre_per_second(loads: Loads
 
 def test_lift_is_a_sine_of_the_angle_of_attack_up_to_30_degrees(loads: Loads) -> None:
     angle = math.radians(15)
-    assert rudder(loads, 1.0, 0.0, 0.0, angle)[1] / math.cos(angle) == pytest.approx(3.83232 * math.sin(math.pi / 4), rel=1e-9)
+    assert rudder(loads, 1.0, 0.0, 0.0, angle)[1] / math.cos(angle) == pytest.approx(
+        3.83232 * math.sin(math.pi / 4), rel=1e-9
+    )
 
 
 @pytest.mark.parametrize("sign", [1.0, -1.0])
-def test_the_inflow_of_a_turn_has_the_published_sign_or_the_physical_one(loads: Loads, sign: float) -> None:
+def test_the_inflow_of_a_turn_has_the_published_sign_or_the_physical_one(
+    loads: Loads, sign: float
+) -> None:
     inflow = math.atan((0.05 + sign * 0.34727 * 0.4) / 0.8)
-    lift = 0.5 * 998 * 1.2 * 0.0064 * 0.64 * math.sin(math.pi / 2 * (0.1 - inflow) / math.radians(30))
+    lift = (
+        0.5 * 998 * 1.2 * 0.0064 * 0.64 * math.sin(math.pi / 2 * (0.1 - inflow) / math.radians(30))
+    )
     found = rudder(loads, 0.8, 0.05, 0.4, 0.1, inflow_sign=sign)
     assert found == pytest.approx((-lift * math.sin(0.1), lift * math.cos(0.1)))
 
 
 def test_a_rudder_of_other_size_and_shape(loads: Loads) -> None:
-    changes = {"area": 0.02, "max_lift_coefficient": 1.0, "stall_angle": 0.4, "density": 1000.0, "arm": 1.0}
+    changes = {
+        "area": 0.02,
+        "max_lift_coefficient": 1.0,
+        "stall_angle": 0.4,
+        "density": 1000.0,
+        "arm": 1.0,
+    }
     lift = 0.5 * 1000 * 0.02 * 4 * math.sin(math.pi / 2 * (0.1 - math.atan(0.1)) / 0.4)
     assert rudder(loads, 2.0, 0.0, 0.2, 0.1, **changes)[1] == pytest.approx(lift * math.cos(0.1))
 

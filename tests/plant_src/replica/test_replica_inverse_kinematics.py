@@ -41,7 +41,12 @@ def test_the_low_pass_at_rest_stays_there() -> None:
 def controller(**values: float) -> dict[str, float]:
     """Outputs of a controller that hovers at its altitude."""
     unit = InverseKinematics(instance_name="inverse")
-    unit.values |= {"initial_force": HOVER, "altitude_command": 2.0, "vehicle.position.z": 2.0, **values}
+    unit.values |= {
+        "initial_force": HOVER,
+        "altitude_command": 2.0,
+        "vehicle.position.z": 2.0,
+        **values,
+    }
     unit.exit_initialization_mode()
     assert unit.do_step(0.0, 0.01)
     return unit.values
@@ -59,7 +64,9 @@ def test_the_thrust_points_along_the_wanted_force() -> None:
     phi, theta = values["phi_command"], values["theta_command"]
     up = [-math.sin(theta), math.cos(theta) * math.sin(phi), math.cos(theta) * math.cos(phi)]
     np.testing.assert_allclose(up, force / np.linalg.norm(force), rtol=1e-12)
-    assert values["throttle"] == pytest.approx(65.88 * math.sqrt(np.linalg.norm(force) / HOVER), rel=1e-3)
+    assert values["throttle"] == pytest.approx(
+        65.88 * math.sqrt(np.linalg.norm(force) / HOVER), rel=1e-3
+    )
 
 
 def test_the_force_starts_at_zero_as_published() -> None:
@@ -68,7 +75,8 @@ def test_the_force_starts_at_zero_as_published() -> None:
 
 
 @pytest.mark.parametrize(
-    ("profile", "distance", "speed"), [(return_move_acceleration, 0.0, 0.0), (stop_move_acceleration, 100.0, 10.0)]
+    ("profile", "distance", "speed"),
+    [(return_move_acceleration, 0.0, 0.0), (stop_move_acceleration, 100.0, 10.0)],
 )
 def test_profiles_travel_as_far_as_published(profile, distance: float, speed: float) -> None:
     time = np.arange(0, 25, 1e-3) + 5e-4
@@ -78,7 +86,9 @@ def test_profiles_travel_as_far_as_published(profile, distance: float, speed: fl
     assert velocity.sum() * 1e-3 == pytest.approx(distance, abs=2e-2)
 
 
-@pytest.mark.parametrize(("profile", "largest"), [(return_move_acceleration, 0.578), (stop_move_acceleration, 1.875)])
+@pytest.mark.parametrize(
+    ("profile", "largest"), [(return_move_acceleration, 0.578), (stop_move_acceleration, 1.875)]
+)
 def test_profiles_peak_as_published(profile, largest: float) -> None:
     values = [profile(t) for t in np.arange(0, 20, 1e-2)]
     assert (max(values), min(values)) == pytest.approx((largest, -largest), rel=2e-3)
@@ -89,14 +99,19 @@ START = "/components/plant/arguments/vehicles/uav/position"
 
 def test_started_in_hover_the_demo_goes_24_metres_sideways_and_comes_back() -> None:
     """At the commanded altitude, with altitude loop and filter at the weight."""
-    result = cosim.run("demo3_replica", parameters={"uav.inverse.initial_force": HOVER, START: [-5.125, 0.825, 2.0]})
+    result = cosim.run(
+        "demo3_replica",
+        parameters={"uav.inverse.initial_force": HOVER, START: [-5.125, 0.825, 2.0]},
+    )
     assert result["plant.uav.position.x"][-1] + 5.125 == pytest.approx(24.3, abs=0.05)
     assert result["plant.uav.position.y"].max() - 0.825 > 4
     assert abs(result["plant.uav.position.y"][-1] - 0.825) == pytest.approx(0.23, abs=0.02)
 
 
 def test_started_as_published_the_demo_drifts_away() -> None:
-    """The first tilt commands are huge; they leave a velocity, and metres after 20 s (re-simulated: 0.4 m/s and 8.3 m)."""
+    """The first tilt commands are huge; they leave a velocity, and metres after 20 s (re-simulated:
+    0.4 m/s and 8.3 m).
+    """
     result = cosim.run("demo3_replica")
     assert np.abs(result["uav.inverse.phi_command"][result.time < 0.08]).max() > math.radians(80)
     assert 0.2 < result["plant.uav.velocity.y"][-1] < 0.8

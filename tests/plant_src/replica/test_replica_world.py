@@ -1,4 +1,6 @@
-"""The plant of the replica: its interface, its conventions, and mechanics that can be computed by hand."""
+"""The plant of the replica: its interface, its conventions, and mechanics that can be computed by
+hand.
+"""
 
 from __future__ import annotations
 
@@ -19,13 +21,24 @@ WEIGHT = 0.443892 * 9.81
 
 #: equation 10: four thrusts, four torques, thrust and rudder of the vessel, X, Y, N
 INPUTS = [f"uav.{load}[{i}]" for load in ("thrust", "torque") for i in (1, 2, 3, 4)]
-INPUTS += ["usv.thrust", "usv.rudder.x", "usv.rudder.y", "usv.water.x", "usv.water.y", "usv.water.n"]
+INPUTS += [
+    "usv.thrust",
+    "usv.rudder.x",
+    "usv.rudder.y",
+    "usv.water.x",
+    "usv.water.y",
+    "usv.water.n",
+]
 
 #: equation 11
 OUTPUTS = [f"uav.position.{axis}" for axis in "xyz"]
 OUTPUTS += [f"uav.attitude.{angle}" for angle in ("phi", "theta", "psi")]
 OUTPUTS += [f"uav.{vector}.{axis}" for vector in ("velocity", "acceleration") for axis in "xyz"]
-OUTPUTS += [f"usv.{vector}.{axis}" for vector in ("position", "velocity", "angular_velocity") for axis in "xyz"]
+OUTPUTS += [
+    f"usv.{vector}.{axis}"
+    for vector in ("position", "velocity", "angular_velocity")
+    for axis in "xyz"
+]
 OUTPUTS += ["usv.attitude.yaw"]
 
 
@@ -73,7 +86,9 @@ def test_the_signals_have_the_published_order() -> None:
 
 
 def test_the_start_is_published_in_the_original_conventions() -> None:
-    trial = Trial({"position": [1.0, 2.0, 3.0], "yaw": np.pi / 2}, {"position": [-4.0, 5.0], "yaw": -3.0})
+    trial = Trial(
+        {"position": [1.0, 2.0, 3.0], "yaw": np.pi / 2}, {"position": [-4.0, 5.0], "yaw": -3.0}
+    )
     np.testing.assert_allclose(trial.vector("uav.position"), [1, 2, 3], atol=1e-12)
     np.testing.assert_allclose(trial.attitude, [0, 0, -np.pi / 2], atol=1e-8)
     np.testing.assert_allclose(trial.vector("usv.position"), [-4, 5, 0.1245])
@@ -90,18 +105,30 @@ def test_it_falls_as_two_engine_steps_per_sample_make_it_fall(measured: Measurem
     trial = Trial({"position": [0, 0, 10]}).step(50)
     assert trial["uav.velocity.z"] == pytest.approx(-9.81 * 0.5)
     fall, expected = 10 - trial["uav.position.z"], 9.81 * HALF**2 * 100 * 101 / 2
-    measured(REPLICA, "free fall in two Euler steps per sample, 0.5 s", fall, expected, "m", "closed form", relative=1e-6)
+    measured(
+        REPLICA,
+        "free fall in two Euler steps per sample, 0.5 s",
+        fall,
+        expected,
+        "m",
+        "closed form",
+        relative=1e-6,
+    )
 
 
 def test_the_published_point_is_not_the_centre_of_mass() -> None:
-    """A free spin is about the centre of mass, which flies on straight; the origin of the model goes round it."""
+    """A free spin is about the centre of mass, which flies on straight; the origin of the model
+    goes round it.
+    """
     spin, duration, centre = 2.0, 0.1, complex(-0.003329, 0.001981)
     trial = Trial({"position": [0, 0, 10], "rates": [0, 0, spin]})
     np.testing.assert_allclose(trial.vector("uav.velocity"), 0, atol=1e-9)
     trial.step(10)
     expected = centre + 1j * spin * centre * duration - centre * np.exp(1j * spin * duration)
     assert abs(expected) > 5e-5
-    np.testing.assert_allclose(trial.vector("uav.position")[:2], [expected.real, expected.imag], atol=1e-5)
+    np.testing.assert_allclose(
+        trial.vector("uav.position")[:2], [expected.real, expected.imag], atol=1e-5
+    )
 
 
 def test_hovering_thrust_carries_the_weight() -> None:
@@ -118,8 +145,16 @@ def test_hovering_thrust_carries_the_weight() -> None:
     ],
 )
 def test_rotors_turn_the_body_as_the_published_numbers_say(loads: dict[str, float]) -> None:
-    """Forward-right-down: inertia, rotor places and senses of the fact sheet; two steps from rest turn by 3 h^2 alpha."""
-    inertia = np.array([[0.002835, -0.000978, -0.000116], [-0.000978, 0.002821, -0.000111], [-0.000116, -0.000111, 0.005131]])
+    """Forward-right-down: inertia, rotor places and senses of the fact sheet; two steps from rest
+    turn by 3 h^2 alpha.
+    """
+    inertia = np.array(
+        [
+            [0.002835, -0.000978, -0.000116],
+            [-0.000978, 0.002821, -0.000111],
+            [-0.000116, -0.000111, 0.005131],
+        ]
+    )
     rotors = [
         [0.181777, 0.000828, -0.006153],
         [0.000096, -0.181531, -0.006153],
@@ -129,19 +164,31 @@ def test_rotors_turn_the_body_as_the_published_numbers_say(loads: dict[str, floa
     torque = np.zeros(3)
     for name, value in loads.items():
         i = int(name[-2]) - 1
-        torque += np.cross(rotors[i], [0, 0, -value]) if "thrust" in name else [0, 0, (-1) ** (i + 1) * value]
+        torque += (
+            np.cross(rotors[i], [0, 0, -value])
+            if "thrust" in name
+            else [0, 0, (-1) ** (i + 1) * value]
+        )
     turned = Trial({"position": [0, 0, 10]}).step(**loads).attitude
-    np.testing.assert_allclose(turned, 3 * HALF**2 * np.linalg.solve(inertia, torque), atol=2e-6, rtol=5e-3)
+    np.testing.assert_allclose(
+        turned, 3 * HALF**2 * np.linalg.solve(inertia, torque), atol=2e-6, rtol=5e-3
+    )
 
 
 @pytest.mark.parametrize(("rotor", "angle", "sign"), [(1, 1, 1), (2, 0, 1), (3, 1, -1), (4, 0, -1)])
 def test_positive_angles_are_nose_up_and_right_side_down(rotor: int, angle: int, sign: int) -> None:
-    assert sign * Trial({"position": [0, 0, 10]}).step(**{f"uav__thrust[{rotor}]": 0.2}).attitude[angle] > 1e-4
+    assert (
+        sign
+        * Trial({"position": [0, 0, 10]}).step(**{f"uav__thrust[{rotor}]": 0.2}).attitude[angle]
+        > 1e-4
+    )
 
 
 def test_a_tilted_rotor_pulls_sideways() -> None:
     """Nose down accelerates forward."""
-    trial = Trial({"position": [0, 0, 10]}).hover().step(20, **{"uav__thrust[3]": WEIGHT / 4 + 0.05})
+    trial = (
+        Trial({"position": [0, 0, 10]}).hover().step(20, **{"uav__thrust[3]": WEIGHT / 4 + 0.05})
+    )
     assert trial.attitude[1] < -0.05
     assert trial["uav.velocity.x"] > 0.03
 
@@ -152,7 +199,13 @@ def test_the_links_of_the_rig_move_with_the_hull(measured: MeasurementCheck) -> 
     *level, climb = trial.vector("usv.velocity")
     assert climb == 0
     measured(
-        REPLICA, "speed of the hull with the links of its rig", level, [0.1 / 4.31, 0.2 / 4.21], "m/s", "F t / m", relative=1e-9
+        REPLICA,
+        "speed of the hull with the links of its rig",
+        level,
+        [0.1 / 4.31, 0.2 / 4.21],
+        "m/s",
+        "F t / m",
+        relative=1e-9,
     )
 
 
@@ -162,12 +215,16 @@ def test_rudder_and_moment_turn_the_hull() -> None:
 
 
 def test_forces_of_the_hull_lie_in_its_axes() -> None:
-    trial = Trial({"position": [0, 0, 100]}, {"position": [0, 0], "yaw": np.pi / 2}).step(usv__thrust=1.0, usv__rudder__x=0.5)
+    trial = Trial({"position": [0, 0, 100]}, {"position": [0, 0], "yaw": np.pi / 2}).step(
+        usv__thrust=1.0, usv__rudder__x=0.5
+    )
     np.testing.assert_allclose(trial.vector("usv.velocity"), [0, 0.015 / 4.21, 0], atol=1e-12)
 
 
 def test_yaw_of_the_vessel_is_cyclic() -> None:
-    trial = Trial({"position": [0, 0, 100]}, {"position": [0, 0], "yaw": 3.1, "rates": [0, 0, 1.0]}).step(10)
+    trial = Trial(
+        {"position": [0, 0, 100]}, {"position": [0, 0], "yaw": 3.1, "rates": [0, 0, 1.0]}
+    ).step(10)
     assert trial["usv.attitude.yaw"] == pytest.approx(3.2 - 2 * np.pi, abs=1e-6)
 
 
@@ -192,16 +249,29 @@ def test_it_rests_on_its_feet(support: str) -> None:
 
 
 def test_landing_sideways_pushes_the_vessel(measured: MeasurementCheck) -> None:
-    trial = Trial({"position": [0, 0, 0.33], "velocity_body": [0.3, 0, 0]}, {"position": [0, 0]}).step(40)
+    trial = Trial(
+        {"position": [0, 0, 0.33], "velocity_body": [0.3, 0, 0]}, {"position": [0, 0]}
+    ).step(40)
     share = 0.443892 / (0.443892 + 4.31)
     found, expected = trial["usv.velocity.x"], 0.3 * share
-    measured(REPLICA, "common speed after a sideways landing", found, expected, "m/s", "conservation", relative=0.02)
+    measured(
+        REPLICA,
+        "common speed after a sideways landing",
+        found,
+        expected,
+        "m/s",
+        "conservation",
+        relative=0.02,
+    )
     assert trial["uav.velocity.x"] == pytest.approx(0.3 * share, rel=0.02)
 
 
 def test_more_sub_steps_change_little_in_flight() -> None:
     ends = [
-        Trial({"position": [0, 0, 10], "rates": [0.5, 0.2, 0.1]}, sub_steps=n).hover(50).vector("uav.position") for n in (2, 20)
+        Trial({"position": [0, 0, 10], "rates": [0.5, 0.2, 0.1]}, sub_steps=n)
+        .hover(50)
+        .vector("uav.position")
+        for n in (2, 20)
     ]
     assert 1e-6 < np.linalg.norm(ends[0] - ends[1]) < 0.02
 
@@ -223,8 +293,17 @@ def test_a_value_that_is_not_finite_is_rejected_by_name() -> None:
     ("arguments", "text"),
     [
         ({"vehicles": {"uav": {"position": [0, 0, 1]}}}, "expected the vehicles"),
-        ({"vehicles": {"uav": {"position": [0, 0, 1]}, "usv": {"position": [0, 0]}}, "sub_steps": 0}, "at least 1"),
-        ({"vehicles": {"uav": {"position": [0, 0]}, "usv": {"position": [0, 0]}}}, "list of 3 numbers"),
+        (
+            {
+                "vehicles": {"uav": {"position": [0, 0, 1]}, "usv": {"position": [0, 0]}},
+                "sub_steps": 0,
+            },
+            "at least 1",
+        ),
+        (
+            {"vehicles": {"uav": {"position": [0, 0]}, "usv": {"position": [0, 0]}}},
+            "list of 3 numbers",
+        ),
         ({"vehicles": {"uav": {"position": [0, 0, 0.2]}, "usv": {"position": [0, 0]}}}, "overlap"),
     ],
 )

@@ -17,11 +17,15 @@ def times(figure):
 
 
 def test_ghosts_are_one_second_apart_and_end_at_the_touchdown():
-    assert times(ghosts(scene_mission(), pixels=PIXELS)) == [f"{TOUCHDOWN - 8 + i:.1f} s" for i in range(9)]
+    assert times(ghosts(scene_mission(), pixels=PIXELS)) == [
+        f"{TOUCHDOWN - 8 + i:.1f} s" for i in range(9)
+    ]
 
 
 def test_a_window_can_be_chosen():
-    figure = ghosts(scene_mission(), camera="overview", start=2.0, stop=5.0, interval=1.5, pixels=PIXELS)
+    figure = ghosts(
+        scene_mission(), camera="overview", start=2.0, stop=5.0, interval=1.5, pixels=PIXELS
+    )
     assert times(figure) == ["2.0 s", "3.5 s", "5.0 s"]
 
 

@@ -37,7 +37,9 @@ def test_a_ball_appears_where_the_camera_projects_it(place):
     with SolidRenderer([Part("sphere", (0.3,), (0.0, 0.0, 0.0), (1.0, 1.0, 1.0))]) as stage:
         stage.set_pose(0, place, UPRIGHT)
         y, x = np.nonzero(np.isfinite(stage.render(AHEAD, *SIZE).depth))
-    assert AHEAD.pixels(np.array([place]), *SIZE)[0] == pytest.approx((x.mean() + 0.5, y.mean() + 0.5), abs=1.0)
+    assert AHEAD.pixels(np.array([place]), *SIZE)[0] == pytest.approx(
+        (x.mean() + 0.5, y.mean() + 0.5), abs=1.0
+    )
 
 
 def test_parts_rotate_with_their_object():
@@ -48,9 +50,15 @@ def test_parts_rotate_with_their_object():
 
 
 def test_the_mirrored_view_shows_the_mirror_image_upside_down():
-    below, place, (width, height) = View(AHEAD.eye, np.array([10.0, 0.0, 1.0])), np.array([[8.0, 1.0, 1.2]]), SIZE
+    below, place, (width, height) = (
+        View(AHEAD.eye, np.array([10.0, 0.0, 1.0])),
+        np.array([[8.0, 1.0, 1.2]]),
+        SIZE,
+    )
     x, y = below.pixels(place, width, height)[0]
-    assert below.mirrored().pixels(place * (1, 1, -1), width, height)[0] == pytest.approx((x, height - y))
+    assert below.mirrored().pixels(place * (1, 1, -1), width, height)[0] == pytest.approx(
+        (x, height - y)
+    )
 
 
 def test_water_is_where_rays_meet_it():
@@ -67,7 +75,9 @@ ONE_BANK = bank(7.0, -3.0, 200.0, 50.0, beach=0.5)
 
 @pytest.mark.parametrize("eye", [(0.0, 0.0, 3.0), (0.0, 3.0, 1.5), (3.0, -6.0, 2.0)])
 def test_banks_look_like_boxes_of_their_size(eye, monkeypatch):
-    """Rays against TinyRenderer, which draws half a pixel elsewhere: its depth is one of those around."""
+    """Rays against TinyRenderer, which draws half a pixel elsewhere: its depth is one of those
+    around.
+    """
     view = View(np.array(eye), np.array([9.0, 0.5, 0.1]))
     monkeypatch.setattr("plant_src.scene.shores.BANKS", [ONE_BANK])
     found = Picture(np.zeros((80, 160, 3), np.uint8), np.full((80, 160), np.inf, np.float32))
@@ -80,17 +90,25 @@ def test_banks_look_like_boxes_of_their_size(eye, monkeypatch):
     both = seen & np.isfinite(drawn.depth)
     around = np.stack([np.roll(found.depth, shift, (0, 1)) for shift in np.ndindex(3, 3)])
     around = np.roll(around, (-1, -1), (1, 2))[:, both]
-    hit = (drawn.depth[both] > 0.999 * around.min(axis=0)) & (drawn.depth[both] < 1.001 * around.max(axis=0))
+    hit = (drawn.depth[both] > 0.999 * around.min(axis=0)) & (
+        drawn.depth[both] < 1.001 * around.max(axis=0)
+    )
     assert hit.mean() > 0.98
-    assert np.mean(np.abs(found.colour[both].astype(int) - drawn.colour[both]).max(axis=1) > 20) < 0.08
+    assert (
+        np.mean(np.abs(found.colour[both].astype(int) - drawn.colour[both]).max(axis=1) > 20) < 0.08
+    )
 
 
 def test_the_mirror_image_of_a_bank_shows_its_shore(monkeypatch):
-    """Seen from below the water, in the picture upside down, land ends where it ends seen from above."""
+    """Seen from below the water, in the picture upside down, land ends where it ends seen from
+    above.
+    """
     monkeypatch.setattr("plant_src.scene.shores.BANKS", [ONE_BANK])
     view, pictures = View(np.array([0.0, 0.0, 3.0]), np.array([9.0, 0.5, 0.1])), []
     for one in (view, view.mirrored()):
-        pictures.append(Picture(np.zeros((80, 160, 3), np.uint8), np.full((80, 160), np.inf, np.float32)))
+        pictures.append(
+            Picture(np.zeros((80, 160, 3), np.uint8), np.full((80, 160), np.inf, np.float32))
+        )
         add_land(pictures[-1], one, pixel_rays(one, *SIZE))
     upright, mirrored = (np.isfinite(picture.depth) for picture in pictures)
     assert np.abs(upright.sum(axis=0) - mirrored[::-1].sum(axis=0)).max() <= 6
@@ -99,7 +117,10 @@ def test_the_mirror_image_of_a_bank_shows_its_shore(monkeypatch):
 def test_land_hides_only_what_is_behind_it(monkeypatch):
     monkeypatch.setattr("plant_src.scene.shores.BANKS", [ONE_BANK])
     view = View(np.array([0.0, 0.0, 3.0]), np.array([9.0, 0.5, 0.1]))
-    near, far = (Picture(np.zeros((80, 160, 3), np.uint8), np.full((80, 160), depth, np.float32)) for depth in (2.0, 50.0))
+    near, far = (
+        Picture(np.zeros((80, 160, 3), np.uint8), np.full((80, 160), depth, np.float32))
+        for depth in (2.0, 50.0)
+    )
     for picture in (near, far):
         add_land(picture, view, pixel_rays(view, *SIZE))
     assert not near.colour.any()
@@ -111,7 +132,9 @@ def as_part(step):
     return Part("box", tuple(high - low), tuple((low + high) / 2), step.colour)
 
 
-@pytest.mark.parametrize("place", [(6.0, 0.0, 2.0), (8.0, 2.6, 1.4), (3.0, -1.3, 2.4), (0.2, 0.2, 2.0), (-5.0, 0.0, 2.0)])
+@pytest.mark.parametrize(
+    "place", [(6.0, 0.0, 2.0), (8.0, 2.6, 1.4), (3.0, -1.3, 2.4), (0.2, 0.2, 2.0), (-5.0, 0.0, 2.0)]
+)
 def test_a_window_holds_all_of_a_ball(place):
     """All points of it that are in the picture."""
     window = AHEAD.bounding_window(np.array([place]), np.array([0.3]), *SIZE)
@@ -119,11 +142,15 @@ def test_a_window_holds_all_of_a_ball(place):
     points = place + 0.3 * turns / np.linalg.norm(turns, axis=1)[:, None]
     x, y = AHEAD.pixels(points[points[:, 0] > NEAR], *SIZE).T
     inside = (x > 0) & (x < 160) & (y > 0) & (y < 80)
-    assert ((x >= window.left) & (x <= window.right) & (y >= window.top) & (y <= window.bottom))[inside].all()
+    assert ((x >= window.left) & (x <= window.right) & (y >= window.top) & (y <= window.bottom))[
+        inside
+    ].all()
 
 
 def test_a_window_is_not_much_larger_than_its_ball():
-    left, right, top, bottom = AHEAD.bounding_window(np.array([[6.0, 0.0, 2.0]]), np.array([0.3]), *SIZE)
+    left, right, top, bottom = AHEAD.bounding_window(
+        np.array([[6.0, 0.0, 2.0]]), np.array([0.3]), *SIZE
+    )
     width = 2 * 0.3 / 6.0 * 80 / (2 * math.tan(0.3))
     assert width <= right - left <= width + 6
     assert width <= bottom - top <= width + 6
@@ -166,9 +193,13 @@ def test_a_vehicle_behind_a_solid_is_hidden():
 
 
 def test_a_vehicle_covers_the_sky_by_its_opacity():
-    layer = Layer.from_solids(Picture(np.zeros((1, 1, 3), np.uint8), np.full((1, 1), np.inf, np.float32)))
+    layer = Layer.from_solids(
+        Picture(np.zeros((1, 1, 3), np.uint8), np.full((1, 1), np.inf, np.float32))
+    )
     for share in (0.5, 0.5):
-        layer.blend(Picture(np.full((1, 1, 3), 255, np.uint8), np.full((1, 1), 4.0, np.float32)), share)
+        layer.blend(
+            Picture(np.full((1, 1, 3), 255, np.uint8), np.full((1, 1), 4.0, np.float32)), share
+        )
     assert layer.alpha[0, 0] == pytest.approx(0.75)
     assert layer.colour[0, 0].tolist() == pytest.approx([0.75] * 3)
 
@@ -223,7 +254,10 @@ def test_all_clients_are_disconnected():
 def test_visual_parts_have_about_the_size_of_the_collision_boxes(vehicle):
     parts = vehicle_parts(vehicle)
     seen = max(math.hypot(*part.position) for part in parts)
-    solid = max(np.linalg.norm(box.corners(), axis=1).max() for box in next(iter(VEHICLE_MODELS[vehicle].values())).body.boxes)
+    solid = max(
+        np.linalg.norm(box.corners(), axis=1).max()
+        for box in next(iter(VEHICLE_MODELS[vehicle].values())).body.boxes
+    )
     assert 0.5 * solid < seen < 2.5 * solid
 
 

@@ -21,7 +21,13 @@ EXAMPLES = {data["family"]: data for data in (json.loads(file.read_text()) for f
 
 def paths(data: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
     """Paths of all keys of objects."""
-    items = data.items() if isinstance(data, dict) else enumerate(data) if isinstance(data, list) else ()
+    items = (
+        data.items()
+        if isinstance(data, dict)
+        else enumerate(data)
+        if isinstance(data, list)
+        else ()
+    )
     below = [(*path, key) for key, _ in items] if isinstance(data, dict) else []
     return below + [found for key, value in items for found in paths(value, (*path, key))]
 
@@ -48,7 +54,8 @@ def test_schema_and_reader_require_the_same_keys(family: str) -> None:
         for key in path[:-1]:
             parent = parent[key]
         del parent[path[-1]]
-        # coefficients may be in "rotor" or in each of the rotors, which the schema does not know; likewise all of "propeller"
+        # coefficients may be in "rotor" or in each of the rotors, which the schema does not know;
+        # likewise all of "propeller"
         if path[-1] not in ("thrust_coefficient", "torque_coefficient") and path not in (
             ("propeller",),
             ("propeller", "max_speed"),

@@ -16,7 +16,9 @@ STEP = 0.01  # s
 class SensorHarness:
     """Bound component in step mode, with access to variables by name."""
 
-    def __init__(self, component: SignalComponent, start: float = 0.0, step: float = STEP, **inputs: Any):
+    def __init__(
+        self, component: SignalComponent, start: float = 0.0, step: float = STEP, **inputs: Any
+    ):
         self.component, self.start, self.step_size, self.steps = component, start, step, 0
         self._inputs, self._outputs = _ports(component, "input"), _ports(component, "output")
         component.bind(self._inputs, self._outputs)
@@ -27,10 +29,16 @@ class SensorHarness:
         component.exit_initialization_mode()
 
     def set_inputs(self, **values: Any) -> SensorHarness:
-        """Set inputs ("vehicle__position=(x, y, z)" for vehicle.position.x|y|z); outputs follow in initialization mode."""
+        """Set inputs ("vehicle__position=(x, y, z)" for vehicle.position.x|y|z); outputs follow in
+        initialization mode.
+        """
         for name, value in values.items():
             prefix = name.replace("__", ".")
-            names = [v.name for v in self._inputs.variables if v.name == prefix or v.name.startswith(prefix + ".")]
+            names = [
+                v.name
+                for v in self._inputs.variables
+                if v.name == prefix or v.name.startswith(prefix + ".")
+            ]
             assert names, prefix
             for each, number in zip(names, np.ravel(value).tolist(), strict=True):
                 self[each] = number
@@ -74,7 +82,10 @@ class SensorHarness:
 
 def _ports(component: SignalComponent, causality: str) -> Ports:
     variables = [v for v in component.variables if v.causality == causality]
-    sizes = {dtype: sum(len(v.scalar_names) for v in variables if v.dtype == dtype) for dtype in {v.dtype for v in variables}}
+    sizes = {
+        dtype: sum(len(v.scalar_names) for v in variables if v.dtype == dtype)
+        for dtype in {v.dtype for v in variables}
+    }
     return Ports(variables, {dtype: np.zeros(size, dtype) for dtype, size in sizes.items()})
 
 

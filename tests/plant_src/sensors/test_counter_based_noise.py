@@ -6,7 +6,11 @@ import sys
 import numpy as np
 from scipy import stats
 
-from plant_src.sensors.counter_based_noise import CounterBasedNoise, gauss_markov_factors, normal_to_uniform
+from plant_src.sensors.counter_based_noise import (
+    CounterBasedNoise,
+    gauss_markov_factors,
+    normal_to_uniform,
+)
 
 
 def rows(noise, count):
@@ -57,7 +61,11 @@ def test_numbers_are_equal_in_other_processes_and_with_other_hash_seeds():
     code = f"{import_line}; print(CounterBasedNoise(2, 'imu', 'uav.imu', 3)[777])"
     found = {
         subprocess.run(
-            [sys.executable, "-c", code], env={"PYTHONHASHSEED": seed}, capture_output=True, check=True, text=True
+            [sys.executable, "-c", code],
+            env={"PYTHONHASHSEED": seed},
+            capture_output=True,
+            check=True,
+            text=True,
         ).stdout
         for seed in ("0", "1")
     }

@@ -7,7 +7,13 @@ from sensor_harness import SensorHarness, with_parameters
 from cosim.core.errors import InputError
 from plant_src.sensors.gnss import Gnss
 
-NOISES = ("horizontal_noise", "vertical_noise", "horizontal_drift", "vertical_drift", "velocity_noise")
+NOISES = (
+    "horizontal_noise",
+    "vertical_noise",
+    "horizontal_drift",
+    "vertical_drift",
+    "velocity_noise",
+)
 EXACT = dict.fromkeys(NOISES, 0.0)
 POSITION = [f"position.{axis}" for axis in "xyz"]
 
@@ -27,7 +33,15 @@ def test_samples_have_the_rate_and_the_latency(measured):
     now, position, time = moving(trial, 200).T
     newest = np.floor((now - 0.13) / 0.2 + 1e-9) * 0.2
     error = position - np.maximum(newest, 0)
-    measured("Sensors", "GNSS at 5 Hz, 0.13 s late: age of a fix", error, 0.0, "s", "floor of the time", within=1e-12)
+    measured(
+        "Sensors",
+        "GNSS at 5 Hz, 0.13 s late: age of a fix",
+        error,
+        0.0,
+        "s",
+        "floor of the time",
+        within=1e-12,
+    )
     assert np.allclose(time, position, atol=1e-12)
 
 
@@ -49,7 +63,15 @@ def test_white_noise_has_its_standard_deviations(measured):
     names = [*POSITION, *(f"velocity.{axis}" for axis in "xyz")]
     spread = SensorHarness(gnss).record(4000, names).std(axis=0)
     expected = [0.5, 0.5, 2.0, 0.1, 0.1, 0.1]
-    measured("Sensors", "GNSS noise, standard deviations", spread, expected, "m, m/s", "as set", relative=0.06)
+    measured(
+        "Sensors",
+        "GNSS noise, standard deviations",
+        spread,
+        expected,
+        "m, m/s",
+        "as set",
+        relative=0.06,
+    )
 
 
 def test_the_drift_is_correlated_as_a_gauss_markov_process(measured):
@@ -60,12 +82,24 @@ def test_the_drift_is_correlated_as_a_gauss_markov_process(measured):
     for lag in (5, 20):
         correlation = np.mean(drift[lag:] * drift[:-lag]) / drift.var()
         expected, case = np.exp(-lag * 0.1 / 2.0), f"{lag * 0.1:g} s"
-        measured("Sensors", "GNSS drift, correlation", correlation, expected, "1", "exp(-t/T)", within=0.05, case=case)
+        measured(
+            "Sensors",
+            "GNSS drift, correlation",
+            correlation,
+            expected,
+            "1",
+            "exp(-t/T)",
+            within=0.05,
+            case=case,
+        )
 
 
 def test_the_first_fix_has_the_stationary_drift():
     parameters = {**EXACT, "horizontal_drift": 3.0}
-    first = [SensorHarness(with_parameters(Gnss("gnss", seed=seed), **parameters))["position.x"] for seed in range(300)]
+    first = [
+        SensorHarness(with_parameters(Gnss("gnss", seed=seed), **parameters))["position.x"]
+        for seed in range(300)
+    ]
     assert np.std(first) == pytest.approx(3.0, rel=0.13)
 
 
@@ -82,10 +116,13 @@ def test_the_last_fix_stays_and_is_invalid_without_satellites():
 
 def test_sampling_noise_does_not_depend_on_the_step_size():
     coarse, fine = (
-        SensorHarness(with_parameters(Gnss("gnss", seed=4), rate=10.0, latency=0.0), step=step) for step in (0.1, 0.01)
+        SensorHarness(with_parameters(Gnss("gnss", seed=4), rate=10.0, latency=0.0), step=step)
+        for step in (0.1, 0.01)
     )
     for _ in range(20):
-        assert np.allclose(coarse.step().vector("position"), fine.step(10).vector("position"), atol=1e-9)
+        assert np.allclose(
+            coarse.step().vector("position"), fine.step(10).vector("position"), atol=1e-9
+        )
 
 
 def test_an_unknown_receiver_is_refused():

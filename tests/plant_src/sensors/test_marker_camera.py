@@ -17,9 +17,13 @@ def wxyz(turn):
 
 
 def look(vehicle, attitude, deck, deck_attitude, **parameters):
-    camera = with_parameters(MarkerCamera("marker", seed=parameters.pop("seed", 0)), **{**EXACT, **parameters})
+    camera = with_parameters(
+        MarkerCamera("marker", seed=parameters.pop("seed", 0)), **{**EXACT, **parameters}
+    )
     inputs = {"vehicle__position": vehicle, "vehicle__orientation": wxyz(attitude)}
-    return SensorHarness(camera, **inputs, deck__position=deck, deck__orientation=wxyz(deck_attitude))
+    return SensorHarness(
+        camera, **inputs, deck__position=deck, deck__orientation=wxyz(deck_attitude)
+    )
 
 
 def projected(points, vehicle, attitude, tilt, mounting):
@@ -41,24 +45,56 @@ def test_a_marker_is_valid_if_all_corners_are_in_the_picture(measured):
         deck_attitude = Rotation.from_euler("ZYX", random.normal(0, [1, 0.1, 0.1]))
         vehicle, deck = np.array([0, 0, random.uniform(1, 6)]), random.normal(0, [0.8, 0.8, 0.1])
         tilt, mounting = random.uniform(-0.3, 0.6), random.normal(0, 0.05, 3)
-        trial = look(vehicle, attitude, deck, deck_attitude, tilt=tilt, mounting=mounting, incidence=np.pi / 2)
-        place, depth = projected(deck + deck_attitude.apply(square), vehicle, attitude, tilt, mounting)
+        trial = look(
+            vehicle,
+            attitude,
+            deck,
+            deck_attitude,
+            tilt=tilt,
+            mounting=mounting,
+            incidence=np.pi / 2,
+        )
+        place, depth = projected(
+            deck + deck_attitude.apply(square), vehicle, attitude, tilt, mounting
+        )
         inside = (np.abs(place) <= (WIDTH / 2, HEIGHT / 2)).all() and (depth > 0).all()
         seen.append(trial["valid"])
         wrong += trial["valid"] != inside
     assert 50 < sum(seen) < 250
-    measured("Sensors", "marker camera: wrong decisions what is in view, of 300", wrong, 0, "1", "pinhole projection in NumPy")
+    measured(
+        "Sensors",
+        "marker camera: wrong decisions what is in view, of 300",
+        wrong,
+        0,
+        "1",
+        "pinhole projection in NumPy",
+    )
 
 
 def test_pose_is_exact_without_errors(measured):
     vehicle, deck = np.array([1.0, 2.0, 2.5]), np.array([1.2, 1.9, 0.3])
-    attitude, deck_attitude = Rotation.from_euler("ZYX", [2.0, 0.1, -0.1]), Rotation.from_euler("ZYX", [2.4, -0.05, 0.08])
+    attitude, deck_attitude = (
+        Rotation.from_euler("ZYX", [2.0, 0.1, -0.1]),
+        Rotation.from_euler("ZYX", [2.4, -0.05, 0.08]),
+    )
     trial = look(vehicle, attitude, deck, deck_attitude, tilt=0.1, mounting=[0.02, 0.01, -0.03])
     assert trial["valid"] is True
     error = vehicle + attitude.apply(trial.vector("position")) - deck
-    measured("Sensors", "marker camera without errors: place of the deck", error, 0.0, "m", "rigid transforms", within=1e-12)
+    measured(
+        "Sensors",
+        "marker camera without errors: place of the deck",
+        error,
+        0.0,
+        "m",
+        "rigid transforms",
+        within=1e-12,
+    )
     found = [trial[f"attitude.{angle}"] for angle in ("yaw", "pitch", "roll")]
-    assert np.allclose((attitude * Rotation.from_euler("ZYX", found)).as_matrix(), deck_attitude.as_matrix(), atol=1e-12)
+    assert np.allclose(
+        (attitude * Rotation.from_euler("ZYX", found)).as_matrix(),
+        deck_attitude.as_matrix(),
+        atol=1e-12,
+    )
 
 
 LEVEL = Rotation.identity()
@@ -85,7 +121,9 @@ def test_noise_grows_with_the_depth_across_and_with_its_square_along_the_view():
     for depth in (1.0, 3.0):
         trial = look([0, 0, depth], LEVEL, [0, 0, 0], LEVEL, pixel_noise=0.5, seed=2)
         across, turn = 0.5 * depth / FOCAL, 0.5 * depth / FOCAL / SIZE
-        assert trial.record(4000, names).std(axis=0) == pytest.approx([across, across, turn * depth, turn, 3 * turn], rel=0.06)
+        assert trial.record(4000, names).std(axis=0) == pytest.approx(
+            [across, across, turn * depth, turn, 3 * turn], rel=0.06
+        )
 
 
 def test_drop_outs_have_their_rate():
@@ -96,4 +134,8 @@ def test_drop_outs_have_their_rate():
 def test_the_last_pose_stays_when_the_marker_is_lost():
     trial = look([0, 0, 2.0], LEVEL, [0.1, 0, 0], LEVEL, latency=0.05)
     trial.step(20).set_inputs(deck__position=(30.0, 0, 0)).step(20)
-    assert (trial["valid"], trial["position.x"], trial["time"]) == (False, pytest.approx(0.1), pytest.approx(0.2))
+    assert (trial["valid"], trial["position.x"], trial["time"]) == (
+        False,
+        pytest.approx(0.1),
+        pytest.approx(0.2),
+    )

@@ -18,7 +18,9 @@ STEP, UP = 0.01, np.array([0, 0, 9.81])
 
 @cache
 def swing(t):
-    """Position, velocity, acceleration (world) and attitude of a flight that starts at rest and level after one second."""
+    """Position, velocity, acceleration (world) and attitude of a flight that starts at rest and
+    level after one second.
+    """
     s, ds, dds = (np.maximum(t - 1, 0) ** n * f for n, f in ((3, 1.0), (2, 3.0), (1, 6.0)))
     ramp, rate = s / (1 + s), ds / (1 + s) ** 2
     bend = dds / (1 + s) ** 2 - 2 * ds**2 / (1 + s) ** 3
@@ -26,13 +28,22 @@ def swing(t):
     shape = np.array([np.sin(phase), np.cos(phase) - 1, 0.3 * np.sin(2 * phase)])
     slope = w * np.array([np.cos(phase), -np.sin(phase), 0.6 * np.cos(2 * phase)])
     curve = w**2 * np.array([-np.sin(phase), -np.cos(phase), -1.2 * np.sin(2 * phase)])
-    attitude = Rotation.from_euler("ZYX", ramp * np.array([0.5 * t, 0.1 * np.sin(phase), 0.15 * np.cos(phase)]))
-    return ramp * shape, rate * shape + ramp * slope, bend * shape + 2 * rate * slope + ramp * curve, attitude
+    attitude = Rotation.from_euler(
+        "ZYX", ramp * np.array([0.5 * t, 0.1 * np.sin(phase), 0.15 * np.cos(phase)])
+    )
+    return (
+        ramp * shape,
+        rate * shape + ramp * slope,
+        bend * shape + 2 * rate * slope + ramp * curve,
+        attitude,
+    )
 
 
 @cache
 def sensor_values(n):
-    """Specific force, rates and field in body axes of exact sensors in the step that ends at n STEP."""
+    """Specific force, rates and field in body axes of exact sensors in the step that ends at n
+    STEP.
+    """
     (_, v0, _, r0), (_, v1, _, r1) = (swing(max(k, 0) / 100) for k in (n - 1, n))
     turn = (r0.inv() * r1).as_rotvec()
     middle = r0 * Rotation.from_rotvec(turn / 2)
@@ -84,9 +95,33 @@ class Flight:
 
 def test_exact_sensors_give_the_motion(measured):
     position, velocity, attitude = Flight().fly(8)
-    measured("Sensors", "navigation, exact sensors: place", position, 0.0, "m", "motion in closed form", within=2e-3)
-    measured("Sensors", "navigation, exact sensors: velocity", velocity, 0.0, "m/s", "motion in closed form", within=3e-3)
-    measured("Sensors", "navigation, exact sensors: attitude", attitude, 0.0, "rad", "motion in closed form", within=2e-3)
+    measured(
+        "Sensors",
+        "navigation, exact sensors: place",
+        position,
+        0.0,
+        "m",
+        "motion in closed form",
+        within=2e-3,
+    )
+    measured(
+        "Sensors",
+        "navigation, exact sensors: velocity",
+        velocity,
+        0.0,
+        "m/s",
+        "motion in closed form",
+        within=3e-3,
+    )
+    measured(
+        "Sensors",
+        "navigation, exact sensors: attitude",
+        attitude,
+        0.0,
+        "rad",
+        "motion in closed form",
+        within=2e-3,
+    )
 
 
 def test_the_latency_of_a_fix_does_not_matter():
@@ -115,7 +150,9 @@ def test_fixes_correct_an_attitude_error():
 def test_names_and_frames_are_those_of_the_plant():
     trial = Flight().trial
     trial.step(50)
-    velocity = Rotation.from_quat([trial[f"orientation.{part}"] for part in "xyzw"]).apply(trial.vector("velocity_body", "uvw"))
+    velocity = Rotation.from_quat([trial[f"orientation.{part}"] for part in "xyzw"]).apply(
+        trial.vector("velocity_body", "uvw")
+    )
     assert np.allclose(velocity, trial.vector("velocity"), atol=1e-12)
 
 
@@ -130,13 +167,22 @@ def test_history_returns_the_values_of_a_time():
 
 
 def drive(tracker, seconds, speed=1.0, latency=0.1, marker=None):
-    """Track a deck that moves east; fixes every 0.1 s, marker measurements (offset from the true position) in every step."""
+    """Track a deck that moves east; fixes every 0.1 s, marker measurements (offset from the true
+    position) in every step.
+    """
     for n in range(1, round(seconds / STEP) + 1):
         taken = max(0, (n - round(latency / STEP)) // 10 * 10)
-        inputs = {"gnss__position": (speed * taken * STEP, 2.0, 0.3), "gnss__velocity": (speed, 0, 0), "gnss__time": taken * STEP}
+        inputs = {
+            "gnss__position": (speed * taken * STEP, 2.0, 0.3),
+            "gnss__velocity": (speed, 0, 0),
+            "gnss__time": taken * STEP,
+        }
         if marker is not None:
             sight = max(0, n - 5)
-            inputs |= {"marker__position": np.add((speed * sight * STEP, 2.0, 0.3), marker), "marker__time": sight * STEP}
+            inputs |= {
+                "marker__position": np.add((speed * sight * STEP, 2.0, 0.3), marker),
+                "marker__time": sight * STEP,
+            }
         tracker.set_inputs(**inputs)
         tracker.step()
     return tracker
@@ -149,5 +195,9 @@ def test_the_deck_is_followed_without_lag():
 
 
 def test_marker_measurements_outweigh_fixes():
-    tracker = drive(SensorHarness(with_parameters(DeckTracker("deck"), sight_gain=0.2, fix_gain=0.2)), 10.0, marker=(0.05, 0, 0))
+    tracker = drive(
+        SensorHarness(with_parameters(DeckTracker("deck"), sight_gain=0.2, fix_gain=0.2)),
+        10.0,
+        marker=(0.05, 0, 0),
+    )
     assert tracker["position.x"] == pytest.approx(10.05, abs=0.01)

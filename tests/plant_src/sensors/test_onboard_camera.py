@@ -18,8 +18,16 @@ def camera(tmp_path):
     made = []
 
     def make(attitude=None, position=(0, 0, 5.0), parameters=None, **arguments):
-        arguments = {"vehicles": {"uav": "ar_drone"}, "carrier": "uav", "size": [WIDTH, HEIGHT]} | arguments
-        made.append(with_parameters(Camera("eye", folder=str(tmp_path / "frames"), **arguments), **parameters or {}))
+        arguments = {
+            "vehicles": {"uav": "ar_drone"},
+            "carrier": "uav",
+            "size": [WIDTH, HEIGHT],
+        } | arguments
+        made.append(
+            with_parameters(
+                Camera("eye", folder=str(tmp_path / "frames"), **arguments), **parameters or {}
+            )
+        )
         x, y, z, w = (attitude or Rotation.identity()).as_quat()
         return SensorHarness(made[-1], uav__position=position, uav__orientation=(w, x, y, z))
 
@@ -43,7 +51,11 @@ def changed(trial, empty):
 def test_a_deck_is_where_a_pinhole_camera_sees_it(camera, tilt):
     attitude, position = Rotation.from_euler("ZYX", [0.7, 0.1, -0.15]), np.array([0.0, 0.0, 5.0])
     deck = box((0.6, -0.4, 0.49), (1.4, 0.9, 0.5))
-    pose = {"attitude": attitude, "position": position, "parameters": {"tilt": tilt, "mounting": [0.1, 0, -0.05]}}
+    pose = {
+        "attitude": attitude,
+        "position": position,
+        "parameters": {"tilt": tilt, "mounting": [0.1, 0, -0.05]},
+    }
     found = changed(camera(platforms={"deck": deck}, **pose), camera(**pose))
     ahead, right = np.array([np.sin(tilt), 0, -np.cos(tilt)]), np.array([0, -1.0, 0])
     axes = np.stack([right, np.cross(ahead, right), ahead])
@@ -80,11 +92,19 @@ def test_files_are_written_at_the_rate(camera, tmp_path):
 
 
 def test_the_same_pose_gives_the_same_picture(camera):
-    pictures = [camera(vehicles={"uav": "ar_drone", "usv": "strider"}).component.render().tobytes() for _ in range(2)]
+    pictures = [
+        camera(vehicles={"uav": "ar_drone", "usv": "strider"}).component.render().tobytes()
+        for _ in range(2)
+    ]
     assert pictures[0] == pictures[1]
 
 
 def test_all_invalid_arguments_are_reported_together():
     with pytest.raises(InputError) as caught:
         Camera("eye", {"uav": "ar_dron"}, "usv", "frames", {"start": {"size": [1, 2, 3]}}, [0, 10])
-    assert {problem.subject[1] for problem in caught.value.problems} == {"vehicles", "carrier", "platforms", "size"}
+    assert {problem.subject[1] for problem in caught.value.problems} == {
+        "vehicles",
+        "carrier",
+        "platforms",
+        "size",
+    }

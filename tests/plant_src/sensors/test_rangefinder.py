@@ -20,7 +20,9 @@ def sensor():
 
     def make(parameters=None, inputs=None, **arguments):
         exact = {"noise_floor": 0.0, "noise_share": 0.0, "rate": 100.0}
-        made.append(with_parameters(Rangefinder("range", **arguments), **exact | (parameters or {})))
+        made.append(
+            with_parameters(Rangefinder("range", **arguments), **exact | (parameters or {}))
+        )
         return SensorHarness(made[-1], **inputs or {})
 
     yield make
@@ -29,23 +31,45 @@ def sensor():
 
 
 def test_water_below_a_tilted_vehicle(sensor, measured):
-    trial = sensor(inputs={"vehicle__position": (3, 4, 2.0), "vehicle__orientation": quaternion((1, 1, 0), 0.4)})
+    trial = sensor(
+        inputs={
+            "vehicle__position": (3, 4, 2.0),
+            "vehicle__orientation": quaternion((1, 1, 0), 0.4),
+        }
+    )
     distance = trial["distance"]
-    measured("Sensors", "rangefinder, tilted above water", distance, 2.0 / np.cos(0.4), "m", "plane geometry", relative=1e-12)
+    measured(
+        "Sensors",
+        "rangefinder, tilted above water",
+        distance,
+        2.0 / np.cos(0.4),
+        "m",
+        "plane geometry",
+        relative=1e-12,
+    )
 
 
 def test_a_platform_in_between(sensor):
     trial = sensor(platforms=TABLE)
-    assert trial.set_inputs(vehicle__position=(11.9, 1.9, 2.0)).step()["distance"] == pytest.approx(1.5, abs=1e-6)
-    assert trial.set_inputs(vehicle__position=(12.1, 1.9, 2.0)).step()["distance"] == pytest.approx(2.0, abs=1e-6)
+    assert trial.set_inputs(vehicle__position=(11.9, 1.9, 2.0)).step()["distance"] == pytest.approx(
+        1.5, abs=1e-6
+    )
+    assert trial.set_inputs(vehicle__position=(12.1, 1.9, 2.0)).step()["distance"] == pytest.approx(
+        2.0, abs=1e-6
+    )
 
 
 def test_the_mounting_turns_with_the_vehicle(sensor):
     parameters = {"mounting": [0.5, 0.0, -0.1], "direction": [2.0, 0.0, -2.0]}
-    trial = sensor(parameters, {"vehicle__position": (0, 0, 3.0), "vehicle__orientation": quaternion((0, 1, 0), 0.3)})
+    trial = sensor(
+        parameters,
+        {"vehicle__position": (0, 0, 3.0), "vehicle__orientation": quaternion((0, 1, 0), 0.3)},
+    )
     turn = Rotation.from_rotvec([0, 0.3, 0])
     height = 3.0 + turn.apply([0.5, 0, -0.1])[2]
-    assert trial["distance"] == pytest.approx(-height / (turn.apply([1, 0, -1]) / np.sqrt(2))[2], rel=1e-12)
+    assert trial["distance"] == pytest.approx(
+        -height / (turn.apply([1, 0, -1]) / np.sqrt(2))[2], rel=1e-12
+    )
 
 
 def test_the_deck_of_a_heeling_vessel_where_it_is(sensor, measured):
@@ -60,11 +84,22 @@ def test_the_deck_of_a_heeling_vessel_where_it_is(sensor, measured):
     normal = turn.apply([0, 0, 1])
     height = point[2] - (normal[0] * (5.1 - point[0]) + normal[1] * (-3.05 - point[1])) / normal[2]
     distance = trial["distance"]
-    measured("Sensors", "rangefinder above a heeling deck", distance, 2.0 - height, "m", "plane geometry", within=1e-6)
+    measured(
+        "Sensors",
+        "rangefinder above a heeling deck",
+        distance,
+        2.0 - height,
+        "m",
+        "plane geometry",
+        within=1e-6,
+    )
 
 
 def test_the_deck_moves_on_and_leaves_the_water(sensor):
-    trial = sensor(vessels={"usv": "strider"}, inputs={"vehicle__position": (0, 0, 2.0), "usv__deck__position": (0, 0, 0.27)})
+    trial = sensor(
+        vessels={"usv": "strider"},
+        inputs={"vehicle__position": (0, 0, 2.0), "usv__deck__position": (0, 0, 0.27)},
+    )
     assert trial["distance"] == pytest.approx(2.0 - 0.27, abs=1e-6)
     trial.set_inputs(usv__deck__position=((DECK_X[0] - DECK_X[1]) / 2 - 0.01, 0, 0.27)).step()
     assert trial["distance"] == pytest.approx(2.0, abs=1e-6)
@@ -90,17 +125,33 @@ def test_noise_grows_with_distance(sensor):
 
 def test_a_vehicle_that_is_not_a_vessel_is_rejected_with_the_other_problems():
     with pytest.raises(InputError) as caught:
-        Rangefinder("range", vessels={"uav": "ar_drone"}, platforms={"start": {"size": [1, 2], "position": [0, 0, 0]}})
-    assert [problem.subject[1:3] for problem in caught.value.problems] == [("vessels", "uav"), ("platforms", "start")]
+        Rangefinder(
+            "range",
+            vessels={"uav": "ar_drone"},
+            platforms={"start": {"size": [1, 2], "position": [0, 0, 0]}},
+        )
+    assert [problem.subject[1:3] for problem in caught.value.problems] == [
+        ("vessels", "uav"),
+        ("platforms", "start"),
+    ]
 
 
-@pytest.mark.parametrize(("vehicle", "motion"), [("strider", "planar"), ("strider", "6dof"), ("otter", "6dof")])
+@pytest.mark.parametrize(
+    ("vehicle", "motion"), [("strider", "planar"), ("strider", "6dof"), ("otter", "6dof")]
+)
 def test_distance_to_the_deck_agrees_with_the_world(sensor, vehicle, motion):
-    world = World("plant", {"usv": {"model": vehicle, "motion": motion, "position": [3.0, -2.0], "yaw": 0.6}})
+    world = World(
+        "plant", {"usv": {"model": vehicle, "motion": motion, "position": [3.0, -2.0], "yaw": 0.6}}
+    )
     try:
-        pose = {f"usv.{name}": [world.get(f"usv.{name}.{axis}") for axis in axes] for name, axes in POSE.items()}
+        pose = {
+            f"usv.{name}": [world.get(f"usv.{name}.{axis}") for axis in axes]
+            for name, axes in POSE.items()
+        }
         deck = np.array([world.get(f"usv.deck.position.{axis}") for axis in "xyz"])
     finally:
         world.free()
-    trial = sensor(vessels={"usv": vehicle}, inputs=pose | {"vehicle__position": deck + np.array([0, 0, 1.5])})
+    trial = sensor(
+        vessels={"usv": vehicle}, inputs=pose | {"vehicle__position": deck + np.array([0, 0, 1.5])}
+    )
     assert trial["distance"] == pytest.approx(1.5, abs=1e-6)

@@ -25,23 +25,34 @@ def test_vector_rotations_equal_scipy_and_are_inverse(q):
 def test_euler_angles_equal_scipy_and_are_inverse(q):
     roll, pitch, yaw = rotations.euler_angles(q)
     assert np.allclose((yaw, pitch, roll), scipys(q).as_euler("ZYX"), atol=1e-12)
-    assert abs(np.dot(rotations.quaternion_from_euler(roll, pitch, yaw), q)) == pytest.approx(1, abs=1e-14)
+    assert abs(np.dot(rotations.quaternion_from_euler(roll, pitch, yaw), q)) == pytest.approx(
+        1, abs=1e-14
+    )
 
 
 def test_products_and_rotation_vectors_equal_scipy():
     for a, b in zip(QUATERNIONS[::2], QUATERNIONS[1::2], strict=True):
         assert np.allclose(
-            scipys(rotations.quaternion_product(a, b)).as_matrix(), (scipys(a) * scipys(b)).as_matrix(), atol=1e-14
+            scipys(rotations.quaternion_product(a, b)).as_matrix(),
+            (scipys(a) * scipys(b)).as_matrix(),
+            atol=1e-14,
         )
         v = RANDOM.normal(size=3)
         assert np.allclose(
-            scipys(rotations.quaternion_from_rotation_vector(v)).as_matrix(), Rotation.from_rotvec(v).as_matrix(), atol=1e-14
+            scipys(rotations.quaternion_from_rotation_vector(v)).as_matrix(),
+            Rotation.from_rotvec(v).as_matrix(),
+            atol=1e-14,
         )
 
 
 def test_midpoint_is_half_of_the_shorter_rotation():
-    a, b = rotations.quaternion_from_rotation_vector((0.0, 0.0, 0.2)), rotations.quaternion_from_rotation_vector((0.0, 0.0, 0.8))
+    a, b = (
+        rotations.quaternion_from_rotation_vector((0.0, 0.0, 0.2)),
+        rotations.quaternion_from_rotation_vector((0.0, 0.0, 0.8)),
+    )
     for other in (b, [-x for x in b]):
         assert np.allclose(
-            rotations.midpoint_attitude(a, other), rotations.quaternion_from_rotation_vector((0.0, 0.0, 0.5)), atol=1e-15
+            rotations.midpoint_attitude(a, other),
+            rotations.quaternion_from_rotation_vector((0.0, 0.0, 0.5)),
+            atol=1e-15,
         )

@@ -1,4 +1,6 @@
-"""Contract of all sensors and of the fault block: determinism, restored states and the interface of a component."""
+"""Contract of all sensors and of the fault block: determinism, restored states and the interface of
+a component.
+"""
 
 import ctypes
 import math
@@ -20,7 +22,9 @@ from plant_src.sensors.rangefinder import Rangefinder
 
 
 def faulty(name, seed=0):
-    return with_parameters(SignalFault(name, {"a[3]": "m", "b": ""}, seed=seed), noise__b=1.0, delay=0.07)
+    return with_parameters(
+        SignalFault(name, {"a[3]": "m", "b": ""}, seed=seed), noise__b=1.0, delay=0.07
+    )
 
 
 MAKERS = {

@@ -25,7 +25,9 @@ ROUNDS, STEPS = 7, 2000
 
 
 def rotors(**parameters):
-    return with_parameters(SignalFault("fault", {"rotor_speed[4]": "rad/s"}, gain_of="square"), **parameters)
+    return with_parameters(
+        SignalFault("fault", {"rotor_speed[4]": "rad/s"}, gain_of="square"), **parameters
+    )
 
 
 CONTENDERS = {

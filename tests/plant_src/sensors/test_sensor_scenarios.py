@@ -20,7 +20,14 @@ def test_a_fault_without_events_changes_no_bit_of_the_flight(measured):
     for axis in "xyz":
         name = f"plant.uav.position.{axis}"
         error = faulty[name] - plain[name]
-        measured("Sensors", "flight through a fault that is not on", error, 0.0, "m", "the flight without it")
+        measured(
+            "Sensors",
+            "flight through a fault that is not on",
+            error,
+            0.0,
+            "m",
+            "the flight without it",
+        )
 
 
 def test_the_commands_of_a_weak_rotor_are_cut_by_the_root_of_its_efficiency():
@@ -34,12 +41,18 @@ def test_the_commands_of_a_weak_rotor_are_cut_by_the_root_of_its_efficiency():
 
 def test_a_rotor_with_four_tenths_of_its_thrust_is_a_crash():
     gains = [1.0, 0.4, 1.0, 1.0]
-    result = cosim.run("fault_rotor_efficiency", {"/events/0/set/rotor_fault.gain.rotor_speed": gains}, stop_time=12)
+    result = cosim.run(
+        "fault_rotor_efficiency",
+        {"/events/0/set/rotor_fault.gain.rotor_speed": gains},
+        stop_time=12,
+    )
     assert np.abs(result["plant.uav.attitude.roll"]).max() > 1.5
 
 
 def test_another_seed_is_another_flight_and_the_same_seed_the_same():
-    runs = [cosim.run("landing_on_sensors", {"measured.seed": seed}, stop_time=2) for seed in (5, 5, 6)]
+    runs = [
+        cosim.run("landing_on_sensors", {"measured.seed": seed}, stop_time=2) for seed in (5, 5, 6)
+    ]
     first, same, other = (np.stack([result[name] for name in result]).tobytes() for result in runs)
     assert first == same != other
 
@@ -50,7 +63,11 @@ class Rising(Component):
     binds_everything = has_state = False
 
     def __init__(self):
-        self.variables = [v for v in Gnss("x").variables if v.causality == "output" and v.name.startswith(("pos", "vel"))]
+        self.variables = [
+            v
+            for v in Gnss("x").variables
+            if v.causality == "output" and v.name.startswith(("pos", "vel"))
+        ]
         self._z = 0.0
 
     def bind(self, _inputs, outputs):
@@ -80,7 +97,11 @@ def simulated(components, wires, record, stop, events=()):
     connections = [Connection(end(source), end(target)) for source, target in wires.items()]
     built = System(components, connections, tuple((name,) for name in components))
     settings = Settings(
-        exact_fraction("0"), exact_fraction(stop), exact_fraction("0.01"), {name: end(name) for name in record}, events=events
+        exact_fraction("0"),
+        exact_fraction(stop),
+        exact_fraction("0.01"),
+        {name: end(name) for name in record},
+        events=events,
     )
     outcome = simulate(built, settings)
     assert outcome.failure is None
@@ -110,15 +131,30 @@ def test_a_sensor_in_a_later_stage_measures_the_same_time():
 
 
 def test_initial_outputs_reach_navigation_through_the_sensors():
-    components = {"plant": Rising(), "gnss": Gnss("gnss", seed=3), "navigation": Navigation("navigation")}
-    wires = {"plant.position.z": "gnss.vehicle.position.z", "gnss.position.z": "navigation.gnss.position.z"}
+    components = {
+        "plant": Rising(),
+        "gnss": Gnss("gnss", seed=3),
+        "navigation": Navigation("navigation"),
+    }
+    wires = {
+        "plant.position.z": "gnss.vehicle.position.z",
+        "gnss.position.z": "navigation.gnss.position.z",
+    }
     recording = simulated(components, wires, ["gnss.position.z", "navigation.position.z"], "0.01")
-    first, passed = (recording.columns[name][0] for name in ("gnss.position.z", "navigation.position.z"))
+    first, passed = (
+        recording.columns[name][0] for name in ("gnss.position.z", "navigation.position.z")
+    )
     assert passed == first != 0
 
 
 def test_landing_on_sensors_succeeds_on_a_deck_in_waves():
-    waves = {"spectrum": "jonswap", "significant_height": 0.05, "peak_period": 2.0, "direction": 0.6, "spreading": 2}
+    waves = {
+        "spectrum": "jonswap",
+        "significant_height": 0.05,
+        "peak_period": 2.0,
+        "direction": 0.6,
+        "spreading": 2,
+    }
     sea = {"vehicles/usv/motion": "6dof", "environment": {"seed": 1, "waves": waves}}
     settings = {f"/components/plant/arguments/{key}": value for key, value in sea.items()}
     result = cosim.run("landing_on_sensors", settings, stop_time=20)

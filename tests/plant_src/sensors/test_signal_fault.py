@@ -55,7 +55,11 @@ def test_stuck_outputs_its_value_and_follows_a_change():
 
 
 def test_gain_and_bias():
-    assert FaultHarness().on(3, gain__rudder_angle=0.5, bias__rudder_angle=10.0) == [10.5, 11.0, 11.5]
+    assert FaultHarness().on(3, gain__rudder_angle=0.5, bias__rudder_angle=10.0) == [
+        10.5,
+        11.0,
+        11.5,
+    ]
 
 
 def test_a_gain_of_the_square_scales_the_signal_by_its_root():
@@ -87,7 +91,11 @@ def test_added_noise_has_its_standard_deviation_and_no_mean():
 
 def test_only_the_affected_elements_fail():
     trial = SensorHarness(SignalFault("fault", {"rotor_speed[4]": "rad/s", "extra": ""}))
-    for name, value in (("affected.rotor_speed", [False, True, False, False]), ("affected.extra", False), ("mode", "stuck")):
+    for name, value in (
+        ("affected.rotor_speed", [False, True, False, False]),
+        ("affected.extra", False),
+        ("mode", "stuck"),
+    ):
         trial.component.set(name, value)
     trial["input.rotor_speed"], trial["input.extra"] = [1.0, 2.0, 3.0, 4.0], 5.0
     trial.step()
@@ -113,4 +121,8 @@ def test_an_unknown_mode_is_refused_with_the_nearest_one():
 def test_all_invalid_arguments_are_reported_together():
     with pytest.raises(InputError) as caught:
         SignalFault("fault", {"rotor speed": "", "x": "parsec"}, gain_of="cube")
-    assert [problem.subject[1] for problem in caught.value.problems] == ["signals", "signals", "gain_of"]
+    assert [problem.subject[1] for problem in caught.value.problems] == [
+        "signals",
+        "signals",
+        "gain_of",
+    ]

@@ -22,18 +22,27 @@ FAULTS = [
     ({"rotor_radius": float("nan")}, "rotor_radius: found nan"),
     (
         {"inertia": np.diag([1.0, 1.0, 3.0])},
-        r"inertia: found the principal moments 1 about x, 1 about y, 3 about z, expected none greater than the sum",
+        (
+            r"inertia: found the principal moments 1 about x, 1 about y, 3 about z, expected none "
+            r"greater than the sum"
+        ),
     ),
     ({"inertia": np.diag([1.0, -1.0, 1.0])}, "expected all greater than 0"),
     ({"inertia": np.array([[1, 0.5, 0], [0, 1, 0], [0, 0, 1]])}, "expected a symmetric tensor"),
     ({"inertia": np.eye(2)}, "expected 3 rows of 3 finite numbers"),
     ({"rotors": ()}, "rotors: found none"),
-    ({"rotors": (replace(NOSE, torque_sign=0.5),)}, r"rotors\[1\].torque_sign: found 0.5, expected 1 or -1"),
+    (
+        {"rotors": (replace(NOSE, torque_sign=0.5),)},
+        r"rotors\[1\].torque_sign: found 0.5, expected 1 or -1",
+    ),
     (
         {"rotors": (Rotor("nose", (0.1, 0.0, 0.0), 1.0, 1e-5, 1e-7, (0.0, 0.0, 2.0)),)},
         r"rotors\[1\].axis: .* expected a unit vector",
     ),
-    ({"effects": RotorEffects(body_drag=(0.0, -0.1, 0.0))}, "effects.body_drag: found .* expected finite numbers of at least 0"),
+    (
+        {"effects": RotorEffects(body_drag=(0.0, -0.1, 0.0))},
+        "effects.body_drag: found .* expected finite numbers of at least 0",
+    ),
 ]
 
 
@@ -45,7 +54,12 @@ def test_impossible_data_are_refused(change: dict, text: str) -> None:
 
 def test_all_faults_are_reported_together() -> None:
     with pytest.raises(InputError) as caught:
-        replace(AIRFRAME, mass=0.0, inertia=np.diag([1.0, 1.0, 3.0]), effects=RotorEffects(ground_effect=-1.0))
+        replace(
+            AIRFRAME,
+            mass=0.0,
+            inertia=np.diag([1.0, 1.0, 3.0]),
+            effects=RotorEffects(ground_effect=-1.0),
+        )
     assert len(caught.value.problems) == 3
 
 
@@ -60,7 +74,9 @@ def test_principal_axes_make_the_inertia_diagonal(seed: int) -> None:
     moments, axes = principal_axes(tensor)
     assert axes @ np.diag(moments) @ axes.T == pytest.approx(tensor, abs=1e-12)
     assert np.linalg.det(axes) == pytest.approx(1.0)
-    assert np.trace(axes) > 0  # angle less than 120 degrees, as `shapes.quaternion_from_matrix` requires
+    assert (
+        np.trace(axes) > 0
+    )  # angle less than 120 degrees, as `shapes.quaternion_from_matrix` requires
 
 
 @pytest.mark.parametrize("name", ["ar_drone", "crazyflie", "survey_hexacopter"])

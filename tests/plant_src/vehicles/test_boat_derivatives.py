@@ -1,4 +1,6 @@
-"""Derivatives of vessels that are given by data, with random matrices, propellers and rudders, against NumPy."""
+"""Derivatives of vessels that are given by data, with random matrices, propellers and rudders,
+against NumPy.
+"""
 
 from __future__ import annotations
 
@@ -20,7 +22,16 @@ casadi = pytest.importorskip("casadi")
 
 RANDOM = np.random.default_rng(8)
 STATES = 100  # of each family; half of those of floating vessels with one hull, half with two
-SEA = {"seed": 5, "waves": {"significant_height": 0.4, "peak_period": 2.5, "direction": 0.7, "spreading": 4, "components": 9}}
+SEA = {
+    "seed": 5,
+    "waves": {
+        "significant_height": 0.4,
+        "peak_period": 2.5,
+        "direction": 0.7,
+        "spreading": 4,
+        "components": 9,
+    },
+}
 
 
 def positive_definite(size: int, scale: float) -> np.ndarray:
@@ -31,9 +42,20 @@ def positive_definite(size: int, scale: float) -> np.ndarray:
 
 def propeller(number: int) -> Propeller:
     axis = RANDOM.standard_normal(3)
-    numbers = RANDOM.uniform([1e-3, 1e-3, 50, 30, 0.1, 0.03, 1e-3, 0], [5e-3, 4e-3, 90, 60, 0.3, 0.06, 5e-3, 2])
-    numbers[[4, 5, 7]] *= number % 2, number % 3 > 0, number % 4 > 0  # without lag, radius or azimuth angle
-    return Propeller(str(number), tuple(RANDOM.uniform(-1, 1, 3)), tuple(axis / np.linalg.norm(axis)), *numbers.tolist())
+    numbers = RANDOM.uniform(
+        [1e-3, 1e-3, 50, 30, 0.1, 0.03, 1e-3, 0], [5e-3, 4e-3, 90, 60, 0.3, 0.06, 5e-3, 2]
+    )
+    numbers[[4, 5, 7]] *= (
+        number % 2,
+        number % 3 > 0,
+        number % 4 > 0,
+    )  # without lag, radius or azimuth angle
+    return Propeller(
+        str(number),
+        tuple(RANDOM.uniform(-1, 1, 3)),
+        tuple(axis / np.linalg.norm(axis)),
+        *numbers.tolist(),
+    )
 
 
 def rudder(number: int) -> Rudder:
@@ -62,17 +84,36 @@ def boat(size: int) -> dict[str, Any]:
 def commands() -> reference.Commands:
     speed, azimuth = RANDOM.uniform([[-100], [-2]], [[100], [2]], (2, MAX_PROPELLERS))
     loads = RANDOM.uniform(-5, 5, 11)
-    return reference.Commands(speed, azimuth, RANDOM.uniform(-1, 1, MAX_RUDDERS), *np.split(loads, [3, 6, 9]))
+    return reference.Commands(
+        speed, azimuth, RANDOM.uniform(-1, 1, MAX_RUDDERS), *np.split(loads, [3, 6, 9])
+    )
 
 
 def inputs(given: reference.Commands) -> list[float]:
-    return [*given.force, *given.torque, *given.speed, *given.azimuth, *given.rudder, *given.wind, *given.current]
+    return [
+        *given.force,
+        *given.torque,
+        *given.speed,
+        *given.azimuth,
+        *given.rudder,
+        *given.wind,
+        *given.current,
+    ]
 
 
 def rate_function(model: Any, given: dict[str, Any]) -> Any:
-    values = np.concatenate([np.ravel(given.get(v.name, v.start)) for v in model.variables if v.causality == "parameter"])
+    values = np.concatenate(
+        [
+            np.ravel(given.get(v.name, v.start))
+            for v in model.variables
+            if v.causality == "parameter"
+        ]
+    )
     constants = casadi.DM(model.derived_parameters(casadi.SX(values)))
-    state, u = casadi.SX.sym("x", len(model.states)), casadi.SX.sym("u", len(model.elements("input")))
+    state, u = (
+        casadi.SX.sym("x", len(model.states)),
+        casadi.SX.sym("u", len(model.elements("input"))),
+    )
     return casadi.Function("rate", [state, u], [model.derivatives(state, u, casadi.SX(constants))])
 
 
@@ -80,8 +121,16 @@ def test_planar_vessel_at_random_states() -> None:
     from plant_src.vehicles.planar_vessel.planar_equations import PlanarEquations
 
     quadratic = tuple(10 * RANDOM.uniform(0, 1, (3, 3)) for _ in range(3))
-    vessel = PlanarVessel(**boat(3), yaw_inertia=7.0, height=0.1, quadratic_damping=quadratic, cubic_damping=(1.0, 2.0, 3.0))
-    rate = rate_function(PlanarEquations(vessel, (MAX_PROPELLERS, MAX_RUDDERS), "boat", "").model, {})
+    vessel = PlanarVessel(
+        **boat(3),
+        yaw_inertia=7.0,
+        height=0.1,
+        quadratic_damping=quadratic,
+        cubic_damping=(1.0, 2.0, 3.0),
+    )
+    rate = rate_function(
+        PlanarEquations(vessel, (MAX_PROPELLERS, MAX_RUDDERS), "boat", "").model, {}
+    )
     for _ in range(STATES):
         yaw, nu, speeds, given = (
             RANDOM.uniform(-3, 3),
@@ -99,10 +148,14 @@ def test_planar_vessel_at_random_states() -> None:
 
 @pytest.mark.parametrize("count", [1, 2])
 def test_floating_vessel_at_random_states(count: int) -> None:
-    """Half of the states lie in all attitudes and up to 0.4 m above or below the water, the others near the rest."""
+    """Half of the states lie in all attitudes and up to 0.4 m above or below the water, the others
+    near the rest.
+    """
     from plant_src.vehicles.surface_vessel.floating_equations import FloatingEquations
 
-    hull = HullForm(count, 1.6, 0.4 / count, 0.3, 0.4, -0.25, -0.04, 0.8, 0.05 * count, 0.1 * count, 1.2, 0.9)
+    hull = HullForm(
+        count, 1.6, 0.4 / count, 0.3, 0.4, -0.25, -0.04, 0.8, 0.05 * count, 0.1 * count, 1.2, 0.9
+    )
     inertia, quadratic = positive_definite(3, 1) + 4 * np.eye(3), RANDOM.uniform(0, 30, (6, 6))
     vessel = SurfaceVessel(**boat(6), inertia=inertia, quadratic_damping=quadratic, hull=hull)
     equations = FloatingEquations(vessel, (MAX_PROPELLERS, MAX_RUDDERS), "boat", "")
@@ -110,7 +163,10 @@ def test_floating_vessel_at_random_states(count: int) -> None:
     components = len(realisation.phase)
     given_waves: dict[str, Any] = {"wave.count": float(components)}
     for name in ("amplitude", "frequency", "direction", "phase"):
-        given_waves[f"wave.{name}"] = [*getattr(realisation, name), *[0.0] * (MAX_WAVE_COMPONENTS - components)]
+        given_waves[f"wave.{name}"] = [
+            *getattr(realisation, name),
+            *[0.0] * (MAX_WAVE_COMPONENTS - components),
+        ]
     rate = rate_function(equations.model.create_continuous_model(), given_waves)
     points, centre, emerged = (
         reference.strip_points(vessel),
@@ -119,8 +175,15 @@ def test_floating_vessel_at_random_states(count: int) -> None:
     )
     for k in range(STATES // 2):
         tilt = np.pi if k % 2 else 0.05
-        turned = Rotation.from_euler("ZYX", [RANDOM.uniform(-3, 3), *RANDOM.uniform(-tilt, tilt, 2)])
-        place = np.array([*RANDOM.uniform(-5, 5, 2), -centre[2] + RANDOM.uniform(-0.4, 0.4) * (1 if k % 2 else 0.1)])
+        turned = Rotation.from_euler(
+            "ZYX", [RANDOM.uniform(-3, 3), *RANDOM.uniform(-tilt, tilt, 2)]
+        )
+        place = np.array(
+            [
+                *RANDOM.uniform(-5, 5, 2),
+                -centre[2] + RANDOM.uniform(-0.4, 0.4) * (1 if k % 2 else 0.1),
+            ]
+        )
         nu, speeds, time, given = (
             RANDOM.uniform(-1, 1, 6),
             RANDOM.uniform(-60, 60, MAX_PROPELLERS),
@@ -131,7 +194,9 @@ def test_floating_vessel_at_random_states(count: int) -> None:
         surface = (np.column_stack([points, np.zeros(10)]) + centre) @ matrix.T + place
         water = water_at(realisation, surface[:, :2], time, points, hull.strip_beam, vessel.draught)
         found = rate([*place, w, x, y, z, *nu, time, *speeds], [*inputs(given), 1.0]).full().ravel()
-        expected = reference.floating_rate(vessel, np.concatenate([place, nu, speeds]), given, water, matrix)
+        expected = reference.floating_rate(
+            vessel, np.concatenate([place, nu, speeds]), given, water, matrix
+        )
         assert found[7:13] == pytest.approx(expected, rel=0, abs=1e-12 * np.linalg.norm(expected))
         assert found[14:] == pytest.approx(reference.speed_rates(vessel, speeds, given), rel=1e-12)
         emerged += reference.buoyancy(vessel, matrix[2], place[2], np.zeros(10))[1] < 0.99

@@ -31,17 +31,29 @@ def equations(name: str) -> Any:
 @ALL
 def test_the_fmu_has_the_variables_of_the_catalogue(name: str) -> None:
     description = read_model_description(str(resources.root() / "fmus" / f"{name}.fmu"))
-    expected = {slot: variable.causality for variable in MODELS[name].interface for slot in variable.scalar_names}
-    assert {variable.name: variable.causality for variable in description.modelVariables} == expected
+    expected = {
+        slot: variable.causality
+        for variable in MODELS[name].interface
+        for slot in variable.scalar_names
+    }
+    assert {
+        variable.name: variable.causality for variable in description.modelVariables
+    } == expected
 
 
 @ALL
 def test_environment_inputs_come_last_among_the_inputs(name: str) -> None:
-    inputs = [variable.name in ENVIRONMENT_INPUTS for variable in MODELS[name].interface if variable.causality == "input"]
+    inputs = [
+        variable.name in ENVIRONMENT_INPUTS
+        for variable in MODELS[name].interface
+        if variable.causality == "input"
+    ]
     assert inputs == sorted(inputs)
 
 
-@pytest.mark.parametrize("name", [name for name, model in MODELS.items() if model.constant_count is not None])
+@pytest.mark.parametrize(
+    "name", [name for name, model in MODELS.items() if model.constant_count is not None]
+)
 def test_the_number_of_constants_is_that_of_the_equations(name: str) -> None:
     model = MODELS[name]
     if model.airframe:
@@ -53,12 +65,18 @@ def test_the_number_of_constants_is_that_of_the_equations(name: str) -> None:
     elif isinstance(model.boat, PlanarVessel):
         constants = PlanarEquations(model.boat, SLOTS, name, "").constants
     else:
-        constants = getattr(equations(model.binary), "CONSTANTS", None) or equations(model.binary).VESSEL.constants
+        constants = (
+            getattr(equations(model.binary), "CONSTANTS", None)
+            or equations(model.binary).VESSEL.constants
+        )
     parameters = model.equation_parameters(model.start_values("parameter"))
     assert constants.vector(ca.SX(parameters)).numel() == model.constant_count
 
 
 def test_strider_moves_in_the_plane_by_default() -> None:
-    assert [model.name for model in VEHICLE_MODELS["strider"].values()] == ["strider", "strider_6dof"]
+    assert [model.name for model in VEHICLE_MODELS["strider"].values()] == [
+        "strider",
+        "strider_6dof",
+    ]
     assert next(iter(VEHICLE_MODELS["strider"])) == "planar"
     assert list(VEHICLE_MODELS["otter"]) == ["6dof"]

@@ -42,10 +42,14 @@ def test_a_boat_comes_to_rest_as_predicted() -> None:
     assert isinstance(vessel, SurfaceVessel)
     attitude = rest(vessel)
     assert attitude is not None
-    assert trial.vector("usv.attitude", ("roll", "pitch")) == pytest.approx([attitude.heel, attitude.trim], abs=2e-3)
+    assert trial.vector("usv.attitude", ("roll", "pitch")) == pytest.approx(
+        [attitude.heel, attitude.trim], abs=2e-3
+    )
 
 
 @pytest.mark.parametrize(("ahead", "port"), [(-0.4, 0.0), (0.4, 0.0), (0.0, 0.5)])
 def test_a_boat_that_capsizes_or_wets_its_deck_is_refused(ahead: float, port: float) -> None:
-    with pytest.raises(InputError, match=r"centre_of_mass: found .* (capsizes|a deck edge is under water)"):
+    with pytest.raises(
+        InputError, match=r"centre_of_mass: found .* (capsizes|a deck edge is under water)"
+    ):
         model_from_data(boat(ahead, port))

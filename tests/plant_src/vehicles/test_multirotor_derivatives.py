@@ -1,4 +1,6 @@
-"""Derivatives of a multirotor with 16 different, tilted rotors in air and water against an implementation in NumPy."""
+"""Derivatives of a multirotor with 16 different, tilted rotors in air and water against an
+implementation in NumPy.
+"""
 
 from __future__ import annotations
 
@@ -27,7 +29,10 @@ AIRFRAME = Airframe(
     "scatter",
     MASS,
     (INERTIA + INERTIA.T) / 2,
-    tuple(Rotor(str(i), tuple(HUBS[i]), SIGNS[i], THRUST[i], TORQUE[i], tuple(AXES[i])) for i in range(MAX_ROTORS)),
+    tuple(
+        Rotor(str(i), tuple(HUBS[i]), SIGNS[i], THRUST[i], TORQUE[i], tuple(AXES[i]))
+        for i in range(MAX_ROTORS)
+    ),
     900.0,
     RADIUS,
     RotorEffects(LAG, SPIN_INERTIA, tuple(ROTOR_DRAG), tuple(BODY_DRAG), 0.8, LIFT),
@@ -37,17 +42,28 @@ AIRFRAME = Airframe(
 
 
 def ground_factor(i: int, height: float, share: float, speed_ratio: float) -> float:
-    """The ratio of a rotor's thrust; the speed of the air is that in its plane over the induced velocity."""
+    """The ratio of a rotor's thrust; the speed of the air is that in its plane over the induced
+    velocity.
+    """
     z = max(height, RADIUS / 2)
     distances = np.hypot(*(HUBS[:, :2] - HUBS[i, :2]).T)
-    reduction = float(np.sum(RADIUS**2 / 2 * z / np.sqrt(distances**2 + 4 * z**2) ** 3)) / (1 + speed_ratio**2)
+    reduction = float(np.sum(RADIUS**2 / 2 * z / np.sqrt(distances**2 + 4 * z**2) ** 3)) / (
+        1 + speed_ratio**2
+    )
     return 1 + 0.8 * share * (1 / (1 - min(0.5, reduction)) - 1)
 
 
 def derivative(
-    state: np.ndarray, command: np.ndarray, loads: np.ndarray, wind: np.ndarray, ground: np.ndarray, water: np.ndarray
+    state: np.ndarray,
+    command: np.ndarray,
+    loads: np.ndarray,
+    wind: np.ndarray,
+    ground: np.ndarray,
+    water: np.ndarray,
 ) -> np.ndarray:
-    """Newton and Euler, rotor by rotor, with rotation matrices; `water` is the level and the current."""
+    """Newton and Euler, rotor by rotor, with rotation matrices; `water` is the level and the
+    current.
+    """
     w, x, y, z = state[3:7]
     to_world = Rotation.from_quat([x, y, z, w]).as_matrix()
     velocity, rates, speeds = state[7:10], state[10:13], state[13:]
@@ -70,28 +86,53 @@ def derivative(
         torque -= np.cross(rates, momentum * speeds[i]) + momentum * speed_rates[i]
     immersed = np.clip((water[0] - state[2]) / EDGES[2] + 0.5, 0, 1)
     flow, (a, b, c) = to_world.T @ (velocity - [*water[1:], 0]), EDGES
-    force -= immersed * 1025 / 2 * WATER_DRAG * np.linalg.norm(flow) * np.array([b * c, a * c, a * b]) * flow
+    force -= (
+        immersed
+        * 1025
+        / 2
+        * WATER_DRAG
+        * np.linalg.norm(flow)
+        * np.array([b * c, a * c, a * b])
+        * flow
+    )
     plates = np.array([a * b**4, b * a**4, c * (a**4 + b**4)]) / 32
     torque -= immersed * 1025 / 2 * WATER_DRAG * np.linalg.norm(rates) * plates * rates
     weight = [0, 0, MASS * GRAVITY - immersed * 1025 * VOLUME * GRAVITY]
-    acceleration = (to_world @ force + loads[:3] - weight) / (MASS + immersed * 0.68 * 1025 * a * b * c)
+    acceleration = (to_world @ force + loads[:3] - weight) / (
+        MASS + immersed * 0.68 * 1025 * a * b * c
+    )
     moment = torque + to_world.T @ loads[3:] - np.cross(rates, AIRFRAME.inertia @ rates)
     p, q, r = rates
-    turning = 0.5 * np.array([-x * p - y * q - z * r, w * p + y * r - z * q, w * q + z * p - x * r, w * r + x * q - y * p])
-    return np.concatenate([velocity, turning, acceleration, np.linalg.solve(AIRFRAME.inertia, moment), speed_rates])
+    turning = 0.5 * np.array(
+        [
+            -x * p - y * q - z * r,
+            w * p + y * r - z * q,
+            w * q + z * p - x * r,
+            w * r + x * q - y * p,
+        ]
+    )
+    return np.concatenate(
+        [velocity, turning, acceleration, np.linalg.solve(AIRFRAME.inertia, moment), speed_rates]
+    )
 
 
 def test_derivatives_equal_those_of_numpy_at_1000_random_states(measured: MeasurementCheck) -> None:
     equations = MultirotorEquations(AIRFRAME, MAX_ROTORS)
     starts = [v.start for v in variables(AIRFRAME) if v.causality == "parameter"]
-    constants = ca.DM(equations.constants.vector(ca.SX(np.concatenate([np.ravel(start) for start in starts]))))
+    constants = ca.DM(
+        equations.constants.vector(ca.SX(np.concatenate([np.ravel(start) for start in starts])))
+    )
     symbols = [ca.SX.sym("", size) for size in (13 + MAX_ROTORS, MAX_ROTORS + 14)]
     rate = ca.Function("rate", symbols, [equations.rate(*symbols, ca.SX(constants))])
     worst = 0.0
     for _ in range(1000):
         quaternion = RANDOM.standard_normal(4)
         state = np.concatenate(
-            [RANDOM.standard_normal(3), quaternion / np.linalg.norm(quaternion), 5 * RANDOM.standard_normal(6)]
+            [
+                RANDOM.standard_normal(3),
+                quaternion / np.linalg.norm(quaternion),
+                5 * RANDOM.standard_normal(6),
+            ]
         )
         state = np.concatenate([state, RANDOM.uniform(0, 900, MAX_ROTORS)])
         command, ground = RANDOM.uniform(-100, 1000, MAX_ROTORS), RANDOM.uniform(0, 1, 2)

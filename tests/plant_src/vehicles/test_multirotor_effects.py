@@ -68,7 +68,9 @@ def test_tumbling_without_torque_keeps_the_energy(name: str, measured: Measureme
     assert np.abs(fmu.vector("rates", "pqr") - axis_before).max() > 0.1  # it has tumbled
 
 
-def test_rotors_follow_a_step_of_their_command_with_a_first_order_lag(measured: MeasurementCheck) -> None:
+def test_rotors_follow_a_step_of_their_command_with_a_first_order_lag(
+    measured: MeasurementCheck,
+) -> None:
     """Climb from thrust k n^2 with n = c (1 - exp(-t/T)), integrated by hand."""
     lag, speed = 0.08, 1.1 * CRAZYFLIE.hover_speed
     fmu = PlantFmu("crazyflie", {**STILL, "rotor_time_constant": lag})
@@ -93,20 +95,38 @@ def test_rotors_follow_a_step_of_their_command_with_a_first_order_lag(measured: 
 def test_a_lag_much_shorter_than_a_step_is_stable_and_has_no_effect(lag: float) -> None:
     found = []
     for time_constant in (lag, 0.0):
-        fmu = PlantFmu("crazyflie", {**STILL, "rotor_time_constant": time_constant, "initial_rotor_speed": CRAZYFLIE.hover_speed})
+        fmu = PlantFmu(
+            "crazyflie",
+            {
+                **STILL,
+                "rotor_time_constant": time_constant,
+                "initial_rotor_speed": CRAZYFLIE.hover_speed,
+            },
+        )
         for speed in (1500.0, 1600.0, 1400.0):
             fmu.set(commands(CRAZYFLIE, speed))
             fmu.step(0.01, 10)
         found.append(fmu.get("velocity.z")[0])
-    assert found[0] == pytest.approx(found[1], abs=0.02)  # m/s; a quarter of a step of another thrust, three times
+    assert found[0] == pytest.approx(
+        found[1], abs=0.02
+    )  # m/s; a quarter of a step of another thrust, three times
 
 
 def test_body_drag_ends_a_fall_at_the_terminal_velocity(measured: MeasurementCheck) -> None:
     fmu = PlantFmu("survey_hexacopter", {**HIGH, "ground_effect": 0.0})
     fmu.step(10.0, 5)
-    speed, terminal = -fmu.get("velocity.z"), np.sqrt(HEXACOPTER.mass * GRAVITY / HEXACOPTER.body_drag[2])
+    speed, terminal = (
+        -fmu.get("velocity.z"),
+        np.sqrt(HEXACOPTER.mass * GRAVITY / HEXACOPTER.body_drag[2]),
+    )
     measured(
-        "Crazyflie and survey hexacopter", "terminal velocity by body drag", speed, terminal, "m/s", "closed form", relative=1e-9
+        "Crazyflie and survey hexacopter",
+        "terminal velocity by body drag",
+        speed,
+        terminal,
+        "m/s",
+        "closed form",
+        relative=1e-9,
     )
 
 
@@ -137,7 +157,9 @@ def test_a_falling_body_drifts_with_the_wind() -> None:
 
 @pytest.mark.parametrize("name", VEHICLES)
 @pytest.mark.parametrize("height", [0.1, 0.5, 0.8, 1.5, 3.0, 10.0])
-def test_ground_effect_adds_the_published_share_of_thrust(name: str, height: float, measured: MeasurementCheck) -> None:
+def test_ground_effect_adds_the_published_share_of_thrust(
+    name: str, height: float, measured: MeasurementCheck
+) -> None:
     """`height` in rotor radii; below half a radius the effect no longer grows."""
     vehicle = VEHICLES[name]
     fmu = PlantFmu(name, {**STILL, "ground_effect": 1.0, "rotor_time_constant": 0.0})
@@ -164,25 +186,38 @@ def test_far_from_a_surface_there_is_no_ground_effect() -> None:
     assert abs(fmu.get("velocity.z")[0]) < 1e-10  # at the usual distance of 1000 m
 
 
-def rates_after_a_moment(parameters: dict[str, float], speeds: dict[str, float], moment: float) -> np.ndarray:
+def rates_after_a_moment(
+    parameters: dict[str, float], speeds: dict[str, float], moment: float
+) -> np.ndarray:
     fmu = PlantFmu("survey_hexacopter", {**STILL, "initial.rates.q": 2.0, **parameters})
     fmu.set(speeds)
     fmu.step(moment)
     return fmu.vector("rates", "pqr")
 
 
-def test_spinning_rotors_turn_a_pitching_body_about_its_roll_axis(measured: MeasurementCheck) -> None:
-    """Rotors 2, 4 and 6 turn counter-clockwise: their momentum H along z, carried along at q, takes the torque -q H about x."""
+def test_spinning_rotors_turn_a_pitching_body_about_its_roll_axis(
+    measured: MeasurementCheck,
+) -> None:
+    """Rotors 2, 4 and 6 turn counter-clockwise: their momentum H along z, carried along at q, takes
+    the torque -q H about x.
+    """
     inertia, speed, moment = 3.5e-4, 400.0, 1e-5
     speeds = {f"rotor_speed[{number}]": speed for number in (2, 4, 6)}
     without, with_rotors = (
-        rates_after_a_moment({"rotor_time_constant": 0.0, "rotor_inertia": value}, speeds, moment) for value in (0.0, inertia)
+        rates_after_a_moment({"rotor_time_constant": 0.0, "rotor_inertia": value}, speeds, moment)
+        for value in (0.0, inertia)
     )
     expected = -2.0 * 3 * inertia * speed / HEXACOPTER.inertia[0, 0]
     found = (with_rotors - without) / moment
     assert found[1:] == pytest.approx(0.0, abs=1e-3)
     measured(
-        "Crazyflie and survey hexacopter", "gyroscopic roll acceleration", found[0], expected, "rad/s2", "-q H / I", relative=1e-3
+        "Crazyflie and survey hexacopter",
+        "gyroscopic roll acceleration",
+        found[0],
+        expected,
+        "rad/s2",
+        "-q H / I",
+        relative=1e-3,
     )
 
 
@@ -190,7 +225,8 @@ def test_accelerating_rotors_turn_the_body_in_the_opposite_direction() -> None:
     inertia, lag, speed, moment = 3.5e-4, 0.05, 400.0, 1e-6
     speeds = {f"rotor_speed[{number}]": speed for number in (2, 4, 6)}
     without, with_rotors = (
-        rates_after_a_moment({"rotor_time_constant": lag, "rotor_inertia": value}, speeds, moment) for value in (0.0, inertia)
+        rates_after_a_moment({"rotor_time_constant": lag, "rotor_inertia": value}, speeds, moment)
+        for value in (0.0, inertia)
     )
     expected = -3 * inertia * speed / lag / HEXACOPTER.inertia[2, 2]
     assert (with_rotors - without)[2] / moment == pytest.approx(expected, rel=1e-3)
@@ -204,7 +240,13 @@ def test_without_effects_shorter_code_gives_the_same_flight() -> None:
         for number, speed in enumerate((345.0, 350.0, 344.0, 349.0), 1):
             fmu.set({f"rotor_speed[{number}]": speed})
         fmu.step(0.01, 200)
-        found.append([*fmu.vector("position"), *fmu.vector("orientation", "wxyz"), *fmu.vector("rates", "pqr")])
+        found.append(
+            [
+                *fmu.vector("position"),
+                *fmu.vector("orientation", "wxyz"),
+                *fmu.vector("rates", "pqr"),
+            ]
+        )
     assert found[0] == pytest.approx(found[1], rel=1e-12, abs=1e-12)
 
 
@@ -217,10 +259,15 @@ def test_wind_carries_the_ground_effect_away(measured: MeasurementCheck) -> None
         sums = []
         for distance in (0.15, 1e3):
             fmu = PlantFmu("ar_drone", {**HIGH, "ground_effect": 1.0})
-            fmu.set({f"rotor_speed[{k}]": 350.0 for k in range(1, 5)} | {"wind.x": wind, "ground_distance": distance})
+            fmu.set(
+                {f"rotor_speed[{k}]": 350.0 for k in range(1, 5)}
+                | {"wind.x": wind, "ground_distance": distance}
+            )
             fmu.step(1e-4)
             sums.append((fmu.get("velocity.z").item() / 1e-4 + GRAVITY) * 0.443892)
-        reduction = square_ground_effect(0.1016, 0.181777 * np.sqrt(2))(0.15) / (1 + (wind / induced) ** 2)
+        reduction = square_ground_effect(0.1016, 0.181777 * np.sqrt(2))(0.15) / (
+            1 + (wind / induced) ** 2
+        )
         measured(
             "Multirotors",
             "ratio of thrust in ground effect, in wind",
@@ -233,7 +280,9 @@ def test_wind_carries_the_ground_effect_away(measured: MeasurementCheck) -> None
         )
 
 
-def test_translational_lift_grows_with_the_air_speed_up_to_half_the_tip_speed(measured: MeasurementCheck) -> None:
+def test_translational_lift_grows_with_the_air_speed_up_to_half_the_tip_speed(
+    measured: MeasurementCheck,
+) -> None:
     for wind, square in ((4.0, 16.0), (30.0, (0.5 * 0.1016 * 350.0) ** 2)):
         fmu = PlantFmu("ar_drone", {**HIGH, "translational_lift": 0.01})
         fmu.set({f"rotor_speed[{k}]": 350.0 for k in range(1, 5)} | {"wind.y": wind})
@@ -254,8 +303,21 @@ def test_translational_lift_grows_with_the_air_speed_up_to_half_the_tip_speed(me
 
 def test_the_rate_of_the_state_is_the_derivative_of_a_step() -> None:
     random, moment = np.random.default_rng(5), 1e-6
-    state = np.concatenate([random.standard_normal(3), [1, 0, 0, 0], random.standard_normal(6), 1500 + random.standard_normal(4)])
-    inputs = np.concatenate([0.01 * random.standard_normal(6), 1600 + random.standard_normal(4), [1, 2, 3, 0.05, 0.9, -9, 0, 0]])
+    state = np.concatenate(
+        [
+            random.standard_normal(3),
+            [1, 0, 0, 0],
+            random.standard_normal(6),
+            1500 + random.standard_normal(4),
+        ]
+    )
+    inputs = np.concatenate(
+        [
+            0.01 * random.standard_normal(6),
+            1600 + random.standard_normal(4),
+            [1, 2, 3, 0.05, 0.9, -9, 0, 0],
+        ]
+    )
     model = MODELS["crazyflie"]
     effects = [0.07, 5e-8, 1e-6, 2e-6, 1e-6, 0.01, 0.02, 0.03, 1.0, 1e-3]
     equations = MultirotorEquations(model.airframe, 4)
@@ -263,5 +325,9 @@ def test_the_rate_of_the_state_is_the_derivative_of_a_step() -> None:
     constants = ca.DM(equations.constants.vector(parameters)).full().ravel()
     symbols = [ca.SX.sym("", len(vector)) for vector in (state, inputs, constants)]
     rate = ca.Function("rate", symbols, [equations.rate(*symbols)])(state, inputs, constants)
-    after = ca.Function("after", symbols, [equations.step_with_effects(*symbols, ca.SX(moment))])(state, inputs, constants)
-    assert ((after - state) / moment).full().ravel() == pytest.approx(rate.full().ravel(), rel=1e-3, abs=1e-3)
+    after = ca.Function("after", symbols, [equations.step_with_effects(*symbols, ca.SX(moment))])(
+        state, inputs, constants
+    )
+    assert ((after - state) / moment).full().ravel() == pytest.approx(
+        rate.full().ravel(), rel=1e-3, abs=1e-3
+    )

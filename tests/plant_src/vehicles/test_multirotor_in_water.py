@@ -21,7 +21,15 @@ def test_a_light_quadcopter_floats_at_the_depth_of_archimedes(measured: Measurem
     for _ in range(300):  # it still heaves by millimetres, because the drag is quadratic
         fmu.step(0.01)
         depths.append(0.05 - fmu.get("position.z").item())
-    measured("Multirotors", "mean depth of a floating AR.Drone", np.mean(depths), depth, "m", "Archimedes", within=2e-4)
+    measured(
+        "Multirotors",
+        "mean depth of a floating AR.Drone",
+        np.mean(depths),
+        depth,
+        "m",
+        "Archimedes",
+        within=2e-4,
+    )
 
 
 def test_a_heavy_quadcopter_sinks_at_the_speed_of_its_drag(measured: MeasurementCheck) -> None:
@@ -30,7 +38,15 @@ def test_a_heavy_quadcopter_sinks_at_the_speed_of_its_drag(measured: Measurement
     fmu.step(0.01, 1000)
     weight = GRAVITY * CRAZYFLIE_MASS * (1 - WATER / 1200)
     speed = np.sqrt(2 * weight / (WATER * 1.2 * CRAZYFLIE_AREA))
-    measured("Multirotors", "speed of a sinking Crazyflie", -fmu.get("velocity.z"), speed, "m/s", "closed form", relative=1e-9)
+    measured(
+        "Multirotors",
+        "speed of a sinking Crazyflie",
+        -fmu.get("velocity.z"),
+        speed,
+        "m/s",
+        "closed form",
+        relative=1e-9,
+    )
 
 
 def test_it_drifts_with_the_current_and_stops_turning() -> None:
@@ -42,7 +58,9 @@ def test_it_drifts_with_the_current_and_stops_turning() -> None:
 
 
 def test_rotors_below_the_surface_have_no_thrust() -> None:
-    """Full thrust lifts the quadcopter from the surface, on which its rotors are dry, but not from below."""
+    """Full thrust lifts the quadcopter from the surface, on which its rotors are dry, but not from
+    below.
+    """
     heights = []
     for start in (0.06, -0.3):
         fmu = PlantFmu("ar_drone", {"initial.position.z": start, "displaced_volume": 4e-4})
@@ -57,7 +75,14 @@ def test_far_above_the_water_its_parameters_do_not_matter() -> None:
     positions = []
     for volume in (0.0, 1.0):
         fmu = PlantFmu("ar_drone", {"initial.position.z": 0.2, "displaced_volume": volume})
-        fmu.set({"water_level": 0.0, "rotor_speed[1]": 345.0, "rotor_speed[3]": 346.0, "external_force.z": 2.2})
+        fmu.set(
+            {
+                "water_level": 0.0,
+                "rotor_speed[1]": 345.0,
+                "rotor_speed[3]": 346.0,
+                "external_force.z": 2.2,
+            }
+        )
         fmu.step(0.01, 20)
         positions.append(fmu.vector("position").tolist())
     assert positions[0] == positions[1]
@@ -73,7 +98,15 @@ def test_shorter_steps_converge_on_a_fast_impact(measured: MeasurementCheck) -> 
         depths.append(fmu.get("position.z").item())
     errors = np.abs(np.array(depths[:3]) - depths[3])
     assert errors[2] <= errors[0]
-    measured("Multirotors", "place 1 s after the start of a fall into water at 10 ms", errors[0], 0.0, "m", "0.1 ms", within=2e-4)
+    measured(
+        "Multirotors",
+        "place 1 s after the start of a fall into water at 10 ms",
+        errors[0],
+        0.0,
+        "m",
+        "0.1 ms",
+        within=2e-4,
+    )
 
 
 def test_the_world_has_water_everywhere(measured: MeasurementCheck) -> None:
@@ -93,11 +126,15 @@ def test_the_world_has_water_everywhere(measured: MeasurementCheck) -> None:
 
 def test_a_floating_quadcopter_follows_the_waves() -> None:
     waves = {"spectrum": "jonswap", "significant_height": 0.3, "peak_period": 5.0}
-    trial = WorldHarness({"uav": quadcopter_settings([0.0, 0.0, 0.5])}, environment={"waves": waves})
+    trial = WorldHarness(
+        {"uav": quadcopter_settings([0.0, 0.0, 0.5])}, environment={"waves": waves}
+    )
     trial.step(1000)
     errors = []
     for _ in range(400):
         trial.step()
-        level = trial.world._environment.water_level(trial["uav.position.x"], trial["uav.position.y"], trial.steps * 0.01)
+        level = trial.world._environment.water_level(
+            trial["uav.position.x"], trial["uav.position.y"], trial.steps * 0.01
+        )
         errors.append(trial["uav.position.z"] - level)
     assert np.abs(errors).max() < 0.05

@@ -29,7 +29,9 @@ EFFECTS = {
     "ground_effect": 0.0,
 }
 MOTION = [
-    f"{group}.{axis}" for group, axes in {"position": "xyz", "orientation": "wxyz", "rates": "pqr"}.items() for axis in axes
+    f"{group}.{axis}"
+    for group, axes in {"position": "xyz", "orientation": "wxyz", "rates": "pqr"}.items()
+    for axis in axes
 ]
 
 
@@ -49,14 +51,30 @@ def scalars(speeds: list[float]) -> dict[str, float]:
 
 def scenario(model: str, wind: dict[str, float]) -> dict[str, Any]:
     """The same flight in the world and on FMUs of versions 2.0 and 3.0."""
-    start = {**parameters(model), "initial.position.z": 50.0, "initial.velocity_body.u": 1.0, **wind}
-    vehicle = {"model": model, "position": [0, 0, 50], "velocity_body": [1, 0, 0], "parameters": parameters(model)}
+    start = {
+        **parameters(model),
+        "initial.position.z": 50.0,
+        "initial.velocity_body.u": 1.0,
+        **wind,
+    }
+    vehicle = {
+        "model": model,
+        "position": [0, 0, 50],
+        "velocity_body": [1, 0, 0],
+        "parameters": parameters(model),
+    }
     plant = {"vehicles": {"uav": vehicle}, "environment": {"wind": {"velocity": list(WIND)}}}
     root = resources.root()
     events = []
     for k in range(4):
         arrays = dict.fromkeys(("world.uav.rotor_speed", "three.rotor_speed"), commands(model, k))
-        events.append({"time": k, "set": arrays | {f"two.{name}": speed for name, speed in scalars(commands(model, k)).items()}})
+        events.append(
+            {
+                "time": k,
+                "set": arrays
+                | {f"two.{name}": speed for name, speed in scalars(commands(model, k)).items()},
+            }
+        )
     return {
         "name": "doors",
         "stop_time": 4.0,
@@ -71,18 +89,33 @@ def scenario(model: str, wind: dict[str, float]) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("model", ROTORS)
-def test_world_and_fmus_of_both_versions_agree(model: str, tmp_path: Path, measured: MeasurementCheck) -> None:
+def test_world_and_fmus_of_both_versions_agree(
+    model: str, tmp_path: Path, measured: MeasurementCheck
+) -> None:
     wind = dict(zip(("wind.x", "wind.y", "wind.z"), WIND, strict=True))
     (file := tmp_path / "doors.json").write_text(json.dumps(scenario(model, wind)))
     result = cosim.run(file)
-    alone = PlantFmu(model, {**parameters(model), "initial.position.z": 50.0, "initial.velocity_body.u": 1.0, **wind})
+    alone = PlantFmu(
+        model,
+        {**parameters(model), "initial.position.z": 50.0, "initial.velocity_body.u": 1.0, **wind},
+    )
     for k in range(4):
         alone.set(scalars(commands(model, k)))
         alone.step(0.01, 100)
     for name in MOTION:
-        two, three, world = (result[f"{component}.{name}"] for component in ("two", "three", "world.uav"))
+        two, three, world = (
+            result[f"{component}.{name}"] for component in ("two", "three", "world.uav")
+        )
         assert two[-1] == alone.get(name)[0]
-        measured("World and plant FMUs", "multirotor, FMI 3.0", three - two, 0.0, "m, 1, rad/s", "its FMI 2.0 FMU", case=model)
+        measured(
+            "World and plant FMUs",
+            "multirotor, FMI 3.0",
+            three - two,
+            0.0,
+            "m, 1, rad/s",
+            "its FMI 2.0 FMU",
+            case=model,
+        )
         error = world - two
         measured(
             "World and plant FMUs",

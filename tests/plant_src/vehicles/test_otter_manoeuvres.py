@@ -1,4 +1,6 @@
-"""Turning circle and zig-zag scenarios of the Otter of MSS against the independent implementation in NumPy."""
+"""Turning circle and zig-zag scenarios of the Otter of MSS against the independent implementation
+in NumPy.
+"""
 
 import math
 
@@ -16,7 +18,9 @@ SETTLING, DURATION = 2.0, 15.0
 
 
 def rows(commands):
-    """Place (x north, y east), heading (clockwise) after each step from the order on, from the steady speed ahead."""
+    """Place (x north, y east), heading (clockwise) after each step from the order on, from the
+    steady speed ahead.
+    """
     otter = Otter()
     otter.shafts[:], otter.nu[0] = 100.0, 2.85735
     for _ in range(20):
@@ -31,7 +35,9 @@ def rows(commands):
 
 
 def passing(values, level):
-    """Return the time (s) at which a value first passes a level, by linear interpolation between steps."""
+    """Return the time (s) at which a value first passes a level, by linear interpolation between
+    steps.
+    """
     k = int(np.argmax(values >= level))
     return (k - (values[k] - level) / (values[k] - values[k - 1])) * STEP
 
@@ -66,7 +72,10 @@ def zigzag():
         when = first * STEP + passing(sign * psi[first:], angle)
         row = math.ceil(when / STEP)
         back = row + int(np.argmax(-sign * psi[row:] >= angle))
-        measures |= {f"execute[{number}]": when, f"overshoot[{number}]": (sign * psi[row:back]).max() - angle}
+        measures |= {
+            f"execute[{number}]": when,
+            f"overshoot[{number}]": (sign * psi[row:back]).max() - angle,
+        }
         first = row
     return measures
 
@@ -74,16 +83,32 @@ def zigzag():
 @pytest.fixture(scope="module", params=["circle", "zigzag"])
 def manoeuvre(request):
     name = {"circle": "otter_turning_circle", "zigzag": "otter_zigzag"}[request.param]
-    return request.param, cosim.run(SCENARIOS / f"{name}.json").kpis, request.getfixturevalue(request.param)
+    return (
+        request.param,
+        cosim.run(SCENARIOS / f"{name}.json").kpis,
+        request.getfixturevalue(request.param),
+    )
 
 
 def test_the_measures_are_those_of_the_independent_implementation(manoeuvre, measured):
     name, kpis, expected = manoeuvre
     for measure, value in expected.items():
         found, case = kpis[f"{name}.{measure}"], f"{name}, {measure}"
-        measured("Otter of MSS", "IMO measures from 100/100 rad/s", found, value, "m, s, rad", NUMPY, relative=1e-4, case=case)
+        measured(
+            "Otter of MSS",
+            "IMO measures from 100/100 rad/s",
+            found,
+            value,
+            "m, s, rad",
+            NUMPY,
+            relative=1e-4,
+            case=case,
+        )
 
 
 def test_a_manoeuvre_before_the_recording_is_refused():
     with pytest.raises(InputError, match="starts at -1 s, before the first recorded row"):
-        cosim.run(SCENARIOS / "otter_zigzag.json", parameters={"/kpis/0/arguments/start": -1.0, "/stop_time": 1.0})
+        cosim.run(
+            SCENARIOS / "otter_zigzag.json",
+            parameters={"/kpis/0/arguments/start": -1.0, "/stop_time": 1.0},
+        )

@@ -1,6 +1,8 @@
-"""Standard tests of the vehicles that are given by data alone: hover of a multirotor, straight run and turn of a vessel.
+"""Standard tests of the vehicles that are given by data alone: hover of a multirotor, straight run
+and turn of a vessel.
 
-The expected values follow from the data of each vehicle: balances of forces in steady motion, and published figures.
+The expected values follow from the data of each vehicle: balances of forces in steady motion, and
+published figures.
 """
 
 from __future__ import annotations
@@ -47,7 +49,12 @@ def surge_balance(vessel: Boat, u: float) -> float:
     if isinstance(vessel, SurfaceVessel):
         return thrust - resistance - vessel.quadratic_damping[0, 0] * u**2
     assert isinstance(vessel, PlanarVessel)
-    return thrust - resistance - vessel.quadratic_damping[0][0, 0] * u**2 - vessel.cubic_damping[0] * u**3
+    return (
+        thrust
+        - resistance
+        - vessel.quadratic_damping[0][0, 0] * u**2
+        - vessel.cubic_damping[0] * u**3
+    )
 
 
 @pytest.mark.parametrize("name", MULTIROTORS)
@@ -80,24 +87,31 @@ def test_a_vessel_rests_runs_straight_and_turns(name: str) -> None:
     u, v = trial.vector("usv.velocity_body", "uv")
     published, tolerance = PUBLISHED_SPEEDS[name]
     assert u == pytest.approx(published, abs=tolerance)
-    assert abs(surge_balance(vessel, u)) < 0.03 * surge_balance(vessel, 0.0)  # a floating vessel runs with a trim
+    assert abs(surge_balance(vessel, u)) < 0.03 * surge_balance(
+        vessel, 0.0
+    )  # a floating vessel runs with a trim
     assert [v, trial["usv.position.y"]] == pytest.approx([0, 0], abs=1e-9)
     assert abs(trial["usv.attitude.pitch"]) < 0.1
     if any(rudder.max_angle for rudder in vessel.rudders):
         trial["usv.rudder_angle"] = [0.3] * len(vessel.rudders)
     else:
         trial["usv.propeller_speed"] = [
-            0.5 * n if each.position[1] < 0 else n for n, each in zip(full, vessel.propellers, strict=True)
+            0.5 * n if each.position[1] < 0 else n
+            for n, each in zip(full, vessel.propellers, strict=True)
         ]
     trial.step(2000)
     assert not trial["usv.crashed"]
-    assert trial["usv.rates.r"] < -0.05  # to starboard: away from the stronger propeller, and with a positive rudder angle
+    assert (
+        trial["usv.rates.r"] < -0.05
+    )  # to starboard: away from the stronger propeller, and with a positive rudder angle
     assert trial["usv.velocity_body.v"] > 0.01  # it drifts outwards, with keels only little
 
 
 def quantities(data: Any) -> Any:
     """Yield all quantities with a unit."""
-    for value in data.values() if isinstance(data, dict) else data if isinstance(data, list) else ():
+    for value in (
+        data.values() if isinstance(data, dict) else data if isinstance(data, list) else ()
+    ):
         if isinstance(value, dict) and "value" in value:
             yield value
         yield from quantities(value)

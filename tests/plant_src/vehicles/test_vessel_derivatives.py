@@ -1,4 +1,6 @@
-"""Derivatives of the vessels against an independent implementation at random states, emerged hulls included."""
+"""Derivatives of the vessels against an independent implementation at random states, emerged hulls
+included.
+"""
 
 from __future__ import annotations
 
@@ -20,17 +22,31 @@ casadi = pytest.importorskip("casadi")
 STATES = 1000
 SHORT_CRESTED = {
     "seed": 5,
-    "waves": {"significant_height": 0.3, "peak_period": 2.0, "direction": 0.7, "spreading": 4, "components": 9},
+    "waves": {
+        "significant_height": 0.3,
+        "peak_period": 2.0,
+        "direction": 0.7,
+        "spreading": 4,
+        "components": 9,
+    },
 }
 
 
 def rate_function(model: Any, given: Mapping[str, Any]) -> tuple[Any, list[str]]:
     """Return the function from state and inputs to the rate, and the names of the inputs."""
-    parameters = np.concatenate([np.ravel(given.get(v.name, v.start)) for v in model.variables if v.causality == "parameter"])
+    parameters = np.concatenate(
+        [
+            np.ravel(given.get(v.name, v.start))
+            for v in model.variables
+            if v.causality == "parameter"
+        ]
+    )
     constants = casadi.evalf(model.derived_parameters(casadi.SX(parameters)))
     names = [variable.name for variable in model.elements("input")]
     state, inputs = casadi.SX.sym("x", len(model.states)), casadi.SX.sym("u", len(names))
-    return casadi.Function("rate", [state, inputs], [model.derivatives(state, inputs, casadi.SX(constants))]), names
+    return casadi.Function(
+        "rate", [state, inputs], [model.derivatives(state, inputs, casadi.SX(constants))]
+    ), names
 
 
 def random_catamaran(random: np.random.Generator, realisation: Sea) -> Catamaran:
@@ -39,10 +55,15 @@ def random_catamaran(random: np.random.Generator, realisation: Sea) -> Catamaran
 
 
 def inputs_of(reference: Catamaran, names: list[str]) -> list[float]:
-    values = dict.fromkeys(names, 0.0) | {"thrust": reference.thrust, "rudder_angle": reference.rudder}
+    values = dict.fromkeys(names, 0.0) | {
+        "thrust": reference.thrust,
+        "rudder_angle": reference.rudder,
+    }
     values |= {"wave_gain": 1.0} if "wave_gain" in names else {}
     values |= {f"wind.{axis}": value for axis, value in zip("xyz", reference.wind, strict=True)}
-    values |= {f"current.{axis}": value for axis, value in zip("xy", reference.current, strict=True)}
+    values |= {
+        f"current.{axis}": value for axis, value in zip("xy", reference.current, strict=True)
+    }
     return list(values.values())
 
 
@@ -50,8 +71,14 @@ def waves(realisation: Sea) -> dict[str, list[float]]:
     """Parameters of the equations for a sea."""
     count = len(realisation.phase)
     padding = [0.0] * (MAX_WAVE_COMPONENTS - count)
-    rows = {name: [*getattr(realisation, name), *padding] for name in ("amplitude", "frequency", "direction", "phase")}
-    return {"wave.count": [float(count)], **{f"wave.{name}": values for name, values in rows.items()}}
+    rows = {
+        name: [*getattr(realisation, name), *padding]
+        for name in ("amplitude", "frequency", "direction", "phase")
+    }
+    return {
+        "wave.count": [float(count)],
+        **{f"wave.{name}": values for name, values in rows.items()},
+    }
 
 
 @pytest.mark.parametrize("hull", ["default", "paper"])
@@ -69,7 +96,9 @@ def test_planar_catamaran_at_random_states(hull: str, measured: MeasurementCheck
         turn = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])
         u, v = nu[:2] - turn @ reference.current
         air = [*(nu[:2] - turn @ reference.wind[:2]), 0.0]
-        loads = reference.loads(np.array([u, v, 0, 0, 0, nu[2]]), np.zeros(3)) + reference.driving(np.array(air))
+        loads = reference.loads(np.array([u, v, 0, 0, 0, nu[2]]), np.zeros(3)) + reference.driving(
+            np.array(air)
+        )
         expected = loads[[0, 1, 5]] / [4.11, 4.11, 0.6391] + [nu[1] * nu[2], -nu[0] * nu[2], 0]
         worst.append(np.abs(found - expected).max() / np.linalg.norm(expected))
     measured(
@@ -85,7 +114,9 @@ def test_planar_catamaran_at_random_states(hull: str, measured: MeasurementCheck
 
 
 def test_catamaran_at_random_states(measured: MeasurementCheck) -> None:
-    """Half of the states lie in all attitudes and up to 0.3 m above or below the water, the others near the rest."""
+    """Half of the states lie in all attitudes and up to 0.3 m above or below the water, the others
+    near the rest.
+    """
     from plant_src.vehicles.strider_6dof import equations
 
     realisation = sea(SHORT_CRESTED)
@@ -93,12 +124,19 @@ def test_catamaran_at_random_states(measured: MeasurementCheck) -> None:
     random, worst, emerged = np.random.default_rng(3), [], 0
     for k in range(STATES):
         tilt = np.pi if k % 2 else 0.05
-        turned = Rotation.from_euler("ZYX", [random.uniform(-3, 3), *random.uniform(-tilt, tilt, 2)])
-        place = [*random.uniform(-5, 5, 2), 0.1245 + random.uniform(-0.3, 0.3) * (1 if k % 2 else 0.1)]
+        turned = Rotation.from_euler(
+            "ZYX", [random.uniform(-3, 3), *random.uniform(-tilt, tilt, 2)]
+        )
+        place = [
+            *random.uniform(-5, 5, 2),
+            0.1245 + random.uniform(-0.3, 0.3) * (1 if k % 2 else 0.1),
+        ]
         nu, time = random.uniform(-1, 1, 6), random.uniform(0, 60)
         reference = random_catamaran(random, realisation)
         x, y, z, w = turned.as_quat()
-        found = rate([*place, w, x, y, z, *nu, time], inputs_of(reference, names)).full().ravel()[7:13]
+        found = (
+            rate([*place, w, x, y, z, *nu, time], inputs_of(reference, names)).full().ravel()[7:13]
+        )
         matrix = turned.as_matrix()
         expected = reference.rate(time, np.concatenate([place, matrix.ravel(), nu]))[12:]
         worst.append(np.abs(found - expected).max() / np.linalg.norm(expected))

@@ -22,13 +22,30 @@ WATERS = {
     "wind": {"velocity": [3.0, -2.0, 0.0]},
     "current": {"velocity": [0.2, 0.1]},
 }
-ENVIRONMENT_VALUES = {"wind.x": 3.0, "wind.y": -2.0, "wind.z": 0.0, "current.x": 0.2, "current.y": 0.1}
-START = {"initial.position.x": 1.0, "initial.position.y": 2.0, "initial.yaw": 0.5, "initial.velocity_body.u": 0.4}
+ENVIRONMENT_VALUES = {
+    "wind.x": 3.0,
+    "wind.y": -2.0,
+    "wind.z": 0.0,
+    "current.x": 0.2,
+    "current.y": 0.1,
+}
+START = {
+    "initial.position.x": 1.0,
+    "initial.position.y": 2.0,
+    "initial.yaw": 0.5,
+    "initial.velocity_body.u": 0.4,
+}
 VESSELS: dict[str, tuple[dict[str, Any], dict[str, Any]]] = {
     "strider": ({"model": "strider"}, {"thrust": 1.0, "rudder_angle": 0.1}),
     "strider_6dof": ({"model": "strider", "motion": "6dof"}, {"thrust": 1.0, "rudder_angle": 0.1}),
-    "otter": ({"model": "otter", "parameters": {"payload_mass": 10.0}}, {"propeller_speed": [80.0, 60.0]}),
-    "otter_mss": ({"model": "otter_mss", "parameters": {"payload_mass": 10.0}}, {"propeller_speed": [80.0, 60.0]}),
+    "otter": (
+        {"model": "otter", "parameters": {"payload_mass": 10.0}},
+        {"propeller_speed": [80.0, 60.0]},
+    ),
+    "otter_mss": (
+        {"model": "otter_mss", "parameters": {"payload_mass": 10.0}},
+        {"propeller_speed": [80.0, 60.0]},
+    ),
 }
 MOTION = [
     f"{group}.{axis}"
@@ -45,7 +62,12 @@ MOTION = [
 
 def scalars(values: dict[str, Any]) -> dict[str, float]:
     """Replace lists by scalars "name[1]", "name[2]"."""
-    lists = {f"{name}[{k}]": x for name, xs in values.items() if isinstance(xs, list) for k, x in enumerate(xs, 1)}
+    lists = {
+        f"{name}[{k}]": x
+        for name, xs in values.items()
+        if isinstance(xs, list)
+        for k, x in enumerate(xs, 1)
+    }
     return {name: x for name, x in values.items() if not isinstance(x, list)} | lists
 
 
@@ -53,16 +75,30 @@ def parameters(model: str) -> dict[str, Any]:
     """Return the environment inputs that the world's environment gives, and the initial state."""
     vehicle, inputs = VESSELS[model]
     waves = sea(WATERS)
-    arrays = {name: getattr(waves, name).tolist() for name in ("amplitude", "frequency", "direction", "phase")}
-    table = {"wave.count": float(len(waves.amplitude)), **{f"wave.{name}": values for name, values in arrays.items()}}
-    return {**START, **ENVIRONMENT_VALUES, **inputs, **vehicle.get("parameters", {}), **(table if model != "strider" else {})}
+    arrays = {
+        name: getattr(waves, name).tolist()
+        for name in ("amplitude", "frequency", "direction", "phase")
+    }
+    table = {
+        "wave.count": float(len(waves.amplitude)),
+        **{f"wave.{name}": values for name, values in arrays.items()},
+    }
+    return {
+        **START,
+        **ENVIRONMENT_VALUES,
+        **inputs,
+        **vehicle.get("parameters", {}),
+        **(table if model != "strider" else {}),
+    }
 
 
 def scenario(model: str) -> dict[str, Any]:
     """The same voyage in the world and on FMUs of versions 2.0 and 3.0."""
     vehicle, inputs = VESSELS[model]
     vehicle = {**vehicle, "position": [1.0, 2.0], "yaw": 0.5, "velocity_body": [0.4, 0.0, 0.0]}
-    environment = WATERS if model != "strider" else {name: WATERS[name] for name in ("wind", "current")}
+    environment = (
+        WATERS if model != "strider" else {name: WATERS[name] for name in ("wind", "current")}
+    )
     root = resources.root()
     world = {
         "python": f"{root}/plant_src/world.py:World",
@@ -73,7 +109,10 @@ def scenario(model: str) -> dict[str, Any]:
         "stop_time": 5.0,
         "step_size": 0.01,
         "components": {
-            "world": {**world, "parameters": {f"usv.{name}": value for name, value in inputs.items()}},
+            "world": {
+                **world,
+                "parameters": {f"usv.{name}": value for name, value in inputs.items()},
+            },
             "two": {"fmu": f"{root}/fmus/{model}.fmu", "parameters": parameters(model)},
             "three": {"fmu": f"{root}/fmus/fmi3/{model}.fmu", "parameters": parameters(model)},
         },
@@ -81,14 +120,35 @@ def scenario(model: str) -> dict[str, Any]:
 
 
 @pytest.mark.parametrize("model", VESSELS)
-def test_world_and_fmus_of_both_versions_agree(model: str, tmp_path: Path, measured: MeasurementCheck) -> None:
+def test_world_and_fmus_of_both_versions_agree(
+    model: str, tmp_path: Path, measured: MeasurementCheck
+) -> None:
     (file := tmp_path / "doors.json").write_text(json.dumps(scenario(model)))
     result = cosim.run(file)
     alone = PlantFmu(model, scalars(parameters(model)))
     alone.step(0.01, 500)
     for name in MOTION:
-        two, three, world = (result[f"{component}.{name}"] for component in ("two", "three", "world.usv"))
+        two, three, world = (
+            result[f"{component}.{name}"] for component in ("two", "three", "world.usv")
+        )
         assert two[-1] == alone.get(name)[0]
-        measured("World and plant FMUs", "vessel, FMI 3.0", three - two, 0.0, UNITS, "its FMI 2.0 FMU", case=model)
-        measured("World and plant FMUs", "vessel, world", world - two, 0.0, UNITS, "its FMI 2.0 FMU", within=1e-12, case=model)
+        measured(
+            "World and plant FMUs",
+            "vessel, FMI 3.0",
+            three - two,
+            0.0,
+            UNITS,
+            "its FMI 2.0 FMU",
+            case=model,
+        )
+        measured(
+            "World and plant FMUs",
+            "vessel, world",
+            world - two,
+            0.0,
+            UNITS,
+            "its FMI 2.0 FMU",
+            within=1e-12,
+            case=model,
+        )
     assert np.ptp(result["two.position.x"]) > 1

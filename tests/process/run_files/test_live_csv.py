@@ -26,18 +26,32 @@ from cosim.process.run_files.live_csv_writer import CsvLineReader, LiveCsvWriter
 from cosim.results.csv_files import write_csv
 
 ROWS_COUNT = 1234
-KINDS = {"a.x": "<f8", 'quoted "b"': "<f4", "flag": "|b1", "small": "|i1", "natural": "<u8", "whole": "<i8"}
+KINDS = {
+    "a.x": "<f8",
+    'quoted "b"': "<f4",
+    "flag": "|b1",
+    "small": "|i1",
+    "natural": "<u8",
+    "whole": "<i8",
+}
 
 
 #: from these rows on the two texts are others
-TEXTS = {0: {"first": "a"}, 7: {"last": 'quoted, "x"'}, 600: {"first": "", "last": "\N{SNOWMAN}\n"}, 1200: {"last": "end"}}
+TEXTS = {
+    0: {"first": "a"},
+    7: {"last": 'quoted, "x"'},
+    600: {"first": "", "last": "\N{SNOWMAN}\n"},
+    1200: {"last": "end"},
+}
 
 
 @pytest.fixture
 def table() -> np.ndarray:
     """Random bits in all types, with gaps between some fields and non-finite numbers."""
     offsets = [0, 8, 12, 13, 24, 32]
-    dtype = np.dtype({"names": list(KINDS), "formats": list(KINDS.values()), "offsets": offsets, "itemsize": 48})
+    dtype = np.dtype(
+        {"names": list(KINDS), "formats": list(KINDS.values()), "offsets": offsets, "itemsize": 48}
+    )
     rows = np.random.default_rng(5).integers(0, 256, ROWS_COUNT * 48, dtype=np.uint8).view(dtype)
     rows["flag"] = rows["small"] > 0
     rows["a.x"][:3] = np.nan, np.inf, -np.inf
@@ -47,9 +61,21 @@ def table() -> np.ndarray:
 def header(table: np.ndarray) -> RowsHeader:
     """Header of the rows; one signal is recorded under two names."""
     fields = {name: table.dtype.fields[name] for name in table.dtype.names}
-    columns = [Column(name, kind.str, offset, kind.kind == "b", "") for name, (kind, offset) in fields.items()]
+    columns = [
+        Column(name, kind.str, offset, kind.kind == "b", "")
+        for name, (kind, offset) in fields.items()
+    ]
     twin = Column("twin", "<i8", fields["whole"][1], False, "")
-    return RowsHeader(5, 1, 100, 2, table.dtype.itemsize, [twin, *columns], [], [(0, "first"), (len(columns) + 2, "last")])
+    return RowsHeader(
+        5,
+        1,
+        100,
+        2,
+        table.dtype.itemsize,
+        [twin, *columns],
+        [],
+        [(0, "first"), (len(columns) + 2, "last")],
+    )
 
 
 def texts(rows: int) -> dict[str, np.ndarray]:
@@ -62,7 +88,10 @@ def texts(rows: int) -> dict[str, np.ndarray]:
 
 def expected(table: np.ndarray, folder: Path, rows: int) -> bytes:
     time = np.array([(5 + 2 * n) / 100 for n in range(rows)])
-    numbers = {"twin": table["whole"][:rows], **{name: table[name][:rows] for name in table.dtype.names}}
+    numbers = {
+        "twin": table["whole"][:rows],
+        **{name: table[name][:rows] for name in table.dtype.names},
+    }
     first, last = texts(rows).values()
     columns = {"first": first, **numbers, "last": last}
     write_csv(Recording(time, columns, {}), folder / "expected.csv")
@@ -89,7 +118,10 @@ def running(table: np.ndarray, folder: Path) -> Journal:
 def test_lines_have_the_format_of_results(table, tmp_path):
     write_texts(tmp_path)
     described = header(table)
-    lines, file = CsvLineReader(described, TextReader(tmp_path, described)), io.BytesIO(table.tobytes())
+    lines, file = (
+        CsvLineReader(described, TextReader(tmp_path, described)),
+        io.BytesIO(table.tobytes()),
+    )
     text = lines.header_line()
     while lines.row_count < ROWS_COUNT:
         text += lines.read_lines(file, ROWS_COUNT)
@@ -105,7 +137,11 @@ def test_the_file_is_complete_even_if_an_update_is_interrupted(table, tmp_path, 
     for n, rows in enumerate((1, 2, 600, 601, 1100, ROWS_COUNT)):
         journal[ROW_COUNT] = rows
         if n % 2:
-            monkeypatch.setattr(CsvLineReader, "read_lines", lambda self, *more: next_lines(self, *more) and interrupt())
+            monkeypatch.setattr(
+                CsvLineReader,
+                "read_lines",
+                lambda self, *more: next_lines(self, *more) and interrupt(),
+            )
             with pytest.raises(KeyboardInterrupt):
                 csv.update()
             monkeypatch.setattr(CsvLineReader, "read_lines", next_lines)
@@ -144,17 +180,39 @@ def test_the_final_file_is_not_replaced(table, tmp_path):
     assert final.read_text() == "final"
 
 
-@pytest.mark.parametrize("line", [b"[" * 100_000, b"{}", b"[1]", b'["x", {}]', b"[1, 2]", b"\xff", b'[1, {"other": "x"}]', b"\0"])
+@pytest.mark.parametrize(
+    "line",
+    [
+        b"[" * 100_000,
+        b"{}",
+        b"[1]",
+        b'["x", {}]',
+        b"[1, 2]",
+        b"\xff",
+        b'[1, {"other": "x"}]',
+        b"\0",
+    ],
+)
 def test_a_damaged_line_of_texts_changes_nothing(table, tmp_path, line):
     write_texts(tmp_path)
     first, *others = (tmp_path / TEXTS_FILE).read_bytes().splitlines(keepends=True)
     (tmp_path / TEXTS_FILE).write_bytes(b"".join([first, line, b"\n", *others]))
     reader = TextReader(tmp_path, header(table))
-    assert [reader.read_row(row) for row in range(ROWS_COUNT)] == list(map(list, zip(*texts(ROWS_COUNT).values(), strict=True)))
+    assert [reader.read_row(row) for row in range(ROWS_COUNT)] == list(
+        map(list, zip(*texts(ROWS_COUNT).values(), strict=True))
+    )
 
 
 @pytest.mark.parametrize(
-    "text", ["[" * 100_000, "{}", "[]", '{"columns": [1]}', '{"columns": [], "calls": 3, "texts": []}', "\0"]
+    "text",
+    [
+        "[" * 100_000,
+        "{}",
+        "[]",
+        '{"columns": [1]}',
+        '{"columns": [], "calls": 3, "texts": []}',
+        "\0",
+    ],
 )
 def test_a_damaged_header_counts_as_missing(tmp_path, text):
     (tmp_path / HEADER_FILE).write_text(text)

@@ -20,7 +20,9 @@ STEPS = 3000
 def recorded(every=1, **more):
     columns = {"a.y": endpoint("a.y"), "a.n": endpoint("a.n")}
     interval = Fraction(every, 100)
-    settings = Settings(Fraction(0), Fraction(STEPS, 100), Fraction(1, 100), columns, interval, **more)
+    settings = Settings(
+        Fraction(0), Fraction(STEPS, 100), Fraction(1, 100), columns, interval, **more
+    )
     return simulate(make_system({"a": counter()}), settings).recording
 
 
@@ -50,7 +52,10 @@ def test_rows_of_every_nth_step_have_the_right_times():
 def test_rows_are_stored_in_the_given_file(tmp_path):
     recording = recorded(rows_file=tmp_path / "rows")
     dtype = np.dtype([("y", np.float64), ("n", np.int32), ("gap", np.int32)])
-    assert read_rows(tmp_path / "rows", dtype, STEPS + 1)["n"].tolist() == recording.columns["a.n"].tolist()
+    assert (
+        read_rows(tmp_path / "rows", dtype, STEPS + 1)["n"].tolist()
+        == recording.columns["a.n"].tolist()
+    )
 
 
 @pytest.mark.usefixtures("small_chunks")

@@ -29,9 +29,13 @@ class SandboxProbe(Fmi2Slave):
             "write to its own folder": lambda: Path(own).write_text("mine"),
             "read a private file": lambda: Path(private).read_text(),
             "connect": lambda: socket.create_connection(("127.0.0.1", port), 2) and "connected",
-            "send": lambda: socket.socket(type=socket.SOCK_DGRAM).sendto(b"out", ("127.0.0.1", port)),
+            "send": lambda: socket.socket(type=socket.SOCK_DGRAM).sendto(
+                b"out", ("127.0.0.1", port)
+            ),
             "signal": lambda: os.kill(process, 0),
-            "see processes": lambda: max(int(path.name) for path in Path("/proc").iterdir() if path.name.isdigit()),
+            "see processes": lambda: max(
+                int(path.name) for path in Path("/proc").iterdir() if path.name.isdigit()
+            ),
         }
 
     def exit_initialization_mode(self):

@@ -29,7 +29,9 @@ from cosim.process.sandbox import (
 pytestmark = pytest.mark.slow
 
 AVAILABLE = find_available_sandboxes()
-needs_sandbox = pytest.mark.skipif(not AVAILABLE.confines_fmus, reason="this system cannot confine FMUs")
+needs_sandbox = pytest.mark.skipif(
+    not AVAILABLE.confines_fmus, reason="this system cannot confine FMUs"
+)
 needs_bubblewrap = pytest.mark.skipif(not AVAILABLE.bubblewrap, reason="no bubblewrap that works")
 
 #: a worker enters the sandbox, tries something, and says what came of it
@@ -73,22 +75,36 @@ class TestFiles:
 
     def test_what_is_listed_is_read_and_not_written(self, private, tmp_path):
         assert worker(f"Path({str(private)!r}).read_text()", readable=[tmp_path]) == "secret"
-        assert worker(f"Path({str(private)!r}).write_text('mine')", readable=[tmp_path]) == "PermissionError"
+        assert (
+            worker(f"Path({str(private)!r}).write_text('mine')", readable=[tmp_path])
+            == "PermissionError"
+        )
         assert private.read_text() == "secret"
 
     def test_one_file_can_be_listed(self, private, tmp_path):
         (tmp_path / "other").write_text("other")
         assert worker(f"Path({str(private)!r}).read_text()", readable=[private]) == "secret"
-        assert worker(f"Path({str(tmp_path / 'other')!r}).read_text()", readable=[private]) == "PermissionError"
+        assert (
+            worker(f"Path({str(tmp_path / 'other')!r}).read_text()", readable=[private])
+            == "PermissionError"
+        )
 
     def test_writing_works_in_the_temporary_folder_only(self, tmp_path):
         (tmp_path / "temporary").mkdir()
         inside, outside = tmp_path / "temporary" / "file", tmp_path / "file"
-        assert worker(f"Path({str(inside)!r}).write_text('mine')", writable=[tmp_path / "temporary"]) == 4
-        assert worker(f"Path({str(outside)!r}).write_text('mine')", writable=[tmp_path / "temporary"]) == "PermissionError"
+        assert (
+            worker(f"Path({str(inside)!r}).write_text('mine')", writable=[tmp_path / "temporary"])
+            == 4
+        )
+        assert (
+            worker(f"Path({str(outside)!r}).write_text('mine')", writable=[tmp_path / "temporary"])
+            == "PermissionError"
+        )
         assert not outside.exists()
 
-    @pytest.mark.parametrize("act", ["os.unlink({0!r})", "os.rename({0!r}, {0!r} + '2')", "os.truncate({0!r}, 0)"])
+    @pytest.mark.parametrize(
+        "act", ["os.unlink({0!r})", "os.rename({0!r}, {0!r} + '2')", "os.truncate({0!r}, 0)"]
+    )
     def test_files_outside_are_not_removed_moved_or_cut(self, private, act):
         assert worker(act.format(str(private))) == "PermissionError"
         assert private.read_text() == "secret"
@@ -102,12 +118,18 @@ class TestFiles:
     def test_libraries_inside_still_load(self):
         assert worker("__import__('numpy').ones(3).sum()", memory=4 << 30) == 3.0
 
-    @pytest.mark.parametrize("act", ["os.fork()", "subprocess.run(['true'])", "os.posix_spawn('/bin/true', ['true'], {})"])
+    @pytest.mark.parametrize(
+        "act",
+        ["os.fork()", "subprocess.run(['true'])", "os.posix_spawn('/bin/true', ['true'], {})"],
+    )
     def test_no_process_is_started(self, act):
         assert worker(act, readable=["/usr/bin", "/bin"]) == "PermissionError"
 
     def test_threads_are_started(self):
-        code = "(lambda t: (t.start(), t.join(2), t.is_alive()))(__import__('threading').Thread(target=os.getpid))[2]"
+        code = (
+            "(lambda t: (t.start(), t.join(2), "
+            "t.is_alive()))(__import__('threading').Thread(target=os.getpid))[2]"
+        )
         assert worker(code) is False
 
 
@@ -141,13 +163,16 @@ class TestEnvironment:
         assert worker("(os.environ['HOME'], os.environ['TMPDIR'])") == [str(tmp_path)] * 2
 
     def test_no_value_remains_in_memory(self, monkeypatch):
-        """All memory of the process is searched, for the text itself and not for the pattern, which is in memory too."""
+        """All memory of the process is searched, for the text itself and not for the pattern, which
+        is in memory too.
+        """
         monkeypatch.setenv("SECRET", "swordfish-in-memory")
         assert searched("pass") > 0
         assert searched("clear_environment()") == 0
 
 
-#: an environment is cleared, or not, and a text is searched in all memory; the text is put together from its letters
+#: an environment is cleared, or not, and a text is searched in all memory; the text is put together
+#: from its letters
 SEARCH = """
 import ctypes, os
 from cosim.process.sandbox import clear_environment
@@ -181,16 +206,26 @@ class TestLimits:
 
     def test_files_do_not_grow_without_end(self, tmp_path):
         assert (
-            worker(f"Path({str(tmp_path / 'file')!r}).write_bytes(bytes(2000))", file_size=1000, writable=[tmp_path]) == "OSError"
+            worker(
+                f"Path({str(tmp_path / 'file')!r}).write_bytes(bytes(2000))",
+                file_size=1000,
+                writable=[tmp_path],
+            )
+            == "OSError"
         )
 
     def test_processor_time_ends_the_process(self):
         words = [sys.executable, "-c", WORKER, '{"cpu_seconds": 1}', "[0 for _ in iter(int, 1)]"]
-        assert subprocess.run(words, check=False, timeout=60).returncode in (-signal.SIGKILL, -signal.SIGXCPU)
+        assert subprocess.run(words, check=False, timeout=60).returncode in (
+            -signal.SIGKILL,
+            -signal.SIGXCPU,
+        )
 
     def test_nothing_can_be_read_from_standard_input(self):
         words = [sys.executable, "-c", WORKER, "{}", "sys.stdin.read()"]
-        done = subprocess.run(words, capture_output=True, text=True, input="typed", check=False, timeout=60)
+        done = subprocess.run(
+            words, capture_output=True, text=True, input="typed", check=False, timeout=60
+        )
         assert json.loads(done.stdout) == ""
 
     @needs_sandbox
@@ -199,12 +234,20 @@ class TestLimits:
         code = "__import__('dataclasses').asdict(probe_restrictions())"
         found = worker(code, memory=2 << 30, open_files=99)
         assert (found["files_confined"], found["network_closed"]) == (True, True)
-        assert (found["own_session"], found["no_new_privileges"], found["open_files"]) == (True, True, 99)
+        assert (found["own_session"], found["no_new_privileges"], found["open_files"]) == (
+            True,
+            True,
+            99,
+        )
         assert found["memory"] > 2 << 30
 
     def test_a_free_process_claims_nothing(self):
         free = subprocess.run(
-            [sys.executable, "-c", "from cosim.process.sandbox import probe_restrictions; print(probe_restrictions())"],
+            [
+                sys.executable,
+                "-c",
+                "from cosim.process.sandbox import probe_restrictions; print(probe_restrictions())",
+            ],
             capture_output=True,
             text=True,
             check=True,
@@ -228,12 +271,21 @@ time.sleep(100)
 
 
 def test_a_worker_does_not_outlive_its_parent():
-    done = subprocess.run([sys.executable, "-c", PARENT, CHILD], capture_output=True, text=True, check=False, timeout=60)
+    done = subprocess.run(
+        [sys.executable, "-c", PARENT, CHILD],
+        capture_output=True,
+        text=True,
+        check=False,
+        timeout=60,
+    )
     worker_id = int(done.stdout)
     ended = time.monotonic() + 10
     while Path(f"/proc/{worker_id}").exists() and time.monotonic() < ended:
         time.sleep(0.02)
-    assert not Path(f"/proc/{worker_id}").exists() or "Z" in Path(f"/proc/{worker_id}/stat").read_text()
+    assert (
+        not Path(f"/proc/{worker_id}").exists()
+        or "Z" in Path(f"/proc/{worker_id}/stat").read_text()
+    )
 
 
 @needs_sandbox
@@ -279,7 +331,9 @@ class TestModuleFolders:
         (folder / "package-1.0.dist-info/RECORD").touch()
         assert folder in interpreter_folders()
 
-    @pytest.mark.parametrize("other", ["notes.txt", ".ssh/id_rsa", "namespace/deep/letter.odt", ".netrc"])
+    @pytest.mark.parametrize(
+        "other", ["notes.txt", ".ssh/id_rsa", "namespace/deep/letter.odt", ".netrc"]
+    )
     def test_a_folder_in_pythonpath_with_other_files_is_refused(self, folder, other):
         (folder / other).parent.mkdir(parents=True, exist_ok=True)
         (folder / other).touch()
@@ -293,7 +347,9 @@ class TestModuleFolders:
 
     def test_the_own_packages_are_readable(self):
         assert landlock.__file__ is not None
-        assert any(Path(landlock.__file__).is_relative_to(folder) for folder in interpreter_folders())
+        assert any(
+            Path(landlock.__file__).is_relative_to(folder) for folder in interpreter_folders()
+        )
 
 
 def strict(code: str, **folders: list[Path]) -> subprocess.CompletedProcess[str]:
@@ -326,7 +382,10 @@ class TestStrict:
         late = tmp_path / "late"
         child = f"import time; time.sleep(0.5); open({str(late)!r}, 'w')"
         done = strict(
-            f"import subprocess, sys; subprocess.Popen([sys.executable, '-c', {child!r}], start_new_session=True)",
+            (
+                f"import subprocess, sys; subprocess.Popen([sys.executable, '-c', {child!r}], "
+                "start_new_session=True)"
+            ),
             writable=[tmp_path],
         )
         assert done.returncode == 0, done.stderr

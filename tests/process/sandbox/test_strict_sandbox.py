@@ -20,8 +20,12 @@ from cosim.process.sandbox import find_available_sandboxes
 
 pytestmark = [
     pytest.mark.slow,
-    pytest.mark.skipif(not find_available_sandboxes().bubblewrap, reason="no bubblewrap that works"),
-    pytest.mark.skipif(not find_available_sandboxes().confines_fmus, reason="this system cannot confine FMUs"),
+    pytest.mark.skipif(
+        not find_available_sandboxes().bubblewrap, reason="no bubblewrap that works"
+    ),
+    pytest.mark.skipif(
+        not find_available_sandboxes().confines_fmus, reason="this system cannot confine FMUs"
+    ),
 ]
 
 
@@ -67,7 +71,13 @@ def prowling(home: Path, port: int = 9, **more: Any) -> Path:
         "process": os.getpid(),
     }
     component = {"python": "sandbox_probe.py:SandboxProbe", "arguments": arguments}
-    content = {"name": "prowling", "stop_time": 0.1, "step_size": 0.01, "components": {"p": component}, **more}
+    content = {
+        "name": "prowling",
+        "stop_time": 0.1,
+        "step_size": 0.01,
+        "components": {"p": component},
+        **more,
+    }
     file = home / "project/prowling.json"
     file.write_text(json.dumps(content))
     return file
@@ -101,9 +111,16 @@ def test_the_run_writes_its_results_and_reaches_nothing_else(home, server):
 
 def test_without_sandbox_the_same_run_reaches_everything(home, server):
     """Control experiment for the test above."""
-    done = cosim(home, "run", prowling(home, server.getsockname()[1]), "--output-dir", "out", "--no-report")
+    done = cosim(
+        home, "run", prowling(home, server.getsockname()[1]), "--output-dir", "out", "--no-report"
+    )
     found = report(done)
-    assert (found["read a private file"], found["connect"], found["send"], found["signal"]) == ("secret", "connected", 3, None)
+    assert (found["read a private file"], found["connect"], found["send"], found["signal"]) == (
+        "secret",
+        "connected",
+        3,
+        None,
+    )
     assert (found["write beside its source"], server.recv(10)) == (4, b"out")
 
 
@@ -136,19 +153,35 @@ def test_a_bubblewrap_that_does_not_start_the_command_is_a_failure(home):
     (home / "bwrap").write_text("#!/bin/sh\nexit 0\n")
     (home / "bwrap").chmod(0o755)
     done = cosim(home, "run", prowling(home), "--sandbox", "strict", PATH=f"{home}:/bin")
-    assert (done.returncode, done.stderr) == (2, "bubblewrap could not start the command (exit code 0)\n")
+    assert (done.returncode, done.stderr) == (
+        2,
+        "bubblewrap could not start the command (exit code 0)\n",
+    )
     assert not (home / "runs").exists()
 
 
 @pytest.mark.parametrize("place", ["project", "."], ids=["folder of the scenario", "folder above"])
 def test_the_home_folder_is_not_opened(home, place):
-    done = cosim(home, "run", prowling(home), "--output-dir", "out", "--sandbox", "strict", HOME=str((home / place).resolve()))
-    assert (done.returncode, (home / "out").exists()) == ((2, False) if place == "project" else (0, True)), done.stderr
+    done = cosim(
+        home,
+        "run",
+        prowling(home),
+        "--output-dir",
+        "out",
+        "--sandbox",
+        "strict",
+        HOME=str((home / place).resolve()),
+    )
+    assert (done.returncode, (home / "out").exists()) == (
+        (2, False) if place == "project" else (0, True)
+    ), done.stderr
     assert ("contains the home folder" in done.stderr) is (place == "project")
 
 
 def test_results_are_not_written_to_the_home_folder(home):
-    done = cosim(home, "run", prowling(home), "--output-dir", ".", "--sandbox", "strict", HOME=str(home))
+    done = cosim(
+        home, "run", prowling(home), "--output-dir", ".", "--sandbox", "strict", HOME=str(home)
+    )
     assert (done.returncode, done.stderr.count("\n")) == (2, 1)
     assert f'"{home}" holds a file or the results of this run' in done.stderr
 
@@ -157,7 +190,16 @@ def test_the_environment_inside_is_a_listed_one(home):
     probe = (home / "project/sandbox_probe.py").read_text()
     (home / "project/sandbox_probe.py").write_text(probe + "\nprint(sorted(os.environ))\n")
     done = cosim(
-        home, "run", prowling(home), "--output-dir", "out", "--no-report", "--sandbox", "strict", PRIVATE="x", LC_ALL="C"
+        home,
+        "run",
+        prowling(home),
+        "--output-dir",
+        "out",
+        "--no-report",
+        "--sandbox",
+        "strict",
+        PRIVATE="x",
+        LC_ALL="C",
     )
     assert done.returncode == 0, done.stderr
     assert "PRIVATE" not in done.stdout + done.stderr
@@ -174,8 +216,19 @@ def test_strict_sandbox_of_a_single_fmu(home, probe):
 
 def slow(home: Path) -> subprocess.Popen[str]:
     """Long real-time run that has written rows."""
-    order = ("run", prowling(home, stop_time=1000), "--output-dir", "out", "--no-report", "--sandbox", "strict", "--real-time")
-    process = subprocess.Popen(words(*order), cwd=home, env=variables(home), stderr=subprocess.PIPE, text=True)
+    order = (
+        "run",
+        prowling(home, stop_time=1000),
+        "--output-dir",
+        "out",
+        "--no-report",
+        "--sandbox",
+        "strict",
+        "--real-time",
+    )
+    process = subprocess.Popen(
+        words(*order), cwd=home, env=variables(home), stderr=subprocess.PIPE, text=True
+    )
     latest = time.monotonic() + 60
     while not (home / "out/result.csv").exists() and time.monotonic() < latest:
         time.sleep(0.02)
@@ -187,7 +240,10 @@ def marked(home: Path) -> list[str]:
     found = []
     for entry in Path("/proc").iterdir():
         try:
-            if entry.name.isdigit() and f"TMPDIR={home / 'tmp'}".encode() in (entry / "environ").read_bytes():
+            if (
+                entry.name.isdigit()
+                and f"TMPDIR={home / 'tmp'}".encode() in (entry / "environ").read_bytes()
+            ):
                 found.append(entry.name)
         except OSError:
             continue

@@ -55,9 +55,18 @@ CONDITIONAL = [
 ]
 
 
-def decide(machine: str, number: int, arguments: tuple[int, ...] = (), architecture: int | None = None) -> int:
+def decide(
+    machine: str, number: int, arguments: tuple[int, ...] = (), architecture: int | None = None
+) -> int:
     """Execute the filter as the kernel does and return its decision."""
-    data = struct.pack("<iIQ6Q", number, architecture or ARCHITECTURES[machine], 0, *arguments, *[0] * (6 - len(arguments)))
+    data = struct.pack(
+        "<iIQ6Q",
+        number,
+        architecture or ARCHITECTURES[machine],
+        0,
+        *arguments,
+        *[0] * (6 - len(arguments)),
+    )
     program, counter, register = filter_program(machine, PROCESS), 0, 0
     while True:
         code, if_true, if_false, operand = program[counter]
@@ -69,7 +78,11 @@ def decide(machine: str, number: int, arguments: tuple[int, ...] = (), architect
         elif code == 0x54:
             register &= operand
         elif code in (0x15, 0x25):
-            counter += if_true if (register == operand if code == 0x15 else register > operand) else if_false
+            counter += (
+                if_true
+                if (register == operand if code == 0x15 else register > operand)
+                else if_false
+            )
         else:
             raise AssertionError(f"code {code:#x}")
 

@@ -1,4 +1,6 @@
-"""Connections to the live page that stay idle, are slow or send too much: the page remains reachable."""
+"""Connections to the live page that stay idle, are slow or send too much: the page remains
+reachable.
+"""
 
 import os
 import resource
@@ -20,7 +22,9 @@ pytestmark = pytest.mark.slow
 @pytest.fixture(scope="module")
 def run(tmp_path_factory):
     """A paused run with its page."""
-    run = LiveRun(tmp_path_factory.mktemp("paused"), "free_flight", "--stop-time", "3", "--real-time", "0.1")
+    run = LiveRun(
+        tmp_path_factory.mktemp("paused"), "free_flight", "--stop-time", "3", "--real-time", "0.1"
+    )
     run.command("pause")
     yield run
     assert run.end() in (0, 3)
@@ -67,7 +71,10 @@ def open_descriptors(run):
 HALF_OPEN = b"GET /chat HTTP/1.1\r\nHost: x\r\nUpgrade: websocket\r\nConnection: Upgrade\r\n"
 
 
-@pytest.mark.parametrize("data", [b"", b"G", HALF_OPEN, b"POST / HTTP/1.1\r\nContent-Length: 99\r\nExpect: 100-continue\r\n"])
+@pytest.mark.parametrize(
+    "data",
+    [b"", b"G", HALF_OPEN, b"POST / HTTP/1.1\r\nContent-Length: 99\r\nExpect: 100-continue\r\n"],
+)
 def test_the_page_is_reachable_beside_many_idle_connections(run, data):
     connections = [connect(address(run), data) for _ in range(300)]
     assert run.get().status == 200
@@ -96,9 +103,13 @@ def test_a_connection_with_the_token_survives_a_flood_of_others(run):
 
 
 def test_without_free_descriptors_the_server_waits(run):
-    """The processor stays free for the run; as soon as descriptors are free, the page is there again."""
+    """The processor stays free for the run; as soon as descriptors are free, the page is there
+    again.
+    """
     before = resource.prlimit(run.process.pid, resource.RLIMIT_NOFILE)
-    resource.prlimit(run.process.pid, resource.RLIMIT_NOFILE, (max(open_descriptors(run)) + 1, before[1]))
+    resource.prlimit(
+        run.process.pid, resource.RLIMIT_NOFILE, (max(open_descriptors(run)) + 1, before[1])
+    )
     connections = [connect(address(run)) for _ in range(20)]
     ticks = processor_ticks(run)
     time.sleep(0.6)
@@ -157,6 +168,8 @@ def test_the_number_of_connections_is_limited(server):
     connections[0].settimeout(20)
     assert connections[0].recv(1) == b""
     assert len(server._admissions) <= MAX_CONNECTIONS
-    assert reply(connect(server.server_address, b"GET / HTTP/1.1\r\n\r\n")).startswith(b"HTTP/1.1 403")
+    assert reply(connect(server.server_address, b"GET / HTTP/1.1\r\n\r\n")).startswith(
+        b"HTTP/1.1 403"
+    )
     for connection in connections:
         connection.close()

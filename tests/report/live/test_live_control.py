@@ -29,9 +29,13 @@ class Steered:
     def __init__(self, commands, refuse=None, speed=None):
         self.commands, self.refuse = commands, refuse
         self.connection, child_end = Pipe()
-        gain = Variable("k", causality="parameter", variability="tunable", start=1.0, minimum=0.0, maximum=9.0)
+        gain = Variable(
+            "k", causality="parameter", variability="tunable", start=1.0, minimum=0.0, maximum=9.0
+        )
         text = Variable("text", "String", causality="parameter", variability="tunable", start="")
-        self.fake = FakeComponent([gain, text, *inputs("u"), *outputs("y")], self.step, start={"k": 1.0, "text": ""})
+        self.fake = FakeComponent(
+            [gain, text, *inputs("u"), *outputs("y")], self.step, start={"k": 1.0, "text": ""}
+        )
         self.fake.set = self.set
         self.system = make_system({"a": self.fake})
         self.control = LiveControl(child_end, self.system, GRID, speed, {"rows": 61})
@@ -84,15 +88,27 @@ def test_values_that_were_set_are_returned_as_events_at_exact_times():
     events = run.control.finish()
     assert [event["time"] for event in events] == [0.0, 0.1, "7/60"]
     repeated = [Event(Fraction(str(e["time"])), {"a": {"k": e["set"]["a.k"]}}) for e in events]
-    assert Steered({}).run(repeated, control=False).recording.columns["y"].tolist() == values.tolist()
+    assert (
+        Steered({}).run(repeated, control=False).recording.columns["y"].tolist() == values.tolist()
+    )
 
 
 def test_a_paused_run_waits_for_step_or_resume():
-    run = Steered({3: [{"command": "pause"}, {"command": "step"}, {"command": "step"}], 5: [{"command": "resume"}]})
+    run = Steered(
+        {
+            3: [{"command": "pause"}, {"command": "step"}, {"command": "step"}],
+            5: [{"command": "resume"}],
+        }
+    )
     assert run.run().macro_steps == 60
     _, pause, step, more, resume = run.said()
     assert [answer["time"] for answer in (pause, step, more)] == [3 / 60] * 3
-    assert (resume["time"], pause["paused"], more["paused"], resume["paused"]) == (5 / 60, True, True, False)
+    assert (resume["time"], pause["paused"], more["paused"], resume["paused"]) == (
+        5 / 60,
+        True,
+        True,
+        False,
+    )
 
 
 def test_the_first_message_lists_the_variables_that_can_be_set():
@@ -137,7 +153,10 @@ def recorded(tmp_path):
     rows = np.zeros(101, dtype)
     rows["x"], rows["n"], rows["b"] = np.arange(101) ** 2, np.arange(101), np.arange(101) % 2
     rows.tofile(tmp_path / "rows")
-    columns = [Column(name, dtype[name].str, dtype.fields[name][1], name == "b", "") for name in dtype.names]
+    columns = [
+        Column(name, dtype[name].str, dtype.fields[name][1], name == "b", "")
+        for name in dtype.names
+    ]
     return tmp_path, RowsHeader(0, 1, 100, 2, dtype.itemsize, columns, [], [])
 
 
@@ -153,4 +172,6 @@ def test_rows_of_long_runs_are_downsampled(recorded, monkeypatch):
     monkeypatch.setattr(cosim.report.live.feed, "MAX_VALUES", 4 * 26)
     feed = RowFeed(*recorded, expected_rows=101)
     assert (feed.stride, feed.available(1), feed.available(9), feed.capacity) == (4, 1, 3, 26)
-    assert np.frombuffer(feed.read(1, 25), "<f4").reshape(4, 25)[2].tolist() == list(range(4, 101, 4))
+    assert np.frombuffer(feed.read(1, 25), "<f4").reshape(4, 25)[2].tolist() == list(
+        range(4, 101, 4)
+    )

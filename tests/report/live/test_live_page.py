@@ -21,7 +21,10 @@ def page(chromium, run):
     page = context.new_page()
     page.console_messages, page.requests = [], []
     page.on("pageerror", lambda error: page.console_messages.append(str(error)))
-    page.on("console", lambda said: page.console_messages.append(said.text) if said.type == "error" else None)
+    page.on(
+        "console",
+        lambda said: page.console_messages.append(said.text) if said.type == "error" else None,
+    )
     page.on("request", lambda request: page.requests.append(request.url))
     page.goto(run.url)
     page.wait_for_selector("#replay[data-ready]", timeout=60_000)
@@ -34,9 +37,13 @@ def waiting(page, condition):
 
 
 def test_a_live_run_is_shown_steered_and_replayed(run, page):
-    assert page.locator(".play").count() == page.locator(".speed").count() == 1  # one set of controls
+    assert (
+        page.locator(".play").count() == page.locator(".speed").count() == 1
+    )  # one set of controls
     page.locator(".play").click()
-    waiting(page, "cosimReplay.player.time > cosimReplay.player.first && cosimReplay.live.run.rows > 20")
+    waiting(
+        page, "cosimReplay.player.time > cosimReplay.player.first && cosimReplay.live.run.rows > 20"
+    )
     page.keyboard.press("Space")
     waiting(page, "document.querySelector('.state').textContent === 'Paused'")
     rows = page.evaluate("cosimReplay.live.run.rows")
@@ -48,7 +55,13 @@ def test_a_live_run_is_shown_steered_and_replayed(run, page):
     assert (count.first.get_attribute("type"), count.first.get_attribute("max")) == ("range", "32")
     count.last.fill("99")
     count.last.press("Enter")
-    waiting(page, "document.querySelector('.answer').textContent.includes('must lie in 1.0 ... 32.0, found 99')")
+    waiting(
+        page,
+        (
+            "document.querySelector('.answer').textContent.includes('must lie in 1.0 ... 32.0, "
+            "found 99')"
+        ),
+    )
     assert count.last.input_value() == "5"
     speed = page.get_by_label("usv.speed_command", exact=True)
     speed.fill("0.25")
@@ -59,12 +72,16 @@ def test_a_live_run_is_shown_steered_and_replayed(run, page):
     page.locator(".play").click()
     assert run.wait() in (0, 3)
     waiting(page, "document.querySelector('.state').textContent === 'Finished'")
-    assert run.run_metadata()["live_events"] == [{"time": pytest.approx(0.01 * rows), "set": {"usv.speed_command": 0.25}}]
+    assert run.run_metadata()["live_events"] == [
+        {"time": pytest.approx(0.01 * rows), "set": {"usv.speed_command": 0.25}}
+    ]
     result = Result.from_csv(run.out / "result.csv")
     assert page.evaluate("cosimReplay.live.run.rows") == len(result.time)
     waiting(page, "cosimReplay.player.time === 6")
     x, y, z = page.evaluate("cosimReplay.view.actors[1].object.position.toArray()")
-    assert (x, y, z) == pytest.approx([result[f"vessel.position.{axis}"][-1] for axis in "xyz"], abs=1e-5)
+    assert (x, y, z) == pytest.approx(
+        [result[f"vessel.position.{axis}"][-1] for axis in "xyz"], abs=1e-5
+    )
 
     page.evaluate("cosimReplay.player.seek(2)")  # a replay as any
     assert page.get_by_label("Replay speed", exact=True).input_value() == "1"

@@ -27,7 +27,14 @@ FORCE = "vessel.external_force.y"
 @pytest.fixture(scope="module")
 def paused(tmp_path_factory):
     """A run that stands still; nothing that a test asks of it may move it."""
-    run = LiveRun(tmp_path_factory.mktemp("paused"), "free_flight", "--stop-time", str(STOP), "--real-time", "0.1")
+    run = LiveRun(
+        tmp_path_factory.mktemp("paused"),
+        "free_flight",
+        "--stop-time",
+        str(STOP),
+        "--real-time",
+        "0.1",
+    )
     assert run.command("pause")["paused"]
     rows = run.count()
     yield run
@@ -51,10 +58,14 @@ def values(result):
 
 
 def same(one, other):
-    return all(np.array_equal(mine, its) for mine, its in zip(values(one).values(), values(other).values(), strict=True))
+    return all(
+        np.array_equal(mine, its)
+        for mine, its in zip(values(one).values(), values(other).values(), strict=True)
+    )
 
 
-# -- what it does ------------------------------------------------------------------------------------------------------------
+# -- what it does
+# ------------------------------------------------------------------------------------------------------------
 
 
 def test_a_step_is_one_macro_step_and_viewing_does_not_change_the_result(begun):
@@ -67,7 +78,9 @@ def test_a_step_is_one_macro_step_and_viewing_does_not_change_the_result(begun):
 
 
 def test_values_that_were_set_are_events_that_reproduce_the_result(begun):
-    assert begun.command("set", name="usv.speed_command", value=0.5)["time"] == begun.rows()[0]["time"]
+    assert (
+        begun.command("set", name="usv.speed_command", value=0.5)["time"] == begun.rows()[0]["time"]
+    )
     before = begun.count()
     for _ in range(7):
         begun.command("step")
@@ -101,7 +114,9 @@ def test_the_page_receives_the_rows_of_the_result(begun):
 
 
 def test_the_speed_is_relative_to_real_time(begun):
-    """At a tenth of its speed a run is no further than a tenth of the time that has passed, on a busy machine not even there."""
+    """At a tenth of its speed a run is no further than a tenth of the time that has passed, on a
+    busy machine not even there.
+    """
     began = time.monotonic()
     before = begun.command("resume")["time"]
     time.sleep(0.5)
@@ -117,19 +132,25 @@ def test_an_interrupt_ends_a_run_that_is_paused(begun):
     begun.process.send_signal(signal.SIGINT)
     assert begun.wait() == 130
     about = begun.run_metadata()
-    assert (about["failure"], [event["set"] for event in about["live_events"]]) == ("interrupted", [{FORCE: 1.5}])
+    assert (about["failure"], [event["set"] for event in about["live_events"]]) == (
+        "interrupted",
+        [{FORCE: 1.5}],
+    )
 
 
 def test_the_values_that_were_set_survive_a_killed_run(begun):
     begun.command("set", name=FORCE, value=1.5)
     number = begun.process.pid
-    os.kill(int(Path(f"/proc/{number}/task/{number}/children").read_text().split()[0]), signal.SIGKILL)
+    os.kill(
+        int(Path(f"/proc/{number}/task/{number}/children").read_text().split()[0]), signal.SIGKILL
+    )
     assert begun.wait() == 1
     assert [event["set"] for event in begun.run_metadata()["live_events"]] == [{FORCE: 1.5}]
     assert len(Result.from_csv(begun.out / "result.csv").time)
 
 
-# -- who is let in -----------------------------------------------------------------------------------------------------------
+# -- who is let in
+# -----------------------------------------------------------------------------------------------------------
 
 
 @pytest.mark.parametrize("path", ["/", "/rows?first=0&version=-1", "/wrong/", "//", "/?token"])
@@ -139,14 +160,27 @@ def test_requests_without_the_token_are_refused(paused, path):
 
 
 @pytest.mark.parametrize("method", ["GET", "POST"])
-@pytest.mark.parametrize("host", ["evil.example", "127.0.0.1", "localhost:1", "127.0.0.1:{port}.evil.example", None])
+@pytest.mark.parametrize(
+    "host", ["evil.example", "127.0.0.1", "localhost:1", "127.0.0.1:{port}.evil.example", None]
+)
 def test_another_host_is_refused(paused, method, host):
     """A name that somebody else lets point to this machine is no name of it."""
     host = host and host.format(port=paused.host.rpartition(":")[2])
-    body = {"body": b"{}", "Content_Length": "2", "Content_Type": "application/json"} if method == "POST" else {}
+    body = (
+        {"body": b"{}", "Content_Length": "2", "Content_Type": "application/json"}
+        if method == "POST"
+        else {}
+    )
     origin = {"Origin": f"http://{host}"} if method == "POST" else {}
     assert (
-        paused.request(method, f"{paused.path}{'command' if method == 'POST' else ''}", **body, Host=host, **origin).status == 403
+        paused.request(
+            method,
+            f"{paused.path}{'command' if method == 'POST' else ''}",
+            **body,
+            Host=host,
+            **origin,
+        ).status
+        == 403
     )
 
 
@@ -156,7 +190,9 @@ def test_the_host_localhost_is_accepted(paused):
     assert paused.post(b'{"command": "pause"}', Host=name, Origin=f"http://{name}").status == 200
 
 
-@pytest.mark.parametrize("origin", ["http://evil.example", "null", "https://{host}", "http://localhost:{port}", None])
+@pytest.mark.parametrize(
+    "origin", ["http://evil.example", "null", "https://{host}", "http://localhost:{port}", None]
+)
 def test_commands_of_other_pages_are_refused(paused, origin):
     origin = origin and origin.format(host=paused.host, port=paused.host.rpartition(":")[2])
     assert paused.post(b'{"command": "resume"}', Origin=origin).status == 403
@@ -191,14 +227,35 @@ def test_an_invalid_request_body_is_refused(paused, body, headers, status):
     [
         ({"command": "resum"}, 'unknown command "resum"; did you mean "resume"?'),
         ({}, 'unknown command "None"'),
-        ({"command": "set", "name": "usv.sped_command", "value": 1}, 'did you mean "usv.speed_command"?'),
-        ({"command": "set", "name": "usv.waypoint_count", "value": 33}, '"waypoint_count" must lie in 1.0 ... 32.0, found 33'),
-        ({"command": "set", "name": "usv.waypoint_count", "value": 2.5}, "is of type Int32, found 2.5"),
-        ({"command": "set", "name": "usv.speed_command", "value": "fast"}, 'is of type Float64, found "fast"'),
-        ({"command": "set", "name": "usv.speed_command", "value": float("nan")}, "is of type Float64, found NaN"),
+        (
+            {"command": "set", "name": "usv.sped_command", "value": 1},
+            'did you mean "usv.speed_command"?',
+        ),
+        (
+            {"command": "set", "name": "usv.waypoint_count", "value": 33},
+            '"waypoint_count" must lie in 1.0 ... 32.0, found 33',
+        ),
+        (
+            {"command": "set", "name": "usv.waypoint_count", "value": 2.5},
+            "is of type Int32, found 2.5",
+        ),
+        (
+            {"command": "set", "name": "usv.speed_command", "value": "fast"},
+            'is of type Float64, found "fast"',
+        ),
+        (
+            {"command": "set", "name": "usv.speed_command", "value": float("nan")},
+            "is of type Float64, found NaN",
+        ),
         ({"command": "set", "name": "usv.speed_command"}, "is of type Float64, found null"),
-        ({"command": "set", "name": "vessel.thrust", "value": 1.0}, '"vessel.thrust" is neither a tunable parameter nor an'),
-        ({"command": "speed", "factor": 0}, "the speed must lie in 0.01 ... 1000, or be null; found 0"),
+        (
+            {"command": "set", "name": "vessel.thrust", "value": 1.0},
+            '"vessel.thrust" is neither a tunable parameter nor an',
+        ),
+        (
+            {"command": "speed", "factor": 0},
+            "the speed must lie in 0.01 ... 1000, or be null; found 0",
+        ),
         ({"command": "speed", "factor": True}, "found true"),
         ({"command": "speed", "factor": "1"}, 'found "1"'),
     ],
@@ -210,7 +267,8 @@ def test_a_command_that_cannot_be_carried_out_gets_an_error(paused, message, err
 
 
 @pytest.mark.parametrize(
-    ("resource", "status"), [("run.json", 404), ("../", 404), ("rows", 400), ("rows?first=-1&version=0", 400)]
+    ("resource", "status"),
+    [("run.json", 404), ("../", 404), ("rows", 400), ("rows?first=-1&version=0", 400)],
 )
 def test_unknown_resources_are_not_found(paused, resource, status):
     assert paused.get(resource).status == status
@@ -227,13 +285,17 @@ def test_the_page_may_connect_only_to_its_server_and_cannot_be_framed(paused):
     assert "default-src 'none'" in policy
     assert "connect-src 'self'" in policy
     assert "frame-ancestors 'none'" in policy
-    assert policy.startswith(re.search(r'-Policy" content="(.*?)">', html.unescape(reply.body.decode())).group(1))
+    assert policy.startswith(
+        re.search(r'-Policy" content="(.*?)">', html.unescape(reply.body.decode())).group(1)
+    )
     assert not [name for name in reply.headers if name.lower().startswith("access-control")]
 
 
 def refused(*options):
     done = subprocess.run(
-        [sys.executable, "-m", "cosim", "run", "free_flight", "--view", *options], capture_output=True, text=True
+        [sys.executable, "-m", "cosim", "run", "free_flight", "--view", *options],
+        capture_output=True,
+        text=True,
     )
     return done.returncode, done.stderr
 
@@ -254,7 +316,10 @@ def test_options_that_exclude_the_live_view_are_refused(options, error):
 
 def test_a_port_that_is_taken_is_refused(paused):
     port = paused.host.rpartition(":")[2]
-    assert refused("--view-port", port) == (2, f"--view cannot listen on 127.0.0.1:{port}: Address already in use\n")
+    assert refused("--view-port", port) == (
+        2,
+        f"--view cannot listen on 127.0.0.1:{port}: Address already in use\n",
+    )
 
 
 def test_the_address_of_the_page_is_in_no_list_of_processes(tmp_path, monkeypatch):

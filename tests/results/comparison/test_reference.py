@@ -9,15 +9,30 @@ from cosim.core.errors import CheckError
 from cosim.core.recording import Recording
 from cosim.results import Result
 from cosim.results.comparison import Tolerance, compare
-from cosim.results.comparison.reference import decimate, describe_provenance_changes, write_reference
+from cosim.results.comparison.reference import (
+    decimate,
+    describe_provenance_changes,
+    write_reference,
+)
 
 TIME = np.arange(2001) / 100
 SWITCH = TIME >= 7.77
-METADATA = {"name": "swing", "versions": {"numpy": "2"}, "machine": {"system": "Linux"}, "sha256": {"a.fmu": "12"}, "timing": 3}
+METADATA = {
+    "name": "swing",
+    "versions": {"numpy": "2"},
+    "machine": {"system": "Linux"},
+    "sha256": {"a.fmu": "12"},
+    "timing": 3,
+}
 
 
 def swing(**columns):
-    columns = {"a.x": np.sin(TIME) * np.exp(-TIME / 5), "a.on": SWITCH, "b": np.cos(9 * TIME), **columns}
+    columns = {
+        "a.x": np.sin(TIME) * np.exp(-TIME / 5),
+        "a.on": SWITCH,
+        "b": np.cos(9 * TIME),
+        **columns,
+    }
     return Result(Recording(TIME, columns, dict.fromkeys(columns, "m")), metadata=METADATA)
 
 
@@ -29,7 +44,9 @@ def test_few_rows_describe_the_run_closely():
     assert list(reference) == ["a.x", "a.on"]
     assert len(reference.time) < 120
     assert (reference.time[0], reference.time[-1]) == (0, 20)
-    assert compare(swing(), reference, {name: part.scaled(0.25) for name, part in TOLERANCES.items()}).passed
+    assert compare(
+        swing(), reference, {name: part.scaled(0.25) for name, part in TOLERANCES.items()}
+    ).passed
 
 
 def test_rows_are_dense_where_the_signal_changes():
@@ -53,7 +70,9 @@ def test_the_same_run_writes_the_same_bytes(tmp_path):
     for name in ("first", "second"):
         write_reference(swing(), tmp_path / f"{name}.csv", TOLERANCES)
     for suffix in (".csv", ".json"):
-        assert (tmp_path / f"first{suffix}").read_bytes() == (tmp_path / f"second{suffix}").read_bytes()
+        assert (tmp_path / f"first{suffix}").read_bytes() == (
+            tmp_path / f"second{suffix}"
+        ).read_bytes()
     about = json.loads((tmp_path / "first.json").read_text())
     assert about == {
         **{key: METADATA[key] for key in ("name", "versions", "machine", "sha256")},
@@ -75,8 +94,16 @@ def test_written_rows_are_recorded_ones_rounded_to_a_hundredth_of_the_tolerance(
     ("run", "tolerances", "reason"),
     [
         (swing(c=np.where(TIME == 3, np.nan, 0)), {"c": Tolerance(1)}, "c is nan at t = 3 s"),
-        (swing(), {"a.x": Tolerance(1), "a.z": Tolerance(1)}, '^this run is no reference: "a.z" matches no recorded signal'),
-        (swing(), {"a.[xy]": Tolerance(1)}, r'"a.\[xy\]" matches no recorded signal; only "\*" is a wildcard$'),
+        (
+            swing(),
+            {"a.x": Tolerance(1), "a.z": Tolerance(1)},
+            '^this run is no reference: "a.z" matches no recorded signal',
+        ),
+        (
+            swing(),
+            {"a.[xy]": Tolerance(1)},
+            r'"a.\[xy\]" matches no recorded signal; only "\*" is a wildcard$',
+        ),
     ],
 )
 def test_a_run_that_fails_its_own_comparison_is_refused(run, tolerances, reason, tmp_path):
@@ -86,7 +113,11 @@ def test_a_run_that_fails_its_own_comparison_is_refused(run, tolerances, reason,
 
 
 def test_changes_name_what_is_different():
-    later = {"versions": {"numpy": "3"}, "machine": {"system": "Linux"}, "sha256": {"a.fmu": "13", "b.py": "7"}}
+    later = {
+        "versions": {"numpy": "3"},
+        "machine": {"system": "Linux"},
+        "sha256": {"a.fmu": "13", "b.py": "7"},
+    }
     assert describe_provenance_changes(METADATA, METADATA) == []
     assert describe_provenance_changes(METADATA, later) == ["numpy 2 -> 3", "a.fmu", "b.py"]
 
@@ -98,12 +129,25 @@ def test_a_changed_module_is_named_unless_its_folder_has_many(tmp_path):
     run = Result(swing().recording, metadata={**METADATA, "sha256": few | many | data})
     write_reference(run, tmp_path / "r.csv", TOLERANCES)
     made_by = json.loads((tmp_path / "r.json").read_text())
-    assert sorted(made_by["sha256"]) == ["controllers/a.py", "controllers/b.py", "plant/*.py", *data]
+    assert sorted(made_by["sha256"]) == [
+        "controllers/a.py",
+        "controllers/b.py",
+        "plant/*.py",
+        *data,
+    ]
     assert describe_provenance_changes(made_by, run.metadata) == []
     changed = {"sha256": few | many | data | {"controllers/b.py": "2", "plant/m3.py": "2"}}
-    assert describe_provenance_changes(made_by, {**run.metadata, **changed}) == ["controllers/b.py", "plant/*.py"]
-    older = {**made_by, "sha256": {"controllers/*.py": "one hash of all"}}  # references of older versions
-    assert describe_provenance_changes(older, {**run.metadata, "sha256": few}) == ["controllers/*.py"]
+    assert describe_provenance_changes(made_by, {**run.metadata, **changed}) == [
+        "controllers/b.py",
+        "plant/*.py",
+    ]
+    older = {
+        **made_by,
+        "sha256": {"controllers/*.py": "one hash of all"},
+    }  # references of older versions
+    assert describe_provenance_changes(older, {**run.metadata, "sha256": few}) == [
+        "controllers/*.py"
+    ]
 
 
 def test_an_angle_that_jumps_by_a_turn_needs_few_rows():
@@ -111,5 +155,11 @@ def test_an_angle_that_jumps_by_a_turn_needs_few_rows():
     run = Result(Recording(TIME, {"yaw": angle}, {"yaw": "rad"}))
     reference = decimate(run, {"yaw": Tolerance(absolute=0.01)})
     assert len(reference.time) < 100
-    later = Result(Recording(TIME, {"yaw": np.angle(np.exp(1j * (np.pi + 0.3 * np.sin(TIME - 0.02))))}, {"yaw": "rad"}))
+    later = Result(
+        Recording(
+            TIME,
+            {"yaw": np.angle(np.exp(1j * (np.pi + 0.3 * np.sin(TIME - 0.02))))},
+            {"yaw": "rad"},
+        )
+    )
     assert compare(later, reference, {"yaw": Tolerance(absolute=0.01)}).passed

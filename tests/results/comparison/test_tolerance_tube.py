@@ -26,7 +26,9 @@ def bounds(moments, time, values, *tolerance):
 
 
 def searched(moments, time, values, reach):
-    """Return the extremes of a polyline within `reach` of each moment, from all corners and both ends of each window."""
+    """Return the extremes of a polyline within `reach` of each moment, from all corners and both
+    ends of each window.
+    """
     lower, upper = [], []
     for moment in moments:
         begin, end = max(moment - reach, time[0]), min(moment + reach, time[-1])
@@ -108,7 +110,9 @@ def test_a_result_passes_where_every_point_is_inside(seed):
     lower, upper = searched(time, time, values, 0.1)
     allowed = rng.choice([0.05, 0.1, 0.2])
     outside = np.flatnonzero((found < lower - allowed) | (found > upper + allowed))
-    verdict = compare(recorded(time, x=found), recorded(time, x=values), {"x": Tolerance(allowed, 0, 0.1)}).verdicts[0]
+    verdict = compare(
+        recorded(time, x=found), recorded(time, x=values), {"x": Tolerance(allowed, 0, 0.1)}
+    ).verdicts[0]
     assert verdict.time == (time[outside[0]] if outside.size else np.inf)
     assert f"{outside.size} of 200 points" in verdict.problem or not outside.size
 
@@ -122,10 +126,16 @@ def test_pyfunnel_draws_the_same_tube(seed, tmp_path):
     moments = np.sort(np.concatenate([time, rng.uniform(time[0], time[-1], 200)]))
     values = np.interp(moments, time, reference) + rng.normal(size=320)
     allowed, reach = rng.uniform(0.1, 1), rng.uniform(0.02, 0.5)
-    pyfunnel.compareAndReport(time, reference, moments, values, outputDirectory=str(tmp_path), atolx=reach, atoly=allowed)
+    pyfunnel.compareAndReport(
+        time, reference, moments, values, outputDirectory=str(tmp_path), atolx=reach, atoly=allowed
+    )
     with (tmp_path / "errors.csv").open() as file:
-        times, errors = np.array([[float(cell) for cell in row] for row in list(csv.reader(file))[1:]]).T
-    tube = Comparer(recorded(moments, x=values), recorded(time, x=reference)).tube("x", Tolerance(allowed, 0, reach))
+        times, errors = np.array(
+            [[float(cell) for cell in row] for row in list(csv.reader(file))[1:]]
+        ).T
+    tube = Comparer(recorded(moments, x=values), recorded(time, x=reference)).tube(
+        "x", Tolerance(allowed, 0, reach)
+    )
     distance = np.maximum(np.maximum(tube.lower - values, values - tube.upper), 0)
     assert times == pytest.approx(moments)
     assert (errors > 1e-9).sum() > 10

@@ -9,7 +9,9 @@ def files(lag, settings):
     return set(collect_bundle(lag.folder / "lag.json", [settings]).files)
 
 
-@pytest.mark.parametrize("settings", [{"/components/lag/parameters": {"fault": "table.txt"}}, {"lag.fault": "table.txt"}])
+@pytest.mark.parametrize(
+    "settings", [{"/components/lag/parameters": {"fault": "table.txt"}}, {"lag.fault": "table.txt"}]
+)
 def test_a_file_named_by_a_parameter_is_in_the_bundle(lag, settings):
     (lag.folder / "table.txt").write_text("1")
     assert files(lag, settings) == {"lag.json", "lag.fmu", "table.txt"}

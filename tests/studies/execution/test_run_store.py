@@ -37,9 +37,24 @@ def test_an_incomplete_last_line_is_cut_off(tmp_path):
             assert [run_store[key].kpis["a"] for key in KEYS[:2]] == [1.0, 3.0]
 
 
-LINES = [b"\0" * 20, b"{", b'{"key": "zz"}', b'{"key": "00", "kpis": 3}', b"[1]", b"\xff", b"[" * 100_000, b"1" * 5000]
-LINES += [b'{"key": "00", "kpis": {"a": %s}}' % value for value in (b'"text"', b'{"b": 1}', b"[1]", b"null", b"1" + b"0" * 400)]
-LINES += [b'{"key": "00", %s}' % field for field in (b'"seconds": "x"', b'"failure": 1', b'"output": null', b'"more": 1')]
+LINES = [
+    b"\0" * 20,
+    b"{",
+    b'{"key": "zz"}',
+    b'{"key": "00", "kpis": 3}',
+    b"[1]",
+    b"\xff",
+    b"[" * 100_000,
+    b"1" * 5000,
+]
+LINES += [
+    b'{"key": "00", "kpis": {"a": %s}}' % value
+    for value in (b'"text"', b'{"b": 1}', b"[1]", b"null", b"1" + b"0" * 400)
+]
+LINES += [
+    b'{"key": "00", %s}' % field
+    for field in (b'"seconds": "x"', b'"failure": 1', b'"output": null', b'"more": 1')
+]
 
 
 @pytest.mark.parametrize("line", LINES, ids=range(len(LINES)))
@@ -91,4 +106,14 @@ def test_a_folder_is_locked_against_a_second_sweep(tmp_path):
 
 def test_a_key_depends_on_files_and_settings_but_not_on_their_order():
     assert run_key("a", {"x": 1, "y": 2}) == run_key("a", {"y": 2, "x": 1})
-    assert len({run_key("a", {"x": 1}), run_key("b", {"x": 1}), run_key("a", {"x": 2}), run_key("a", {"z": 1})}) == 4
+    assert (
+        len(
+            {
+                run_key("a", {"x": 1}),
+                run_key("b", {"x": 1}),
+                run_key("a", {"x": 2}),
+                run_key("a", {"z": 1}),
+            }
+        )
+        == 4
+    )

@@ -15,7 +15,9 @@ from cosim.studies.sweep import SweepRow
 @pytest.mark.parametrize(("successes", "count"), [(0, 10), (1, 10), (7, 9), (50, 1000), (10, 10)])
 def test_wilson_intervals_agree_with_scipy(successes, count):
     expected = stats.binomtest(successes, count).proportion_ci(0.95, method="wilson")
-    assert wilson_interval(successes, count) == pytest.approx((expected.low, expected.high), abs=1e-12)
+    assert wilson_interval(successes, count) == pytest.approx(
+        (expected.low, expected.high), abs=1e-12
+    )
 
 
 def test_the_interval_without_runs_is_zero_to_one():
@@ -24,7 +26,10 @@ def test_the_interval_without_runs_is_zero_to_one():
 
 def row(run, value, label="a", failure=""):
     return SweepRow(
-        run, Point({"f": label}, {}), Record(str(run), {} if failure else {"k": value}, failure), not failure and value < 5
+        run,
+        Point({"f": label}, {}),
+        Record(str(run), {} if failure else {"k": value}, failure),
+        not failure and value < 5,
     )
 
 
@@ -33,14 +38,23 @@ def test_statistics_use_only_finite_values():
     (group,) = group_rows(lambda: [row(run, value) for run, value in enumerate(values)], [])
     ((name, found),) = group.statistics()
     finite = np.array([3.0, 9.0, 4.0, 1.0])
-    expected = {"count": 4, "mean": 4.25, "std": finite.std(ddof=1), "min": 1, "median": 3.5, "max": 9}
+    expected = {
+        "count": 4,
+        "mean": 4.25,
+        "std": finite.std(ddof=1),
+        "min": 1,
+        "median": 3.5,
+        "max": 9,
+    }
     assert name == "k"
     assert {key: found[key] for key in expected} == pytest.approx(expected)
     assert found["q05"] == pytest.approx(np.quantile(finite, 0.05))
 
 
 def test_groups_are_in_order_of_appearance_and_count_failures():
-    found = group_rows(lambda: [row(0, 1.0, "b"), row(1, 9.0, "a"), row(2, 0.0, "b", "broken")], ["f"])
+    found = group_rows(
+        lambda: [row(0, 1.0, "b"), row(1, 9.0, "a"), row(2, 0.0, "b", "broken")], ["f"]
+    )
     assert [(g.labels["f"], g.runs, g.failed, g.passed, g.success_rate) for g in found] == [
         ("b", 2, 1, 1, 0.5),
         ("a", 1, 0, 0, 0.0),
@@ -49,9 +63,19 @@ def test_groups_are_in_order_of_appearance_and_count_failures():
 
 def test_a_shared_run_counts_once_in_intervals():
     """Two groups of eight points share two runs, one of which is a success."""
-    rows = [replace(row(run, 9 * (run % 2), "ab"[run // 8]), record=Record(str(run % 2), {}), shared=True) for run in range(16)]
+    rows = [
+        replace(
+            row(run, 9 * (run % 2), "ab"[run // 8]), record=Record(str(run % 2), {}), shared=True
+        )
+        for run in range(16)
+    ]
     for group in group_rows(lambda: rows, ["f"]):
-        assert (group.runs, group.distinct, group.success_rate, group.interval) == (8, 2, 0.5, wilson_interval(1, 2))
+        assert (group.runs, group.distinct, group.success_rate, group.interval) == (
+            8,
+            2,
+            0.5,
+            wilson_interval(1, 2),
+        )
 
 
 def test_the_standard_deviation_of_one_value_is_nan():

@@ -42,7 +42,9 @@ def test_it_stays_on_the_deck_with_its_motors_stopped(demo):
     for i in range(1, 5):
         assert not result[f"uav.rotor_speed[{i}]"][landed].any()
     weight = 0.443892 * 9.81
-    np.testing.assert_allclose(result["plant.uav.contact.force"][result.time > 39], weight, rtol=1e-3)
+    np.testing.assert_allclose(
+        result["plant.uav.contact.force"][result.time > 39], weight, rtol=1e-3
+    )
 
 
 def test_the_last_row_is_the_stop_time_and_every_row_its_own(demo):
@@ -53,8 +55,23 @@ def test_the_last_row_is_the_stop_time_and_every_row_its_own(demo):
 
 
 def digest(tmp_path, seed):
-    run = [sys.executable, "-m", "cosim", "run", "demo1_box", "--no-report", "--output-dir", str(tmp_path / seed)]
-    subprocess.run(run, cwd=tmp_path, capture_output=True, check=True, env={**__import__("os").environ, "PYTHONHASHSEED": seed})
+    run = [
+        sys.executable,
+        "-m",
+        "cosim",
+        "run",
+        "demo1_box",
+        "--no-report",
+        "--output-dir",
+        str(tmp_path / seed),
+    ]
+    subprocess.run(
+        run,
+        cwd=tmp_path,
+        capture_output=True,
+        check=True,
+        env={**__import__("os").environ, "PYTHONHASHSEED": seed},
+    )
     return sha256((tmp_path / seed / "result.csv").read_bytes()).hexdigest()
 
 
@@ -79,7 +96,12 @@ def test_one_controller_fmu_flies_like_the_nested_system(demo):
         "parameters": {"vtol.landing_time": 5.0, "altitude_command": 2.0},
     }
     single = cosim.run("demo1_box", {"/components/uav": whole})
-    for name in ("plant.uav.position.x", "plant.uav.position.z", "uav.altitude_reference", "uav.mode"):
+    for name in (
+        "plant.uav.position.x",
+        "plant.uav.position.z",
+        "uav.altitude_reference",
+        "uav.mode",
+    ):
         assert np.array_equal(single[name], nested[name]), name
 
 

@@ -15,7 +15,11 @@ WORLD = {
     "python": f"{root()}/plant_src/world.py:World",
     "arguments": {
         "vehicles": {
-            "quadcopter": {"model": "ar_drone", "position": [-5.0, 1.0, 2.0], "yaw": 1.5707963267948966},
+            "quadcopter": {
+                "model": "ar_drone",
+                "position": [-5.0, 1.0, 2.0],
+                "yaw": 1.5707963267948966,
+            },
             "vessel": {
                 "model": "strider",
                 "hull": "paper",
@@ -46,7 +50,9 @@ def test_plant_fmus_and_world_agree_over_forty_seconds():
     together = cosim.run("free_flight", CHANGES)
     for vehicle in ("quadcopter", "vessel"):
         for name in MOTION:
-            difference = np.abs(alone[f"{vehicle}.{name}"] - together[f"quadcopter.{vehicle}.{name}"]).max()
+            difference = np.abs(
+                alone[f"{vehicle}.{name}"] - together[f"quadcopter.{vehicle}.{name}"]
+            ).max()
             assert difference <= 1e-6, f"{vehicle}.{name}: {difference}"
 
 

@@ -29,7 +29,9 @@ def test_the_runs_of_a_pair_are_the_same(results, n):
 def test_the_last_pair_is_demo1(results):
     demo1 = cosim.run("demo1_box", stop_time=35)
     for name in demo1:
-        assert np.array_equal(results["performance_5"][f"demo1.{name}"], demo1[name], equal_nan=True), name
+        assert np.array_equal(
+            results["performance_5"][f"demo1.{name}"], demo1[name], equal_nan=True
+        ), name
 
 
 def test_the_first_pairs_differ_in_duration_and_do_not_land(results):
@@ -42,11 +44,20 @@ def test_the_first_pairs_differ_in_duration_and_do_not_land(results):
 
 def test_figure_18_has_six_bars(tmp_path):
     for name in NAMES:
-        done = CliRunner().invoke(run, [name, "--stop-time", "2", "--no-report", "--output-dir", str(tmp_path / name)])
+        done = CliRunner().invoke(
+            run, [name, "--stop-time", "2", "--no-report", "--output-dir", str(tmp_path / name)]
+        )
         assert (tmp_path / name / "run.json").is_file(), done.output
-    CliRunner().invoke(plot, [*(str(tmp_path / name) for name in NAMES), "--timings", "--format", "png"], catch_exceptions=False)
+    CliRunner().invoke(
+        plot,
+        [*(str(tmp_path / name) for name in NAMES), "--timings", "--format", "png"],
+        catch_exceptions=False,
+    )
     with (tmp_path / "timings.csv").open(newline="") as file:
         heights = [float(row[-1]) for row in list(csv.reader(file))[1:]]
-    loops = [json.loads((tmp_path / name / "run.json").read_text())["timing"]["loop_seconds"] for name in NAMES]
+    loops = [
+        json.loads((tmp_path / name / "run.json").read_text())["timing"]["loop_seconds"]
+        for name in NAMES
+    ]
     assert heights[:6] == pytest.approx([2.0 / loop for loop in loops])
     assert (tmp_path / "timings.png").stat().st_size > 0

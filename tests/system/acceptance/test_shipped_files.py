@@ -31,8 +31,12 @@ def test_fmpy_finds_no_problem(path):
     read_model_description(str(path), validate_model_structure=True)
 
 
-#: every twelfth FMU always, the others with `pytest -m long`: FMPy needs 10 ms for the syntax of a name
-CHECKED_NAMES = [pytest.param(path, marks=[] if i % 12 == 0 else [pytest.mark.long]) for i, path in enumerate(FMUS)]
+#: every twelfth FMU always, the others with `pytest -m long`: FMPy needs 10 ms for the syntax of a
+#: name
+CHECKED_NAMES = [
+    pytest.param(path, marks=[] if i % 12 == 0 else [pytest.mark.long])
+    for i, path in enumerate(FMUS)
+]
 
 
 @pytest.mark.parametrize("path", CHECKED_NAMES, ids=label)
@@ -52,7 +56,13 @@ def test_start_values_are_those_of_the_description(path):
             return getattr(component, name)
 
         def exit_initialization_mode(self):
-            seen.update({v.name: (component.get(v.name), v.start) for v in component.variables if v.start is not None})
+            seen.update(
+                {
+                    v.name: (component.get(v.name), v.start)
+                    for v in component.variables
+                    if v.start is not None
+                }
+            )
             component.exit_initialization_mode()
 
     run_system(make_system({"fmu": Look()}), 0.01, 0.01)
@@ -70,7 +80,12 @@ def test_fmus_are_finite_and_repeat_themselves(path):
 
 def outputs_over_a_second(path):
     file = FmuFile(path)
-    names = [slot for v in file.description.variables if v.causality == "output" for slot in v.scalar_names]
+    names = [
+        slot
+        for v in file.description.variables
+        if v.causality == "output"
+        for slot in v.scalar_names
+    ]
     columns = {name: Endpoint("fmu", name) for name in names}
     outcome = simulate(
         make_system({"fmu": create_component(file, "fmu")}),
@@ -83,7 +98,10 @@ def outputs_over_a_second(path):
 @pytest.mark.parametrize("path", FMUS, ids=label)
 def test_sources_are_inside(path):
     names = ZipFile(path).namelist()
-    assert any(name.startswith("sources/") and name.endswith(".c") for name in names) or f"resources/{path.stem}.py" in names
+    assert (
+        any(name.startswith("sources/") and name.endswith(".c") for name in names)
+        or f"resources/{path.stem}.py" in names
+    )
 
 
 def test_the_manifest_lists_exactly_the_fmus():

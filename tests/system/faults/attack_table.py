@@ -1,4 +1,5 @@
-"""Attacks of FMUs, the outcomes that are expected in each mode, and the table of SECURITY.md that lists them.
+"""Attacks of FMUs, the outcomes that are expected in each mode, and the table of SECURITY.md that
+lists them.
 
 Run this file to write the table.
 """
@@ -23,11 +24,11 @@ class Attack:
     Attributes:
         name: Name of the function in attacks.c.
         text: Description for the table.
-        target: "file" or "folder" outside, "process" of the user, "port", "stream", "datagram" or "abstract" socket; other texts
-            are passed to the function.
+        target: "file" or "folder" outside, "process" of the user, "port", "stream", "datagram" or
+            "abstract" socket; other texts are passed to the function.
         default: Outcome without sandbox.
-        needs: Precondition of the outcome without sandbox: "root", or a property that a "system" may lack or refuse to all
-            processes; "" for none.
+        needs: Precondition of the outcome without sandbox: "root", or a property that a "system"
+            may lack or refuse to all processes; "" for none.
         alone: The attack ends the run where it is possible.
     """
 
@@ -59,7 +60,10 @@ class Fault:
 
 
 FAILED = "lag: fmi2DoStep failed at t = 0.05 s: "
-SIGNAL, EXIT = FAILED + "the process was ended by signal ", FAILED + "it ended the process with exit code "
+SIGNAL, EXIT = (
+    FAILED + "the process was ended by signal ",
+    FAILED + "it ended the process with exit code ",
+)
 
 CLASSES: dict[str, list[Attack]] = {
     "files of the user": [
@@ -86,7 +90,12 @@ CLASSES: dict[str, list[Attack]] = {
         Attack("read_attribute", "read an extended attribute of a file", "file", needs="system"),
         Attack("watch_folder", "monitor accesses to a folder (`inotify`)", "folder"),
         Attack("create_device", "create a device as root", needs="root"),
-        Attack("open_by_handle", "create a handle of a file (`name_to_handle_at`)", "file", needs="system"),
+        Attack(
+            "open_by_handle",
+            "create a handle of a file (`name_to_handle_at`)",
+            "file",
+            needs="system",
+        ),
     ],
     "environment variables": [
         Attack("environment", "read a variable (`getenv`)"),
@@ -105,11 +114,15 @@ CLASSES: dict[str, list[Attack]] = {
         Attack("signal_by_descriptor", "send a signal (`pidfd_send_signal`)", "process"),
         Attack("signal_by_pipe", "send signals through a pipe (`F_SETOWN`)", "process"),
         Attack("change_limits", "change the limits of another process (`prlimit`)", "process"),
-        Attack("change_priority", "change the priority of another process (`setpriority`)", "process"),
+        Attack(
+            "change_priority", "change the priority of another process (`setpriority`)", "process"
+        ),
         Attack("change_io_priority", "change the I/O priority of another process", "process"),
         Attack("change_processors", "change the processor affinity of another process", "process"),
         Attack("change_scheduler", "change the scheduling policy of another process", "process"),
-        Attack("offer_to_memory_killer", "raise the out-of-memory score of another process", "process"),
+        Attack(
+            "offer_to_memory_killer", "raise the out-of-memory score of another process", "process"
+        ),
         Attack("kill_process", "kill another process of the user", "process"),
         Attack("raise_limits", "raise its own limits as root", needs="system"),
         Attack("fork_process", "start a process (`fork`)"),
@@ -122,7 +135,10 @@ CLASSES: dict[str, list[Attack]] = {
         Attack("tcp6", "open an IPv6 socket", needs="system"),
         Attack("udp", "send by UDP", "port"),
         Attack("server", "open a server socket"),
-        Attack("server_without_bind", "open a server socket without an address (`listen` without `bind`)"),
+        Attack(
+            "server_without_bind",
+            "open a server socket without an address (`listen` without `bind`)",
+        ),
         Attack("local_stream", "connect to a local socket with a path", "stream"),
         Attack("local_datagram", "send to a local socket with a path", "datagram"),
         Attack("abstract_socket", "send to an abstract local socket", "abstract"),
@@ -155,15 +171,39 @@ FAULTS = [
     Fault("loop", "never return", FAILED + "did not return within 0.5 s", NAMED),
     Fault("memory", "use all memory", FAILED + "status 3 (error)", NAMED),
     Fault("fp_traps", "enable floating-point traps", "changed the floating-point mode", WARNED),
-    Fault("close_all", "close all files of the process", "lag: a call that closed the files", NAMED, SURVIVED),
-    Fault("open_files", "open files endlessly", "lag: changed the number of free descriptors", WARNED, SURVIVED),
+    Fault(
+        "close_all",
+        "close all files of the process",
+        "lag: a call that closed the files",
+        NAMED,
+        SURVIVED,
+    ),
+    Fault(
+        "open_files",
+        "open files endlessly",
+        "lag: changed the number of free descriptors",
+        WARNED,
+        SURVIVED,
+    ),
     Fault("flood_stdout", "print endlessly"),
     Fault("log_20000", "log endlessly"),
     Fault("print_control", "send control sequences to the terminal", "\\x1b[31mred", "escaped"),
     Fault("log_control", "fake log lines", "WARNING lag: \\x1b[31mred", "escaped"),
     Fault("read_stdin", "wait for keyboard input"),
-    Fault("change_folder", "change the working directory", "lag: changed the working directory", WARNED, SURVIVED),
-    Fault("change_environment", "change the environment", "lag: changed the environment", WARNED, SURVIVED),
+    Fault(
+        "change_folder",
+        "change the working directory",
+        "lag: changed the working directory",
+        WARNED,
+        SURVIVED,
+    ),
+    Fault(
+        "change_environment",
+        "change the environment",
+        "lag: changed the environment",
+        WARNED,
+        SURVIVED,
+    ),
     Fault("ignore_interrupts", "ignore Ctrl-C", "lag: changed what is done upon", WARNED, SURVIVED),
     Fault("thread", "leave a thread running"),
 ]
@@ -176,7 +216,9 @@ def render_table() -> str:
         lines.append(f"| *{title}* | | |")
         lines += [f"| {attack.text} | {attack.default} | {PREVENTED} |" for attack in attacks]
     lines.append("| *the run itself* | | |")
-    lines += [f"| {fault.text} | {fault.outcome} | {fault.sandbox or fault.outcome} |" for fault in FAULTS]
+    lines += [
+        f"| {fault.text} | {fault.outcome} | {fault.sandbox or fault.outcome} |" for fault in FAULTS
+    ]
     return "\n".join(lines) + "\n"
 
 

@@ -16,7 +16,9 @@ from fault_fmu import scenario
 
 @dataclass(frozen=True)
 class CommandResult:
-    """Exit code and wall time (s) of a command, ids of processes that outlived it, and what stands in its folder."""
+    """Exit code and wall time (s) of a command, ids of processes that outlived it, and what stands
+    in its folder.
+    """
 
     folder: Path
     code: int
@@ -34,13 +36,21 @@ class CommandResult:
     @cached_property
     def rows(self) -> list[dict[str, float]]:
         """Rows of the result file; none where there is no file."""
-        files = [path for name in ("result.csv", "out/result.csv") if (path := self.folder / name).is_file()]
+        files = [
+            path
+            for name in ("result.csv", "out/result.csv")
+            if (path := self.folder / name).is_file()
+        ]
         with (files[0] if files else Path(os.devnull)).open() as file:
-            return [{name: float(value) for name, value in row.items()} for row in csv.DictReader(file)]
+            return [
+                {name: float(value) for name, value in row.items()} for row in csv.DictReader(file)
+            ]
 
     @cached_property
     def changes(self) -> list[str]:
-        """Changes of the command to its own process (folder, locale, signals ...); an entry when it never came to its end."""
+        """Changes of the command to its own process (folder, locale, signals ...); an entry when it
+        never came to its end.
+        """
         report = self.folder / "changes"
         return report.read_text().splitlines() if report.exists() else ["the process ended early"]
 
@@ -60,19 +70,31 @@ class CommandRunner:
         self._server.close()
 
     def cosim(
-        self, folder: Path, *arguments: object, environment: Mapping[str, str] | None = None, **conditions: Any
+        self,
+        folder: Path,
+        *arguments: object,
+        environment: Mapping[str, str] | None = None,
+        **conditions: Any,
     ) -> CommandResult:
-        """Run a command in `folder`, with temporary files in folder/tmp; `conditions`: see `cosim_command.CONDITIONS`."""
+        """Run a command in `folder`, with temporary files in folder/tmp; `conditions`: see
+        `cosim_command.CONDITIONS`.
+        """
         (folder / "tmp").mkdir(exist_ok=True)
         environment = {"TMPDIR": str(folder / "tmp"), **(environment or {})}
         conditions = {"limit": 60, "observe": True, **conditions}
-        return CommandResult(folder, **self._server.run(folder, folder, arguments, environment, **conditions))
+        return CommandResult(
+            folder, **self._server.run(folder, folder, arguments, environment, **conditions)
+        )
 
-    def run(self, folder: Path, fmu: Path, deadlines: dict[str, float] | None = None, **conditions: Any) -> CommandResult:
+    def run(
+        self, folder: Path, fmu: Path, deadlines: dict[str, float] | None = None, **conditions: Any
+    ) -> CommandResult:
         """`cosim run` of a scenario around the FMU; results in folder/out."""
         words = ("run", scenario(folder, fmu, deadlines), "--output-dir", "out", "--no-report")
         return self.cosim(folder, *words, **conditions)
 
     def simulate(self, folder: Path, fmu: Path, *words: str, **conditions: Any) -> CommandResult:
         """`cosim simulate` of the FMU alone; results in folder/result.csv."""
-        return self.cosim(folder, "simulate", fmu, "--output-file", "result.csv", *words, **conditions)
+        return self.cosim(
+            folder, "simulate", fmu, "--output-file", "result.csv", *words, **conditions
+        )

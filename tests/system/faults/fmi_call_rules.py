@@ -1,4 +1,6 @@
-"""Rules for the calls of an importer, checked from the record of calls: FMI 2.0 section 4.2.4, FMI 3.0 sections 2.3 and 4.2."""
+"""Rules for the calls of an importer, checked from the record of calls: FMI 2.0 section 4.2.4, FMI
+3.0 sections 2.3 and 4.2.
+"""
 
 from __future__ import annotations
 
@@ -8,7 +10,8 @@ from collections.abc import Iterable, Iterator, Sequence
 WARNING, ERROR, FATAL = 1, 3, 4
 #: what is still allowed after an error
 AFTER_ERROR = ("FreeInstance", "Reset", "SetFMUstate", "SetFMUState")
-#: letters of the life cycle: instantiate, set, get, setup, enter and exit initialization, step, terminate, free, logging
+#: letters of the life cycle: instantiate, set, get, setup, enter and exit initialization, step,
+#: terminate, free, logging
 CALL_LETTERS = {
     "Instantiate": "I",
     "SetupExperiment": "u",
@@ -26,7 +29,9 @@ LIFE_CYCLE = {
 
 
 def calls(lines: Iterable[str]) -> Iterator[tuple[str, str]]:
-    """(instance or "-" before there is one, function without prefix) of every call; ("...", "status N") of every bad return."""
+    """(instance or "-" before there is one, function without prefix) of every call; ("...", "status
+    N") of every bad return.
+    """
     for line in lines:
         words = line.split()
         if len(words) > 2 and words[1] == "status":
@@ -37,13 +42,17 @@ def calls(lines: Iterable[str]) -> Iterator[tuple[str, str]]:
 
 def letter(function: str) -> str:
     name = function.removesuffix("CoSimulation")
-    return CALL_LETTERS.get(name, "s" if name.startswith("Set") else "g" if name.startswith("Get") else "?")
+    return CALL_LETTERS.get(
+        name, "s" if name.startswith("Set") else "g" if name.startswith("Get") else "?"
+    )
 
 
 def life_cycle(lines: Iterable[str]) -> str:
     """The life of the FMU's only instance as a word of letters."""
     return "".join(
-        letter(function) for _, function in calls(lines) if not function.startswith(("status", "GetTypes", "GetVersion"))
+        letter(function)
+        for _, function in calls(lines)
+        if not function.startswith(("status", "GetTypes", "GetVersion"))
     )
 
 
@@ -53,7 +62,9 @@ def violations(lines: Sequence[str]) -> list[str]:
 
 
 def _after_bad_status(lines: Sequence[str]) -> Iterator[str]:
-    """After fatal nothing on any instance, after an error little on that one, after NULL nothing on the one not made."""
+    """After fatal nothing on any instance, after an error little on that one, after NULL nothing on
+    the one not made.
+    """
     dead, failed = False, set()
     for who, what in calls(lines):
         if what.startswith("status"):

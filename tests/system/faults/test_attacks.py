@@ -1,7 +1,8 @@
-"""Attacks of FMUs on files, processes and resources outside: each one succeeds without a sandbox and fails in it.
+"""Attacks of FMUs on files, processes and resources outside: each one succeeds without a sandbox
+and fails in it.
 
-All attacks that return are made by one FMU in one run per mode. An attack has reached its target if its call succeeded, or if the
-target has changed.
+All attacks that return are made by one FMU in one run per mode. An attack has reached its target if
+its call succeeded, or if the target has changed.
 """
 
 from __future__ import annotations
@@ -18,7 +19,18 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 import pytest
-from attack_table import ATTACKS, BEGIN, ENDED, FAULTS, NAMED, OPEN, SECURITY, Attack, Fault, replace_table
+from attack_table import (
+    ATTACKS,
+    BEGIN,
+    ENDED,
+    FAULTS,
+    NAMED,
+    OPEN,
+    SECURITY,
+    Attack,
+    Fault,
+    replace_table,
+)
 from command_runner import CommandResult, CommandRunner
 from fault_fmu import STEP_COUNT, FaultFmus, lag_output, scenario
 
@@ -31,9 +43,14 @@ MODES = {
     "strict": ["--sandbox", "strict"],
 }
 ALL = STEP_COUNT + 1
-needs_sandbox = pytest.mark.skipif(not AVAILABLE.confines_fmus, reason="this system cannot confine FMUs")
+needs_sandbox = pytest.mark.skipif(
+    not AVAILABLE.confines_fmus, reason="this system cannot confine FMUs"
+)
 needs_bubblewrap = pytest.mark.skipif(not AVAILABLE.bubblewrap, reason="no bubblewrap that works")
-SANDBOXES = [pytest.param("sandbox", marks=needs_sandbox), pytest.param("strict", marks=[needs_sandbox, needs_bubblewrap])]
+SANDBOXES = [
+    pytest.param("sandbox", marks=needs_sandbox),
+    pytest.param("strict", marks=[needs_sandbox, needs_bubblewrap]),
+]
 
 
 @dataclass
@@ -60,14 +77,21 @@ class Targets:
 
     def state(self) -> dict[str, object]:
         """Return the state of the targets by the names of the attacks that change it."""
-        files = {path.name: file_state(path) for path in self.folder.iterdir() if path.suffix != ".socket"}
+        files = {
+            path.name: file_state(path)
+            for path in self.folder.iterdir()
+            if path.suffix != ".socket"
+        }
         return {**files, **process_state(self.process)}
 
     def received(self) -> set[str]:
         """Return the names of the attacks by which something has arrived at the servers."""
         arrived = set()
         servers = {"tcp": self.port, "udp": self.datagrams, "local_stream": self.sockets["stream"]}
-        servers |= {"local_datagram": self.sockets["datagram"], "abstract_socket": self.sockets["abstract"]}
+        servers |= {
+            "local_datagram": self.sockets["datagram"],
+            "abstract_socket": self.sockets["abstract"],
+        }
         for name, server in servers.items():
             with suppress(BlockingIOError):
                 server.accept()[0].close() if server.type == socket.SOCK_STREAM else server.recv(10)
@@ -78,7 +102,14 @@ class Targets:
 def file_state(path: Path) -> tuple[object, ...]:
     status = path.lstat()
     content = path.read_bytes() if path.is_file() else b""
-    return status.st_mode, status.st_nlink, status.st_mtime_ns, status.st_uid, content, os.listxattr(path, follow_symlinks=False)
+    return (
+        status.st_mode,
+        status.st_nlink,
+        status.st_mtime_ns,
+        status.st_uid,
+        content,
+        os.listxattr(path, follow_symlinks=False),
+    )
 
 
 def process_state(process: subprocess.Popen[bytes]) -> dict[str, object]:
@@ -107,12 +138,21 @@ def make_targets(tmp_path_factory: pytest.TempPathFactory) -> Iterator[object]:
                     (folder / attack.name).write_text("secret")
             with suppress(OSError):  # file systems without attributes
                 os.setxattr(folder / "read_attribute", "user.attack", b"secret")
-            process = stack.enter_context(subprocess.Popen([sys.executable, "-c", "import time; time.sleep(300)"]))
+            process = stack.enter_context(
+                subprocess.Popen([sys.executable, "-c", "import time; time.sleep(300)"])
+            )
             stack.callback(process.kill)
-            port, datagrams = (stack.enter_context(socket.socket(type=kind)) for kind in (socket.SOCK_STREAM, socket.SOCK_DGRAM))
+            port, datagrams = (
+                stack.enter_context(socket.socket(type=kind))
+                for kind in (socket.SOCK_STREAM, socket.SOCK_DGRAM)
+            )
             port.bind(("127.0.0.1", 0))
             datagrams.bind(port.getsockname())
-            addresses = {"stream": str(folder / "s.socket"), "datagram": str(folder / "d.socket"), "abstract": str(folder)}
+            addresses = {
+                "stream": str(folder / "s.socket"),
+                "datagram": str(folder / "d.socket"),
+                "abstract": str(folder),
+            }
             targets = Targets(folder, process, port, datagrams, addresses)
             for name, address in addresses.items():
                 kind = socket.SOCK_STREAM if name == "stream" else socket.SOCK_DGRAM
@@ -154,14 +194,26 @@ def outcomes(fault_libraries, make_targets, runner, tmp_path_factory):
     def outcome(mode: str) -> Outcome:
         if mode not in known:
             attacks = [attack for attack in ATTACKS if mode != "default" or not attack.alone]
-            known[mode] = attack_all(mode, attacks, make_targets(), fault_libraries, runner, tmp_path_factory.mktemp("run"))
+            known[mode] = attack_all(
+                mode,
+                attacks,
+                make_targets(),
+                fault_libraries,
+                runner,
+                tmp_path_factory.mktemp("run"),
+            )
         return known[mode]
 
     return outcome
 
 
 def attack_all(
-    mode: str, attacks: list[Attack], targets: Targets, libraries: dict[int, Path], runner: CommandRunner, folder: Path
+    mode: str,
+    attacks: list[Attack],
+    targets: Targets,
+    libraries: dict[int, Path],
+    runner: CommandRunner,
+    folder: Path,
 ) -> Outcome:
     before = targets.state()
     orders = "".join(f"attack {attack.name} {targets.of(attack)}\n" for attack in attacks)
@@ -169,13 +221,19 @@ def attack_all(
     done = runner.simulate(folder, fmu, *MODES[mode])
     answers = dict(re.findall(r"^attack (\w+): (.*)$", done.err, re.MULTILINE))
     after = targets.state()
-    different = {name.removesuffix(".new") for name in before.keys() | after.keys() if before.get(name) != after.get(name)}
+    different = {
+        name.removesuffix(".new")
+        for name in before.keys() | after.keys()
+        if before.get(name) != after.get(name)
+    }
     if targets.process.poll() is not None:
         different |= {"kill_process"}
     return Outcome(done, answers, (different & answers.keys()) | targets.received())
 
 
-@pytest.mark.parametrize("attack", [each for each in ATTACKS if not each.alone], ids=lambda each: each.name)
+@pytest.mark.parametrize(
+    "attack", [each for each in ATTACKS if not each.alone], ids=lambda each: each.name
+)
 def test_without_a_sandbox_an_attack_has_its_documented_outcome(outcomes, attack):
     """Control: the attacks work, so that they show what a sandbox prevents."""
     outcome = outcomes("default")
@@ -188,9 +246,13 @@ def test_without_a_sandbox_an_attack_has_its_documented_outcome(outcomes, attack
         assert outcome.done.processes == []
 
 
-@pytest.mark.parametrize("attack", [each for each in ATTACKS if each.alone], ids=lambda each: each.name)
+@pytest.mark.parametrize(
+    "attack", [each for each in ATTACKS if each.alone], ids=lambda each: each.name
+)
 def test_without_a_sandbox_an_attack_ends_the_command(fmus, runner, tmp_path, attack):
-    done = runner.simulate(tmp_path, fmus(2, "DoStep 6 attack", attacks=f"attack {attack.name} -\n"))
+    done = runner.simulate(
+        tmp_path, fmus(2, "DoStep 6 attack", attacks=f"attack {attack.name} -\n")
+    )
     assert (attack.default, done.code) == (OPEN, -signal.SIGKILL)
 
 
@@ -211,7 +273,11 @@ def test_the_run_with_the_attacks_ends_as_without_them(outcomes, mode):
 @pytest.mark.parametrize("fault", FAULTS, ids=lambda fault: fault.order)
 @pytest.mark.parametrize("mode", ["default", pytest.param("sandbox", marks=needs_sandbox)])
 def test_a_fault_is_contained_and_attributed(fmus, runner, tmp_path, fault: Fault, mode):
-    deadlines = {"load": 10.0, "initialization": 10.0, "step": 0.5, "end": 10.0} if fault.order == "loop" else None
+    deadlines = (
+        {"load": 10.0, "initialization": 10.0, "step": 0.5, "end": 10.0}
+        if fault.order == "loop"
+        else None
+    )
     file = scenario(tmp_path, fmus(2, f"DoStep 6 {fault.order}"), deadlines)
     done = runner.cosim(tmp_path, "run", file, "--output-dir", "out", "--no-report", *MODES[mode])
     outcome = fault.sandbox if mode == "sandbox" and fault.sandbox else fault.outcome

@@ -1,4 +1,6 @@
-"""Runs in threads, in an event loop and after a fork: each gives the usual result, and the process stays as it was."""
+"""Runs in threads, in an event loop and after a fork: each gives the usual result, and the process
+stays as it was.
+"""
 
 from __future__ import annotations
 
@@ -38,7 +40,12 @@ def unchanged_process() -> Iterator[None]:
 def process_state() -> tuple[Any, ...]:
     mask = os.umask(0o22)
     os.umask(mask)
-    return Path.cwd(), mask, dict(os.environ) | {"PYTEST_CURRENT_TEST": ""}, locale.setlocale(locale.LC_ALL)
+    return (
+        Path.cwd(),
+        mask,
+        dict(os.environ) | {"PYTEST_CURRENT_TEST": ""},
+        locale.setlocale(locale.LC_ALL),
+    )
 
 
 def end_value(path: str, **options: Any) -> float:
@@ -55,7 +62,10 @@ def test_runs_in_threads(healthy):
 
 
 def test_isolated_runs_in_threads(healthy):
-    assert in_threads(lambda path: end_value(path, isolation="fmu"), *[healthy] * THREADS) == [END] * THREADS
+    assert (
+        in_threads(lambda path: end_value(path, isolation="fmu"), *[healthy] * THREADS)
+        == [END] * THREADS
+    )
 
 
 def test_runs_of_one_process_step_in_turns(healthy):
@@ -75,33 +85,52 @@ def test_runs_of_one_process_step_in_turns(healthy):
 def test_isolated_runs_step_at_the_same_time(healthy):
     barrier = threading.Barrier(2, timeout=20)
     observers = [lambda *_: barrier.wait()]
-    assert in_threads(lambda path: end_value(path, isolation="fmu", observers=observers), healthy, healthy) == [END, END]
+    assert in_threads(
+        lambda path: end_value(path, isolation="fmu", observers=observers), healthy, healthy
+    ) == [END, END]
 
 
-@pytest.mark.parametrize("function", ["load", "EnterInitializationMode", "DoStep", "Terminate", "FreeInstance"])
-@pytest.mark.parametrize("change", ["change_folder", "change_umask", "change_environment", "change_locale"])
-def test_a_change_of_the_process_is_undone_and_blamed_on_its_author(fmus, function, change, monkeypatch, caplog):
+@pytest.mark.parametrize(
+    "function", ["load", "EnterInitializationMode", "DoStep", "Terminate", "FreeInstance"]
+)
+@pytest.mark.parametrize(
+    "change", ["change_folder", "change_umask", "change_environment", "change_locale"]
+)
+def test_a_change_of_the_process_is_undone_and_blamed_on_its_author(
+    fmus, function, change, monkeypatch, caplog
+):
     monkeypatch.chdir(fmus.folder)
     good = scenario(fmus.folder, fmus(2)).rename(fmus.folder / "good.json").name
     rude_fmu = fmus(2, f"{function} 1 {change}", "rude")
     rude = scenario(fmus.folder, rude_fmu, components={"rude": {"fmu": str(rude_fmu)}}).name
     in_threads(cosim.run, *[good, rude] * 2)
-    authors = {record.getMessage().partition(":")[0] for record in caplog.records if "of the process" in record.getMessage()}
+    authors = {
+        record.getMessage().partition(":")[0]
+        for record in caplog.records
+        if "of the process" in record.getMessage()
+    }
     assert authors == {"rude"}
 
 
 def test_a_run_within_a_run(healthy):
     inner = []
-    result = cosim.run(healthy, observers=[lambda step, _: inner.append(end_value(healthy)) if step == 5 else None])
+    result = cosim.run(
+        healthy, observers=[lambda step, _: inner.append(end_value(healthy)) if step == 5 else None]
+    )
     assert (inner, result["lag.y"][-1]) == ([END], END)
 
 
 def test_in_an_event_loop(healthy):
     async def main() -> list[float]:
         direct = end_value(healthy)
-        return [direct, *await asyncio.gather(*(asyncio.to_thread(end_value, healthy) for _ in range(THREADS)))]
+        return [
+            direct,
+            *await asyncio.gather(*(asyncio.to_thread(end_value, healthy) for _ in range(THREADS))),
+        ]
 
-    with ThreadPoolExecutor(1) as pool:  # a browser test before this one may have left a loop in the main thread
+    with ThreadPoolExecutor(
+        1
+    ) as pool:  # a browser test before this one may have left a loop in the main thread
         assert pool.submit(asyncio.run, main()).result() == [END] * (THREADS + 1)
 
 

@@ -1,4 +1,5 @@
-"""A fault at every single call of a run: whichever call it is, the rows are kept and nothing forbidden is called.
+"""A fault at every single call of a run: whichever call it is, the rows are kept and nothing
+forbidden is called.
 
 A short sample of the calls always, all of them with `pytest -m long`.
 """
@@ -34,19 +35,32 @@ def healthy(fault_libraries, runner, tmp_path_factory):
 
 
 def expected_rows(names: list[str], n: int) -> int:
-    """Row 0 exists after the first Get in step mode, row k after the Get that follows the k-th DoStep."""
-    stepping = "".join("X" if "ExitInit" in name else "G" if name.startswith("Get") else "." for name in names[: n - 1])
+    """Row 0 exists after the first Get in step mode, row k after the Get that follows the k-th
+    DoStep.
+    """
+    stepping = "".join(
+        "X" if "ExitInit" in name else "G" if name.startswith("Get") else "."
+        for name in names[: n - 1]
+    )
     return stepping.partition("X")[2].count("G")
 
 
-def judge(fmus, runner, names: list[str], version: int, n: int, what: str, **conditions: str) -> None:
+def judge(
+    fmus, runner, names: list[str], version: int, n: int, what: str, **conditions: str
+) -> None:
     name = names[n - 1]
     deadlines = DEADLINES if what == "sleep" else None
-    done = runner.run(fmus.folder, fmus(version, f"* {n} {what}"), deadlines=deadlines, limit=20, **conditions)
+    done = runner.run(
+        fmus.folder, fmus(version, f"* {n} {what}"), deadlines=deadlines, limit=20, **conditions
+    )
     where = f"{what} at call {n} ({name}): {done.err}"
     is_null_text = name in TEXT_CALLS and what in RETURNS
-    assert done.code in ((0,) if is_null_text or what in ("warning", "nan") else (0, 1) if name in LAST else (1,)), where
-    assert len(done.rows) == (expected_rows(names, n) if done.code and name not in LAST else STEP_COUNT + 1), where
+    assert done.code in (
+        (0,) if is_null_text or what in ("warning", "nan") else (0, 1) if name in LAST else (1,)
+    ), where
+    assert len(done.rows) == (
+        expected_rows(names, n) if done.code and name not in LAST else STEP_COUNT + 1
+    ), where
     assert done.code == 0 or re.search(r"^(WARNING |ERROR )?lag: ", done.err, re.MULTILINE), where
     assert is_null_text or violations(fmus.lines()) == [], where
     assert [folder for folder in done.temporary_files if folder.startswith("cosim-")] == [], where
@@ -61,7 +75,9 @@ def test_a_healthy_run_is_long_enough(healthy):
 
 
 @pytest.mark.parametrize("what", RETURNS + CRASHES)
-@pytest.mark.parametrize(("version", "n"), [(version, n) for version, sample in SAMPLE.items() for n in sample])
+@pytest.mark.parametrize(
+    ("version", "n"), [(version, n) for version, sample in SAMPLE.items() for n in sample]
+)
 def test_a_fault_at_some_calls(fmus, runner, healthy, version, n, what):
     names = healthy[version]
     judge(fmus, runner, names, version, n if n > 0 else len(names) + 1 + n, what)
@@ -79,4 +95,11 @@ def test_the_other_executor_does_the_same(fmus, runner, healthy, version, what):
 def test_a_fault_at_every_call(fault_libraries, runner, healthy, tmp_path, version, what):
     for n in range(1, len(healthy[version]) + 1):
         (tmp_path / str(n)).mkdir()
-        judge(FaultFmus(fault_libraries, tmp_path / str(n)), runner, healthy[version], version, n, what)
+        judge(
+            FaultFmus(fault_libraries, tmp_path / str(n)),
+            runner,
+            healthy[version],
+            version,
+            n,
+            what,
+        )

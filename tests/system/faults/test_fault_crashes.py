@@ -1,4 +1,6 @@
-"""FMUs that crash, end the process, hang or leave something behind: a supervised run survives, names them, keeps the rows."""
+"""FMUs that crash, end the process, hang or leave something behind: a supervised run survives,
+names them, keeps the rows.
+"""
 
 from __future__ import annotations
 
@@ -50,7 +52,11 @@ def check(done: CommandResult, case: Case, version: int) -> None:
 
 FAILED = "lag: {f} failed"
 T5 = FAILED + " at t = 0.05 s: "
-SIGNAL, EXIT, LATE = "the process was ended by signal ", "it ended the process with exit code ", "did not return within 0.5 s"
+SIGNAL, EXIT, LATE = (
+    "the process was ended by signal ",
+    "it ended the process with exit code ",
+    "did not return within 0.5 s",
+)
 
 CRASHES = table(
     Case("DoStep 6 segv", T5 + SIGNAL + "11 (SIGSEGV"),
@@ -87,9 +93,13 @@ def test_a_crash_is_named_and_the_rows_are_kept(fmus, runner, tmp_path, case, ve
 
 
 def test_the_command_itself_survives(fmus, tmp_path, version):
-    """The command is started like a user's, with its own imports; the other tests fork a process that has done them."""
+    """The command is started like a user's, with its own imports; the other tests fork a process
+    that has done them.
+    """
     words = ["simulate", fmus(version, "DoStep 6 segv"), "--output-file", tmp_path / "result.csv"]
-    done = subprocess.run([sys.executable, "-m", "cosim", *words], capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        [sys.executable, "-m", "cosim", *words], capture_output=True, text=True, check=False
+    )
     assert done.returncode == 1
     assert f"fmi{version}DoStep failed at t = 0.05 s: {SIGNAL}11" in done.stderr
     assert len((tmp_path / "result.csv").read_text().splitlines()) == 7
@@ -116,12 +126,19 @@ def test_a_hang_is_found_at_its_deadline(fmus, runner, tmp_path, case, version):
     Case("DoStep 6 change_umask", code=0, rows=ALL),
     Case("DoStep 6 change_environment", code=0, rows=ALL),
     Case("DoStep 6 ignore_interrupts", code=0, rows=ALL),
-    Case("DoStep 6 block_signals", "lag: changed which signals are blocked of the process", code=0, rows=ALL),
+    Case(
+        "DoStep 6 block_signals",
+        "lag: changed which signals are blocked of the process",
+        code=0,
+        rows=ALL,
+    ),
     Case("DoStep 6 set_alarm", "lag: changed the timers of the process", code=0, rows=ALL),
     Case("GetReal @0.095 limit_files", "lag: changed the limits of the process", code=0, rows=ALL),
     Case("GetReal @0.095 limit_size", "lag: changed the limits of the process", code=0, rows=ALL),
     Case("DoStep 6 round_up", "lag: the step changed the floating-point mode", code=0, rows=ALL),
-    Case("DoStep 6 flush_to_zero", "lag: the step changed the floating-point mode", code=0, rows=ALL),
+    Case(
+        "DoStep 6 flush_to_zero", "lag: the step changed the floating-point mode", code=0, rows=ALL
+    ),
     Case("DoStep 6 fp_traps", "lag: a step changed the floating-point mode", code=0, rows=ALL),
     Case("DoStep 6 thread", code=0, rows=ALL),
     Case("DoStep 6 close_output", code=0, rows=ALL),
@@ -129,7 +146,9 @@ def test_a_hang_is_found_at_its_deadline(fmus, runner, tmp_path, case, version):
     Case("DoStep 6 memory", "status 3 (error): out of memory"),
     Case("DoStep 6 tcp", code=0, rows=ALL),
 )
-def test_what_an_fmu_does_to_its_process_does_not_reach_the_importer(fmus, runner, tmp_path, case, version):
+def test_what_an_fmu_does_to_its_process_does_not_reach_the_importer(
+    fmus, runner, tmp_path, case, version
+):
     done = runner.run(tmp_path, fmus(version, case.order), deadlines={"step": 3.0})
     check(done, case, version)
     assert (tmp_path / "out/result.csv").stat().st_mode & 0o400
@@ -139,16 +158,32 @@ def test_what_an_fmu_does_to_its_process_does_not_reach_the_importer(fmus, runne
 def test_another_thread_of_an_fmu_may_log(fmus, runner, tmp_path, version, executor):
     if executor == "native" and not native_available():
         pytest.skip("the native executor was not built")
-    done = runner.run(tmp_path, fmus(version, "DoStep 6 log_thread"), deadlines=DEADLINES, executor=executor)
+    done = runner.run(
+        tmp_path, fmus(version, "DoStep 6 log_thread"), deadlines=DEADLINES, executor=executor
+    )
     assert (done.code, len(done.rows)) == (0, ALL), done.err
     assert "INFO lag: from a thread" in done.err
 
 
 @pytest.mark.parametrize("isolation", ["run", "fmu"])
-def test_an_fmu_that_overwrites_what_the_supervisor_reads(fmus, runner, tmp_path, version, isolation):
-    """The FMU overwrites the journal in which the child records its present call; the deadline still ends the run by name."""
+def test_an_fmu_that_overwrites_what_the_supervisor_reads(
+    fmus, runner, tmp_path, version, isolation
+):
+    """The FMU overwrites the journal in which the child records its present call; the deadline
+    still ends the run by name.
+    """
     file = scenario(tmp_path, fmus(version, "DoStep 6 overwrite"), deadlines={"step": 3.0})
-    done = runner.cosim(tmp_path, "run", file, "--output-dir", "out", "--no-report", "--isolation", isolation, limit=20)
+    done = runner.cosim(
+        tmp_path,
+        "run",
+        file,
+        "--output-dir",
+        "out",
+        "--no-report",
+        "--isolation",
+        isolation,
+        limit=20,
+    )
     assert done.code == 1, done.err
     assert "lag: " in done.err
     assert (tmp_path / "out/result.csv").exists()
@@ -158,7 +193,10 @@ def test_an_fmu_that_overwrites_what_the_supervisor_reads(fmus, runner, tmp_path
 def test_an_fmu_that_takes_all_descriptors_costs_no_rows(fmus, runner, tmp_path, version):
     done = runner.run(tmp_path, fmus(version, "DoStep 6 open_files"))
     assert (done.code, len(done.rows)) == (0, ALL), done.err
-    assert "WARNING lag: changed the number of free descriptors (none was left) of the process" in done.err
+    assert (
+        "WARNING lag: changed the number of free descriptors (none was left) of the process"
+        in done.err
+    )
     assert (done.temporary_files, done.processes, done.changes) == ([], [], [])
 
 
@@ -181,13 +219,17 @@ class Ticker(Fmi2Slave):
 
 @pytest.mark.parametrize("isolation", ["run", "fmu", "none"])
 @pytest.mark.parametrize("moment", ["DoStep 1", "GetReal 6", "Terminate 1"])
-def test_an_fmu_that_empties_all_open_files_costs_no_rows(fmus, runner, tmp_path, version, isolation, moment):
+def test_an_fmu_that_empties_all_open_files_costs_no_rows(
+    fmus, runner, tmp_path, version, isolation, moment
+):
     """A string that changes in each step is recorded beside the numbers."""
     (tmp_path / "ticker.py").write_text(TICKER)
     lag = {"fmu": str(fmus(version, f"{moment} truncate_all"))}
     components = {"lag": lag, "ticker": {"python": "ticker.py:Ticker"}}
     file = scenario(tmp_path, fmus.folder, components=components)
-    done = runner.cosim(tmp_path, "run", file, "--output-dir", "out", "--no-report", "--isolation", isolation)
+    done = runner.cosim(
+        tmp_path, "run", file, "--output-dir", "out", "--no-report", "--isolation", isolation
+    )
     assert done.code == 0, done.err
     result = Result.from_csv(tmp_path / "out/result.csv")
     assert result["ticker.count"].tolist() == list(range(ALL))
@@ -214,21 +256,39 @@ NOTICED = "WARNING lag: {f} forked the process; a copy that returns from the cal
 
 
 FORKS = ["DoStep 6 fork_return", "DoStep 6 fork_silently", "DoStep 6 fork_program"]
-OTHER_FORKS = ["GetReal 6", "Instantiate 1", "ExitInitializationMode 1", "Terminate 1", "FreeInstance 1", "DoStep *"]
+OTHER_FORKS = [
+    "GetReal 6",
+    "Instantiate 1",
+    "ExitInitializationMode 1",
+    "Terminate 1",
+    "FreeInstance 1",
+    "DoStep *",
+]
 
 
 @pytest.mark.parametrize(
     ("order", "isolation", "executor"),
     [
         *[(order, isolation, "native") for order in FORKS for isolation in ("run", "fmu", "none")],
-        *[(f"{moment} fork_return", isolation, "python") for moment in OTHER_FORKS for isolation in ("run", "fmu")],
+        *[
+            (f"{moment} fork_return", isolation, "python")
+            for moment in OTHER_FORKS
+            for isolation in ("run", "fmu")
+        ],
     ],
 )
-def test_a_forked_copy_does_not_continue_the_run(fmus, runner, tmp_path, order, isolation, executor):
-    """Calls of a component that another one follows; without supervision a copy ends at the latest with the run."""
+def test_a_forked_copy_does_not_continue_the_run(
+    fmus, runner, tmp_path, order, isolation, executor
+):
+    """Calls of a component that another one follows; without supervision a copy ends at the latest
+    with the run.
+    """
     version = 2 + (isolation == "run")
     noticed = isolation != "none" and "silently" not in order
-    components = {"lag": {"fmu": str(fmus(version, order))}, "other": {"fmu": str(fmus(version, name="other"))}}
+    components = {
+        "lag": {"fmu": str(fmus(version, order))},
+        "other": {"fmu": str(fmus(version, name="other"))},
+    }
     file = scenario(tmp_path, fmus.folder, components=components)
     words = ("run", file, "--output-dir", "out", "--no-report", "--isolation", isolation)
     done = runner.cosim(tmp_path, *words, executor=executor, limit=20)
@@ -241,23 +301,43 @@ def test_a_forked_copy_does_not_continue_the_run(fmus, runner, tmp_path, order, 
 
 
 @pytest.mark.parametrize("isolation", ["run", "none"])
-def test_a_copy_that_a_python_component_forks_does_not_continue_the_run(runner, tmp_path, isolation):
+def test_a_copy_that_a_python_component_forks_does_not_continue_the_run(
+    runner, tmp_path, isolation
+):
     (tmp_path / "ticker.py").write_text(
-        TICKER.replace("        return True", "        __import__('os').fork()\n        return True")
+        TICKER.replace(
+            "        return True", "        __import__('os').fork()\n        return True"
+        )
     )
-    file = scenario(tmp_path, tmp_path, components={"ticker": {"python": "ticker.py:Ticker"}}, stop_time=0.03)
-    done = runner.cosim(tmp_path, "run", file, "--output-dir", "out", "--no-report", "--isolation", isolation, limit=20)
+    file = scenario(
+        tmp_path, tmp_path, components={"ticker": {"python": "ticker.py:Ticker"}}, stop_time=0.03
+    )
+    done = runner.cosim(
+        tmp_path,
+        "run",
+        file,
+        "--output-dir",
+        "out",
+        "--no-report",
+        "--isolation",
+        isolation,
+        limit=20,
+    )
     assert done.code == 0, done.err
     assert len(Result.from_csv(tmp_path / "out/result.csv").time) == 4
     assert done.out.count("simulated in") == 1
     assert ("WARNING ticker: do_step forked the process" in done.err) == (isolation == "run")
     assert (done.temporary_files, done.changes) == ([], [])
-    assert done.processes == [] or isolation == "none"  # nobody ends the copies before they have left the run
+    assert (
+        done.processes == [] or isolation == "none"
+    )  # nobody ends the copies before they have left the run
 
 
 def test_an_fmu_cannot_read_what_is_typed(fmus, runner, tmp_path, version):
     os.mkfifo(tmp_path / "typed")
-    done = runner.run(tmp_path, fmus(version, "DoStep 6 read_stdin"), limit=10, stdin=str(tmp_path / "typed"))
+    done = runner.run(
+        tmp_path, fmus(version, "DoStep 6 read_stdin"), limit=10, stdin=str(tmp_path / "typed")
+    )
     assert (done.code, len(done.rows)) == (0, ALL)
     assert fmus.lines("stdin") == ["stdin 0"]
 
@@ -288,8 +368,18 @@ def test_one_fmu_alone_is_supervised_too(fmus, runner, tmp_path, version, what):
 def test_the_innocent_are_not_accused(fmus, runner, tmp_path, version):
     """The crashed one of two instances in one stage is named."""
     components = {name: {"fmu": str(fmus(version))} for name in ("first", "second", "third")}
-    file = scenario(tmp_path, fmus.folder, components=components, algorithm={"stages": [list(components)]})
-    words = ("run", file, "--output-dir", "out", "--no-report", "--set", "second.fault=DoStep 6 segv")
+    file = scenario(
+        tmp_path, fmus.folder, components=components, algorithm={"stages": [list(components)]}
+    )
+    words = (
+        "run",
+        file,
+        "--output-dir",
+        "out",
+        "--no-report",
+        "--set",
+        "second.fault=DoStep 6 segv",
+    )
     done = runner.cosim(tmp_path, *words)
     assert (done.code, len(done.rows)) == (1, 6)
     assert f"second: fmi{version}DoStep failed at t = 0.05 s: {SIGNAL}11" in done.err

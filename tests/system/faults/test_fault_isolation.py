@@ -1,4 +1,6 @@
-"""FMUs in separate processes: nothing that one of them does reaches the importer, which has no supervisor here."""
+"""FMUs in separate processes: nothing that one of them does reaches the importer, which has no
+supervisor here.
+"""
 
 from __future__ import annotations
 
@@ -14,16 +16,35 @@ import pytest
 from command_runner import CommandResult, CommandRunner
 from fault_fmu import STEP_COUNT, FaultFmus, lag_output, scenario
 from fmi_call_rules import calls, violations
-from test_fault_crashes import ALL, CRASHES, DEADLINES, EXIT, FAILED, LATE, SIGNAL, SLACK, T5, Case, check, table
+from test_fault_crashes import (
+    ALL,
+    CRASHES,
+    DEADLINES,
+    EXIT,
+    FAILED,
+    LATE,
+    SIGNAL,
+    SLACK,
+    T5,
+    Case,
+    check,
+    table,
+)
 
 from cosim.process.sandbox import find_available_sandboxes
 
 ROOT = Path(__file__).parents[3]
-needs_sandbox = pytest.mark.skipif(not find_available_sandboxes().confines_fmus, reason="this system cannot confine FMUs")
-needs_bubblewrap = pytest.mark.skipif(not find_available_sandboxes().bubblewrap, reason="no bubblewrap that works")
+needs_sandbox = pytest.mark.skipif(
+    not find_available_sandboxes().confines_fmus, reason="this system cannot confine FMUs"
+)
+needs_bubblewrap = pytest.mark.skipif(
+    not find_available_sandboxes().bubblewrap, reason="no bubblewrap that works"
+)
 
 
-def run(runner: CommandRunner, folder: Path, components: dict[str, Any], *words: str, **more: Any) -> CommandResult:
+def run(
+    runner: CommandRunner, folder: Path, components: dict[str, Any], *words: str, **more: Any
+) -> CommandResult:
     """A run without supervisor whose components are in separate processes."""
     conditions = {name: more.pop(name) for name in ("limit", "stdin", "executor") if name in more}
     apart = {name: {"fmu": str(fmu), "isolation": "fmu"} for name, fmu in components.items()}
@@ -95,24 +116,35 @@ def test_a_daemon_ends_with_the_supervised_run(fmus, runner, tmp_path, version):
 
 
 def test_the_others_end_in_order(fmus, runner, tmp_path, version):
-    """One of three instances crashes; the others are freed, and all rows before are those of a good run."""
+    """One of three instances crashes; the others are freed, and all rows before are those of a good
+    run.
+    """
     components = dict.fromkeys(("first", "second", "third"), fmus(version))
     done = run(runner, tmp_path, components, "--set", "second.fault=DoStep 6 segv")
     assert done.code == 1
     assert f"second: fmi{version}DoStep failed at t = 0.05 s: {SIGNAL}11" in done.err
     assert [row["first.y"] for row in done.rows] == [lag_output(n) for n in range(6)]
-    assert {who for who, what in calls(fmus.lines()) if what == "FreeInstance"} == {"first", "third"}
+    assert {who for who, what in calls(fmus.lines()) if what == "FreeInstance"} == {
+        "first",
+        "third",
+    }
     assert (done.processes, done.changes, done.temporary_files) == ([], [], [])
 
 
-@pytest.mark.parametrize("order", ["GetReal 9 discard", "DoStep 3 error", "DoStep 3 fatal", "EnterInitializationMode 1 fatal"])
+@pytest.mark.parametrize(
+    "order",
+    ["GetReal 9 discard", "DoStep 3 error", "DoStep 3 fatal", "EnterInitializationMode 1 fatal"],
+)
 def test_nothing_forbidden_follows_a_bad_status(fmus, runner, tmp_path, version, order):
     function, _, status = order.split()
     names = {"GetReal": "GetFloat64"} if version == 3 else {}
     done = run(runner, tmp_path, {"lag": fmus(version, order)})
     assert done.code == 1
     assert f"lag: fmi{version}{names.get(function, function)} failed at t = " in done.err
-    assert f"status {['warning', 'discard', 'error', 'fatal'].index(status) + 1} ({status})" in done.err
+    assert (
+        f"status {['warning', 'discard', 'error', 'fatal'].index(status) + 1} ({status})"
+        in done.err
+    )
     assert violations(fmus.lines()) == []
 
 
@@ -130,7 +162,9 @@ def test_messages_are_cut_and_counted(fmus, runner, tmp_path, version):
     assert "messages of components were not shown" in done.err
 
 
-@pytest.mark.parametrize(("what", "words"), [("exit_0", EXIT), ("error", "status 3"), ("negative", "status -1")])
+@pytest.mark.parametrize(
+    ("what", "words"), [("exit_0", EXIT), ("error", "status 3"), ("negative", "status -1")]
+)
 def test_the_other_executor_does_the_same(fmus, runner, tmp_path, version, what, words):
     done = run(runner, tmp_path, {"lag": fmus(version, f"DoStep 6 {what}")}, executor="python")
     assert f"lag: fmi{version}DoStep failed at t = 0.05 s: {words}" in done.err
@@ -165,7 +199,9 @@ class TestSandbox:
         assert (done.code, len(done.rows)) == (0, STEP_COUNT + 1), done.err
         assert [row["lag.y"] for row in done.rows] == [lag_output(n) for n in range(STEP_COUNT + 1)]
 
-    @pytest.mark.parametrize(("words", "written"), [((), True), (("--sandbox",), False)], ids=["free", "sandbox"])
+    @pytest.mark.parametrize(
+        ("words", "written"), [((), True), (("--sandbox",), False)], ids=["free", "sandbox"]
+    )
     def test_it_writes_to_no_folder_of_others(self, confined, tmp_path, words, written):
         done = confined("DoStep 6 write_here", *words)
         assert f"file fault_was_here {int(written)}" in done.err
@@ -198,7 +234,9 @@ class TestSandbox:
         ],
         indirect=["version"],
     )
-    def test_strictly_it_has_neither_files_nor_network_nor_other_processes(self, confined, tmp_path, order, words):
+    def test_strictly_it_has_neither_files_nor_network_nor_other_processes(
+        self, confined, tmp_path, order, words
+    ):
         done = confined(order, "--sandbox", "strict", "--isolation", "run")
         assert re.search(words, done.err)
         assert (done.code, len(done.rows), done.processes, done.temporary_files) == (0, ALL, [], [])
@@ -211,14 +249,30 @@ class TestSandbox:
         assert (done.code, len(done.rows), done.processes, done.temporary_files) == (1, 6, [], [])
 
 
-ANSWERS = ["[" * 100_000 + "\n", "\n\n", '{"value": ["a", false, false]}\n', '{"component_error": ["other", "f", "r", "x"]}\n']
-ANSWERS += ['{"input_error": 3}\n', '{"log": ["x", "y"]}\n', '{"log": 3}\n{"value": 1}\n', "\xff\n", "unfinished"]
+ANSWERS = [
+    "[" * 100_000 + "\n",
+    "\n\n",
+    '{"value": ["a", false, false]}\n',
+    '{"component_error": ["other", "f", "r", "x"]}\n',
+]
+ANSWERS += [
+    '{"input_error": 3}\n',
+    '{"log": ["x", "y"]}\n',
+    '{"log": 3}\n{"value": 1}\n',
+    "\xff\n",
+    "unfinished",
+]
 
 
 @pytest.mark.parametrize("moment", ["DoStep 6", "Instantiate 1"])
 @pytest.mark.parametrize("answer", ANSWERS, ids=range(len(ANSWERS)))
-def test_an_fmu_that_answers_for_its_worker_process_is_named(fmus, runner, tmp_path, answer, moment):
-    components = {"lag": {"fmu": str(fmus(2, f"{moment} answer"))}, "other": {"fmu": str(fmus(2, name="other"))}}
+def test_an_fmu_that_answers_for_its_worker_process_is_named(
+    fmus, runner, tmp_path, answer, moment
+):
+    components = {
+        "lag": {"fmu": str(fmus(2, f"{moment} answer"))},
+        "other": {"fmu": str(fmus(2, name="other"))},
+    }
     file = scenario(tmp_path, fmus.folder, components=components)
     words = ("run", file, "--output-dir", "out", "--no-report", "--isolation", "fmu")
     done = runner.cosim(tmp_path, *words, environment={"FAULT_ANSWER": answer}, limit=20)

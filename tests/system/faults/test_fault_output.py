@@ -11,10 +11,13 @@ import sys
 import pytest
 from fault_fmu import scenario
 
-#: a colour, a title of the terminal, the one-character introducer of control sequences, right-to-left override, return
+#: a colour, a title of the terminal, the one-character introducer of control sequences,
+#: right-to-left override, return
 CONTROL = "\x1b[31mred\x1b]0;title\a\x9b31m \u202ertl\r"
 ESCAPED = r"\x1b[31mred\x1b]0;title\x07\x9b31m \u202ertl\r"
-ISOLATION = pytest.mark.parametrize("words", [(), ("--isolation", "fmu"), ("--sandbox",)], ids=["run", "fmu", "sandbox"])
+ISOLATION = pytest.mark.parametrize(
+    "words", [(), ("--isolation", "fmu"), ("--sandbox",)], ids=["run", "fmu", "sandbox"]
+)
 
 
 def assert_printable(done):
@@ -62,18 +65,24 @@ def kpi_scenario(folder, fmu):
 
 
 def test_names_of_kpis_are_escaped(fmus, runner, tmp_path):
-    done = runner.cosim(tmp_path, "run", kpi_scenario(tmp_path, fmus(2)), "--output-dir", "out", "--no-report")
+    done = runner.cosim(
+        tmp_path, "run", kpi_scenario(tmp_path, fmus(2)), "--output-dir", "out", "--no-report"
+    )
     assert done.code == 0, done.err
     assert f"sly.{ESCAPED}" in done.out
     assert_printable(done)
 
 
 def test_on_a_terminal_only_the_own_colours_remain(fmus, tmp_path):
-    """The command writes to a pseudo terminal: its table may have colours, but the KPI's name cannot."""
+    """The command writes to a pseudo terminal: its table may have colours, but the KPI's name
+    cannot.
+    """
     primary, secondary = pty.openpty()
     words = ["run", kpi_scenario(tmp_path, fmus(2)), "--output-dir", "out", "--no-report"]
     environment = {**os.environ, "TERM": "xterm", "COLUMNS": "200"}
-    with subprocess.Popen([sys.executable, "-m", "cosim", *words], cwd=tmp_path, env=environment, stdout=secondary) as process:
+    with subprocess.Popen(
+        [sys.executable, "-m", "cosim", *words], cwd=tmp_path, env=environment, stdout=secondary
+    ) as process:
         assert process.wait(60) == 0
     os.close(secondary)
     shown = os.read(primary, 1 << 16).decode()
@@ -86,7 +95,11 @@ def test_on_a_terminal_only_the_own_colours_remain(fmus, tmp_path):
 
 def test_labels_of_sweeps_are_escaped(fmus, runner, tmp_path):
     levels = {CONTROL: {"lag.y_start": 1.0}, "plain": {"lag.y_start": 2.0}}
-    sweep = {"name": "s", "scenario": kpi_scenario(tmp_path, fmus(2)).name, "factors": [{"name": "level", "levels": levels}]}
+    sweep = {
+        "name": "s",
+        "scenario": kpi_scenario(tmp_path, fmus(2)).name,
+        "factors": [{"name": "level", "levels": levels}],
+    }
     more = {"by": [["level"]], "success": [{"kpi": f"sly.{CONTROL}", "max": 2.0}]}
     (tmp_path / "sweep.json").write_text(json.dumps({**sweep, **more}))
     done = runner.cosim(tmp_path, "sweep", "sweep.json", "--workers", 1, "--output-dir", "out")
@@ -112,7 +125,11 @@ class TestSpreadsheets:
 
     def write(self, folder, fmus):
         levels = {label: {"lag.y_start": 1.0 + n} for n, label in enumerate(self.SLY)}
-        sweep = {"name": "s", "scenario": scenario(folder, fmus(2)).name, "factors": [{"name": "level", "levels": levels}]}
+        sweep = {
+            "name": "s",
+            "scenario": scenario(folder, fmus(2)).name,
+            "factors": [{"name": "level", "levels": levels}],
+        }
         (folder / "sweep.json").write_text(json.dumps(sweep))
         return "sweep.json", "--workers", 1, "--output-dir", "out"
 

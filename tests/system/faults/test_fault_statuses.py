@@ -1,4 +1,6 @@
-"""Return values, numbers and log messages of FMUs that are not as they should be: what the command line makes of them."""
+"""Return values, numbers and log messages of FMUs that are not as they should be: what the command
+line makes of them.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +48,9 @@ CASES = [
     Case("ExitInitializationMode 1 error", "lag: {f} failed at t = 0 s: status 3 (error)", rows=0),
     Case("Terminate 1 error", "WARNING lag: {f} failed: status 3 (error)", 0, STEP_COUNT + 1),
     Case("DoStep 6 log_directives", "WARNING lag: %s%s%n%d%f 100%", 0, STEP_COUNT + 1, (3,)),
-    Case("DoStep 6 log_directives", "%n", 0, STEP_COUNT + 1, (2,)),  # FMI 2.0: formats, here without their arguments
+    Case(
+        "DoStep 6 log_directives", "%n", 0, STEP_COUNT + 1, (2,)
+    ),  # FMI 2.0: formats, here without their arguments
     Case("DoStep 6 log_null", "WARNING lag:", 0, STEP_COUNT + 1),
     Case(
         "DoStep 6 log_bytes",
@@ -60,7 +64,9 @@ TABLE = [pytest.param(case, v, id=f"FMI{v} {case.order}") for case in CASES for 
 
 
 @pytest.mark.parametrize(("case", "version"), TABLE)
-def test_a_bad_return_stops_the_run_with_one_line_and_keeps_the_rows(fmus, runner, tmp_path, case, version):
+def test_a_bad_return_stops_the_run_with_one_line_and_keeps_the_rows(
+    fmus, runner, tmp_path, case, version
+):
     done = runner.run(tmp_path, fmus(version, case.order))
     assert (done.code, len(done.rows)) == (case.code, case.rows), done.err
     assert [row["lag.y"] for row in done.rows] == [lag_output(n) for n in range(case.rows)]
@@ -79,11 +85,18 @@ def test_a_bad_return_stops_the_run_with_one_line_and_keeps_the_rows(fmus, runne
     ],
 )
 def test_every_fault_is_reported_in_packed_steps(fmus, runner, tmp_path, version, order, words):
-    """The native executor runs these packed steps after the measured ones, so a fault at 0.08 s is met by packed steps."""
-    components = {"lag": {"fmu": str(fmus(version, order))}, "next": {"fmu": str(fmus(version, name="next"))}}
+    """The native executor runs these packed steps after the measured ones, so a fault at 0.08 s is
+    met by packed steps.
+    """
+    components = {
+        "lag": {"fmu": str(fmus(version, order))},
+        "next": {"fmu": str(fmus(version, name="next"))},
+    }
     ring = [{"from": "lag.y", "to": "next.u"}, {"from": "next.y", "to": "lag.u"}]
     stages = {"stages": [["lag", "next"]]}
-    file = scenario(tmp_path, fmus.folder, components=components, connections=ring, algorithm=stages)
+    file = scenario(
+        tmp_path, fmus.folder, components=components, connections=ring, algorithm=stages
+    )
     done = runner.cosim(tmp_path, "run", file, "--output-dir", "out", "--no-report")
     assert (done.code, len(done.rows)) == (1, 9), done.err
     assert f"lag: {function_name(version, order.split()[0])}{words}" in done.err
@@ -92,7 +105,9 @@ def test_every_fault_is_reported_in_packed_steps(fmus, runner, tmp_path, version
 @pytest.mark.parametrize("isolation", ["run", "fmu"])
 @pytest.mark.parametrize("executor", ["python", "native"])
 @pytest.mark.parametrize("what", ["event", "terminate"])
-def test_outputs_are_read_after_a_step_with_a_flag_too(fmus, runner, tmp_path, what, executor, isolation):
+def test_outputs_are_read_after_a_step_with_a_flag_too(
+    fmus, runner, tmp_path, what, executor, isolation
+):
     """An event that nobody handles here; or the wish to end, said in the last step."""
     file = scenario(tmp_path, fmus(3, f"DoStep 6 {what}"))
     words = ("run", file, "--output-dir", "out", "--no-report", "--isolation", isolation)
@@ -103,7 +118,9 @@ def test_outputs_are_read_after_a_step_with_a_flag_too(fmus, runner, tmp_path, w
 
 
 @pytest.mark.parametrize("what", ["hundred", "negative"])
-def test_the_other_executor_takes_no_other_status_for_a_good_one(fmus, runner, tmp_path, version, what):
+def test_the_other_executor_takes_no_other_status_for_a_good_one(
+    fmus, runner, tmp_path, version, what
+):
     done = runner.run(tmp_path, fmus(version, f"DoStep 6 {what}"), executor="python")
     assert (done.code, len(done.rows)) == (1, 6), done.err
     assert "(not defined by FMI)" in done.err
@@ -111,16 +128,35 @@ def test_the_other_executor_takes_no_other_status_for_a_good_one(fmus, runner, t
 
 def test_an_fmu_that_does_not_say_how_far_a_discarded_step_came(fmus, runner, tmp_path):
     fmu = fmus(2, "GetBooleanStatus 1 discard")
-    words = ("run", scenario(tmp_path, fmu), "--output-dir", "out", "--no-report", "--set", "lag.fault=DoStep 6 discard")
+    words = (
+        "run",
+        scenario(tmp_path, fmu),
+        "--output-dir",
+        "out",
+        "--no-report",
+        "--set",
+        "lag.fault=DoStep 6 discard",
+    )
     done = runner.cosim(tmp_path, *words)
     assert (done.code, len(done.rows)) == (1, 6), done.err
-    assert "lag: fmi2DoStep" + T5 + "status 2 (discard): told to return discard; lastSuccessfulTime is" in done.err
+    assert (
+        "lag: fmi2DoStep" + T5 + "status 2 (discard): told to return discard; lastSuccessfulTime is"
+        in done.err
+    )
 
 
 def test_an_fmu_that_terminates_may_say_nothing_of_the_time(fmus, runner, tmp_path):
     """Then nobody knows what its outputs would belong to: the step does not count."""
     fmu = fmus(2, "GetRealStatus 1 discard")
-    words = ("run", scenario(tmp_path, fmu), "--output-dir", "out", "--no-report", "--set", "lag.fault=DoStep 6 terminate")
+    words = (
+        "run",
+        scenario(tmp_path, fmu),
+        "--output-dir",
+        "out",
+        "--no-report",
+        "--set",
+        "lag.fault=DoStep 6 terminate",
+    )
     done = runner.cosim(tmp_path, *words)
     assert (done.code, len(done.rows)) == (0, 6), done.err
 
@@ -143,7 +179,10 @@ def test_control_characters_of_an_fmu_do_not_reach_the_terminal(fmus, runner, tm
 
 @pytest.mark.parametrize("what", ["nan", "infinity"])
 def test_a_connected_output_that_is_not_finite_ends_the_run(fmus, runner, tmp_path, version, what):
-    components = {"lag": {"fmu": str(fmus(version, f"DoStep 6 {what}"))}, "next": {"fmu": str(fmus(version, name="next"))}}
+    components = {
+        "lag": {"fmu": str(fmus(version, f"DoStep 6 {what}"))},
+        "next": {"fmu": str(fmus(version, name="next"))},
+    }
     wiring = {"components": components, "connections": [{"from": "lag.y", "to": "next.u"}]}
     file = scenario(tmp_path, fmus.folder, **wiring)
     done = runner.cosim(tmp_path, "run", file, "--output-dir", "out", "--no-report")
@@ -164,33 +203,57 @@ def test_a_scenario_tells_an_fmu_by_its_parameter_to_misbehave(fmus, runner, tmp
     """One FMU file, one instance that fails: the other orders of this room lie in the file."""
     components = {name: {"fmu": str(fmus(version))} for name in ("lag", "other")}
     file = scenario(tmp_path, fmus.folder, components=components)
-    done = runner.cosim(tmp_path, "run", file, "--output-dir", "out", "--no-report", "--set", "other.fault=DoStep 4 error")
+    done = runner.cosim(
+        tmp_path,
+        "run",
+        file,
+        "--output-dir",
+        "out",
+        "--no-report",
+        "--set",
+        "other.fault=DoStep 4 error",
+    )
     assert (done.code, len(done.rows)) == (1, 4)
     assert f"other: fmi{version}DoStep failed at t = 0.03 s: status 3 (error)" in done.err
 
 
 AS_OUTPUT = 'causality="output" variability="discrete" initial="calculated"'
 SPEAKING = {
-    2: f'<ScalarVariable name="s" valueReference="1" {AS_OUTPUT}><String/></ScalarVariable></ModelVariables>',
+    2: (
+        '<ScalarVariable name="s" valueReference="1" '
+        f"{AS_OUTPUT}><String/></ScalarVariable></ModelVariables>"
+    ),
     3: f'<String name="s" valueReference="7" {AS_OUTPUT}/></ModelVariables>',
 }
 
 
 def test_a_text_that_is_a_null_pointer_is_a_failure(fmus, runner, tmp_path, version):
     """It would crash the component that reads it."""
-    done = runner.run(tmp_path, fmus(version, "DoStep 3 speechless", changes={"</ModelVariables>": SPEAKING[version]}))
+    done = runner.run(
+        tmp_path,
+        fmus(version, "DoStep 3 speechless", changes={"</ModelVariables>": SPEAKING[version]}),
+    )
     assert done.code == 1, done.err
-    assert f'lag: fmi{version}GetString failed at t = 0.02 s: the value of "s" is a null pointer, expected a text' in done.err
+    assert (
+        f'lag: fmi{version}GetString failed at t = 0.02 s: the value of "s" is a null pointer, '
+        "expected a text"
+    ) in done.err
 
 
 def test_a_text_that_is_not_utf_8_is_read_as_far_as_it_can_be(fmus, runner, tmp_path, version):
     fmu = fmus(version, "DoStep 3 babble", changes={"</ModelVariables>": SPEAKING[version]})
-    done = runner.cosim(tmp_path, "run", scenario(tmp_path, fmu), "--output-dir", "out", "--no-report")
+    done = runner.cosim(
+        tmp_path, "run", scenario(tmp_path, fmu), "--output-dir", "out", "--no-report"
+    )
     assert done.code == 0, done.err
-    assert "\N{REPLACEMENT CHARACTER}" * 2 in (tmp_path / "out/result.csv").read_text(encoding="utf-8")
+    assert "\N{REPLACEMENT CHARACTER}" * 2 in (tmp_path / "out/result.csv").read_text(
+        encoding="utf-8"
+    )
 
 
-def test_rows_of_an_earlier_run_do_not_pass_for_those_of_a_failed_one(fmus, runner, tmp_path, version):
+def test_rows_of_an_earlier_run_do_not_pass_for_those_of_a_failed_one(
+    fmus, runner, tmp_path, version
+):
     assert runner.run(tmp_path, fmus(version)).code == 0
     failed = runner.run(tmp_path, fmus(version, "EnterInitializationMode 1 error"))
     assert (failed.code, failed.rows) == (1, [])

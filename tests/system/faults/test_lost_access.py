@@ -1,4 +1,6 @@
-"""FMUs that take away the access of the process to the files of the run: they are named, and the supervisor saves the rows."""
+"""FMUs that take away the access of the process to the files of the run: they are named, and the
+supervisor saves the rows.
+"""
 
 from __future__ import annotations
 
@@ -7,7 +9,9 @@ from fault_fmu import STEP_COUNT
 
 from cosim.process.sandbox import landlock
 
-pytestmark = pytest.mark.skipif(landlock.abi_version() < 1, reason="without Landlock no process can give up its access")
+pytestmark = pytest.mark.skipif(
+    landlock.abi_version() < 1, reason="without Landlock no process can give up its access"
+)
 
 
 def test_the_component_is_named_and_the_rows_are_kept(fmus, runner, tmp_path, version):

@@ -33,7 +33,9 @@ class CommandFolder:
         self._sessions: set[int] = set()
 
     def scenario(self, stop: float = 1000.0, **more: Any) -> Path:
-        """A scenario with a ticker; its keys are replaced by `more`, those of the ticker's arguments by `arguments`."""
+        """A scenario with a ticker; its keys are replaced by `more`, those of the ticker's
+        arguments by `arguments`.
+        """
         arguments = more.pop("arguments", {})
         content = {
             "name": "robust",
@@ -49,14 +51,26 @@ class CommandFolder:
     def start(
         self, *arguments: object, environment: dict[str, str] | None = None, **more: Any
     ) -> subprocess.Popen[str] | StartedCommand:
-        """Start a command: with an environment or options of `subprocess.Popen` as a program, else in a forked process."""
-        variables = {**os.environ, "TMPDIR": str(self.tmp), "WORKPLACE": str(self.folder), **(environment or {})}
+        """Start a command: with an environment or options of `subprocess.Popen` as a program, else
+        in a forked process.
+        """
+        variables = {
+            **os.environ,
+            "TMPDIR": str(self.tmp),
+            "WORKPLACE": str(self.folder),
+            **(environment or {}),
+        }
         if environment is None and not more:
             process = StartedCommand(*arguments, cwd=self.folder, env=variables)
             self._sessions.add(process.pid)
             return process
         command = [sys.executable, "-m", "cosim", *map(str, arguments)]
-        usual = {"cwd": self.folder, "stdout": subprocess.PIPE, "stderr": subprocess.PIPE, "text": True}
+        usual = {
+            "cwd": self.folder,
+            "stdout": subprocess.PIPE,
+            "stderr": subprocess.PIPE,
+            "text": True,
+        }
         return subprocess.Popen(command, env=variables, **{**usual, **more})
 
     def run(self, *arguments: object, **more: Any) -> subprocess.CompletedProcess[str]:
@@ -71,11 +85,16 @@ class CommandFolder:
     def processes(self) -> list[int]:
         """Processes that were started here and are still there.
 
-        Programs have the mark in their environment; processes that were only forked share a session or the working directory.
+        Programs have the mark in their environment; processes that were only forked share a session
+        or the working directory.
         """
         mark = f"WORKPLACE={self.folder}\0".encode()
         entries = [entry for entry in Path("/proc").iterdir() if entry.name.isdigit()]
-        return [int(entry.name) for entry in entries if mark in _environment(entry) or self._is_forked_here(entry)]
+        return [
+            int(entry.name)
+            for entry in entries
+            if mark in _environment(entry) or self._is_forked_here(entry)
+        ]
 
     def _is_forked_here(self, process: Path) -> bool:
         try:
@@ -86,7 +105,9 @@ class CommandFolder:
         return state != "Z" and (int(session) in self._sessions or here == self.folder)
 
     def leftovers(self) -> list[str]:
-        """Everything that should not be there when a command has ended: processes, temporary files, hidden files."""
+        """Everything that should not be there when a command has ended: processes, temporary files,
+        hidden files.
+        """
         wait_until(lambda: not self.processes(), 3.0)
         hidden = [path.name for path in self.folder.rglob(".*")]
         return [*map(str, self.processes()), *(path.name for path in self.tmp.iterdir()), *hidden]
@@ -101,6 +122,9 @@ def _environment(process: Path) -> bytes:
 
 def child_processes(process: int) -> list[int]:
     try:
-        return [int(word) for word in Path(f"/proc/{process}/task/{process}/children").read_text().split()]
+        return [
+            int(word)
+            for word in Path(f"/proc/{process}/task/{process}/children").read_text().split()
+        ]
     except OSError:
         return []

@@ -23,7 +23,10 @@ def picture(result):
 """
 #: every key of the format is used once
 INNER_SYSTEM: dict[str, Any] = {
-    "components": {"g": {"python": "pythonfmu_blocks.py:Gain", "period": 1}, "h": {"python": "pythonfmu_blocks.py:Gain"}},
+    "components": {
+        "g": {"python": "pythonfmu_blocks.py:Gain", "period": 1},
+        "h": {"python": "pythonfmu_blocks.py:Gain"},
+    },
     "connections": [{"from": "g.y", "to": "h.u", "delay": 1}],
     "algorithm": {"kind": "staged", "stages": [["g"], ["h"]]},
     "ports": {"inputs": {"x": ["g.u"]}, "outputs": {"y": "h.y"}, "parameters": {"factor": "g.k"}},
@@ -38,7 +41,10 @@ SCENARIO: dict[str, Any] = {
         "a": {"python": "pythonfmu_blocks.py:Gain", "parameters": {"k": 3.0}, "period": 1},
         "b": {"python": "pythonfmu_blocks.py:Plant", "arguments": {"vehicle": "ship"}},
         "c": {"python": "pythonfmu_blocks.py:Controller", "parameters": {"gain": [1.0, 2.0]}},
-        "t": {"python": "pythonfmu_blocks.py:Typed", "parameters": {"number": 3, "flag": True, "text": "x"}},
+        "t": {
+            "python": "pythonfmu_blocks.py:Typed",
+            "parameters": {"number": 3, "flag": True, "text": "x"},
+        },
         "inner": {"system": "inner.json", "parameters": {"factor": 2.0}},
         "f": {"fmu": "probe.fmu", "parameters": {"y_start": 1.0}},
     },
@@ -48,7 +54,11 @@ SCENARIO: dict[str, Any] = {
         {"from": "c.motor", "to": "b.ship.motor"},
         {"from": "inner.y", "to": "f.u"},
     ],
-    "algorithm": {"kind": "staged", "stages": [["a", "inner"], ["b", "c", "t"], ["f"]], "parallel": "auto"},
+    "algorithm": {
+        "kind": "staged",
+        "stages": [["a", "inner"], ["b", "c", "t"], ["f"]],
+        "parallel": "auto",
+    },
     "record": {"signals": ["*.y", "b.*"], "interval": 1},
     "events": [{"time": 1, "set": {"a.k": 2.0}}],
     "inputs": [{"file": "profile.csv", "to": {"x": ["a.u"]}, "interpolation": "linear"}],

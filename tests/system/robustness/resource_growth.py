@@ -1,7 +1,9 @@
-"""Growth of a process over many runs, or over the steps of one run: `python resource_growth.py SCENARIO runs|steps COUNT`.
+"""Growth of a process over many runs, or over the steps of one run: `python resource_growth.py
+SCENARIO runs|steps COUNT`.
 
-Prints JSON: growth of the resident memory (bytes), and of open descriptors, threads, child processes and temporary files, from
-the end of a warm-up on (the first runs, or a tenth of the steps).
+Prints JSON: growth of the resident memory (bytes), and of open descriptors, threads, child
+processes and temporary files, from the end of a warm-up on (the first runs, or a tenth of the
+steps).
 """
 
 from __future__ import annotations
@@ -16,7 +18,13 @@ from pathlib import Path
 
 import cosim
 
-NO_OUTPUTS = {"/record": {"signals": []}, "/stop_when": [], "/kpis": [], "/checks": [], "/figures": []}
+NO_OUTPUTS = {
+    "/record": {"signals": []},
+    "/stop_when": [],
+    "/kpis": [],
+    "/checks": [],
+    "/figures": [],
+}
 
 
 def resource_usage() -> dict[str, int]:
@@ -58,5 +66,7 @@ def measure_steps(scenario: str, count: int) -> list[dict[str, int]]:
 
 
 if __name__ == "__main__":
-    before, after = {"runs": measure_runs, "steps": measure_steps}[sys.argv[2]](sys.argv[1], int(sys.argv[3]))
+    before, after = {"runs": measure_runs, "steps": measure_steps}[sys.argv[2]](
+        sys.argv[1], int(sys.argv[3])
+    )
     print(json.dumps({what: after[what] - before[what] for what in before}))

@@ -23,10 +23,12 @@ def tens(count):
 
 
 class SlowCounter(Fmi2Slave):
-    """Each step lasts `pause` s; `count` counts the steps, `tens` says in words how many tens, `clock` is the wall clock (s).
+    """Each step lasts `pause` s; `count` counts the steps, `tens` says in words how many tens,
+    `clock` is the wall clock (s).
 
     Step `fail_at` fails.
-    `slow` names the place where it stays: load, initialization, step, stubborn (a step that no interrupt ends), or nowhere.
+    `slow` names the place where it stays: load, initialization, step, stubborn (a step that no
+    interrupt ends), or nowhere.
     """
 
     def __init__(self, pause=0.002, slow="", fail_at=None, **arguments):

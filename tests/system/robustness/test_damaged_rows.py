@@ -13,13 +13,23 @@ from cosim.cli import main
 from cosim.process.run_files.folder import HEADER_FILE, ROWS_FILE
 
 ROWS, SIZE = 6, 8
-HEADER = {"origin": 0, "stride": 1, "denominator": 100, "steps_per_row": 1, "row_size": SIZE, "calls": [], "texts": []}
+HEADER = {
+    "origin": 0,
+    "stride": 1,
+    "denominator": 100,
+    "steps_per_row": 1,
+    "row_size": SIZE,
+    "calls": [],
+    "texts": [],
+}
 COLUMN = {"name": "a.y", "dtype": "<f8", "offset": 0, "boolean": False, "unit": ""}
 
 
 @pytest.fixture
 def output(tmp_path: Path) -> Path:
-    """An output directory with six rows that were kept, and the three that the run had written until then."""
+    """An output directory with six rows that were kept, and the three that the run had written
+    until then.
+    """
     folder = tmp_path / "out" / ".unfinished"
     folder.mkdir(parents=True)
     (folder / HEADER_FILE).write_text(json.dumps({**HEADER, "columns": [COLUMN]}))
@@ -42,7 +52,14 @@ def test_intact_rows_are_recovered(output):
 
 @pytest.mark.parametrize(
     "change",
-    [None, {"denominator": 0}, {"columns": []}, {"row_size": 0}, {"columns": [{**COLUMN, "dtype": "x"}]}, {"origin": []}],
+    [
+        None,
+        {"denominator": 0},
+        {"columns": []},
+        {"row_size": 0},
+        {"columns": [{**COLUMN, "dtype": "x"}]},
+        {"origin": []},
+    ],
 )
 def test_a_damaged_header(output, change, capsys):
     header = output / ".unfinished" / HEADER_FILE

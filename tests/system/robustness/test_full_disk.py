@@ -1,4 +1,6 @@
-"""Disks that are full or may not be written: a line that says so, whole files or none, and no row lost."""
+"""Disks that are full or may not be written: a line that says so, whole files or none, and no row
+lost.
+"""
 
 from __future__ import annotations
 
@@ -51,7 +53,11 @@ class Disk(CommandFolder):
         super().__init__(folder)
         self.operations, self._left = operations, folder / "left"
         self._left.write_bytes(struct.pack("l", operations))
-        self._environment = {"LD_PRELOAD": str(library), "FULL_DISK": str(self.out), "FULL_DISK_LEFT": str(self._left)}
+        self._environment = {
+            "LD_PRELOAD": str(library),
+            "FULL_DISK": str(self.out),
+            "FULL_DISK_LEFT": str(self._left),
+        }
 
     def begin(self, **scenario: object) -> None:
         figure = {"name": "picture", "python": f"{TICKER}:plot_count"}
@@ -91,7 +97,9 @@ class Disk(CommandFolder):
         return float(json.loads((self.folder / "robust.json").read_text())["stop_time"])
 
 
-@pytest.mark.parametrize(("kind", "numbers"), [(SHORT, (0, 6, 12)), (LONG, (2, 9))], ids=["short", "long"])
+@pytest.mark.parametrize(
+    ("kind", "numbers"), [(SHORT, (0, 6, 12)), (LONG, (2, 9))], ids=["short", "long"]
+)
 def test_a_disk_that_is_full_after_some_operations(full_disk, tmp_path, kind, numbers):
     disks = [Disk(tmp_path / str(n), full_disk, n) for n in numbers]
     for disk in disks:
@@ -111,15 +119,26 @@ def test_a_disk_that_is_full_after_each_number_of_operations(full_disk, tmp_path
     assert 15 < n < 99
 
 
-def on_small_disk(workplace: CommandFolder, size: str, *scripts: str) -> subprocess.CompletedProcess[str]:
+def on_small_disk(
+    workplace: CommandFolder, size: str, *scripts: str
+) -> subprocess.CompletedProcess[str]:
     """Run commands in the folder out on a separate disk, and copy its files to the folder kept."""
     cosim_command = f"{sys.executable} -m cosim"
     script = (
-        f"mkdir out && mount -t tmpfs -o size={size} none out || exit 99\n" + "\n".join(scripts) + "\ncp -r out kept; exit $code"
+        f"mkdir out && mount -t tmpfs -o size={size} none out || exit 99\n"
+        + "\n".join(scripts)
+        + "\ncp -r out kept; exit $code"
     )
-    variables = {**os.environ, "TMPDIR": str(workplace.tmp), "WORKPLACE": str(workplace.folder), "COSIM": cosim_command}
+    variables = {
+        **os.environ,
+        "TMPDIR": str(workplace.tmp),
+        "WORKPLACE": str(workplace.folder),
+        "COSIM": cosim_command,
+    }
     words = ["unshare", "-rm", "sh", "-c", script]
-    done = subprocess.run(words, cwd=workplace.folder, env=variables, capture_output=True, text=True, check=False)
+    done = subprocess.run(
+        words, cwd=workplace.folder, env=variables, capture_output=True, text=True, check=False
+    )
     if done.returncode == 99 or "unshare" in done.stderr:
         pytest.skip("no disk can be mounted here")
     workplace.out = workplace.folder / "kept"
@@ -134,39 +153,61 @@ def test_a_real_disk_that_is_too_small_for_the_result(tmp_path, more):
     """30 000 rows: their numbers fit, their texts do not."""
     workplace = CommandFolder(tmp_path / "work")
     workplace.scenario(300, arguments={"pause": 0})
-    done = on_small_disk(workplace, "1200k", "$COSIM run robust.json --output-dir out --no-report; code=$?", more)
+    done = on_small_disk(
+        workplace, "1200k", "$COSIM run robust.json --output-dir out --no-report; code=$?", more
+    )
     assert done.returncode == 1, done.stderr
     assert done.stderr.count(FULL) == 1
     assert "free about 1 MB, then call `cosim recover out`" in done.stderr
     if more == RECOVER:
-        assert sorted(path.name for path in workplace.out.iterdir()) == ["kpis.json", "result.csv", "run.json"]
+        assert sorted(path.name for path in workplace.out.iterdir()) == [
+            "kpis.json",
+            "result.csv",
+            "run.json",
+        ]
         assert f"{kept(workplace)} rows until t = " in done.stderr
     else:
-        assert [path.name for path in workplace.out.iterdir() if path.name != "result.csv"] == [".unfinished"]
+        assert [path.name for path in workplace.out.iterdir() if path.name != "result.csv"] == [
+            ".unfinished"
+        ]
         assert kept(workplace) < 30_001
     assert list(workplace.tmp.iterdir()) == []
 
 
 def test_all_rows_of_a_finished_run_are_kept(tmp_path):
-    """The rows fit the disk, the CSV file does not; the recovered files are those of a run with enough space."""
+    """The rows fit the disk, the CSV file does not; the recovered files are those of a run with
+    enough space.
+    """
     workplace = CommandFolder(tmp_path / "work")
     pilot = {"pilot": {"fmu": str(FMU)}}
     kpi = {"name": "rows", "python": f"{TICKER}:row_count"}
-    workplace.scenario(2000, components=pilot, kpis=[kpi], record={"signals": ["pilot.thrust", "pilot.rudder_angle"]})
+    workplace.scenario(
+        2000,
+        components=pilot,
+        kpis=[kpi],
+        record={"signals": ["pilot.thrust", "pilot.rudder_angle"]},
+    )
     run = "$COSIM run robust.json --no-report --output-dir"
     done = on_small_disk(workplace, "5m", f"{run} out; code=$?", RECOVER, f"{run} whole >&2")
     assert done.returncode == 1, done.stderr
     assert "; kept 200001 rows: free about " in done.stderr
     for name in ("result.csv", "kpis.json"):
-        assert (workplace.out / name).read_bytes() == (workplace.folder / "whole" / name).read_bytes()
-    whole, recovered = (json.loads((folder / "run.json").read_text()) for folder in (workplace.folder / "whole", workplace.out))
+        assert (workplace.out / name).read_bytes() == (
+            workplace.folder / "whole" / name
+        ).read_bytes()
+    whole, recovered = (
+        json.loads((folder / "run.json").read_text())
+        for folder in (workplace.folder / "whole", workplace.out)
+    )
     assert whole.keys() == recovered.keys()
     assert whole | {"timing": {}} == recovered | {"timing": {}}
 
 
 def test_one_fmu_alone_on_a_full_disk(tmp_path):
     workplace = CommandFolder(tmp_path / "work")
-    simulate = f"$COSIM simulate {FMU} --stop-time 1000 --step-size 0.01 --output-file out/x.csv; code=$?"
+    simulate = (
+        f"$COSIM simulate {FMU} --stop-time 1000 --step-size 0.01 --output-file out/x.csv; code=$?"
+    )
     recover = RECOVER.replace("recover out", "recover out/x.csv")
     done = on_small_disk(workplace, "5500k", simulate, "test -e out/x.csv && code=97", recover)
     assert done.returncode == 1, done.stderr
@@ -177,7 +218,9 @@ def test_one_fmu_alone_on_a_full_disk(tmp_path):
 
 def test_a_result_that_cannot_be_written_for_another_reason(workplace):
     """A KPI function puts a folder where the result should be."""
-    workplace.scenario(1.0, arguments={"pause": 0}, kpis=[{"name": "k", "python": f"{TICKER}:block_result"}])
+    workplace.scenario(
+        1.0, arguments={"pause": 0}, kpis=[{"name": "k", "python": f"{TICKER}:block_result"}]
+    )
     done = workplace.run("run", "robust.json", *RUN, "--no-report")
     assert done.returncode == 2
     (line,) = done.stderr.splitlines()
@@ -194,8 +237,12 @@ def test_a_result_that_cannot_be_written_for_another_reason(workplace):
 
 def test_a_component_that_fails_on_a_full_disk_is_named(tmp_path):
     workplace = CommandFolder(tmp_path / "work")
-    workplace.scenario(300, arguments={"pause": 0, "fail_at": 20_000}, record={"signals": ["ticker.count"]})
-    done = on_small_disk(workplace, "480k", "$COSIM run robust.json --output-dir out --no-report; code=$?")
+    workplace.scenario(
+        300, arguments={"pause": 0, "fail_at": 20_000}, record={"signals": ["ticker.count"]}
+    )
+    done = on_small_disk(
+        workplace, "480k", "$COSIM run robust.json --output-dir out --no-report; code=$?"
+    )
     assert done.returncode == 1
     full, failure = done.stderr.splitlines()
     assert "; kept 20000 rows: free about " in full
@@ -208,31 +255,49 @@ def test_nothing_to_recover(workplace, output):
     (workplace.folder / "empty").mkdir()
     done = workplace.run("recover", output)
     assert done.returncode == 2
-    assert done.stderr == f'no rows were kept for "{output}"; expected an output directory or an output file\n'
+    assert (
+        done.stderr
+        == f'no rows were kept for "{output}"; expected an output directory or an output file\n'
+    )
     assert workplace.leftovers() == []
 
 
 #: rows for about 1.1 GB
-MANY = {"stop": 200_000, "arguments": {"pause": 0, "fail_at": 10}, "record": {"signals": ["ticker.count"]}}
+MANY = {
+    "stop": 200_000,
+    "arguments": {"pause": 0, "fail_at": 10},
+    "record": {"signals": ["ticker.count"]},
+}
 
 
 @pytest.mark.parametrize("command", ["run", "run --isolation none"])
-def test_a_small_temporary_folder_does_not_limit_the_rows_in_the_output_directory(tmp_path, command):
+def test_a_small_temporary_folder_does_not_limit_the_rows_in_the_output_directory(
+    tmp_path, command
+):
     workplace = CommandFolder(tmp_path / "work")
     workplace.scenario(**MANY)
-    done = on_small_disk(workplace, "20m", f"TMPDIR=$PWD/out $COSIM {command} robust.json --output-dir big --no-report; code=$?")
+    done = on_small_disk(
+        workplace,
+        "20m",
+        f"TMPDIR=$PWD/out $COSIM {command} robust.json --output-dir big --no-report; code=$?",
+    )
     assert done.returncode == 1, done.stderr
     assert done.stderr.startswith("10 rows until t = 0.09 s kept in big\n")
 
 
-def test_a_recording_larger_than_the_output_directory_is_refused_before_results_are_removed(tmp_path):
+def test_a_recording_larger_than_the_output_directory_is_refused_before_results_are_removed(
+    tmp_path,
+):
     workplace = CommandFolder(tmp_path / "work")
     workplace.scenario(**MANY)
     run = "$COSIM run robust.json --output-dir out --no-report"
     done = on_small_disk(workplace, "20m", f"{run} --stop-time 0.05 >&2", f"{run}; code=$?")
     assert done.returncode == 2, done.stderr
     where = re.escape(str(workplace.folder / "out"))
-    text = f"robust.json:1:.* 20000001 rows of 1 signal take about 1.12 GB, 0.0.* GB are free in {where}; make the step longer.*"
+    text = (
+        "robust.json:1:.* 20000001 rows of 1 signal take about 1.12 GB, 0.0.* GB are free in "
+        f"{where}; make the step longer.*"
+    )
     assert re.fullmatch(text, done.stderr.splitlines()[-1])
     assert kept(workplace) == 6
 
@@ -240,7 +305,9 @@ def test_a_recording_larger_than_the_output_directory_is_refused_before_results_
 def test_one_fmu_alone_is_refused_before_its_former_result_is_removed(tmp_path):
     workplace = CommandFolder(tmp_path / "work")
     simulate = f"$COSIM simulate {FMU} --step-size 0.01 --output-file out/x.csv"
-    done = on_small_disk(workplace, "20m", f"{simulate} --stop-time 1", f"{simulate} --stop-time 100000; code=$?")
+    done = on_small_disk(
+        workplace, "20m", f"{simulate} --stop-time 1", f"{simulate} --stop-time 100000; code=$?"
+    )
     assert done.returncode == 2, done.stderr
     assert "GB are free in" in done.stderr
     assert len(cosim.Result.from_csv(workplace.out / "x.csv").time) == 101
@@ -279,7 +346,9 @@ def test_a_file_where_a_folder_should_be(workplace, command):
     (workplace.folder / "file").write_text("mine")
     done = workplace.run(*writing(command, "file"))
     assert done.returncode == 2
-    assert done.stderr.splitlines() == [f'cannot write to "{workplace.folder / "file"}": File exists']
+    assert done.stderr.splitlines() == [
+        f'cannot write to "{workplace.folder / "file"}": File exists'
+    ]
     assert (workplace.folder / "file").read_text() == "mine"
     assert workplace.leftovers() == []
 
@@ -288,7 +357,9 @@ def test_a_folder_where_the_result_should_be(workplace):
     (workplace.out / "result.csv").mkdir(parents=True)
     done = workplace.run("run", workplace.scenario(0.1), *RUN)
     assert done.returncode == 2
-    assert done.stderr.splitlines() == [f'cannot replace "{workplace.out / "result.csv"}": Is a directory']
+    assert done.stderr.splitlines() == [
+        f'cannot replace "{workplace.out / "result.csv"}": Is a directory'
+    ]
     assert workplace.leftovers() == []
 
 

@@ -18,7 +18,9 @@ def entry(name: str) -> dict[str, str]:
     return {"name": name, "python": f"{TICKER}:{name}"}
 
 
-def interrupted(workplace: CommandFolder, place: str, *options: str, times: int = 1, **scenario: object) -> float:
+def interrupted(
+    workplace: CommandFolder, place: str, *options: str, times: int = 1, **scenario: object
+) -> float:
     """Interrupt a run at a place; the time (s) it took to end."""
     process = workplace.start("run", workplace.scenario(0.5, **scenario), *RUN, *options)
     assert workplace.wait_for_file(f"reached-{place}"), process.communicate()
@@ -41,14 +43,17 @@ def rows(workplace: CommandFolder) -> int:
 
 
 @pytest.mark.parametrize(
-    ("isolation", "place", "kept"), [("run", "load", 0), ("run", "initialization", 0), ("run", "step", 20), ("none", "step", 20)]
+    ("isolation", "place", "kept"),
+    [("run", "load", 0), ("run", "initialization", 0), ("run", "step", 20), ("none", "step", 20)],
 )
 def test_while_a_component_is_at_work(workplace, isolation, place, kept):
     interrupted(workplace, place, "--isolation", isolation, arguments={"slow": place})
     assert rows(workplace) == kept
 
 
-@pytest.mark.parametrize(("place", "more"), [("kpi", {}), ("figure", {"figures": [entry("slow_figure")]})])
+@pytest.mark.parametrize(
+    ("place", "more"), [("kpi", {}), ("figure", {"figures": [entry("slow_figure")]})]
+)
 def test_when_all_rows_are_there(workplace, place, more):
     kpis = [entry("row_count"), *([entry("slow_kpi")] if place == "kpi" else [])]
     interrupted(workplace, place, kpis=kpis, **more)

@@ -1,4 +1,6 @@
-"""Killed at any moment, a run has lost no more than a second, and what it leaves can be read and goes away."""
+"""Killed at any moment, a run has lost no more than a second, and what it leaves can be read and
+goes away.
+"""
 
 from __future__ import annotations
 
@@ -34,7 +36,9 @@ class Killed:
     moment: float = field(init=False)
 
     def __post_init__(self) -> None:
-        self.process = self.place.start("run", self.place.scenario(), "--output-dir", "out", "--no-report")
+        self.process = self.place.start(
+            "run", self.place.scenario(), "--output-dir", "out", "--no-report"
+        )
 
     def begin(self) -> float:
         assert self.place.wait_for_file("started"), self.process.communicate()
@@ -65,14 +69,19 @@ class Killed:
         assert result["ticker.count"].tolist() == list(range(rows))
         assert result["ticker.tens"].tolist() == [tens(n) for n in range(rows)]
         assert result.time.tolist() == [n / 100 for n in range(rows)]
-        assert self.moment - result["ticker.clock"][-1] <= (0.1 if self.whom == "child" else PROMISE)
+        assert self.moment - result["ticker.clock"][-1] <= (
+            0.1 if self.whom == "child" else PROMISE
+        )
 
 
 def together(folder, seed: int, count: int = 10) -> None:
     """Several runs at once, each killed at a different moment."""
     draw = random.Random(seed)  # noqa: S311 - the same moments each time
     who = ["supervisor", "child", "both"]
-    runs = [Killed(CommandFolder(folder / str(n)), who[n % 3], draw.uniform(0.0, 4.0)) for n in range(count)]
+    runs = [
+        Killed(CommandFolder(folder / str(n)), who[n % 3], draw.uniform(0.0, 4.0))
+        for n in range(count)
+    ]
     for run in sorted(runs, key=Killed.begin):
         run.kill()
     for run in runs:
@@ -101,7 +110,9 @@ def test_the_next_run_removes_what_a_killed_one_left(workplace):
 
 
 def test_temporary_folders_of_living_processes_are_left_alone(workplace):
-    taken, abandoned, foreign = (workplace.tmp / name for name in ("cosim-run-taken", "cosim-run-abandoned", "others"))
+    taken, abandoned, foreign = (
+        workplace.tmp / name for name in ("cosim-run-taken", "cosim-run-abandoned", "others")
+    )
     for folder in (taken, abandoned, foreign):
         folder.mkdir()
         (folder / "file").touch()

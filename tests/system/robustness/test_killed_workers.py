@@ -1,4 +1,6 @@
-"""Whoever of a run with worker processes is killed, at whatever moment: the rows can be read, and nothing stays behind."""
+"""Whoever of a run with worker processes is killed, at whatever moment: the rows can be read, and
+nothing stays behind.
+"""
 
 from __future__ import annotations
 
@@ -33,7 +35,12 @@ def scenario(place: CommandFolder, probe: Path, stop: float = 1000.0) -> Path:
 
 def family(supervisor: int) -> dict[str, list[int]]:
     (child,) = child_processes(supervisor)
-    return {"supervisor": [supervisor], "child": [child], "worker": child_processes(child)[:1], "everybody": [supervisor, child]}
+    return {
+        "supervisor": [supervisor],
+        "child": [child],
+        "worker": child_processes(child)[:1],
+        "everybody": [supervisor, child],
+    }
 
 
 OTHERS = [pytest.param(whom, marks=pytest.mark.long) for whom in ("child", "everybody")]
@@ -41,7 +48,9 @@ OTHERS = [pytest.param(whom, marks=pytest.mark.long) for whom in ("child", "ever
 
 @pytest.mark.parametrize("whom", ["supervisor", "worker", *OTHERS])
 def test_nothing_stays_and_the_rows_can_be_read(workplace, probe, whom):
-    process = workplace.start("run", scenario(workplace, probe), "--output-dir", "out", "--no-report")
+    process = workplace.start(
+        "run", scenario(workplace, probe), "--output-dir", "out", "--no-report"
+    )
     assert workplace.wait_for_file("started"), process.communicate()
     started = float((workplace.folder / "started").read_text())
     time.sleep(random.Random(whom).uniform(0.4, 0.8))  # noqa: S311 - the same moment each time
@@ -58,9 +67,13 @@ def test_nothing_stays_and_the_rows_can_be_read(workplace, probe, whom):
         assert "lag: " in json.loads((workplace.out / "run.json").read_text())["failure"]
     rows = cosim.Result.from_csv(workplace.out / "result.csv")
     assert rows["ticker.count"].tolist() == list(range(len(rows.time)))
-    assert moment - max(started, rows["ticker.clock"][-1]) <= (1.0 if whom in ("supervisor", "everybody") else 0.2)
+    assert moment - max(started, rows["ticker.clock"][-1]) <= (
+        1.0 if whom in ("supervisor", "everybody") else 0.2
+    )
     (workplace.folder / "started").unlink()
-    again = workplace.run("run", scenario(workplace, probe, 0.1), "--output-dir", "out", "--no-report")
+    again = workplace.run(
+        "run", scenario(workplace, probe, 0.1), "--output-dir", "out", "--no-report"
+    )
     assert again.returncode == 0, again.stderr
     assert workplace.leftovers() == []
 
@@ -78,10 +91,16 @@ def test_a_killed_worker_leaves_no_descriptor_in_the_importer(workplace, probe, 
             lag, _ = (child for child in child_processes(os.getpid()) if child not in others)
             os.kill(lag, signal.SIGKILL)
 
-    with pytest.raises(cosim.ComponentError, match=r"lag: .* failed at t = 0.5 s: .*signal 9") as caught:
+    with pytest.raises(
+        cosim.ComponentError, match=r"lag: .* failed at t = 0.5 s: .*signal 9"
+    ) as caught:
         cosim.run(file, observers=[killer])
     assert len(caught.value.result.time) == 51
-    assert (sorted(DESCRIPTORS.iterdir()), child_processes(os.getpid()), list(workplace.tmp.iterdir())) == (before, others, [])
+    assert (
+        sorted(DESCRIPTORS.iterdir()),
+        child_processes(os.getpid()),
+        list(workplace.tmp.iterdir()),
+    ) == (before, others, [])
 
 
 PROGRAM = """
@@ -98,13 +117,19 @@ def folders(place: CommandFolder) -> set[str]:
 
 
 def test_what_a_killed_program_left_goes_at_the_start_of_the_next_one(workplace, probe):
-    """Two programs use the Python interface and one is killed: its folders are removed, those of the other stay."""
+    """Two programs use the Python interface and one is killed: its folders are removed, those of
+    the other stay.
+    """
     file = scenario(workplace, probe)
     environment = {**os.environ, "TMPDIR": str(workplace.tmp)}
     programs = []
     for _ in range(2):
         words = [sys.executable, "-c", PROGRAM, str(file)]
-        programs.append(subprocess.Popen(words, env=environment, cwd=workplace.folder, stdout=subprocess.PIPE, text=True))
+        programs.append(
+            subprocess.Popen(
+                words, env=environment, cwd=workplace.folder, stdout=subprocess.PIPE, text=True
+            )
+        )
         assert programs[-1].stdout.readline() == "running\n"
     living = sorted(workplace.tmp.iterdir())
     assert folders(workplace) == {"cosim-fmu", "cosim-worker"}
@@ -113,7 +138,9 @@ def test_what_a_killed_program_left_goes_at_the_start_of_the_next_one(workplace,
     victim.communicate()
     assert sorted(workplace.tmp.iterdir()) == living
     try:
-        done = workplace.run("run", scenario(workplace, probe, 0.1), "--output-dir", "out", "--no-report")
+        done = workplace.run(
+            "run", scenario(workplace, probe, 0.1), "--output-dir", "out", "--no-report"
+        )
         assert done.returncode == 0, done.stderr
         assert len(living) == 6
         assert len(list(workplace.tmp.iterdir())) == 3
@@ -136,5 +163,11 @@ print(os.listdir(os.environ["TMPDIR"]) == [os.path.basename(folder.name)])
 
 def test_a_forgotten_folder_goes_with_its_process_and_not_with_a_child(workplace):
     environment = {**os.environ, "TMPDIR": str(workplace.tmp)}
-    done = subprocess.run([sys.executable, "-c", FORGETFUL], env=environment, capture_output=True, text=True, check=True)
+    done = subprocess.run(
+        [sys.executable, "-c", FORGETFUL],
+        env=environment,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
     assert (done.stdout, list(workplace.tmp.iterdir())) == ("True\n", [])

@@ -1,4 +1,6 @@
-"""Forbidden code: anything that turns data into a program; and the locked environment fits the project."""
+"""Forbidden code: anything that turns data into a program; and the locked environment fits the
+project.
+"""
 
 from __future__ import annotations
 
@@ -12,10 +14,13 @@ import pytest
 from packaging.requirements import Requirement
 
 ROOT = Path(__file__).parents[3]
-FILES = sorted(path for room in ("cosim", "plant_src", "controllers") for path in (ROOT / room).rglob("*.py"))
+FILES = sorted(
+    path for room in ("cosim", "plant_src", "controllers") for path in (ROOT / room).rglob("*.py")
+)
 MODULES = {"pickle", "cPickle", "marshal", "shelve", "dill", "cloudpickle", "joblib"}
 CALLS = {"eval", "exec", "os.system", "os.popen", "yaml.load", "yaml.unsafe_load", "torch.load"}
-#: frames travel from a worker to its parent, both the same program, through a separate pipe; nothing is read from a file
+#: frames travel from a worker to its parent, both the same program, through a separate pipe;
+#: nothing is read from a file
 ALLOWED = {("cosim/report/frames.py", "import of pickle")}
 LOCK = ROOT / ".ci" / "requirements.txt"
 
@@ -24,7 +29,11 @@ def dangers(tree: ast.AST) -> Iterator[str]:
     for node in ast.walk(tree):
         match node:
             case ast.Import(names=names):
-                yield from (f"import of {alias.name}" for alias in names if alias.name.split(".")[0] in MODULES)
+                yield from (
+                    f"import of {alias.name}"
+                    for alias in names
+                    if alias.name.split(".")[0] in MODULES
+                )
             case ast.ImportFrom(module=str(module)) if module.split(".")[0] in MODULES:
                 yield f"import of {module}"
             case ast.Call(func=function, keywords=keywords):
@@ -33,34 +42,50 @@ def dangers(tree: ast.AST) -> Iterator[str]:
                 yield from (
                     f"{keyword.arg}=True"
                     for keyword in keywords
-                    if keyword.arg in ("shell", "allow_pickle") and ast.unparse(keyword.value) != "False"
+                    if keyword.arg in ("shell", "allow_pickle")
+                    and ast.unparse(keyword.value) != "False"
                 )
 
 
 def test_no_data_is_run():
-    found = {(path.relative_to(ROOT).as_posix(), danger) for path in FILES for danger in dangers(ast.parse(path.read_bytes()))}
+    found = {
+        (path.relative_to(ROOT).as_posix(), danger)
+        for path in FILES
+        for danger in dangers(ast.parse(path.read_bytes()))
+    }
     assert len(FILES) > 100
     assert found <= ALLOWED
 
 
 def test_the_search_finds_them():
-    text = "import pickle\nfrom marshal import loads\neval('1')\nos.system('x')\nrun('x', shell=True)\nnp.load(f, allow_pickle=x)"
+    text = (
+        "import pickle\nfrom marshal import loads\neval('1')\nos.system('x')\nrun('x', "
+        "shell=True)\nnp.load(f, allow_pickle=x)"
+    )
     assert len(list(dangers(ast.parse(text)))) == 6
 
 
 def test_the_linter_looks_for_them_too():
     lint = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["ruff"]["lint"]
     assert "S" in lint["select"]
-    ignored = [*lint["ignore"], *(rule for rules in lint.get("per-file-ignores", {}).values() for rule in rules)]
+    ignored = [
+        *lint["ignore"],
+        *(rule for rules in lint.get("per-file-ignores", {}).values() for rule in rules),
+    ]
     assert not {rule for rule in ignored if re.match(r"S30|S602|S604|S605|S$", rule)}
 
 
 @pytest.mark.skipif(not LOCK.exists(), reason="no checkout")
 def test_the_locked_environment_is_what_the_project_asks_for():
     project = tomllib.loads((ROOT / "pyproject.toml").read_text())["project"]
-    needs = [*project["dependencies"], *(text for extra in project["optional-dependencies"].values() for text in extra)]
+    needs = [
+        *project["dependencies"],
+        *(text for extra in project["optional-dependencies"].values() for text in extra),
+    ]
     lines = [line for line in LOCK.read_text().splitlines() if not line.startswith("#")]
-    assert all(re.fullmatch(r"[a-z0-9.-]+==[\w.]+ --hash=sha256:[0-9a-f]{64}", line) for line in lines)
+    assert all(
+        re.fullmatch(r"[a-z0-9.-]+==[\w.]+ --hash=sha256:[0-9a-f]{64}", line) for line in lines
+    )
     locked = dict(line.split(" ")[0].split("==") for line in lines)
     here = {"python_version": "3.11", "sys_platform": "linux", "platform_machine": "x86_64"}
     for need in map(Requirement, needs):

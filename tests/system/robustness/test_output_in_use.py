@@ -16,13 +16,18 @@ from cosim.core import resources
 
 RUN = ("run", "robust.json", "--no-report", "--output-dir", "out")
 FMU = resources.root() / "fmus" / "python" / "vtol.fmu"
-IN_USE = r'"{output}" is in use by process {process} on \S+, started at \d{{4}}-\d\d-\d\d \d\d:\d\d:\d\d; wait until .*'
+IN_USE = (
+    r'"{output}" is in use by process {process} on \S+, started at \d{{4}}-\d\d-\d\d '
+    r"\d\d:\d\d:\d\d; wait until .*"
+)
 
 
 def refused(done: subprocess.CompletedProcess[str], output: str, process: int) -> bool:
     """The command was refused in one line that names the process which has the output."""
     (line,) = done.stderr.splitlines()
-    return done.returncode == 2 and bool(re.fullmatch(IN_USE.format(output=output, process=process), line))
+    return done.returncode == 2 and bool(
+        re.fullmatch(IN_USE.format(output=output, process=process), line)
+    )
 
 
 @pytest.fixture
@@ -59,7 +64,11 @@ def test_a_run_without_supervision_keeps_its_folder_too(workplace):
 
 
 def test_a_sweep_into_the_folder_of_a_run_is_refused(workplace, running):
-    sweep = {"name": "s", "scenario": "robust.json", "factors": [{"name": "t", "set": "/stop_time", "values": [0.1]}]}
+    sweep = {
+        "name": "s",
+        "scenario": "robust.json",
+        "factors": [{"name": "t", "set": "/stop_time", "values": [0.1]}],
+    }
     (workplace.folder / "sweep.json").write_text(json.dumps(sweep))
     assert refused(workplace.run("sweep", "sweep.json", "--output-dir", "out"), "out", running.pid)
     assert not (workplace.out / "journal.jsonl").exists()
@@ -104,7 +113,9 @@ def test_six_runs_into_one_folder_at_once(workplace):
 @pytest.mark.parametrize("whom", ["both", "supervisor", "child"])
 def test_a_killed_run_locks_nothing(workplace, running, whom):
     (child,) = child_processes(running.pid)
-    for process in {"both": [running.pid, child], "supervisor": [running.pid], "child": [child]}[whom]:
+    for process in {"both": [running.pid, child], "supervisor": [running.pid], "child": [child]}[
+        whom
+    ]:
         os.kill(process, signal.SIGKILL)
     running.communicate(timeout=30)
     workplace.scenario(0.1)

@@ -39,23 +39,53 @@ def expected(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 @pytest.mark.parametrize("scenario", SCENARIOS)
 @pytest.mark.parametrize("seed", ["31337"])
 def test_hash_seeds_do_not_matter(
-    workplace: CommandFolder, expected: dict[str, str], scenario: str, seed: str, measured: MeasurementCheck
+    workplace: CommandFolder,
+    expected: dict[str, str],
+    scenario: str,
+    seed: str,
+    measured: MeasurementCheck,
 ) -> None:
     others = int(digest(workplace, scenario, PYTHONHASHSEED=seed) != expected[scenario])
-    measured(SAME, "other SHA-256 of result.csv", others, 0, "1", "another process and PYTHONHASHSEED", case=scenario)
+    measured(
+        SAME,
+        "other SHA-256 of result.csv",
+        others,
+        0,
+        "1",
+        "another process and PYTHONHASHSEED",
+        case=scenario,
+    )
 
 
 def test_threads_do_not_matter(workplace: CommandFolder, expected: dict[str, str]) -> None:
-    assert digest(workplace, "demo1_waves", OMP_NUM_THREADS="2", OPENBLAS_NUM_THREADS="2") == expected["demo1_waves"]
+    assert (
+        digest(workplace, "demo1_waves", OMP_NUM_THREADS="2", OPENBLAS_NUM_THREADS="2")
+        == expected["demo1_waves"]
+    )
 
 
 @pytest.mark.parametrize("scenario", SCENARIOS)
-def test_another_seed_is_another_run(tmp_path: Path, expected: dict[str, str], scenario: str) -> None:
-    assert digest_here(scenario, tmp_path, {"/components/plant/arguments/environment/seed": 99}) != expected[scenario]
+def test_another_seed_is_another_run(
+    tmp_path: Path, expected: dict[str, str], scenario: str
+) -> None:
+    assert (
+        digest_here(scenario, tmp_path, {"/components/plant/arguments/environment/seed": 99})
+        != expected[scenario]
+    )
 
 
 @pytest.mark.long
 @pytest.mark.parametrize("scenario", SCENARIOS)
-def test_ten_repeats(workplace: CommandFolder, expected: dict[str, str], scenario: str, measured: MeasurementCheck) -> None:
+def test_ten_repeats(
+    workplace: CommandFolder, expected: dict[str, str], scenario: str, measured: MeasurementCheck
+) -> None:
     others = sum(digest(workplace, scenario) != expected[scenario] for _ in range(10))
-    measured(SAME, "other SHA-256 of result.csv in ten repeats", others, 0, "1", "the first run", case=scenario)
+    measured(
+        SAME,
+        "other SHA-256 of result.csv in ten repeats",
+        others,
+        0,
+        "1",
+        "the first run",
+        case=scenario,
+    )

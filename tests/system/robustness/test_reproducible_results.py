@@ -23,14 +23,24 @@ SURROUNDINGS = {
     "hash seed": ({"PYTHONHASHSEED": "12345"}, ".", ()),
     "another hash seed": ({"PYTHONHASHSEED": "7"}, ".", ()),
     "working directory": ({}, "elsewhere", ()),
-    "locale and time zone": ({"LC_ALL": "C.UTF-8", "LANG": "de_DE.UTF-8", "TZ": "Asia/Tokyo"}, ".", ()),
+    "locale and time zone": (
+        {"LC_ALL": "C.UTF-8", "LANG": "de_DE.UTF-8", "TZ": "Asia/Tokyo"},
+        ".",
+        (),
+    ),
     "plain locale": ({"LC_ALL": "C", "PYTHONUTF8": "0"}, ".", ()),
     "in one process": ({}, ".", ("--isolation", "none")),
     "many threads": ({"OMP_NUM_THREADS": "2", "OPENBLAS_NUM_THREADS": "2"}, ".", ()),
 }
 
 
-def digest(workplace: CommandFolder, scenario: str, environment: dict[str, str], folder: str, options: tuple[str, ...]) -> str:
+def digest(
+    workplace: CommandFolder,
+    scenario: str,
+    environment: dict[str, str],
+    folder: str,
+    options: tuple[str, ...],
+) -> str:
     place = workplace.folder / folder
     place.mkdir(exist_ok=True)
     words = ("run", scenario, "--stop-time", "6", "--output-dir", "out", "--no-report", *options)
@@ -67,27 +77,46 @@ def test_twenty_repeats(workplace, expected):
         assert digest(workplace, "demo1_box", *SURROUNDINGS["as it is"]) == expected["demo1_box"]
 
 
-def alone(fmu: Path, folder: Path, stop: float, step: float, **start: float) -> dict[str, np.ndarray]:
+def alone(
+    fmu: Path, folder: Path, stop: float, step: float, **start: float
+) -> dict[str, np.ndarray]:
     """Outputs of one FMU by name, run without a supervisor."""
     from cosim import cli
 
     file = folder / "result.csv"
-    values = [word for name, value in start.items() for word in ("--start-value", f"{name}={value!r}")]
-    words = ["simulate", str(fmu), "--stop-time", repr(stop), "--step-size", repr(step), "--output-file", str(file)]
+    values = [
+        word for name, value in start.items() for word in ("--start-value", f"{name}={value!r}")
+    ]
+    words = [
+        "simulate",
+        str(fmu),
+        "--stop-time",
+        repr(stop),
+        "--step-size",
+        repr(step),
+        "--output-file",
+        str(file),
+    ]
     assert cli._run_command_line([*words, *values, "--isolation", "none"]) == 0
     result = cosim.Result.from_csv(file)
     return {"time": result.time, **result.recording.columns}
 
 
-@pytest.mark.parametrize("name", ["vtol", "strider", "ar_drone", "fmi3/vtol", "fmi3/strider", "python/waypoint_guidance"])
+@pytest.mark.parametrize(
+    "name", ["vtol", "strider", "ar_drone", "fmi3/vtol", "fmi3/strider", "python/waypoint_guidance"]
+)
 def test_one_fmu_alone_is_as_in_fmpy(tmp_path, name):
     fmu = FMUS / f"{name}.fmu"
     ours = alone(fmu, tmp_path, 2.0, 0.01)
     names = [output for output in ours if output != "time"]
-    theirs = fmpy.simulate_fmu(str(fmu), stop_time=2.0, step_size=0.01, output_interval=0.01, output=names)
+    theirs = fmpy.simulate_fmu(
+        str(fmu), stop_time=2.0, step_size=0.01, output_interval=0.01, output=names
+    )
     assert np.allclose(ours["time"], theirs["time"], rtol=0, atol=1e-12)
     for output in names:
-        assert np.allclose(ours[output], theirs[output], rtol=1e-12, atol=1e-12, equal_nan=True), output
+        assert np.allclose(ours[output], theirs[output], rtol=1e-12, atol=1e-12, equal_nan=True), (
+            output
+        )
 
 
 DAHLQUIST = """
@@ -101,13 +130,16 @@ end Dahlquist;
 
 
 def test_dahlquist_is_the_exponential(tmp_path):
-    """x' = -k x: the fourth-order Runge-Kutta inside the FMU leaves h^5/120 per step, cosim adds nothing to it."""
+    """x' = -k x: the fourth-order Runge-Kutta inside the FMU leaves h^5/120 per step, cosim adds
+    nothing to it.
+    """
     if not shutil.which(os.environ.get("CC", "cc")):
         pytest.skip("no C compiler")
     (tmp_path / "Dahlquist.mo").write_text(DAHLQUIST)
     scenario = tmp_path / "dahlquist.json"
     scenario.write_text(
-        '{"name": "d", "stop_time": 2, "step_size": 0.001, "components": {"d": {"modelica": "Dahlquist.mo:Dahlquist"}}}'
+        '{"name": "d", "stop_time": 2, "step_size": 0.001, "components": {"d": {"modelica": '
+        '"Dahlquist.mo:Dahlquist"}}}'
     )
     result = cosim.run(scenario)
     exact = np.array([math.exp(-t) for t in result.time])

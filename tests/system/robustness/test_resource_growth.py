@@ -19,7 +19,9 @@ PLAIN, BULLET = 5 * MEGABYTE, 15 * MEGABYTE
 def grown(folder: Path, *arguments: object) -> dict[str, int]:
     (folder / "tmp").mkdir()
     words = [sys.executable, GROWTH, *map(str, arguments)]
-    environment = {name: value for name, value in os.environ.items() if not name.startswith("COVERAGE_")}  # whose data grow
+    environment = {
+        name: value for name, value in os.environ.items() if not name.startswith("COVERAGE_")
+    }  # whose data grow
     environment["TMPDIR"] = str(folder / "tmp")
     done = subprocess.run(words, env=environment, capture_output=True, text=True, check=False)
     assert done.returncode == 0, done.stderr
@@ -33,7 +35,9 @@ def pair(folder: Path, probes: dict[int, Path]) -> Path:
         "name": "pair",
         "stop_time": 1.0,
         "step_size": 0.01,
-        "components": {name: {"fmu": str(probes[version])} for name, version in (("a", 2), ("b", 3))},
+        "components": {
+            name: {"fmu": str(probes[version])} for name, version in (("a", 2), ("b", 3))
+        },
         "connections": [{"from": "a.y", "to": "b.u"}, {"from": "b.y", "to": "a.u"}],
     }
     file = folder / "pair.json"
@@ -54,7 +58,9 @@ def test_some_runs_with_bullet_leave_nothing(tmp_path):
     judge(grown(tmp_path, "demo1_box", "runs", 10), BULLET / 4)
 
 
-@pytest.mark.parametrize(("scenario", "limit"), [("free_flight", PLAIN / 4), ("demo1_box", BULLET / 4)])
+@pytest.mark.parametrize(
+    ("scenario", "limit"), [("free_flight", PLAIN / 4), ("demo1_box", BULLET / 4)]
+)
 def test_many_steps_need_no_memory(tmp_path, scenario, limit):
     judge(grown(tmp_path, scenario, "steps", 50_000), limit)
 

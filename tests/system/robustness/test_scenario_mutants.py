@@ -1,4 +1,6 @@
-"""Random changes to good scenarios: they are loaded or refused with a place for each problem, soon, and nothing else happens."""
+"""Random changes to good scenarios: they are loaded or refused with a place for each problem, soon,
+and nothing else happens.
+"""
 
 from __future__ import annotations
 
@@ -31,22 +33,38 @@ SHIPPED = sorted(path.stem for path in (resources.root() / "scenarios").glob("*.
 
 def counted(examples: int, part: int = 0) -> Callable[[Any], Any]:
     """Always the same examples, others in each part."""
-    off = [HealthCheck.function_scoped_fixture, HealthCheck.too_slow, HealthCheck.data_too_large, HealthCheck.large_base_example]
+    off = [
+        HealthCheck.function_scoped_fixture,
+        HealthCheck.too_slow,
+        HealthCheck.data_too_large,
+        HealthCheck.large_base_example,
+    ]
     phases = [Phase.generate, Phase.shrink]
-    many = settings(max_examples=examples, database=None, deadline=None, suppress_health_check=off, phases=phases)
+    many = settings(
+        max_examples=examples,
+        database=None,
+        deadline=None,
+        suppress_health_check=off,
+        phases=phases,
+    )
     return lambda test: seed(part)(many(test))
 
 
 def in_parts(short: int, long: int) -> pytest.MarkDecorator:
     """A short run, and a long one in parts that may run at the same time."""
-    parts = [pytest.param(counted(long // 4, part), marks=pytest.mark.fuzz, id=f"{long // 4} {part}") for part in range(1, 5)]
+    parts = [
+        pytest.param(counted(long // 4, part), marks=pytest.mark.fuzz, id=f"{long // 4} {part}")
+        for part in range(1, 5)
+    ]
     return pytest.mark.parametrize("count", [pytest.param(counted(short), id=str(short)), *parts])
 
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory, probes: dict[int, Path]) -> Path:
     folder = write_scenario_files(tmp_path_factory.mktemp("mutants"), probes[3])
-    assert write(folder, SCENARIO, INNER_SYSTEM, limit=60)  # what is imported once is no time of a mutant
+    assert write(
+        folder, SCENARIO, INNER_SYSTEM, limit=60
+    )  # what is imported once is no time of a mutant
     import_module("matplotlib.figure")
     return folder
 
@@ -110,7 +128,18 @@ def test_mutated_nested_systems(folder, count):
 def test_mutated_texts(folder, count):
     """Characters changed, so that most of them are no JSON any more."""
     text = json.dumps(SCENARIO)
-    telling = ("NaN", "-", "1e999", "9" * 5000, "\ufeff", "é", "//", "null", "[" * 500, '{"a":' * 500)
+    telling = (
+        "NaN",
+        "-",
+        "1e999",
+        "9" * 5000,
+        "\ufeff",
+        "é",
+        "//",
+        "null",
+        "[" * 500,
+        '{"a":' * 500,
+    )
     words = st.sampled_from([*'{}[]",:\\ \n\0', *telling])
 
     @count

@@ -12,6 +12,15 @@ FOLDER = Path(__file__).parent
 def test_the_controller_meets_the_checks(tmp_path: Path) -> None:
     build_to(FOLDER / "modelDescription.xml", None, FOLDER / "CONTROLLER.fmu")
     scenario = str(FOLDER / "CONTROLLER.json")
-    command = [sys.executable, "-m", "cosim", "run", scenario, "--no-report", "--output-dir", str(tmp_path)]
+    command = [
+        sys.executable,
+        "-m",
+        "cosim",
+        "run",
+        scenario,
+        "--no-report",
+        "--output-dir",
+        str(tmp_path),
+    ]
     done = subprocess.run(command, capture_output=True, text=True)
     assert done.returncode == 0, done.stdout + done.stderr

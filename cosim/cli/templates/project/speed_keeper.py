@@ -1,4 +1,7 @@
-"""Vessel autopilot for speed and course as a PythonFMU class; it runs in process or, exported, as an FMU."""
+"""Vessel autopilot for speed and course as a PythonFMU class.
+
+It runs in process or, exported, as an FMU.
+"""
 
 from __future__ import annotations
 
@@ -23,17 +26,26 @@ class SpeedKeeper(Fmi2Slave):
     def __init__(self, **arguments: object):
         super().__init__(**arguments)
         self.vehicle = SimpleNamespace(
-            attitude=SimpleNamespace(yaw=0.0), velocity_body=SimpleNamespace(u=0.0), rates=SimpleNamespace(r=0.0)
+            attitude=SimpleNamespace(yaw=0.0),
+            velocity_body=SimpleNamespace(u=0.0),
+            rates=SimpleNamespace(r=0.0),
         )
         self.speed_command, self.speed_P, self.speed_I, self.thrust_limit = 1.0, 82.65, 10.0, 3.0
-        self.course_command, self.course_P, self.course_D, self.rudder_limit = 0.0, 1.5, 0.8, math.radians(35)
+        self.course_command, self.course_P, self.course_D, self.rudder_limit = (
+            0.0,
+            1.5,
+            0.8,
+            math.radians(35),
+        )
         self.thrust, self.rudder_angle = 0.0, 0.0
         self.speed_integral = 0.0
 
         for name in INPUTS:
             self.register_variable(Real(name, causality=Fmi2Causality.input))
         for name in PARAMETERS:
-            self.register_variable(Real(name, causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable))
+            self.register_variable(
+                Real(name, causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable)
+            )
         for name in OUTPUTS:
             self.register_variable(Real(name, causality=Fmi2Causality.output))
         self.register_variable(Real("speed_integral", causality=Fmi2Causality.local))
@@ -45,7 +57,10 @@ class SpeedKeeper(Fmi2Slave):
         return True
 
     def _thrust(self, error: float, step_size: float) -> float:
-        """Return the thrust of a PI controller of the speed; its integral is constant while the thrust is at its limit."""
+        """Return the thrust of a PI controller of the speed.
+
+        Its integral is constant while the thrust is at its limit.
+        """
         thrust = self.speed_P * error + self.speed_integral
         if abs(thrust) < self.thrust_limit:
             self.speed_integral += self.speed_I * step_size * error
@@ -57,7 +72,9 @@ class SpeedKeeper(Fmi2Slave):
         A positive rudder angle turns the bow to starboard, which reduces the yaw angle.
         """
         error = math.atan2(math.sin(error), math.cos(error))
-        return limited(self.course_P * error + self.course_D * self.vehicle.rates.r, self.rudder_limit)
+        return limited(
+            self.course_P * error + self.course_D * self.vehicle.rates.r, self.rudder_limit
+        )
 
 
 def limited(value: float, limit: float) -> float:

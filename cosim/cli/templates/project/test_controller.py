@@ -14,9 +14,22 @@ COURSE = Path(__file__).parents[1] / "scenarios/course.json"
 
 def run_course(folder: Path, setting: str) -> None:
     """Run the scenario with a changed value by the command, which ends an endless loop or a crash with a message."""
-    command = [sys.executable, "-m", "cosim", "run", str(COURSE), "--set", setting, "--no-report", "--output-dir", str(folder)]
+    command = [
+        sys.executable,
+        "-m",
+        "cosim",
+        "run",
+        str(COURSE),
+        "--set",
+        setting,
+        "--no-report",
+        "--output-dir",
+        str(folder),
+    ]
     done = subprocess.run(command, capture_output=True, text=True)
-    assert done.returncode in (0, 3), done.stdout + done.stderr  # 3: the scenario's own checks are for its own values
+    assert done.returncode in (0, 3), (
+        done.stdout + done.stderr
+    )  # 3: the scenario's own checks are for its own values
 
 
 @pytest.mark.parametrize("course", [0.5, -2.0])

@@ -10,7 +10,10 @@ from matplotlib.figure import Figure
 from cosim.results import Result
 
 ARM = 0.1815  # m, from the centre of mass to a rotor
-HULL = {"orientation": [0, math.sqrt(0.5), 0, math.sqrt(0.5)], "colour": [0.9, 0.7, 0.1]}  # along x, yellow
+HULL = {
+    "orientation": [0, math.sqrt(0.5), 0, math.sqrt(0.5)],
+    "colour": [0.9, 0.7, 0.1],
+}  # along x, yellow
 DARK, RED = [0.15, 0.15, 0.17], [0.8, 0.2, 0.15]
 
 
@@ -28,12 +31,23 @@ def track(result: Result, followed: str, vehicle: str) -> Figure:
 
 
 def scene(scenario: dict[str, Any], vehicle: str, vessel: str) -> dict[str, Any]:
-    """Return the scene: a quadcopter and a catamaran on calm water; lengths in m, body frames x forward, y to port, z up."""
+    """Return the scene: a quadcopter and a catamaran on calm water.
+
+    Lengths in m, body frames x forward, y to port, z up.
+    """
     heights = [[f"{vehicle}.position.z", f"{vessel}.deck.position.z"]]
     return {
-        "bodies": [body(vehicle, "#0072b2", quadcopter_parts()), body(vessel, "#d55e00", catamaran_parts())],
+        "bodies": [
+            body(vehicle, "#0072b2", quadcopter_parts()),
+            body(vessel, "#d55e00", catamaran_parts()),
+        ],
         "water": {"waves": [], "gain": 1},
-        "plots": [*heights, [f"{vehicle}.velocity.*"], [f"{vehicle}.attitude.*"], ["uav.rotor_speed*"]],
+        "plots": [
+            *heights,
+            [f"{vehicle}.velocity.*"],
+            [f"{vehicle}.attitude.*"],
+            ["uav.rotor_speed*"],
+        ],
     }
 
 
@@ -41,7 +55,13 @@ def body(name: str, colour: str, parts: list[dict[str, Any]]) -> dict[str, Any]:
     """Return a body of the scene that has the recorded position and orientation of a component."""
     position = [f"{name}.position.{axis}" for axis in "xyz"]
     orientation = [f"{name}.orientation.{part}" for part in "wxyz"]
-    return {"name": name, "colour": colour, "position": position, "orientation": orientation, "parts": parts}
+    return {
+        "name": name,
+        "colour": colour,
+        "position": position,
+        "orientation": orientation,
+        "parts": parts,
+    }
 
 
 def quadcopter_parts() -> list[dict[str, Any]]:
@@ -49,9 +69,18 @@ def quadcopter_parts() -> list[dict[str, Any]]:
     rotors = {(ARM, 0.0): RED, (0.0, ARM): DARK, (-ARM, 0.0): DARK, (0.0, -ARM): DARK}
     return [
         {"shape": "box", "size": [0.2, 0.09, 0.06], "colour": DARK},
-        *({"shape": "box", "size": size, "colour": DARK} for size in ([2 * ARM, 0.02, 0.015], [0.02, 2 * ARM, 0.015])),
         *(
-            {"shape": "cylinder", "size": [0.1, 0.008], "position": [x, y, 0.03], "colour": colour, "opacity": 0.6}
+            {"shape": "box", "size": size, "colour": DARK}
+            for size in ([2 * ARM, 0.02, 0.015], [0.02, 2 * ARM, 0.015])
+        ),
+        *(
+            {
+                "shape": "cylinder",
+                "size": [0.1, 0.008],
+                "position": [x, y, 0.03],
+                "colour": colour,
+                "opacity": 0.6,
+            }
             for (x, y), colour in rotors.items()
         ),
     ]
@@ -60,8 +89,24 @@ def quadcopter_parts() -> list[dict[str, Any]]:
 def catamaran_parts() -> list[dict[str, Any]]:
     """Return deck, beams and hulls of the vessel."""
     return [
-        {"shape": "box", "size": [0.7, 0.6, 0.02], "position": [0, 0, 0.13], "colour": [0.4, 0.4, 0.4]},
-        {"shape": "box", "size": [0.52, 0.3, 0.18], "position": [0, 0, 0.03], "colour": [0.2, 0.4, 0.7]},
-        *({"shape": "box", "size": [0.04, 1.07, 0.04], "position": [x, 0, -0.06]} for x in (-0.24, 0.24)),
-        *({"shape": "cylinder", "size": [0.06, 0.98], "position": [0, y, -0.12], **HULL} for y in (-0.533, 0.533)),
+        {
+            "shape": "box",
+            "size": [0.7, 0.6, 0.02],
+            "position": [0, 0, 0.13],
+            "colour": [0.4, 0.4, 0.4],
+        },
+        {
+            "shape": "box",
+            "size": [0.52, 0.3, 0.18],
+            "position": [0, 0, 0.03],
+            "colour": [0.2, 0.4, 0.7],
+        },
+        *(
+            {"shape": "box", "size": [0.04, 1.07, 0.04], "position": [x, 0, -0.06]}
+            for x in (-0.24, 0.24)
+        ),
+        *(
+            {"shape": "cylinder", "size": [0.06, 0.98], "position": [0, y, -0.12], **HULL}
+            for y in (-0.533, 0.533)
+        ),
     ]

@@ -9,7 +9,10 @@ from matplotlib.figure import Figure
 
 from cosim.results import Result
 
-HULL = {"orientation": [0, math.sqrt(0.5), 0, math.sqrt(0.5)], "colour": [0.9, 0.7, 0.1]}  # along x, yellow
+HULL = {
+    "orientation": [0, math.sqrt(0.5), 0, math.sqrt(0.5)],
+    "colour": [0.9, 0.7, 0.1],
+}  # along x, yellow
 
 
 def course(result: Result, vessel: str) -> Figure:
@@ -24,12 +27,31 @@ def course(result: Result, vessel: str) -> Figure:
 
 
 def scene(scenario: dict[str, Any], vessel: str) -> dict[str, Any]:
-    """Return the scene: the catamaran `vessel` on calm water; lengths in m, body frame x forward, y to port, z up."""
+    """Return the scene: the catamaran `vessel` on calm water.
+
+    Lengths in m, body frame x forward, y to port, z up.
+    """
     parts = [
-        {"shape": "box", "size": [0.7, 0.6, 0.02], "position": [0, 0, 0.13], "colour": [0.4, 0.4, 0.4]},
-        {"shape": "box", "size": [0.52, 0.3, 0.18], "position": [0, 0, 0.03], "colour": [0.2, 0.4, 0.7]},
-        *({"shape": "box", "size": [0.04, 1.07, 0.04], "position": [x, 0, -0.06]} for x in (-0.24, 0.24)),
-        *({"shape": "cylinder", "size": [0.06, 0.98], "position": [0, y, -0.12], **HULL} for y in (-0.533, 0.533)),
+        {
+            "shape": "box",
+            "size": [0.7, 0.6, 0.02],
+            "position": [0, 0, 0.13],
+            "colour": [0.4, 0.4, 0.4],
+        },
+        {
+            "shape": "box",
+            "size": [0.52, 0.3, 0.18],
+            "position": [0, 0, 0.03],
+            "colour": [0.2, 0.4, 0.7],
+        },
+        *(
+            {"shape": "box", "size": [0.04, 1.07, 0.04], "position": [x, 0, -0.06]}
+            for x in (-0.24, 0.24)
+        ),
+        *(
+            {"shape": "cylinder", "size": [0.06, 0.98], "position": [0, y, -0.12], **HULL}
+            for y in (-0.533, 0.533)
+        ),
     ]
     return {
         "bodies": [

@@ -1,4 +1,6 @@
-"""Conversion of the values in the answers of a worker process. Foreign code in the worker may have written these values.
+"""Conversion of the values in the answers of a worker process.
+
+Foreign code in the worker may have written these values.
 
 Each function raises one of `INVALID_ANSWER_ERRORS` for a value that is not of the expected form.
 """
@@ -12,7 +14,14 @@ import numpy as np
 from ....core.component import StepResult, Variable
 from ....core.errors import ComponentError, InputError
 
-INVALID_ANSWER_ERRORS = (ValueError, TypeError, LookupError, AttributeError, ArithmeticError, RecursionError)
+INVALID_ANSWER_ERRORS = (
+    ValueError,
+    TypeError,
+    LookupError,
+    AttributeError,
+    ArithmeticError,
+    RecursionError,
+)
 
 _OBJECT_DTYPE = np.dtype(object)
 
@@ -38,11 +47,18 @@ def call_names(value: Any) -> list[str]:
 
 
 def step_result(value: Any) -> StepResult | None:
-    """Return the step result that a worker sent; None if the step reached its end and requested nothing."""
+    """Return the step result that a worker sent.
+
+    None if the step reached its end and requested nothing.
+    """
     if value is None:
         return None
     time, event_needed, terminate_requested = value
-    if type(time) not in (int, float) or type(event_needed) is not bool or type(terminate_requested) is not bool:
+    if (
+        type(time) not in (int, float)
+        or type(event_needed) is not bool
+        or type(terminate_requested) is not bool
+    ):
         raise TypeError("no outcome of a step")
     return StepResult(float(time), event_needed, terminate_requested)
 
@@ -54,22 +70,40 @@ def variable_value(value: Any, variable: Variable) -> Any:
         string_values(value if variable.shape else [value], count)
         return value
     numbers = np.asarray(value)
-    if numbers.dtype.kind not in "biuf" or numbers.size != count or bool(numbers.ndim) != bool(variable.shape):
+    if (
+        numbers.dtype.kind not in "biuf"
+        or numbers.size != count
+        or bool(numbers.ndim) != bool(variable.shape)
+    ):
         raise TypeError("no value of the variable")
     return value
 
 
 def derivative_values(value: Any, count: int) -> list[float] | None:
-    """Return `count` directional derivatives that a worker sent; None if the FMU does not offer them."""
-    if value is not None and (not isinstance(value, list) or len(value) != count or {type(each) for each in value} - {float}):
+    """Return `count` directional derivatives that a worker sent.
+
+    None if the FMU does not offer them.
+    """
+    if value is not None and (
+        not isinstance(value, list)
+        or len(value) != count
+        or {type(each) for each in value} - {float}
+    ):
         raise TypeError("no directional derivatives")
     return value
 
 
 def string_values(value: Any, count: int) -> list[Any]:
-    """Return `count` values of String or Binary variables that a worker sent; None means an empty list."""
+    """Return `count` values of String or Binary variables that a worker sent.
+
+    None means an empty list.
+    """
     values = [] if value is None else value
-    if not isinstance(values, list) or len(values) != count or not all(isinstance(text, str | bytes) for text in values):
+    if (
+        not isinstance(values, list)
+        or len(values) != count
+        or not all(isinstance(text, str | bytes) for text in values)
+    ):
         raise TypeError("no values of strings")
     return values
 
@@ -78,6 +112,8 @@ def raise_reported_error(message: dict[str, Any], component: str) -> None:
     """Raise the error that a worker's answer reports, if any, with the name of `component`."""
     if "component_error" in message:
         _, function, reason, time = message["component_error"]
-        raise ComponentError(component, str(function), str(reason), None if time is None else float(time))
+        raise ComponentError(
+            component, str(function), str(reason), None if time is None else float(time)
+        )
     if "input_error" in message:
         raise InputError([str(problem) for problem in list(message["input_error"])])

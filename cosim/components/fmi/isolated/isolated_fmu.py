@@ -17,7 +17,14 @@ from ..file import FmuFile
 from ..function_calls import DISCARD, OK
 from ..instance import FmuInstance
 from ..instance_settings import InstanceSettings
-from .answers import call_names, derivative_values, state_number, step_result, string_values, variable_value
+from .answers import (
+    call_names,
+    derivative_values,
+    state_number,
+    step_result,
+    string_values,
+    variable_value,
+)
 from .isolation import Isolation
 from .pipes import STEP_COMMAND, STEP_DONE
 from .shared_memory import SharedMemoryBlock, matching_buffers, string_array
@@ -29,7 +36,8 @@ from .worker_process import WorkerProcess
 class IsolatedFmu(WorkerClient, Component):
     """Component whose FMU instance runs in a worker process.
 
-    Results are identical to those of `FmuInstance`. A crash, exit or hang of the FMU raises a ComponentError.
+    Results are identical to those of `FmuInstance`. A crash, exit or hang of the FMU raises a
+    ComponentError.
     """
 
     binds_everything = False
@@ -43,7 +51,9 @@ class IsolatedFmu(WorkerClient, Component):
         settings: InstanceSettings,
         isolation: Isolation,
     ):
-        """Create the component; see `create_component`. The worker process is started by `instantiate`.
+        """Create the component; see `create_component`.
+
+        The worker process is started by `instantiate`.
 
         Args:
             instance_class: Class of the instance in the worker process.
@@ -53,17 +63,23 @@ class IsolatedFmu(WorkerClient, Component):
             isolation: Deadlines and sandbox of the worker process.
 
         Raises:
-            InputError: The operating system has no fork, or the FMU has no usable binary for this platform.
+            InputError: The operating system has no fork, or the FMU has no usable binary for this
+                platform.
         """
         if not hasattr(os, "fork"):
             raise InputError("isolated FMUs need an operating system with fork (Linux, macOS)")
         file.check_binary()
         super().__init__(file, instance_name, isolation.deadlines.load)
         self._instance_class, self.isolation = instance_class, isolation
-        self.description = file.description.with_structural_parameters(settings.structural_parameters, file.limits)
+        self.description = file.description.with_structural_parameters(
+            settings.structural_parameters, file.limits
+        )
         self.variables, self.has_state = self.description.variables, self.description.has_state
         self.variable_step = self.description.variable_step
-        self.dependencies, self.initial_dependencies = self.description.dependencies, self.description.initial_dependencies
+        self.dependencies, self.initial_dependencies = (
+            self.description.dependencies,
+            self.description.initial_dependencies,
+        )
         self.continuous_states = self.description.continuous_states
         self.interpolates_inputs = self.description.interpolates_inputs
         self.gives_output_slopes = self.description.gives_output_slopes
@@ -72,7 +88,8 @@ class IsolatedFmu(WorkerClient, Component):
         self._temporary_folder: LockedFolder | None = None
         self._result: StepResult | None = None
 
-    # -- life cycle ----------------------------------------------------------------------------------------------------
+    # -- life cycle
+    # ----------------------------------------------------------------------------------------------------
 
     def bind(self, inputs: Ports, outputs: Ports) -> None:
         """Allocate the shared memory that mirrors the bound arrays."""
@@ -99,7 +116,9 @@ class IsolatedFmu(WorkerClient, Component):
         self._deadline = self.isolation.deadlines.initialization
 
     def _start_worker(self, folder: Path, temporary: Path) -> None:
-        import_module(f"fmpy.fmi{self.description.major}")  # imported before the fork, so that workers need not
+        import_module(
+            f"fmpy.fmi{self.description.major}"
+        )  # imported before the fork, so that workers need not
         setup = self.isolation.worker_setup(folder, temporary, os.getpid())
 
         def serve(commands: int, answers: int) -> None:
@@ -135,7 +154,8 @@ class IsolatedFmu(WorkerClient, Component):
             self._temporary_folder = None
             self._file.release()
 
-    # -- access outside the stepping loop ---------------------------------------------------------------------------------------
+    # -- access outside the stepping loop
+    # ---------------------------------------------------------------------------------------
 
     def set(self, name: str, value: Any) -> None:
         """Set a variable of the FMU in the worker process."""
@@ -143,14 +163,20 @@ class IsolatedFmu(WorkerClient, Component):
 
     def get(self, name: str) -> Any:
         """Return the value of a variable of the FMU in the worker process."""
-        return self._execute("get", name, convert=partial(variable_value, variable=self._variables_by_name[name]))
+        return self._execute(
+            "get", name, convert=partial(variable_value, variable=self._variables_by_name[name])
+        )
 
-    def get_directional_derivative(self, outputs: Sequence[str], input_name: str) -> Sequence[float] | None:
+    def get_directional_derivative(
+        self, outputs: Sequence[str], input_name: str
+    ) -> Sequence[float] | None:
         """Return the directional derivatives of the FMU in the worker process."""
         if not self.description.directional_derivatives:
             return None
         convert = partial(derivative_values, count=len(outputs))
-        found: Sequence[float] | None = self._execute("get_directional_derivative", list(outputs), input_name, convert=convert)
+        found: Sequence[float] | None = self._execute(
+            "get_directional_derivative", list(outputs), input_name, convert=convert
+        )
         return found
 
     def get_state(self) -> Any:
@@ -165,7 +191,8 @@ class IsolatedFmu(WorkerClient, Component):
         """Free the FMU state with a number."""
         self._execute("free_state", state)
 
-    # -- steps ---------------------------------------------------------------------------------------------------------
+    # -- steps
+    # ---------------------------------------------------------------------------------------------------------
 
     def set_inputs(self) -> None:
         """Copy the bound inputs to the worker process and set them in the FMU."""
@@ -182,7 +209,9 @@ class IsolatedFmu(WorkerClient, Component):
         self._copy_outputs()
         self._output_strings[:] = strings
 
-    def prepare_step_calls(self, current_time: ctypes.c_double, step_size: float) -> Sequence[PreparedCall]:
+    def prepare_step_calls(
+        self, current_time: ctypes.c_double, step_size: float
+    ) -> Sequence[PreparedCall]:
         """Prepare one call that makes a whole step (set inputs, doStep, get outputs) in the worker process."""
         self._call_names = self._execute("prepare_step", step_size, convert=call_names)
         step = self._step_with_strings if self._has_strings else self._step
@@ -202,7 +231,9 @@ class IsolatedFmu(WorkerClient, Component):
     def _step_with_strings(self, current_time: ctypes.c_double) -> int:
         self._current_time.value = current_time.value
         self._copy_inputs()
-        result, strings = self._execute("step", self._input_strings.tolist(), convert=self._convert_step_with_strings)
+        result, strings = self._execute(
+            "step", self._input_strings.tolist(), convert=self._convert_step_with_strings
+        )
         self._copy_outputs()
         self._output_strings[:] = strings
         return self._store_early_return(result) if result else OK

@@ -16,8 +16,8 @@ class Isolation:
 
     Attributes:
         deadlines: Largest wall times of calls into the FMU (s).
-        sandbox: Restrict the worker process: it reads only its own files and libraries, writes only to its temporary folder, and
-            has no network and no other processes.
+        sandbox: Restrict the worker process: it reads only its own files and libraries, writes only
+            to its temporary folder, and has no network and no other processes.
     """
 
     deadlines: Deadlines = field(default_factory=Deadlines)
@@ -32,10 +32,13 @@ class Isolation:
             importer: Process id of the importer; the worker process ends with it.
 
         Returns:
-            A function that enters the sandbox. It raises InputError if this system does not support the required restrictions.
+            A function that enters the sandbox. It raises InputError if this system does not support
+            the required restrictions.
         """
         from ....process.sandbox import SandboxSettings, enter_sandbox, interpreter_folders
 
         readable = (fmu, *interpreter_folders()) if self.sandbox else ()
-        settings = SandboxSettings(readable=readable, writable=(temporary,), confine=self.sandbox, parent=importer)
+        settings = SandboxSettings(
+            readable=readable, writable=(temporary,), confine=self.sandbox, parent=importer
+        )
         return partial(enter_sandbox, settings)

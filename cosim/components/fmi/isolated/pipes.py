@@ -13,7 +13,8 @@ from typing import Any
 
 from ....core.json_values import decode_object, encode_value
 
-#: the command to execute a prepared step, and the answer that it succeeded without a result: the same empty line
+#: the command to execute a prepared step, and the answer that it succeeded without a result: the
+#: same empty line
 STEP_COMMAND = STEP_DONE = b"\n"
 
 #: bytes of one read
@@ -75,7 +76,10 @@ class SpinningPoller:
             if ready := poll(0):
                 self._next_backoff = 1
                 return ready
-        self._spins_to_skip, self._next_backoff = self._next_backoff, min(2 * self._next_backoff, MAX_SPIN_BACKOFF)
+        self._spins_to_skip, self._next_backoff = (
+            self._next_backoff,
+            min(2 * self._next_backoff, MAX_SPIN_BACKOFF),
+        )
         return []
 
 

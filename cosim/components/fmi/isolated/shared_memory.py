@@ -22,8 +22,9 @@ _PROT_READ_WRITE, _MAP_PRIVATE, _MAP_FIXED, _MAP_ANONYMOUS = 3, 0x02, 0x10, 0x20
 class SharedMemoryBlock:
     """Shared memory block: the worker's journal, the current time, and mirrors of the bound arrays.
 
-    The importer copies values between its own arrays and the mirrors, so that a worker process can change only its own values.
-    Strings are sent through the pipes; their arrays here are private to each process.
+    The importer copies values between its own arrays and the mirrors, so that a worker process can
+    change only its own values. Strings are sent through the pipes; their arrays here are private to
+    each process.
 
     Attributes:
         memory: The shared memory.
@@ -54,9 +55,12 @@ class SharedMemoryBlock:
         return Ports(ports.variables, arrays)
 
     def unshare_other_memory(self) -> None:
-        """Replace all other shared mappings of this process by private ones; called in the worker process.
+        """Replace all other shared mappings of this process by private ones.
 
-        A forked worker process inherits the importer's mappings, such as the blocks of other workers (Linux only).
+        Called in the worker process.
+
+        A forked worker process inherits the importer's mappings, such as the blocks of other
+        workers (Linux only).
         """
         own_address = ctypes.addressof(self.current_time)
         library = ctypes.CDLL(None, use_errno=True)
@@ -74,7 +78,11 @@ def matching_buffers(targets: Ports, sources: Ports) -> list[tuple[memoryview, m
     Returns:
         Pairs (target, source) of byte views; `target[:] = source` copies an array.
     """
-    pairs = [(targets.arrays[dtype], source) for dtype, source in sources.arrays.items() if not dtype.hasobject and len(source)]
+    pairs = [
+        (targets.arrays[dtype], source)
+        for dtype, source in sources.arrays.items()
+        if not dtype.hasobject and len(source)
+    ]
     return [(_byte_view(target), _byte_view(source)) for target, source in pairs]
 
 
@@ -96,10 +104,19 @@ def _aligned_size(array: np.ndarray) -> int:
 
 
 def _shared_regions() -> Sequence[tuple[int, int]]:
-    """Return (begin, end) addresses of writable shared mappings; empty where /proc/self/maps does not exist."""
+    """Return (begin, end) addresses of writable shared mappings.
+
+    Empty where /proc/self/maps does not exist.
+    """
     try:
-        lines = [line.split(maxsplit=2) for line in Path("/proc/self/maps").read_text().splitlines()]
+        lines = [
+            line.split(maxsplit=2) for line in Path("/proc/self/maps").read_text().splitlines()
+        ]
     except OSError:
         return []
-    bounds = [addresses.split("-") for addresses, permissions, _ in lines if permissions[1] == "w" and permissions[3] == "s"]
+    bounds = [
+        addresses.split("-")
+        for addresses, permissions, _ in lines
+        if permissions[1] == "w" and permissions[3] == "s"
+    ]
     return [(int(begin, 16), int(end, 16)) for begin, end in bounds]

@@ -21,7 +21,15 @@ from ....process import journal as journals
 from ....process.forks import attributing_forks, report_forks, watch_forks
 from ....process.journal import CALL_NUMBER, OVERWRITTEN, Phase
 from ..instance import FmuInstance
-from .pipes import STEP_COMMAND, STEP_DONE, SpinningPoller, decode_line, encode_line, read_line, write_line
+from .pipes import (
+    STEP_COMMAND,
+    STEP_DONE,
+    SpinningPoller,
+    decode_line,
+    encode_line,
+    read_line,
+    write_line,
+)
 from .shared_memory import SharedMemoryBlock, string_array
 
 #: characters of a log message; the importer shortens messages to its own limit
@@ -31,7 +39,8 @@ _MAX_MESSAGE_LENGTH = 1 << 20
 class Worker:
     """Command server in the worker process.
 
-    It answers each command with one line. Log messages of the FMU are lines that precede the answer.
+    It answers each command with one line. Log messages of the FMU are lines that precede the
+    answer.
     """
 
     def __init__(self, instance: FmuInstance, block: SharedMemoryBlock, setup: Callable[[], None]):
@@ -43,8 +52,13 @@ class Worker:
             setup: Function that enters the sandbox, called before foreign code is loaded.
         """
         self._instance, self._block, self._setup = instance, block, setup
-        self._input_strings, self._output_strings = string_array(block.inputs), string_array(block.outputs)
-        self._calls: Sequence[tuple[int, Callable[..., int], tuple[Any, ...], bool, PreparedCall]] = ()
+        self._input_strings, self._output_strings = (
+            string_array(block.inputs),
+            string_array(block.outputs),
+        )
+        self._calls: Sequence[
+            tuple[int, Callable[..., int], tuple[Any, ...], bool, PreparedCall]
+        ] = ()
         self._states: dict[int, Any] = {}
         self._state_numbers = count()
         self._commands: dict[str, Callable[..., Any]] = {
@@ -81,7 +95,10 @@ class Worker:
         journals.set_current_journal(self._block.journal)
         tempfile.tempdir = os.environ["TMPDIR"] = str(temporary)
         # the importer limits number and length of the messages
-        component_log.MAX_MESSAGES_PER_SECOND, component_log.MAX_MESSAGE_LENGTH = sys.maxsize, _MAX_MESSAGE_LENGTH
+        component_log.MAX_MESSAGES_PER_SECOND, component_log.MAX_MESSAGE_LENGTH = (
+            sys.maxsize,
+            _MAX_MESSAGE_LENGTH,
+        )
         sender = _LineSender(answers)
         logger = logging.getLogger("cosim.component")
         logger.handlers, logger.propagate, logger.level = [sender], False, logging.INFO
@@ -112,7 +129,9 @@ class Worker:
         except InputError as error:
             return encode_line({"input_error": [str(problem) for problem in error.problems]})
         except Exception as error:
-            reason = f"{type(error).__name__}: {error}" if self._block.journal.is_valid else OVERWRITTEN
+            reason = (
+                f"{type(error).__name__}: {error}" if self._block.journal.is_valid else OVERWRITTEN
+            )
             fields = self._instance.name, "the worker process", reason, None
             return encode_line({"component_error": fields, "fatal": True})
 
@@ -122,7 +141,8 @@ class Worker:
         self._instance.bind(self._block.inputs, self._block.outputs)
         self._instance.instantiate()
 
-    # -- commands that carry strings, which are not in shared memory ---------------------------------------------------
+    # -- commands that carry strings, which are not in shared memory
+    # ---------------------------------------------------
 
     def _set_inputs(self, strings: list[Any]) -> None:
         self._input_strings[:] = strings
@@ -136,10 +156,14 @@ class Worker:
         self._input_strings[:] = strings
         return self._step(), self._output_strings.tolist()
 
-    # -- the stepping loop ---------------------------------------------------------------------------------------------
+    # -- the stepping loop
+    # ---------------------------------------------------------------------------------------------
 
     def _prepare_step(self, step_size: float) -> list[str]:
-        """Prepare the calls of a step and return their names; the journal records the index of the present call."""
+        """Prepare the calls of a step and return their names.
+
+        The journal records the index of the present call.
+        """
         calls = self._instance.prepare_step_calls(self._block.current_time, step_size)
         self._calls = [
             (index, call.function, call.arguments, isinstance(call.native, NativeDoStep), call)
@@ -161,7 +185,8 @@ class Worker:
                 self._instance.restore_float_mode(call.name)
         return result
 
-    # -- FMU states, which stay in the worker process ------------------------------------------------------------------
+    # -- FMU states, which stay in the worker process
+    # ------------------------------------------------------------------
 
     def _get_state(self) -> int:
         number = next(self._state_numbers)

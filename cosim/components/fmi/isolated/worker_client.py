@@ -1,4 +1,7 @@
-"""Importer side of the commands to a worker process: sends them, and converts answers to results and errors."""
+"""Importer side of the commands to a worker process.
+
+Sends them, and converts answers to results and errors.
+"""
 
 from __future__ import annotations
 
@@ -45,7 +48,12 @@ class WorkerClient:
         #: names of the FMI calls of a prepared step, in their order
         self._call_names: Sequence[str] = [""]
 
-    def _execute(self, command: str, *arguments: Any, convert: Callable[[Any], Value] = no_value) -> Value:  # type: ignore[assignment]
+    def _execute(
+        self,
+        command: str,
+        *arguments: Any,
+        convert: Callable[[Any], Value] = no_value,  # type: ignore[assignment]
+    ) -> Value:
         """Execute a command in the worker process and return its value, converted by a function of `answers`."""
         self._command = command
         return self._parse_answer(self._request(encode_line([command, *arguments])), convert)
@@ -59,7 +67,9 @@ class WorkerClient:
         except WorkerLostError as error:
             self._stop_worker()
             raise self._worker_ended_error(str(error)) from None
-        except BaseException:  # after an interrupt, the pending answer would be taken for that of the next command
+        except (
+            BaseException
+        ):  # after an interrupt, the pending answer would be taken for that of the next command
             self._stop_worker()
             raise
 
@@ -74,7 +84,10 @@ class WorkerClient:
             raise WorkerEndedError(self.name, self._command, INVALID_ANSWER) from None
 
     def _worker_ended_error(self, reason: str) -> WorkerEndedError:
-        """Return the error for an ended worker process; its journal names the FMI function that was being called."""
+        """Return the error for an ended worker process.
+
+        Its journal names the FMI function that was being called.
+        """
         journal = self._shared_memory.journal
         if journal.is_valid and journal.phase == Phase.CALLING:
             activity = journal.activity()
@@ -82,16 +95,23 @@ class WorkerClient:
             return WorkerEndedError(self.name, activity.function, reason, time)
         if self._command == "step" and 0 <= journal[CALL_NUMBER] < len(self._call_names):
             function = self._call_names[journal[CALL_NUMBER]]
-            return WorkerEndedError(self.name, function, reason, self._shared_memory.current_time.value)
+            return WorkerEndedError(
+                self.name, function, reason, self._shared_memory.current_time.value
+            )
         return WorkerEndedError(self.name, self._command, reason)
 
     def _execute_or_warn(self, command: str) -> None:
-        """Execute a command after the last step; an end of the worker process is only a warning, as all results are complete."""
+        """Execute a command after the last step.
+
+        An end of the worker process is only a warning, as all results are complete.
+        """
         try:
             if self._process:
                 self._execute(command)
         except WorkerEndedError as error:
-            component_log.log_message(self.name, component_log.WARNING, f"{error.function} failed: {error.reason}")
+            component_log.log_message(
+                self.name, component_log.WARNING, f"{error.function} failed: {error.reason}"
+            )
 
     def _stop_worker(self) -> None:
         assert self._process is not None

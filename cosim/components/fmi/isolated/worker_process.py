@@ -43,7 +43,8 @@ class WorkerLostError(Exception):
 class WorkerProcess:
     """Worker process that answers commands with one line each and keeps a journal in shared memory.
 
-    Its standard output and standard error are forwarded to the importer's standard error, up to a limit.
+    Its standard output and standard error are forwarded to the importer's standard error, up to a
+    limit.
     """
 
     def __init__(self, name: str, journal: Journal, serve: Callable[[int, int], None]):
@@ -52,7 +53,8 @@ class WorkerProcess:
         Args:
             name: Name of the component, for messages.
             journal: Journal of the worker process.
-            serve: Function that runs in the worker process, given the descriptors of commands and answers.
+            serve: Function that runs in the worker process, given the descriptors of commands and
+                answers.
         """
         self._name, self._journal = name, journal
         commands, self._writer = os.pipe()
@@ -66,8 +68,14 @@ class WorkerProcess:
             os.close(descriptor)
         self._foreign_output = ForeignOutput(self._output)
         self._pidfd = os.pidfd_open(self._pid) if hasattr(os, "pidfd_open") else -1
-        self._poller = SpinningPoller(descriptor for descriptor in (self._reader, self._output, self._pidfd) if descriptor >= 0)
-        self._descriptors = [d for d in (self._writer, self._reader, self._output, self._pidfd) if d >= 0]
+        self._poller = SpinningPoller(
+            descriptor
+            for descriptor in (self._reader, self._output, self._pidfd)
+            if descriptor >= 0
+        )
+        self._descriptors = [
+            d for d in (self._writer, self._reader, self._output, self._pidfd) if d >= 0
+        ]
         self._answer_event = [(self._reader, select.POLLIN)]
         self._received = b""
 
@@ -84,7 +92,9 @@ class WorkerProcess:
         Raises:
             WorkerLostError: The worker process has ended, exceeded the deadline or sent too much.
         """
-        if self._received and self._take_answer() is not None:  # before the command to which it would be the answer
+        if (
+            self._received and self._take_answer() is not None
+        ):  # before the command to which it would be the answer
             raise WorkerLostError(INVALID_ANSWER)
         try:
             write_line(self._writer, line)
@@ -99,7 +109,10 @@ class WorkerProcess:
             raise self._lost_error() from None
 
     def _wait_for_answer(self, deadline: float) -> bytes:
-        """Wait for an answer; each FMI call that the worker's journal records restarts the deadline."""
+        """Wait for an answer.
+
+        Each FMI call that the worker's journal records restarts the deadline.
+        """
         last_progress, since = self._progress(), time.monotonic()
         while True:
             if (answer := self._take_answer()) is not None:
@@ -108,7 +121,12 @@ class WorkerProcess:
                 last_progress, since = progress, time.monotonic()
             elif time.monotonic() - since > deadline:
                 raise WorkerLostError(f"did not return within {deadline:g} s")
-            self._receive({descriptor for descriptor, _ in self._poller.wait(min(POLL_INTERVAL, deadline) * 1000)})
+            self._receive(
+                {
+                    descriptor
+                    for descriptor, _ in self._poller.wait(min(POLL_INTERVAL, deadline) * 1000)
+                }
+            )
 
     def _progress(self) -> tuple[int, int]:
         return self._journal[CHANGE_COUNT], self._journal[CALL_NUMBER]
@@ -131,7 +149,9 @@ class WorkerProcess:
             if not data:
                 raise self._lost_error()
             if len(self._received) > _MAX_ANSWER_SIZE:
-                raise WorkerLostError(f"its worker process sent more than {_MAX_ANSWER_SIZE} bytes at once")
+                raise WorkerLostError(
+                    f"its worker process sent more than {_MAX_ANSWER_SIZE} bytes at once"
+                )
         elif self._pidfd in ready:
             raise self._lost_error()
 
@@ -159,7 +179,10 @@ class WorkerProcess:
             self._poller.unregister(self._output)
 
     def _reap(self, timeout: float) -> int | None:
-        """Wait up to `timeout` s for the process to end, then kill its process group; return its status or None."""
+        """Wait up to `timeout` s for the process to end, then kill its process group.
+
+        Return its status or None.
+        """
         end = time.monotonic() + timeout
         while self._pid:
             if os.waitid(os.P_PID, self._pid, os.WEXITED | os.WNOHANG | os.WNOWAIT):
@@ -187,21 +210,32 @@ class WorkerProcess:
         with suppress(KeyError):
             self._forward_output()
         if dropped := self._foreign_output.dropped:
-            component_log.log_message(self._name, component_log.WARNING, f"printed {dropped} bytes more")
+            component_log.log_message(
+                self._name, component_log.WARNING, f"printed {dropped} bytes more"
+            )
         while self._descriptors:
             os.close(self._descriptors.pop())
 
 
-def _run_worker(serve: Callable[[int, int], None], commands: int, answers: int, output: int) -> NoReturn:
+def _run_worker(
+    serve: Callable[[int, int], None], commands: int, answers: int, output: int
+) -> NoReturn:
     """Run the worker process, from the fork to its exit."""
     code = _INTERNAL_ERROR
-    _streams = sys.stdout, sys.stderr  # kept alive, because deleting them would write the importer's buffered output again
+    _streams = (
+        sys.stdout,
+        sys.stderr,
+    )  # kept alive, because deleting them would write the importer's buffered output again
     try:
-        commands, answers, output = map(_duplicate_above_limit, (commands, answers, output))  # they may be standard streams
+        commands, answers, output = map(
+            _duplicate_above_limit, (commands, answers, output)
+        )  # they may be standard streams
         os.dup2(output, 1)
         os.dup2(output, 2)
         _close_other_descriptors({0, 1, 2, commands, answers})
-        sys.stdout, sys.stderr = (os.fdopen(n, "w", buffering=1, errors="replace", closefd=False) for n in (1, 2))
+        sys.stdout, sys.stderr = (
+            os.fdopen(n, "w", buffering=1, errors="replace", closefd=False) for n in (1, 2)
+        )
         serve(commands, answers)
         code = 0
     finally:
@@ -214,7 +248,9 @@ def _duplicate_above_limit(descriptor: int) -> int:
     import resource
 
     soft, _ = resource.getrlimit(resource.RLIMIT_NOFILE)
-    lowest = _FIRST_RESERVED_DESCRIPTOR if soft > 2 * _FIRST_RESERVED_DESCRIPTOR else max(descriptor, 3)
+    lowest = (
+        _FIRST_RESERVED_DESCRIPTOR if soft > 2 * _FIRST_RESERVED_DESCRIPTOR else max(descriptor, 3)
+    )
     return fcntl.fcntl(descriptor, fcntl.F_DUPFD, lowest)
 
 

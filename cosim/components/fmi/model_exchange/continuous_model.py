@@ -61,8 +61,8 @@ class ContinuousModel:
             major: FMI major version.
             library: C functions of the FMU's library.
             handle: Address of the FMU instance.
-            names: Names of the C functions by role: set_time, set_states, get_states, get_derivatives, get_indicators,
-                get_nominals, complete_step, set_inputs.
+            names: Names of the C functions by role: set_time, set_states, get_states,
+                get_derivatives, get_indicators, get_nominals, complete_step, set_inputs.
             counts: Numbers of continuous states and of event indicators.
             completes: The FMU requires fmi*CompletedIntegratorStep.
             linear_inputs: Inputs that change linearly within a communication step.
@@ -82,11 +82,20 @@ class ContinuousModel:
         boolean = BOOLEAN[major]
         self._flags = (boolean(), boolean())
         addresses = [as_pointer(ctypes.addressof(flag)) for flag in self._flags]
-        no_set_state = () if major == 1 else ((ctypes.c_int if major == 2 else ctypes.c_bool).from_param(1),)
-        self._completion_arguments = (self._instance, *no_set_state, *addresses[: 1 if major == 1 else 2])
+        no_set_state = (
+            () if major == 1 else ((ctypes.c_int if major == 2 else ctypes.c_bool).from_param(1),)
+        )
+        self._completion_arguments = (
+            self._instance,
+            *no_set_state,
+            *addresses[: 1 if major == 1 else 2],
+        )
 
     def is_called(self, role: str) -> bool:
-        """Return whether the function of a role is needed: not without states, indicators, inputs or required completion."""
+        """Return whether the function of a role is needed.
+
+        Not without states, indicators, inputs or required completion.
+        """
         needed = {
             "set_time": True,
             "complete_step": self.needs_completed_step,
@@ -95,7 +104,9 @@ class ContinuousModel:
         }
         return needed.get(role, len(self.states) > 0)
 
-    def _array_call(self, role: str, values: np.ndarray, is_optional: bool = False) -> Callable[[], None]:
+    def _array_call(
+        self, role: str, values: np.ndarray, is_optional: bool = False
+    ) -> Callable[[], None]:
         """Return a function that transfers an array, and that does nothing if the array is empty.
 
         A library without an optional function is accepted: the values stay as they are.
@@ -103,7 +114,10 @@ class ContinuousModel:
         name = self.functions[role]
         if not len(values) or (is_optional and name not in self.library):
             return lambda: None
-        function, arguments = self.library[name], (self._instance, as_pointer(values.ctypes.data), as_size(len(values)))
+        function, arguments = (
+            self.library[name],
+            (self._instance, as_pointer(values.ctypes.data), as_size(len(values))),
+        )
 
         def call() -> None:
             status = function(*arguments)
@@ -125,7 +139,9 @@ class ContinuousModel:
         """Raise an IntegrationError if an event indicator is NaN, because its events would be missed."""
         if np.isnan(indicators).any():
             number = int(np.flatnonzero(np.isnan(indicators))[0]) + 1
-            raise IntegrationError(self.functions["get_indicators"], None, f"event indicator {number} is NaN")
+            raise IntegrationError(
+                self.functions["get_indicators"], None, f"event indicator {number} is NaN"
+            )
 
     def complete_step(self) -> StepCompletion:
         """Call fmi*CompletedIntegratorStep if the FMU requires it."""

@@ -1,4 +1,7 @@
-"""Explicit Euler and Runge-Kutta integration at fixed step size; events take effect at the end of the step where they occur."""
+"""Explicit Euler and Runge-Kutta integration at fixed step size.
+
+Events take effect at the end of the step where they occur.
+"""
 
 from __future__ import annotations
 
@@ -25,7 +28,14 @@ except ImportError:  # installed without a C compiler
 #: number of evaluations of the right-hand side per step, by method
 STAGES: Mapping[Method, int] = {"euler": 1, "rk4": 4}
 #: roles of the functions by their number in `_fixed_step.c`
-_ROLES: Sequence[str] = ("set_time", "set_states", "get_derivatives", "get_indicators", "complete_step", "set_inputs")
+_ROLES: Sequence[str] = (
+    "set_time",
+    "set_states",
+    "get_derivatives",
+    "get_indicators",
+    "complete_step",
+    "set_inputs",
+)
 #: relative to the substep: a time event so close after its end is reached
 _TIME_TOLERANCE = 1e-9
 #: status of a call that returned an event indicator which is NaN
@@ -40,17 +50,40 @@ class FixedStepState(ctypes.Structure):
         + [(role, ctypes.c_void_p) for role in _ROLES]
         + [
             (name, ctypes.c_int64)
-            for name in ("version", "stages", "state_count", "indicator_count", "reference_count", "input_count")
+            for name in (
+                "version",
+                "stages",
+                "state_count",
+                "indicator_count",
+                "reference_count",
+                "input_count",
+            )
         ]
         + [
             (name, ctypes.c_void_p)
             for name in (
-                *("states", "derivatives", "start_states", "sum", "indicators", "previous_indicators"),
-                *("input_references", "input_array", "input_indices", "input_slopes", "input_values"),
+                *(
+                    "states",
+                    "derivatives",
+                    "start_states",
+                    "sum",
+                    "indicators",
+                    "previous_indicators",
+                ),
+                *(
+                    "input_references",
+                    "input_array",
+                    "input_indices",
+                    "input_slopes",
+                    "input_values",
+                ),
             )
         ]
         + [(name, ctypes.c_double) for name in ("next_event_time", "substep_size", "time", "begin")]
-        + [(name, ctypes.c_int64) for name in ("substeps", "next_substep", "event", "status", "failed_function")]
+        + [
+            (name, ctypes.c_int64)
+            for name in ("substeps", "next_substep", "event", "status", "failed_function")
+        ]
     )
 
 
@@ -76,7 +109,10 @@ class FixedStepIntegrator(Integrator):
                 setattr(state, role, function_address(model.library[model.functions[role]]))
         state.states, state.derivatives = model.states.ctypes.data, model.derivatives.ctypes.data
         state.start_states, state.sum = self._start_states.ctypes.data, self._sum.ctypes.data
-        state.indicators, state.previous_indicators = model.indicators.ctypes.data, self._previous_indicators.ctypes.data
+        state.indicators, state.previous_indicators = (
+            model.indicators.ctypes.data,
+            self._previous_indicators.ctypes.data,
+        )
         inputs = model.linear_inputs
         state.reference_count, state.input_count = len(inputs.references), len(inputs.indices)
         for name in ("references", "array", "indices", "slopes", "values"):
@@ -88,7 +124,10 @@ class FixedStepIntegrator(Integrator):
         return float(self._state.time)
 
     def prepare_step(self, current_time: ctypes.c_double, step_size: float) -> PreparedCall:
-        """Prepare a call that integrates one communication step; it returns discard at an event and after a failure."""
+        """Prepare a call that integrates one communication step.
+
+        It returns discard at an event and after a failure.
+        """
         exact = exact_fraction(step_size)
         self._state.substeps = math.ceil(exact / self._step_size) if self._step_size else 1
         self._state.substep_size = float(exact / self._state.substeps)
@@ -123,7 +162,9 @@ class FixedStepIntegrator(Integrator):
             state.next_substep = 0
             if state.status == _NOT_A_NUMBER:
                 self._model.check_indicators(self._model.indicators)
-            raise IntegrationError(self._model.functions[_ROLES[state.failed_function]], state.status)
+            raise IntegrationError(
+                self._model.functions[_ROLES[state.failed_function]], state.status
+            )
         return StepEvent(EventKind(state.event), state.time)
 
     def _advance_in_python(self, current_time: ctypes.c_double, step_size: float) -> int:
@@ -133,7 +174,11 @@ class FixedStepIntegrator(Integrator):
         try:
             while (n := state.next_substep) < state.substeps:
                 begin = time + n * state.substep_size
-                end = time + (n + 1) * state.substep_size if n + 1 < state.substeps else time + step_size
+                end = (
+                    time + (n + 1) * state.substep_size
+                    if n + 1 < state.substeps
+                    else time + step_size
+                )
                 state.event = state.status = 0
                 (self._euler_step if state.stages == 1 else self._runge_kutta_step)(begin, end)
                 state.time, state.next_substep = end, n + 1

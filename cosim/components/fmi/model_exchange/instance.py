@@ -1,4 +1,7 @@
-"""Common base of Model Exchange instances: the importer integrates the states and handles the events."""
+"""Common base of Model Exchange instances.
+
+The importer integrates the states and handles the events.
+"""
 
 from __future__ import annotations
 
@@ -30,7 +33,10 @@ class ModelState(NamedTuple):
 
 
 class ModelExchangeInstance(EventModeInstance):
-    """Base of the Model Exchange instances; the other base of a subclass is the Co-Simulation instance of the FMI version."""
+    """Base of the Model Exchange instances.
+
+    The other base of a subclass is the Co-Simulation instance of the FMI version.
+    """
 
     #: names of the C functions by role, see `ContinuousModel`
     _function_names: Mapping[str, str]
@@ -47,7 +53,8 @@ class ModelExchangeInstance(EventModeInstance):
         self._integration_call: PreparedCall | None = None
         self._step_duration = 0.0
 
-    # -- life cycle ------------------------------------------------------------------------------------------------------
+    # -- life cycle
+    # ------------------------------------------------------------------------------------------------------
 
     def _prepare_transfers(self, factory: AccessorCallFactory) -> None:
         super()._prepare_transfers(factory)
@@ -63,7 +70,15 @@ class ModelExchangeInstance(EventModeInstance):
         self._iterate_initial_event()
         names = {role: self._c_prefix + name for role, name in self._function_names.items()}
         counts, completes = self._count_states(), self.description.needs_completed_step
-        model = ContinuousModel(self.major, self._fmu.functions, self._handle, names, counts, completes, self._linear_inputs)
+        model = ContinuousModel(
+            self.major,
+            self._fmu.functions,
+            self._handle,
+            names,
+            counts,
+            completes,
+            self._linear_inputs,
+        )
         self._integrator = self._create_integrator(model)
         self._restart(self._current_time.value)
 
@@ -84,7 +99,8 @@ class ModelExchangeInstance(EventModeInstance):
             self._integrator = None
         super().free()
 
-    # -- events ----------------------------------------------------------------------------------------------------------
+    # -- events
+    # ----------------------------------------------------------------------------------------------------------
 
     @property
     def _is_stepping(self) -> bool:
@@ -95,7 +111,10 @@ class ModelExchangeInstance(EventModeInstance):
         self._integrator.inputs_changed()
 
     def _handle_event(self, change: Callable[[], object] = lambda: None) -> None:
-        """Handle an event at the present time of the integration; `change` sets variables in Event Mode."""
+        """Handle an event at the present time of the integration.
+
+        `change` sets variables in Event Mode.
+        """
         assert self._integrator is not None
         super()._handle_event(change)
         if not self._terminates:
@@ -114,12 +133,17 @@ class ModelExchangeInstance(EventModeInstance):
             yield
         except IntegrationError as error:
             if error.status is None:
-                raise ComponentError(self.name, error.function, error.reason, self._current_time.value) from None
+                raise ComponentError(
+                    self.name, error.function, error.reason, self._current_time.value
+                ) from None
             raise self.status_error(error.function, error.status) from None
 
-    # -- steps -----------------------------------------------------------------------------------------------------------
+    # -- steps
+    # -----------------------------------------------------------------------------------------------------------
 
-    def prepare_step_calls(self, current_time: ctypes.c_double, step_size: float) -> Sequence[PreparedCall]:
+    def prepare_step_calls(
+        self, current_time: ctypes.c_double, step_size: float
+    ) -> Sequence[PreparedCall]:
         """Prepare the calls that set the inputs, integrate one step from `current_time` (s) and get the outputs."""
         self._current_time = current_time
         if not self._inputs.variables:
@@ -160,10 +184,14 @@ class ModelExchangeInstance(EventModeInstance):
                 return StepResult(time, terminate_requested=True)
             if call.function(*call.arguments) == OK:
                 return StepResult(self._current_time.value + self._step_duration)
-        reason = f"more than {MAX_EVENTS_PER_STEP} events in one communication step, the last one at t = {time:.12g} s"
+        reason = (
+            f"more than {MAX_EVENTS_PER_STEP} events in one communication step, the last one at t "
+            f"= {time:.12g} s"
+        )
         raise ComponentError(self.name, function, reason, self._current_time.value)
 
-    # -- states ----------------------------------------------------------------------------------------------------------
+    # -- states
+    # ----------------------------------------------------------------------------------------------------------
 
     def get_state(self) -> Any:
         """Return a snapshot of the FMU and of its integration."""

@@ -10,7 +10,10 @@ from ....core.component import PreparedCall
 
 
 class EventKind(IntFlag):
-    """Reasons why an integration stops before the end of a communication step; the same numbers as in `_fixed_step.c`."""
+    """Reasons why an integration stops before the end of a communication step.
+
+    The same numbers as in `_fixed_step.c`.
+    """
 
     STATE = 1
     TIME = 2
@@ -35,7 +38,8 @@ class Integrator(Protocol):
     def prepare_step(self, current_time: ctypes.c_double, step_size: float) -> PreparedCall:
         """Prepare a call that integrates one communication step.
 
-        The call returns OK at its end and discard at an event or after a failure; called again, it continues.
+        The call returns OK at its end and discard at an event or after a failure; called again, it
+        continues.
 
         Args:
             current_time: Memory from which the call reads the start of the step (s).

@@ -50,7 +50,10 @@ class LinearInputs:
         )
 
     def set(self, time: float) -> int:
-        """Set the inputs to their values at `time` (s), and return the status of the FMU; OK if there are none."""
+        """Set the inputs to their values at `time` (s), and return the status of the FMU.
+
+        OK if there are none.
+        """
         if not len(self.references):
             return SUCCESS_STATUSES[0]
         self.values[:] = self.array[self.indices] + self.slopes * (time - self.begin)

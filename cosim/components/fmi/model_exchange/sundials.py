@@ -1,6 +1,9 @@
-"""CVODE of SUNDIALS, from the libraries that FMPy contains: an initial value problem with root finding.
+"""CVODE of SUNDIALS, from the libraries that FMPy contains.
 
-FMPy's own wrapper passes over internal steps, leaves memory behind, and prints errors of callbacks instead of raising them.
+An initial value problem with root finding.
+
+FMPy's own wrapper passes over internal steps, leaves memory behind, and prints errors of callbacks
+instead of raising them.
 """
 
 from __future__ import annotations
@@ -22,7 +25,8 @@ SUCCESS, STOP_TIME_REACHED, ROOT_FOUND = range(3)
 #: results of the right-hand side and the root function: the solver ends, or tries a smaller step
 FAILED, RECOVERABLE = -1, 1
 
-#: right-hand side (time, address of the states, address of the derivatives) and roots (time, states, values)
+#: right-hand side (time, address of the states, address of the derivatives) and roots (time,
+#: states, values)
 Evaluation = Callable[[float, int, int], int]
 _RIGHT_HAND_SIDE = CFUNCTYPE(c_int, c_double, c_void_p, c_void_p, c_void_p)
 _ERROR_HANDLER = CFUNCTYPE(None, c_int, c_char_p, c_char_p, c_char_p, c_int, c_void_p, c_void_p)
@@ -45,7 +49,9 @@ class Cvode:
         InputError: FMPy has no SUNDIALS libraries for this platform.
     """
 
-    def __init__(self, states: np.ndarray, derivatives: Evaluation, roots: Evaluation, root_count: int):
+    def __init__(
+        self, states: np.ndarray, derivatives: Evaluation, roots: Evaluation, root_count: int
+    ):
         self._states, self._message = states, ""
         self._absolute_tolerances = np.zeros_like(states)
         self._time = c_double()
@@ -63,38 +69,62 @@ class Cvode:
         try:
             from fmpy.sundials.libraries import sundials_core, sundials_cvode
         except (ImportError, OSError):
-            raise InputError('the method "cvode" is not available on this platform; use "euler" or "rk4"') from None
+            raise InputError(
+                'the method "cvode" is not available on this platform; use "euler" or "rk4"'
+            ) from None
         self._core, self._cvode = sundials_core, sundials_cvode
 
     def _function(self, name: str, result: Any, *arguments: Any) -> Any:
-        function: Any = (self._core if name.startswith(("SUNContext", "SUNLogger")) else self._cvode)[name]
+        function: Any = (
+            self._core if name.startswith(("SUNContext", "SUNLogger")) else self._cvode
+        )[name]
         function.restype, function.argtypes = result, arguments
         return function
 
     def _create(self, root_count: int) -> None:
         context, size = c_void_p(), len(self._states)
         self._function("SUNContext_Create", c_int, c_int, POINTER(c_void_p))(0, byref(context))
-        self._free.callback(self._function("SUNContext_Free", c_int, POINTER(c_void_p)), byref(context))
+        self._free.callback(
+            self._function("SUNContext_Free", c_int, POINTER(c_void_p)), byref(context)
+        )
         self._function("SUNContext_ClearErrHandlers", c_int, c_void_p)(context)
-        self._function("SUNContext_PushErrHandler", c_int, c_void_p, _ERROR_HANDLER, c_void_p)(context, self._callbacks[2], None)
+        self._function("SUNContext_PushErrHandler", c_int, c_void_p, _ERROR_HANDLER, c_void_p)(
+            context, self._callbacks[2], None
+        )
         logger = c_void_p()
-        self._function("SUNContext_GetLogger", c_int, c_void_p, POINTER(c_void_p))(context, byref(logger))
-        self._function("SUNLogger_SetWarningFilename", c_int, c_void_p, c_char_p)(logger, os.devnull.encode())
+        self._function("SUNContext_GetLogger", c_int, c_void_p, POINTER(c_void_p))(
+            context, byref(logger)
+        )
+        self._function("SUNLogger_SetWarningFilename", c_int, c_void_p, c_char_p)(
+            logger, os.devnull.encode()
+        )
         make_vector = self._function("N_VMake_Serial", c_void_p, c_int64, c_void_p, c_void_p)
-        self._x = self._owned(make_vector(size, self._states.ctypes.data, context), "N_VDestroy_Serial")
-        self._tolerances = self._owned(make_vector(size, self._absolute_tolerances.ctypes.data, context), "N_VDestroy_Serial")
+        self._x = self._owned(
+            make_vector(size, self._states.ctypes.data, context), "N_VDestroy_Serial"
+        )
+        self._tolerances = self._owned(
+            make_vector(size, self._absolute_tolerances.ctypes.data, context), "N_VDestroy_Serial"
+        )
         make_matrix = self._function("SUNDenseMatrix", c_void_p, c_int64, c_int64, c_void_p)
         matrix = self._owned(make_matrix(size, size, context), "SUNMatDestroy_Dense")
         make_solver = self._function("SUNLinSol_Dense", c_void_p, c_void_p, c_void_p, c_void_p)
         solver = self._owned(make_solver(self._x, matrix, context), "SUNLinSolFree_Dense")
-        self._memory = c_void_p(self._function("CVodeCreate", c_void_p, c_int, c_void_p)(_BDF, context))
-        self._free.callback(self._function("CVodeFree", None, POINTER(c_void_p)), byref(self._memory))
-        self._call("CVodeInit", (_RIGHT_HAND_SIDE, c_double, c_void_p), self._callbacks[0], 0.0, self._x)
+        self._memory = c_void_p(
+            self._function("CVodeCreate", c_void_p, c_int, c_void_p)(_BDF, context)
+        )
+        self._free.callback(
+            self._function("CVodeFree", None, POINTER(c_void_p)), byref(self._memory)
+        )
+        self._call(
+            "CVodeInit", (_RIGHT_HAND_SIDE, c_double, c_void_p), self._callbacks[0], 0.0, self._x
+        )
         self._call("CVodeSVtolerances", (c_double, c_void_p), 1.0, self._tolerances)
         self._call("CVodeRootInit", (c_int, _RIGHT_HAND_SIDE), root_count, self._callbacks[1])
         self._call("CVodeSetNoInactiveRootWarn", ())
         self._call("CVodeSetLinearSolver", (c_void_p, c_void_p), solver, matrix)
-        self._run = self._function("CVode", c_int, c_void_p, c_double, c_void_p, POINTER(c_double), c_int)
+        self._run = self._function(
+            "CVode", c_int, c_void_p, c_double, c_void_p, POINTER(c_double), c_int
+        )
         self._set_stop_time = self._function("CVodeSetStopTime", c_int, c_void_p, c_double)
 
     def _owned(self, address: int, destructor: str) -> int:
@@ -105,7 +135,9 @@ class Cvode:
         if self._function(name, c_int, c_void_p, *kinds)(self._memory, *arguments) < 0:
             raise SolverError(self._message)
 
-    def _store_message(self, _line: int, _function: bytes, _file: bytes, text: bytes, *_: Any) -> None:
+    def _store_message(
+        self, _line: int, _function: bytes, _file: bytes, text: bytes, *_: Any
+    ) -> None:
         self._message = (text or b"").decode("utf-8", "replace").strip()
 
     def restart(self, time: float, tolerance: float, absolute_tolerances: np.ndarray) -> None:
@@ -124,7 +156,8 @@ class Cvode:
         """Make one internal step, not beyond `stop_time` (s).
 
         Returns:
-            SUCCESS, STOP_TIME_REACHED or ROOT_FOUND, and the time reached (s), to which the states belong.
+            SUCCESS, STOP_TIME_REACHED or ROOT_FOUND, and the time reached (s), to which the states
+            belong.
 
         Raises:
             SolverError: The step failed.

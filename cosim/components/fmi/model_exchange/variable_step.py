@@ -1,4 +1,7 @@
-"""Integration with variable step size by CVODE; state events are located by root finding, time events are met exactly."""
+"""Integration with variable step size by CVODE.
+
+State events are located by root finding, time events are met exactly.
+"""
 
 from __future__ import annotations
 
@@ -22,14 +25,18 @@ _MAX_STALLED_STEPS = 100
 
 
 class VariableStepIntegrator(Integrator):
-    """Integrator with CVODE. Steps end at communication points and at time events; each is completed in the FMU."""
+    """Integrator with CVODE.
+
+    Steps end at communication points and at time events; each is completed in the FMU.
+    """
 
     def __init__(self, model: ContinuousModel, tolerance: float):
         """Prepare the integration.
 
         Args:
             model: The FMU instance in Continuous-Time Mode.
-            tolerance: Relative tolerance; the absolute ones are its products with the nominal values of the states.
+            tolerance: Relative tolerance; the absolute ones are its products with the nominal
+                values of the states.
 
         Raises:
             InputError: The method is not available on this platform.
@@ -41,8 +48,13 @@ class VariableStepIntegrator(Integrator):
         #: a model without states gets one that is constant, because CVODE needs one
         self._states = model.states if len(model.states) else np.zeros(1)
         derivatives = self._evaluate_derivatives if len(model.states) else self._evaluate_nothing
-        self._cvode = Cvode(self._states, derivatives, self._evaluate_indicators, len(model.indicators))
-        self._set_states, self._get_derivatives = self._transfer("set_states"), self._transfer("get_derivatives")
+        self._cvode = Cvode(
+            self._states, derivatives, self._evaluate_indicators, len(model.indicators)
+        )
+        self._set_states, self._get_derivatives = (
+            self._transfer("set_states"),
+            self._transfer("get_derivatives"),
+        )
         self._get_indicators = self._transfer("get_indicators")
 
     def _transfer(self, role: str) -> Callable[[int], None]:
@@ -50,7 +62,10 @@ class VariableStepIntegrator(Integrator):
         model = self._model
         if not model.is_called(role):
             return lambda _: None
-        name, count = model.functions[role], len(model.indicators if role == "get_indicators" else model.states)
+        name, count = (
+            model.functions[role],
+            len(model.indicators if role == "get_indicators" else model.states),
+        )
         function, instance, size = model.library[name], as_pointer(model.handle), as_size(count)
 
         def call(address: int) -> None:
@@ -65,10 +80,14 @@ class VariableStepIntegrator(Integrator):
         """Time (s) to which the FMU has been integrated."""
         return self._time
 
-    # -- functions that CVODE calls ------------------------------------------------------------------------------------
+    # -- functions that CVODE calls
+    # ------------------------------------------------------------------------------------
 
     def _guarded(self, evaluate: Callable[[], None]) -> int:
-        """Return the result of a callback; a discarded evaluation makes CVODE try a smaller step."""
+        """Return the result of a callback.
+
+        A discarded evaluation makes CVODE try a smaller step.
+        """
         try:
             evaluate()
         except IntegrationError as error:
@@ -93,15 +112,21 @@ class VariableStepIntegrator(Integrator):
             self._model.set_time(time)
             self._set_states(states)
             self._get_indicators(indicators)
-            self._model.check_indicators(np.ctypeslib.as_array((ctypes.c_double * count).from_address(indicators)))
+            self._model.check_indicators(
+                np.ctypeslib.as_array((ctypes.c_double * count).from_address(indicators))
+            )
 
         count = len(self._model.indicators)
         return self._guarded(evaluate)
 
-    # -- steps ---------------------------------------------------------------------------------------------------------
+    # -- steps
+    # ---------------------------------------------------------------------------------------------------------
 
     def prepare_step(self, current_time: ctypes.c_double, step_size: float) -> PreparedCall:
-        """Prepare a call that integrates one communication step; it returns discard at an event and after a failure."""
+        """Prepare a call that integrates one communication step.
+
+        It returns discard at an event and after a failure.
+        """
         return PreparedCall(self._advance, (current_time, step_size), "integration step")
 
     def restart(self, time: float, next_event_time: float) -> None:
@@ -134,7 +159,9 @@ class VariableStepIntegrator(Integrator):
                 if self._event.kind:
                     return DISCARD
         except SolverError as error:
-            self._failure = self._failure or IntegrationError("CVode", None, f"at t = {self._time:.12g} s: {error}")
+            self._failure = self._failure or IntegrationError(
+                "CVode", None, f"at t = {self._time:.12g} s: {error}"
+            )
             return DISCARD
         except IntegrationError as error:
             self._failure = error
@@ -152,7 +179,9 @@ class VariableStepIntegrator(Integrator):
             if self._must_restart:
                 self._model.get_nominals()
                 nominals = np.abs(self._model.nominals) if len(self._model.states) else np.ones(1)
-                valid = np.where((nominals > 0) & np.isfinite(nominals), nominals, 1.0)  # some FMUs return 0
+                valid = np.where(
+                    (nominals > 0) & np.isfinite(nominals), nominals, 1.0
+                )  # some FMUs return 0
                 self._cvode.restart(self._time, self._tolerance, self._tolerance * valid)
                 self._must_restart = False
             kind = EventKind.STATE if self._step_of_solver(target) == ROOT_FOUND else kind
@@ -167,11 +196,17 @@ class VariableStepIntegrator(Integrator):
         return StepEvent(kind, self._time)
 
     def _step_of_solver(self, target: float) -> int:
-        """Make one internal step of CVODE and return its result; many steps without progress are an error."""
+        """Make one internal step of CVODE and return its result.
+
+        Many steps without progress are an error.
+        """
         flag, time = self._cvode.step(target)
         self._stalled_steps = self._stalled_steps + 1 if time == self._time else 0
         if self._stalled_steps > _MAX_STALLED_STEPS:
-            raise SolverError(f"{_MAX_STALLED_STEPS} internal steps without progress; a derivative may be infinite")
+            raise SolverError(
+                f"{_MAX_STALLED_STEPS} internal steps without progress; a derivative may be "
+                "infinite"
+            )
         self._time = time
         return flag
 

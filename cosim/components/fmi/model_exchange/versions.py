@@ -24,7 +24,11 @@ class Fmi1Model(ModelExchangeInstance, Fmi1Instance):
     """Model Exchange instance of an FMI 1.0 FMU, which has no modes."""
 
     _instantiate_function, _free_function = "fmi1InstantiateModel", "fmi1FreeModelInstance"
-    _function_names = {**_COMMON_NAMES, "get_derivatives": "GetDerivatives", "get_nominals": "GetNominalContinuousStates"}
+    _function_names = {
+        **_COMMON_NAMES,
+        "get_derivatives": "GetDerivatives",
+        "get_nominals": "GetNominalContinuousStates",
+    }
     _update_method = "eventUpdate"
 
     def _fmpy_class(self) -> type:
@@ -89,5 +93,7 @@ class Fmi3Model(ModelExchangeInstance, Fmi3Instance):
         found: int = self.call_function(method)
         if found > MAX_SCALARS:
             reason = f"found {found}, expected at most {MAX_SCALARS}"
-            raise ComponentError(self.name, self._full_name(method), reason, self._current_time.value)
+            raise ComponentError(
+                self.name, self._full_name(method), reason, self._current_time.value
+            )
         return found

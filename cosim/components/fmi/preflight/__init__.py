@@ -69,7 +69,8 @@ class Examination:
     """Result of the preflight check.
 
     Attributes:
-        file_identity: Device, inode, size and modification time, to detect that the file is changed later.
+        file_identity: Device, inode, size and modification time, to detect that the file is changed
+            later.
         members: CRC-32 of each member of the archive, by name.
         model: Model description, None if it cannot be read.
         findings: Findings that do not depend on the platform.
@@ -124,7 +125,9 @@ def _examine_archive(archive: Archive, limits: PreflightLimits, result: Examinat
     result.findings += islice(rules_values.check_dimensions(model, limits), _MAX_FINDINGS_PER_CHECK)
     if not _has_errors(result.findings):
         for interface in model.interfaces:
-            result.binary_findings[interface] = list(_binary_findings(archive, model, interface, limits))
+            result.binary_findings[interface] = list(
+                _binary_findings(archive, model, interface, limits)
+            )
 
 
 def _binary_findings(
@@ -140,7 +143,9 @@ def _has_errors(findings: Sequence[Finding]) -> bool:
     return any(finding.rule.severity == "error" for finding in findings)
 
 
-def extract(path: Path, examination: Examination, folder: Path, limits: PreflightLimits = DEFAULT_LIMITS) -> None:
+def extract(
+    path: Path, examination: Examination, folder: Path, limits: PreflightLimits = DEFAULT_LIMITS
+) -> None:
     """Extract the members of an examined FMU that it can use on this platform.
 
     Args:
@@ -168,7 +173,9 @@ def extract(path: Path, examination: Examination, folder: Path, limits: Prefligh
 def _is_used(name: str, binary_folder: str) -> bool:
     """Return False for sources, documentation and binaries of other platforms."""
     first, _, rest = name.partition("/")
-    return first not in _UNUSED_FOLDERS and (first != "binaries" or rest.partition("/")[0] == binary_folder)
+    return first not in _UNUSED_FOLDERS and (
+        first != "binaries" or rest.partition("/")[0] == binary_folder
+    )
 
 
 def _file_identity(file: BufferedReader) -> tuple[int, ...]:

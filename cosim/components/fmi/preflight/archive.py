@@ -1,4 +1,7 @@
-"""Archive of an FMU: all headers are checked before any data are read, and the read data are bounded."""
+"""Archive of an FMU.
+
+All headers are checked before any data are read, and the read data are bounded.
+"""
 
 from __future__ import annotations
 
@@ -49,7 +52,9 @@ class Archive:
         Raises:
             FatalFindingError: The file is not an archive.
         """
-        entries, self._directory_offset = zip_format.read_central_directory(file, limits.max_members)
+        entries, self._directory_offset = zip_format.read_central_directory(
+            file, limits.max_members
+        )
         self._file, self._limits, self._entries = file, limits, entries
         self.members = {entry.decoded_name: entry for entry in entries}
         self._data_offsets: dict[int, int] = {}
@@ -59,19 +64,28 @@ class Archive:
         for entry in self._entries:
             yield from check_member(entry)
             yield from self._check_size(entry)
-        yield from check_collisions([(entry.decoded_name, (entry.crc, entry.size)) for entry in self._entries])
+        yield from check_collisions(
+            [(entry.decoded_name, (entry.crc, entry.size)) for entry in self._entries]
+        )
         total = sum(entry.size for entry in self._entries)
         if total > self._limits.max_expanded_size:
-            yield SIZE(f"expands to {total} bytes, expected at most {self._limits.max_expanded_size}")
+            yield SIZE(
+                f"expands to {total} bytes, expected at most {self._limits.max_expanded_size}"
+            )
         yield from self._check_offsets()
 
     def _check_size(self, entry: ZipEntry) -> Iterator[Finding]:
         if entry.method == STORED and entry.size != entry.compressed_size:
             text = f"is stored in {entry.compressed_size} bytes but has a size of {entry.size}"
             yield SIZE(text, entry.decoded_name)
-        elif entry.size > max(self._limits.ratio_threshold, self._limits.max_ratio * entry.compressed_size):
+        elif entry.size > max(
+            self._limits.ratio_threshold, self._limits.max_ratio * entry.compressed_size
+        ):
             times = self._limits.max_ratio
-            text = f"{entry.compressed_size} bytes expand to {entry.size}, expected at most {times} times as many"
+            text = (
+                f"{entry.compressed_size} bytes expand to {entry.size}, expected at most {times} "
+                "times as many"
+            )
             yield SIZE(text, entry.decoded_name)
 
     def _check_offsets(self) -> Iterator[Finding]:
@@ -79,18 +93,28 @@ class Archive:
         end = 0
         for entry in sorted(self._entries, key=lambda entry: entry.offset):
             try:
-                begin = self._data_offsets[id(entry)] = zip_format.find_data_offset(self._file, entry, self._directory_offset)
+                begin = self._data_offsets[id(entry)] = zip_format.find_data_offset(
+                    self._file, entry, self._directory_offset
+                )
             except FatalFindingError as error:
                 yield error.finding
                 continue
             data_end = begin + entry.compressed_size
             if entry.offset < end or data_end > self._directory_offset:
-                yield OVERLAP(f"shares its bytes {entry.offset} to {data_end} with another member", entry.decoded_name)
+                yield OVERLAP(
+                    f"shares its bytes {entry.offset} to {data_end} with another member",
+                    entry.decoded_name,
+                )
             elif entry.offset - end > _MAX_DATA_DESCRIPTOR_SIZE:
-                yield GAP(f"{entry.offset - end} bytes before it belong to no member", entry.decoded_name)
+                yield GAP(
+                    f"{entry.offset - end} bytes before it belong to no member", entry.decoded_name
+                )
             end = max(end, data_end)
         if self._directory_offset - end > _MAX_DATA_DESCRIPTOR_SIZE:
-            yield GAP(f"{self._directory_offset - end} bytes before the central directory belong to no member")
+            yield GAP(
+                f"{self._directory_offset - end} bytes before the central directory belong to no "
+                "member"
+            )
 
     def read(self, name: str) -> bytes:
         """Return the content of a member.
@@ -132,16 +156,22 @@ class Archive:
     def _read_chunks(self, entry: ZipEntry) -> Iterator[bytes]:
         """Yield the content in chunks, never more than the size in the central directory."""
         crc, size = 0, 0
-        for chunk in self._read_stored(entry) if entry.method == STORED else self._read_deflated(entry):
+        for chunk in (
+            self._read_stored(entry) if entry.method == STORED else self._read_deflated(entry)
+        ):
             crc, size = zlib.crc32(chunk, crc), size + len(chunk)
             if size > entry.size:
                 break
             yield chunk
         if size != entry.size:
             found = "more" if size > entry.size else size
-            raise FatalFindingError(DATA(f"found {found} bytes, expected {entry.size}", entry.decoded_name))
+            raise FatalFindingError(
+                DATA(f"found {found} bytes, expected {entry.size}", entry.decoded_name)
+            )
         if crc != entry.crc:
-            raise FatalFindingError(DATA(f"found CRC {crc:08x}, expected {entry.crc:08x}", entry.decoded_name))
+            raise FatalFindingError(
+                DATA(f"found CRC {crc:08x}, expected {entry.crc:08x}", entry.decoded_name)
+            )
 
     def _read_stored(self, entry: ZipEntry) -> Iterator[bytes]:
         self._file.seek(self._data_offsets[id(entry)])
@@ -159,9 +189,13 @@ class Archive:
                     yield decompressor.decompress(decompressor.unconsumed_tail, _CHUNK_SIZE)
             yield decompressor.flush()
         except zlib.error as error:
-            raise FatalFindingError(DATA(f"the compressed data are damaged: {error}", entry.decoded_name)) from None
+            raise FatalFindingError(
+                DATA(f"the compressed data are damaged: {error}", entry.decoded_name)
+            ) from None
         if not decompressor.eof or decompressor.unused_data:
-            raise FatalFindingError(DATA("the compressed data end too early or too late", entry.decoded_name))
+            raise FatalFindingError(
+                DATA("the compressed data end too early or too late", entry.decoded_name)
+            )
 
 
 @contextmanager
@@ -172,7 +206,9 @@ def open_regular_file(path: Path) -> Iterator[BufferedReader]:
         InputError: The file does not exist, is not a regular file or cannot be opened.
     """
     try:
-        descriptor = os.open(path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0))
+        descriptor = os.open(
+            path, os.O_RDONLY | getattr(os, "O_NONBLOCK", 0) | getattr(os, "O_BINARY", 0)
+        )
     except (FileNotFoundError, ValueError):
         raise InputError(f'FMU "{path}" does not exist{nearest_file(path)}') from None
     except OSError as error:

@@ -50,8 +50,16 @@ def list_platforms(names: Iterable[str]) -> list[str]:
         Names of the folders with libraries, and "c-code" if the FMU contains sources.
     """
     parts = [name.split("/") for name in names]
-    folders = {part[1] for part in parts if len(part) == 3 and part[0] == "binaries" and part[2].endswith(_LIBRARY_SUFFIXES)}
-    sources = any(part[0] == "sources" and part[-1].endswith((".c", ".cpp")) for part in parts if len(part) > 1)
+    folders = {
+        part[1]
+        for part in parts
+        if len(part) == 3 and part[0] == "binaries" and part[2].endswith(_LIBRARY_SUFFIXES)
+    }
+    sources = any(
+        part[0] == "sources" and part[-1].endswith((".c", ".cpp"))
+        for part in parts
+        if len(part) > 1
+    )
     return [*sorted(folders), *(["c-code"] if sources else [])]
 
 
@@ -65,7 +73,11 @@ def can_be_compiled(platforms: Collection[str]) -> bool:
 
 
 def check_binary(
-    archive: Archive, model: ModelDescription, interface: Interface, machine: FmuPlatform, limits: PreflightLimits
+    archive: Archive,
+    model: ModelDescription,
+    interface: Interface,
+    machine: FmuPlatform,
+    limits: PreflightLimits,
 ) -> Iterator[Finding]:
     """Check that the library for a platform exists, is complete, and exports the functions that the importer calls.
 
@@ -82,40 +94,74 @@ def check_binary(
     folder = machine.binary_folder(model.major)
     platforms = list_platforms(archive.members)
     if folder not in platforms:
-        names = folder if folder == machine.platform_tuple else f"{machine.platform_tuple} ({folder})"
+        names = (
+            folder if folder == machine.platform_tuple else f"{machine.platform_tuple} ({folder})"
+        )
         if can_be_compiled(platforms):
-            yield SOURCES_ONLY(f"has no binary for {names}; its sources are compiled when it is used")
+            yield SOURCES_ONLY(
+                f"has no binary for {names}; its sources are compiled when it is used"
+            )
             return
-        if machine.platform_tuple == "x86_64-linux" and WINDOWS.binary_folder(model.major) in platforms:
-            yield WINDOWS_ONLY(f"has no binary for {names}; its library for Windows runs under Wine")
+        if (
+            machine.platform_tuple == "x86_64-linux"
+            and WINDOWS.binary_folder(model.major) in platforms
+        ):
+            yield WINDOWS_ONLY(
+                f"has no binary for {names}; its library for Windows runs under Wine"
+            )
             return
-        bits = "; 32-bit libraries for Windows cannot be used" if {"win32", "x86-windows"} & set(platforms) else ""
-        yield PLATFORM(f"has no binary for {names}; it has: {', '.join(platforms) or 'no binaries'}{bits}")
+        bits = (
+            "; 32-bit libraries for Windows cannot be used"
+            if {"win32", "x86-windows"} & set(platforms)
+            else ""
+        )
+        yield PLATFORM(
+            f"has no binary for {names}; it has: {', '.join(platforms) or 'no binaries'}{bits}"
+        )
         return
     identifier = model.interfaces[interface].get("modelIdentifier", "")
     member = f"binaries/{folder}/{identifier}{machine.suffix}"
     if member not in archive.members:
-        found = ", ".join(name for name in archive.members if name.startswith(f"binaries/{folder}/"))
+        found = ", ".join(
+            name for name in archive.members if name.startswith(f"binaries/{folder}/")
+        )
         yield PRESENT(f"the library cannot be loaded: {member} does not exist; found: {found}")
     elif archive.members[member].size > limits.max_library_size:
-        yield SIZE(f"the library has {archive.members[member].size} bytes, expected at most {limits.max_library_size}", member)
+        yield SIZE(
+            (
+                f"the library has {archive.members[member].size} bytes, expected at most "
+                f"{limits.max_library_size}"
+            ),
+            member,
+        )
     else:
         yield from _check_library(archive, member, model, interface, machine)
 
 
 def _check_library(
-    archive: Archive, member: str, model: ModelDescription, interface: Interface, machine: FmuPlatform
+    archive: Archive,
+    member: str,
+    model: ModelDescription,
+    interface: Interface,
+    machine: FmuPlatform,
 ) -> Iterator[Finding]:
     try:
         library = _READERS[machine.suffix](archive.read(member), machine.architecture)
     except InvalidLibraryError as error:
         yield FORMAT(f"the library cannot be loaded: it {error}", member)
         return
-    called, identifier = called_functions(model, interface), model.interfaces[interface]["modelIdentifier"]
+    called, identifier = (
+        called_functions(model, interface),
+        model.interfaces[interface]["modelIdentifier"],
+    )
     if missing := sorted(called - library.exports):
         yield FUNCTIONS(f"the library does not export {abbreviate_names(missing, limit=5)}", member)
-    if unused := sorted(standard_functions(model.major, interface, identifier) - called - library.exports):
-        yield UNUSED_FUNCTIONS(f"the library does not export {abbreviate_names(unused, limit=5)}", member)
+    if unused := sorted(
+        standard_functions(model.major, interface, identifier) - called - library.exports
+    ):
+        yield UNUSED_FUNCTIONS(
+            f"the library does not export {abbreviate_names(unused, limit=5)}", member
+        )
     for text in version_deviations(library.constant_texts):
         yield VERSION(text, member)
     for name in library.needed_libraries:
@@ -131,14 +177,25 @@ def version_deviations(texts: Mapping[str, bytes | None]) -> Iterator[str]:
     """
     for name, text in texts.items():
         expected = EXPECTED_TEXTS[name]
-        if text is None or not (text + b".").startswith(expected + b"."):  # "2.0.1" is a version 2.0
-            found = "a null pointer" if text is None else f'"{escape_unprintable(text.decode("utf-8", "replace"), 40)}"'
+        if text is None or not (text + b".").startswith(
+            expected + b"."
+        ):  # "2.0.1" is a version 2.0
+            found = (
+                "a null pointer"
+                if text is None
+                else f'"{escape_unprintable(text.decode("utf-8", "replace"), 40)}"'
+            )
             yield f'{name} returns {found}, expected "{expected.decode()}"'
 
 
 def _is_library_found(name: str, library: SharedLibrary, archive: Archive, member: str) -> bool:
-    """Return whether the loader will probably find a needed library: in the FMU, in a search path or in the loader's cache."""
-    if f"{member.rpartition('/')[0]}/{name}" in archive.members and any("ORIGIN" in folder for folder in library.search_folders):
+    """Return whether the loader will probably find a needed library.
+
+    In the FMU, in a search path or in the loader's cache.
+    """
+    if f"{member.rpartition('/')[0]}/{name}" in archive.members and any(
+        "ORIGIN" in folder for folder in library.search_folders
+    ):
         return True
     folders = [folder for folder in library.search_folders if folder.startswith("/")]
     folders += [folder for folder in os.environ.get("LD_LIBRARY_PATH", "").split(":") if folder]
@@ -146,7 +203,10 @@ def _is_library_found(name: str, library: SharedLibrary, archive: Archive, membe
 
 
 def _is_in_loader_cache(name: str) -> bool:
-    """Return whether the loader's cache contains a library; True on systems without such a cache."""
+    """Return whether the loader's cache contains a library.
+
+    True on systems without such a cache.
+    """
     try:
         return name.encode() + b"\0" in Path("/etc/ld.so.cache").read_bytes()
     except OSError:

@@ -1,7 +1,7 @@
 """Reader of ELF shared libraries that does not load them.
 
-Format and field names: System V ABI 4.1, chapters 4 and 5. The reader follows the same tables as the dynamic loader: program
-headers, dynamic section, symbol table and symbol hash table.
+Format and field names: System V ABI 4.1, chapters 4 and 5. The reader follows the same tables as
+the dynamic loader: program headers, dynamic section, symbol table and symbol hash table.
 """
 
 from __future__ import annotations
@@ -16,19 +16,38 @@ from .library import EXPECTED_TEXTS, InvalidLibraryError, SharedLibrary
 MAGIC = b"\x7fELF"
 #: (EI_CLASS, e_machine) of the supported architectures
 MACHINES = {"x86_64": (2, 62), "aarch64": (2, 183), "x86": (1, 3)}
-_MACHINE_NAMES = {3: "x86", 8: "MIPS", 21: "PowerPC64", 40: "ARM", 62: "x86_64", 183: "aarch64", 243: "RISC-V"}
+_MACHINE_NAMES = {
+    3: "x86",
+    8: "MIPS",
+    21: "PowerPC64",
+    40: "ARM",
+    62: "x86_64",
+    183: "aarch64",
+    243: "RISC-V",
+}
 _ELFDATA2LSB = 1
 _ET_DYN = 3
 _PT_LOAD, _PT_DYNAMIC = 1, 2
-_DT_NEEDED, _DT_HASH, _DT_STRTAB, _DT_SYMTAB, _DT_STRSZ, _DT_RPATH, _DT_RUNPATH = 1, 4, 5, 6, 10, 15, 29
+_DT_NEEDED, _DT_HASH, _DT_STRTAB, _DT_SYMTAB, _DT_STRSZ, _DT_RPATH, _DT_RUNPATH = (
+    1,
+    4,
+    5,
+    6,
+    10,
+    15,
+    29,
+)
 _DT_GNU_HASH = 0x6FFFFEF5
 _STB_LOCAL = 0
 _STV_DEFAULT, _STV_PROTECTED = 0, 3
 _SHN_UNDEF = 0
 _MAX_SYMBOLS = 1 << 22
 _MAX_TEXT_SIZE = 100
-#: x86-64 code that returns the address of a constant: endbr64, push rbp, mov rbp, rsp, lea rax, [rip + offset], pop rbp, ret
-_RETURN_OF_CONSTANT = re.compile(rb"(?:\xf3\x0f\x1e\xfa)?(?:\x55\x48\x89\xe5)?\x48\x8d\x05(.{4})\x5d?\xc3", re.DOTALL)
+#: x86-64 code that returns the address of a constant: endbr64, push rbp, mov rbp, rsp, lea rax,
+#: [rip + offset], pop rbp, ret
+_RETURN_OF_CONSTANT = re.compile(
+    rb"(?:\xf3\x0f\x1e\xfa)?(?:\x55\x48\x89\xe5)?\x48\x8d\x05(.{4})\x5d?\xc3", re.DOTALL
+)
 
 
 class _ProgramHeader(NamedTuple):
@@ -68,7 +87,8 @@ def _check_header(content: bytes, architecture: str) -> tuple[int, str]:
         machine = _MACHINE_NAMES.get(e_machine, f"machine {e_machine}")
         endianness = "little" if ei_data == _ELFDATA2LSB else "big"
         raise InvalidLibraryError(
-            f"is built for {machine}, {32 * ei_class} bit, {endianness}-endian; this machine is {architecture}, little-endian"
+            f"is built for {machine}, {32 * ei_class} bit, {endianness}-endian; this machine is "
+            f"{architecture}, little-endian"
         )
     if e_type != _ET_DYN:
         raise InvalidLibraryError(f"is an ELF file of type {e_type}, expected a shared library")
@@ -82,13 +102,17 @@ class _ElfReader:
         self.content, self.bits, self.byte_order = content, bits, byte_order
         self.word_format = "Q" if bits == 64 else "L"
         self.program_headers = list(self._program_headers())
-        self.load_segments = [header for header in self.program_headers if header.p_type == _PT_LOAD]
+        self.load_segments = [
+            header for header in self.program_headers if header.p_type == _PT_LOAD
+        ]
 
     def unpack(self, form: str, offset: int) -> tuple[int, ...]:
         """Unpack numbers at an offset in the file, in the format of `struct` without byte order."""
         form = self.byte_order + form
         if offset < 0 or offset + struct.calcsize(form) > len(self.content):
-            raise InvalidLibraryError(f"is truncated: it refers to byte {offset}, but has {len(self.content)}")
+            raise InvalidLibraryError(
+                f"is truncated: it refers to byte {offset}, but has {len(self.content)}"
+            )
         return struct.unpack_from(form, self.content, offset)
 
     def _program_headers(self) -> Iterator[_ProgramHeader]:
@@ -101,7 +125,9 @@ class _ElfReader:
             header = self._program_header(e_phoff + i * e_phentsize)
             end = header.p_offset + header.p_filesz
             if header.p_type in (_PT_LOAD, _PT_DYNAMIC) and end > len(self.content):
-                raise InvalidLibraryError(f"is truncated: a segment ends at byte {end}, the file at {len(self.content)}")
+                raise InvalidLibraryError(
+                    f"is truncated: a segment ends at byte {end}, the file at {len(self.content)}"
+                )
             yield header
 
     def _program_header(self, offset: int) -> _ProgramHeader:
@@ -118,9 +144,15 @@ class _ElfReader:
         if not {_DT_STRTAB, _DT_SYMTAB, _DT_STRSZ} <= first_values.keys():
             raise InvalidLibraryError("has no symbol table")
         strings = self._read_address(first_values[_DT_STRTAB], first_values[_DT_STRSZ])
-        search_path = ":".join(_string_at(strings, value) for tag, value in dynamic if tag in (_DT_RPATH, _DT_RUNPATH))
+        search_path = ":".join(
+            _string_at(strings, value) for tag, value in dynamic if tag in (_DT_RPATH, _DT_RUNPATH)
+        )
         addresses = dict(self._exported_symbols(first_values, strings))
-        texts = {name: self._constant_text(addresses[name]) for name in EXPECTED_TEXTS if name in addresses}
+        texts = {
+            name: self._constant_text(addresses[name])
+            for name in EXPECTED_TEXTS
+            if name in addresses
+        }
         return SharedLibrary(
             frozenset(addresses),
             [_string_at(strings, value) for tag, value in dynamic if tag == _DT_NEEDED],
@@ -130,7 +162,10 @@ class _ElfReader:
 
     def _dynamic_entries(self) -> Iterator[tuple[int, int]]:
         """Yield (d_tag, d_val) of the dynamic section."""
-        offset = next((header.p_offset for header in self.program_headers if header.p_type == _PT_DYNAMIC), None)
+        offset = next(
+            (header.p_offset for header in self.program_headers if header.p_type == _PT_DYNAMIC),
+            None,
+        )
         if offset is None:
             raise InvalidLibraryError("is not linked dynamically")
         size = struct.calcsize(f"{self.byte_order}2{self.word_format}")
@@ -148,22 +183,33 @@ class _ElfReader:
     def _read_address(self, address: int, size: int) -> bytes:
         begin = self._file_offset(address)
         if begin + size > len(self.content):
-            raise InvalidLibraryError(f"is truncated: a table ends at byte {begin + size}, the file at {len(self.content)}")
+            raise InvalidLibraryError(
+                f"is truncated: a table ends at byte {begin + size}, the file at "
+                f"{len(self.content)}"
+            )
         return self.content[begin : begin + size]
 
     def _constant_text(self, address: int) -> bytes | None:
         """Return the text that a function returns; None if its code does anything else."""
         try:
             code = self._read_address(address, 0x20)
-            match = _RETURN_OF_CONSTANT.match(code) if self.unpack("H", 18) == (MACHINES["x86_64"][1],) else None
+            match = (
+                _RETURN_OF_CONSTANT.match(code)
+                if self.unpack("H", 18) == (MACHINES["x86_64"][1],)
+                else None
+            )
             if match is None:
                 return None
-            begin = self._file_offset(address + match.end(1) + int.from_bytes(match[1], "little", signed=True))
+            begin = self._file_offset(
+                address + match.end(1) + int.from_bytes(match[1], "little", signed=True)
+            )
         except InvalidLibraryError:
             return None
         return self.content[begin : begin + _MAX_TEXT_SIZE].partition(b"\0")[0]
 
-    def _exported_symbols(self, dynamic: Mapping[int, int], strings: bytes) -> Iterator[tuple[str, int]]:
+    def _exported_symbols(
+        self, dynamic: Mapping[int, int], strings: bytes
+    ) -> Iterator[tuple[str, int]]:
         """Yield names and addresses (0 in 32-bit files) of the symbols that are defined and visible to other libraries."""
         symbol = struct.Struct(self.byte_order + ("L2BHQ8x" if self.bits == 64 else "L8x2BH"))
         table = self._read_address(dynamic[_DT_SYMTAB], self._symbol_count(dynamic) * symbol.size)

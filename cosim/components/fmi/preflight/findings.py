@@ -23,8 +23,8 @@ class Rule:
     Attributes:
         name: Rule id, such as "archive.name".
         source: Section of the standard, or another reason.
-        severity: "error" for an FMU that is not run, "warning" for one that is run, with a message if the
-            rule is one of `RUN_WARNINGS`.
+        severity: "error" for an FMU that is not run, "warning" for one that is run, with a message
+            if the rule is one of `RUN_WARNINGS`.
     """
 
     name: str

@@ -15,7 +15,8 @@ _STAND_ALONE, _TOOL = "CoSimulation_StandAlone", "CoSimulation_Tool"
 def translate_variable(attributes: Mapping[str, str]) -> dict[str, str]:
     """Translate causality and variability of a variable.
 
-    A negated alias of an input or parameter becomes a local variable, because it cannot be set without a change of its sign.
+    A negated alias of an input or parameter becomes a local variable, because it cannot be set
+    without a change of its sign.
 
     Args:
         attributes: XML attributes of the variable and of its type element.
@@ -24,7 +25,9 @@ def translate_variable(attributes: Mapping[str, str]) -> dict[str, str]:
     variability = attributes.get("variability", "continuous")
     causality = _CAUSALITIES.get(causality, causality)
     if variability == "parameter":
-        causality, variability = ("output", "discrete") if causality == "output" else ("parameter", "fixed")
+        causality, variability = (
+            ("output", "discrete") if causality == "output" else ("parameter", "fixed")
+        )
     elif variability == "constant" and causality == "input":
         causality = "local"
     if attributes.get("alias") == "negatedAlias" and causality in ("input", "parameter"):
@@ -33,7 +36,9 @@ def translate_variable(attributes: Mapping[str, str]) -> dict[str, str]:
 
 
 def read_interfaces(root: Any) -> dict[Interface, dict[str, str]]:
-    """Read the interface of an FMU: an FMI 1.0 FMU has exactly one, none if it only starts its tool.
+    """Read the interface of an FMU.
+
+    An FMI 1.0 FMU has exactly one, none if it only starts its tool.
 
     Args:
         root: Root element of modelDescription.xml.
@@ -44,7 +49,12 @@ def read_interfaces(root: Any) -> dict[Interface, dict[str, str]]:
     if (stand_alone := implementation.find(_STAND_ALONE)) is None:
         return {}
     capabilities = stand_alone.find("Capabilities")
-    return {"co-simulation": {**({} if capabilities is None else dict(capabilities.items())), **identifier}}
+    return {
+        "co-simulation": {
+            **({} if capabilities is None else dict(capabilities.items())),
+            **identifier,
+        }
+    }
 
 
 def read_units(root: Any) -> Iterator[UnitDefinition]:
@@ -54,5 +64,7 @@ def read_units(root: Any) -> Iterator[UnitDefinition]:
         root: Root element of modelDescription.xml.
     """
     for element in root.iterfind("UnitDefinitions/BaseUnit"):
-        display = [child.get("displayUnit", "") for child in element.iterfind("DisplayUnitDefinition")]
+        display = [
+            child.get("displayUnit", "") for child in element.iterfind("DisplayUnitDefinition")
+        ]
         yield UnitDefinition(element.get("unit", ""), None, display, element.sourceline)

@@ -6,7 +6,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
 #: text that each function for the version and the platform of FMI must return
-EXPECTED_TEXTS = {"fmi2GetVersion": b"2.0", "fmi2GetTypesPlatform": b"default", "fmi3GetVersion": b"3.0"}
+EXPECTED_TEXTS = {
+    "fmi2GetVersion": b"2.0",
+    "fmi2GetTypesPlatform": b"default",
+    "fmi3GetVersion": b"3.0",
+}
 
 
 class InvalidLibraryError(Exception):
@@ -19,7 +23,8 @@ class SharedLibrary:
 
     Attributes:
         exports: Names of the exported functions.
-        constant_texts: Texts that exported functions return, for those whose code only returns a constant text.
+        constant_texts: Texts that exported functions return, for those whose code only returns a
+            constant text.
         needed_libraries: Names of the libraries that it depends on.
         search_folders: Folders in which the loader searches for them.
     """

@@ -16,7 +16,8 @@ class PreflightLimits:
     max_members: int = 10_000
     #: total extracted size (bytes)
     max_expanded_size: int = 1 << 30
-    #: largest ratio of extracted to compressed size, for members larger than `ratio_threshold` (bytes)
+    #: largest ratio of extracted to compressed size, for members larger than `ratio_threshold`
+    #: (bytes)
     max_ratio: int = 200
     ratio_threshold: int = 1 << 24
     #: size of the library for this platform (bytes), which is read into memory

@@ -19,7 +19,8 @@ _FAT_FORMATS = {b"\xca\xfe\xba\xbe": ">5L", b"\xca\xfe\xba\xbf": ">2L2Q2L"}
 _FAT_HEADER_SIZE, _MACH_HEADER_64_SIZE = 8, 32
 _MH_DYLIB, _MH_BUNDLE = 6, 8
 _LC_SEGMENT_64, _LC_SYMTAB = 0x19, 2
-#: LC_DYLD_EXPORTS_TRIE, LC_DYLD_INFO, LC_DYLD_INFO_ONLY -> position of the export trie's offset and size in the command
+#: LC_DYLD_EXPORTS_TRIE, LC_DYLD_INFO, LC_DYLD_INFO_ONLY -> position of the export trie's offset and
+#: size in the command
 _EXPORT_TRIE_COMMANDS = {0x80000033: 8, 0x22: 40, 0x80000022: 40}
 _MAX_ENTRIES = 1 << 20
 #: bits of n_type
@@ -44,7 +45,9 @@ def read_library(content: bytes, architecture: str) -> SharedLibrary:
         raise InvalidLibraryError("is not a macOS library")
     cputype, _, filetype, ncmds, sizeofcmds = _unpack(content, "<5L", 4)
     if cputype != MACHINES.get(architecture, cputype):
-        raise InvalidLibraryError(f"is built for {_architecture_name(cputype)}; this machine is {architecture}")
+        raise InvalidLibraryError(
+            f"is built for {_architecture_name(cputype)}; this machine is {architecture}"
+        )
     if filetype not in (_MH_DYLIB, _MH_BUNDLE):
         raise InvalidLibraryError(f"is of type {filetype}, expected a dynamic library")
     return SharedLibrary(frozenset(_exports(content, ncmds, _MACH_HEADER_64_SIZE + sizeofcmds)))
@@ -64,20 +67,27 @@ def _select_architecture(content: bytes, architecture: str) -> bytes:
         raise InvalidLibraryError(f"is damaged: it claims {nfat_arch} architectures")
     names = []
     for i in range(nfat_arch):
-        cputype, _, offset, size, *_ = _unpack(content, form, _FAT_HEADER_SIZE + i * struct.calcsize(form))
+        cputype, _, offset, size, *_ = _unpack(
+            content, form, _FAT_HEADER_SIZE + i * struct.calcsize(form)
+        )
         if cputype == MACHINES.get(architecture):
             if offset + size > len(content):
                 raise InvalidLibraryError(
-                    f"is truncated: the part for {architecture} ends at byte {offset + size}, the file at {len(content)}"
+                    f"is truncated: the part for {architecture} ends at byte {offset + size}, the "
+                    f"file at {len(content)}"
                 )
             return content[offset : offset + size]
         names.append(_architecture_name(cputype))
-    raise InvalidLibraryError(f"is built for {', '.join(names[:9]) or 'no architecture'}; this machine is {architecture}")
+    raise InvalidLibraryError(
+        f"is built for {', '.join(names[:9]) or 'no architecture'}; this machine is {architecture}"
+    )
 
 
 def _unpack(content: bytes, form: str, offset: int) -> tuple[int, ...]:
     if offset + struct.calcsize(form) > len(content):
-        raise InvalidLibraryError(f"is truncated: it refers to byte {offset}, but has {len(content)}")
+        raise InvalidLibraryError(
+            f"is truncated: it refers to byte {offset}, but has {len(content)}"
+        )
     return struct.unpack_from(form, content, offset)
 
 
@@ -93,15 +103,23 @@ def _exports(content: bytes, ncmds: int, end: int) -> Iterator[str]:
         elif cmd == _LC_SYMTAB:
             yield from _symbol_table_exports(content, *_unpack(content, "<4L", offset + 8))
         elif cmd in _EXPORT_TRIE_COMMANDS:
-            yield from _trie_exports(content, *_unpack(content, "<2L", offset + _EXPORT_TRIE_COMMANDS[cmd]))
+            yield from _trie_exports(
+                content, *_unpack(content, "<2L", offset + _EXPORT_TRIE_COMMANDS[cmd])
+            )
         offset += cmdsize
 
 
 def _trie_exports(content: bytes, offset: int, size: int) -> Iterator[str]:
-    """Yield the names of an export trie; a node is the size of its export information, that information, and its edges."""
+    """Yield the names of an export trie.
+
+    A node is the size of its export information, that information, and its edges.
+    """
     trie = content[offset : offset + size]
     if len(trie) < size:
-        raise InvalidLibraryError(f"is truncated: its export trie ends at byte {offset + size}, the file at {len(content)}")
+        raise InvalidLibraryError(
+            f"is truncated: its export trie ends at byte {offset + size}, the file at "
+            f"{len(content)}"
+        )
     nodes, visited = [(0, b"")] if trie else [], set[int]()
     while nodes:
         node, name = nodes.pop()
@@ -142,14 +160,19 @@ def _read_uleb128(trie: bytes, position: int) -> tuple[int, int]:
 def _check_segment(content: bytes, command: int) -> None:
     fileoff, filesize = _unpack(content, "<2Q", command + 40)
     if fileoff + filesize > len(content):
-        raise InvalidLibraryError(f"is truncated: a segment ends at byte {fileoff + filesize}, the file at {len(content)}")
+        raise InvalidLibraryError(
+            f"is truncated: a segment ends at byte {fileoff + filesize}, the file at {len(content)}"
+        )
 
 
-def _symbol_table_exports(content: bytes, symoff: int, nsyms: int, stroff: int, strsize: int) -> Iterator[str]:
+def _symbol_table_exports(
+    content: bytes, symoff: int, nsyms: int, stroff: int, strsize: int
+) -> Iterator[str]:
     """Yield the names of the defined external symbols, without the leading underscore of C names."""
     if nsyms > _MAX_ENTRIES or stroff + strsize > len(content):
         raise InvalidLibraryError(
-            f"is truncated: its table of {nsyms} symbols ends at byte {stroff + strsize}, the file at {len(content)}"
+            f"is truncated: its table of {nsyms} symbols ends at byte {stroff + strsize}, the file "
+            f"at {len(content)}"
         )
     for i in range(nsyms):
         n_strx, n_type, _, _, _ = _unpack(content, "<L2BHQ", symoff + _NLIST_64_SIZE * i)

@@ -9,7 +9,8 @@ from typing import Literal
 #: interface of an FMU through which it is simulated
 Interface = Literal["co-simulation", "model-exchange"]
 
-#: (causality, variability) -> allowed values of `initial`, the default first (FMI 2.0.5 section 2.2.7, FMI 3.0.2 section 2.4.7.4)
+#: (causality, variability) -> allowed values of `initial`, the default first (FMI 2.0.5 section
+#: 2.2.7, FMI 3.0.2 section 2.4.7.4)
 _EXACT, _DERIVED, _ANY = ("exact",), ("calculated", "approx"), ("calculated", "exact", "approx")
 ALLOWED_INITIAL: Mapping[tuple[str, str], Sequence[str]] = {
     ("structuralParameter", "fixed"): _EXACT,
@@ -82,7 +83,10 @@ class ModelVariable:
     @property
     def initial(self) -> str:
         """Value of `initial`, or the default for causality and variability, or "" if there is no default."""
-        return self.attributes.get("initial") or ALLOWED_INITIAL.get((self.causality, self.variability), ("",))[0]
+        return (
+            self.attributes.get("initial")
+            or ALLOWED_INITIAL.get((self.causality, self.variability), ("",))[0]
+        )
 
     @property
     def is_float(self) -> bool:
@@ -91,7 +95,9 @@ class ModelVariable:
 
     def attribute(self, name: str) -> str | None:
         """Return an XML attribute of the variable, or else of its declared type."""
-        return self.attributes.get(name) or (self.declared_type.attributes.get(name) if self.declared_type else None)
+        return self.attributes.get(name) or (
+            self.declared_type.attributes.get(name) if self.declared_type else None
+        )
 
     def __str__(self) -> str:
         return f'variable "{self.name}"'
@@ -140,7 +146,8 @@ class ModelDescription:
     Attributes:
         major: FMI major version.
         root: XML attributes of the root element.
-        interfaces: XML attributes of the interfaces through which the FMU can be simulated, the preferred one first.
+        interfaces: XML attributes of the interfaces through which the FMU can be simulated, the
+            preferred one first.
         default_experiment: XML attributes of the default experiment.
         variables: Model variables in order.
         types: Declared types.
@@ -164,9 +171,14 @@ class ModelDescription:
     by_reference: Mapping[str, ModelVariable] = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
-        """Index the variables: FMI 2.0 refers to them by their index from 1, FMI 3.0 by value reference."""
+        """Index the variables.
+
+        FMI 2.0 refers to them by their index from 1, FMI 3.0 by value reference.
+        """
         if self.major < 3:
             references = [str(index) for index in range(1, len(self.variables) + 1)]
         else:
-            references = [variable.attributes.get("valueReference", "").strip() for variable in self.variables]
+            references = [
+                variable.attributes.get("valueReference", "").strip() for variable in self.variables
+            ]
         object.__setattr__(self, "by_reference", dict(zip(references, self.variables, strict=True)))

@@ -42,7 +42,9 @@ def read_library(content: bytes, architecture: str) -> SharedLibrary:
     (e_lfanew,) = _unpack(content, "<L", 0x3C)
     if content[e_lfanew : e_lfanew + 4] != b"PE\0\0":
         raise InvalidLibraryError("has a damaged PE header")
-    machine, number_of_sections, _, _, _, optional_header_size, characteristics = _unpack(content, "<2H3L2H", e_lfanew + 4)
+    machine, number_of_sections, _, _, _, optional_header_size, characteristics = _unpack(
+        content, "<2H3L2H", e_lfanew + 4
+    )
     if machine != MACHINES.get(architecture, machine):
         machine_name = _MACHINE_NAMES.get(machine, f"machine {machine:#x}")
         raise InvalidLibraryError(f"is built for {machine_name}; this machine is {architecture}")
@@ -50,20 +52,28 @@ def read_library(content: bytes, architecture: str) -> SharedLibrary:
         raise InvalidLibraryError("is a program, expected a library")
     optional_header = e_lfanew + _COFF_HEADER_SIZE
     sections = list(_sections(content, optional_header + optional_header_size, number_of_sections))
-    return SharedLibrary(frozenset(_exports(content, _export_table_address(content, optional_header), sections)))
+    return SharedLibrary(
+        frozenset(_exports(content, _export_table_address(content, optional_header), sections))
+    )
 
 
 def _unpack(content: bytes, form: str, offset: int) -> tuple[int, ...]:
     if offset + struct.calcsize(form) > len(content):
-        raise InvalidLibraryError(f"is truncated: it refers to byte {offset}, but has {len(content)}")
+        raise InvalidLibraryError(
+            f"is truncated: it refers to byte {offset}, but has {len(content)}"
+        )
     return struct.unpack_from(form, content, offset)
 
 
 def _sections(content: bytes, section_table: int, count: int) -> Iterator[_Section]:
     for i in range(count):
-        _, address, size, pointer = _unpack(content, "<4L", section_table + _SECTION_HEADER_SIZE * i + 8)
+        _, address, size, pointer = _unpack(
+            content, "<4L", section_table + _SECTION_HEADER_SIZE * i + 8
+        )
         if size and pointer + size > len(content):
-            raise InvalidLibraryError(f"is truncated: a section ends at byte {pointer + size}, the file at {len(content)}")
+            raise InvalidLibraryError(
+                f"is truncated: a section ends at byte {pointer + size}, the file at {len(content)}"
+            )
         yield _Section(address, size, pointer)
 
 
@@ -72,7 +82,9 @@ def _export_table_address(content: bytes, optional_header: int) -> int:
     (magic,) = _unpack(content, "<H", optional_header)
     if magic not in (_PE32, _PE32_PLUS):
         raise InvalidLibraryError("has a damaged PE header")
-    directory_count, address = _unpack(content, "<2L", optional_header + (108 if magic == _PE32_PLUS else 92))
+    directory_count, address = _unpack(
+        content, "<2L", optional_header + (108 if magic == _PE32_PLUS else 92)
+    )
     return address if directory_count else 0
 
 
@@ -80,10 +92,14 @@ def _exports(content: bytes, export_table: int, sections: Sequence[_Section]) ->
     """Yield the names in the export name pointer table."""
     if export_table == 0:
         return
-    name_count, _, name_pointers = _unpack(content, "<3L", _file_offset(export_table, sections) + 24)
+    name_count, _, name_pointers = _unpack(
+        content, "<3L", _file_offset(export_table, sections) + 24
+    )
     if name_count > _MAX_EXPORTS:
         raise InvalidLibraryError(f"is damaged: it claims {name_count} exports")
-    for address in _unpack(content, f"<{name_count}L", _file_offset(name_pointers, sections) if name_count else 0):
+    for address in _unpack(
+        content, f"<{name_count}L", _file_offset(name_pointers, sections) if name_count else 0
+    ):
         begin = _file_offset(address, sections)
         end = content.find(b"\0", begin, begin + _MAX_NAME_LENGTH)
         if end < 0:

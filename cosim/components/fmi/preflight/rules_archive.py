@@ -66,8 +66,12 @@ def _check_name(entry: ZipEntry) -> Iterator[Finding]:
     parts = name.removesuffix("/").split("/")
     if name != "./" and not {"", ".", ".."}.isdisjoint(parts):
         yield NAME('its name contains an empty, "." or ".." part, expected a relative path', name)
-    if len(entry.name) > _MAX_PATH_LENGTH or any(len(os.fsencode(part)) > _MAX_NAME_LENGTH for part in parts):
-        yield NAME(f"its name is longer than {_MAX_NAME_LENGTH} bytes (a path: {_MAX_PATH_LENGTH})", name)
+    if len(entry.name) > _MAX_PATH_LENGTH or any(
+        len(os.fsencode(part)) > _MAX_NAME_LENGTH for part in parts
+    ):
+        yield NAME(
+            f"its name is longer than {_MAX_NAME_LENGTH} bytes (a path: {_MAX_PATH_LENGTH})", name
+        )
 
 
 def _is_utf8(name: bytes) -> bool:
@@ -80,18 +84,23 @@ def _is_utf8(name: bytes) -> bool:
 
 def _check_kind(entry: ZipEntry) -> Iterator[Finding]:
     name, is_folder = entry.decoded_name, entry.decoded_name.endswith("/")
-    # some tools give folders the mode of a file, so only the name decides which members become folders
+    # some tools give folders the mode of a file, so only the name decides which members become
+    # folders
     if stat.S_IFMT(entry.mode) not in (0, stat.S_IFREG, stat.S_IFDIR if is_folder else 0):
         if stat.S_ISDIR(entry.mode):
             yield KIND('has the mode of a folder, expected a name that ends with "/"', name)
         else:
-            yield KIND(f"is {file_type_name(entry.mode)}, expected a regular file or a folder", name)
+            yield KIND(
+                f"is {file_type_name(entry.mode)}, expected a regular file or a folder", name
+            )
     if is_folder and entry.size:
         yield KIND(f"is a folder with {entry.size} bytes of data", name)
     if entry.flags & zip_format.ENCRYPTED:
         yield ENCRYPTION("is encrypted", name)
     if entry.method not in (STORED, DEFLATED):
-        yield COMPRESSION(f"is compressed by method {entry.method}, expected 0 (stored) or 8 (deflated)", name)
+        yield COMPRESSION(
+            f"is compressed by method {entry.method}, expected 0 (stored) or 8 (deflated)", name
+        )
 
 
 def check_collisions(members: Sequence[tuple[str, object]]) -> Iterator[Finding]:
@@ -107,7 +116,12 @@ def check_collisions(members: Sequence[tuple[str, object]]) -> Iterator[Finding]
         if folded in first_names:
             first = first_names[folded]
             rule = REPEATED if first == name and content == contents[name] else COLLISION
-            yield rule("occurs twice" if first == name else f'differs only in case or Unicode form from "{first}"', name)
+            yield rule(
+                "occurs twice"
+                if first == name
+                else f'differs only in case or Unicode form from "{first}"',
+                name,
+            )
         first_names.setdefault(folded, name)
         contents.setdefault(name, content)
     files = {folded for folded, name in first_names.items() if not name.endswith("/")}
@@ -117,10 +131,15 @@ def check_collisions(members: Sequence[tuple[str, object]]) -> Iterator[Finding]
 
 
 def _parent_folders(name: str) -> Iterator[str]:
-    """Yield the folders of a path from the outermost, up to the depth limit: "a" and "a/b" for "a/b/c"."""
+    """Yield the folders of a path from the outermost, up to the depth limit.
+
+    "a" and "a/b" for "a/b/c".
+    """
     return islice((name[:i] for i, c in enumerate(name) if c == "/"), _MAX_DEPTH)
 
 
 def _fold_case(name: str) -> str:
     """Return a name as case-insensitive and normalizing file systems compare it."""
-    return unicodedata.normalize("NFC", unicodedata.normalize("NFC", name.removesuffix("/")).casefold())
+    return unicodedata.normalize(
+        "NFC", unicodedata.normalize("NFC", name.removesuffix("/")).casefold()
+    )

@@ -1,4 +1,7 @@
-"""Rules about the model as a whole: names, interface, units, types, default experiment and log categories."""
+"""Rules about the model as a whole.
+
+Names, interface, units, types, default experiment and log categories.
+"""
 
 from __future__ import annotations
 
@@ -52,12 +55,26 @@ def check_names(model: ModelDescription) -> Iterator[Finding]:
     if not model.interfaces:
         yield INTERFACE("offers neither Co-Simulation nor Model Exchange", DESCRIPTION_FILE, line)
     for name, attributes in model.interfaces.items():
-        line = model.lines["" if model.major == 1 else "CoSimulation" if name == "co-simulation" else "ModelExchange"]
+        line = model.lines[
+            ""
+            if model.major == 1
+            else "CoSimulation"
+            if name == "co-simulation"
+            else "ModelExchange"
+        ]
         identifier = attributes.get("modelIdentifier", "")
         if not identifier or not {"/", "\\"}.isdisjoint(identifier):
-            yield LIBRARY_NAME(f'found modelIdentifier "{identifier}", expected a file name', DESCRIPTION_FILE, line)
+            yield LIBRARY_NAME(
+                f'found modelIdentifier "{identifier}", expected a file name',
+                DESCRIPTION_FILE,
+                line,
+            )
         elif not _C_IDENTIFIER.fullmatch(identifier):
-            yield IDENTIFIER(f'found modelIdentifier "{identifier}", expected a C identifier', DESCRIPTION_FILE, line)
+            yield IDENTIFIER(
+                f'found modelIdentifier "{identifier}", expected a C identifier',
+                DESCRIPTION_FILE,
+                line,
+            )
 
 
 def check_units(model: ModelDescription) -> Iterator[Finding]:
@@ -72,7 +89,11 @@ def _check_unit_base(unit: UnitDefinition) -> Iterator[Finding]:
     for name, text in (unit.base_unit or {}).items():
         if not _is_valid_base_unit_value(name, text):
             expected = "an integer" if name in BASE_UNITS else "a finite number, a factor not 0"
-            yield UNIT_BASE(f'unit "{unit.name}": found {name}="{text}", expected {expected}', DESCRIPTION_FILE, unit.line)
+            yield UNIT_BASE(
+                f'unit "{unit.name}": found {name}="{text}", expected {expected}',
+                DESCRIPTION_FILE,
+                unit.line,
+            )
 
 
 def _is_valid_base_unit_value(name: str, text: str) -> bool:
@@ -88,15 +109,25 @@ def _is_valid_base_unit_value(name: str, text: str) -> bool:
 
 def check_types(model: ModelDescription) -> Iterator[Finding]:
     """Check that type names are unique, that types are defined by FMI, and that enumerations have valid items."""
-    for name, line in _find_duplicates((definition.name, definition.line) for definition in model.types):
+    for name, line in _find_duplicates(
+        (definition.name, definition.line) for definition in model.types
+    ):
         yield TYPE_NAME(f'the type "{name}" is defined twice', DESCRIPTION_FILE, line)
     for definition in model.types:
         if not definition.kind:
-            yield TYPE_KIND(f'the type "{definition.name}" is not of a type defined by FMI', DESCRIPTION_FILE, definition.line)
+            yield TYPE_KIND(
+                f'the type "{definition.name}" is not of a type defined by FMI',
+                DESCRIPTION_FILE,
+                definition.line,
+            )
         for message in _item_violations(definition):
             yield ITEMS(message, DESCRIPTION_FILE, definition.line)
         if definition.kind == "Enumeration" and not definition.items:
-            yield TYPE_KIND(f'the enumeration "{definition.name}" has no items', DESCRIPTION_FILE, definition.line)
+            yield TYPE_KIND(
+                f'the enumeration "{definition.name}" has no items',
+                DESCRIPTION_FILE,
+                definition.line,
+            )
 
 
 def _item_violations(definition: TypeDefinition) -> Iterator[str]:
@@ -108,7 +139,10 @@ def _item_violations(definition: TypeDefinition) -> Iterator[str]:
         try:
             parse_value(value, "Int64")
         except ValueError:
-            yield f'the item "{name}" of enumeration "{definition.name}" is "{value}", expected an integer'
+            yield (
+                f'the item "{name}" of enumeration "{definition.name}" is "{value}", expected an '
+                "integer"
+            )
 
 
 def check_counts(model: ModelDescription) -> Iterator[Finding]:
@@ -117,7 +151,9 @@ def check_counts(model: ModelDescription) -> Iterator[Finding]:
         return
     for name in ("numberOfContinuousStates", "numberOfEventIndicators"):
         text = model.root.get(name, "0")
-        if not (text.isascii() and text.isdecimal() and len(text) < 10 and int(text) <= MAX_SCALARS):
+        if not (
+            text.isascii() and text.isdecimal() and len(text) < 10 and int(text) <= MAX_SCALARS
+        ):
             found = f'found {name}="{text}", expected an integer from 0 to {MAX_SCALARS}'
             yield COUNT(found, DESCRIPTION_FILE, model.lines[""])
 
@@ -134,19 +170,31 @@ def check_experiment(model: ModelDescription) -> Iterator[Finding]:
         except ValueError:
             numbers[name] = math.nan
         if not math.isfinite(numbers[name]):
-            yield EXPERIMENT_VALUE(f'found {name}="{text}", expected a finite number', DESCRIPTION_FILE, line)
+            yield EXPERIMENT_VALUE(
+                f'found {name}="{text}", expected a finite number', DESCRIPTION_FILE, line
+            )
     start, stop = numbers.get("startTime", 0.0), numbers.get("stopTime", math.inf)
     if stop <= start:
-        yield EXPERIMENT(f"found stopTime {stop:g}, expected more than the startTime {start:g}", DESCRIPTION_FILE, line)
+        yield EXPERIMENT(
+            f"found stopTime {stop:g}, expected more than the startTime {start:g}",
+            DESCRIPTION_FILE,
+            line,
+        )
     for name in ("stepSize", "tolerance"):
         if numbers.get(name, 1.0) <= 0:
-            yield EXPERIMENT(f"found {name} {numbers[name]:g}, expected more than 0", DESCRIPTION_FILE, line)
+            yield EXPERIMENT(
+                f"found {name} {numbers[name]:g}, expected more than 0", DESCRIPTION_FILE, line
+            )
 
 
 def check_categories(model: ModelDescription) -> Iterator[Finding]:
     """Check that log categories are unique."""
     for name, _ in _find_duplicates((name, 0) for name in model.log_categories):
-        yield CATEGORIES(f'the log category "{name}" occurs twice', DESCRIPTION_FILE, model.lines["LogCategories"])
+        yield CATEGORIES(
+            f'the log category "{name}" occurs twice',
+            DESCRIPTION_FILE,
+            model.lines["LogCategories"],
+        )
 
 
 def _find_duplicates(names: Iterable[tuple[str, int]]) -> Iterator[tuple[str, int]]:

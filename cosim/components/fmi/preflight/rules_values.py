@@ -31,7 +31,9 @@ _NON_NUMERIC_TYPES = ("String", "Binary", "Clock", "")
 def check_starts(model: ModelDescription) -> Iterator[Finding]:
     """Check that start values exist where required, are valid, and are between min and max."""
     for variable in model.variables:
-        if variable.kind not in ("Clock", "") and model.major > 1:  # FMI 1.0 requires no start values
+        if (
+            variable.kind not in ("Clock", "") and model.major > 1
+        ):  # FMI 1.0 requires no start values
             yield from _check_start_presence(variable)
         if variable.kind not in _NON_NUMERIC_TYPES:
             yield from _check_start_values(variable)
@@ -41,7 +43,9 @@ def _check_start_presence(variable: ModelVariable) -> Iterator[Finding]:
     initial, causality = variable.initial, variable.causality
     if not variable.start_words and (initial in ("exact", "approx") or causality == "input"):
         reason = "inputs" if causality == "input" else f'initial="{initial}"'
-        yield _variable_finding(MISSING, variable, f"has no start value, which is required for {reason}")
+        yield _variable_finding(
+            MISSING, variable, f"has no start value, which is required for {reason}"
+        )
     if variable.start_words is not None and (initial == "calculated" or causality == "independent"):
         reason = "it is independent" if causality == "independent" else 'initial="calculated"'
         yield _variable_finding(UNEXPECTED, variable, f"has a start value, but {reason}")
@@ -53,7 +57,10 @@ def _check_start_values(variable: ModelVariable) -> Iterator[Finding]:
         try:
             number = parse_value(word, variable.kind)
         except ValueError:
-            text = f'start value "{" ".join(variable.start_words or ())}" of {variable} is not a valid {variable.kind}'
+            text = (
+                f'start value "{" ".join(variable.start_words or ())}" of {variable} is not a '
+                f"valid {variable.kind}"
+            )
             yield VALUE(text, DESCRIPTION_FILE, variable.line)
             return
         if not math.isfinite(number):
@@ -61,23 +68,32 @@ def _check_start_values(variable: ModelVariable) -> Iterator[Finding]:
             text = f"found start value {word}, expected a finite number"
             yield _variable_finding(INFINITE if is_allowed else FINITE, variable, text)
         elif not low <= number <= high:
-            yield _variable_finding(RANGE, variable, f"found start value {word}, expected {low:g} to {high:g}")
+            yield _variable_finding(
+                RANGE, variable, f"found start value {word}, expected {low:g} to {high:g}"
+            )
     yield from _check_enumeration_start(variable)
 
 
 def _read_limits(variable: ModelVariable) -> Generator[Finding, None, tuple[float, float]]:
-    """Return (min, max), infinite for a limit that is missing or invalid; yield findings about invalid limits."""
+    """Return (min, max), infinite for a limit that is missing or invalid.
+
+    Yield findings about invalid limits.
+    """
     limits = {"min": -math.inf, "max": math.inf}
     for name in limits:
         if (text := variable.attribute(name)) is None or variable.kind == "Boolean":
             continue
         limit = read_limit(text)
         if limit is None:
-            yield _variable_finding(LIMIT_VALUE, variable, f'found {name}="{text}", expected a number')
+            yield _variable_finding(
+                LIMIT_VALUE, variable, f'found {name}="{text}", expected a number'
+            )
         else:
             limits[name] = limit
     if limits["min"] > limits["max"]:
-        yield _variable_finding(LIMIT, variable, f"min {limits['min']:g} is above max {limits['max']:g}")
+        yield _variable_finding(
+            LIMIT, variable, f"min {limits['min']:g} is above max {limits['max']:g}"
+        )
         return -math.inf, math.inf
     return limits["min"], limits["max"]
 
@@ -85,7 +101,8 @@ def _read_limits(variable: ModelVariable) -> Generator[Finding, None, tuple[floa
 def read_limit(text: str) -> float | None:
     """Parse the value of `min` or `max`.
 
-    Limits of integers are parsed as floating-point numbers too, because exporters write limits beyond the integer range.
+    Limits of integers are parsed as floating-point numbers too, because exporters write limits
+    beyond the integer range.
 
     Returns:
         The limit, or None if the text is not a number.
@@ -102,7 +119,9 @@ def _check_enumeration_start(variable: ModelVariable) -> Iterator[Finding]:
         values = {item[1].strip() for item in variable.declared_type.items}
         for word in variable.start_words or ():
             if word not in values:
-                text = f'found start value {word}, expected an item of "{variable.declared_type.name}"'
+                text = (
+                    f'found start value {word}, expected an item of "{variable.declared_type.name}"'
+                )
                 yield _variable_finding(RANGE, variable, text)
 
 
@@ -118,11 +137,16 @@ def check_dimensions(model: ModelDescription, limits: PreflightLimits) -> Iterat
             continue
         size = math.prod(shape)
         if size > limits.max_array_size:
-            yield _variable_finding(SIZE, variable, f"has {size} elements, expected at most {limits.max_array_size}")
+            yield _variable_finding(
+                SIZE, variable, f"has {size} elements, expected at most {limits.max_array_size}"
+            )
             continue
         scalars += size * (1 + len(variable.aliases))
         if scalars > limits.max_scalars:
-            text = f"the variables up to this one have {scalars} elements, expected at most {limits.max_scalars}"
+            text = (
+                f"the variables up to this one have {scalars} elements, expected at most "
+                f"{limits.max_scalars}"
+            )
             yield _variable_finding(SIZE, variable, text)
             return
         if variable.start_words and len(variable.start_words) not in (1, size):
@@ -131,8 +155,13 @@ def check_dimensions(model: ModelDescription, limits: PreflightLimits) -> Iterat
             yield _variable_finding(COUNT, variable, text)
 
 
-def _read_shape(model: ModelDescription, variable: ModelVariable) -> Generator[Finding, None, Sequence[int] | None]:
-    """Return the shape, or None if a dimension is invalid; yield findings about invalid dimensions."""
+def _read_shape(
+    model: ModelDescription, variable: ModelVariable
+) -> Generator[Finding, None, Sequence[int] | None]:
+    """Return the shape, or None if a dimension is invalid.
+
+    Yield findings about invalid dimensions.
+    """
     sizes = [dimension_size(model, dimension) for dimension in variable.dimensions]
     for size, dimension in zip(sizes, variable.dimensions, strict=True):
         if size is None or size < 1:
@@ -152,14 +181,20 @@ def dimension_size(model: ModelDescription, dimension: Mapping[str, str]) -> int
         dimension: XML attributes of the dimension.
 
     Returns:
-        The size, or None if the dimension is not defined by exactly one of `start` and a valid `valueReference`.
+        The size, or None if the dimension is not defined by exactly one of `start` and a valid
+        `valueReference`.
     """
     reference, text = dimension.get("valueReference"), dimension.get("start")
     if (reference is None) == (text is None):
         return None
     if reference is not None:
         source = model.by_reference.get(reference.strip())
-        if source is None or source.dimensions or source.causality != "structuralParameter" or len(source.start_words or ()) != 1:
+        if (
+            source is None
+            or source.dimensions
+            or source.causality != "structuralParameter"
+            or len(source.start_words or ()) != 1
+        ):
             return None
         text = (source.start_words or ("",))[0]
     try:

@@ -1,4 +1,7 @@
-"""Complete check of an FMU for `cosim validate`: all data of the archive, and all XML files against their schemas."""
+"""Complete check of an FMU for `cosim validate`.
+
+All data of the archive, and all XML files against their schemas.
+"""
 
 from __future__ import annotations
 
@@ -13,7 +16,8 @@ from .limits import DEFAULT_LIMITS, PreflightLimits
 from .schema import SCHEMA_FILES, check_schema
 from .xml import parse_xml
 
-#: largest model that is checked by schemas, because their uniqueness constraints take quadratic time
+#: largest model that is checked by schemas, because their uniqueness constraints take quadratic
+#: time
 MAX_SCHEMA_VARIABLES = 10_000
 
 
@@ -39,12 +43,22 @@ def validate_fmu(path: Path, limits: PreflightLimits = DEFAULT_LIMITS) -> Sequen
             if all(finding.rule.severity == "warning" for finding in findings):
                 findings += _check_xml_files(archive, examination, limits)
     # a schema often reports, less clearly, the same problem as a rule
-    locations = {finding.location for finding in findings if finding.line and finding.rule.name != "xml.schema"}
-    unique = [finding for finding in findings if finding.rule.name != "xml.schema" or finding.location not in locations]
+    locations = {
+        finding.location
+        for finding in findings
+        if finding.line and finding.rule.name != "xml.schema"
+    }
+    unique = [
+        finding
+        for finding in findings
+        if finding.rule.name != "xml.schema" or finding.location not in locations
+    ]
     return sorted(dict.fromkeys(unique), key=lambda finding: finding.rule.severity)
 
 
-def _check_xml_files(archive: Archive, examination: Examination, limits: PreflightLimits) -> Iterator[Finding]:
+def _check_xml_files(
+    archive: Archive, examination: Examination, limits: PreflightLimits
+) -> Iterator[Finding]:
     model = examination.model
     assert model is not None  # otherwise the examination has found an error
     for version, member in SCHEMA_FILES:

@@ -1,4 +1,7 @@
-"""Numbers in the lexical forms of XML Schema; Python accepts more forms, such as "1_000" and "nan"."""
+"""Numbers in the lexical forms of XML Schema.
+
+Python accepts more forms, such as "1_000" and "nan".
+"""
 
 from __future__ import annotations
 
@@ -41,7 +44,9 @@ def _parse_integer(word: str, kind: str) -> int:
     if not _INTEGER.fullmatch(word.strip()):
         raise ValueError(word)
     bits = 64 if kind == "Enumeration" else int(kind.removeprefix("U").removeprefix("Int"))
-    low, high = (0, 2**bits - 1) if kind.startswith("U") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+    low, high = (
+        (0, 2**bits - 1) if kind.startswith("U") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
+    )
     if not low <= int(word) <= high:
         raise ValueError(word)
     return int(word)

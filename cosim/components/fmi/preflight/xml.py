@@ -1,4 +1,7 @@
-"""Safe XML parser: no DOCTYPE and therefore no entities and no external files, and limits of the document's size."""
+"""Safe XML parser.
+
+No DOCTYPE and therefore no entities and no external files, and limits of the document's size.
+"""
 
 from __future__ import annotations
 
@@ -18,7 +21,9 @@ SYNTAX = Rule("xml.syntax", "XML 1.0")
 #: accepted encodings; FMI requires UTF-8, but exporters use the others too
 _ENCODINGS = ("utf-8", "us-ascii", "ascii", "iso-8859-1", "windows-1252", "utf-16")
 _DECLARED = re.compile(rb"""\s*<\?xml[^>]*?\sencoding\s*=\s*["']([A-Za-z0-9._-]+)["']""")
-_TOO_LONG_TEXTS = etree.XPath("//@*[string-length() > $length] | //text()[string-length() > $length]")
+_TOO_LONG_TEXTS = etree.XPath(
+    "//@*[string-length() > $length] | //text()[string-length() > $length]"
+)
 #: begin of libxml2's message for an attribute or text above its own limit of 10^7 bytes
 _LIBRARY_LIMIT = "Resource limit exceeded"
 #: largest number of attributes of an element; lxml takes quadratic time in it
@@ -42,36 +47,59 @@ def parse_xml(content: bytes, member: str, limits: PreflightLimits) -> Any:
         FatalFindingError: The document is not well-formed, exceeds a limit or is not safe.
     """
     if len(content) > limits.max_xml_size:
-        raise FatalFindingError(SIZE(f"has {len(content)} bytes, expected at most {limits.max_xml_size}", member))
+        raise FatalFindingError(
+            SIZE(f"has {len(content)} bytes, expected at most {limits.max_xml_size}", member)
+        )
     content = _to_utf8(content, member)
     if (position := content.find(b"<!DOCTYPE")) >= 0:
-        raise FatalFindingError(DOCTYPE("found a DOCTYPE, expected none", member, content.count(b"\n", 0, position) + 1))
+        raise FatalFindingError(
+            DOCTYPE("found a DOCTYPE, expected none", member, content.count(b"\n", 0, position) + 1)
+        )
     if (tags := content.count(b"<")) > limits.max_xml_tags:
-        raise FatalFindingError(SIZE(f"has {tags} tags, expected at most {limits.max_xml_tags}", member))
+        raise FatalFindingError(
+            SIZE(f"has {tags} tags, expected at most {limits.max_xml_tags}", member)
+        )
     root = _parse_tree(content, member, limits)
     for element in _TOO_MANY_ATTRIBUTES(root):
-        raise FatalFindingError(SIZE(f"<{element.tag}> has more than {_MAX_ATTRIBUTES} attributes", member, element.sourceline))
+        raise FatalFindingError(
+            SIZE(
+                f"<{element.tag}> has more than {_MAX_ATTRIBUTES} attributes",
+                member,
+                element.sourceline,
+            )
+        )
     for text in _TOO_LONG_TEXTS(root, length=limits.max_text_length):
         where = f'attribute "{text.attrname}"' if text.is_attribute else "text"
-        found = f"<{text.getparent().tag}> has {where} with {len(text)} characters, expected at most {limits.max_text_length}"
+        found = (
+            f"<{text.getparent().tag}> has {where} with {len(text)} characters, expected at most "
+            f"{limits.max_text_length}"
+        )
         raise FatalFindingError(SIZE(found, member, text.getparent().sourceline))
     return root
 
 
 def _to_utf8(content: bytes, member: str) -> bytes:
     """Convert a document to UTF-8, so that the parser does not guess the encoding."""
-    mark_encoding = next((name for mark, name in _BYTE_ORDER_MARKS.items() if content.startswith(mark)), None)
+    mark_encoding = next(
+        (name for mark, name in _BYTE_ORDER_MARKS.items() if content.startswith(mark)), None
+    )
     declared = _DECLARED.match(content)
     encoding = mark_encoding or (declared.group(1).decode().lower() if declared else "utf-8")
     if mark_encoding is None and encoding not in _ENCODINGS:
-        raise FatalFindingError(ENCODING(f'found encoding "{encoding}", expected "UTF-8"', member, 1))
+        raise FatalFindingError(
+            ENCODING(f'found encoding "{encoding}", expected "UTF-8"', member, 1)
+        )
     try:
         text = content.decode(encoding)
     except UnicodeDecodeError as error:
         line = content.count(b"\n", 0, error.start) + 1
-        raise FatalFindingError(ENCODING(f"is not {encoding.removesuffix('-sig')} text: {error.reason}", member, line)) from None
+        raise FatalFindingError(
+            ENCODING(f"is not {encoding.removesuffix('-sig')} text: {error.reason}", member, line)
+        ) from None
     if "\0" in text:
-        raise FatalFindingError(ENCODING("contains null characters, expected UTF-8 text", member, 1))
+        raise FatalFindingError(
+            ENCODING("contains null characters, expected UTF-8 text", member, 1)
+        )
     return content if encoding == "utf-8" else text.encode()
 
 
@@ -92,6 +120,8 @@ def _parse_tree(content: bytes, member: str, limits: PreflightLimits) -> Any:
         if _LIBRARY_LIMIT in error.msg:
             found = f"has an attribute or text with more than {limits.max_text_length} characters"
             raise FatalFindingError(SIZE(found, member, line)) from None
-        raise FatalFindingError(SYNTAX(f"is not well-formed XML: {error.msg} (column {column})", member, line)) from None
+        raise FatalFindingError(
+            SYNTAX(f"is not well-formed XML: {error.msg} (column {column})", member, line)
+        ) from None
     except (ValueError, LookupError) as error:
         raise FatalFindingError(SYNTAX(f"is not well-formed XML: {error}", member)) from None

@@ -9,7 +9,14 @@ from typing import Any
 
 from . import fmi1_reader
 from .findings import DESCRIPTION_FILE, FatalFindingError, Finding, Rule
-from .model_description import Interface, ModelDescription, ModelVariable, TypeDefinition, UnitDefinition, Unknown
+from .model_description import (
+    Interface,
+    ModelDescription,
+    ModelVariable,
+    TypeDefinition,
+    UnitDefinition,
+    Unknown,
+)
 
 _ROOT = "FMI 2.0.5 section 2.2.1, FMI 3.0.2 section 2.4.1"
 ROOT = Rule("model.root", _ROOT)
@@ -18,11 +25,25 @@ REPEATED = Rule("model.repeated", _ROOT)
 
 #: names of type elements -> FMI 3.0 type names, by FMI major version
 TYPE_NAMES = {
-    1: {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "String": "String", "Enumeration": "Enumeration"},
-    2: {"Real": "Float64", "Integer": "Int32", "Boolean": "Boolean", "String": "String", "Enumeration": "Enumeration"},
+    1: {
+        "Real": "Float64",
+        "Integer": "Int32",
+        "Boolean": "Boolean",
+        "String": "String",
+        "Enumeration": "Enumeration",
+    },
+    2: {
+        "Real": "Float64",
+        "Integer": "Int32",
+        "Boolean": "Boolean",
+        "String": "String",
+        "Enumeration": "Enumeration",
+    },
     3: {
         **{f"Float{bits}": f"Float{bits}" for bits in (32, 64)},
-        **{f"{sign}Int{bits}": f"{sign}Int{bits}" for bits in (8, 16, 32, 64) for sign in ("", "U")},
+        **{
+            f"{sign}Int{bits}": f"{sign}Int{bits}" for bits in (8, 16, 32, 64) for sign in ("", "U")
+        },
         **{name: name for name in ("Boolean", "String", "Binary", "Enumeration", "Clock")},
     },
 }
@@ -33,10 +54,20 @@ _FMI2_STRUCTURE = {
     "InitialUnknown": "InitialUnknowns/Unknown",
 }
 _FMI3_STRUCTURE = {
-    name: name for name in ("Output", "ContinuousStateDerivative", "ClockedState", "InitialUnknown", "EventIndicator")
+    name: name
+    for name in (
+        "Output",
+        "ContinuousStateDerivative",
+        "ClockedState",
+        "InitialUnknown",
+        "EventIndicator",
+    )
 }
 #: elements of the interfaces, the preferred one first
-_INTERFACES: Mapping[Interface, str] = {"co-simulation": "CoSimulation", "model-exchange": "ModelExchange"}
+_INTERFACES: Mapping[Interface, str] = {
+    "co-simulation": "CoSimulation",
+    "model-exchange": "ModelExchange",
+}
 _FIXED_CAUSALITIES = ("parameter", "calculatedParameter", "structuralParameter")
 #: without "3.0-beta", because the C functions changed until 3.0
 _SUPPORTED_VERSION = re.compile(r"1\.0|2\.0(\.[0-9]+)?|3\.[0-9]+(\.[0-9]+)?")
@@ -52,12 +83,28 @@ def read_model(root: Any) -> ModelDescription:
         FatalFindingError: The root element is not a model description of a supported FMI version.
     """
     if root.tag != "fmiModelDescription":
-        raise FatalFindingError(ROOT(f"found <{root.tag}>, expected <fmiModelDescription>", DESCRIPTION_FILE, root.sourceline))
+        raise FatalFindingError(
+            ROOT(
+                f"found <{root.tag}>, expected <fmiModelDescription>",
+                DESCRIPTION_FILE,
+                root.sourceline,
+            )
+        )
     version = root.get("fmiVersion")
     if version is None or not _SUPPORTED_VERSION.fullmatch(version):
-        pre_release = ", a pre-release, whose C functions differ" if version and "-" in version else ""
-        found = "lacks the attribute fmiVersion" if version is None else f"is an FMI {version} FMU{pre_release}"
-        raise FatalFindingError(VERSION(f"{found}; FMI 1.0, 2.0 and 3.0 are supported", DESCRIPTION_FILE, root.sourceline))
+        pre_release = (
+            ", a pre-release, whose C functions differ" if version and "-" in version else ""
+        )
+        found = (
+            "lacks the attribute fmiVersion"
+            if version is None
+            else f"is an FMI {version} FMU{pre_release}"
+        )
+        raise FatalFindingError(
+            VERSION(
+                f"{found}; FMI 1.0, 2.0 and 3.0 are supported", DESCRIPTION_FILE, root.sourceline
+            )
+        )
     major = int(version[0])
     types = [_read_type(element, major) for element in root.iterfind("TypeDefinitions/*")]
     types_by_name = {definition.name: definition for definition in types}
@@ -66,9 +113,16 @@ def read_model(root: Any) -> ModelDescription:
         _read_attributes(root),
         fmi1_reader.read_interfaces(root) if major == 1 else _read_interfaces(root),
         _read_attributes(root.find("DefaultExperiment")),
-        [_read_variable(element, major, types_by_name) for element in root.iterfind("ModelVariables/*")],
+        [
+            _read_variable(element, major, types_by_name)
+            for element in root.iterfind("ModelVariables/*")
+        ],
         types,
-        list(fmi1_reader.read_units(root) if major == 1 else map(_read_unit, root.iterfind("UnitDefinitions/Unit"))),
+        list(
+            fmi1_reader.read_units(root)
+            if major == 1
+            else map(_read_unit, root.iterfind("UnitDefinitions/Unit"))
+        ),
         list(_read_structure(root, major)),
         [element.get("name", "") for element in root.iterfind("LogCategories/Category")],
         {"": root.sourceline} | {element.tag: element.sourceline for element in root},
@@ -76,7 +130,11 @@ def read_model(root: Any) -> ModelDescription:
 
 
 def _read_interfaces(root: Any) -> dict[Interface, dict[str, str]]:
-    return {name: _read_attributes(root.find(tag)) for name, tag in _INTERFACES.items() if root.find(tag) is not None}
+    return {
+        name: _read_attributes(root.find(tag))
+        for name, tag in _INTERFACES.items()
+        if root.find(tag) is not None
+    }
 
 
 def check_repeated_elements(root: Any) -> Iterator[Finding]:
@@ -88,7 +146,11 @@ def check_repeated_elements(root: Any) -> Iterator[Finding]:
     counts = Counter(element.tag for element in root)
     for tag, count in counts.items():
         if count > 1:
-            yield REPEATED(f"<{tag}> occurs {count} times, expected once", DESCRIPTION_FILE, root.find(tag).sourceline)
+            yield REPEATED(
+                f"<{tag}> occurs {count} times, expected once",
+                DESCRIPTION_FILE,
+                root.find(tag).sourceline,
+            )
 
 
 def _read_attributes(element: Any) -> dict[str, str]:
@@ -96,22 +158,36 @@ def _read_attributes(element: Any) -> dict[str, str]:
 
 
 def _type_element(element: Any, major: int) -> Any:
-    """Return the element with the type of a variable or type definition: a child in FMI 2.0, the element itself in FMI 3.0."""
+    """Return the element with the type of a variable or type definition.
+
+    A child in FMI 2.0, the element itself in FMI 3.0.
+    """
     return (
-        element if major == 3 else next((child for child in element if child.tag.removesuffix("Type") in TYPE_NAMES[2]), element)
+        element
+        if major == 3
+        else next(
+            (child for child in element if child.tag.removesuffix("Type") in TYPE_NAMES[2]), element
+        )
     )
 
 
 def _read_type(element: Any, major: int) -> TypeDefinition:
     type_element = _type_element(element, major)
-    kind = TYPE_NAMES[major].get(type_element.tag if major == 2 else type_element.tag.removesuffix("Type"), "")
+    kind = TYPE_NAMES[major].get(
+        type_element.tag if major == 2 else type_element.tag.removesuffix("Type"), ""
+    )
     attributes = _read_attributes(type_element) | _read_attributes(element)
     numbered = enumerate(type_element.iterfind("Item"), 1)  # FMI 1.0 has no values
-    items = [(item.get("name", ""), item.get("value", str(n) if major == 1 else "")) for n, item in numbered]
+    items = [
+        (item.get("name", ""), item.get("value", str(n) if major == 1 else ""))
+        for n, item in numbered
+    ]
     return TypeDefinition(element.get("name", ""), kind, attributes, items, element.sourceline)
 
 
-def _read_variable(element: Any, major: int, types_by_name: Mapping[str, TypeDefinition]) -> ModelVariable:
+def _read_variable(
+    element: Any, major: int, types_by_name: Mapping[str, TypeDefinition]
+) -> ModelVariable:
     type_element = _type_element(element, major)
     attributes = _read_attributes(type_element) | _read_attributes(element)
     if major == 1:
@@ -139,10 +215,15 @@ def _default_variability(kind: str, causality: str, major: int) -> str:
 
 
 def _read_starts(element: Any, kind: str, text: str | None, major: int) -> Sequence[str] | None:
-    """Return the words of a start value; String and Binary variables of FMI 3.0 have one element per value."""
+    """Return the words of a start value.
+
+    String and Binary variables of FMI 3.0 have one element per value.
+    """
     if kind in ("String", "Binary") and major == 3:
         values = [child.get("value", "") for child in element.iterfind("Start")]
-        return values or (None if text is None or kind == "Binary" else [text])  # Dymola 2023x writes an attribute
+        return values or (
+            None if text is None or kind == "Binary" else [text]
+        )  # Dymola 2023x writes an attribute
     if text is None:
         return None
     return [text] if kind == "String" else text.split()
@@ -151,7 +232,12 @@ def _read_starts(element: Any, kind: str, text: str | None, major: int) -> Seque
 def _read_unit(element: Any) -> UnitDefinition:
     base = element.find("BaseUnit")
     display = [child.get("name", "") for child in element.iterfind("DisplayUnit")]
-    return UnitDefinition(element.get("name", ""), None if base is None else _read_attributes(base), display, element.sourceline)
+    return UnitDefinition(
+        element.get("name", ""),
+        None if base is None else _read_attributes(base),
+        display,
+        element.sourceline,
+    )
 
 
 def _read_structure(root: Any, major: int) -> Iterator[Unknown]:
@@ -161,5 +247,10 @@ def _read_structure(root: Any, major: int) -> Iterator[Unknown]:
 
 
 def _read_unknown(element: Any, name: str, reference_attribute: str) -> Unknown:
-    words = [None if (text := element.get(key)) is None else text.split() for key in ("dependencies", "dependenciesKind")]
-    return Unknown(name, element.get(reference_attribute, ""), words[0], words[1], element.sourceline)
+    words = [
+        None if (text := element.get(key)) is None else text.split()
+        for key in ("dependencies", "dependenciesKind")
+    ]
+    return Unknown(
+        name, element.get(reference_attribute, ""), words[0], words[1], element.sourceline
+    )

@@ -1,7 +1,10 @@
-"""Strict reader of ZIP structures: one central directory at the end of the file, and consistent headers.
+"""Strict reader of ZIP structures.
 
-Python's zipfile is lenient by design. It accepts overlapping members, trailing data and contradictory headers, so that two
-programs can see different contents in the same file. Format: PKWARE APPNOTE 6.3.10, sections 4.3 and 4.5.
+One central directory at the end of the file, and consistent headers.
+
+Python's zipfile is lenient by design. It accepts overlapping members, trailing data and
+contradictory headers, so that two programs can see different contents in the same file. Format:
+PKWARE APPNOTE 6.3.10, sections 4.3 and 4.5.
 """
 
 from __future__ import annotations
@@ -67,7 +70,10 @@ class ZipEntry:
 
     @property
     def decoded_name(self) -> str:
-        """Name as path with "/" between its parts and without "./" at its beginning; the folder "./" keeps its name."""
+        """Name as path with "/" between its parts and without "./" at its beginning.
+
+        The folder "./" keeps its name.
+        """
         name = self.raw_name.replace("\\", "/")
         return name.removeprefix("./") or name
 
@@ -83,14 +89,20 @@ def read_central_directory(file: BufferedReader, max_entries: int) -> tuple[list
         The headers of the members, and the offset of the central directory in the file (bytes).
 
     Raises:
-        FatalFindingError: The file is not an archive, the central directory is damaged or has too many members.
+        FatalFindingError: The file is not an archive, the central directory is damaged or has too
+            many members.
     """
     count, size, offset = _read_eocd(file)
     if count > max_entries:
-        raise FatalFindingError(CENTRAL_DIRECTORY(f"found {count} members, expected at most {max_entries}"))
+        raise FatalFindingError(
+            CENTRAL_DIRECTORY(f"found {count} members, expected at most {max_entries}")
+        )
     if size > max_entries * _MAX_HEADER_SIZE:
         raise FatalFindingError(
-            CENTRAL_DIRECTORY(f"found a central directory of {size} bytes, expected at most {max_entries * _MAX_HEADER_SIZE}")
+            CENTRAL_DIRECTORY(
+                f"found a central directory of {size} bytes, expected at most "
+                f"{max_entries * _MAX_HEADER_SIZE}"
+            )
         )
     file.seek(offset)
     directory = file.read(size)
@@ -99,30 +111,46 @@ def read_central_directory(file: BufferedReader, max_entries: int) -> tuple[list
         entry, position = _read_entry(directory, position)
         entries.append(entry)
     if position != size:
-        text = f"the central directory is {count_noun(size - position, 'byte')} longer than its {count_noun(count, 'header')}"
+        text = (
+            f"the central directory is {count_noun(size - position, 'byte')} longer than its "
+            f"{count_noun(count, 'header')}"
+        )
         raise FatalFindingError(CENTRAL_DIRECTORY(text))
     return entries, offset
 
 
 def _read_eocd(file: BufferedReader) -> tuple[int, int, int]:
-    """Read the end of central directory record; return (members, size, offset) of the central directory."""
+    """Read the end of central directory record.
+
+    Return (members, size, offset) of the central directory.
+    """
     length = file.seek(0, os.SEEK_END)
     file.seek(max(0, length - _EOCD.size - _MAX_COMMENT_SIZE))
     tail = file.read()
     position = tail.rfind(_EOCD_SIGNATURE)
     if position < 0 or len(tail) - position < _EOCD.size:
-        raise FatalFindingError(NO_ZIP("is not an FMU: it is not a ZIP file, or its end is missing"))
-    _, disk, directory_disk, disk_count, count, size, offset, comment_size = _EOCD.unpack_from(tail, position)
+        raise FatalFindingError(
+            NO_ZIP("is not an FMU: it is not a ZIP file, or its end is missing")
+        )
+    _, disk, directory_disk, disk_count, count, size, offset, comment_size = _EOCD.unpack_from(
+        tail, position
+    )
     surplus = len(tail) - position - _EOCD.size - comment_size
     if surplus or _is_in_comment(tail, position):
         raise FatalFindingError(
-            TRAILING(f"found {count_noun(abs(surplus), 'byte')} behind the end of the archive or a second end, expected neither")
+            TRAILING(
+                f"found {count_noun(abs(surplus), 'byte')} behind the end of the archive or a "
+                "second end, expected neither"
+            )
         )
     if (disk, directory_disk) != (0, 0) or disk_count != count:
         raise FatalFindingError(CENTRAL_DIRECTORY("is one part of an archive in several parts"))
     end = length - _EOCD.size - comment_size
     if offset + size != end:
-        text = f"the central directory should end at byte {end}, found {offset + size} (truncated, or data in front?)"
+        text = (
+            f"the central directory should end at byte {end}, found {offset + size} (truncated, or "
+            "data in front?)"
+        )
         raise FatalFindingError(CENTRAL_DIRECTORY(text))
     return count, size, offset
 
@@ -141,22 +169,47 @@ def _is_in_comment(tail: bytes, position: int) -> bool:
 
 def _read_entry(directory: bytes, position: int) -> tuple[ZipEntry, int]:
     """Read the central directory header at a position; return it and the position after it."""
-    if len(directory) - position < _CENTRAL_HEADER.size or not directory.startswith(_CENTRAL_SIGNATURE, position):
+    if len(directory) - position < _CENTRAL_HEADER.size or not directory.startswith(
+        _CENTRAL_SIGNATURE, position
+    ):
         raise _damaged_directory_error(position)
     fields = _CENTRAL_HEADER.unpack_from(directory, position)
-    _, _, _, flags, method, _, _, crc, compressed, size, name_size, extra_size, comment_size, _, _, attributes, offset = fields
+    (
+        _,
+        _,
+        _,
+        flags,
+        method,
+        _,
+        _,
+        crc,
+        compressed,
+        size,
+        name_size,
+        extra_size,
+        comment_size,
+        _,
+        _,
+        attributes,
+        offset,
+    ) = fields
     name_begin = position + _CENTRAL_HEADER.size
     extra_begin = name_begin + name_size
     end = extra_begin + extra_size + comment_size
     if end > len(directory):
         raise _damaged_directory_error(position)
-    name, extra = directory[name_begin:extra_begin], directory[extra_begin : extra_begin + extra_size]
+    name, extra = (
+        directory[name_begin:extra_begin],
+        directory[extra_begin : extra_begin + extra_size],
+    )
     size, compressed, offset = _apply_zip64(extra, size, compressed, offset)
     return ZipEntry(name, flags, method, crc, compressed, size, attributes >> 16, offset), end
 
 
 def _damaged_directory_error(position: int) -> FatalFindingError:
-    return FatalFindingError(CENTRAL_DIRECTORY(f"the central directory is damaged at its byte {position}"))
+    return FatalFindingError(
+        CENTRAL_DIRECTORY(f"the central directory is damaged at its byte {position}")
+    )
 
 
 def _apply_zip64(extra: bytes, *values: int) -> tuple[int, ...]:
@@ -167,7 +220,9 @@ def _apply_zip64(extra: bytes, *values: int) -> tuple[int, ...]:
         if header_id == _ZIP64_HEADER_ID:
             count = (len(extra[position + 4 : position + 4 + length])) // 8
             wide_values = iter(struct.unpack_from(f"<{count}Q", extra, position + 4))
-            return tuple(next(wide_values, value) if value == _ZIP64_MARKER else value for value in values)
+            return tuple(
+                next(wide_values, value) if value == _ZIP64_MARKER else value for value in values
+            )
         position += 4 + length
     return values
 
@@ -189,8 +244,12 @@ def find_data_offset(file: BufferedReader, entry: ZipEntry, end: int) -> int:
     file.seek(min(entry.offset, end))
     header = file.read(_LOCAL_HEADER.size)
     if len(header) < _LOCAL_HEADER.size or not header.startswith(_LOCAL_SIGNATURE):
-        raise FatalFindingError(HEADER(f"found no member at byte {entry.offset}", entry.decoded_name))
-    _, _, flags, method, _, _, crc, compressed, size, name_size, extra_size = _LOCAL_HEADER.unpack(header)
+        raise FatalFindingError(
+            HEADER(f"found no member at byte {entry.offset}", entry.decoded_name)
+        )
+    _, _, flags, method, _, _, crc, compressed, size, name_size, extra_size = _LOCAL_HEADER.unpack(
+        header
+    )
     name, extra = file.read(name_size), file.read(extra_size)
     size, compressed = _apply_zip64(extra, size, compressed)
     pairs = {
@@ -202,9 +261,16 @@ def find_data_offset(file: BufferedReader, entry: ZipEntry, end: int) -> int:
         "size": (size, entry.size),
     }
     for label, (local, central) in pairs.items():
-        is_in_data_descriptor = local == 0 and flags & HAS_DATA_DESCRIPTOR and label in ("CRC", "compressed size", "size")
+        is_in_data_descriptor = (
+            local == 0
+            and flags & HAS_DATA_DESCRIPTOR
+            and label in ("CRC", "compressed size", "size")
+        )
         if local != central and not is_in_data_descriptor:
-            text = f"its local file header has {label} {local!r}, the central directory has {central!r}"
+            text = (
+                f"its local file header has {label} {local!r}, the central directory has "
+                f"{central!r}"
+            )
             raise FatalFindingError(HEADER(text, entry.decoded_name))
     data_offset: int = entry.offset + _LOCAL_HEADER.size + name_size + extra_size
     return data_offset

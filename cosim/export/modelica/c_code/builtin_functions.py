@@ -8,7 +8,18 @@ from functools import reduce
 
 from ..model import syntax_tree
 from ..model.syntax_tree import raise_model_error
-from .c_values import CExpression, CValue, c_call, c_literal, common_type, infix, map_elements, prefix, scalar_value, sum_terms
+from .c_values import (
+    CExpression,
+    CValue,
+    c_call,
+    c_literal,
+    common_type,
+    infix,
+    map_elements,
+    prefix,
+    scalar_value,
+    sum_terms,
+)
 from .subscripts import SubscriptLowering
 
 _TRIGONOMETRIC_FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh")
@@ -46,7 +57,9 @@ def _two_operand_function(lowering: SubscriptLowering, node: syntax_tree.Builtin
     elements = [value.element(k) for value in values for k in range(value.size)]
     if (len(values) == 2 and any(value.shape for value in values)) or not elements:
         raise_model_error(f"{node.name}() takes two scalars or one array", node.where)
-    return scalar_value(type_name, reduce(lambda a, b: _call_helper(node.name, type_name, a, b), elements))
+    return scalar_value(
+        type_name, reduce(lambda a, b: _call_helper(node.name, type_name, a, b), elements)
+    )
 
 
 def _abs(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
@@ -59,18 +72,31 @@ def _abs(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
 def _integer(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
     """Lower integer(x), the largest Integer not above x, and Integer(e), the number of an enumeration literal."""
     value = lowering.lower(node.arguments[0])
-    return map_elements(value, "Integer", (lambda x: c_call("integer_of", "m", x)) if value.type == "Real" else (lambda x: x))
+    return map_elements(
+        value,
+        "Integer",
+        (lambda x: c_call("integer_of", "m", x)) if value.type == "Real" else (lambda x: x),
+    )
 
 
 def _sum(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
     value = lowering.lower(node.arguments[0])
-    return scalar_value(value.type, sum_terms(value.type, [value.element(k) for k in range(value.size)]))
+    return scalar_value(
+        value.type, sum_terms(value.type, [value.element(k) for k in range(value.size)])
+    )
 
 
 def _product(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
     value = lowering.lower(node.arguments[0])
-    multiply = (lambda a, b: infix("*", a, b)) if value.type == "Real" else (lambda a, b: c_call("multiply", "m", a, b))
-    return scalar_value(value.type, reduce(multiply, [value.element(k) for k in range(value.size)], c_literal(1, value.type)))
+    multiply = (
+        (lambda a, b: infix("*", a, b))
+        if value.type == "Real"
+        else (lambda a, b: c_call("multiply", "m", a, b))
+    )
+    return scalar_value(
+        value.type,
+        reduce(multiply, [value.element(k) for k in range(value.size)], c_literal(1, value.type)),
+    )
 
 
 def _cross(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
@@ -80,7 +106,9 @@ def _cross(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
 
     def element(k: int | str) -> CExpression:
         i, j = (int(k) + 1) % 3, (int(k) + 2) % 3
-        return infix("-", infix("*", a.element(i), b.element(j)), infix("*", a.element(j), b.element(i)))
+        return infix(
+            "-", infix("*", a.element(i), b.element(j)), infix("*", a.element(j), b.element(i))
+        )
 
     return CValue("Real", (3,), element, indexable_in_loop=False)
 
@@ -89,30 +117,49 @@ def _transpose(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue
     value = lowering.evaluated_once(lowering.lower(node.arguments[0]))
     rows, columns = value.shape
     return CValue(
-        value.type, (columns, rows), lambda k: value.element(int(k) % rows * columns + int(k) // rows), indexable_in_loop=False
+        value.type,
+        (columns, rows),
+        lambda k: value.element(int(k) % rows * columns + int(k) // rows),
+        indexable_in_loop=False,
     )
 
 
 def _fill(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
     """Lower fill(value, sizes), zeros(sizes) and ones(sizes)."""
     sizes = node.arguments[1:] if node.name == "fill" else node.arguments
-    value = lowering.evaluated_once(lowering.lower(node.arguments[0])) if node.name == "fill" else None
+    value = (
+        lowering.evaluated_once(lowering.lower(node.arguments[0])) if node.name == "fill" else None
+    )
     element = value or scalar_value("Integer", c_literal(int(node.name == "ones"), "Integer"))
-    return CValue(element.type, _shape(lowering, node, sizes), lambda _: element.text, reusable=True)
+    return CValue(
+        element.type, _shape(lowering, node, sizes), lambda _: element.text, reusable=True
+    )
 
 
 def _matrix(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
-    """Lower a concatenation: rows(a, b) of the parts of `[a; b]`, columns(a, b) of `[a, b]`; scalars and vectors are columns."""
+    """Lower a concatenation: rows(a, b) of the parts of `[a; b]`, columns(a, b) of `[a, b]`.
+
+    Scalars and vectors are columns.
+    """
     parts = [lowering.lower(argument) for argument in node.arguments]
     shapes = [(*part.shape, 1, 1)[:2] if len(part.shape) < 2 else part.shape for part in parts]
     vertical = node.name == "rows"
     if len({shape[vertical] for shape in shapes}) != 1:
-        raise_model_error(f"the parts of a matrix have the sizes {', '.join(str(list(s)) for s in shapes)}", node.where)
-    shape = (sum(s[0] for s in shapes), shapes[0][1]) if vertical else (shapes[0][0], sum(s[1] for s in shapes))
+        raise_model_error(
+            f"the parts of a matrix have the sizes {', '.join(str(list(s)) for s in shapes)}",
+            node.where,
+        )
+    shape = (
+        (sum(s[0] for s in shapes), shapes[0][1])
+        if vertical
+        else (shapes[0][0], sum(s[1] for s in shapes))
+    )
     elements = [
         (part, row * size[1] + column)
         for row_parts in (
-            [[pair] for pair in zip(parts, shapes, strict=True)] if vertical else [list(zip(parts, shapes, strict=True))]
+            [[pair] for pair in zip(parts, shapes, strict=True)]
+            if vertical
+            else [list(zip(parts, shapes, strict=True))]
         )
         for row in range(row_parts[0][1][0])
         for part, size in row_parts
@@ -140,12 +187,17 @@ def _diagonal(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
     value = lowering.evaluated_once(lowering.lower(node.arguments[0]))
     n, zero = value.size, c_literal(0, value.type)
     return CValue(
-        value.type, (n, n), lambda k: value.element(int(k) // n) if int(k) % (n + 1) == 0 else zero, indexable_in_loop=False
+        value.type,
+        (n, n),
+        lambda k: value.element(int(k) // n) if int(k) % (n + 1) == 0 else zero,
+        indexable_in_loop=False,
     )
 
 
 def _linspace(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
-    first, last = (lowering.evaluated_once(lowering.lower(argument)).text for argument in node.arguments[:2])
+    first, last = (
+        lowering.evaluated_once(lowering.lower(argument)).text for argument in node.arguments[:2]
+    )
     (n,) = _shape(lowering, node, node.arguments[2:])
 
     def element(k: int | str) -> CExpression:
@@ -157,7 +209,10 @@ def _linspace(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
 
 def _past(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
     """Lower past(k, T), the value of the argument of delay() number k at the time - T."""
-    index, duration = lowering.static_integer(node.arguments[0]), lowering.scalar_of(node.arguments[1])
+    index, duration = (
+        lowering.static_integer(node.arguments[0]),
+        lowering.scalar_of(node.arguments[1]),
+    )
     at = infix("-", CExpression("time"), duration)
     return scalar_value("Real", c_call("past_value", f"&m->past[{index}]", at))
 
@@ -165,14 +220,25 @@ def _past(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
 def _identity(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
     (n,) = _shape(lowering, node, node.arguments)
     return CValue(
-        "Integer", (n, n), lambda k: c_literal(int(int(k) % (n + 1) == 0), "Integer"), indexable_in_loop=False, reusable=True
+        "Integer",
+        (n, n),
+        lambda k: c_literal(int(int(k) % (n + 1) == 0), "Integer"),
+        indexable_in_loop=False,
+        reusable=True,
     )
 
 
-def _shape(lowering: SubscriptLowering, node: syntax_tree.Builtin, sizes: tuple[syntax_tree.Expression, ...]) -> tuple[int, ...]:
+def _shape(
+    lowering: SubscriptLowering,
+    node: syntax_tree.Builtin,
+    sizes: tuple[syntax_tree.Expression, ...],
+) -> tuple[int, ...]:
     numbers = [lowering.static_integer(size) for size in sizes]
     return tuple(
-        n if n is not None else raise_model_error(f"the sizes in {node.name}() must be constant", node.where) for n in numbers
+        n
+        if n is not None
+        else raise_model_error(f"the sizes in {node.name}() must be constant", node.where)
+        for n in numbers
     )
 
 
@@ -196,7 +262,11 @@ def _size(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
     shape = lowering.lower(node.arguments[0]).shape
     if len(node.arguments) == 1:
         return CValue(
-            "Integer", (len(shape),), lambda k: c_literal(shape[int(k)], "Integer"), indexable_in_loop=False, reusable=True
+            "Integer",
+            (len(shape),),
+            lambda k: c_literal(shape[int(k)], "Integer"),
+            indexable_in_loop=False,
+            reusable=True,
         )
     dimension = lowering.static_integer(node.arguments[1])
     if dimension is None or not 1 <= dimension <= len(shape):
@@ -205,11 +275,16 @@ def _size(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
 
 
 def _ndims(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
-    return scalar_value("Integer", c_literal(len(lowering.lower(node.arguments[0]).shape), "Integer"), reusable=True)
+    return scalar_value(
+        "Integer", c_literal(len(lowering.lower(node.arguments[0]).shape), "Integer"), reusable=True
+    )
 
 
 def _first_argument(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
-    """Lower noEvent(x) and homotopy(actual, simplified) to their first argument: there are no state events or iterations."""
+    """Lower noEvent(x) and homotopy(actual, simplified) to their first argument.
+
+    There are no state events or iterations.
+    """
     return lowering.lower(node.arguments[0])
 
 
@@ -228,7 +303,9 @@ def _pre(lowering: SubscriptLowering, node: syntax_tree.Builtin) -> CValue:
     return _pre_value(lowering, argument, node)
 
 
-def _pre_value(lowering: SubscriptLowering, name: syntax_tree.Expression, node: syntax_tree.Builtin) -> CValue:
+def _pre_value(
+    lowering: SubscriptLowering, name: syntax_tree.Expression, node: syntax_tree.Builtin
+) -> CValue:
     if not isinstance(name, syntax_tree.Name) or name.name not in lowering.pre_scope:
         raise_model_error(f"{node.name}() takes a variable", node.where)
     return lowering.pre_scope[name.name]

@@ -1,4 +1,7 @@
-"""C expressions of Modelica values: identifiers, types, operator precedence and element access of arrays."""
+"""C expressions of Modelica values.
+
+Identifiers, types, operator precedence and element access of arrays.
+"""
 
 from __future__ import annotations
 
@@ -32,11 +35,18 @@ _GENERATED_NAME = re.compile(r"tmp_\d+|holds_\d+|pre_\w+")
 
 
 def c_identifier(name: str) -> str:
-    """Return a C identifier for a Modelica name: "pid[1].kp" becomes pid_1_kp; different names may give the same one."""
+    """Return a C identifier for a Modelica name: "pid[1].kp" becomes pid_1_kp.
+
+    Different names may give the same one.
+    """
     identifier = re.sub(r"\W+", "_", name, flags=re.ASCII).strip("_")
     if not identifier or identifier[0].isdigit():
         identifier = "_" + identifier
-    return identifier + "_" if identifier in _RESERVED or _GENERATED_NAME.fullmatch(identifier) else identifier
+    return (
+        identifier + "_"
+        if identifier in _RESERVED or _GENERATED_NAME.fullmatch(identifier)
+        else identifier
+    )
 
 
 class CExpression(NamedTuple):
@@ -69,7 +79,8 @@ PRECEDENCE = {
 }
 
 
-#: least precedence of the left and the right operand without parentheses; higher than C requires where gcc would warn
+#: least precedence of the left and the right operand without parentheses; higher than C requires
+#: where gcc would warn
 _OPERAND_PRECEDENCE = {
     "||": (6, 6),
     "&&": (4, 5),
@@ -84,7 +95,10 @@ _OPERAND_PRECEDENCE |= {"+": (9, 10), "-": (9, 10), "*": (10, 11), "/": (10, 11)
 
 
 def infix(operator: str, left: CExpression, right: CExpression) -> CExpression:
-    """Return `left operator right`; parentheses preserve the grouping, so that floating-point results do not change."""
+    """Return `left operator right`.
+
+    Parentheses preserve the grouping, so that floating-point results do not change.
+    """
     precedence, (least_left, least_right) = PRECEDENCE[operator], _OPERAND_PRECEDENCE[operator]
     is_or_chain = operator == "||" and left.precedence == precedence
     left_code = left.code if is_or_chain else left.parenthesized(least_left)
@@ -93,17 +107,23 @@ def infix(operator: str, left: CExpression, right: CExpression) -> CExpression:
 
 def prefix(operator: str, operand: CExpression) -> CExpression:
     """Return a unary operation: `-operand`, `!operand` or a cast."""
-    return CExpression(f"{operator}{operand.parenthesized(PRECEDENCE['unary'] + 1)}", PRECEDENCE["unary"])
+    return CExpression(
+        f"{operator}{operand.parenthesized(PRECEDENCE['unary'] + 1)}", PRECEDENCE["unary"]
+    )
 
 
 def c_call(function: str, *arguments: CExpression | str) -> CExpression:
     """Return a function call."""
-    return CExpression(f"{function}({', '.join(a if isinstance(a, str) else a.code for a in arguments)})")
+    return CExpression(
+        f"{function}({', '.join(a if isinstance(a, str) else a.code for a in arguments)})"
+    )
 
 
 def conditional(condition: CExpression, yes: CExpression, no: CExpression) -> CExpression:
     """Return the conditional expression `condition ? yes : no`."""
-    return CExpression(f"{condition.parenthesized(2)} ? {yes.parenthesized(2)} : {no.parenthesized(1)}", 1)
+    return CExpression(
+        f"{condition.parenthesized(2)} ? {yes.parenthesized(2)} : {no.parenthesized(1)}", 1
+    )
 
 
 @dataclass(frozen=True, slots=True)
@@ -144,7 +164,9 @@ def variable_value(type_name: str, shape: tuple[int, ...], code: str) -> CValue:
     """Return the value of a C variable, or of a C array if the shape is not ()."""
     if not shape:
         return scalar_value(type_name, CExpression(code), reusable=True)
-    return CValue(type_name, shape, lambda k: CExpression(f"{code}[{k}]"), pointer=code, reusable=True)
+    return CValue(
+        type_name, shape, lambda k: CExpression(f"{code}[{k}]"), pointer=code, reusable=True
+    )
 
 
 def c_literal(value: float | int | bool, type_name: str) -> CExpression:
@@ -159,11 +181,15 @@ def linear_index(terms: list[tuple[int, int | str]]) -> int | str:
     """Return the sum of all factor * index as a number, or as C code if an index is C code."""
     constant = sum(factor * index for factor, index in terms if isinstance(index, int))
     parts = [
-        index if factor == 1 else f"{factor}*{_parenthesize_index(index)}" for factor, index in terms if isinstance(index, str)
+        index if factor == 1 else f"{factor}*{_parenthesize_index(index)}"
+        for factor, index in terms
+        if isinstance(index, str)
     ]
     if not parts:
         return constant
-    return " + ".join(parts) + (f" + {constant}" if constant > 0 else f" - {-constant}" if constant < 0 else "")
+    return " + ".join(parts) + (
+        f" + {constant}" if constant > 0 else f" - {-constant}" if constant < 0 else ""
+    )
 
 
 def _parenthesize_index(index: str) -> str:
@@ -171,13 +197,23 @@ def _parenthesize_index(index: str) -> str:
 
 
 def common_type(type_names: list[str]) -> str:
-    """Return the common type of several values: Real if one of them is Real, else the type of the first."""
+    """Return the common type of several values.
+
+    Real if one of them is Real, else the type of the first.
+    """
     return "Real" if "Real" in type_names else type_names[0]
 
 
-def map_elements(value: CValue, type_name: str, change: Callable[[CExpression], CExpression]) -> CValue:
+def map_elements(
+    value: CValue, type_name: str, change: Callable[[CExpression], CExpression]
+) -> CValue:
     """Return the value of an elementwise function of one argument."""
-    return CValue(type_name, value.shape, lambda k: change(value.element(k)), indexable_in_loop=value.indexable_in_loop)
+    return CValue(
+        type_name,
+        value.shape,
+        lambda k: change(value.element(k)),
+        indexable_in_loop=value.indexable_in_loop,
+    )
 
 
 def sum_terms(type_name: str, terms: list[CExpression]) -> CExpression:

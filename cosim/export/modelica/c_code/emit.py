@@ -13,7 +13,9 @@ from .hybrid_code import HybridCode
 from .model_code import ModelCode
 
 
-def generate_c(defaults: Interpreter, sources: Sequence[str], packages: Mapping[str, Path] | None = None) -> dict[str, str]:
+def generate_c(
+    defaults: Interpreter, sources: Sequence[str], packages: Mapping[str, Path] | None = None
+) -> dict[str, str]:
     """Generate the C files of a model.
 
     Args:
@@ -29,8 +31,17 @@ def generate_c(defaults: Interpreter, sources: Sequence[str], packages: Mapping[
     """
     code = (HybridCode if defaults.model.hybrid else ModelCode)(defaults)
     folder = resources.files(__package__ or "")
-    texts = {name: folder.joinpath(name).read_text(encoding="utf-8") for name in ("runtime.h", *code.headers())}
+    texts = {
+        name: folder.joinpath(name).read_text(encoding="utf-8")
+        for name in ("runtime.h", *code.headers())
+    }
     model_c = code.model_c()
-    header = HeaderWriter(defaults.model, defaults.schedule, defaults.parameter_roles, sources, len(code.functions.warnings))
+    header = HeaderWriter(
+        defaults.model,
+        defaults.schedule,
+        defaults.parameter_roles,
+        sources,
+        len(code.functions.warnings),
+    )
     external = external_files(code.functions.external_functions, packages or {})
     return {"model.c": model_c, "model.h": header.text(), **texts, **external}

@@ -26,7 +26,11 @@ def copy_values(variables: Iterable[ValuePair]) -> list[str]:
 
 
 def _differs(a: CValue, b: CValue) -> str:
-    return f"memcmp({a.pointer}, {b.pointer}, sizeof {a.pointer}) != 0" if a.shape else f"{a.text.code} != {b.text.code}"
+    return (
+        f"memcmp({a.pointer}, {b.pointer}, sizeof {a.pointer}) != 0"
+        if a.shape
+        else f"{a.text.code} != {b.text.code}"
+    )
 
 
 def memory_functions(inputs: Sequence[ValuePair], others: Sequence[ValuePair]) -> list[str]:
@@ -39,8 +43,13 @@ def memory_functions(inputs: Sequence[ValuePair], others: Sequence[ValuePair]) -
     return [
         "/* Stores the values before an event, or before another evaluation in the same event. */",
         function_definition("static void remember(Model *m)", copy_values(others) or ["(void)m;"]),
-        function_definition("static void remember_inputs(Model *m)", copy_values(inputs) or ["(void)m;"]),
-        function_definition("static bool inputs_changed(const Model *m)", ["(void)m;", f"return {_any_differs(inputs)};"]),
+        function_definition(
+            "static void remember_inputs(Model *m)", copy_values(inputs) or ["(void)m;"]
+        ),
+        function_definition(
+            "static bool inputs_changed(const Model *m)",
+            ["(void)m;", f"return {_any_differs(inputs)};"],
+        ),
     ]
 
 
@@ -58,7 +67,8 @@ def event_functions(
         model: The flat model.
         values: The C values of the variables.
         evaluation: The statements of an evaluation of all equations.
-        endless: The failure code of an event iteration that does not end by the variable that changes.
+        endless: The failure code of an event iteration that does not end by the variable that
+            changes.
         initial: The statements of the initialization.
         limits: The statements that compute the values of continuous variables before an event.
 
@@ -76,16 +86,28 @@ def event_functions(
             [pairs[name] for name in inputs],
             [pair for name, pair in pairs.items() if name not in {*inputs, *model.hybrid.sampled}],
         ),
-        "/* Returns the failure of an event iteration in which a value changes in each evaluation. */",
-        function_definition("static int32_t endless(const Model *m)", ["(void)m;", *causes, "return 0;"]),
-        "/* Evaluates all equations; returns whether they must be evaluated again, since values have changed. */",
+        (
+            "/* Returns the failure of an event iteration in which a value changes in each "
+            "evaluation. */"
+        ),
+        function_definition(
+            "static int32_t endless(const Model *m)", ["(void)m;", *causes, "return 0;"]
+        ),
+        (
+            "/* Evaluates all equations; returns whether they must be evaluated again, since "
+            "values have changed. */"
+        ),
         function_definition(
             "static bool evaluate(Model *m, double time, const bool *due)",
             ["(void)time;", "(void)due;", *evaluation, f"return m->failure == 0 && ({changes});"],
         ),
         function_definition(
             "static void event(Model *m, double time, const bool *due)",
-            [*limits, *_sampled_lines(pairs[name] for name in model.hybrid.sampled), *_event_lines()],
+            [
+                *limits,
+                *_sampled_lines(pairs[name] for name in model.hybrid.sampled),
+                *_event_lines(),
+            ],
         ),
         function_definition(
             "static bool initialize(Model *m, double time)",
@@ -100,7 +122,12 @@ def _any_differs(pairs: Iterable[ValuePair]) -> str:
 
 def _sampled_lines(pairs: Iterable[ValuePair]) -> list[str]:
     copies = copy_values(pairs)
-    guarded = ["if (time > m->event_time) {", *(f"    {line}" for line in copies), "}", f"m->event_time = time + {SAME_TIME};"]
+    guarded = [
+        "if (time > m->event_time) {",
+        *(f"    {line}" for line in copies),
+        "}",
+        f"m->event_time = time + {SAME_TIME};",
+    ]
     return guarded if copies else []
 
 
@@ -108,7 +135,10 @@ def _event_lines() -> list[str]:
     return [
         "remember(m);",
         "/* flags of ticks are true in the first evaluation only */",
-        "for (int pass = 0; (evaluate(m, time, due) || due != NO_TICK) && m->failure == 0; pass++) {",
+        (
+            "for (int pass = 0; (evaluate(m, time, due) || due != NO_TICK) && m->failure == 0; "
+            "pass++) {"
+        ),
         f"    if (pass == {MAX_PASSES}) fail(m, endless(m));",
         "    remember(m);",
         "    remember_inputs(m);",

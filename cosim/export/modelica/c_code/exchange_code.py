@@ -1,4 +1,7 @@
-"""Code generation for Model Exchange: addresses of the states, evaluation between events, and events."""
+"""Code generation for Model Exchange.
+
+Addresses of the states, evaluation between events, and events.
+"""
 
 from __future__ import annotations
 
@@ -8,12 +11,16 @@ from ..model.flat_model import Model, Relation, is_integrated
 from .formatting import function_definition
 from .statements import StatementLowering
 
-#: distance from a crossing at which its indicator changes its sign, so that the relation has changed when the event is executed
+#: distance from a crossing at which its indicator changes its sign, so that the relation has
+#: changed when the event is executed
 _HYSTERESIS = "1e-10"
 
 
 def has_exchange(model: Model) -> bool:
-    """Return whether a model is also exported for Model Exchange: it has states, or relations that change with time."""
+    """Return whether a model is also exported for Model Exchange.
+
+    It has states, or relations that change with time.
+    """
     return bool(model.states) or is_integrated(model)
 
 
@@ -38,20 +45,34 @@ def exchange_declarations(model: Model, states: int) -> list[str]:
 
 
 def indicator_lines(relations: Iterable[Relation], lowering: StatementLowering) -> list[str]:
-    """Generate the event indicators: the difference of the operands of each relation, with a hysteresis."""
+    """Generate the event indicators.
+
+    The difference of the operands of each relation, with a hysteresis.
+    """
     for k, relation in enumerate(relations):
         left, right = (
-            lowering.evaluated_once(lowering.lower(s)).text for s in (relation.condition.left, relation.condition.right)
+            lowering.evaluated_once(lowering.lower(s)).text
+            for s in (relation.condition.left, relation.condition.right)
         )
         held = lowering.scope[relation.name].text.code
         signs = ("-1", "1") if relation.condition.operator in ("<", "<=") else ("1", "-1")
-        shift = f"({held} ? {signs[0]} : {signs[1]}) * {_HYSTERESIS} * (1 + fabs((double)({right.code})))"
-        lowering.lines.append(f"m->indicator[{k}] = {left.parenthesized(9)} - {right.parenthesized(10)} + {shift};")
+        shift = (
+            f"({held} ? {signs[0]} : {signs[1]}) * {_HYSTERESIS} * (1 + "
+            f"fabs((double)({right.code})))"
+        )
+        lowering.lines.append(
+            f"m->indicator[{k}] = {left.parenthesized(9)} - {right.parenthesized(10)} + {shift};"
+        )
     return lowering.lines
 
 
 def exchange_functions(
-    continuous: Sequence[str], states: Sequence[str], rates: Sequence[str], clocks: int, event: str, record: bool
+    continuous: Sequence[str],
+    states: Sequence[str],
+    rates: Sequence[str],
+    clocks: int,
+    event: str,
+    record: bool,
 ) -> list[str]:
     """Generate the functions of Model Exchange.
 
@@ -60,30 +81,40 @@ def exchange_functions(
         states: C expressions of the addresses of the states.
         rates: Those of their derivatives.
         clocks: The number of clocks.
-        event: The C statement that evaluates an event at `time`, in which clocks tick as in the array `due`.
+        event: The C statement that evaluates an event at `time`, in which clocks tick as in the
+            array `due`.
         record: True if the model stores past values.
 
     Returns:
         The function definitions.
     """
     addresses = [
-        f"{array}[{k}] = {address};" for array, all in (("states", states), ("rates", rates)) for k, address in enumerate(all)
+        f"{array}[{k}] = {address};"
+        for array, all in (("states", states), ("rates", rates))
+        for k, address in enumerate(all)
     ]
     return [
         function_definition(
             "void model_states(Model *m, double **states, double **rates)",
             addresses or ["(void)m;", "(void)states;", "(void)rates;"],
         ),
-        "/* Computes all continuous variables and the event indicators from states, inputs and the time. */",
+        (
+            "/* Computes all continuous variables and the event indicators from states, inputs and "
+            "the time. */"
+        ),
         function_definition(
             "const char *model_continuous(Model *m, double time)",
             ["(void)time;", "m->failure = 0;", *continuous, "return REASONS[m->failure];"],
         ),
         "/* Executes an event; `next` is the time of the next tick. */",
-        function_definition("const char *model_update(Model *m, double time, double *next)", _update_lines(clocks, event)),
+        function_definition(
+            "const char *model_update(Model *m, double time, double *next)",
+            _update_lines(clocks, event),
+        ),
         "/* Accepts the states at a time as part of the solution. */",
         function_definition(
-            "void model_accept(Model *m, double time)", ["record(m, time);"] if record else ["(void)m;", "(void)time;"]
+            "void model_accept(Model *m, double time)",
+            ["record(m, time);"] if record else ["(void)m;", "(void)time;"],
         ),
     ]
 
@@ -91,11 +122,21 @@ def exchange_functions(
 def _update_lines(clocks: int, event: str) -> list[str]:
     if not clocks:
         due = ["const bool due[1] = {false};"] * ("due" in event)
-        return ["(void)time;", "m->failure = 0;", "*next = INFINITY;", *due, event, "return REASONS[m->failure];"]
+        return [
+            "(void)time;",
+            "m->failure = 0;",
+            "*next = INFINITY;",
+            *due,
+            event,
+            "return REASONS[m->failure];",
+        ]
     return [
         f"bool due[{clocks}], later[{clocks}];",
         "m->failure = 0;",
-        f"const bool tick = next_event(m->clock, {clocks}, due) <= time + TOLERANCE * shortest_period(m->clock, {clocks});",
+        (
+            f"const bool tick = next_event(m->clock, {clocks}, due) <= time + TOLERANCE * "
+            f"shortest_period(m->clock, {clocks});"
+        ),
         f"for (int k = 0; k < {clocks}; k++) due[k] = due[k] && tick;",
         event,
         f"for (int k = 0; k < {clocks}; k++) m->clock[k].ticks += due[k];",

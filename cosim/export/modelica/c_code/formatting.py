@@ -15,14 +15,22 @@ def function_definition(head: str, body: Iterable[str]) -> str:
 
 
 def wrap_lines(lines: Iterable[str]) -> Iterator[str]:
-    """Yield the lines indented by one level; long lines are wrapped, except those with text in quotation marks."""
+    """Yield the lines indented by one level.
+
+    Long lines are wrapped, except those with text in quotation marks.
+    """
     for line in lines:
         if '"' in line:
             yield "    " + line
             continue
         indent = " " * (8 + len(line) - len(line.lstrip()))
         yield from textwrap.wrap(
-            "    " + line, _WIDTH, subsequent_indent=indent, break_long_words=False, break_on_hyphens=False, drop_whitespace=True
+            "    " + line,
+            _WIDTH,
+            subsequent_indent=indent,
+            break_long_words=False,
+            break_on_hyphens=False,
+            drop_whitespace=True,
         ) or [""]
 
 

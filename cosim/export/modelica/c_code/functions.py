@@ -1,4 +1,7 @@
-"""Code generation for Modelica functions: one C function per combination of argument shapes, so that all sizes are constant."""
+"""Code generation for Modelica functions.
+
+One C function per combination of argument shapes, so that all sizes are constant.
+"""
 
 from __future__ import annotations
 
@@ -40,13 +43,18 @@ class FunctionTranslator:
             self.warnings.append(node)
         return self.warnings.index(node)
 
-    def function_instance(self, call: syntax_tree.Call, shapes: Shapes, numbers: tuple[int | None, ...]) -> FunctionInstance:
-        """Return the C function for a call; it is translated at the first call with arguments of these shapes.
+    def function_instance(
+        self, call: syntax_tree.Call, shapes: Shapes, numbers: tuple[int | None, ...]
+    ) -> FunctionInstance:
+        """Return the C function for a call.
+
+        It is translated at the first call with arguments of these shapes.
 
         Args:
             call: The call.
             shapes: Shapes of the arguments.
-            numbers: Values of the constant Integer arguments; they can determine the sizes of variables of the function.
+            numbers: Values of the constant Integer arguments; they can determine the sizes of
+                variables of the function.
 
         Raises:
             InputError: The function is recursive, unknown, or uses an unsupported feature.
@@ -57,7 +65,9 @@ class FunctionTranslator:
         key = (call.function, shapes, sizes)
         if key not in self._instances:
             if call.function in self._in_translation:
-                raise_model_error(f"the recursive function {call.function} is not supported", call.where)
+                raise_model_error(
+                    f"the recursive function {call.function} is not supported", call.where
+                )
             self._in_translation.append(call.function)
             self._instances[key] = self._translate(function, shapes, call.where)
             self._in_translation.pop()
@@ -69,46 +79,83 @@ class FunctionTranslator:
         names = dict.fromkeys(name for name, _, _ in self._instances)
         return [self.functions[name] for name in names if self.functions[name].external]
 
-    def _translate(self, function: Function, shapes: Shapes, where: SourceLocation | None) -> FunctionInstance:
+    def _translate(
+        self, function: Function, shapes: Shapes, where: SourceLocation | None
+    ) -> FunctionInstance:
         if len(shapes) != len(function.inputs):
-            raise_model_error(f"{function.name}: found {len(shapes)} arguments, expected {len(function.inputs)}", where)
+            raise_model_error(
+                f"{function.name}: found {len(shapes)} arguments, expected {len(function.inputs)}",
+                where,
+            )
         lowering = StatementLowering(self, {}, function=function.name)
-        inputs = [self._declare(lowering, local, shape, where) for local, shape in zip(function.inputs, shapes, strict=True)]
+        inputs = [
+            self._declare(lowering, local, shape, where)
+            for local, shape in zip(function.inputs, shapes, strict=True)
+        ]
         outputs = [self._declare(lowering, local, None, where) for local in function.outputs]
         local_values = [self._declare(lowering, local, None, where) for local in function.locals]
         self._initialize_variables(lowering, (*function.outputs, *function.locals))
         lowering.body(function.body)
-        instance = FunctionInstance(self._name(function.name), tuple(inputs), tuple(outputs), uses_variable("m", lowering.lines))
+        instance = FunctionInstance(
+            self._name(function.name),
+            tuple(inputs),
+            tuple(outputs),
+            uses_variable("m", lowering.lines),
+        )
         self.definitions.append(_function_text(function, instance, local_values, lowering.lines))
         return instance
 
     def _declare(
-        self, lowering: StatementLowering, local: FunctionVariable, shape: tuple[int, ...] | None, where: SourceLocation | None
+        self,
+        lowering: StatementLowering,
+        local: FunctionVariable,
+        shape: tuple[int, ...] | None,
+        where: SourceLocation | None,
     ) -> CValue:
-        """Add a variable of the function to its scope; `shape` is that of the argument of an input, else None."""
+        """Add a variable of the function to its scope.
+
+        `shape` is that of the argument of an input, else None.
+        """
         if local.type not in C_TYPES:
             raise_model_error(f"{local.name}: the type {local.type} is not supported", local.where)
         declared = [None if d is None else lowering.static_integer(d) for d in local.dimensions]
-        unknown = [d for d, n in zip(local.dimensions, declared, strict=True) if n is None and (shape is None or d is not None)]
+        unknown = [
+            d
+            for d, n in zip(local.dimensions, declared, strict=True)
+            if n is None and (shape is None or d is not None)
+        ]
         if unknown:
-            raise_model_error(f"the size of {local.name} must be constant, or the size() of an input", local.where)
+            raise_model_error(
+                f"the size of {local.name} must be constant, or the size() of an input", local.where
+            )
         actual = tuple(n for n in declared if n is not None) if shape is None else shape
-        if len(actual) != len(declared) or any(n not in (None, k) for n, k in zip(declared, actual, strict=True)):
+        if len(actual) != len(declared) or any(
+            n not in (None, k) for n, k in zip(declared, actual, strict=True)
+        ):
             expected = ", ".join(":" if n is None else str(n) for n in declared)
-            raise_model_error(f"the argument for {local.name}: found size {list(actual)}, expected [{expected}]", where)
+            raise_model_error(
+                f"the argument for {local.name}: found size {list(actual)}, expected [{expected}]",
+                where,
+            )
         value = variable_value(local.type, actual, c_identifier(local.name.replace(".", "__")))
         lowering.scope[local.name] = value
         return value
 
-    def _initialize_variables(self, lowering: StatementLowering, variables: tuple[FunctionVariable, ...]) -> None:
+    def _initialize_variables(
+        self, lowering: StatementLowering, variables: tuple[FunctionVariable, ...]
+    ) -> None:
         for local in variables:
             if local.default is not None:
-                lowering.store(lowering.scope[local.name], local.default, syntax_tree.Name(local.name))
+                lowering.store(
+                    lowering.scope[local.name], local.default, syntax_tree.Name(local.name)
+                )
 
     def _name(self, name: str) -> str:
         base = c_identifier(name) if "." in name else c_identifier(name) + "_"
         used = {instance.name for instance in self._instances.values()}
-        return next(n for n in (base, *(f"{base}_{k}" for k in range(2, len(used) + 3))) if n not in used)
+        return next(
+            n for n in (base, *(f"{base}_{k}" for k in range(2, len(used) + 3))) if n not in used
+        )
 
 
 def _with_sizes(function: Function, numbers: tuple[int | None, ...]) -> tuple[Function, Sizes]:
@@ -117,31 +164,66 @@ def _with_sizes(function: Function, numbers: tuple[int | None, ...]) -> tuple[Fu
     Returns:
         The function, and the names and values of these arguments.
     """
-    used = variable_names(tuple(local.dimensions for local in (*function.outputs, *function.locals)))
-    used |= variable_names(tuple(n.arguments for n in walk(function.body) if isinstance(n, syntax_tree.Call)))
-    sizes = tuple((i.name, n) for i, n in zip(function.inputs, numbers, strict=False) if n is not None and i.name in used)
+    used = variable_names(
+        tuple(local.dimensions for local in (*function.outputs, *function.locals))
+    )
+    used |= variable_names(
+        tuple(n.arguments for n in walk(function.body) if isinstance(n, syntax_tree.Call))
+    )
+    sizes = tuple(
+        (i.name, n)
+        for i, n in zip(function.inputs, numbers, strict=False)
+        if n is not None and i.name in used
+    )
     literals = {name: syntax_tree.Literal(number, "Integer") for name, number in sizes}
 
     def insert(node: Any) -> Any:
         return literals.get(node.name, node) if isinstance(node, syntax_tree.Name) else node
 
     def resize(local: FunctionVariable) -> FunctionVariable:
-        return replace(local, dimensions=rewrite(local.dimensions, insert), default=rewrite(local.default, insert))
+        return replace(
+            local,
+            dimensions=rewrite(local.dimensions, insert),
+            default=rewrite(local.default, insert),
+        )
 
-    outputs, local_variables = tuple(map(resize, function.outputs)), tuple(map(resize, function.locals))
-    return replace(function, outputs=outputs, locals=local_variables, body=rewrite(function.body, insert)), sizes
+    outputs, local_variables = (
+        tuple(map(resize, function.outputs)),
+        tuple(map(resize, function.locals)),
+    )
+    return replace(
+        function, outputs=outputs, locals=local_variables, body=rewrite(function.body, insert)
+    ), sizes
 
 
-def _function_text(function: Function, instance: FunctionInstance, local_values: list[CValue], body: list[str]) -> str:
-    """Return the definition of a C function; it returns a single scalar result and writes all other results via pointers."""
+def _function_text(
+    function: Function, instance: FunctionInstance, local_values: list[CValue], body: list[str]
+) -> str:
+    """Return the definition of a C function.
+
+    It returns a single scalar result and writes all other results via pointers.
+    """
     inputs = [_parameter(value, "const ") for value in instance.inputs]
-    results = [] if instance.returns_scalar else [_result_parameter(value) for value in instance.outputs]
+    results = (
+        [] if instance.returns_scalar else [_result_parameter(value) for value in instance.outputs]
+    )
     parameters = ", ".join([*["Model *m"] * instance.takes_model, *inputs, *results]) or "void"
-    lines = [*_opening_lines(function, instance, local_values, body), *body, *_closing_lines(instance)]
+    lines = [
+        *_opening_lines(function, instance, local_values, body),
+        *body,
+        *_closing_lines(instance),
+    ]
     return "\n".join(
         [
-            f"/* {function.name} ({function.where.file_and_line if function.where else 'no source'}) */",
-            f"static {C_TYPES[instance.outputs[0].type] if instance.returns_scalar else 'void'} {instance.name}({parameters})",
+            (
+                f"/* {function.name} "
+                f"({function.where.file_and_line if function.where else 'no source'}) */"
+            ),
+            (
+                "static "
+                f"{C_TYPES[instance.outputs[0].type] if instance.returns_scalar else 'void'} "
+                f"{instance.name}({parameters})"
+            ),
             "{",
             *wrap_lines(lines),
             "}",
@@ -149,10 +231,13 @@ def _function_text(function: Function, instance: FunctionInstance, local_values:
     )
 
 
-def _opening_lines(function: Function, instance: FunctionInstance, local_values: list[CValue], body: list[str]) -> list[str]:
+def _opening_lines(
+    function: Function, instance: FunctionInstance, local_values: list[CValue], body: list[str]
+) -> list[str]:
     """Return the declarations, and `(void)` statements for variables that C compilers would report as unused."""
     lines = [
-        _declaration(output) if instance.returns_scalar or not output.shape else _zero_fill(output) for output in instance.outputs
+        _declaration(output) if instance.returns_scalar or not output.shape else _zero_fill(output)
+        for output in instance.outputs
     ]
     used = [
         (value, local.name)
@@ -162,17 +247,29 @@ def _opening_lines(function: Function, instance: FunctionInstance, local_values:
     lines += [_declaration(value) for value, _ in used]
     read = {referenced_variable(reference) for reference in read_references(function.body)}
     unread = [value for value in instance.inputs if not uses_variable(_c_name(value), body)]
-    return [*lines, *(f"(void){_c_name(value)};" for value in (*unread, *(value for value, name in used if name not in read)))]
+    return [
+        *lines,
+        *(
+            f"(void){_c_name(value)};"
+            for value in (*unread, *(value for value, name in used if name not in read))
+        ),
+    ]
 
 
 def _closing_lines(instance: FunctionInstance) -> list[str]:
     if instance.returns_scalar:
         return [f"return {instance.outputs[0].text.code};"]
-    return [f"*{output.text.code}_result = {output.text.code};" for output in instance.outputs if not output.shape]
+    return [
+        f"*{output.text.code}_result = {output.text.code};"
+        for output in instance.outputs
+        if not output.shape
+    ]
 
 
 def _result_parameter(value: CValue) -> str:
-    return _parameter(value, "") if value.shape else f"{C_TYPES[value.type]} *{value.text.code}_result"
+    return (
+        _parameter(value, "") if value.shape else f"{C_TYPES[value.type]} *{value.text.code}_result"
+    )
 
 
 def _c_name(value: CValue) -> str:
@@ -190,4 +287,7 @@ def _zero_fill(value: CValue) -> str:
 
 def _declaration(value: CValue) -> str:
     start = ' = ""' if value.type == "String" else " = 0"
-    return f"{C_TYPES[value.type]} {_c_name(value)}{f'[{max(value.size, 1)}] = {{0}}' if value.shape else start};"
+    return (
+        f"{C_TYPES[value.type]} "
+        f"{_c_name(value)}{f'[{max(value.size, 1)}] = {{0}}' if value.shape else start};"
+    )

@@ -70,7 +70,10 @@ class HeaderWriter:
             "#include <stdbool.h>",
             "#include <stdint.h>",
             "",
-            "/* A clock with ticks at start + k*period (s), k = 0, 1, ...; `ticks` is the number of past ticks. */",
+            (
+                "/* A clock with ticks at start + k*period (s), k = 0, 1, ...; `ticks` is the "
+                "number of past ticks. */"
+            ),
             "typedef struct {",
             "    double start, period;",
             "    int64_t ticks;",
@@ -97,7 +100,9 @@ class HeaderWriter:
 
     @property
     def _state_count(self) -> int:
-        return sum(struct_member(self.model.variables[name], name).size for name in self.model.states)
+        return sum(
+            struct_member(self.model.variables[name], name).size for name in self.model.states
+        )
 
     def _states(self) -> list[str]:
         count = self._state_count
@@ -142,20 +147,29 @@ class HeaderWriter:
             section = [variable for variable in remaining if contains(variable)]
             remaining = [variable for variable in remaining if variable not in section]
             yield from [f"/* {title} */"] * bool(section)
-            yield from (_member_declaration(variable, names[variable.name]) + _member_comment(variable) for variable in section)
+            yield from (
+                _member_declaration(variable, names[variable.name]) + _member_comment(variable)
+                for variable in section
+            )
         yield "/* internal data */"
         yield from [f"Clock clock[{len(self.schedule.clocks)}];"] * bool(self.schedule.clocks)
-        yield from [f"bool held[{self.schedule.edge_detector_count}];"] * bool(self.schedule.edge_detector_count)
+        yield from [f"bool held[{self.schedule.edge_detector_count}];"] * bool(
+            self.schedule.edge_detector_count
+        )
         if self.model.hybrid:
-            yield from [f"Past past[{len(self.model.hybrid.delays)}];"] * bool(self.model.hybrid.delays)
+            yield from [f"Past past[{len(self.model.hybrid.delays)}];"] * bool(
+                self.model.hybrid.delays
+            )
             if has_exchange(self.model) and self.model.hybrid.relations:
                 yield f"double indicator[{len(self.model.hybrid.relations)}];"
             yield "bool changed; /* a parameter was set after the last event */"
             yield from ["double step; /* next integration step (s) */"] * is_integrated(self.model)
-            yield from ["double event_time; /* events up to this time are at the time of the last one */"] * bool(
-                self.model.hybrid.sampled
+            yield from [
+                "double event_time; /* events up to this time are at the time of the last one */"
+            ] * bool(self.model.hybrid.sampled)
+            yield from ["double no_state[2];"] * (
+                is_integrated(self.model) and not self.model.states
             )
-            yield from ["double no_state[2];"] * (is_integrated(self.model) and not self.model.states)
         if has_messages(self.model):
             yield "char reason[512], warning[512];"
             yield f"bool warned[{max(self.warnings, 1)}];"
@@ -165,7 +179,9 @@ class HeaderWriter:
 
 def has_messages(model: Model) -> bool:
     """Return whether a model has messages that are composed at run time, warnings, or external functions that may log them."""
-    return bool(composed_asserts(_asserts(model))) or any(f.external for f in model.functions.values())
+    return bool(composed_asserts(_asserts(model))) or any(
+        f.external for f in model.functions.values()
+    )
 
 
 def _asserts(model: Model) -> tuple[Any, ...]:

@@ -1,11 +1,20 @@
-"""Code generation for models with event iteration: the functions that hybrid.h and the communication step call."""
+"""Code generation for models with event iteration.
+
+The functions that hybrid.h and the communication step call.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 
-from ..causality.event_limits import MAX_EVENTS, MAX_PASSES, chattering_reason, endless_reason, iterated_names
+from ..causality.event_limits import (
+    MAX_EVENTS,
+    MAX_PASSES,
+    chattering_reason,
+    endless_reason,
+    iterated_names,
+)
 from ..causality.matching import is_input
 from ..causality.past_values import PAST_VALUES
 from ..model.flat_model import Model, Relation, derivative_name, is_integrated, previous_name
@@ -25,7 +34,11 @@ class HybridCode(ModelCode):
         """Return the names of the C headers that model.c includes besides model.h and runtime.h."""
         assert self.model.hybrid
         others = [name for name in super().headers() if name != "runge_kutta.h"]
-        return [*others, *["past.h"] * bool(self.model.hybrid.delays), *["hybrid.h"] * is_integrated(self.model)]
+        return [
+            *others,
+            *["past.h"] * bool(self.model.hybrid.delays),
+            *["hybrid.h"] * is_integrated(self.model),
+        ]
 
     def definitions(self) -> list[str]:
         """Generate the functions of model.c."""
@@ -37,16 +50,25 @@ class HybridCode(ModelCode):
             *self._common_definitions(),
             f"static const bool NO_TICK[{max(clocks, 1)}] = {{false}};",
             record_function(model, values, self._make_lowering(), PAST_VALUES),
-            *event_functions(model, values, self._event(), self._endless_codes(), initial, self._limits()),
-            function_definition("const char *model_initialize(Model *m, double time)", self._initialize_hybrid()),
+            *event_functions(
+                model, values, self._event(), self._endless_codes(), initial, self._limits()
+            ),
+            function_definition(
+                "const char *model_initialize(Model *m, double time)", self._initialize_hybrid()
+            ),
         ]
         if is_integrated(model):
             definitions += [*self._hybrid_system(values)]
         step = hybrid_step_body(clocks, is_integrated(model), bool(model.hybrid.sampled))
         return [
             *definitions,
-            function_definition("const char *model_step(Model *m, double time, double step_size)", step),
-            *self._exchange(f"event(m, time, {'tick ? due : ' * bool(clocks)}NO_TICK);", record=bool(model.hybrid.delays)),
+            function_definition(
+                "const char *model_step(Model *m, double time, double step_size)", step
+            ),
+            *self._exchange(
+                f"event(m, time, {'tick ? due : ' * bool(clocks)}NO_TICK);",
+                record=bool(model.hybrid.delays),
+            ),
         ]
 
     def _endless_codes(self) -> dict[str, str]:
@@ -54,18 +76,32 @@ class HybridCode(ModelCode):
         hybrid, variables = self.model.hybrid, self.model.variables
         assert hybrid
         names = iterated_names(hybrid)
-        return {name: self._failure_code(endless_reason(hybrid, name), variables[name].where) for name in names}
+        return {
+            name: self._failure_code(endless_reason(hybrid, name), variables[name].where)
+            for name in names
+        }
 
     def _initialize_hybrid(self) -> list[str]:
-        """Generate the body of model_initialize: the initial equations, repeated until relations are consistent, and an event."""
-        past = ["memset(m->past, 0, sizeof m->past);"] if self.model.hybrid and self.model.hybrid.delays else []
+        """Generate the body of model_initialize.
+
+        The initial equations, repeated until relations are consistent, and an event.
+        """
+        past = (
+            ["memset(m->past, 0, sizeof m->past);"]
+            if self.model.hybrid and self.model.hybrid.delays
+            else []
+        )
         return [
             "m->failure = 0;",
             *(["m->step = 0;"] if is_integrated(self.model) else []),
             *past,
             "start_variables(m);",
             *self._clock_lines(),
-            *(["m->event_time = -INFINITY;"] if self.model.hybrid and self.model.hybrid.sampled else []),
+            *(
+                ["m->event_time = -INFINITY;"]
+                if self.model.hybrid and self.model.hybrid.sampled
+                else []
+            ),
             "for (int pass = 0; initialize(m, time); pass++) {",
             f"    if (pass == {MAX_PASSES}) fail(m, endless(m));",
             *(f"    {line}" for line in self._copy_relations()),
@@ -78,17 +114,29 @@ class HybridCode(ModelCode):
         ]
 
     def _derivatives(self) -> list[str]:
-        """Generate the derivatives of the states; values that are needed nowhere else are local variables."""
+        """Generate the derivatives of the states.
+
+        Values that are needed nowhere else are local variables.
+        """
         assert self.model.hybrid
-        stored = {*self.model.hybrid.remembered, *(delay.name for delay in self.model.hybrid.delays)}
+        stored = {
+            *self.model.hybrid.remembered,
+            *(delay.name for delay in self.model.hybrid.delays),
+        }
         stored |= {derivative_name(name) for name in self.model.states}
         body = self.schedule.between.derivatives
-        targets = [s.target.name for s in body if isinstance(s, Assign) and isinstance(s.target, Name)]
-        names = [name for name in targets if name not in stored and not self.model.variables[name].shape]
+        targets = [
+            s.target.name for s in body if isinstance(s, Assign) and isinstance(s.target, Name)
+        ]
+        names = [
+            name for name in targets if name not in stored and not self.model.variables[name].shape
+        ]
         lowering = self._make_lowering()
         for name in names:
             local = f"local_{self.members[name]}"
-            lowering.scope[name] = scalar_value(self.model.variables[name].type, CExpression(local), reusable=True)
+            lowering.scope[name] = scalar_value(
+                self.model.variables[name].type, CExpression(local), reusable=True
+            )
             lowering.lines.append(f"{C_TYPES[self.model.variables[name].type]} {local};")
         lowering.body(body)
         return ["(void)m;", "(void)time;", *lowering.lines]
@@ -99,14 +147,20 @@ class HybridCode(ModelCode):
         return lowering.lines
 
     def _first_ticks(self) -> list[str]:
-        """Generate the event of the clocks that tick at the start time; with inputs, it belongs to the first step."""
+        """Generate the event of the clocks that tick at the start time.
+
+        With inputs, it belongs to the first step.
+        """
         clocks = len(self.schedule.clocks)
         if not clocks or any(map(is_input, self.model.variables.values())):
             return []
         return [
             f"bool due[{clocks}];",
             f"const double next = next_event(m->clock, {clocks}, due);",
-            f"if (m->failure == 0 && next <= time + TOLERANCE * shortest_period(m->clock, {clocks})) {{",
+            (
+                "if (m->failure == 0 && next <= time + TOLERANCE * shortest_period(m->clock, "
+                f"{clocks})) {{"
+            ),
             "    event(m, time, due);",
             f"    for (int k = 0; k < {clocks}; k++) m->clock[k].ticks += due[k];",
             "}",
@@ -120,14 +174,19 @@ class HybridCode(ModelCode):
 
     def _chattering_codes(self) -> list[str]:
         relations = self.model.hybrid.relations if self.model.hybrid else ()
-        return [self._failure_code(chattering_reason(each), each.condition.where) for each in relations]
+        return [
+            self._failure_code(chattering_reason(each), each.condition.where) for each in relations
+        ]
 
     def _hybrid_system(self, values: Mapping[str, CValue]) -> list[str]:
         """Generate the functions for the integration between events."""
         assert self.model.hybrid
         lowering = self._make_lowering()
         lowering.body(self.schedule.between.indicators)
-        states, rates = self._element_pointers(self.model.states), self._element_pointers(map(derivative_name, self.model.states))
+        states, rates = (
+            self._element_pointers(self.model.states),
+            self._element_pointers(map(derivative_name, self.model.states)),
+        )
         if not self.model.states:
             states, rates = ["&m->no_state[0]"], ["&m->no_state[1]"]
         return [
@@ -136,7 +195,10 @@ class HybridCode(ModelCode):
                 self._derivatives(),
             ),
             crossing_function(self.model.hybrid.relations, values, lowering),
-            f"static const int32_t CHATTERING[] = {{0, {', '.join(self._chattering_codes()) or 0}}};",
+            (
+                "static const int32_t CHATTERING[] = {0, "
+                f"{', '.join(self._chattering_codes()) or 0}}};"
+            ),
             function_definition(
                 "static bool advance(Model *m, double from, double to, double *reached)",
                 [
@@ -152,7 +214,9 @@ class HybridCode(ModelCode):
         ]
 
 
-def record_function(model: Model, values: Mapping[str, CValue], lowering: StatementLowering, capacity: int) -> str:
+def record_function(
+    model: Model, values: Mapping[str, CValue], lowering: StatementLowering, capacity: int
+) -> str:
     """Generate `record`, which stores the arguments of delay()."""
     assert model.hybrid
     lines = ["(void)m;", "(void)time;"]
@@ -160,29 +224,41 @@ def record_function(model: Model, values: Mapping[str, CValue], lowering: Statem
         duration = lowering.scalar_of(delay.duration).parenthesized(11)
         lines += [
             *lowering.lines,
-            f"record_value(&m->past[{k}], time, {values[delay.name].text.code}, {duration} / {capacity // 2});",
+            (
+                f"record_value(&m->past[{k}], time, {values[delay.name].text.code}, {duration} / "
+                f"{capacity // 2});"
+            ),
         ]
         lowering.lines = []
     return function_definition("static void record(Model *m, double time)", lines)
 
 
-def crossing_function(relations: Iterable[Relation], values: Mapping[str, CValue], lowering: StatementLowering) -> str:
+def crossing_function(
+    relations: Iterable[Relation], values: Mapping[str, CValue], lowering: StatementLowering
+) -> str:
     """Generate `crossed`, which compares the relations with their stored values."""
     lines = ["int changed = 0;", "(void)m;", "(void)time;", "z[0] = 0;"]
     for k, relation in enumerate(relations):
-        a, b = (lowering.evaluated_once(lowering.lower(s)).text for s in (relation.condition.left, relation.condition.right))
+        a, b = (
+            lowering.evaluated_once(lowering.lower(s)).text
+            for s in (relation.condition.left, relation.condition.right)
+        )
         left, right, held = a.parenthesized(9), b.parenthesized(10), values[relation.name].text.code
         lowering.lines += [
             f"z[{k}] = {left} - {right};",
             f"if (({left} {relation.condition.operator} {right}) != {held}) changed = {k + 1};",
         ]
     return function_definition(
-        "static int crossed(Model *m, double time, double *z)", [*lines, *lowering.lines, "return changed;"]
+        "static int crossed(Model *m, double time, double *z)",
+        [*lines, *lowering.lines, "return changed;"],
     )
 
 
 def hybrid_step_body(clocks: int, continuous: bool, inputs_first: bool) -> list[str]:
-    """Generate the body of model_step; `inputs_first`: changes of inputs are an event before a tick at the same time."""
+    """Generate the body of model_step.
+
+    `inputs_first`: changes of inputs are an event before a tick at the same time.
+    """
     lines = ["const double end = time + step_size;", "m->failure = 0;"]
     tick = ["const bool tick = false;", *["const double target = end;"] * continuous]
     if clocks:
@@ -194,9 +270,12 @@ def hybrid_step_body(clocks: int, continuous: bool, inputs_first: bool) -> list[
         ]
     loop, at_start = [*tick], "count == 0"
     if clocks:
-        loop += [f"const bool at_start = tick && next <= time + TOLERANCE * shortest_period(m->clock, {clocks});"] * (
-            continuous or not inputs_first
-        )
+        loop += [
+            (
+                "const bool at_start = tick && next <= time + TOLERANCE * "
+                f"shortest_period(m->clock, {clocks});"
+            )
+        ] * (continuous or not inputs_first)
         at_start += " && !at_start" * (not inputs_first)
     input_event = f"if ({at_start} && (m->changed || inputs_changed(m)))"
     loop += (
@@ -207,7 +286,10 @@ def hybrid_step_body(clocks: int, continuous: bool, inputs_first: bool) -> list[
     if continuous:
         lines.append("double reached = time;")
         loop += [
-            f"const bool crossing = {'!at_start && ' * bool(clocks)}advance(m, reached, target, &reached);",
+            (
+                f"const bool crossing = {'!at_start && ' * bool(clocks)}advance(m, reached, "
+                "target, &reached);"
+            ),
             "if (m->failure != 0) break;",
             "if (crossing) {",
             "    double z[RELATIONS];",
@@ -218,6 +300,13 @@ def hybrid_step_body(clocks: int, continuous: bool, inputs_first: bool) -> list[
         ]
     loop += ["if (!tick) break;"]
     if clocks:
-        loop += ["event(m, target, due);", f"for (int k = 0; k < {clocks}; k++) m->clock[k].ticks += due[k];"]
-    lines += ["for (int count = 0; m->failure == 0; count++) {", *("    " + line for line in loop), "}"]
+        loop += [
+            "event(m, target, due);",
+            f"for (int k = 0; k < {clocks}; k++) m->clock[k].ticks += due[k];",
+        ]
+    lines += [
+        "for (int count = 0; m->failure == 0; count++) {",
+        *("    " + line for line in loop),
+        "}",
+    ]
     return [*lines, "if (m->failure == 0) event(m, end, NO_TICK);", "return REASONS[m->failure];"]

@@ -1,4 +1,7 @@
-"""Base of the lowering to C: the scope, generated statements, temporary variables and static evaluation."""
+"""Base of the lowering to C.
+
+The scope, generated statements, temporary variables and static evaluation.
+"""
 
 from __future__ import annotations
 
@@ -45,7 +48,10 @@ class TranslationUnit(Protocol):
         """Return the number of an assertion with the level warning."""
 
     def function_instance(
-        self, call: syntax_tree.Call, shapes: tuple[tuple[int, ...], ...], numbers: tuple[int | None, ...]
+        self,
+        call: syntax_tree.Call,
+        shapes: tuple[tuple[int, ...], ...],
+        numbers: tuple[int | None, ...],
     ) -> FunctionInstance:
         """Return the C function for a call with arguments of these shapes."""
 
@@ -54,7 +60,8 @@ class TranslationUnit(Protocol):
 class Lowering:
     """Lowering in one scope: the model, or the body of a function.
 
-    The methods of the subclasses for the kinds of nodes are named after the classes of `syntax_tree`.
+    The methods of the subclasses for the kinds of nodes are named after the classes of
+    `syntax_tree`.
     """
 
     translation_unit: TranslationUnit
@@ -73,9 +80,13 @@ class Lowering:
         Raises:
             InputError: The expression is not supported.
         """
-        method: Callable[[Expression], CValue] | None = getattr(self, f"_{type(node).__name__.lower()}", None)
+        method: Callable[[Expression], CValue] | None = getattr(
+            self, f"_{type(node).__name__.lower()}", None
+        )
         if method is None:
-            raise_model_error(f"{type(node).__name__} is not supported here", getattr(node, "where", None))
+            raise_model_error(
+                f"{type(node).__name__} is not supported here", getattr(node, "where", None)
+            )
         return method(node)
 
     def scalar_of(self, node: Expression) -> CExpression:
@@ -101,11 +112,16 @@ class Lowering:
         """Declare a temporary C variable or array without initialization."""
         self.temporaries += 1
         name = f"tmp_{self.temporaries}"
-        self.lines.append(f"{C_TYPES[type_name]} {name}{f'[{max(prod(shape), 1)}]' if shape else ''};")
+        self.lines.append(
+            f"{C_TYPES[type_name]} {name}{f'[{max(prod(shape), 1)}]' if shape else ''};"
+        )
         return variable_value(type_name, shape, name)
 
     def evaluated_once(self, value: CValue) -> CValue:
-        """Return a reusable value; the value is stored in a temporary variable if it is not reusable yet."""
+        """Return a reusable value.
+
+        The value is stored in a temporary variable if it is not reusable yet.
+        """
         if value.reusable:
             return value
         if value.shape:
@@ -118,7 +134,10 @@ class Lowering:
         return scalar_value(value.type, CExpression(name), reusable=True)
 
     def as_c_array(self, value: CValue, type_name: str) -> str:
-        """Return the name of a C array with the elements of a value; they are copied unless such an array exists."""
+        """Return the name of a C array with the elements of a value.
+
+        They are copied unless such an array exists.
+        """
         if value.pointer is not None and C_TYPES[value.type] == C_TYPES[type_name]:
             return value.pointer
         target = self.new_temporary(type_name, value.shape)
@@ -131,7 +150,9 @@ class Lowering:
             self.lines.append(f"for (int each = 0; each < {value.size}; each++)")
             self.lines.append(f"    {target.element('each').code} = {value.element('each').code};")
         else:
-            self.lines += [f"{target.element(k).code} = {value.element(k).code};" for k in range(value.size)]
+            self.lines += [
+                f"{target.element(k).code} = {value.element(k).code};" for k in range(value.size)
+            ]
 
     def shape_of(self, node: Expression) -> tuple[int, ...]:
         """Return the shape of an expression; no code is generated."""
@@ -141,7 +162,10 @@ class Lowering:
     # static evaluation
 
     def static_integer(self, node: Expression) -> int | None:
-        """Evaluate an Integer expression of literals, size(), `+`, `-` and `*`; return None for all other expressions."""
+        """Evaluate an Integer expression of literals, size(), `+`, `-` and `*`.
+
+        Return None for all other expressions.
+        """
         if isinstance(node, syntax_tree.Literal) and node.type in ("Integer", "Enumeration"):
             return int(node.number)
         if isinstance(node, syntax_tree.Unary) and node.operator == "-":
@@ -152,7 +176,11 @@ class Lowering:
             if left is None or right is None:
                 return None
             return {"+": left + right, "-": left - right, "*": left * right}[node.operator]
-        if isinstance(node, syntax_tree.Builtin) and node.name == "size" and len(node.arguments) == 2:
+        if (
+            isinstance(node, syntax_tree.Builtin)
+            and node.name == "size"
+            and len(node.arguments) == 2
+        ):
             dimension = self.static_integer(node.arguments[1])
             return None if dimension is None else self.shape_of(node.arguments[0])[dimension - 1]
         value = self.static_value(node) if isinstance(node, syntax_tree.Builtin) else None
@@ -174,8 +202,11 @@ class Lowering:
             InputError: The bounds or the step are not constant.
         """
         start, step, stop = (
-            self.static_integer(e) for e in (node.start, node.step or syntax_tree.Literal(1, "Integer"), node.stop)
+            self.static_integer(e)
+            for e in (node.start, node.step or syntax_tree.Literal(1, "Integer"), node.stop)
         )
         if start is None or step is None or stop is None:
-            raise_model_error("the bounds of a range must be constant here", getattr(node.stop, "where", None))
+            raise_model_error(
+                "the bounds of a range must be constant here", getattr(node.stop, "where", None)
+            )
         return list(range(start, stop + (1 if step > 0 else -1), step))

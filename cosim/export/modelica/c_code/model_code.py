@@ -32,7 +32,8 @@ _STANDARD_REASONS = (
 _HYBRID_REASONS = (*_STANDARD_REASONS, "the integration step has become too small")
 
 
-#: function that returns an external object, which is constructed again if a state of another instance was restored
+#: function that returns an external object, which is constructed again if a state of another
+#: instance was restored
 _OBJECTS = """static void *object(Model *m, uint64_t identifier)
 {
     static _Thread_local bool constructing;
@@ -49,14 +50,21 @@ void model_free(Model *m) { external_delete(m); }"""
 
 @dataclass
 class ModelCode:
-    """Code generator of model.c; collects the failure reasons and the functions of the model while it generates code."""
+    """Code generator of model.c.
+
+    Collects the failure reasons and the functions of the model while it generates code.
+    """
 
     defaults: Interpreter
     reasons: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.reasons += _HYBRID_REASONS if self.defaults.model.hybrid else _STANDARD_REASONS
-        self.model, self.schedule, self.roles = self.defaults.model, self.defaults.schedule, self.defaults.parameter_roles
+        self.model, self.schedule, self.roles = (
+            self.defaults.model,
+            self.defaults.schedule,
+            self.defaults.parameter_roles,
+        )
         self.members = struct_members(self.model)
         self.functions = FunctionTranslator(dict(self.model.functions), self._failure_code)
 
@@ -67,36 +75,63 @@ class ModelCode:
 
     def model_c(self) -> str:
         """Return the text of model.c."""
-        includes = "\n".join(f'#include "{name}"' for name in ("model.h", *(self.headers() or ["runtime.h"])))
+        includes = "\n".join(
+            f'#include "{name}"' for name in ("model.h", *(self.headers() or ["runtime.h"]))
+        )
         definitions = self.definitions()
         objects = [_OBJECTS] * self._has_objects
-        text = "\n\n".join([includes, self._reasons(), *objects, *self.functions.definitions, *definitions]) + "\n"
-        reason = "m->failure == COMPOSED_REASON ? m->reason : REASONS[m->failure]" if self.has_messages else "REASONS[m->failure]"
+        text = (
+            "\n\n".join(
+                [includes, self._reasons(), *objects, *self.functions.definitions, *definitions]
+            )
+            + "\n"
+        )
+        reason = (
+            "m->failure == COMPOSED_REASON ? m->reason : REASONS[m->failure]"
+            if self.has_messages
+            else "REASONS[m->failure]"
+        )
         if not self.functions.external_functions:
             return text.replace("return REASONS[m->failure];", f"return {reason};")
-        text = text.replace("return REASONS[m->failure];", f"return external_reason({reason}, m->warning, sizeof m->warning);")
+        text = text.replace(
+            "return REASONS[m->failure];",
+            f"return external_reason({reason}, m->warning, sizeof m->warning);",
+        )
         return f'#include "external_calls.h"\n{text}'
 
     def headers(self) -> list[str]:
         """Return the names of the C headers that model.c includes besides model.h and runtime.h."""
-        bodies = (self.schedule.initialization, self.schedule.event, self.schedule.between.continuous)
+        bodies = (
+            self.schedule.initialization,
+            self.schedule.event,
+            self.schedule.between.continuous,
+        )
         solved = any(isinstance(item, Solve) for item in walk(bodies))
-        return [*["messages.h"] * self.has_messages, *["newton.h"] * solved, *["runge_kutta.h"] * bool(self.model.states)]
+        return [
+            *["messages.h"] * self.has_messages,
+            *["newton.h"] * solved,
+            *["runge_kutta.h"] * bool(self.model.states),
+        ]
 
     def definitions(self) -> list[str]:
         """Generate the functions of model.c."""
         event = self._event()
         optional = {"time": "double time", "due": "const bool *due"}
-        parameters = {"m": "Model *m"} | {name: code for name, code in optional.items() if uses_variable(name, event)}
+        parameters = {"m": "Model *m"} | {
+            name: code for name, code in optional.items() if uses_variable(name, event)
+        }
         call = f"event({', '.join(parameters).replace('time', 'now')});"
         step = continuous_step_body if self.model.states else sampled_step_body
         return [
             *self._common_definitions(),
             function_definition(f"static void event({', '.join(parameters.values())})", event),
-            function_definition("const char *model_initialize(Model *m, double time)", self._model_initialize()),
+            function_definition(
+                "const char *model_initialize(Model *m, double time)", self._model_initialize()
+            ),
             *self._continuous(),
             function_definition(
-                "const char *model_step(Model *m, double time, double step_size)", step(len(self.schedule.clocks), call)
+                "const char *model_step(Model *m, double time, double step_size)",
+                step(len(self.schedule.clocks), call),
             ),
             *self._exchange(call.replace("now", "time"), record=False),
         ]
@@ -109,7 +144,9 @@ class ModelCode:
         ]
 
     def _reasons(self) -> str:
-        texts = ",\n    ".join(["NULL", *(json.dumps(reason, ensure_ascii=False) for reason in self.reasons)])
+        texts = ",\n    ".join(
+            ["NULL", *(json.dumps(reason, ensure_ascii=False) for reason in self.reasons)]
+        )
         comment = "/* Reasons for failures; m->failure is an index in this array. */"
         return f"{comment}\nstatic const char *const REASONS[] = {{\n    {texts},\n}};"
 
@@ -120,20 +157,32 @@ class ModelCode:
         return str(self.reasons.index(text) + 1)
 
     def _make_lowering(self, initial: bool = False) -> StatementLowering:
-        """Create a lowering with the scope of the model: struct members, and local variables `pre_...` for pre()."""
-        scope = {v.name: struct_member(v, f"m->{self.members[v.name]}") for v in self.model.variables.values()}
+        """Create a lowering with the scope of the model.
+
+        Struct members, and local variables `pre_...` for pre().
+        """
+        scope = {
+            v.name: struct_member(v, f"m->{self.members[v.name]}")
+            for v in self.model.variables.values()
+        }
         scope["time"] = scalar_value("Real", CExpression("time"), reusable=True)
-        pre_scope = {v.name: struct_member(v, f"pre_{self.members[v.name]}") for v in self.model.variables.values()}
+        pre_scope = {
+            v.name: struct_member(v, f"pre_{self.members[v.name]}")
+            for v in self.model.variables.values()
+        }
         return StatementLowering(self.functions, scope, pre_scope, initial=initial)
 
     # start values and parameters
 
     def _model_start(self) -> list[str]:
         lines = [*["external_delete(m);"] * self._has_objects, "memset(m, 0, sizeof *m);"]
-        constants = [self.model.variables[name] for name in (*self.roles.settable, *self.roles.fixed)]
+        constants = [
+            self.model.variables[name] for name in (*self.roles.settable, *self.roles.fixed)
+        ]
         for variable in [*constants, *filter(is_input, self.model.variables.values())]:
             lines += _assign_constant(
-                struct_member(variable, f"m->{self.members[variable.name]}"), self.defaults.get(variable.name)
+                struct_member(variable, f"m->{self.members[variable.name]}"),
+                self.defaults.get(variable.name),
             )
         return [*lines, "model_parameters(m);", "start_variables(m);"]
 
@@ -141,14 +190,22 @@ class ModelCode:
         lowering = self._make_lowering()
         for variable in self.model.variables.values():
             if variable.variability not in ("parameter", "constant") and not is_input(variable):
-                lowering.store(lowering.scope[variable.name], start_value(self.model, variable.name), Name(variable.name))
+                lowering.store(
+                    lowering.scope[variable.name],
+                    start_value(self.model, variable.name),
+                    Name(variable.name),
+                )
         return lowering.lines or ["(void)m;"]
 
     def _model_parameters(self) -> list[str]:
         lowering = self._make_lowering()
         for name in self.roles.dependent:
             binding = self.model.variables[name].binding
-            lowering.store(lowering.scope[name], binding if binding is not None else start_value(self.model, name), Name(name))
+            lowering.store(
+                lowering.scope[name],
+                binding if binding is not None else start_value(self.model, name),
+                Name(name),
+            )
         begin = ["external_begin();"] * self._has_objects
         changed = ["m->changed = true;"] * bool(self.model.hybrid)
         return [*begin, *lowering.lines, *changed] or ["(void)m;"]
@@ -160,14 +217,20 @@ class ModelCode:
     # events
 
     def _body(self, body: Body, initial: bool) -> list[str]:
-        """Generate statements, preceded by copies of the arguments of pre(); a comment marks the statements of a component."""
+        """Generate statements, preceded by copies of the arguments of pre().
+
+        A comment marks the statements of a component.
+        """
         lowering = self._make_lowering(initial)
         for name in pre_variables(self.model, body):
             lowering.lines += _save_pre_value(self.model.variables[name], self.members[name])
         previous_component = None
         for statement in body:
             if (component := _owning_component(statement)) != previous_component:
-                lowering.lines += [*[""] * bool(lowering.lines), f"/* {component or 'the model itself'} */"]
+                lowering.lines += [
+                    *[""] * bool(lowering.lines),
+                    f"/* {component or 'the model itself'} */",
+                ]
                 previous_component = component
             lowering.statement(statement)
         return lowering.lines
@@ -185,17 +248,30 @@ class ModelCode:
         value = struct_member(variable, f"m->{self.members[variable.name]}")
         failure = self._failure_code(f"{variable.name} is not a finite number", None)
         test = f"if (!isfinite({value.element('each').code})) fail(m, {failure});"
-        return [f"for (int each = 0; each < {value.size}; each++) {test}"] if variable.shape else [test]
+        return (
+            [f"for (int each = 0; each < {value.size}; each++) {test}"]
+            if variable.shape
+            else [test]
+        )
 
     def _model_initialize(self) -> list[str]:
         lines = [*self._clock_lines(), *self._body(self.schedule.initialization, initial=True)]
         unused = [] if uses_variable("time", lines) else ["(void)time;"]
-        return [*unused, "m->failure = 0;", "start_variables(m);", *lines, "return REASONS[m->failure];"]
+        return [
+            *unused,
+            "m->failure = 0;",
+            "start_variables(m);",
+            *lines,
+            "return REASONS[m->failure];",
+        ]
 
     def _clock_lines(self) -> list[str]:
         lowering = self._make_lowering()
         for k, clock in enumerate(self.schedule.clocks):
-            start, period = lowering.scalar_of(clock.start).code, lowering.scalar_of(clock.period).code
+            start, period = (
+                lowering.scalar_of(clock.start).code,
+                lowering.scalar_of(clock.period).code,
+            )
             lowering.lines.append(f"set_clock(m, &m->clock[{k}], {start}, {period}, time);")
         return lowering.lines
 
@@ -207,7 +283,10 @@ class ModelCode:
             return []
         lines = self._body(self.schedule.between.derivatives, initial=False)
         unused = [] if uses_variable("time", lines) else ["(void)time;"]
-        states, rates = self._element_pointers(self.model.states), self._element_pointers(map(derivative_name, self.model.states))
+        states, rates = (
+            self._element_pointers(self.model.states),
+            self._element_pointers(map(derivative_name, self.model.states)),
+        )
         system = [
             "const System system = {",
             f"    {{{', '.join(states)}}},",
@@ -216,9 +295,12 @@ class ModelCode:
             "};",
         ]
         return [
-            function_definition("static void derivatives(Model *m, double time)", [*unused, *lines]),
             function_definition(
-                "static double advance(Model *m, double from, double to)", [*system, "return integrate(m, &system, from, to);"]
+                "static void derivatives(Model *m, double time)", [*unused, *lines]
+            ),
+            function_definition(
+                "static double advance(Model *m, double from, double to)",
+                [*system, "return integrate(m, &system, from, to);"],
             ),
         ]
 
@@ -228,19 +310,36 @@ class ModelCode:
             return []
         continuous = self._body(self.schedule.between.continuous, initial=False)
         if self.model.hybrid:
-            continuous += ["{", *indicator_lines(self.model.hybrid.relations, self._make_lowering()), "}"]
-        states, rates = self._element_pointers(self.model.states), self._element_pointers(map(derivative_name, self.model.states))
-        return exchange_functions(continuous, states, rates, len(self.schedule.clocks), event, record)
+            continuous += [
+                "{",
+                *indicator_lines(self.model.hybrid.relations, self._make_lowering()),
+                "}",
+            ]
+        states, rates = (
+            self._element_pointers(self.model.states),
+            self._element_pointers(map(derivative_name, self.model.states)),
+        )
+        return exchange_functions(
+            continuous, states, rates, len(self.schedule.clocks), event, record
+        )
 
     def _element_pointers(self, names: Iterable[str]) -> list[str]:
         """Return C pointers to all elements of variables."""
-        values = (struct_member(self.model.variables[name], f"m->{self.members[name]}") for name in names)
+        values = (
+            struct_member(self.model.variables[name], f"m->{self.members[name]}") for name in names
+        )
         return [f"&{value.element(k).code}" for value in values for k in range(value.size)]
 
 
 def _owning_component(statement: Statement) -> str:
     """Return the component whose variable a statement assigns first."""
-    return next((owning_component(referenced_variable(target)) for target in assigned_references(statement)), "")
+    return next(
+        (
+            owning_component(referenced_variable(target))
+            for target in assigned_references(statement)
+        ),
+        "",
+    )
 
 
 def _save_pre_value(variable: Variable, name: str) -> list[str]:
@@ -248,7 +347,10 @@ def _save_pre_value(variable: Variable, name: str) -> list[str]:
     c_type = C_TYPES[variable.type]
     if not variable.shape:
         return [f"const {c_type} pre_{name} = m->{name};"]
-    return [f"{c_type} pre_{name}[{struct_member(variable, name).size}];", f"memcpy(pre_{name}, m->{name}, sizeof pre_{name});"]
+    return [
+        f"{c_type} pre_{name}[{struct_member(variable, name).size}];",
+        f"memcpy(pre_{name}, m->{name}, sizeof pre_{name});",
+    ]
 
 
 def _assign_constant(target: CValue, value: Any) -> list[str]:

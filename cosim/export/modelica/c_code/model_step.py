@@ -1,4 +1,7 @@
-"""Code generation of model_step: the events of a communication step and the integration of continuous states between them."""
+"""Code generation of model_step.
+
+The events of a communication step and the integration of continuous states between them.
+"""
 
 from __future__ import annotations
 
@@ -19,13 +22,16 @@ def sampled_step_body(clocks: int, event: str) -> list[str]:
         return _with_failure_check(["(void)time;", "(void)step_size;", event])
     if clocks == 0:
         return _with_failure_check(["const double now = time + step_size;", event])
-    return _with_failure_check(_single_clock_loop(event) if clocks == 1 else _multi_clock_loop(clocks, [event]))
+    return _with_failure_check(
+        _single_clock_loop(event) if clocks == 1 else _multi_clock_loop(clocks, [event])
+    )
 
 
 def continuous_step_body(clocks: int, event: str) -> list[str]:
     """Generate the body of model_step for a model with continuous states.
 
-    The states are integrated to each tick and to the end of the step. There is an event at every tick and at the end.
+    The states are integrated to each tick and to the end of the step. There is an event at every
+    tick and at the end.
 
     Args:
         clocks: The number of clocks.
@@ -35,11 +41,22 @@ def continuous_step_body(clocks: int, event: str) -> list[str]:
         The lines of C code.
     """
     if clocks == 0:
-        return _with_failure_check(["const double now = time + step_size;", "advance(m, time, now);", event])
+        return _with_failure_check(
+            ["const double now = time + step_size;", "advance(m, time, now);", event]
+        )
     no_tick = [f"const bool due[{clocks}] = {{false}};"] if "due" in event else []
-    final_event = ["const double now = time + step_size;", *no_tick, "advance(m, reached, now);", event]
+    final_event = [
+        "const double now = time + step_size;",
+        *no_tick,
+        "advance(m, reached, now);",
+        event,
+    ]
     return _with_failure_check(
-        ["double reached = time;", *_multi_clock_loop(clocks, ["reached = advance(m, reached, now);", event]), *final_event]
+        [
+            "double reached = time;",
+            *_multi_clock_loop(clocks, ["reached = advance(m, reached, now);", event]),
+            *final_event,
+        ]
     )
 
 
@@ -49,14 +66,23 @@ def _with_failure_check(lines: list[str]) -> list[str]:
 
 def _single_clock_loop(event: str) -> list[str]:
     condition = "(now = next_tick(m->clock)) < time + step_size - TOLERANCE * m->clock->period"
-    return ["double now;", f"while (m->failure == 0 && {condition}) {{", f"    {event}", "    m->clock->ticks++;", "}"]
+    return [
+        "double now;",
+        f"while (m->failure == 0 && {condition}) {{",
+        f"    {event}",
+        "    m->clock->ticks++;",
+        "}",
+    ]
 
 
 def _multi_clock_loop(clocks: int, tick: list[str]) -> list[str]:
     lines = [
         f"bool due[{clocks}];",
         f"const double now = next_event(m->clock, {clocks}, due);",
-        f"if (m->failure != 0 || now >= time + step_size - TOLERANCE * shortest_period(m->clock, {clocks})) break;",
+        (
+            "if (m->failure != 0 || now >= time + step_size - TOLERANCE * "
+            f"shortest_period(m->clock, {clocks})) break;"
+        ),
         *tick,
         f"for (int k = 0; k < {clocks}; k++) m->clock[k].ticks += due[k];",
     ]

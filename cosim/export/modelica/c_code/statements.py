@@ -46,11 +46,14 @@ class StatementLowering(ExpressionLowering):
         Args:
             target: The value of the assigned variable.
             value: The expression.
-            reference: The assigned variable as an expression. It determines whether `value` depends on the target.
+            reference: The assigned variable as an expression. It determines whether `value` depends
+                on the target.
         """
         while isinstance(value, syntax_tree.If) and (known := self.known_branch(value)) is not None:
             value = known
-        if isinstance(value, syntax_tree.If) and (target.shape or self._needs_if_statement(target, value)):
+        if isinstance(value, syntax_tree.If) and (
+            target.shape or self._needs_if_statement(target, value)
+        ):
             self._lower_choice(target, value, reference)
         elif (
             isinstance(value, syntax_tree.Call)
@@ -75,7 +78,10 @@ class StatementLowering(ExpressionLowering):
 
     def _can_return_into(self, value: syntax_tree.Call, target: CValue) -> bool:
         """Return whether a function can write its result to the target without a copy."""
-        shapes, numbers = tuple(map(self.shape_of, value.arguments)), tuple(map(self.static_integer, value.arguments))
+        shapes, numbers = (
+            tuple(map(self.shape_of, value.arguments)),
+            tuple(map(self.static_integer, value.arguments)),
+        )
         outputs = self.translation_unit.function_instance(value, shapes, numbers).outputs
         return [(output.type, output.shape) for output in outputs] == [(target.type, target.shape)]
 
@@ -87,7 +93,10 @@ class StatementLowering(ExpressionLowering):
         return bool(lines) or len(target.text.code) + len(text.code) > _MAX_CONDITIONAL_LENGTH
 
     def _lower_choice(self, target: CValue, value: syntax_tree.If, reference: Expression) -> None:
-        """Lower an if-expression to an if-statement; an `else if` is nested if its condition requires statements."""
+        """Lower an if-expression to an if-statement.
+
+        An `else if` is nested if its condition requires statements.
+        """
         (condition, first), rest = value.branches[0], value.branches[1:]
         self.lines.append(f"if ({self.scalar_of(condition).code}) {{")
         with self.collect_lines() as yes:
@@ -100,7 +109,10 @@ class StatementLowering(ExpressionLowering):
         self._close_if(yes, no)
 
     def _close_if(self, yes: list[str], no: list[str]) -> None:
-        """Append the branches of an if-statement; `else { if ... }` is shortened to `else if` where possible."""
+        """Append the branches of an if-statement.
+
+        `else { if ... }` is shortened to `else if` where possible.
+        """
         self.lines += yes
         if no and _is_one_if(no):
             self.lines += ["} else " + no[0].strip(), *(line[4:] for line in no[1:])]
@@ -140,10 +152,13 @@ class StatementLowering(ExpressionLowering):
         first, last = self.static_integer(node.range.start), self.static_integer(node.range.stop)
         bounds = None if first is None or last is None else (min(first, last), max(first, last))
         self.lines.append(
-            f"for (int32_t {index} = {start.code}; {index} {'<=' if step > 0 else '>='} {stop.code}; {index} += {step}) {{"
+            f"for (int32_t {index} = {start.code}; {index} {'<=' if step > 0 else '>='} "
+            f"{stop.code}; {index} += {step}) {{"
         )
         shadowed = self.scope.get(node.index)
-        self.scope[node.index] = replace(scalar_value("Integer", CExpression(index), reusable=True), bounds=bounds)
+        self.scope[node.index] = replace(
+            scalar_value("Integer", CExpression(index), reusable=True), bounds=bounds
+        )
         with self.collect_lines() as lines:
             self.body(node.body)
         if shadowed is None:
@@ -157,7 +172,9 @@ class StatementLowering(ExpressionLowering):
             self._composed_assert(node)
             return
         condition = self.scalar_of(node.condition)
-        text = "".join(str(part.value) for part in node.message if isinstance(part, syntax_tree.Literal))
+        text = "".join(
+            str(part.value) for part in node.message if isinstance(part, syntax_tree.Literal)
+        )
         failure = self.translation_unit.failure_code(text, node.where)
         self.lines.append(f"if (!{condition.parenthesized(13)}) fail(m, {failure});")
 
@@ -168,9 +185,14 @@ class StatementLowering(ExpressionLowering):
             texts, values = zip(*map(self._message_part, node.message), strict=True)
             location = f" ({node.where.file_and_line})" if node.where else ""
             arguments = "".join(f", {value}" for value in values if value)
-            text = json.dumps("".join(texts) + location.replace("%", "%%"), ensure_ascii=False) + arguments
+            text = (
+                json.dumps("".join(texts) + location.replace("%", "%%"), ensure_ascii=False)
+                + arguments
+            )
             if not node.warning:
-                self.lines.append(f"{'request_termination' if node.terminates else 'fail_with'}(m, {text});")
+                self.lines.append(
+                    f"{'request_termination' if node.terminates else 'fail_with'}(m, {text});"
+                )
         if node.warning:
             number = self.translation_unit.warning_number(node)
             self.lines += [line.removeprefix("    ") for line in lines]
@@ -189,7 +211,10 @@ class StatementLowering(ExpressionLowering):
 
     def _solve(self, node: syntax_tree.Solve) -> None:
         """Lower a system of equations to a loop of Newton's method."""
-        n, failure = len(node.unknowns), self.translation_unit.failure_code("a system of equations has no solution", node.where)
+        n, failure = (
+            len(node.unknowns),
+            self.translation_unit.failure_code("a system of equations has no solution", node.where),
+        )
         unknowns = ", ".join(f"&{self.lower(unknown).text.code}" for unknown in node.unknowns)
         with self.collect_lines() as lines:
             self.lines.append(f"double residual[{n}], jacobian[{n * n}];")
@@ -197,7 +222,10 @@ class StatementLowering(ExpressionLowering):
                 self.lines.append(f"residual[{k}] = {self.scalar_of(residual).code};")
             for k, derivative in enumerate(item for row in node.jacobian for item in row):
                 self.lines.append(f"jacobian[{k}] = {self.scalar_of(derivative).code};")
-            arguments = f"m, {n}, (double *[]){{{unknowns}}}, residual, jacobian, step, scale, &search, iteration, {failure}"
+            arguments = (
+                f"m, {n}, (double *[]){{{unknowns}}}, residual, jacobian, step, scale, &search, "
+                f"iteration, {failure}"
+            )
             self.lines.append(f"if (newton({arguments})) break;")
         state = [f"double step[{n}], scale[{n}];", "NewtonSearch search;"]
         self.lines += ["{", *state, "for (int iteration = 0;; iteration++) {", *lines, "}", "}"]
@@ -210,13 +238,22 @@ class StatementLowering(ExpressionLowering):
         for expression, argument in zip(node.arguments, signature.arguments, strict=True):
             value = self.lower(expression)
             if argument.is_array:
-                arguments += [self.as_c_array(value, argument.type), *[str(value.size)] * signature.is_constructor]
+                arguments += [
+                    self.as_c_array(value, argument.type),
+                    *[str(value.size)] * signature.is_constructor,
+                ]
             elif isinstance(expression, syntax_tree.Name) and expression.name in outputs:
                 arguments.append(f"&{value.text.code}")
             else:
-                arguments.append(f"object(m, {value.text.code})" if argument.type == "ExternalObject" else value.text.code)
+                arguments.append(
+                    f"object(m, {value.text.code})"
+                    if argument.type == "ExternalObject"
+                    else value.text.code
+                )
         arguments += [f"&{self.lower(node.result).text.code}"] if node.result else []
-        failure = self.translation_unit.failure_code(f"the external function {function.name} has failed", node.where)
+        failure = self.translation_unit.failure_code(
+            f"the external function {function.name} has failed", node.where
+        )
         self.lines.append(f"if (!{signature.name}({', '.join(arguments)})) fail(m, {failure});")
 
     def _while(self, node: syntax_tree.While) -> None:
@@ -249,4 +286,8 @@ def _variables_read(node: Expression) -> set[str]:
 
 def _is_one_if(lines: list[str]) -> bool:
     """Return whether the lines are one if-statement, which begins in the first line and ends in the last one."""
-    return lines[0].startswith("    if (") and lines[0].endswith("{") and lines.index("    }") == len(lines) - 1
+    return (
+        lines[0].startswith("    if (")
+        and lines[0].endswith("{")
+        and lines.index("    }") == len(lines) - 1
+    )

@@ -1,4 +1,7 @@
-"""Lowering of subscripts: elements and slices of arrays, as values and as targets of assignments."""
+"""Lowering of subscripts.
+
+Elements and slices of arrays, as values and as targets of assignments.
+"""
 
 from __future__ import annotations
 
@@ -33,22 +36,40 @@ class SubscriptLowering(Lowering):
             found = f"found {count_noun(len(node.subscripts), 'subscript')}"
             raise_model_error(f"{found}, expected at most {len(base.shape)}", node.where)
         label = node.base.name if isinstance(node.base, syntax_tree.Name) else "array"
-        subscripts = [*node.subscripts, *[syntax_tree.Colon()] * (len(base.shape) - len(node.subscripts))]
-        offsets = [self._element_offsets(s, n, label, node.where) for s, n in zip(subscripts, base.shape, strict=True)]
+        subscripts = [
+            *node.subscripts,
+            *[syntax_tree.Colon()] * (len(base.shape) - len(node.subscripts)),
+        ]
+        offsets = [
+            self._element_offsets(s, n, label, node.where)
+            for s, n in zip(subscripts, base.shape, strict=True)
+        ]
         if any(isinstance(offset, str) for offset in offsets) and base.pointer is None:
             base = variable_value(base.type, base.shape, self.as_c_array(base, base.type))
         offset_lists = [offset if isinstance(offset, list) else [offset] for offset in offsets]
         shape = tuple(len(offset) for offset in offsets if isinstance(offset, list))
         factors = [prod(base.shape[d + 1 :]) for d in range(len(base.shape))]
-        selected = [linear_index(list(zip(factors, index, strict=True))) for index in product(*offset_lists)]
+        selected = [
+            linear_index(list(zip(factors, index, strict=True))) for index in product(*offset_lists)
+        ]
         if shape == base.shape and selected == list(range(base.size)):
             return base
         if not shape:
             return scalar_value(base.type, base.element(selected[0]), reusable=base.reusable)
-        return CValue(base.type, shape, lambda k: base.element(selected[int(k)]), indexable_in_loop=False, reusable=base.reusable)
+        return CValue(
+            base.type,
+            shape,
+            lambda k: base.element(selected[int(k)]),
+            indexable_in_loop=False,
+            reusable=base.reusable,
+        )
 
     def _element_offsets(
-        self, subscript: Expression | syntax_tree.Colon, size: int, label: str, where: SourceLocation | None
+        self,
+        subscript: Expression | syntax_tree.Colon,
+        size: int,
+        label: str,
+        where: SourceLocation | None,
     ) -> list[int] | int | str:
         """Return the offset (from 0) of an element as a number or C code, or the offsets of a slice as a list."""
         if isinstance(subscript, syntax_tree.Colon):
@@ -65,7 +86,9 @@ class SubscriptLowering(Lowering):
         failure = self.translation_unit.failure_code(f"{label}: subscript outside 1..{size}", where)
         return c_call("element", "m", value.text, str(size), failure).code
 
-    def _check_bounds(self, subscript: int, size: int, label: str, where: SourceLocation | None) -> int:
+    def _check_bounds(
+        self, subscript: int, size: int, label: str, where: SourceLocation | None
+    ) -> int:
         return (
             subscript - 1
             if 1 <= subscript <= size

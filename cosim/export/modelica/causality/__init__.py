@@ -1,1 +1,4 @@
-"""Causality analysis of a flat model: matching, sorting, clocks, continuous states and parameter roles."""
+"""Causality analysis of a flat model.
+
+Matching, sorting, clocks, continuous states and parameter roles.
+"""

@@ -8,15 +8,19 @@ from typing import TypeVar
 Key = TypeVar("Key", bound=Hashable)
 
 
-def match(candidates: Sequence[Sequence[Key]], optional: Sequence[Collection[Key]] = ()) -> dict[int, Key]:
+def match(
+    candidates: Sequence[Sequence[Key]], optional: Sequence[Collection[Key]] = ()
+) -> dict[int, Key]:
     """Assign an unknown to each equation, if possible.
 
-    Assignments without an alternative are made first, so that a system that can be solved in sequence is.
+    Assignments without an alternative are made first, so that a system that can be solved in
+    sequence is.
 
     Args:
-        candidates: For each equation the unknowns for which it can be solved, the preferred ones first.
-        optional: Groups of unknowns that have a value anyway. They are assigned only to equations that cannot be assigned
-            otherwise, those of the first group first.
+        candidates: For each equation the unknowns for which it can be solved, the preferred ones
+            first.
+        optional: Groups of unknowns that have a value anyway. They are assigned only to equations
+            that cannot be assigned otherwise, those of the first group first.
 
     Returns:
         Equation number -> unknown; equations that cannot be matched are missing.
@@ -66,7 +70,9 @@ def _match_in_sequence(candidates: Sequence[Sequence[Key]]) -> dict[int, Key]:
     return matched
 
 
-def _augment(start: int, candidates: Sequence[Sequence[Key]], matched: dict[int, Key], owner: dict[Key, int]) -> None:
+def _augment(
+    start: int, candidates: Sequence[Sequence[Key]], matched: dict[int, Key], owner: dict[Key, int]
+) -> None:
     """Find an augmenting path from an unmatched equation by breadth-first search."""
     reached_from: dict[Key, int] = {}
     queue = [start]
@@ -82,7 +88,13 @@ def _augment(start: int, candidates: Sequence[Sequence[Key]], matched: dict[int,
             return
 
 
-def _flip(key: Key, start: int, reached_from: dict[Key, int], matched: dict[int, Key], owner: dict[Key, int]) -> None:
+def _flip(
+    key: Key,
+    start: int,
+    reached_from: dict[Key, int],
+    matched: dict[int, Key],
+    owner: dict[Key, int],
+) -> None:
     while True:
         number = reached_from[key]
         previous = matched.get(number)

@@ -1,4 +1,7 @@
-"""Statements that are executed between events: derivatives of states, operands of relations, and all continuous variables."""
+"""Statements that are executed between events.
+
+Derivatives of states, operands of relations, and all continuous variables.
+"""
 
 from __future__ import annotations
 
@@ -17,10 +20,12 @@ class BetweenEvents(NamedTuple):
     """Statements that are executed between events.
 
     Attributes:
-        derivatives: Those that compute the derivatives of the states and the arguments of delay(), with constant inputs.
+        derivatives: Those that compute the derivatives of the states and the arguments of delay(),
+            with constant inputs.
         indicators: Those that compute the operands of relations, with constant inputs.
         continuous: All variables that change between events, with changing inputs (Model Exchange).
-        limits: Those that compute the values of continuous variables before an event, for pre(), with constant inputs.
+        limits: Those that compute the values of continuous variables before an event, for pre(),
+            with constant inputs.
     """
 
     derivatives: Body
@@ -29,7 +34,9 @@ class BetweenEvents(NamedTuple):
     limits: Body = ()
 
 
-def statements_between_events(model: Model, continuous: Iterable[Statement], held: set[ScalarKey]) -> BetweenEvents:
+def statements_between_events(
+    model: Model, continuous: Iterable[Statement], held: set[ScalarKey]
+) -> BetweenEvents:
     """Return the statements between events.
 
     Args:
@@ -39,17 +46,27 @@ def statements_between_events(model: Model, continuous: Iterable[Statement], hel
     """
     statements = [s for s in continuous if not (model.hybrid and _is_discrete(model, s))]
     nodes = [make_node(model, (_without_ticks(statement),)) for statement in statements]
-    nodes += [node for body in model.algorithms for node in algorithm_nodes(model, body, lambda _: ())]
+    nodes += [
+        node for body in model.algorithms for node in algorithm_nodes(model, body, lambda _: ())
+    ]
     for node in nodes:
         node.reads -= held
-    required = {key for name in model.states for key in scalar_keys(model.variables, Name(derivative_name(name)))}
+    required = {
+        key
+        for name in model.states
+        for key in scalar_keys(model.variables, Name(derivative_name(name)))
+    }
     order = sort_topologically(nodes)
     if not model.hybrid:
-        return BetweenEvents(merge_statements(required_nodes(order, required)), (), merge_statements(order))
+        return BetweenEvents(
+            merge_statements(required_nodes(order, required)), (), merge_statements(order)
+        )
     required |= {(delay.name, 0) for delay in model.hybrid.delays}
     operands = {
         key
-        for reference in read_references(tuple(relation.condition for relation in model.hybrid.relations))
+        for reference in read_references(
+            tuple(relation.condition for relation in model.hybrid.relations)
+        )
         for key in scalar_keys(model.variables, reference)
     }
     varying = _varying(model, order, model.states)
@@ -57,7 +74,8 @@ def statements_between_events(model: Model, continuous: Iterable[Statement], hel
     remembered = {
         key
         for name in model.hybrid.remembered
-        if model.variables[name].type == "Real" and name not in {*model.states, *inputs, *model.hybrid.iterated}
+        if model.variables[name].type == "Real"
+        and name not in {*model.states, *inputs, *model.hybrid.iterated}
         for key in scalar_keys(model.variables, Name(name))
     }
     return BetweenEvents(
@@ -73,7 +91,11 @@ def _varying(model: Model, order: Iterable[Node], sources: Iterable[str]) -> lis
     changing = {key for name in sources for key in scalar_keys(model.variables, Name(name))}
     nodes = []
     for node in order:
-        if node.reads & changing or "time" in variable_names(node.statements) or has_builtin(node.statements, "past"):
+        if (
+            node.reads & changing
+            or "time" in variable_names(node.statements)
+            or has_builtin(node.statements, "past")
+        ):
             changing |= node.writes
             nodes.append(node)
     return nodes
@@ -81,7 +103,9 @@ def _varying(model: Model, order: Iterable[Node], sources: Iterable[str]) -> lis
 
 def _without_ticks(statement: Statement) -> Statement:
     def change(node: Any) -> Any:
-        return Literal(False, "Boolean") if isinstance(node, Builtin) and node.name == "due" else node
+        return (
+            Literal(False, "Boolean") if isinstance(node, Builtin) and node.name == "due" else node
+        )
 
     result: Statement = rewrite(statement, change)
     return result

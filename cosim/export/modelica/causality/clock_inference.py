@@ -14,7 +14,16 @@ from typing import Any
 
 from ..model.evaluate import Evaluator
 from ..model.flat_model import Model
-from ..model.syntax_tree import Builtin, Expression, If, Index, Name, SourceLocation, When, raise_model_error
+from ..model.syntax_tree import (
+    Builtin,
+    Expression,
+    If,
+    Index,
+    Name,
+    SourceLocation,
+    When,
+    raise_model_error,
+)
 from ..model.traversal import variable_names, walk
 
 CONVERSIONS = ("subSample", "superSample", "shiftSample", "backSample")
@@ -36,7 +45,10 @@ class Rate:
 
 @dataclass(frozen=True, slots=True)
 class _Relation:
-    """The period of the second node is `scale` times that of the first; the shift is a part of the first period."""
+    """The period of the second node is `scale` times that of the first.
+
+    The shift is a part of the first period.
+    """
 
     first: str
     second: str
@@ -49,14 +61,22 @@ def is_clock(expression: Any, model: Model) -> bool:
     if isinstance(expression, If):
         return is_clock(expression.otherwise, model)
     if isinstance(expression, Builtin):
-        return expression.name == "Clock" or (expression.name in CONVERSIONS and is_clock(expression.arguments[0], model))
+        return expression.name == "Clock" or (
+            expression.name in CONVERSIONS and is_clock(expression.arguments[0], model)
+        )
     base = expression.base if isinstance(expression, Index) else expression
-    return isinstance(base, Name) and base.name in model.variables and model.variables[base.name].type == "Clock"
+    return (
+        isinstance(base, Name)
+        and base.name in model.variables
+        and model.variables[base.name].type == "Clock"
+    )
 
 
 def is_sampler(call: Builtin, model: Model) -> bool:
     """Return whether a call is `sample(u)` or `sample(u, clock)`, and not the event `sample(start, period)`."""
-    return call.name == "sample" and (len(call.arguments) == 1 or is_clock(call.arguments[1], model))
+    return call.name == "sample" and (
+        len(call.arguments) == 1 or is_clock(call.arguments[1], model)
+    )
 
 
 def samplers(trees: Any, model: Model) -> Iterator[Builtin]:
@@ -71,9 +91,17 @@ def is_clocked_when(when: Any, model: Model) -> bool:
 
 def clock_parameters(model: Model) -> set[str]:
     """Return the parameters that determine clocks; they are constants of the FMU."""
-    calls = [item for item in walk(_sections(model)) if isinstance(item, Builtin) and item.name in (*CONVERSIONS, "Clock")]
+    calls = [
+        item
+        for item in walk(_sections(model))
+        if isinstance(item, Builtin) and item.name in (*CONVERSIONS, "Clock")
+    ]
     names = {name for call in calls for name in variable_names(call.arguments)}
-    return {name for name in names if name in model.variables and model.variables[name].variability == "parameter"}
+    return {
+        name
+        for name in names
+        if name in model.variables and model.variables[name].variability == "parameter"
+    }
 
 
 def _sections(model: Model) -> tuple[Any, ...]:
@@ -121,14 +149,23 @@ class ClockInference:
 
     def evaluate(self, expression: Expression) -> Any:
         """Return the value of an expression of parameters with their default values."""
-        values = {name: self.evaluate(self._value(name, expression)) for name in variable_names(expression)}
+        values = {
+            name: self.evaluate(self._value(name, expression))
+            for name in variable_names(expression)
+        }
         return Evaluator(self._model.functions, values)(expression)
 
     def _value(self, name: str, expression: Expression) -> Expression:
         variable = self._model.variables.get(name)
-        value = variable and variable.variability in ("parameter", "constant") and (variable.binding or variable.start)
+        value = (
+            variable
+            and variable.variability in ("parameter", "constant")
+            and (variable.binding or variable.start)
+        )
         where = getattr(expression, "where", None)
-        return value or raise_model_error(f"a clock needs values that are known when the FMU is built; {name} is not", where)
+        return value or raise_model_error(
+            f"a clock needs values that are known when the FMU is built; {name} is not", where
+        )
 
     # collection
 
@@ -136,7 +173,9 @@ class ClockInference:
         if isinstance(tree, tuple) and not isinstance(tree, SourceLocation):
             for item in tree:
                 self._collect(node, item, where)
-        elif isinstance(tree, Builtin) and (tree.name in CLOCKED_OPERATORS or is_sampler(tree, self._model)):
+        elif isinstance(tree, Builtin) and (
+            tree.name in CLOCKED_OPERATORS or is_sampler(tree, self._model)
+        ):
             self._operator(node, tree, where)
         elif isinstance(tree, Index) and is_clock(tree, self._model):
             self._parents[self._find(node)] = self._find(str(replace(tree, where=None)))
@@ -152,7 +191,10 @@ class ClockInference:
 
     def selected(self, choice: If) -> Expression:
         """Return the branch of an if-expression between clocks."""
-        return next((value for condition, value in choice.branches if self.evaluate(condition)), choice.otherwise)
+        return next(
+            (value for condition, value in choice.branches if self.evaluate(condition)),
+            choice.otherwise,
+        )
 
     def _reference(self, node: str, name: str, where: SourceLocation | None) -> None:
         variable = self._model.variables.get(name)
@@ -185,10 +227,17 @@ class ClockInference:
         if isinstance(first, Name) and self._model.variables[first.name].type == "Boolean":
             return Rate(condition=first)
         if is_clock(first, self._model):
-            raise_model_error("a clock with a solver method is not supported; write difference equations", call.where)
+            raise_model_error(
+                "a clock with a solver method is not supported; write difference equations",
+                call.where,
+            )
         counter = self.evaluate(first)
         period = Fraction(repr(counter)) / (int(self.evaluate(others[0])) if others else 1)
-        return Rate(period) if period > 0 else raise_model_error(f"found the period {period} s, expected > 0", call.where)
+        return (
+            Rate(period)
+            if period > 0
+            else raise_model_error(f"found the period {period} s, expected > 0", call.where)
+        )
 
     def _relation(self, inner: str, node: str, call: Builtin) -> _Relation | None:
         values = [int(self.evaluate(argument)) for argument in call.arguments[1:]]
@@ -196,7 +245,9 @@ class ClockInference:
             factor = Fraction(values[0] if values else 0)
             if factor == 0:
                 return None
-            return _Relation(inner, node, factor if call.name == "subSample" else 1 / factor, Fraction(0))
+            return _Relation(
+                inner, node, factor if call.name == "subSample" else 1 / factor, Fraction(0)
+            )
         shift = Fraction(values[0], values[1] if len(values) > 1 else 1)
         return _Relation(inner, node, Fraction(1), shift if call.name == "shiftSample" else -shift)
 
@@ -218,14 +269,22 @@ class ClockInference:
                 self._propagate(rates, relation)
         for node, where in self._clocked.items():
             if self._find(node) not in rates:
-                raise_model_error("the clock of this equation is not determined; write sample(u, Clock(0.1))", where)
+                raise_model_error(
+                    "the clock of this equation is not determined; write sample(u, Clock(0.1))",
+                    where,
+                )
         return rates
 
-    def _set(self, rates: dict[str, Rate], node: str, rate: Rate, where: SourceLocation | None) -> None:
+    def _set(
+        self, rates: dict[str, Rate], node: str, rate: Rate, where: SourceLocation | None
+    ) -> None:
         if rate.offset < 0:
             raise_model_error("backSample() begins before the clock of its argument", where)
         if (known := rates.setdefault(self._find(node), rate)) != rate:
-            raise_model_error(f"this equation has two clocks: {known} and {rate}; convert one with subSample()", where)
+            raise_model_error(
+                f"this equation has two clocks: {known} and {rate}; convert one with subSample()",
+                where,
+            )
 
     def _propagate(self, rates: dict[str, Rate], relation: _Relation) -> None:
         first, second = (rates.get(self._find(node)) for node in (relation.first, relation.second))
@@ -238,7 +297,9 @@ class ClockInference:
             self._set(rates, relation.second, Rate(first.period * relation.scale, shifted), where)
         elif second:
             period = second.period / relation.scale
-            self._set(rates, relation.first, Rate(period, second.offset - relation.shift * period), where)
+            self._set(
+                rates, relation.first, Rate(period, second.offset - relation.shift * period), where
+            )
 
     def _refuse_continuous(self) -> None:
         for node, name, where in self._continuous:

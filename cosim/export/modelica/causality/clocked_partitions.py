@@ -1,7 +1,8 @@
 """Replacement of clocked equations by equations and when-clauses with `sample(start, period)`.
 
-All variables of a clocked partition keep their values between ticks if the values from other partitions and from the previous
-tick do. Therefore only these become variables that a when-clause sets at a tick; the clocked equations remain equations.
+All variables of a clocked partition keep their values between ticks if the values from other
+partitions and from the previous tick do. Therefore only these become variables that a when-clause
+sets at a tick; the clocked equations remain equations.
 """
 
 from __future__ import annotations
@@ -28,7 +29,16 @@ from ..model.syntax_tree import (
     referenced_variable,
 )
 from ..model.traversal import has_builtin, variable_names
-from .clock_inference import CLOCKED_OPERATORS, SECTIONS, ClockInference, Rate, is_clock, is_clocked_when, is_sampler, samplers
+from .clock_inference import (
+    CLOCKED_OPERATORS,
+    SECTIONS,
+    ClockInference,
+    Rate,
+    is_clock,
+    is_clocked_when,
+    is_sampler,
+    samplers,
+)
 from .jumps import JumpSearch
 
 
@@ -42,7 +52,10 @@ def resolve_clocks(model: Model) -> Model:
         InputError: A clock is not determined, contradictory or not supported.
     """
     sections = tuple(getattr(model, section) for section in SECTIONS)
-    if not has_builtin(sections, *CLOCKED_OPERATORS) and next(samplers(sections, model), None) is None:
+    if (
+        not has_builtin(sections, *CLOCKED_OPERATORS)
+        and next(samplers(sections, model), None) is None
+    ):
         return model
     return _Replacement(model).model()
 
@@ -65,17 +78,24 @@ class _Replacement:
         self._jumps = JumpSearch(model)
         self._limits: list[Equation] = []
         sections = tuple(getattr(model, section) for section in SECTIONS)
-        #: true if a sampled value can depend on a held one, so that held values have their start values at the initialization
-        self._has_limits = any(self._jumps.may_jump(call.arguments[0]) for call in samplers(sections, model))
+        #: true if a sampled value can depend on a held one, so that held values have their start
+        #: values at the initialization
+        self._has_limits = any(
+            self._jumps.may_jump(call.arguments[0]) for call in samplers(sections, model)
+        )
 
     def model(self) -> Model:
         """Return the translated model."""
         changed: dict[str, list[Any]] = {section: [] for section in SECTIONS}
         for node, item in self._clocks.items():
-            if isinstance(item, Equation) and (is_clock(item.left, self._model) or is_clock(item.right, self._model)):
+            if isinstance(item, Equation) and (
+                is_clock(item.left, self._model) or is_clock(item.right, self._model)
+            ):
                 continue
             changed[node.partition(" ")[0]].append(self._translate(node, item))
-        whens = [When(((self._condition(*key), tuple(body)),)) for key, body in self._bodies.items()]
+        whens = [
+            When(((self._condition(*key), tuple(body)),)) for key, body in self._bodies.items()
+        ]
         sections: dict[str, Any] = {section: tuple(items) for section, items in changed.items()}
         sections["whens"] += tuple(whens)
         sections["equations"] += tuple(self._limits)
@@ -85,16 +105,32 @@ class _Replacement:
         """Return the tree of a node without clocked operators."""
         if isinstance(tree, tuple) and not isinstance(tree, SourceLocation):
             return tuple(self._translate(node, item) for item in tree)
-        if isinstance(tree, Builtin) and (tree.name in CLOCKED_OPERATORS or is_sampler(tree, self._model)):
+        if isinstance(tree, Builtin) and (
+            tree.name in CLOCKED_OPERATORS or is_sampler(tree, self._model)
+        ):
             return self._operator(node, tree)
         if is_clocked_when(tree, self._model):
             return self._translate_when(node, tree)
         if not is_dataclass(tree) or isinstance(tree, type):
             return tree
-        return replace(tree, **{field.name: self._translate(node, getattr(tree, field.name)) for field in fields(tree)})
+        return replace(
+            tree,
+            **{
+                field.name: self._translate(node, getattr(tree, field.name))
+                for field in fields(tree)
+            },
+        )
 
     def _translate_when(self, node: str, when: When) -> When:
-        return When(((self._condition(self._rate(node), True), self._translate(node, when.branches[0][1])),), when.where)
+        return When(
+            (
+                (
+                    self._condition(self._rate(node), True),
+                    self._translate(node, when.branches[0][1]),
+                ),
+            ),
+            when.where,
+        )
 
     def _rate(self, node: str) -> Rate:
         rate = self._clocks.rate(node)
@@ -104,7 +140,11 @@ class _Replacement:
     def _operator(self, node: str, call: Builtin) -> Expression:
         if call.name == "interval":
             period = self._rate(node).period
-            return Literal(float(period), "Real") if period else raise_model_error("the clock has no fixed interval", call.where)
+            return (
+                Literal(float(period), "Real")
+                if period
+                else raise_model_error("the clock has no fixed interval", call.where)
+            )
         if call.name == "firstTick":
             return Binary("<=", self._count(self._rate(node)), Literal(1, "Integer"))
         if call.name == "previous":
@@ -117,20 +157,40 @@ class _Replacement:
         if limited:
             value = self._left_limit(value, call)
         if call.name == "hold":
-            return self._hold(self._rate(inner), value, call, with_start=True, at_start=not self._has_limits)
+            return self._hold(
+                self._rate(inner), value, call, with_start=True, at_start=not self._has_limits
+            )
         if call.name == "backSample":  # the start value until the first tick of the argument
             value = self._hold(self._rate(inner), value, call, with_start=True)
-        return self._hold(self._rate(node), value, call, with_start=call.name != "sample", at_start=not limited)
+        return self._hold(
+            self._rate(node), value, call, with_start=call.name != "sample", at_start=not limited
+        )
 
     def _condition(self, rate: Rate, at_start: bool) -> Expression:
-        """Return the condition of a when-clause at the ticks of a clock, `at_start`: also at the initialization."""
-        if rate.condition:  # a clock with a condition that depends on its own ticks acts in the next evaluation of the event
-            return Builtin("pre", (rate.condition,)) if self._jumps.is_held(rate.condition) else rate.condition
-        tick = Builtin("sample", (Literal(float(rate.offset), "Real"), Literal(float(rate.period), "Real")))
+        """Return the condition of a when-clause at the ticks of a clock, `at_start`.
+
+        Also at the initialization.
+        """
+        # a clock with a condition that depends on its own ticks acts in the next evaluation of the
+        # event
+        if rate.condition:
+            return (
+                Builtin("pre", (rate.condition,))
+                if self._jumps.is_held(rate.condition)
+                else rate.condition
+            )
+        tick = Builtin(
+            "sample", (Literal(float(rate.offset), "Real"), Literal(float(rate.period), "Real"))
+        )
         return Array((Builtin("initial", ()), tick)) if at_start and rate.offset == 0 else tick
 
-    def _hold(self, rate: Rate, value: Expression, call: Builtin, with_start: bool, at_start: bool = True) -> Name:
-        """Return the variable with the value at the last tick; `at_start`: the initialization sets it, too."""
+    def _hold(
+        self, rate: Rate, value: Expression, call: Builtin, with_start: bool, at_start: bool = True
+    ) -> Name:
+        """Return the variable with the value at the last tick.
+
+        `at_start`: the initialization sets it, too.
+        """
         if (rate, value) not in self._held:
             template = self._template(value, call)
             name = self._declare(f"$clocked {len(self._held) + 1}", template, with_start)
@@ -142,7 +202,9 @@ class _Replacement:
         """Return a variable with the value of an expression before the event."""
         template = self._template(value, call)
         sampled = self._declare(f"{SAMPLED}{len(self._limits)}", template, with_start=False)
-        self._variables[sampled.name] = replace(self._variables[sampled.name], variability=template.variability)
+        self._variables[sampled.name] = replace(
+            self._variables[sampled.name], variability=template.variability
+        )
         limit = self._declare(f"$limit {len(self._limits)}", template, with_start=False)
         before = Builtin("pre", (sampled,), call.where)
         self._limits += [Equation(sampled, value, call.where), Equation(limit, before, call.where)]
@@ -166,7 +228,9 @@ class _Replacement:
         """Return the variable with the number of ticks, at most 2."""
         if rate not in self._ticks:
             template = replace(self._real(), type="Integer", variability="discrete")
-            ticks = self._ticks[rate] = self._declare(f"$ticks {len(self._ticks) + 1}", template, with_start=False)
+            ticks = self._ticks[rate] = self._declare(
+                f"$ticks {len(self._ticks) + 1}", template, with_start=False
+            )
             number = Binary("+", Builtin("pre", (ticks,)), Literal(1, "Integer"))
             body = Assign(ticks, Builtin("min", (number, Literal(2, "Integer"))))
             self._bodies.setdefault((rate, False), []).append(body)
@@ -174,7 +238,9 @@ class _Replacement:
 
     def _declare(self, name: str, template: Variable, with_start: bool) -> Name:
         variable = internal_variable(template, name)
-        self._variables[name] = replace(variable, variability="discrete", start=template.start if with_start else None)
+        self._variables[name] = replace(
+            variable, variability="discrete", start=template.start if with_start else None
+        )
         return Name(name)
 
     def _template(self, value: Expression, call: Builtin) -> Variable:
@@ -182,11 +248,21 @@ class _Replacement:
         if isinstance(value, Name) and value.name in self._variables:
             return self._variables[value.name]
         if isinstance(value, Index):
-            if any(isinstance(each, Colon | Range) or variable_names(each) for each in value.subscripts):
-                raise_model_error(f"{call.name}() takes a variable or an element of an array", call.where)
+            if any(
+                isinstance(each, Colon | Range) or variable_names(each) for each in value.subscripts
+            ):
+                raise_model_error(
+                    f"{call.name}() takes a variable or an element of an array", call.where
+                )
             return replace(self._variables[referenced_variable(value)], shape=(), start=None)
         return self._real()
 
     def _real(self) -> Variable:
         template = next(iter(self._model.variables.values()))
-        return replace(internal_variable(template, ""), type="Real", shape=(), enumeration="", variability="continuous")
+        return replace(
+            internal_variable(template, ""),
+            type="Real",
+            shape=(),
+            enumeration="",
+            variability="continuous",
+        )

@@ -1,7 +1,7 @@
 """Solution of the continuous equations and of the initial equations of a model.
 
-Models whose equations all have a variable alone on one side keep their array equations. For all others the equations are split
-into scalar ones and solved in general form (`equation_systems`).
+Models whose equations all have a variable alone on one side keep their array equations. For all
+others the equations are split into scalar ones and solved in general form (`equation_systems`).
 """
 
 from __future__ import annotations
@@ -20,7 +20,9 @@ from .matching import ScalarKey, is_input, match_equations, match_initial_equati
 Solution = Assign | Solve | For
 
 
-def solve_equations(model: Model, assigned: Collection[str]) -> tuple[Sequence[Solution], set[ScalarKey]]:
+def solve_equations(
+    model: Model, assigned: Collection[str]
+) -> tuple[Sequence[Solution], set[ScalarKey]]:
     """Solve the continuous equations for the variables that nothing else defines.
 
     Args:
@@ -28,7 +30,8 @@ def solve_equations(model: Model, assigned: Collection[str]) -> tuple[Sequence[S
         assigned: The continuous states and the variables that when-clauses and algorithms assign.
 
     Returns:
-        The solved equations, and the relations in algebraic loops, which keep their value in an evaluation of the equations.
+        The solved equations, and the relations in algebraic loops, which keep their value in an
+        evaluation of the equations.
 
     Raises:
         InputError: The equations do not determine the variables.
@@ -39,16 +42,27 @@ def solve_equations(model: Model, assigned: Collection[str]) -> tuple[Sequence[S
         explicit = None
     if explicit is not None and not _has_loop(model, explicit):
         return explicit, set()
-    known = {v.name for v in model.variables.values() if v.variability in ("constant", "parameter") or is_input(v)}
+    known = {
+        v.name
+        for v in model.variables.values()
+        if v.variability in ("constant", "parameter") or is_input(v)
+    }
     known |= set(assigned) | _previous_values(model)
     system = EquationSystem(model, model.equations, _keys(model, set(model.variables) - known))
     return system.solve(), system.held
 
 
 def _has_loop(model: Model, statements: Sequence[Assign]) -> bool:
-    writers = {key: k for k, s in enumerate(statements) for key in scalar_keys(model.variables, s.target)}
+    writers = {
+        key: k for k, s in enumerate(statements) for key in scalar_keys(model.variables, s.target)
+    }
     reads = [
-        {writers[key] for item in read_references(s) for key in scalar_keys(model.variables, item) if key in writers}
+        {
+            writers[key]
+            for item in read_references(s)
+            for key in scalar_keys(model.variables, item)
+            if key in writers
+        }
         for s in statements
     ]
     return any(len(component) > 1 for component in strongly_connected_components(reads)) or any(
@@ -57,12 +71,15 @@ def _has_loop(model: Model, statements: Sequence[Assign]) -> bool:
 
 
 def solve_initial_equations(
-    model: Model, assigned: Collection[str], continuous: Sequence[Solution], written: Collection[ScalarKey]
+    model: Model,
+    assigned: Collection[str],
+    continuous: Sequence[Solution],
+    written: Collection[ScalarKey],
 ) -> tuple[Sequence[Solution], set[ScalarKey]]:
     """Solve the continuous and the initial equations for the values at the start.
 
-    States, variables that when-clauses assign, and values before the initialization have their start values unless an initial
-    equation determines them.
+    States, variables that when-clauses assign, and values before the initialization have their
+    start values unless an initial equation determines them.
 
     Args:
         model: The flat model.
@@ -83,7 +100,11 @@ def solve_initial_equations(
             explicit = None
         if explicit is not None and all(isinstance(s, Assign) for s in continuous):
             return [*continuous, *explicit], set()
-    known = {v.name for v in model.variables.values() if v.variability in ("constant", "parameter") or is_input(v)}
+    known = {
+        v.name
+        for v in model.variables.values()
+        if v.variability in ("constant", "parameter") or is_input(v)
+    }
     fixed = {name for name in model.states if model.variables[name].fixed}
     started = (set(assigned) | _previous_values(model)) - fixed
     optional = _keys(model, started) - set(written)
@@ -106,7 +127,11 @@ def solve_initial_equations(
 
 
 def _solved_keys(model: Model, statement: Solution) -> set[ScalarKey]:
-    return {key for target in assigned_references(statement) for key in scalar_keys(model.variables, target)}
+    return {
+        key
+        for target in assigned_references(statement)
+        for key in scalar_keys(model.variables, target)
+    }
 
 
 def _previous_values(model: Model) -> set[str]:

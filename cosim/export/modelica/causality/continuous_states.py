@@ -1,4 +1,7 @@
-"""Continuous states: replacement of der(x) by a variable with the name "der(x)", which an equation must define."""
+"""Continuous states.
+
+Replacement of der(x) by a variable with the name "der(x)", which an equation must define.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +10,25 @@ from dataclasses import replace
 from typing import Any
 
 from ..model.flat_model import Model, Variable, derivative_name, internal_variable
-from ..model.syntax_tree import Builtin, Expression, Index, Name, raise_model_error, referenced_variable
+from ..model.syntax_tree import (
+    Builtin,
+    Expression,
+    Index,
+    Name,
+    raise_model_error,
+    referenced_variable,
+)
 from ..model.traversal import rewrite, walk
 from .matching import is_input
 
-_SECTIONS = ("equations", "whens", "algorithms", "asserts", "initial_equations", "initial_algorithms")
+_SECTIONS = (
+    "equations",
+    "whens",
+    "algorithms",
+    "asserts",
+    "initial_equations",
+    "initial_algorithms",
+)
 
 
 def introduce_derivatives(model: Model) -> Model:
@@ -26,7 +43,12 @@ def introduce_derivatives(model: Model) -> Model:
     states = tuple(name for name in model.variables if name in der_calls)
     return replace(
         model,
-        variables={**model.variables, **{derivative_name(name): derivative_variable(model.variables[name]) for name in states}},
+        variables={
+            **model.variables,
+            **{
+                derivative_name(name): derivative_variable(model.variables[name]) for name in states
+            },
+        },
         states=states,
         **{section: rewrite(getattr(model, section), _replace_der) for section in _SECTIONS},
     )
@@ -41,17 +63,31 @@ def _der_calls(model: Model) -> Iterator[tuple[str, Builtin]]:
 
 def _der_argument(call: Builtin) -> Name | Index:
     (argument,) = call.arguments
-    if not (isinstance(argument, Name) or (isinstance(argument, Index) and isinstance(argument.base, Name))):
+    if not (
+        isinstance(argument, Name)
+        or (isinstance(argument, Index) and isinstance(argument.base, Name))
+    ):
         raise_model_error(
-            "der() of an expression is not supported; declare a variable x for the expression and use der(x)", call.where
+            (
+                "der() of an expression is not supported; declare a variable x for the expression "
+                "and use der(x)"
+            ),
+            call.where,
         )
     return argument
 
 
 def _check_state(model: Model, name: str, call: Builtin) -> None:
     variable = model.variables.get(name)
-    if variable is None or variable.type != "Real" or variable.variability != "continuous" or is_input(variable):
-        raise_model_error(f"der({name}): {name} is not a continuous Real variable of the model", call.where)
+    if (
+        variable is None
+        or variable.type != "Real"
+        or variable.variability != "continuous"
+        or is_input(variable)
+    ):
+        raise_model_error(
+            f"der({name}): {name} is not a continuous Real variable of the model", call.where
+        )
 
 
 def derivative_variable(state: Variable) -> Variable:

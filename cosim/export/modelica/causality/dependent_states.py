@@ -1,7 +1,8 @@
 """Variables in der() that equations determine, for example the input of a derivative block.
 
-Such a variable is not a continuous state. Its derivative is computed from the derivative of the equation that determines it, and
-of the equations that determine the variables therein (Pantelides' algorithm with dummy derivatives).
+Such a variable is not a continuous state. Its derivative is computed from the derivative of the
+equation that determines it, and of the equations that determine the variables therein (Pantelides'
+algorithm with dummy derivatives).
 """
 
 from __future__ import annotations
@@ -9,7 +10,14 @@ from __future__ import annotations
 from dataclasses import replace
 
 from ..model.flat_model import Equation, Model, Variable, derivative_name
-from ..model.syntax_tree import Expression, Index, Literal, Name, raise_model_error, referenced_variable
+from ..model.syntax_tree import (
+    Expression,
+    Index,
+    Literal,
+    Name,
+    raise_model_error,
+    referenced_variable,
+)
 from ..model.traversal import assigned_references, variable_names
 from .continuous_states import derivative_variable
 from .differentiation import Differentiation
@@ -26,7 +34,10 @@ def reduce_states(model: Model) -> Model:
         InputError: The derivative of an input is needed, or an expression cannot be differentiated.
     """
     for _ in range(_MAX_ROUNDS if model.states else 0):
-        assigned = {referenced_variable(target) for target in assigned_references((model.whens, model.algorithms))}
+        assigned = {
+            referenced_variable(target)
+            for target in assigned_references((model.whens, model.algorithms))
+        }
         assigned |= model.initialized
         system = _system(model, assigned)
         matched = system.matching()
@@ -38,20 +49,39 @@ def reduce_states(model: Model) -> Model:
 
 
 def _system(model: Model, assigned: set[str]) -> EquationSystem:
-    known = {v.name for v in model.variables.values() if v.variability in ("constant", "parameter") or is_input(v)} | assigned
-    keys = [key for name in model.variables if name not in known for key in scalar_keys(model.variables, Name(name))]
+    known = {
+        v.name
+        for v in model.variables.values()
+        if v.variability in ("constant", "parameter") or is_input(v)
+    } | assigned
+    keys = [
+        key
+        for name in model.variables
+        if name not in known
+        for key in scalar_keys(model.variables, Name(name))
+    ]
     groups: list[list[ScalarKey]] = [[], [], []]
     for key in keys:
         if key[0] in model.states:
             variable = model.variables[key[0]]
             groups[2 if variable.shape else bool(variable.fixed)].append(key)
-    return EquationSystem(model, model.equations, {key for key in keys if key[0] not in model.states}, groups)
+    return EquationSystem(
+        model, model.equations, {key for key in keys if key[0] not in model.states}, groups
+    )
 
 
 class _Reduction:
-    def __init__(self, model: Model, system: EquationSystem, matched: dict[int, ScalarKey], assigned: set[str]):
+    def __init__(
+        self,
+        model: Model,
+        system: EquationSystem,
+        matched: dict[int, ScalarKey],
+        assigned: set[str],
+    ):
         self._model, self._system = model, system
-        self._equation_of = {key: system.scalar_equations[number] for number, key in matched.items()}
+        self._equation_of = {
+            key: system.scalar_equations[number] for number, key in matched.items()
+        }
         self._assigned = assigned
         self._variables = dict(model.variables)
         self._differentiate = Differentiation(model.functions, self._derivative)
@@ -63,7 +93,8 @@ class _Reduction:
         for name in names:
             if not scalar_keys(self._model.variables, Name(name)) <= dependent:
                 raise_model_error(
-                    f"only some elements of the state {name} are determined by equations", self._model.variables[name].where
+                    f"only some elements of the state {name} are determined by equations",
+                    self._model.variables[name].where,
                 )
         self._refuse_nonlinear_constraints(dependent)
         self._pending = sorted(dependent)
@@ -75,7 +106,9 @@ class _Reduction:
             done.add(key)
             equations.append(self._differentiated(key))
         states = tuple(name for name in self._model.states if name not in names)
-        return replace(self._model, variables=self._variables, states=states, equations=tuple(equations))
+        return replace(
+            self._model, variables=self._variables, states=states, equations=tuple(equations)
+        )
 
     def _refuse_nonlinear_constraints(self, dependent: set[ScalarKey]) -> None:
         """Raise InputError if an equation between states cannot be solved for one of them at all times."""
@@ -84,8 +117,10 @@ class _Reduction:
             names = variable_names((equation.left, equation.right)) & set(self._model.states)
             if len(names) > 1 and not self._system.is_linear(equation, key):
                 raise_model_error(
-                    f"this equation relates the states {', '.join(sorted(names))}, and it is not linear in {key[0]}: "
-                    "such an index reduction is not supported; write the model with independent states",
+                    f"this equation relates the states {', '.join(sorted(names))}, and it is not "
+                    f"linear in {key[0]}: "
+                    "such an index reduction is not supported; write the model with independent "
+                    "states",
                     equation.where,
                 )
 
@@ -94,9 +129,12 @@ class _Reduction:
         equation = self._equation_of.get(key)
         if equation is None:
             raise_model_error(
-                f"the derivative of {key[0]} is needed, but no equation gives it", self._model.variables[key[0]].where
+                f"the derivative of {key[0]} is needed, but no equation gives it",
+                self._model.variables[key[0]].where,
             )
-        return Equation(self._differentiate(equation.left), self._differentiate(equation.right), equation.where)
+        return Equation(
+            self._differentiate(equation.left), self._differentiate(equation.right), equation.where
+        )
 
     def _derivative(self, reference: Name | Index) -> Expression | None:
         """Return the derivative of a variable with respect to time."""
@@ -104,10 +142,17 @@ class _Reduction:
         if name == "time":
             return Literal(1.0, "Real")
         variable = self._variables.get(name)
-        if variable is None or variable.type != "Real" or variable.variability != "continuous" or name in self._assigned:
+        if (
+            variable is None
+            or variable.type != "Real"
+            or variable.variability != "continuous"
+            or name in self._assigned
+        ):
             return None
         if is_input(variable):
-            raise_model_error(f"the derivative of the input {name} is needed; filter the input", variable.where)
+            raise_model_error(
+                f"the derivative of the input {name} is needed; filter the input", variable.where
+            )
         whole = derivative_name(name)
         if whole in self._variables:
             target = Name(whole, getattr(reference, "where", None))

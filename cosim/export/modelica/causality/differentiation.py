@@ -78,12 +78,17 @@ _DERIVATIVES: Mapping[str, Callable[[Expression], Expression]] = {
     "log": lambda x: divide(ONE, x),
     "log10": lambda x: divide(Literal(0.4342944819032518, "Real"), x),
     "sqrt": lambda x: divide(Literal(0.5, "Real"), _function("sqrt", x)),
-    "abs": lambda x: If(((Builtin("noEvent", (Binary("<", x, ZERO),)), Literal(-1.0, "Real")),), ONE),
+    "abs": lambda x: If(
+        ((Builtin("noEvent", (Binary("<", x, ZERO),)), Literal(-1.0, "Real")),), ONE
+    ),
 }
 
 
 class Differentiation:
-    """Differentiation of expressions with respect to what `leaf` defines: a variable, or the time."""
+    """Differentiation of expressions with respect to what `leaf` defines.
+
+    A variable, or the time.
+    """
 
     def __init__(self, functions: Mapping[str, Function], leaf: LeafDerivative):
         self._functions = functions
@@ -104,13 +109,18 @@ class Differentiation:
         if isinstance(node, Unary):
             return negate(self(node.operand))
         if isinstance(node, If):
-            return If(tuple((condition, self(value)) for condition, value in node.branches), self(node.otherwise))
+            return If(
+                tuple((condition, self(value)) for condition, value in node.branches),
+                self(node.otherwise),
+            )
         if isinstance(node, Binary):
             return self._binary(node)
         if isinstance(node, Call) and (inlined := inline_call(node, self._functions)) is not None:
             return self(inlined)
         if not isinstance(node, Builtin):
-            raise_model_error("this expression cannot be differentiated", getattr(node, "where", None))
+            raise_model_error(
+                "this expression cannot be differentiated", getattr(node, "where", None)
+            )
         return self._builtin(node)
 
     def _binary(self, node: Binary) -> Expression:
@@ -143,7 +153,9 @@ class Differentiation:
             return If(((Builtin("noEvent", (first,)), self(arguments[0])),), self(arguments[1]))
         if node.name == "atan2":
             y, x = arguments
-            return divide(subtract(multiply(x, self(y)), multiply(y, self(x))), add(_square(x), _square(y)))
+            return divide(
+                subtract(multiply(x, self(y)), multiply(y, self(x))), add(_square(x), _square(y))
+            )
         if node.name in ("pre", "sign", "integer", "floor", "ceil"):
             return ZERO
         if node.name not in _DERIVATIVES:

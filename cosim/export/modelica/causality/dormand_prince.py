@@ -4,7 +4,8 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
-#: times of the stages, weights of the slopes of each stage, and those of the error, as fractions of the step
+#: times of the stages, weights of the slopes of each stage, and those of the error, as fractions of
+#: the step
 NODES = (0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0)
 WEIGHTS: Sequence[Sequence[float]] = (
     (),

@@ -1,4 +1,7 @@
-"""Causality of equations in any form: matching of scalar equations, explicit solution, and systems for algebraic loops."""
+"""Causality of equations in any form.
+
+Matching of scalar equations, explicit solution, and systems for algebraic loops.
+"""
 
 from __future__ import annotations
 
@@ -39,7 +42,11 @@ def reference_of(key: ScalarKey, model: Model) -> Name | Index:
     for size in reversed(shape):
         position.insert(0, number % size)
         number //= size
-    return Index(Name(name), tuple(Literal(k + 1, "Integer") for k in position)) if shape else Name(name)
+    return (
+        Index(Name(name), tuple(Literal(k + 1, "Integer") for k in position))
+        if shape
+        else Name(name)
+    )
 
 
 class SingularError(InputError):
@@ -47,7 +54,8 @@ class SingularError(InputError):
 
     Attributes:
         undetermined: Variables that no equation determines, with the places of their declarations.
-        surplus: Places of the equations that determine no variable, with the variables that they contain.
+        surplus: Places of the equations that determine no variable, with the variables that they
+            contain.
     """
 
     def __init__(
@@ -74,14 +82,18 @@ class EquationSystem:
     model: Model
     equations: Sequence[Equation]
     unknowns: Collection[ScalarKey]
-    #: groups of unknowns that have a value if no equation is needed for them, for example start values
+    #: groups of unknowns that have a value if no equation is needed for them, for example start
+    #: values
     optional: Sequence[Collection[ScalarKey]] = ()
-    #: true to solve equations with homotopy(actual, simplified) in steps from the simplified to the actual ones
+    #: true to solve equations with homotopy(actual, simplified) in steps from the simplified to the
+    #: actual ones
     continues: bool = False
 
     def __post_init__(self) -> None:
         splitter = EquationSplitter(self.model)
-        self._scalar = [scalar for equation in self.equations for scalar in splitter.split(equation)]
+        self._scalar = [
+            scalar for equation in self.equations for scalar in splitter.split(equation)
+        ]
         self._all = set(self.unknowns).union(*self.optional)
         self._incidence = [self._keys(equation) for equation in self._scalar]
         relations = self.model.hybrid.relations if self.model.hybrid else ()
@@ -99,7 +111,10 @@ class EquationSystem:
         return self._system([equation], [key]).linear
 
     def matching(self) -> dict[int, ScalarKey]:
-        """Return the unknown that each scalar equation determines; equations without one are missing."""
+        """Return the unknown that each scalar equation determines.
+
+        Equations without one are missing.
+        """
         return match([self._preferences(k) for k in range(len(self._scalar))], self.optional)
 
     def solve(self) -> list[Assign | Solve | For]:
@@ -113,30 +128,52 @@ class EquationSystem:
         numbers = sorted(matched)
         owner = {matched[number]: k for k, number in enumerate(numbers)}
         successors = [
-            {owner[key] for key in self._incidence[n] if key in owner and owner[key] != k} for k, n in enumerate(numbers)
+            {owner[key] for key in self._incidence[n] if key in owner and owner[key] != k}
+            for k, n in enumerate(numbers)
         ]
         components = strongly_connected_components(successors)
         if loops := {
-            key for c in components if len(c) > 1 for key in (matched[numbers[k]] for k in c) if key[0] in self._relations
+            key
+            for c in components
+            if len(c) > 1
+            for key in (matched[numbers[k]] for k in c)
+            if key[0] in self._relations
         }:
             self.held |= loops
-            successors = [{k for k in nodes if matched[numbers[k]] not in loops} for nodes in successors]
+            successors = [
+                {k for k in nodes if matched[numbers[k]] not in loops} for nodes in successors
+            ]
             components = strongly_connected_components(successors)
-        return [self._solve_component([numbers[k] for k in component], matched) for component in components]
+        return [
+            self._solve_component([numbers[k] for k in component], matched)
+            for component in components
+        ]
 
     def _keys(self, equation: Equation) -> list[ScalarKey]:
         """Return the unknowns that an equation contains."""
         references = read_references((equation.left, equation.right))
-        keys = {key for reference in references for key in scalar_keys(self.model.variables, reference)}
+        keys = {
+            key for reference in references for key in scalar_keys(self.model.variables, reference)
+        }
         return sorted(keys & self._all)
 
     def _preferences(self, number: int) -> list[ScalarKey]:
-        """Return the unknowns for which an equation can be solved; those that stand alone on one side are first."""
+        """Return the unknowns for which an equation can be solved.
+
+        Those that stand alone on one side are first.
+        """
         equation = self._scalar[number]
         alone = [
-            key for side in (equation.left, equation.right) for key in self._key_of(side) if self._is_free_of(key, side, equation)
+            key
+            for side in (equation.left, equation.right)
+            for key in self._key_of(side)
+            if self._is_free_of(key, side, equation)
         ]
-        others = [key for key in self._incidence[number] if key not in alone and not self._is_discrete(key)]
+        others = [
+            key
+            for key in self._incidence[number]
+            if key not in alone and not self._is_discrete(key)
+        ]
         return [*dict.fromkeys(alone), *others]
 
     def _key_of(self, side: Expression) -> set[ScalarKey]:
@@ -145,27 +182,42 @@ class EquationSystem:
 
     def _is_free_of(self, key: ScalarKey, side: Expression, equation: Equation) -> bool:
         other = equation.right if side is equation.left else equation.left
-        return not any(key in scalar_keys(self.model.variables, reference) for reference in read_references(other))
+        return not any(
+            key in scalar_keys(self.model.variables, reference)
+            for reference in read_references(other)
+        )
 
     def _is_discrete(self, key: ScalarKey) -> bool:
         return self.model.variables[key[0]].type in _DISCRETE_TYPES
 
     def _check(self, matched: dict[int, ScalarKey]) -> None:
         missing = set(self.unknowns) - set(matched.values())
-        surplus = [equation for number, equation in enumerate(self._scalar) if number not in matched]
+        surplus = [
+            equation for number, equation in enumerate(self._scalar) if number not in matched
+        ]
         if surplus or missing:
-            variables = [(name, self.model.variables[name].where) for name in sorted({name for name, _ in missing})]
-            equations = [(each.where, sorted({name for name, _ in self._keys(each)})) for each in surplus]
+            variables = [
+                (name, self.model.variables[name].where)
+                for name in sorted({name for name, _ in missing})
+            ]
+            equations = [
+                (each.where, sorted({name for name, _ in self._keys(each)})) for each in surplus
+            ]
             raise SingularError(variables, equations)
 
-    def _solve_component(self, numbers: list[int], matched: dict[int, ScalarKey]) -> Assign | Solve | For:
+    def _solve_component(
+        self, numbers: list[int], matched: dict[int, ScalarKey]
+    ) -> Assign | Solve | For:
         if len(numbers) == 1:
             return self._solve_scalar(self._scalar[numbers[0]], matched[numbers[0]])
         keys = [matched[number] for number in numbers]
         if discrete := [key for key in keys if self._is_discrete(key)]:
             chain = ", ".join(sorted({name for name, _ in keys}))
             raise_model_error(
-                f"algebraic loop with the discrete variable {discrete[0][0]}: {chain}; break it with pre()",
+                (
+                    f"algebraic loop with the discrete variable {discrete[0][0]}: {chain}; break "
+                    "it with pre()"
+                ),
                 self._scalar[numbers[0]].where,
             )
         return self._continued([self._scalar[number] for number in numbers], keys)
@@ -180,7 +232,9 @@ class EquationSystem:
             if not (isinstance(node, Builtin) and node.name == "homotopy"):
                 return node
             actual, simplified = node.arguments
-            return Binary("+", simplified, Binary("*", part, Binary("-", actual, simplified, node.where)))
+            return Binary(
+                "+", simplified, Binary("*", part, Binary("-", actual, simplified, node.where))
+            )
 
         system = self._system(rewrite(tuple(equations), mix), keys)
         steps = Range(Literal(0, "Integer"), None, Literal(_CONTINUATION_STEPS, "Integer"))
@@ -210,9 +264,14 @@ class EquationSystem:
 
     def _system(self, equations: Sequence[Equation], keys: Sequence[ScalarKey]) -> Solve:
         residuals = tuple(subtract(equation.left, equation.right) for equation in equations)
-        jacobian = tuple(tuple(self._derivative(residual, key) for key in keys) for residual in residuals)
+        jacobian = tuple(
+            tuple(self._derivative(residual, key) for key in keys) for residual in residuals
+        )
         contained = {
-            key for item in read_references(jacobian) for key in scalar_keys(self.model.variables, item) if key in set(keys)
+            key
+            for item in read_references(jacobian)
+            for key in scalar_keys(self.model.variables, item)
+            if key in set(keys)
         }
         references = tuple(reference_of(key, self.model) for key in keys)
         return Solve(references, residuals, jacobian, not contained, _first_location(equations))
@@ -237,7 +296,11 @@ def _simplified(node: Expression) -> Expression:
     operations = {"+": add, "-": subtract, "*": multiply, "/": divide}
 
     def simplify(item: object) -> object:
-        if isinstance(item, Binary) and item.operator.removeprefix(".") in operations and ZERO in (item.left, item.right):
+        if (
+            isinstance(item, Binary)
+            and item.operator.removeprefix(".") in operations
+            and ZERO in (item.left, item.right)
+        ):
             if item.operator == "/" and item.right == ZERO:
                 return item
             return operations[item.operator.removeprefix(".")](item.left, item.right)

@@ -13,15 +13,23 @@ MAX_PASSES, MAX_EVENTS = 100, 100_000
 
 def iterated_names(hybrid: Hybrid) -> Sequence[str]:
     """Return the variables that can require another evaluation in an event."""
-    return list(dict.fromkeys((*hybrid.iterated, *(relation.name for relation in hybrid.relations))))
+    return list(
+        dict.fromkeys((*hybrid.iterated, *(relation.name for relation in hybrid.relations)))
+    )
 
 
 def endless_reason(hybrid: Hybrid, name: str) -> str:
     """Return the message of an event iteration that does not end, because a variable changes in each evaluation."""
-    condition = next((to_text(relation.condition) for relation in hybrid.relations if relation.name == name), name)
+    condition = next(
+        (to_text(relation.condition) for relation in hybrid.relations if relation.name == name),
+        name,
+    )
     return f"the event iteration does not end: {condition} changes in each evaluation"
 
 
 def chattering_reason(relation: Relation) -> str:
     """Return the message of too many events in a communication step, the last one by this relation."""
-    return f"too many events in one step (chattering): {to_text(relation.condition)} changes again and again"
+    return (
+        f"too many events in one step (chattering): {to_text(relation.condition)} changes again "
+        "and again"
+    )

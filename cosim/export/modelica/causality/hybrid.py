@@ -1,12 +1,16 @@
 """Preparation of models with event iteration.
 
-A model needs it if `pre()` or `sample()` occurs outside when-clauses, or if it has `reinit()`, `delay()`, or comparisons between
-values that change while the states are integrated, or if it uses a library and has states or when-clauses whose conditions change
-with time, or if an initial equation determines `pre()` of a variable that equations determine. In such a model
+A model needs it if `pre()` or `sample()` occurs outside when-clauses, or if it has `reinit()`,
+`delay()`, or comparisons between values that change while the states are integrated, or if it uses
+a library and has states or when-clauses whose conditions change with time, or if an initial
+equation determines `pre()` of a variable that equations determine. In such a model
 
-- `pre(x)` becomes a variable with this name, which holds the value of x before the current evaluation of the equations;
-- a comparison becomes a Boolean variable, which keeps its value between events; its change is an event;
-- a value that floor(), ceil(), integer(), div(), mod() or rem() rounds becomes a variable, which a when-clause changes;
+- `pre(x)` becomes a variable with this name, which holds the value of x before the current
+  evaluation of the equations;
+- a comparison becomes a Boolean variable, which keeps its value between events; its change is an
+  event;
+- a value that floor(), ceil(), integer(), div(), mod() or rem() rounds becomes a variable, which a
+  when-clause changes;
 - the argument of `delay()` becomes a variable, whose past values are stored.
 """
 
@@ -16,7 +20,17 @@ from collections.abc import Callable
 from dataclasses import replace
 from typing import Any
 
-from ..model.flat_model import SAMPLED, Delay, Equation, Hybrid, Model, Relation, Variable, internal_variable, previous_name
+from ..model.flat_model import (
+    SAMPLED,
+    Delay,
+    Equation,
+    Hybrid,
+    Model,
+    Relation,
+    Variable,
+    internal_variable,
+    previous_name,
+)
 from ..model.syntax_tree import (
     Array,
     Assign,
@@ -45,7 +59,14 @@ from ..model.traversal import (
 )
 from .matching import is_input
 
-_SECTIONS = ("equations", "whens", "algorithms", "asserts", "initial_equations", "initial_algorithms")
+_SECTIONS = (
+    "equations",
+    "whens",
+    "algorithms",
+    "asserts",
+    "initial_equations",
+    "initial_algorithms",
+)
 _COMPARISONS = ("<", "<=", ">", ">=")
 _ROUNDINGS = ("floor", "ceil", "integer", "div", "mod", "rem")
 
@@ -59,9 +80,16 @@ def prepare_hybrid(model: Model) -> Model:
 class _Preparation:
     def __init__(self, model: Model):
         self._model = model
-        self._assigned = {referenced_variable(target) for target in assigned_references((model.whens, model.algorithms))}
+        self._assigned = {
+            referenced_variable(target)
+            for target in assigned_references((model.whens, model.algorithms))
+        }
         self._discrete = self._assigned | model.initialized
-        self._discrete |= {v.name for v in model.variables.values() if v.variability != "continuous" or v.type != "Real"}
+        self._discrete |= {
+            v.name
+            for v in model.variables.values()
+            if v.variability != "continuous" or v.type != "Real"
+        }
         self._variables: dict[str, Variable] = dict(model.variables)
         self._relations: list[Relation] = []
         self._delays: list[Delay] = []
@@ -71,22 +99,37 @@ class _Preparation:
 
     def is_needed(self) -> bool:
         """Return whether the model has elements that require event iteration."""
-        outside = tuple(s for body in self._model.algorithms for s in body if not isinstance(s, When))
-        conditions = tuple(
-            c for item in walk((self._model.whens, self._model.algorithms)) if isinstance(item, When) for c, _ in item.branches
+        outside = tuple(
+            s for body in self._model.algorithms for s in body if not isinstance(s, When)
         )
-        if has_builtin((self._model.equations, outside, self._model.asserts), *PRE_OPERATORS, "sample", "delay"):
+        conditions = tuple(
+            c
+            for item in walk((self._model.whens, self._model.algorithms))
+            if isinstance(item, When)
+            for c, _ in item.branches
+        )
+        if has_builtin(
+            (self._model.equations, outside, self._model.asserts), *PRE_OPERATORS, "sample", "delay"
+        ):
             return True
-        if has_builtin(conditions, *PRE_OPERATORS) or any(_is_combined_sample(c) for c in conditions):
+        if has_builtin(conditions, *PRE_OPERATORS) or any(
+            _is_combined_sample(c) for c in conditions
+        ):
             return True
-        if any(isinstance(item, Reinit) for item in walk((self._model.whens, self._model.algorithms))):
+        if any(
+            isinstance(item, Reinit) for item in walk((self._model.whens, self._model.algorithms))
+        ):
             return True
         if _remembered(self._model.initial_equations) - self._assigned:
             return True
-        if self._model.uses_library and (self._model.states or any(self._is_relation(item) for item in walk(conditions))):
+        if self._model.uses_library and (
+            self._model.states or any(self._is_relation(item) for item in walk(conditions))
+        ):
             return True
         comparisons = rewrite_outermost((self._model.equations, conditions), _without_events)
-        return bool(self._model.states) and any(self._is_relation(item) or self._is_rounding(item) for item in walk(comparisons))
+        return bool(self._model.states) and any(
+            self._is_relation(item) or self._is_rounding(item) for item in walk(comparisons)
+        )
 
     def prepare(self) -> Model:
         model = self._model
@@ -95,24 +138,38 @@ class _Preparation:
             sections["equations"] = rewrite_outermost(sections["equations"], self._replace_rounding)
             sections["whens"] = self._in_conditions(sections["whens"], self._replace_rounding)
             sections["equations"] = rewrite_outermost(sections["equations"], self._replace_relation)
-            sections["whens"] = self._in_conditions((*sections["whens"], *self._whens), self._replace_relation)
+            sections["whens"] = self._in_conditions(
+                (*sections["whens"], *self._whens), self._replace_relation
+            )
             sections["algorithms"] = tuple(map(self._in_algorithm, sections["algorithms"]))
         sections["equations"] = (*sections["equations"], *self._equations)
         used = {name for section in sections.values() for name in _remembered(section)}
-        used |= {relation.name for relation in self._relations} | {v.name for v in self._variables.values() if is_input(v)}
+        used |= {relation.name for relation in self._relations} | {
+            v.name for v in self._variables.values() if is_input(v)
+        }
         sections = {name: rewrite(section, self._replace_pre) for name, section in sections.items()}
-        reinitialized = {item.name for item in walk((model.whens, model.algorithms)) if isinstance(item, Reinit)}
+        reinitialized = {
+            item.name for item in walk((model.whens, model.algorithms)) if isinstance(item, Reinit)
+        }
         remembered = tuple(
-            n for n, v in self._variables.items() if n in used | reinitialized and v.variability not in ("constant", "parameter")
+            n
+            for n, v in self._variables.items()
+            if n in used | reinitialized and v.variability not in ("constant", "parameter")
         )
         for name in remembered:
             variable = self._variables[name]
             internal = internal_variable(variable, previous_name(name))
-            self._variables[internal.name] = replace(internal, variability="discrete", start=variable.start)
+            self._variables[internal.name] = replace(
+                internal, variability="discrete", start=variable.start
+            )
         sampled = tuple(n for n in remembered if n.startswith(SAMPLED))
         excluded = {*sampled, *(n for n in remembered if is_input(self._variables[n]))}
-        iterated = tuple(n for n in remembered if n in self._discrete | reinitialized and n not in excluded)
-        relations = tuple(Relation(r.name, rewrite(r.condition, self._replace_pre)) for r in self._relations)
+        iterated = tuple(
+            n for n in remembered if n in self._discrete | reinitialized and n not in excluded
+        )
+        relations = tuple(
+            Relation(r.name, rewrite(r.condition, self._replace_pre)) for r in self._relations
+        )
         hybrid = Hybrid(relations, tuple(self._delays), remembered, iterated, sampled)
         return replace(model, variables=self._variables, hybrid=hybrid, **sections)
 
@@ -125,15 +182,23 @@ class _Preparation:
         return self._changes_between_events((node.left, node.right))
 
     def _changes_between_events(self, node: Any) -> bool:
-        return any(name == "time" or (name in self._variables and name not in self._discrete) for name in variable_names(node))
+        return any(
+            name == "time" or (name in self._variables and name not in self._discrete)
+            for name in variable_names(node)
+        )
 
     @staticmethod
-    def _in_conditions(whens: tuple[When, ...], replacement: Callable[[Any], Any]) -> tuple[When, ...]:
+    def _in_conditions(
+        whens: tuple[When, ...], replacement: Callable[[Any], Any]
+    ) -> tuple[When, ...]:
         """Return when-clauses with conditions in which nodes are replaced."""
         return tuple(
             replace(
                 when,
-                branches=tuple((rewrite_outermost(condition, replacement), body) for condition, body in when.branches),
+                branches=tuple(
+                    (rewrite_outermost(condition, replacement), body)
+                    for condition, body in when.branches
+                ),
             )
             for when in whens
         )
@@ -145,7 +210,9 @@ class _Preparation:
         def change(node: Any) -> Any:
             return node if variable_names(node) & assigned else self._replace_relation(node)
 
-        return tuple(self._in_conditions((s,), change)[0] if isinstance(s, When) else s for s in body)
+        return tuple(
+            self._in_conditions((s,), change)[0] if isinstance(s, When) else s for s in body
+        )
 
     def _replace_relation(self, node: Any) -> Any:
         if _without_events(node) is not None:
@@ -167,7 +234,10 @@ class _Preparation:
     def _declare(self, name: str, type_name: str, is_discrete: bool) -> None:
         template = next(iter(self._model.variables.values()))
         variable = replace(
-            internal_variable(template, name), type=type_name, shape=(), variability="discrete" if is_discrete else "continuous"
+            internal_variable(template, name),
+            type=type_name,
+            shape=(),
+            variability="discrete" if is_discrete else "continuous",
         )
         self._variables[name] = variable
 
@@ -175,7 +245,11 @@ class _Preparation:
 
     def _is_rounding(self, node: Any) -> bool:
         """Return whether a node rounds a value that changes between events."""
-        return isinstance(node, Builtin) and node.name in _ROUNDINGS and self._changes_between_events(node.arguments)
+        return (
+            isinstance(node, Builtin)
+            and node.name in _ROUNDINGS
+            and self._changes_between_events(node.arguments)
+        )
 
     def _replace_rounding(self, node: Any) -> Any:
         if _without_events(node) is not None:
@@ -194,7 +268,11 @@ class _Preparation:
         if node.name != "mod":
             positive = Binary(">=", quotient, Literal(0.0, "Real"), node.where)
             whole = If(((positive, whole),), Unary("-", self._floor(Unary("-", quotient), node)))
-        return whole if node.name == "div" else Binary("-", first, Binary("*", whole, divisor, node.where), node.where)
+        return (
+            whole
+            if node.name == "div"
+            else Binary("-", first, Binary("*", whole, divisor, node.where), node.where)
+        )
 
     def _floor(self, value: Expression, call: Builtin) -> Name:
         """Return the variable with the largest whole number that is not greater than a value."""
@@ -207,7 +285,9 @@ class _Preparation:
         above = Binary(">=", value, Binary("+", before, Literal(1.0, "Real")), call.where)
         below = Binary("<", value, before, call.where)
         body = (Assign(rounded, Builtin("floor", (value,), call.where), call.where),)
-        self._whens.append(When(((Array((Builtin("initial", ()), above, below)), body),), call.where))
+        self._whens.append(
+            When(((Array((Builtin("initial", ()), above, below)), body),), call.where)
+        )
         return rounded
 
     # delay() and pre()
@@ -218,7 +298,9 @@ class _Preparation:
         name = f"$delayed {len(self._delays) + 1}"
         self._add_variable(name, "Real", node.arguments[0])
         self._delays.append(Delay(name, node.arguments[1]))
-        return Builtin("past", (Literal(len(self._delays) - 1, "Integer"), node.arguments[1]), node.where)
+        return Builtin(
+            "past", (Literal(len(self._delays) - 1, "Integer"), node.arguments[1]), node.where
+        )
 
     def _replace_pre(self, node: Any) -> Any:
         if not (isinstance(node, Builtin) and node.name in PRE_OPERATORS):
@@ -227,7 +309,11 @@ class _Preparation:
         previous = self._previous(argument, node)
         if node.name == "pre":
             return previous
-        return Binary("and", argument, Unary("not", previous)) if node.name == "edge" else Binary("<>", argument, previous)
+        return (
+            Binary("and", argument, Unary("not", previous))
+            if node.name == "edge"
+            else Binary("<>", argument, previous)
+        )
 
     def _previous(self, argument: Expression, call: Builtin) -> Expression:
         if isinstance(argument, Literal):
@@ -252,7 +338,8 @@ def delay_number(past: Builtin) -> int:
 def _without_events(node: Any) -> Any:
     """Return the node itself if comparisons in it are no events, else None."""
     if isinstance(node, Builtin) and (
-        node.name == "noEvent" or (node.name == "smooth" and node.arguments[0] != Literal(0, "Integer"))
+        node.name == "noEvent"
+        or (node.name == "smooth" and node.arguments[0] != Literal(0, "Integer"))
     ):
         return Literal(True, "Boolean")
     return None
@@ -260,9 +347,18 @@ def _without_events(node: Any) -> Any:
 
 def _is_combined_sample(condition: Expression) -> bool:
     alternatives = getattr(condition, "elements", (condition,))
-    return any(has_builtin(c, "sample") and not (isinstance(c, Builtin) and c.name == "sample") for c in alternatives)
+    return any(
+        has_builtin(c, "sample") and not (isinstance(c, Builtin) and c.name == "sample")
+        for c in alternatives
+    )
 
 
 def _remembered(section: Any) -> set[str]:
-    calls = (item for item in walk(section) if isinstance(item, Builtin) and item.name in PRE_OPERATORS)
-    return {referenced_variable(call.arguments[0]) for call in calls if isinstance(call.arguments[0], Name | Index)}
+    calls = (
+        item for item in walk(section) if isinstance(item, Builtin) and item.name in PRE_OPERATORS
+    )
+    return {
+        referenced_variable(call.arguments[0])
+        for call in calls
+        if isinstance(call.arguments[0], Name | Index)
+    }

@@ -1,4 +1,7 @@
-"""Interpreter of models with event iteration; it performs the same operations as hybrid.h, past.h and the generated code."""
+"""Interpreter of models with event iteration.
+
+It performs the same operations as hybrid.h, past.h and the generated code.
+"""
 
 from __future__ import annotations
 
@@ -46,7 +49,10 @@ class HybridInterpreter(Interpreter):
         self._event_time = -math.inf
 
     def set(self, name: str, value: Any) -> None:
-        """Set a parameter or an input; a parameter causes an event at the start of the next step."""
+        """Set a parameter or an input.
+
+        A parameter causes an event at the start of the next step.
+        """
         super().set(name, value)
         self._parameters_changed |= self.model.variables[name].variability == "parameter"
 
@@ -96,7 +102,11 @@ class HybridInterpreter(Interpreter):
             at_start = is_tick and tick <= time + slack
             target = tick if is_tick else end
             inputs_first = not at_start or bool(self._hybrid.sampled)
-            if count == 0 and inputs_first and (self._parameters_changed or self._changed(self._inputs)):
+            if (
+                count == 0
+                and inputs_first
+                and (self._parameters_changed or self._changed(self._inputs))
+            ):
                 self._event("step", time, ())
                 self._event_time = -math.inf
             crossing = False
@@ -117,7 +127,11 @@ class HybridInterpreter(Interpreter):
 
     def _raise_chattering(self, time: float) -> NoReturn:
         self.values["time"] = time
-        relations = [r for r in self._hybrid.relations if bool(self.evaluate(r.condition)) != self.values[r.name]]
+        relations = [
+            r
+            for r in self._hybrid.relations
+            if bool(self.evaluate(r.condition)) != self.values[r.name]
+        ]
         raise ComponentError(self.model.name, "step", chattering_reason(relations[-1]), time)
 
     # events
@@ -125,7 +139,9 @@ class HybridInterpreter(Interpreter):
     def _check_passes(self, count: int) -> None:
         if count == MAX_PASSES:
             name = next(name for name in iterated_names(self._hybrid) if self._changed([name]))
-            raise EvaluationError(endless_reason(self._hybrid, name), self.model.variables[name].where)
+            raise EvaluationError(
+                endless_reason(self._hybrid, name), self.model.variables[name].where
+            )
 
     def _event(self, function: str, time: float, due: Sequence[int]) -> None:
         self.values["time"] = time
@@ -134,7 +150,9 @@ class HybridInterpreter(Interpreter):
             self._remember_sampled(time)
             self._remember([name for name in self._hybrid.remembered if name not in self._inputs])
             for count in range(MAX_PASSES + 1):
-                self.evaluate.event_flags.update({("due", k): k in due for k in range(len(self.clocks))})
+                self.evaluate.event_flags.update(
+                    {("due", k): k in due for k in range(len(self.clocks))}
+                )
                 self.evaluate.execute(self.schedule.event)
                 self._check_finite()
                 if not (due or self._changed(self._hybrid.iterated)):
@@ -159,11 +177,16 @@ class HybridInterpreter(Interpreter):
                 self.values[previous_name(name)] = self.get(name)
 
     def _changed(self, names: Sequence[str]) -> bool:
-        return any(not np.array_equal(self.values[name], self.values[previous_name(name)]) for name in names)
+        return any(
+            not np.array_equal(self.values[name], self.values[previous_name(name)])
+            for name in names
+        )
 
     def _record(self, time: float) -> None:
         for past, delay in zip(self._past, self._hybrid.delays, strict=True):
-            past.record(time, self.values[delay.name], self.evaluate(delay.duration) / (PAST_VALUES // 2))
+            past.record(
+                time, self.values[delay.name], self.evaluate(delay.duration) / (PAST_VALUES // 2)
+            )
 
     def _next_ticks(self) -> tuple[Sequence[int], float]:
         """Return the clocks that tick next, and the time of the tick."""
@@ -171,7 +194,9 @@ class HybridInterpreter(Interpreter):
         if not ticks:
             return (), math.inf
         tick = min(ticks)
-        return [k for k, other in enumerate(ticks) if other <= tick + TICK_TOLERANCE * self.clocks[k][1]], tick
+        return [
+            k for k, other in enumerate(ticks) if other <= tick + TICK_TOLERANCE * self.clocks[k][1]
+        ], tick
 
     def _shortest_period(self) -> float:
         return min((period for _, period, _ in self.clocks), default=math.inf)
@@ -203,16 +228,28 @@ class HybridInterpreter(Interpreter):
         self.evaluate.execute(self.schedule.between.indicators)
         changed, differences = False, []
         for relation in self._hybrid.relations:
-            left, right = (float(self.evaluate(side)) for side in (relation.condition.left, relation.condition.right))
+            left, right = (
+                float(self.evaluate(side))
+                for side in (relation.condition.left, relation.condition.right)
+            )
             differences.append(left - right)
-            changed |= _COMPARISONS[relation.condition.operator](left, right) != self.values[relation.name]
+            changed |= (
+                _COMPARISONS[relation.condition.operator](left, right) != self.values[relation.name]
+            )
         return changed, differences
 
-    def _dormand_prince(self, time: float, h: float, start: Sequence[float], slopes: list[list[float]]) -> float:
-        """Advance the states from `start` with the slopes in the first row; return the error as a multiple of the tolerance."""
+    def _dormand_prince(
+        self, time: float, h: float, start: Sequence[float], slopes: list[list[float]]
+    ) -> float:
+        """Advance the states from `start` with the slopes in the first row.
+
+        Return the error as a multiple of the tolerance.
+        """
         del slopes[1:]
         for node, weights in zip(NODES[1:], WEIGHTS[1:], strict=True):
-            self._set_states([x + h * weighted_sum(weights, slopes, i) for i, x in enumerate(start)])
+            self._set_states(
+                [x + h * weighted_sum(weights, slopes, i) for i, x in enumerate(start)]
+            )
             slopes.append(self._slopes(time + node * h))
         largest = 0.0
         for i, (x, y) in enumerate(zip(start, self._get_states(), strict=True)):
@@ -224,7 +261,9 @@ class HybridInterpreter(Interpreter):
         return largest
 
     def _advance(self, start_time: float, end: float) -> tuple[float, bool]:
-        """Integrate to `end` or to the first event; return the time reached, and whether there is an event.
+        """Integrate to `end` or to the first event.
+
+        Return the time reached, and whether there is an event.
 
         The event before has computed the derivatives.
         """
@@ -254,7 +293,9 @@ class HybridInterpreter(Interpreter):
             slopes = [slopes[-1]]
         return time, False
 
-    def _locate(self, time: float, h: float, start: Sequence[float], slopes: list[list[float]]) -> float:
+    def _locate(
+        self, time: float, h: float, start: Sequence[float], slopes: list[list[float]]
+    ) -> float:
         """Return the first time in (time, time + h] after which a relation has changed, with the states of this time."""
         width = max(1e-10, 8 * 2.0**-52 * abs(time + h))
         left, right, after = 0.0, h, self._crossed(time + h)[1]
@@ -267,7 +308,11 @@ class HybridInterpreter(Interpreter):
                 root = left + (right - left) * divide(a, a - b)
                 if left < root < at:
                     at = root
-            at = left + (right - left) / 2 if count % 3 == 2 else at + (-width if side else width) / 2
+            at = (
+                left + (right - left) / 2
+                if count % 3 == 2
+                else at + (-width if side else width) / 2
+            )
             at = min(max(at, left + width / 4), right - width / 4)
             self._dormand_prince(time, at, start, slopes)
             side, differences = self._crossed(time + at)

@@ -1,4 +1,7 @@
-"""Interpreter of a flat model: reference for tests of the generated C code, and evaluation of default values."""
+"""Interpreter of a flat model.
+
+Reference for tests of the generated C code, and evaluation of default values.
+"""
 
 from __future__ import annotations
 
@@ -82,8 +85,12 @@ class Interpreter:
         for clock in self.schedule.clocks:
             start, period = self.evaluate(clock.start), self.evaluate(clock.period)
             if not period > 0:
-                raise ComponentError(self.model.name, "initialize", "the period of sample() must be positive", time)
-            self.clocks.append([start, period, max(0, math.ceil(divide(time - start, period) - TICK_TOLERANCE))])
+                raise ComponentError(
+                    self.model.name, "initialize", "the period of sample() must be positive", time
+                )
+            self.clocks.append(
+                [start, period, max(0, math.ceil(divide(time - start, period) - TICK_TOLERANCE))]
+            )
 
     def step(self, time: float, step_size: float) -> None:
         """Execute all ticks t with time <= t < time + step_size.
@@ -104,7 +111,10 @@ class Interpreter:
             self._evaluate_event("step", end)
 
     def _run_ticks(self, time: float, end: float) -> float:
-        """Execute all ticks in time <= t < end; return the time of the states after the last one."""
+        """Execute all ticks in time <= t < end.
+
+        Return the time of the states after the last one.
+        """
         reached = time
         while self.clocks:
             ticks = [start + count * period for start, period, count in self.clocks]
@@ -120,7 +130,10 @@ class Interpreter:
         return reached
 
     def _integrate(self, start: float, end: float) -> float:
-        """Integrate the states from `start` to `end` in equal steps of at most 5 ms; return the time of the states."""
+        """Integrate the states from `start` to `end` in equal steps of at most 5 ms.
+
+        Return the time of the states.
+        """
         count = math.ceil((end - start) / _MAX_STEP_SIZE - 1e-9) if self.model.states else 0
         if count <= 0:
             return start
@@ -133,9 +146,15 @@ class Interpreter:
         """Integrate one step of the classical Runge-Kutta method of order 4."""
         start = self._state_values()
         k1 = self._evaluate_derivatives(time)
-        k2 = self._evaluate_derivatives(time + h / 2, [x + h / 2 * k for x, k in zip(start, k1, strict=True)])
-        k3 = self._evaluate_derivatives(time + h / 2, [x + h / 2 * k for x, k in zip(start, k2, strict=True)])
-        k4 = self._evaluate_derivatives(time + h, [x + h * k for x, k in zip(start, k3, strict=True)])
+        k2 = self._evaluate_derivatives(
+            time + h / 2, [x + h / 2 * k for x, k in zip(start, k1, strict=True)]
+        )
+        k3 = self._evaluate_derivatives(
+            time + h / 2, [x + h / 2 * k for x, k in zip(start, k2, strict=True)]
+        )
+        k4 = self._evaluate_derivatives(
+            time + h, [x + h * k for x, k in zip(start, k3, strict=True)]
+        )
         for name, x, a, b, c, d in zip(self.model.states, start, k1, k2, k3, k4, strict=True):
             self._assign(name, x + h / 6 * (a + 2 * b + 2 * c + d))
 
@@ -165,14 +184,18 @@ class Interpreter:
 
     def _apply_start_values(self, inputs: bool) -> None:
         for variable in self.model.variables.values():
-            if variable.variability not in ("parameter", "constant") and (inputs or not is_input(variable)):
+            if variable.variability not in ("parameter", "constant") and (
+                inputs or not is_input(variable)
+            ):
                 self._assign(variable.name, self.evaluate(start_value(self.model, variable.name)))
 
     def _evaluate_event(self, function: str, time: float) -> None:
         """Evaluate the equations at an event (`function` "step") or at the initialization ("initialize")."""
         body = self.schedule.event if function == "step" else self.schedule.initialization
         self.values["time"] = time
-        self.evaluate.pre_values = {name: deepcopy(self.values[name]) for name in self._pre_variables[function]}
+        self.evaluate.pre_values = {
+            name: deepcopy(self.values[name]) for name in self._pre_variables[function]
+        }
         with self._as_component_error(function, time):
             self.evaluate.execute(body)
             if function == "step":

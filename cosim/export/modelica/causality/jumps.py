@@ -35,11 +35,26 @@ class JumpSearch:
 
     def __init__(self, model: Model):
         self._model = model
-        calls = (item for item in walk(model.equations) if isinstance(item, Builtin) and item.name == "der")
-        ends = {referenced_variable(call.arguments[0]) for call in calls if variable_names(call.arguments)}
-        ends |= {v.name for v in model.variables.values() if is_input(v) or v.variability in ("parameter", "constant")}
+        calls = (
+            item
+            for item in walk(model.equations)
+            if isinstance(item, Builtin) and item.name == "der"
+        )
+        ends = {
+            referenced_variable(call.arguments[0])
+            for call in calls
+            if variable_names(call.arguments)
+        }
+        ends |= {
+            v.name
+            for v in model.variables.values()
+            if is_input(v) or v.variability in ("parameter", "constant")
+        }
         self._ends = ends
-        self._assigned = {referenced_variable(target) for target in assigned_references((model.whens, model.algorithms))}
+        self._assigned = {
+            referenced_variable(target)
+            for target in assigned_references((model.whens, model.algorithms))
+        }
         self._equations: dict[str, list[Any]] = {}
         for equation in model.equations:
             for name in variable_names(equation):
@@ -65,9 +80,17 @@ class JumpSearch:
 
     def _jumps(self, tree: Any) -> bool:
         names = variable_names(tree) - self._ends
-        discrete = any(name in self._assigned or _is_discrete(name, self._model.variables) for name in names)
-        return discrete or has_builtin(tree, *_JUMPING) or any(isinstance(item, If) for item in walk(tree))
+        discrete = any(
+            name in self._assigned or _is_discrete(name, self._model.variables) for name in names
+        )
+        return (
+            discrete
+            or has_builtin(tree, *_JUMPING)
+            or any(isinstance(item, If) for item in walk(tree))
+        )
 
 
 def _is_discrete(name: str, variables: Mapping[str, Any]) -> bool:
-    return name in variables and (variables[name].type != "Real" or variables[name].variability != "continuous")
+    return name in variables and (
+        variables[name].type != "Real" or variables[name].variability != "continuous"
+    )

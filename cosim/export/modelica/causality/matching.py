@@ -1,6 +1,7 @@
 """Matching: assignment of each continuous equation to the variable that it defines.
 
-Equations are not solved symbolically. Therefore one side must be a variable (`y = f(...)`, or a connection `a = b`).
+Equations are not solved symbolically. Therefore one side must be a variable (`y = f(...)`, or a
+connection `a = b`).
 """
 
 from __future__ import annotations
@@ -10,23 +11,39 @@ from itertools import product
 from math import prod
 
 from ..model.flat_model import Equation, Model, Variable, previous_name
-from ..model.syntax_tree import Assign, Builtin, Colon, Expression, Index, Literal, Name, raise_model_error
+from ..model.syntax_tree import (
+    Assign,
+    Builtin,
+    Colon,
+    Expression,
+    Index,
+    Literal,
+    Name,
+    raise_model_error,
+)
 
 #: a scalar: variable name and row-major index of the element
 ScalarKey = tuple[str, int]
 
 
 def scalar_keys(variables: Mapping[str, Variable], reference: Name | Index) -> set[ScalarKey]:
-    """Return the scalars that a reference denotes; with a non-literal subscript, all elements of the variable."""
+    """Return the scalars that a reference denotes.
+
+    With a non-literal subscript, all elements of the variable.
+    """
     name = reference if isinstance(reference, Name) else reference.base
     if not isinstance(name, Name) or (variable := variables.get(name.name)) is None:
         return set()
     shape = variable.shape
-    if isinstance(reference, Name) or not all(isinstance(s, Literal | Colon) for s in reference.subscripts):
+    if isinstance(reference, Name) or not all(
+        isinstance(s, Literal | Colon) for s in reference.subscripts
+    ):
         return {(name.name, k) for k in range(prod(shape))}
     literals = [int(s.number) - 1 if isinstance(s, Literal) else None for s in reference.subscripts]
     literals += [None] * (len(shape) - len(literals))
-    indices = [range(n) if k is None else range(k, k + 1) for k, n in zip(literals, shape, strict=False)]
+    indices = [
+        range(n) if k is None else range(k, k + 1) for k, n in zip(literals, shape, strict=False)
+    ]
     return {(name.name, _flat_index(index, shape)) for index in product(*indices)}
 
 
@@ -40,8 +57,8 @@ def _flat_index(index: Iterable[int], shape: Iterable[int]) -> int:
 def match_equations(model: Model, assigned: Collection[str]) -> list[Assign]:
     """Match the continuous equations with variables.
 
-    An equation between two variables (`a = b`) defines the one that no other equation defines. It is matched after the other
-    equations have been matched.
+    An equation between two variables (`a = b`) defines the one that no other equation defines. It
+    is matched after the other equations have been matched.
 
     Args:
         model: The flat model.
@@ -77,29 +94,55 @@ def match_equations(model: Model, assigned: Collection[str]) -> list[Assign]:
 
 
 def is_input(variable: Variable) -> bool:
-    """Return whether a variable is an input of the model itself; neither one of a component nor a protected connector."""
+    """Return whether a variable is an input of the model itself.
+
+    Neither one of a component nor a protected connector.
+    """
     return variable.causality == "input" and variable.top_level and not variable.protected
 
 
 def _candidates(model: Model, equation: Equation, defined: Collection[ScalarKey]) -> list[Assign]:
-    """Return the assignments of an undefined variable that are equivalent to the equation: none, one or two."""
+    """Return the assignments of an undefined variable that are equivalent to the equation.
+
+    None, one or two.
+    """
     sides = ((equation.left, equation.right), (equation.right, equation.left))
     return [
         Assign(side, other, equation.where)
         for side, other in sides
-        if isinstance(side, Name | Index) and (keys := scalar_keys(model.variables, side)) and not keys & set(defined)
+        if isinstance(side, Name | Index)
+        and (keys := scalar_keys(model.variables, side))
+        and not keys & set(defined)
     ]
 
 
-def _raise_unmatched(equations: list[Equation], model: Model, defined: Collection[ScalarKey]) -> None:
+def _raise_unmatched(
+    equations: list[Equation], model: Model, defined: Collection[ScalarKey]
+) -> None:
     equation = equations[0]
     if _candidates(model, equation, defined):
-        names = ", ".join(sorted({side.name for e in equations for side in (e.left, e.right) if isinstance(side, Name)}))
+        names = ", ".join(
+            sorted(
+                {
+                    side.name
+                    for e in equations
+                    for side in (e.left, e.right)
+                    if isinstance(side, Name)
+                }
+            )
+        )
         raise_model_error(
-            f"these variables are only connected to each other, no equation gives them a value: {names}", equation.where
+            (
+                "these variables are only connected to each other, no equation gives them a "
+                f"value: {names}"
+            ),
+            equation.where,
         )
     raise_model_error(
-        "this equation defines no variable: one side must be a variable, or der() of one, that no other equation defines",
+        (
+            "this equation defines no variable: one side must be a variable, or der() of one, that "
+            "no other equation defines"
+        ),
         equation.where,
     )
 
@@ -129,12 +172,19 @@ def match_initial_equations(model: Model, assigned: Collection[str]) -> list[Ass
 def _initial_assignment(model: Model, equation: Equation, assigned: Collection[str]) -> Assign:
     assignments = []
     for side, other in ((equation.left, equation.right), (equation.right, equation.left)):
-        target: Expression = side.arguments[0] if isinstance(side, Builtin) and side.name == "pre" else side
-        if isinstance(target, Name | Index) and {name for name, _ in scalar_keys(model.variables, target)} & set(assigned):
+        target: Expression = (
+            side.arguments[0] if isinstance(side, Builtin) and side.name == "pre" else side
+        )
+        if isinstance(target, Name | Index) and {
+            name for name, _ in scalar_keys(model.variables, target)
+        } & set(assigned):
             assignments.append(Assign(target, other, equation.where))
     if not assignments:
         raise_model_error(
-            "one side of an initial equation must be a continuous state, or a variable that a when-clause assigns",
+            (
+                "one side of an initial equation must be a continuous state, or a variable that a "
+                "when-clause assigns"
+            ),
             equation.where,
         )
     return assignments[0]

@@ -28,7 +28,10 @@ from .when_conditions import WhenConditions
 
 
 def make_node(model: Model, statements: Body, assigned: Iterable[str] = ()) -> Node:
-    """Create the node of some statements; reading the variables `assigned`, of an algorithm, creates no dependency."""
+    """Create the node of some statements.
+
+    Reading the variables `assigned`, of an algorithm, creates no dependency.
+    """
     written = {
         key
         for target in assigned_references(statements)
@@ -36,13 +39,27 @@ def make_node(model: Model, statements: Body, assigned: Iterable[str] = ()) -> N
     }
     if len(statements) == 1 and isinstance(statements[0], Assign):
         written = scalar_keys(model.variables, statements[0].target)
-    if unknowns := [target for item in walk(statements) if isinstance(item, Solve) for target in item.unknowns]:
+    if unknowns := [
+        target for item in walk(statements) if isinstance(item, Solve) for target in item.unknowns
+    ]:
         written = {key for target in unknowns for key in scalar_keys(model.variables, target)}
-    read = {key for reference in read_references(statements) for key in scalar_keys(model.variables, reference)}
-    flags_read = {_flag_key(item.arguments[0]) for item in walk(statements) if isinstance(item, Builtin) and item.name == "risen"}
-    flags_written = {_flag_key(Literal(s.index, "Integer")) for s in statements if isinstance(s, EdgeDetector)}
+    read = {
+        key
+        for reference in read_references(statements)
+        for key in scalar_keys(model.variables, reference)
+    }
+    flags_read = {
+        _flag_key(item.arguments[0])
+        for item in walk(statements)
+        if isinstance(item, Builtin) and item.name == "risen"
+    }
+    flags_written = {
+        _flag_key(Literal(s.index, "Integer")) for s in statements if isinstance(s, EdgeDetector)
+    }
     return Node(
-        statements, {key for key in read if key[0] not in assigned} | (flags_read - flags_written), written | flags_written
+        statements,
+        {key for key in read if key[0] not in assigned} | (flags_read - flags_written),
+        written | flags_written,
     )
 
 
@@ -52,7 +69,10 @@ def _flag_key(index: Expression) -> ScalarKey:
 
 
 def algorithm_nodes(
-    model: Model, body: Body, translate_when: Callable[[When], Body], conditions: WhenConditions | None = None
+    model: Model,
+    body: Body,
+    translate_when: Callable[[When], Body],
+    conditions: WhenConditions | None = None,
 ) -> Iterator[Node]:
     """Yield one node for an algorithm with its when-clauses translated, or none if no statement remains.
 
@@ -66,12 +86,18 @@ def algorithm_nodes(
             statements += conditions.detectors_in(translated, assigned)
         statements += translated
     if statements:
-        yield make_node(model, tuple(statements), {referenced_variable(t) for t in assigned_references(tuple(statements))})
+        yield make_node(
+            model,
+            tuple(statements),
+            {referenced_variable(t) for t in assigned_references(tuple(statements))},
+        )
 
 
 def split_by_target(model: Model, statements: Body) -> Iterator[Node]:
     """Yield one node for each variable that when-equations assign, since they have no order, and one for the assertions."""
-    for name in dict.fromkeys(referenced_variable(target) for target in assigned_references(statements)):
+    for name in dict.fromkeys(
+        referenced_variable(target) for target in assigned_references(statements)
+    ):
         yield make_node(model, filter_statements(statements, partial(_assigns, name)))
     asserts = filter_statements(statements, lambda s: isinstance(s, Assert))
     if asserts:
@@ -87,7 +113,10 @@ def filter_statements(statements: Body, accepts: Callable[[Statement], bool]) ->
     result: list[Statement] = []
     for statement in statements:
         if isinstance(statement, IfStatement):
-            branches = [(condition, filter_statements(body, accepts)) for condition, body in statement.branches]
+            branches = [
+                (condition, filter_statements(body, accepts))
+                for condition, body in statement.branches
+            ]
             otherwise = filter_statements(statement.otherwise, accepts)
             while branches and not otherwise and not branches[-1][1]:
                 branches.pop()

@@ -1,4 +1,7 @@
-"""Roles of parameters: settable, fixed or dependent, and the order in which dependent parameters are computed."""
+"""Roles of parameters.
+
+Settable, fixed or dependent, and the order in which dependent parameters are computed.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,8 @@ class ParameterRoles:
     fixed: Sequence[str]
     #: are computed from other parameters, in this order
     dependent: Sequence[str]
-    #: settable parameters that determine the start or period of a clock; changes after the initialization have no effect
+    #: settable parameters that determine the start or period of a clock; changes after the
+    #: initialization have no effect
     clock_parameters: Sequence[str]
 
 
@@ -39,13 +43,22 @@ def classify_parameters(model: Model, schedule: Schedule) -> ParameterRoles:
     parameters = [v for v in model.variables.values() if v.variability in ("parameter", "constant")]
     dependencies = {v.name: _dependencies(v) for v in parameters}
     _check_dependencies(model, dependencies)
-    settable = [v.name for v in parameters if v.variability == "parameter" and not dependencies[v.name] and _is_open(v, model)]
+    settable = [
+        v.name
+        for v in parameters
+        if v.variability == "parameter" and not dependencies[v.name] and _is_open(v, model)
+    ]
     try:
         order = TopologicalSorter(dependencies).static_order()
-        dependent = [name for name in order if dependencies[name] or model.variables[name].type == "ExternalObject"]
+        dependent = [
+            name
+            for name in order
+            if dependencies[name] or model.variables[name].type == "ExternalObject"
+        ]
     except CycleError as error:
         raise_model_error(
-            f"these parameters depend on each other: {', '.join(error.args[1])}", model.variables[error.args[1][0]].where
+            f"these parameters depend on each other: {', '.join(error.args[1])}",
+            model.variables[error.args[1][0]].where,
         )
     used_by_clocks = {
         parameter
@@ -70,7 +83,8 @@ def _check_dependencies(model: Model, dependencies: dict[str, list[str]]) -> Non
     for name, others in dependencies.items():
         if invalid := [other for other in others if other not in dependencies]:
             raise_model_error(
-                f"the parameter {name} depends on {invalid[0]}, which is not a parameter", model.variables[name].where
+                f"the parameter {name} depends on {invalid[0]}, which is not a parameter",
+                model.variables[name].where,
             )
 
 
@@ -83,5 +97,8 @@ def _transitive_dependencies(name: str, dependencies: dict[str, list[str]]) -> I
 def _is_open(parameter: Variable, model: Model) -> bool:
     """Return whether the importer may set a parameter."""
     return not (
-        parameter.type == "ExternalObject" or parameter.final or parameter.protected or parameter.name in model.structural
+        parameter.type == "ExternalObject"
+        or parameter.final
+        or parameter.protected
+        or parameter.name in model.structural
     )

@@ -17,7 +17,12 @@ class PastValues:
         values = self._values
         if values and values[-1] == (time, value):
             return
-        if len(values) > 1 and values[-1][0] < time and time - values[-2][0] < spacing and values[-2][0] < values[-1][0]:
+        if (
+            len(values) > 1
+            and values[-1][0] < time
+            and time - values[-2][0] < spacing
+            and values[-2][0] < values[-1][0]
+        ):
             values[-1] = (time, value)
             return
         values.append((time, value))

@@ -15,36 +15,86 @@ from ..model import syntax_tree
 from ..model.arithmetic import EvaluationError
 from ..model.evaluate import Evaluator, convert_to_type
 from ..model.flat_model import Equation, Function, Model
-from ..model.syntax_tree import Binary, Builtin, Call, Colon, Expression, Index, Literal, Name, raise_model_error
+from ..model.syntax_tree import (
+    Binary,
+    Builtin,
+    Call,
+    Colon,
+    Expression,
+    Index,
+    Literal,
+    Name,
+    raise_model_error,
+)
 from ..model.traversal import variable_names
 
 Position = tuple[int, ...]
 
-_MATH_FUNCTIONS = {"sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh", "exp", "log", "log10", "sqrt"}
-_ELEMENTWISE = _MATH_FUNCTIONS | {"ceil", "floor", "abs", "sign", "integer", "noEvent", "homotopy", "pre", "der", "String"}
+_MATH_FUNCTIONS = {
+    "sin",
+    "cos",
+    "tan",
+    "asin",
+    "acos",
+    "atan",
+    "sinh",
+    "cosh",
+    "tanh",
+    "exp",
+    "log",
+    "log10",
+    "sqrt",
+}
+_ELEMENTWISE = _MATH_FUNCTIONS | {
+    "ceil",
+    "floor",
+    "abs",
+    "sign",
+    "integer",
+    "noEvent",
+    "homotopy",
+    "pre",
+    "der",
+    "String",
+}
 
 
 class EquationSplitter:
-    """Splitting of the equations of one model; shapes are those of the values that the default values give."""
+    """Splitting of the equations of one model.
+
+    Shapes are those of the values that the default values give.
+    """
 
     def __init__(self, model: Model):
         values: dict[str, Any] = {
-            v.name: convert_to_type(1, v.type, v.shape) for v in model.variables.values() if v.type != "String"
+            v.name: convert_to_type(1, v.type, v.shape)
+            for v in model.variables.values()
+            if v.type != "String"
         }
         flags: defaultdict[tuple[str, int], bool] = defaultdict(bool)
-        self._evaluate = Evaluator(_uncalled(model.functions), {**values, "time": 0.0}, dict(values), flags)
+        self._evaluate = Evaluator(
+            _uncalled(model.functions), {**values, "time": 0.0}, dict(values), flags
+        )
 
     def split(self, equation: Equation) -> Iterator[Equation]:
-        """Yield one equation for each element; an equation between arrays without elements yields none."""
+        """Yield one equation for each element.
+
+        An equation between arrays without elements yields none.
+        """
         shapes = [self.shape(side) for side in (equation.left, equation.right)]
         shape = max(shapes, key=len)
         if any(other and other != shape for other in shapes):
             raise_model_error(
-                f"the sides of this equation have the sizes {list(shapes[0])} and {list(shapes[1])}", equation.where
+                (
+                    f"the sides of this equation have the sizes {list(shapes[0])} and "
+                    f"{list(shapes[1])}"
+                ),
+                equation.where,
             )
         for position in product(*map(range, shape)):
             left, right = (
-                self.element(side, position if s else ()) for side, s in zip((equation.left, equation.right), shapes, strict=True)
+                self.element(side, position if s else ())
+                for side, s in zip((equation.left, equation.right), shapes, strict=True)
             )
             yield Equation(left, right, equation.where)
 
@@ -56,12 +106,20 @@ class EquationSplitter:
         except KeyError:  # a built-in function without a value here, such as sample()
             return ()
         except (EvaluationError, ZeroDivisionError) as error:
-            raise_model_error(f"the size of an expression is not known: {error}", getattr(node, "where", None))
+            raise_model_error(
+                f"the size of an expression is not known: {error}", getattr(node, "where", None)
+            )
 
     def element(self, node: Expression, position: Position) -> Expression:
         """Return the expression of one element, counted from 0."""
-        method: Callable[..., Expression | None] | None = getattr(self, f"_{type(node).__name__.lower()}", None)
-        result = method(node, position) if method and (position or not isinstance(node, syntax_tree.Array)) else None
+        method: Callable[..., Expression | None] | None = getattr(
+            self, f"_{type(node).__name__.lower()}", None
+        )
+        result = (
+            method(node, position)
+            if method and (position or not isinstance(node, syntax_tree.Array))
+            else None
+        )
         if result is not None:
             return result
         return Index(node, _literals(position)) if position else node
@@ -73,37 +131,57 @@ class EquationSplitter:
         return replace(node, operand=self.element(node.operand, position))
 
     def _if(self, node: syntax_tree.If, position: Position) -> Expression:
-        branches = tuple((self.element(condition, ()), self.element(value, position)) for condition, value in node.branches)
+        branches = tuple(
+            (self.element(condition, ()), self.element(value, position))
+            for condition, value in node.branches
+        )
         return syntax_tree.If(branches, self.element(node.otherwise, position))
 
     def _index(self, node: Index, position: Position) -> Expression | None:
         """Select from the subscripts of a variable, or of another array."""
         subscripts: list[Expression] = []
         rest = list(position)
-        for subscript in (*node.subscripts, *[Colon()] * (len(self.shape(node.base)) - len(node.subscripts))):
+        for subscript in (
+            *node.subscripts,
+            *[Colon()] * (len(self.shape(node.base)) - len(node.subscripts)),
+        ):
             if isinstance(subscript, Colon):
                 subscripts.append(Literal(rest.pop(0) + 1, "Integer"))
             elif variable_names(subscript) & set(self._evaluate.values):
                 return None if position else node
             else:
                 numbers = self._evaluate(subscript)
-                subscripts.append(Literal(int(numbers[rest.pop(0)] if np.ndim(numbers) else numbers), "Integer"))
+                subscripts.append(
+                    Literal(int(numbers[rest.pop(0)] if np.ndim(numbers) else numbers), "Integer")
+                )
         if isinstance(node.base, Name):
             return Index(node.base, tuple(subscripts), node.where)
-        return self.element(node.base, tuple(int(s.number) - 1 for s in subscripts if isinstance(s, Literal)))
+        return self.element(
+            node.base, tuple(int(s.number) - 1 for s in subscripts if isinstance(s, Literal))
+        )
 
     def _binary(self, node: Binary, position: Position) -> Expression | None:
         left, right = self.shape(node.left), self.shape(node.right)
         if node.operator == "*" and left and right:
             return self._product(node, len(left), len(right), left[-1], position)
-        a, b = (self.element(side, position if shape else ()) for side, shape in ((node.left, left), (node.right, right)))
+        a, b = (
+            self.element(side, position if shape else ())
+            for side, shape in ((node.left, left), (node.right, right))
+        )
         return Binary(node.operator.removeprefix("."), a, b, node.where)
 
-    def _product(self, node: Binary, left: int, right: int, inner: int, position: Position) -> Expression:
+    def _product(
+        self, node: Binary, left: int, right: int, inner: int, position: Position
+    ) -> Expression:
         row, column = position[: left - 1], position[left - 1 :]
         assert len(column) == right - 1
         terms = [
-            Binary("*", self.element(node.left, (*row, k)), self.element(node.right, (k, *column)), node.where)
+            Binary(
+                "*",
+                self.element(node.left, (*row, k)),
+                self.element(node.right, (k, *column)),
+                node.where,
+            )
             for k in range(inner)
         ]
         return _total(terms)
@@ -115,7 +193,12 @@ class EquationSplitter:
         if node.name == "delay":
             return replace(node, arguments=(self.element(arguments[0], position), *arguments[1:]))
         if node.name in _ELEMENTWISE:
-            return replace(node, arguments=tuple(self.element(a, position if self.shape(a) else ()) for a in arguments))
+            return replace(
+                node,
+                arguments=tuple(
+                    self.element(a, position if self.shape(a) else ()) for a in arguments
+                ),
+            )
         if node.name in ("zeros", "ones"):
             return Literal(float(node.name == "ones"), "Real")
         if node.name == "fill":
@@ -127,14 +210,30 @@ class EquationSplitter:
         if node.name in ("rows", "columns"):
             return self._joined(arguments, position, axis=("rows", "columns").index(node.name))
         if node.name == "sum" and not position:
-            return _total([self.element(arguments[0], p) for p in product(*map(range, self.shape(arguments[0])))])
-        if node.name in ("min", "max") and len(arguments) == 1 and (size := self.shape(arguments[0])):
+            return _total(
+                [
+                    self.element(arguments[0], p)
+                    for p in product(*map(range, self.shape(arguments[0])))
+                ]
+            )
+        if (
+            node.name in ("min", "max")
+            and len(arguments) == 1
+            and (size := self.shape(arguments[0]))
+        ):
             elements = [self.element(arguments[0], p) for p in product(*map(range, size))]
-            return reduce(lambda a, b: Builtin(node.name, (a, b), node.where), elements) if elements else None
+            return (
+                reduce(lambda a, b: Builtin(node.name, (a, b), node.where), elements)
+                if elements
+                else None
+            )
         return None
 
     def _joined(self, parts: Sequence[Expression], position: Position, axis: int) -> Expression:
-        """Select from `[a, b]` or `[a; b]`; a vector is a column, and a scalar a matrix with one element."""
+        """Select from `[a, b]` or `[a; b]`.
+
+        A vector is a column, and a scalar a matrix with one element.
+        """
         index = list(position)
         for part in parts:
             shape = self.shape(part)
@@ -163,4 +262,7 @@ def _total(terms: Sequence[Expression]) -> Expression:
 
 def _uncalled(functions: Mapping[str, Function]) -> dict[str, Function]:
     """Return the functions with external ones that leave their outputs zero, since only the sizes matter."""
-    return {name: replace(f, external=replace(f.external, library=None)) if f.external else f for name, f in functions.items()}
+    return {
+        name: replace(f, external=replace(f.external, library=None)) if f.external else f
+        for name, f in functions.items()
+    }

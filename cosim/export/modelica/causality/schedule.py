@@ -1,8 +1,9 @@
 """Causality analysis: the order of computation of a flat model.
 
-The result is three lists of statements: for the initialization, for an event (a clock tick or the end of a step), and for the
-derivatives of the continuous states between events. Equations have become assignments, sorted topologically so that every value
-is computed before it is read. When-clauses have become if-statements on event flags (see `when_conditions`).
+The result is three lists of statements: for the initialization, for an event (a clock tick or the
+end of a step), and for the derivatives of the continuous states between events. Equations have
+become assignments, sorted topologically so that every value is computed before it is read.
+When-clauses have become if-statements on event flags (see `when_conditions`).
 """
 
 from __future__ import annotations
@@ -42,7 +43,11 @@ from .topological_sort import Node, merge_statements, sort_topologically
 from .when_conditions import Clock, WhenConditions, tick_flag
 
 _TRUE, _FALSE = Literal(True, "Boolean"), Literal(False, "Boolean")
-_ZERO = {"Real": Literal(0.0, "Real"), "Integer": Literal(0, "Integer"), "Boolean": Literal(False, "Boolean")}
+_ZERO = {
+    "Real": Literal(0.0, "Real"),
+    "Integer": Literal(0, "Integer"),
+    "Boolean": Literal(False, "Boolean"),
+}
 
 
 @dataclass(frozen=True)
@@ -60,7 +65,10 @@ class Schedule:
 
 
 def start_value(model: Model, name: str) -> Expression:
-    """Return the start expression of a variable; the default is zero, false or the first enumeration literal."""
+    """Return the start expression of a variable.
+
+    The default is zero, false or the first enumeration literal.
+    """
     variable = model.variables[name]
     return variable.start or _ZERO.get(variable.type, Literal(1, "Enumeration"))
 
@@ -72,12 +80,17 @@ def pre_variables(model: Model, body: Body) -> list[str]:
 
 
 def finite_variables(model: Model, schedule: Schedule) -> list[str]:
-    """Return the Real variables that must remain finite: outputs, continuous states and arguments of pre()."""
+    """Return the Real variables that must remain finite.
+
+    Outputs, continuous states and arguments of pre().
+    """
     stored = {*pre_variables(model, schedule.event), *model.states}
     return [
         v.name
         for v in model.variables.values()
-        if v.type == "Real" and (v.name in stored or (v.causality == "output" and v.top_level)) and v.variability != "parameter"
+        if v.type == "Real"
+        and (v.name in stored or (v.causality == "output" and v.top_level))
+        and v.variability != "parameter"
     ]
 
 
@@ -89,15 +102,25 @@ def build_schedule(model: Model) -> Schedule:
     """
     conditions = WhenConditions(model)
     model = _with_tick_flags(model, conditions)
-    assigned = {referenced_variable(target) for target in assigned_references((model.whens, model.algorithms))}
+    assigned = {
+        referenced_variable(target)
+        for target in assigned_references((model.whens, model.algorithms))
+    }
     assigned |= {*model.states, *model.initialized}
     continuous, held = solve_equations(model, assigned)
-    events = [*_event_nodes(model, conditions), *(make_node(model, (statement,)) for statement in continuous)]
+    events = [
+        *_event_nodes(model, conditions),
+        *(make_node(model, (statement,)) for statement in continuous),
+    ]
     initial = _initial_nodes(model, conditions)
     solved, initially_held = solve_initial_equations(model, assigned, continuous, _written(initial))
     initial += [make_node(model, (statement,)) for statement in solved]
     for nodes, constant in ((events, held), (initial, initially_held)):
-        separate = [d for d in conditions.edge_detectors if nodes is initial or d.index not in conditions.in_place]
+        separate = [
+            d
+            for d in conditions.edge_detectors
+            if nodes is initial or d.index not in conditions.in_place
+        ]
         nodes += [make_node(model, (detector,)) for detector in separate]
         for node in nodes:
             node.reads -= constant
@@ -109,7 +132,9 @@ def build_schedule(model: Model) -> Schedule:
         conditions.clocks,
         len(conditions.edge_detectors),
         _at_initialization(model, merge_statements(sort_topologically(initial))),
-        _substitute_initial(_remove_unused_detectors((*event_body, *_reinits(model, conditions))), False),
+        _substitute_initial(
+            _remove_unused_detectors((*event_body, *_reinits(model, conditions))), False
+        ),
         BetweenEvents(*(_substitute_initial(body, False) for body in between)),
     )
 
@@ -123,7 +148,10 @@ def _with_tick_flags(model: Model, conditions: WhenConditions) -> Model:
         return node if isinstance(node, When) else conditions.as_tick_flag(node)
 
     sections = ("equations", "algorithms", "asserts")
-    return replace(model, **{section: rewrite_outermost(getattr(model, section), change) for section in sections})
+    return replace(
+        model,
+        **{section: rewrite_outermost(getattr(model, section), change) for section in sections},
+    )
 
 
 def _at_initialization(model: Model, body: Body) -> Body:
@@ -144,7 +172,8 @@ def _at_initialization(model: Model, body: Body) -> Body:
 def _reinits(model: Model, conditions: WhenConditions) -> Body:
     """Return the assignments of reinit(), which follow all others."""
     bodies = [
-        conditions.at_event(when) for when in (*model.whens, *(s for b in model.algorithms for s in b if isinstance(s, When)))
+        conditions.at_event(when)
+        for when in (*model.whens, *(s for b in model.algorithms for s in b if isinstance(s, When)))
     ]
     selected = (filter_statements(body, lambda s: isinstance(s, Reinit)) for body in bodies)
     return tuple(rewrite_outermost(tuple(s for body in selected for s in body), _as_assignment))
@@ -167,7 +196,11 @@ def _event_nodes(model: Model, conditions: WhenConditions) -> Iterator[Node]:
 
 
 def _initial_nodes(model: Model, conditions: WhenConditions) -> list[Node]:
-    nodes = [node for when in model.whens for node in split_by_target(model, conditions.at_initialization(when))]
+    nodes = [
+        node
+        for when in model.whens
+        for node in split_by_target(model, conditions.at_initialization(when))
+    ]
     for body in (*model.algorithms, *model.initial_algorithms):
         nodes += algorithm_nodes(model, body, conditions.at_initialization)
     return nodes + [make_node(model, (statement,)) for statement in model.asserts]
@@ -176,14 +209,27 @@ def _initial_nodes(model: Model, conditions: WhenConditions) -> list[Node]:
 def _remove_clock_condition(body: Body) -> Body:
     """Remove the flag of the only clock: without continuous states, it ticks in every event."""
     simplified = rewrite(body, lambda node: _TRUE if node == tick_flag(0) else node)
-    inner = (s.branches[0][1] if isinstance(s, IfStatement) and _is_always_true(s.branches[0][0]) else (s,) for s in simplified)
+    inner = (
+        s.branches[0][1]
+        if isinstance(s, IfStatement) and _is_always_true(s.branches[0][0])
+        else (s,)
+        for s in simplified
+    )
     return tuple(statement for statements in inner for statement in statements)
 
 
 def _remove_unused_detectors(body: Body) -> Body:
     """Remove the edge detectors whose flag is not read."""
-    read = {item.arguments[0] for item in walk(body) if isinstance(item, Builtin) and item.name == "risen"}
-    return tuple(s for s in body if not (isinstance(s, EdgeDetector) and Literal(s.index, "Integer") not in read))
+    read = {
+        item.arguments[0]
+        for item in walk(body)
+        if isinstance(item, Builtin) and item.name == "risen"
+    }
+    return tuple(
+        s
+        for s in body
+        if not (isinstance(s, EdgeDetector) and Literal(s.index, "Integer") not in read)
+    )
 
 
 def _is_always_true(condition: Expression) -> bool:
@@ -194,5 +240,7 @@ def _is_always_true(condition: Expression) -> bool:
 
 def _substitute_initial(body: Body, value: bool) -> Body:
     """Replace initial() by a constant."""
-    result: Body = rewrite(body, lambda node: Literal(value, "Boolean") if node == Builtin("initial", ()) else node)
+    result: Body = rewrite(
+        body, lambda node: Literal(value, "Boolean") if node == Builtin("initial", ()) else node
+    )
     return result

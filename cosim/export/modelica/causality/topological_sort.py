@@ -12,7 +12,10 @@ from .matching import ScalarKey
 
 @dataclass(eq=False)
 class Node:
-    """Node of the dependency graph: statements that are not separated, with the scalars that they read and write."""
+    """Node of the dependency graph.
+
+    Statements that are not separated, with the scalars that they read and write.
+    """
 
     statements: Body
     reads: set[ScalarKey]
@@ -27,8 +30,8 @@ class Node:
 def sort_topologically(nodes: list[Node]) -> list[Node]:
     """Sort nodes so that every node follows the nodes that write the variables that it reads.
 
-    Among the nodes that could be next, one that can be merged with the previous node comes first, then one of the same
-    component; otherwise the given order is preserved.
+    Among the nodes that could be next, one that can be merged with the previous node comes first,
+    then one of the same component; otherwise the given order is preserved.
 
     Raises:
         InputError: A scalar is written by two nodes, or there is an algebraic loop.
@@ -37,7 +40,9 @@ def sort_topologically(nodes: list[Node]) -> list[Node]:
     for node in nodes:
         for key in sorted(node.writes):
             if key in writers:
-                raise_model_error(f"{key[0]} is defined twice, first at {writers[key].where}", node.where)
+                raise_model_error(
+                    f"{key[0]} is defined twice, first at {writers[key].where}", node.where
+                )
             writers[key] = node
     dependencies = {node: {writers[key] for key in node.reads if key in writers} for node in nodes}
     remaining, done, order = list(nodes), set[Node](), list[Node]()
@@ -67,16 +72,26 @@ def merge_statements(nodes: list[Node]) -> Body:
     result: list[Statement] = []
     for node in nodes:
         last, first = result[-1] if result else None, node.statements[0]
-        if isinstance(first, IfStatement) and isinstance(last, IfStatement) and _mergeable((last,), node.statements):
+        if (
+            isinstance(first, IfStatement)
+            and isinstance(last, IfStatement)
+            and _mergeable((last,), node.statements)
+        ):
             bodies = zip(last.branches, first.branches, strict=True)
-            result[-1] = replace(first, branches=tuple((flag, (*body, *added)) for (flag, body), (_, added) in bodies))
+            result[-1] = replace(
+                first,
+                branches=tuple((flag, (*body, *added)) for (flag, body), (_, added) in bodies),
+            )
         else:
             result += node.statements
     return tuple(result)
 
 
 def _placement_cost(last: Node, node: Node) -> int:
-    """Return the priority of a node after the last one: 0 if both can be merged, 1 for the same component, else 2."""
+    """Return the priority of a node after the last one.
+
+    0 if both can be merged, 1 for the same component, else 2.
+    """
     if _mergeable(last.statements, node.statements):
         return 0
     return 1 if _owning_component(last) == _owning_component(node) else 2
@@ -91,14 +106,19 @@ def _raise_algebraic_loop(remaining: list[Node], dependencies: dict[Node, set[No
     while chain[-1] not in chain[:-1]:
         chain.append(next(node for node in remaining if node in dependencies[chain[-1]]))
     loop = chain[chain.index(chain[-1]) :]
-    steps = " -> ".join(f"{min(node.writes)[0]} ({node.where.file_and_line if node.where else '?'})" for node in reversed(loop))
+    steps = " -> ".join(
+        f"{min(node.writes)[0]} ({node.where.file_and_line if node.where else '?'})"
+        for node in reversed(loop)
+    )
     raise_model_error(f"algebraic loop: {steps}; break it with pre()", loop[0].where)
 
 
 def _mergeable(first: Body, second: Body) -> bool:
     """Return whether both are single if-statements on the same event flags, which are constant during an event."""
     a, b = first[-1], second[0]
-    if not (isinstance(a, IfStatement) and isinstance(b, IfStatement) and len(first) == len(second) == 1):
+    if not (
+        isinstance(a, IfStatement) and isinstance(b, IfStatement) and len(first) == len(second) == 1
+    ):
         return False
     same_conditions = [x for x, _ in a.branches] == [y for y, _ in b.branches]
     return same_conditions and all(has_builtin(x, "due", "risen") for x, _ in a.branches)

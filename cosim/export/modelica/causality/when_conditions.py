@@ -1,7 +1,7 @@
 """Conditions of when-clauses: clocks, edge detectors and initialization.
 
-A when-clause becomes an if-statement on the event flags due(k), "clock k ticks in this event", and risen(k), "the condition of
-edge detector k has become true in this event".
+A when-clause becomes an if-statement on the event flags due(k), "clock k ticks in this event", and
+risen(k), "the condition of edge detector k has become true in this event".
 """
 
 from __future__ import annotations
@@ -51,7 +51,10 @@ def tick_flag(index: int) -> Builtin:
 
 
 class WhenConditions:
-    """Translation of when-clauses; assigns one number to each distinct clock and edge detector of a model."""
+    """Translation of when-clauses.
+
+    Assigns one number to each distinct clock and edge detector of a model.
+    """
 
     def __init__(self, model: Model):
         self._model = model
@@ -61,14 +64,27 @@ class WhenConditions:
         self.in_place: set[int] = set()
 
     def at_event(self, when: When) -> Body:
-        """Translate a when-clause for an event; branches that only initial() activates are omitted."""
+        """Translate a when-clause for an event.
+
+        Branches that only initial() activates are omitted.
+        """
         flagged = [(self._flags(condition, when.where), body) for condition, body in when.branches]
         branches = tuple((_disjunction(flags), body) for flags, body in flagged if flags)
         return (IfStatement(branches, (), when.where),) if branches else ()
 
     def at_initialization(self, when: When) -> Body:
-        """Return the statements of a when-clause for the initialization: the first branch with initial() in its condition."""
-        return next((body for condition, body in when.branches if Builtin("initial", ()) in self._alternatives(condition)), ())
+        """Return the statements of a when-clause for the initialization.
+
+        The first branch with initial() in its condition.
+        """
+        return next(
+            (
+                body
+                for condition, body in when.branches
+                if Builtin("initial", ()) in self._alternatives(condition)
+            ),
+            (),
+        )
 
     def _flags(self, condition: Expression, where: SourceLocation | None) -> list[Builtin]:
         alternatives = [c for c in self._alternatives(condition) if c != Builtin("initial", ())]
@@ -76,9 +92,13 @@ class WhenConditions:
 
     def _alternatives(self, condition: Expression) -> tuple[Expression, ...]:
         """Return the conditions of a vector of conditions."""
-        variable = self._model.variables.get(condition.name) if isinstance(condition, Name) else None
+        variable = (
+            self._model.variables.get(condition.name) if isinstance(condition, Name) else None
+        )
         if variable is not None and variable.shape:
-            return tuple(Index(condition, (Literal(k + 1, "Integer"),)) for k in range(variable.shape[0]))
+            return tuple(
+                Index(condition, (Literal(k + 1, "Integer"),)) for k in range(variable.shape[0])
+            )
         return condition.elements if isinstance(condition, Array) else (condition,)
 
     def detectors_in(self, body: Body, assigned: Collection[str]) -> list[EdgeDetector]:
@@ -88,14 +108,18 @@ class WhenConditions:
         """
         used = {int(item.arguments[0].number) for item in walk(body) if _is_edge_flag(item)}
         found = [detector for detector in self.edge_detectors if detector.index in used]
-        found = [detector for detector in found if variable_names(detector.condition) & set(assigned)]
+        found = [
+            detector for detector in found if variable_names(detector.condition) & set(assigned)
+        ]
         self.in_place |= {detector.index for detector in found}
         return found
 
     def _flag(self, condition: Expression, where: SourceLocation | None) -> Builtin:
         if isinstance(condition, Builtin) and condition.name == "sample":
             return tick_flag(self._clock_index(condition, where))
-        return edge_flag(self._edge_detector_index(rewrite_outermost(condition, self.as_tick_flag), where))
+        return edge_flag(
+            self._edge_detector_index(rewrite_outermost(condition, self.as_tick_flag), where)
+        )
 
     def as_tick_flag(self, node: Any) -> Builtin | None:
         """Return the event flag of a sample(), or None for all other nodes."""
@@ -128,8 +152,14 @@ def _disjunction(flags: list[Builtin]) -> Expression:
 
 
 def _to_real(expression: Expression) -> Expression:
-    return Literal(float(expression.number), "Real") if isinstance(expression, Literal) else expression
+    return (
+        Literal(float(expression.number), "Real") if isinstance(expression, Literal) else expression
+    )
 
 
 def _is_edge_flag(node: Any) -> bool:
-    return isinstance(node, Builtin) and node.name == "risen" and isinstance(node.arguments[0], Literal)
+    return (
+        isinstance(node, Builtin)
+        and node.name == "risen"
+        and isinstance(node.arguments[0], Literal)
+    )

@@ -1,1 +1,4 @@
-"""External C functions of Modelica models: their sources, the calls from C code, and their evaluation in Python."""
+"""External C functions of Modelica models.
+
+Their sources, the calls from C code, and their evaluation in Python.
+"""

@@ -1,4 +1,7 @@
-"""Generation of external_calls.c: one C function for each external function of a model, which reports errors by its result."""
+"""Generation of external_calls.c.
+
+One C function for each external function of a model, which reports errors by its result.
+"""
 
 from __future__ import annotations
 
@@ -34,8 +37,9 @@ class Argument(NamedTuple):
 class CallSignature:
     """Signature of the C function for an external function.
 
-    A constructor of an external object has the owner of the object as its first parameter, and the number of elements after
-    each array. The result, if there is one, is written through the last parameter.
+    A constructor of an external object has the owner of the object as its first parameter, and the
+    number of elements after each array. The result, if there is one, is written through the last
+    parameter.
     """
 
     name: str
@@ -72,34 +76,53 @@ def call_signature(function: Function) -> CallSignature:
     return CallSignature(name, call.function, arguments, result)
 
 
-def _argument(node: Expression, variables: dict[str, FunctionVariable], outputs: set[str], function: Function) -> Argument:
+def _argument(
+    node: Expression, variables: dict[str, FunctionVariable], outputs: set[str], function: Function
+) -> Argument:
     if isinstance(node, Name) and node.name in variables:
         variable = variables[node.name]
         if variable.dimensions and variable.type not in ("Real", "Integer", "Enumeration"):
-            raise_model_error(f"{function.name}: arrays of type {variable.type} cannot be passed to a C function", variable.where)
+            raise_model_error(
+                f"{function.name}: arrays of type {variable.type} cannot be passed to a C function",
+                variable.where,
+            )
         return Argument(variable.type, bool(variable.dimensions), node.name in outputs)
     if isinstance(node, Literal):
         return Argument(node.type, False, False)
     if isinstance(node, Builtin) and node.name == "size":
         return Argument("Integer", False, False)
     return raise_model_error(
-        f"{function.name}: an argument of a C function must be a variable, a literal or a size()", function.where
+        f"{function.name}: an argument of a C function must be a variable, a literal or a size()",
+        function.where,
     )
 
 
 def declarations(functions: Iterable[Function]) -> str:
     """Return the text of external_calls.h."""
     heads = "\n".join(f"{_head(call_signature(function))};" for function in functions)
-    return f'/* Calls of external functions; the result is false after an error. */\n#include "external.h"\n\n{heads}\n'
+    return (
+        "/* Calls of external functions; the result is false after an error. */\n#include "
+        f'"external.h"\n\n{heads}\n'
+    )
 
 
 def definitions(functions: Iterable[Function]) -> str:
     """Return the text of external_calls.c."""
     functions = list(functions)
-    includes = {f.external.include: f.where for f in reversed(functions) if f.external and f.external.include}
-    lines = [f'#line {where.line} "{where.path.name}"\n{text}' if where else text for text, where in includes.items()]
+    includes = {
+        f.external.include: f.where
+        for f in reversed(functions)
+        if f.external and f.external.include
+    }
+    lines = [
+        f'#line {where.line} "{where.path.name}"\n{text}' if where else text
+        for text, where in includes.items()
+    ]
     texts = [_definition(function) for function in functions]
-    return "\n\n".join(['#include "external_calls.h"', *lines, '#line 1 "external_calls.c"', *texts]) + "\n"
+    return (
+        "\n\n".join(['#include "external_calls.h"', *lines, '#line 1 "external_calls.c"', *texts])
+        + "\n"
+    )
 
 
 def _head(signature: CallSignature) -> str:
@@ -122,24 +145,41 @@ def _parameter(argument: Argument, name: str) -> str:
 
 def _definition(function: Function) -> str:
     signature = call_signature(function)
-    body = _constructor_body(function, signature) if signature.is_constructor else _call_body(signature)
+    body = (
+        _constructor_body(function, signature)
+        if signature.is_constructor
+        else _call_body(signature)
+    )
     prototype = [] if function.external and function.external.include else [_prototype(signature)]
     return "\n".join([*prototype, _head(signature), "{", *(f"    {line}" for line in body), "}"])
 
 
 def _call_body(signature: CallSignature) -> list[str]:
     arguments = signature.arguments
-    booleans = [k for k, argument in enumerate(arguments) if argument.is_output and argument.type == "Boolean"]
+    booleans = [
+        k
+        for k, argument in enumerate(arguments)
+        if argument.is_output and argument.type == "Boolean"
+    ]
     call = _call(signature)
-    lines = [f"if (a{k} == NULL) return false;" for k, argument in enumerate(arguments) if argument.type == "ExternalObject"]
+    lines = [
+        f"if (a{k} == NULL) return false;"
+        for k, argument in enumerate(arguments)
+        if argument.type == "ExternalObject"
+    ]
     lines += [f"int b{k} = 0;" for k in booleans]
-    call = f"*result = {call}{' != 0' * (signature.result == 'Boolean')}" if signature.result else call
+    call = (
+        f"*result = {call}{' != 0' * (signature.result == 'Boolean')}" if signature.result else call
+    )
     copies = "".join(f"; *a{k} = b{k} != 0" for k in booleans)
     return [*lines, f"EXTERNAL_CALL({call}{copies});"]
 
 
 def _constructor_body(function: Function, signature: CallSignature) -> list[str]:
-    lines = [f"uint64_t hash = {_FIRST_HASH};", f'hash = external_hash_text(hash, "{function.name}");']
+    lines = [
+        f"uint64_t hash = {_FIRST_HASH};",
+        f'hash = external_hash_text(hash, "{function.name}");',
+    ]
     for k, argument in enumerate(signature.arguments):
         if argument.type == "String":
             lines.append(f"hash = external_hash_text(hash, a{k});")
@@ -159,7 +199,11 @@ def _call(signature: CallSignature) -> str:
     def passed(k: int, argument: Argument) -> str:
         if argument.is_output and argument.type == "Boolean":
             return f"&b{k}"
-        return f"({_C_TYPES[argument.type]} *)a{k}" if argument.is_array and not argument.is_output else f"a{k}"
+        return (
+            f"({_C_TYPES[argument.type]} *)a{k}"
+            if argument.is_array and not argument.is_output
+            else f"a{k}"
+        )
 
     return f"{signature.function}({', '.join(passed(k, a) for k, a in enumerate(signature.arguments))})"
 
@@ -167,6 +211,8 @@ def _call(signature: CallSignature) -> str:
 def _prototype(signature: CallSignature) -> str:
     """Return the declaration of a C function without an Include annotation."""
     types = {**_C_TYPES, "Boolean": "int"}
-    parameters = (f"{types[a.type]}{' *' * (a.is_array or a.is_output)}" for a in signature.arguments)
+    parameters = (
+        f"{types[a.type]}{' *' * (a.is_array or a.is_output)}" for a in signature.arguments
+    )
     result = types[signature.result] if signature.result else "void"
     return f"extern {result} {signature.function}({', '.join(parameters) or 'void'});"

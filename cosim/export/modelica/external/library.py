@@ -1,4 +1,7 @@
-"""Evaluation of external C functions in Python: the library of a model's C code, compiled on first use and called by ctypes."""
+"""Evaluation of external C functions in Python.
+
+The library of a model's C code, compiled on first use and called by ctypes.
+"""
 
 from __future__ import annotations
 
@@ -31,15 +34,21 @@ _C_TYPES: dict[str, Any] = {
     "ExternalObject": ctypes.c_void_p,
 }
 _VISIBLE = (
-    '#pragma GCC visibility push(default)\n#include "external.h"\n#include "external_calls.h"\n#pragma GCC visibility pop\n'
+    '#pragma GCC visibility push(default)\n#include "external.h"\n#include "external_calls.h"\n'
+    "#pragma GCC visibility pop\n"
 )
 _owners = count(1)
 
 
-def callable_functions(functions: Mapping[str, Function], packages: Mapping[str, Path]) -> dict[str, Function]:
+def callable_functions(
+    functions: Mapping[str, Function], packages: Mapping[str, Path]
+) -> dict[str, Function]:
     """Return the functions of a model with a library that evaluates the external ones."""
     library = ExternalLibrary({name: f for name, f in functions.items() if f.external}, packages)
-    return {name: replace(f, external=replace(f.external, library=library)) if f.external else f for name, f in functions.items()}
+    return {
+        name: replace(f, external=replace(f.external, library=library)) if f.external else f
+        for name, f in functions.items()
+    }
 
 
 @dataclass
@@ -71,27 +80,48 @@ class ExternalLibrary:
             EvaluationError: The C function has called ModelicaError.
         """
         signature = call_signature(function)
-        key = (function.name, *(value.tobytes() if isinstance(value, np.ndarray) else value for value in inputs))
+        key = (
+            function.name,
+            *(value.tobytes() if isinstance(value, np.ndarray) else value for value in inputs),
+        )
         if signature.is_constructor and key in self._objects:
             return {-1: self._objects[key]}
         pairs = zip(inputs, signature.arguments, strict=True)
-        passed = [_passed(self._object(value) if a.type == "ExternalObject" else value, a) for value, a in pairs]
-        results = [(ctypes.c_uint64 if signature.is_constructor else _C_TYPES[signature.result])()] if signature.result else []
+        passed = [
+            _passed(self._object(value) if a.type == "ExternalObject" else value, a)
+            for value, a in pairs
+        ]
+        results = (
+            [(ctypes.c_uint64 if signature.is_constructor else _C_TYPES[signature.result])()]
+            if signature.result
+            else []
+        )
         arguments = [*self._arguments(signature, passed), *map(ctypes.byref, results)]
         if not getattr(self._library, signature.name)(*arguments):
             reason = f"the external function {function.name} has failed".encode()
-            raise EvaluationError(self._library.external_reason(reason, None, 0).decode(errors="replace"), function.where)
-        outputs = {k: _value(passed[k]) for k, argument in enumerate(signature.arguments) if argument.is_output}
+            raise EvaluationError(
+                self._library.external_reason(reason, None, 0).decode(errors="replace"),
+                function.where,
+            )
+        outputs = {
+            k: _value(passed[k])
+            for k, argument in enumerate(signature.arguments)
+            if argument.is_output
+        }
         for result in results:
             outputs[-1] = (
-                result.value.decode(errors="replace") if isinstance(result, ctypes.c_char_p) and result.value else result.value
+                result.value.decode(errors="replace")
+                if isinstance(result, ctypes.c_char_p) and result.value
+                else result.value
             )
         if signature.is_constructor:
             self._objects[key] = outputs[-1]
         return outputs
 
     def _object(self, identifier: int) -> int | None:
-        address: int | None = self._library.external_object(ctypes.c_void_p(self._owner), ctypes.c_uint64(identifier))
+        address: int | None = self._library.external_object(
+            ctypes.c_void_p(self._owner), ctypes.c_uint64(identifier)
+        )
         return address
 
     def _arguments(self, signature: CallSignature, passed: Sequence[Any]) -> list[Any]:
@@ -108,18 +138,30 @@ class ExternalLibrary:
     def _library(self) -> Any:
         """The shared library; it is compiled unless the cache contains it."""
         files = external_files(self.functions.values(), self.packages)
-        archives = {n: path.read_bytes() for n, path in external_archives(self.functions.values(), self.packages).items()}
-        digest = sha256(repr((sorted(files.items()), sorted(archives.items()))).encode()).hexdigest()[:24]
+        archives = {
+            n: path.read_bytes()
+            for n, path in external_archives(self.functions.values(), self.packages).items()
+        }
+        digest = sha256(
+            repr((sorted(files.items()), sorted(archives.items()))).encode()
+        ).hexdigest()[:24]
         target = cache_directory() / "modelica" / f"external-{digest}.so"
         if not target.is_file():
-            with TemporaryDirectory(prefix="cosim-external-") as temporary, writing_atomically(target) as written:
+            with (
+                TemporaryDirectory(prefix="cosim-external-") as temporary,
+                writing_atomically(target) as written,
+            ):
                 texts = {**files, "external_calls.c": _VISIBLE + files["external_calls.c"]}
                 texts["external.c"] = _VISIBLE + texts["external.c"]
                 for name, text in texts.items():
                     (Path(temporary) / name).write_text(text)
                 for name, content in archives.items():
                     (Path(temporary) / name).write_bytes(content)
-                compile_library(Path(temporary), [*sorted(n for n in texts if n.endswith(".c")), *archives], written)
+                compile_library(
+                    Path(temporary),
+                    [*sorted(n for n in texts if n.endswith(".c")), *archives],
+                    written,
+                )
         library = ctypes.CDLL(str(target))
         library.external_object.restype = ctypes.c_void_p
         library.external_reason.restype = ctypes.c_char_p

@@ -25,10 +25,16 @@ def fold_constants(model: Model) -> Model:
     """
     model = _rewrite_model(_bind_parameters(model), _ShapeFolder(model).fold)
     structural = _structural_parameters(model)
-    foldable = {v.name: v for v in model.variables.values() if not v.shape and _is_foldable(v, structural)}
+    foldable = {
+        v.name: v for v in model.variables.values() if not v.shape and _is_foldable(v, structural)
+    }
     literals: dict[str, Literal] = {}
     failed: set[str] = set()
-    while ready := [v for v in foldable.values() if v.name not in literals | dict.fromkeys(failed) and _is_ready(v, literals)]:
+    while ready := [
+        v
+        for v in foldable.values()
+        if v.name not in literals | dict.fromkeys(failed) and _is_ready(v, literals)
+    ]:
         values = {name: literal.value for name, literal in literals.items()}
         for variable in ready:
             try:
@@ -36,7 +42,9 @@ def fold_constants(model: Model) -> Model:
                 literals[variable.name] = Literal(to_python_scalar(value), variable.type)
             except (EvaluationError, KeyError, TypeError):
                 failed.add(variable.name)
-    constants = {v.name for v in model.variables.values() if v.variability == "constant"} & set(literals)
+    constants = {v.name for v in model.variables.values() if v.variability == "constant"} & set(
+        literals
+    )
 
     def fold(node: Any) -> Any:
         if isinstance(node, Name):
@@ -44,7 +52,8 @@ def fold_constants(model: Model) -> Model:
         return _unroll_known(node, model) if isinstance(node, Comprehension) else node
 
     return replace(
-        _rewrite_model(model, fold, {name for name in model.variables if name not in constants}), structural=frozenset(structural)
+        _rewrite_model(model, fold, {name for name in model.variables if name not in constants}),
+        structural=frozenset(structural),
     )
 
 
@@ -54,7 +63,11 @@ def _bind_parameters(model: Model) -> Model:
     Those that depend on variables or on the time become variables that are only computed at the initialization, and so do the
     parameters that depend on them.
     """
-    free = {v.name for v in model.variables.values() if v.variability == "parameter" and v.fixed is False and 0 not in v.shape}
+    free = {
+        v.name
+        for v in model.variables.values()
+        if v.variability == "parameter" and v.fixed is False and 0 not in v.shape
+    }
     known = {v.name for v in model.variables.values() if v.variability in ("constant", "parameter")}
     bindings: dict[str, Expression] = {}
     remaining = []
@@ -65,31 +78,65 @@ def _bind_parameters(model: Model) -> Model:
         else:
             remaining.append(equation)
     initialized = free - set(bindings)
-    while dependent := [v for v in model.variables.values() if v.name not in initialized and _depends(v, initialized)]:
-        remaining += [Equation(Name(v.name, v.where), v.binding, v.where) for v in dependent if v.binding]
+    while dependent := [
+        v
+        for v in model.variables.values()
+        if v.name not in initialized and _depends(v, initialized)
+    ]:
+        remaining += [
+            Equation(Name(v.name, v.where), v.binding, v.where) for v in dependent if v.binding
+        ]
         initialized |= {v.name for v in dependent}
-    variables = {n: replace(v, binding=bindings[n]) if n in bindings else v for n, v in model.variables.items()}
-    variables |= {n: replace(model.variables[n], variability="discrete", binding=None) for n in initialized}
-    return replace(model, variables=variables, initial_equations=tuple(remaining), initialized=frozenset(initialized))
+    variables = {
+        n: replace(v, binding=bindings[n]) if n in bindings else v
+        for n, v in model.variables.items()
+    }
+    variables |= {
+        n: replace(model.variables[n], variability="discrete", binding=None) for n in initialized
+    }
+    return replace(
+        model,
+        variables=variables,
+        initial_equations=tuple(remaining),
+        initialized=frozenset(initialized),
+    )
 
 
 def _depends(variable: Variable, names: set[str]) -> bool:
     """Return whether the binding of a parameter depends on variables."""
-    return variable.variability == "parameter" and not names.isdisjoint(variable_names(variable.binding))
+    return variable.variability == "parameter" and not names.isdisjoint(
+        variable_names(variable.binding)
+    )
 
 
 def _rewrite_model(model: Model, change: Any, names: Iterable[str] | None = None) -> Model:
-    """Return the model with `change` applied to all expressions; only the variables `names` remain."""
+    """Return the model with `change` applied to all expressions.
+
+    Only the variables `names` remain.
+    """
 
     def change_variable(variable: Variable) -> Variable:
         expressions = ("start", "binding", "minimum", "maximum")
-        return replace(variable, **{key: rewrite(getattr(variable, key), change) for key in expressions})
+        return replace(
+            variable, **{key: rewrite(getattr(variable, key), change) for key in expressions}
+        )
 
-    sections = ("equations", "whens", "algorithms", "asserts", "initial_equations", "initial_algorithms")
+    sections = (
+        "equations",
+        "whens",
+        "algorithms",
+        "asserts",
+        "initial_equations",
+        "initial_algorithms",
+    )
     names = model.variables if names is None else names
     return replace(
         model,
-        variables={name: change_variable(model.variables[name]) for name in model.variables if name in names},
+        variables={
+            name: change_variable(model.variables[name])
+            for name in model.variables
+            if name in names
+        },
         **{section: rewrite(getattr(model, section), change) for section in sections},
     )
 
@@ -101,7 +148,11 @@ class _ShapeFolder:
         self._shapes = {v.name: v.shape for v in model.variables.values()}
 
     def fold(self, node: Any) -> Any:
-        if not (isinstance(node, Builtin) and node.name == "size" and isinstance(node.arguments[0], Name)):
+        if not (
+            isinstance(node, Builtin)
+            and node.name == "size"
+            and isinstance(node.arguments[0], Name)
+        ):
             return node
         shape = self._shapes.get(node.arguments[0].name)
         if shape is None or len(node.arguments) != 2 or not isinstance(node.arguments[1], Literal):
@@ -125,13 +176,21 @@ def _structural_parameters(model: Model) -> set[str]:
 
 
 def _value(variable: Variable) -> Expression:
-    return variable.binding or variable.start or Literal(False if variable.type == "Boolean" else 0, variable.type)
+    return (
+        variable.binding
+        or variable.start
+        or Literal(False if variable.type == "Boolean" else 0, variable.type)
+    )
 
 
 def _is_foldable(variable: Variable, structural: set[str]) -> bool:
     if variable.variability == "constant" or variable.name in structural:
         return True
-    hidden = variable.variability == "parameter" and (variable.protected or variable.final) and variable.fixed is not False
+    hidden = (
+        variable.variability == "parameter"
+        and (variable.protected or variable.final)
+        and variable.fixed is not False
+    )
     return hidden and variable.type in _DISCRETE_TYPES
 
 

@@ -46,11 +46,14 @@ def _within(text: str) -> list[str]:
 
 
 def models_hint(name: str, path: Path) -> str:
-    """Return a hint for the end of a message about a model that a file lacks: its models, and the reference to the nearest one.
+    """Return a hint for the end of a message about a model that a file lacks.
+
+    Its models, and the reference to the nearest one.
 
     Args:
         name: The missing model.
-        path: The file. For a `package.mo` without models, those of the other files of its folder are listed.
+        path: The file. For a `package.mo` without models, those of the other files of its folder
+            are listed.
     """
     models = dict(_models_of([path]))
     if not models and path.name == "package.mo":
@@ -58,19 +61,30 @@ def models_hint(name: str, path: Path) -> str:
     if not models:
         return ""
     inside = any(model.startswith(f"{name}.") for model in models)
-    near = _same_class(name, models) or ("" if inside else nearest_name(name, models)) or next(iter(models))
+    near = (
+        _same_class(name, models)
+        or ("" if inside else nearest_name(name, models))
+        or next(iter(models))
+    )
     listed = f", but {abbreviate_names(models, _MAX_LISTED)}" if len(models) > 1 else ""
     return f"{listed}; write {_shown(models[near])}:{near}"
 
 
 def _same_class(name: str, models: Iterable[str]) -> str:
-    """Return the first model that has the name of another one without its packages; "" if there is none."""
+    """Return the first model that has the name of another one without its packages.
+
+    "" if there is none.
+    """
     last = name.rpartition(".")[2].lower()
     return next((model for model in models if model.rpartition(".")[2].lower() == last), "")
 
 
 def _models_of(files: Iterable[Path]) -> Iterator[tuple[str, Path]]:
-    return ((model, file) for file in files for model in declared_models(file.read_text(encoding="utf-8", errors="replace")))
+    return (
+        (model, file)
+        for file in files
+        for model in declared_models(file.read_text(encoding="utf-8", errors="replace"))
+    )
 
 
 def _shown(file: Path) -> str:

@@ -1,4 +1,7 @@
-"""Conversion of expressions from rumoca's JSON to the flat model; unknown elements are errors, they are never ignored."""
+"""Conversion of expressions from rumoca's JSON to the flat model.
+
+Unknown elements are errors, they are never ignored.
+"""
 
 from __future__ import annotations
 
@@ -40,7 +43,10 @@ _MODELICA_SPELLING = {
 
 
 def is_object_constructor(function: Json) -> bool:
-    """Return whether a function constructs an external object; it has the name of the object's class."""
+    """Return whether a function constructs an external object.
+
+    It has the name of the object's class.
+    """
     return any(output["type_class"] == "Class" for output in function["outputs"])
 
 
@@ -55,8 +61,14 @@ def _fold_constants(node: Expression) -> Expression:
     if not (isinstance(node, syntax_tree.Binary) and node.operator in _INTEGER_OPERATORS):
         return node
     left, right = _fold_constants(node.left), _fold_constants(node.right)
-    if isinstance(left, syntax_tree.Literal) and isinstance(right, syntax_tree.Literal) and left.type == right.type == "Integer":
-        return syntax_tree.Literal(_INTEGER_OPERATORS[node.operator](left.number, right.number), "Integer")
+    if (
+        isinstance(left, syntax_tree.Literal)
+        and isinstance(right, syntax_tree.Literal)
+        and left.type == right.type == "Integer"
+    ):
+        return syntax_tree.Literal(
+            _INTEGER_OPERATORS[node.operator](left.number, right.number), "Integer"
+        )
     return node
 
 
@@ -73,15 +85,28 @@ class ExpressionReader:
         return self.sources.locate(node.get("span") or node.get("source_span"))
 
     def _type(self, canonical: int) -> str:
-        predefined: dict[int, str] = {number: name.capitalize() for name, number in self.json["predefined_types"].items()}
-        return predefined.get(canonical) or ("ExternalObject" if canonical in self._object_types else "Enumeration")
+        predefined: dict[int, str] = {
+            number: name.capitalize() for name, number in self.json["predefined_types"].items()
+        }
+        return predefined.get(canonical) or (
+            "ExternalObject" if canonical in self._object_types else "Enumeration"
+        )
 
     @cached_property
     def _object_types(self) -> set[int]:
         """Numbers of the types of external objects."""
         functions = self.json["functions"].values()
-        locals_ = (local for f in functions for kind in ("inputs", "outputs", "locals") for local in f[kind])
-        return {local["effective_type"]["canonical_type"] for local in locals_ if local["type_class"] == "Class"}
+        locals_ = (
+            local
+            for f in functions
+            for kind in ("inputs", "outputs", "locals")
+            for local in f[kind]
+        )
+        return {
+            local["effective_type"]["canonical_type"]
+            for local in locals_
+            if local["type_class"] == "Class"
+        }
 
     def _optional(self, node: Json | None) -> Expression | None:
         return None if node is None else self.read_expression(node)
@@ -104,11 +129,15 @@ class ExpressionReader:
             "If": self._if,
             "Array": self._array,
             "Range": lambda n: syntax_tree.Range(
-                self.read_expression(n["start"]), self._optional(n["step"]), self.read_expression(n["end"])
+                self.read_expression(n["start"]),
+                self._optional(n["step"]),
+                self.read_expression(n["end"]),
             ),
             "BuiltinCall": self._builtin,
             "FunctionCall": self._call,
-            "StringConversion": lambda n: syntax_tree.Builtin("String", (self.read_expression(n["value"]),), self.locate(n)),
+            "StringConversion": lambda n: syntax_tree.Builtin(
+                "String", (self.read_expression(n["value"]),), self.locate(n)
+            ),
             "ArrayComprehension": self._comprehension,
             "FieldAccess": self._field_access,
         }
@@ -125,7 +154,11 @@ class ExpressionReader:
         if (ordinal := self.json["enum_literal_ordinals"].get(name)) is not None:
             return syntax_tree.Literal(ordinal, "Enumeration")
         base = syntax_tree.Name(name, where)
-        return syntax_tree.Index(base, self._subscripts(node["subscripts"]), where) if node["subscripts"] else base
+        return (
+            syntax_tree.Index(base, self._subscripts(node["subscripts"]), where)
+            if node["subscripts"]
+            else base
+        )
 
     def _subscripts(self, nodes: list[Json]) -> tuple[Expression | syntax_tree.Colon, ...]:
         return tuple(self._subscript(*split_tagged(node)) for node in nodes)
@@ -152,11 +185,17 @@ class ExpressionReader:
             f"the operator {node['op']} is not supported", self.locate(node)
         )
         return syntax_tree.Binary(
-            operator, self.read_expression(node["lhs"]), self.read_expression(node["rhs"]), self.locate(node)
+            operator,
+            self.read_expression(node["lhs"]),
+            self.read_expression(node["rhs"]),
+            self.locate(node),
         )
 
     def _if(self, node: Json) -> syntax_tree.If:
-        branches = tuple((self.read_expression(condition), self.read_expression(value)) for condition, value in node["branches"])
+        branches = tuple(
+            (self.read_expression(condition), self.read_expression(value))
+            for condition, value in node["branches"]
+        )
         return syntax_tree.If(branches, self.read_expression(node["else_branch"]))
 
     def _array(self, node: Json) -> Expression:
@@ -167,12 +206,20 @@ class ExpressionReader:
             return syntax_tree.Array(elements)
         if kind == "Vertical" and (rows := self._scalar_rows(elements)):
             return syntax_tree.Array(rows)
-        return syntax_tree.Builtin("rows" if kind == "Vertical" else "columns", elements, self.locate(node))
+        return syntax_tree.Builtin(
+            "rows" if kind == "Vertical" else "columns", elements, self.locate(node)
+        )
 
     def _scalar_rows(self, rows: tuple[Expression, ...]) -> tuple[syntax_tree.Array, ...]:
         """Return the rows of a matrix as arrays if all their elements are certainly scalars, else no rows."""
-        columns = [row.arguments for row in rows if isinstance(row, syntax_tree.Builtin) and row.name == "columns"]
-        if len(columns) != len(rows) or not all(self._is_scalar(element) for row in columns for element in row):
+        columns = [
+            row.arguments
+            for row in rows
+            if isinstance(row, syntax_tree.Builtin) and row.name == "columns"
+        ]
+        if len(columns) != len(rows) or not all(
+            self._is_scalar(element) for row in columns for element in row
+        ):
             return ()
         return tuple(map(syntax_tree.Array, columns))
 
@@ -182,19 +229,28 @@ class ExpressionReader:
             variable = self.json["variables"].get(node.name)
             return variable is not None and not variable["dims"]
         if isinstance(node, syntax_tree.Index):
-            return isinstance(node.base, syntax_tree.Name) and all(isinstance(s, syntax_tree.Literal) for s in node.subscripts)
+            return isinstance(node.base, syntax_tree.Name) and all(
+                isinstance(s, syntax_tree.Literal) for s in node.subscripts
+            )
         if isinstance(node, syntax_tree.Binary):
             return self._is_scalar(node.left) and self._is_scalar(node.right)
-        return isinstance(node, syntax_tree.Literal) or (isinstance(node, syntax_tree.Unary) and self._is_scalar(node.operand))
+        return isinstance(node, syntax_tree.Literal) or (
+            isinstance(node, syntax_tree.Unary) and self._is_scalar(node.operand)
+        )
 
     def _comprehension(self, node: Json) -> Expression:
-        """Convert an array constructor with iterators; the last iterator varies fastest in Modelica's nesting order."""
+        """Convert an array constructor with iterators.
+
+        The last iterator varies fastest in Modelica's nesting order.
+        """
         where = self.locate(node)
         if node.get("filter") is not None:
             raise_model_error("an array constructor with a condition is not supported", where)
         value = self.read_expression(node["expr"])
         for index in node["indices"]:
-            value = syntax_tree.Comprehension(value, index["name"], self.read_expression(index["range"]), where)
+            value = syntax_tree.Comprehension(
+                value, index["name"], self.read_expression(index["range"]), where
+            )
         return value
 
     def _builtin(self, node: Json) -> Expression:
@@ -204,13 +260,18 @@ class ExpressionReader:
         if name in _UNSUPPORTED_BUILTINS:
             raise_model_error(_UNSUPPORTED_BUILTINS[name], self.locate(node))
         return syntax_tree.Builtin(
-            _MODELICA_SPELLING.get(name, name), tuple(map(self.read_expression, node["args"])), self.locate(node)
+            _MODELICA_SPELLING.get(name, name),
+            tuple(map(self.read_expression, node["args"])),
+            self.locate(node),
         )
 
     def _field_access(self, node: Json) -> Expression:
         kind, record = split_tagged(node["base"])
         if kind != "FunctionCall":
-            raise_model_error("a field can only be taken from a record variable or a function call", self.locate(node))
+            raise_model_error(
+                "a field can only be taken from a record variable or a function call",
+                self.locate(node),
+            )
         return self.read_field(record, node["field"])
 
     def read_field(self, call: Json, field: str) -> Expression:
@@ -224,12 +285,17 @@ class ExpressionReader:
             names = [name for local in function["outputs"] for name in self.scalar_names(local)]
             if (name := f"{function['outputs'][0]['name']}.{field}") in names:
                 return replace(self._call(call), result=names.index(name))
-        reason = f"the record of {function['name']}() has no field {field}; records in records are not supported"
+        reason = (
+            f"the record of {function['name']}() has no field {field}; records in records are not "
+            "supported"
+        )
         return raise_model_error(reason, where)
 
     def scalar_names(self, local: Json) -> list[str]:
         """Return the names of the fields of a record that is a variable of a function, or the name of any other variable."""
-        return [f"{local['name']}.{field['name']}" for field in self.fields(local)] or [local["name"]]
+        return [f"{local['name']}.{field['name']}" for field in self.fields(local)] or [
+            local["name"]
+        ]
 
     def fields(self, local: Json) -> list[Json]:
         """Return the fields of a record that is a variable of a function, none for other variables."""
@@ -243,17 +309,29 @@ class ExpressionReader:
 
     def _call(self, node: Json) -> syntax_tree.Call:
         if node["is_constructor"]:
-            raise_model_error("a record constructor is not supported here; write one for a record variable", self.locate(node))
+            raise_model_error(
+                "a record constructor is not supported here; write one for a record variable",
+                self.locate(node),
+            )
         return self._function_call(node["name"], node["args"], self.locate(node))
 
-    def _function_call(self, reference: Json, arguments: list[Json], where: SourceLocation | None) -> syntax_tree.Call:
+    def _function_call(
+        self, reference: Json, arguments: list[Json], where: SourceLocation | None
+    ) -> syntax_tree.Call:
         """Convert a function call.
 
-        rumoca identifies functions by their short names and would silently use a function of another package with the same
-        name. Such calls are rejected.
+        rumoca identifies functions by their short names and would silently use a function of
+        another package with the same name. Such calls are rejected.
         """
         name = reference["name"]
-        function = self.json["functions"].get(name) or raise_model_error(f"unknown function {name}", where)
-        if not is_object_constructor(function) and reference["component_ref"]["parts"][-1]["def_id"] != function["def_id"]:
-            raise_model_error(f'the model uses several functions named "{name}"; give them different names', where)
+        function = self.json["functions"].get(name) or raise_model_error(
+            f"unknown function {name}", where
+        )
+        if (
+            not is_object_constructor(function)
+            and reference["component_ref"]["parts"][-1]["def_id"] != function["def_id"]
+        ):
+            raise_model_error(
+                f'the model uses several functions named "{name}"; give them different names', where
+            )
         return syntax_tree.Call(name, tuple(map(self.read_expression, arguments)), where)

@@ -1,4 +1,7 @@
-"""Cache of the front end, below the user's cache folder: flat models by the contents of their sources, and links to libraries."""
+"""Cache of the front end, below the user's cache folder.
+
+Flat models by the contents of their sources, and links to libraries.
+"""
 
 from __future__ import annotations
 
@@ -34,8 +37,8 @@ def store_document(key: Sequence[Any], document: str) -> None:
 def link_libraries(libraries: Sequence[Library]) -> Path:
     """Return a folder that contains a link to each library under its plain name and nothing else.
 
-    The folder depends on names and places of the libraries only, so that names of files in messages of the front end are the same
-    in each call.
+    The folder depends on names and places of the libraries only, so that names of files in messages
+    of the front end are the same in each call.
 
     Raises:
         InputError: The cache cannot be written.

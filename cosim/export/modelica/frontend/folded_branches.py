@@ -15,7 +15,9 @@ from typing import Any
 
 from .sources import ModelicaSources
 
-_TOKEN = re.compile(r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\])*"|\'(?:\\.|[^\'\\])*\'|[A-Za-z_]\w*|\d[\w.]*|\S', re.DOTALL)
+_TOKEN = re.compile(
+    r'//[^\n]*|/\*.*?\*/|"(?:\\.|[^"\\])*"|\'(?:\\.|[^\'\\])*\'|[A-Za-z_]\w*|\d[\w.]*|\S', re.DOTALL
+)
 _SECTIONS = {"algorithm", "equation", "public", "protected", "initial", "external"}
 _BODY_TERMINATORS = {"end", "else", "elseif", "elsewhen"} | _SECTIONS
 
@@ -34,7 +36,9 @@ class _IfEquation:
 
 
 def folded_parameters(json: Mapping[str, Any], sources: ModelicaSources) -> frozenset[str]:
-    """Return the parameters whose values have selected the branch of an if-equation; they are structural.
+    """Return the parameters whose values have selected the branch of an if-equation.
+
+    They are structural.
 
     Args:
         json: rumoca's document of the flat model.
@@ -48,22 +52,36 @@ def folded_parameters(json: Mapping[str, Any], sources: ModelicaSources) -> froz
             names = statement.identifiers & settable
             if names and _is_folded(statement, depth, flat_equations):
                 found |= names
-    return frozenset(name for name in json["variables"] if name.rpartition(".")[2] in found and _is_settable(json, name))
+    return frozenset(
+        name
+        for name in json["variables"]
+        if name.rpartition(".")[2] in found and _is_settable(json, name)
+    )
 
 
 def _is_settable(json: Mapping[str, Any], name: str) -> bool:
     variability = json["variables"][name]["variability"]
-    return isinstance(variability, dict) and "Parameter" in variability and not json["variable_final_flags"].get(name)
+    return (
+        isinstance(variability, dict)
+        and "Parameter" in variability
+        and not json["variable_final_flags"].get(name)
+    )
 
 
 def _is_folded(statement: _IfEquation, depth: int, flat_equations: list[tuple[int, int]]) -> bool:
     """Return whether an equation of the statement has lost an `if`, or all are missing from an existing when-clause."""
-    depths = [flat_depth for start, flat_depth in flat_equations if statement.start <= start < statement.end]
+    depths = [
+        flat_depth
+        for start, flat_depth in flat_equations
+        if statement.start <= start < statement.end
+    ]
     when_exists = any(statement.when[0] <= start < statement.when[1] for start, _ in flat_equations)
     return when_exists and (not depths or min(depths) < depth)
 
 
-def _equations_by_file(json: Mapping[str, Any], sources: ModelicaSources) -> dict[Path, list[tuple[int, int]]]:
+def _equations_by_file(
+    json: Mapping[str, Any], sources: ModelicaSources
+) -> dict[Path, list[tuple[int, int]]]:
     """Return (byte offset, nesting depth in `if`) of all equations in when-clauses of the flat model, by source file."""
     result: dict[Path, list[tuple[int, int]]] = {}
     for chain in json["when_chains"]:
@@ -74,7 +92,9 @@ def _equations_by_file(json: Mapping[str, Any], sources: ModelicaSources) -> dic
     return result
 
 
-def _equation_spans(nodes: list[Mapping[str, Any]], depth: int) -> Iterator[tuple[Mapping[str, int], int]]:
+def _equation_spans(
+    nodes: list[Mapping[str, Any]], depth: int
+) -> Iterator[tuple[Mapping[str, int], int]]:
     for node in nodes:
         ((kind, payload),) = node.items()
         if kind == "Conditional":
@@ -88,7 +108,10 @@ def _equation_spans(nodes: list[Mapping[str, Any]], depth: int) -> Iterator[tupl
 
 
 class _Scanner:
-    """Scanner for the if-equations of a Modelica file; it tokenizes the file and skips all other parts of the language."""
+    """Scanner for the if-equations of a Modelica file.
+
+    It tokenizes the file and skips all other parts of the language.
+    """
 
     def __init__(self, text: str):
         matches = [m for m in _TOKEN.finditer(text) if not m[0].startswith(("//", "/*"))]
@@ -106,7 +129,10 @@ class _Scanner:
         return self._found
 
     def _body(self, depth: int, when: int | None) -> None:
-        """Scan equations up to the keyword that ends them; `when` is the token index of the enclosing when-clause."""
+        """Scan equations up to the keyword that ends them.
+
+        `when` is the token index of the enclosing when-clause.
+        """
         while (word := self._tokens[self._next]) not in _BODY_TERMINATORS:
             if word == "if":
                 self._if(depth, when)
@@ -125,7 +151,10 @@ class _Scanner:
         self._skip(";")
         if word == "when":
             span = (self._offsets[first], self._offsets[self._next - 1])
-            self._found[begin:] = [(_IfEquation(s.start, s.end, span, s.identifiers), d) for s, d in self._found[begin:]]
+            self._found[begin:] = [
+                (_IfEquation(s.start, s.end, span, s.identifiers), d)
+                for s, d in self._found[begin:]
+            ]
 
     def _if(self, depth: int, when: int | None) -> None:
         first, identifiers = self._next, set[str]()
@@ -143,7 +172,10 @@ class _Scanner:
             self._found.append((_IfEquation(*span, span, frozenset(identifiers)), depth + 1))
 
     def _condition(self) -> None:
-        """Advance past the `then` that ends a condition; a `then` of an if-expression inside it does not end it."""
+        """Advance past the `then` that ends a condition.
+
+        A `then` of an if-expression inside it does not end it.
+        """
         open_ifs = 0
         while True:
             self._next += 1

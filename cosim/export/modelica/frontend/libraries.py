@@ -1,9 +1,10 @@
 """Modelica libraries: search in folders, required versions, and a digest of their contents.
 
-A library is a folder with `package.mo` or a file `NAME.mo`. The name may contain a version (`Modelica 4.1.0`). Libraries are
-searched in the given folders and then in those of the environment variable MODELICAPATH (Modelica Language Specification 3.6,
-section 13.3.4). The annotation `uses` requires versions. The annotation `conversion(noneFromVersion=...)` of a library names
-older versions that it replaces without changes (section 18.8).
+A library is a folder with `package.mo` or a file `NAME.mo`. The name may contain a version
+(`Modelica 4.1.0`). Libraries are searched in the given folders and then in those of the environment
+variable MODELICAPATH (Modelica Language Specification 3.6, section 13.3.4). The annotation `uses`
+requires versions. The annotation `conversion(noneFromVersion=...)` of a library names older
+versions that it replaces without changes (section 18.8).
 """
 
 from __future__ import annotations
@@ -69,7 +70,9 @@ class Library:
         if version in ("", self.version):
             return True
         conversion = split_arguments(top_annotation(self.package_file).get("conversion", ""))
-        return any(version == _string(value) for name, value in conversion if name == "noneFromVersion")
+        return any(
+            version == _string(value) for name, value in conversion if name == "noneFromVersion"
+        )
 
     @cached_property
     def files(self) -> list[Path]:
@@ -84,7 +87,9 @@ class Library:
         digest = sha256()
         for file in self.files:
             content = file.read_bytes()
-            digest.update(f"{file.relative_to(self.path.parent)}\0{len(content)}\0".encode() + content)
+            digest.update(
+                f"{file.relative_to(self.path.parent)}\0{len(content)}\0".encode() + content
+            )
         return digest.hexdigest()
 
     def __str__(self) -> str:
@@ -92,7 +97,10 @@ class Library:
 
 
 def library_folders(given: Sequence[Path]) -> list[Path]:
-    """Return the folders that are searched for libraries: the given ones, then those of MODELICAPATH."""
+    """Return the folders that are searched for libraries.
+
+    The given ones, then those of MODELICAPATH.
+    """
     listed = [Path(each) for each in os.environ.get(_PATH_VARIABLE, "").split(os.pathsep) if each]
     return list(dict.fromkeys(folder.absolute() for folder in (*given, *listed)))
 
@@ -114,7 +122,9 @@ def libraries_in(folders: Iterable[Path]) -> Iterator[Library]:
             yield Library(_name_of(entry), entry)
 
 
-def find_libraries(files: Sequence[Path], folders: Sequence[Path], known: Collection[str]) -> list[Library]:
+def find_libraries(
+    files: Sequence[Path], folders: Sequence[Path], known: Collection[str]
+) -> list[Library]:
     """Return the libraries that a model needs, including those that they use themselves.
 
     Args:
@@ -135,23 +145,33 @@ def find_libraries(files: Sequence[Path], folders: Sequence[Path], known: Collec
             continue
         if name in found:
             raise InputError(
-                Problem(f"uses the library {name} {version}, but another file uses {found[name]}", _place(user, name))
+                Problem(
+                    f"uses the library {name} {version}, but another file uses {found[name]}",
+                    _place(user, name),
+                )
             )
         found[name] = _choose(name, version, available, user)
-        queue += [(used, needed, found[name].package_file) for used, needed in found[name].uses.items()]
+        queue += [
+            (used, needed, found[name].package_file) for used, needed in found[name].uses.items()
+        ]
     return list(found.values())
 
 
 def _used_names(file: Path, names: Mapping[str, bool]) -> dict[str, str]:
-    """Return the required version of each library that a file uses: those of `uses`, and those of `names` that it refers to.
+    """Return the required version of each library that a file uses.
 
-    A library in a single file (value True), such as `Complex`, may also be a class that declarations name alone.
+    Those of `uses`, and those of `names` that it refers to.
+
+    A library in a single file (value True), such as `Complex`, may also be a class that
+    declarations name alone.
     """
     text = file.read_text(encoding="utf-8", errors="replace")
     code = _COMMENT_OR_STRING.sub(" ", text)
     references = {match[1] for match in _REFERENCE.finditer(code)}
     references |= {name for name in _WORD.findall(code) if names.get(name)}
-    return dict.fromkeys(sorted(references & {*names, _STANDARD_LIBRARY}), "") | required_versions(_top_annotation_of(text))
+    return dict.fromkeys(sorted(references & {*names, _STANDARD_LIBRARY}), "") | required_versions(
+        _top_annotation_of(text)
+    )
 
 
 def _choose(name: str, version: str, available: Sequence[Library], user: Path) -> Library:
@@ -164,7 +184,10 @@ def _choose(name: str, version: str, available: Sequence[Library], user: Path) -
         found = join_alternatives([f'{library} in "{library.path}"' for library in candidates])
         raise InputError(Problem(f"uses the library {wanted}, found {found}", _place(user, name)))
     hint = did_you_mean(name, {library.name for library in available})
-    text = f"uses the library {wanted}, which is not found; add its folder to {_PATH_VARIABLE} or pass --library{hint}"
+    text = (
+        f"uses the library {wanted}, which is not found; add its folder to {_PATH_VARIABLE} or "
+        f"pass --library{hint}"
+    )
     raise InputError(Problem(text, _place(user, name)))
 
 
@@ -177,7 +200,10 @@ def _place(user: Path, library: str) -> str:
 
 def _is_library(entry: Path) -> bool:
     if entry.suffix == ".mo":
-        return entry.name != _PACKAGE_FILE and _FOLDER_NAME.fullmatch(_name_with_version(entry)) is not None
+        return (
+            entry.name != _PACKAGE_FILE
+            and _FOLDER_NAME.fullmatch(_name_with_version(entry)) is not None
+        )
     return (entry / _PACKAGE_FILE).is_file() and _FOLDER_NAME.fullmatch(entry.name) is not None
 
 
@@ -196,14 +222,23 @@ def _version_in_name(name: str) -> str:
 def _preference(entry: Path) -> tuple[str, bool, list[int], str]:
     """Return the key by which folders without version come first, then the newest version."""
     version = _version_in_name(entry.name)
-    return _name_of(entry), version != "", [-int(number) for number in re.findall(r"\d+", version)], version
+    return (
+        _name_of(entry),
+        version != "",
+        [-int(number) for number in re.findall(r"\d+", version)],
+        version,
+    )
 
 
-# -- annotations ---------------------------------------------------------------------------------------------------------------
+# -- annotations
+# ---------------------------------------------------------------------------------------------------------------
 
 
 def top_annotation(package_file: Path) -> Mapping[str, str]:
-    """Return the arguments of the annotation of the top-level class of a file: name -> text of its value."""
+    """Return the arguments of the annotation of the top-level class of a file.
+
+    Name -> text of its value.
+    """
     return _annotation_of_file(package_file, package_file.stat().st_mtime_ns)
 
 
@@ -235,7 +270,9 @@ def split_arguments(text: str) -> list[tuple[str, str]]:
     for part in _split_at_commas(text):
         if match := _ARGUMENT.match(part):
             rest = part[match.end() :].strip()
-            arguments.append((match[1], rest if match[2] == "=" else _inside_parentheses(f"({rest}")))
+            arguments.append(
+                (match[1], rest if match[2] == "=" else _inside_parentheses(f"({rest}"))
+            )
     return arguments
 
 

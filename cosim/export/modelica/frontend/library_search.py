@@ -22,18 +22,29 @@ def find_class(folder: Path, names: list[str]) -> tuple[SourceLocation, bool] | 
 
     Args:
         folder: The folder of the package that contains the class.
-        names: Names of the nested classes. The last ones may be members of a class; then the class is not complete.
+        names: Names of the nested classes. The last ones may be members of a class; then the class
+            is not complete.
     """
     while names and (folder / names[0] / "package.mo").is_file():
         folder, names = folder / names[0], names[1:]
-    file = folder / f"{names[0]}.mo" if names and (folder / f"{names[0]}.mo").is_file() else folder / "package.mo"
+    file = (
+        folder / f"{names[0]}.mo"
+        if names and (folder / f"{names[0]}.mo").is_file()
+        else folder / "package.mo"
+    )
     text, position, found = _code(file), -1, 0
     for name in names:
-        declaration = re.compile(_CLASS.format(re.escape(name)), re.MULTILINE).search(text, max(position, 0))
+        declaration = re.compile(_CLASS.format(re.escape(name)), re.MULTILINE).search(
+            text, max(position, 0)
+        )
         if declaration is None:
             break
         position, found = declaration.end(), found + 1
-    return (SourceLocation(file, text.count("\n", 0, position) + 1), found == len(names)) if position >= 0 else None
+    return (
+        (SourceLocation(file, text.count("\n", 0, position) + 1), found == len(names))
+        if position >= 0
+        else None
+    )
 
 
 def find_operator(word: str, code: str, packages: Mapping[str, Path]) -> SourceLocation | None:
@@ -49,12 +60,18 @@ def find_operator(word: str, code: str, packages: Mapping[str, Path]) -> SourceL
     while pending and len(seen) < MAX_CLASSES:
         owner, text = pending.pop(0)
         for name in _references(owner, _HIDDEN.sub(" ", text), packages):
-            place = None if name in seen else find_class(packages[name.partition(".")[0]], name.split(".")[1:])
+            place = (
+                None
+                if name in seen
+                else find_class(packages[name.partition(".")[0]], name.split(".")[1:])
+            )
             seen.add(name)
             if place and place[1]:
                 body = _body(place[0], name.rpartition(".")[2])
                 if match := pattern.search(body):
-                    return SourceLocation(place[0].path, place[0].line + body.count("\n", 0, match.start()))
+                    return SourceLocation(
+                        place[0].path, place[0].line + body.count("\n", 0, match.start())
+                    )
                 pending.append((name, body))
     return None
 

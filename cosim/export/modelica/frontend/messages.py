@@ -17,8 +17,10 @@ _QUOTED = re.compile(r"['`]([\w.]+(?: = [\w.]+)?)['`]")
 _DIMENSION = re.compile(r"component dimension for ([\w.]+)")
 #: beginnings of messages that name a part of the front end
 _PHASE = re.compile(
-    r"^(?:parse error: |\w+ failed: \S+ failed in \w+: (?:unsupported Flat semantic owner `[^`]*`: |"
-    r"unsupported runtime operator `[^`]+`: |canonical DAE construction rejected an invalid operation: )?)"
+    r"^(?:parse error: |\w+ failed: \S+ failed in \w+: (?:unsupported Flat semantic owner "
+    r"`[^`]*`: |"
+    r"unsupported runtime operator `[^`]+`: |canonical DAE construction rejected an invalid "
+    r"operation: )?)"
 )
 #: operators that a message may name without quotes
 _OPERATOR = re.compile(
@@ -30,9 +32,15 @@ _MEANINGS = {
     "must name a coordinate classified as a continuous state": "der() needs a variable with a derivative: inputs, discrete "
     "variables and parameters have none; filter an input u first, T*der(x) = u - x, and use der(x)",
     "component binding type compatibility": "the type of the binding does not fit the declaration",
-    "a non-guarded nested return": "return inside a loop or a branch is not supported; write one assignment for each branch",
-    "a proved finite arithmetic-series form": "break inside a loop is not supported; write its condition after while",
-    "range and subscript must cover one declared array axis exactly": "the range of a loop in an algorithm differs from the "
+    "a non-guarded nested return": (
+        "return inside a loop or a branch is not supported; write one assignment for each branch"
+    ),
+    "a proved finite arithmetic-series form": (
+        "break inside a loop is not supported; write its condition after while"
+    ),
+    (
+        "range and subscript must cover one declared array axis exactly"
+    ): "the range of a loop in an algorithm differs from the "
     "declared size of an array that it subscripts",
     "expression shape mismatch": "expression shape mismatch: the sizes of the operands differ",
 }
@@ -40,7 +48,8 @@ _COUNTS = re.compile(r"; unknowns\[.*$")
 _NOT_FOUND = " could not be compiled because resolve/parse failed"
 _LOCATION_SUFFIX = re.compile(r"\[(?P<file>[^\[\]]+):(?P<line>\d+):\d+\]$")
 _PANIC = re.compile(
-    r'detail: "(?P<what>[^"]+)", span: Span \{ source: SourceId\((?P<source>\d+)\), start: BytePos\((?P<start>\d+)\)'
+    r'detail: "(?P<what>[^"]+)", span: Span \{ source: SourceId\((?P<source>\d+)\), start: '
+    r"BytePos\((?P<start>\d+)\)"
 )
 _SYNTAX_ERROR = re.compile(r"×\s*(?P<what>.+?)\n[^\n]*╭─\[[^\]]*:(?P<line>\d+):\d+\]", re.DOTALL)
 _LINE_BREAK = re.compile(r"\s*\n[\s│]*")
@@ -62,12 +71,18 @@ def to_syntax_problem(file: str, line: int, message: str) -> Problem:
     what = _LINE_BREAK.sub(" ", detail["what"])
     word = what.removeprefix("unexpected ").strip("`")
     if _RESERVED.fullmatch(word) and _is_in_place_of_name(word, message):
-        what = f"`{word}` is a reserved keyword in Modelica (MLS §2.3.3) and cannot be used as an identifier"
+        what = (
+            f"`{word}` is a reserved keyword in Modelica (MLS §2.3.3) and cannot be used as an "
+            "identifier"
+        )
     return Problem(what, f"{file}:{detail['line']}")
 
 
 def _is_in_place_of_name(word: str, message: str) -> bool:
-    """Return whether a word stands in a declaration after its type: a type may go on with "." or ".*", a term also with "+"."""
+    """Return whether a word stands in a declaration after its type.
+
+    A type may go on with "." or ".*", a term also with "+".
+    """
     expected = _EXPECTED.search(message)
     tokens = expected["tokens"].replace("\n", " ").split(", ") if expected else []
     tokens = [token.strip() for token in tokens]
@@ -75,15 +90,22 @@ def _is_in_place_of_name(word: str, message: str) -> bool:
     return "dotstar" in tokens and "+" not in tokens and ends_declaration is not None
 
 
-def to_problems(answer: Mapping[str, Any], name: str, path: Path, sources: ModelicaSources) -> list[Problem]:
+def to_problems(
+    answer: Mapping[str, Any], name: str, path: Path, sources: ModelicaSources
+) -> list[Problem]:
     """Convert the front end's message (see `rumoca_process`) to problems, one for each informative line."""
     error = answer["error"]
     if panic := _PANIC.search(error):
         return [
-            Problem(_shorten(panic["what"]), str(sources.locate({key: int(panic[key]) for key in ("source", "start")}) or path))
+            Problem(
+                _shorten(panic["what"]),
+                str(sources.locate({key: int(panic[key]) for key in ("source", "start")}) or path),
+            )
         ]
     lines = [line.rpartition("[Resolve]:")[2].strip(" -") for line in error.splitlines()]
-    reasons = [line for line in dict.fromkeys(lines) if line and not line.startswith("Related failures")]
+    reasons = [
+        line for line in dict.fromkeys(lines) if line and not line.startswith("Related failures")
+    ]
     if any(line.startswith("unresolved extends base class") for line in reasons):
         reasons = [line for line in reasons if not line.startswith("base class not found")]
     if [line for line in reasons if not line.endswith(_NOT_FOUND)] == []:
@@ -91,11 +113,20 @@ def to_problems(answer: Mapping[str, Any], name: str, path: Path, sources: Model
     specific = [line for line in reasons if " could not be compiled: " not in line] or reasons
     if not specific or answer["panicked"]:
         specific = [f"the Modelica front end failed on the model {name}: {' '.join(lines)}"]
-    return list(dict.fromkeys(_to_problem(reason, name, path, sources, answer["lines"]) for reason in specific))
+    return list(
+        dict.fromkeys(
+            _to_problem(reason, name, path, sources, answer["lines"]) for reason in specific
+        )
+    )
 
 
-def _to_problem(reason: str, name: str, path: Path, sources: ModelicaSources, part: Sequence[int] | None) -> Problem:
-    """Convert a reason: that of an operator that it does not name or place, else the reason with a place."""
+def _to_problem(
+    reason: str, name: str, path: Path, sources: ModelicaSources, part: Sequence[int] | None
+) -> Problem:
+    """Convert a reason.
+
+    That of an operator that it does not name or place, else the reason with a place.
+    """
     explained = explain_unsupported_operator(reason, sources)
     if explained and explained.where:
         return explained
@@ -110,12 +141,15 @@ def _shorten(reason: str) -> str:
     return _COUNTS.sub("", _PHASE.sub("", reason))
 
 
-def _locate_problem(reason: str, name: str, path: Path, sources: ModelicaSources, part: Sequence[int] | None) -> Problem:
+def _locate_problem(
+    reason: str, name: str, path: Path, sources: ModelicaSources, part: Sequence[int] | None
+) -> Problem:
     """Add a location to a reason.
 
-    It is the first of these that exists: the one at the end of the reason; that of the class of a library that it names; the
-    first line with a name that it quotes, in the `part` of the model (first and last line) to which the error is due; the first
-    line of the model's file with an operator that it names; the first line of this part; the first line of all files with such a
+    It is the first of these that exists: the one at the end of the reason; that of the class of a
+    library that it names; the first line with a name that it quotes, in the `part` of the model
+    (first and last line) to which the error is due; the first line of the model's file with an
+    operator that it names; the first line of this part; the first line of all files with such a
     name; that of the model.
     """
     if ending := _LOCATION_SUFFIX.search(reason):
@@ -125,18 +159,28 @@ def _locate_problem(reason: str, name: str, path: Path, sources: ModelicaSources
     place = sources.locate_library_class(_QUOTED.findall(reason))
     if place is None and part:
         place = _find_quoted_name(f"{reason} {meaning}", [path], range(part[0], part[1] + 1))
-        place = place or _find_name(_OPERATOR.findall(reason), [path]) or SourceLocation(path, part[0])
+        place = (
+            place or _find_name(_OPERATOR.findall(reason), [path]) or SourceLocation(path, part[0])
+        )
     place = place or _find_quoted_name(f"{reason} {meaning}", sources.files)
     place = place or sources.locate_in_libraries(_OPERATOR.findall(f"{reason} {meaning}"))
     return Problem(meaning, str(place or sources.locate_class(name)))
 
 
-def _find_quoted_name(reason: str, files: Iterable[Path], lines: Container[int] | None = None) -> SourceLocation | None:
+def _find_quoted_name(
+    reason: str, files: Iterable[Path], lines: Container[int] | None = None
+) -> SourceLocation | None:
     """Return the first source line with a name that a message quotes, or with an operator that it names."""
-    return _find_name((*_QUOTED.findall(reason), *_DIMENSION.findall(reason), *_OPERATOR.findall(reason)), files, lines)
+    return _find_name(
+        (*_QUOTED.findall(reason), *_DIMENSION.findall(reason), *_OPERATOR.findall(reason)),
+        files,
+        lines,
+    )
 
 
-def _find_name(names: Iterable[str], files: Iterable[Path], lines: Container[int] | None = None) -> SourceLocation | None:
+def _find_name(
+    names: Iterable[str], files: Iterable[Path], lines: Container[int] | None = None
+) -> SourceLocation | None:
     """Return the first source line with one of these names, the first name first."""
     for quoted in names:
         word = re.compile(rf"(?<![\w.]){re.escape(quoted)}(?![\w])")

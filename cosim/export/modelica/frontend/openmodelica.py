@@ -1,7 +1,10 @@
-"""Export by OpenModelica, for features that the built-in compiler lacks: standard library, implicit equations, state events.
+"""Export by OpenModelica, for features that the built-in compiler lacks.
 
-This module follows OpenModelica's documentation. It has not been tested with OpenModelica itself: the tests check the command
-and not its result. The FMU contains OpenModelica's solver (Euler by default): compare its results with a reference before use.
+Standard library, implicit equations, state events.
+
+This module follows OpenModelica's documentation. It has not been tested with OpenModelica itself:
+the tests check the command and not its result. The FMU contains OpenModelica's solver (Euler by
+default): compare its results with a reference before use.
 """
 
 from __future__ import annotations
@@ -16,7 +19,9 @@ from tempfile import TemporaryDirectory
 from ....core.errors import InputError, Problem
 from .rumoca_frontend import find_packages, model_name, read_source
 
-_ERROR = re.compile(r"^(?:\[(?P<file>[^\]]+?):(?P<line>\d+):\d+-\d+:\d+:\w+\] )?Error: (?P<what>.+)$", re.MULTILINE)
+_ERROR = re.compile(
+    r"^(?:\[(?P<file>[^\]]+?):(?P<line>\d+):\d+-\d+:\d+:\w+\] )?Error: (?P<what>.+)$", re.MULTILINE
+)
 _TIMEOUT = 1800.0
 
 
@@ -33,7 +38,9 @@ def export_with_omc(path: Path, target: Path, model: str | None = None) -> None:
     """
     compiler = shutil.which("omc")
     if compiler is None:
-        raise InputError('OpenModelica is not installed: there is no "omc" on PATH (see https://openmodelica.org)')
+        raise InputError(
+            'OpenModelica is not installed: there is no "omc" on PATH (see https://openmodelica.org)'
+        )
     path = path.resolve()
     with TemporaryDirectory() as folder:
         script = Path(folder) / "export.mos"
@@ -50,10 +57,15 @@ def _script(path: Path, model: str | None) -> str:
     """Return the script for omc: load the packages and the file, and build the FMU."""
     text = read_source(path)
     packages = find_packages(path, text)
-    model_files = [] if any(map(path.is_relative_to, packages)) else [path]  # a package loads its members
+    model_files = (
+        [] if any(map(path.is_relative_to, packages)) else [path]
+    )  # a package loads its members
     files = [*(package / "package.mo" for package in packages), *model_files]
     loads = [f"loadFile({json.dumps(str(file), ensure_ascii=False)});" for file in files]
-    build = f'buildModelFMU({model_name(path, text, model)}, version="2.0", fmuType="cs", platforms={{"static"}});'
+    build = (
+        f'buildModelFMU({model_name(path, text, model)}, version="2.0", fmuType="cs", '
+        'platforms={"static"});'
+    )
     return "\n".join([*loads, build, "print(getErrorString());"]) + "\n"
 
 
@@ -77,5 +89,12 @@ def _run_omc(compiler: str, script: Path) -> str:
 
 def _parse_errors(log: str, path: Path) -> list[Problem]:
     """Return the errors in the output of omc, or the whole output if it contains none."""
-    problems = [Problem(e["what"], f"{e['file']}:{e['line']}" if e["file"] else str(path)) for e in _ERROR.finditer(log)]
-    return problems or [Problem(f"OpenModelica has created no FMU: {log.strip() or 'it printed nothing'}", str(path))]
+    problems = [
+        Problem(e["what"], f"{e['file']}:{e['line']}" if e["file"] else str(path))
+        for e in _ERROR.finditer(log)
+    ]
+    return problems or [
+        Problem(
+            f"OpenModelica has created no FMU: {log.strip() or 'it printed nothing'}", str(path)
+        )
+    ]

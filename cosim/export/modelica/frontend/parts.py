@@ -1,4 +1,7 @@
-"""Parts of a Modelica text that are changed in order to find the one that the front end refuses: equations, values, bindings."""
+"""Parts of a Modelica text that are changed in order to find the one that the front end refuses.
+
+Equations, values, bindings.
+"""
 
 from __future__ import annotations
 
@@ -29,7 +32,11 @@ def removable_parts(text: str) -> list[tuple[int, int]]:
     k = 0
     while k < len(tokens):
         in_section = tokens[k][0] in _SECTIONS
-        k = _read_section(tokens, k + 1, equations) if in_section else _read_declaration(tokens, k, bindings)
+        k = (
+            _read_section(tokens, k + 1, equations)
+            if in_section
+            else _read_declaration(tokens, k, bindings)
+        )
     return equations + bindings
 
 
@@ -55,22 +62,45 @@ def _tokens(text: str) -> list[Token]:
 
 
 def _read_section(tokens: Sequence[Token], k: int, parts: list[tuple[int, int]]) -> int:
-    """Append the statements of a section that begins at a token; return the number of the token after it."""
-    while k < len(tokens) and tokens[k][0] not in ("end", "public", "protected", "initial", "annotation", "external", *_SECTIONS):
-        last = _end_of_compound(tokens, k) if tokens[k][0] in _COMPOUND else _end_of_simple(tokens, k)
+    """Append the statements of a section that begins at a token.
+
+    Return the number of the token after it.
+    """
+    while k < len(tokens) and tokens[k][0] not in (
+        "end",
+        "public",
+        "protected",
+        "initial",
+        "annotation",
+        "external",
+        *_SECTIONS,
+    ):
+        last = (
+            _end_of_compound(tokens, k) if tokens[k][0] in _COMPOUND else _end_of_simple(tokens, k)
+        )
         parts.append((tokens[k][1], tokens[last][2]))
         k = last + 1
     return k
 
 
 def _read_declaration(tokens: Sequence[Token], k: int, parts: list[tuple[int, int]]) -> int:
-    """Append the binding of the declaration that begins at a token, if it has one; return the number of the token after it."""
+    """Append the binding of the declaration that begins at a token, if it has one.
+
+    Return the number of the token after it.
+    """
     last = _end_of_simple(tokens, k)
     for j in _outside_of_parentheses(tokens, k, last):
         if tokens[j][0] in _SECTIONS:
             return j
         if tokens[j][0] == "=":
-            stop = next((i for i in _outside_of_parentheses(tokens, j, last) if tokens[i][0] in ("annotation", "if")), last)
+            stop = next(
+                (
+                    i
+                    for i in _outside_of_parentheses(tokens, j, last)
+                    if tokens[i][0] in ("annotation", "if")
+                ),
+                last,
+            )
             while tokens[stop - 1][0].startswith('"') and stop - 2 > j:
                 stop -= 1
             parts.append((tokens[j][1], tokens[stop - 1][2]))
@@ -105,6 +135,10 @@ def _end_of_compound(tokens: Sequence[Token], first: int) -> int:
             depth -= 1
             if depth == 0:
                 return k + 2
-        elif word in _COMPOUND and tokens[k - 1][0] in (";", "then", "else", "loop", *_SECTIONS) and (depth or k == first):
+        elif (
+            word in _COMPOUND
+            and tokens[k - 1][0] in (";", "then", "else", "loop", *_SECTIONS)
+            and (depth or k == first)
+        ):
             depth += 1
     return _end_of_simple(tokens, first)

@@ -1,4 +1,7 @@
-"""Conversion of rumoca's JSON to the flat model; unknown elements are errors, they are never ignored."""
+"""Conversion of rumoca's JSON to the flat model.
+
+Unknown elements are errors, they are never ignored.
+"""
 
 from __future__ import annotations
 
@@ -33,12 +36,19 @@ class ModelReader(StatementReader):
             variables={key: _with_default(self.read_variable(key)) for key in names},
             equations=(*self._unrolled_equations(), *self._declaration_equations()),
             whens=tuple(self.read_when_chain(chain) for chain in self.json["when_chains"]),
-            algorithms=tuple(self.read_body(algorithm["statements"]) for algorithm in self.json["algorithms"]),
+            algorithms=tuple(
+                self.read_body(algorithm["statements"]) for algorithm in self.json["algorithms"]
+            ),
             asserts=tuple(self._assert(node) for node in self.json["assert_equations"]),
             initial_equations=self.read_equations("initial_equations"),
-            initial_algorithms=tuple(self.read_body(algorithm["statements"]) for algorithm in self.json["initial_algorithms"]),
+            initial_algorithms=tuple(
+                self.read_body(algorithm["statements"])
+                for algorithm in self.json["initial_algorithms"]
+            ),
             functions={
-                key: self.read_function(node) for key, node in self.json["functions"].items() if not node["is_constructor"]
+                key: self.read_function(node)
+                for key, node in self.json["functions"].items()
+                if not node["is_constructor"]
             },
             enumerations=self._enumerations(),
             structural=frozenset(
@@ -51,12 +61,21 @@ class ModelReader(StatementReader):
     def _check_document(self, where: SourceLocation) -> None:
         if self.json["is_partial"]:
             raise_model_error("the model is partial", where)
-        for kind in ("initial_assert_equations", "definite_roots", "branches", "optional_edges", "potential_roots"):
+        for kind in (
+            "initial_assert_equations",
+            "definite_roots",
+            "branches",
+            "optional_edges",
+            "potential_roots",
+        ):
             if self.json.get(kind):
                 raise_model_error(f"{kind.replace('_', ' ')} are not supported", where)
 
         if next(unroll_equations(self.json, "initial_structured_equations"), None):
-            raise_model_error("a for-equation among the initial equations was not unrolled by the front end", where)
+            raise_model_error(
+                "a for-equation among the initial equations was not unrolled by the front end",
+                where,
+            )
 
     def _resolve_name(self, candidates: list[str]) -> str:
         """Return the first of the candidate names (innermost scope first) that is a variable."""
@@ -107,7 +126,9 @@ class ModelReader(StatementReader):
         """Return whether a variable belongs to the model itself, also as a field of its records or connectors."""
         parts = name.split(".")
         owners = (".".join(parts[:depth]) for depth in range(1, len(parts)))
-        return parts[0] in self.json["top_level_connectors"] or all(owner in self.json["record_instances"] for owner in owners)
+        return parts[0] in self.json["top_level_connectors"] or all(
+            owner in self.json["record_instances"] for owner in owners
+        )
 
     def _text(self, node: Any) -> str:
         if node is None or isinstance(node, str):
@@ -125,7 +146,10 @@ class ModelReader(StatementReader):
             type_name, _, literal = key.rpartition(".")
             if not literal.startswith("'"):
                 types.setdefault(type_name, {})[ordinal] = literal
-        return {type_name: tuple(literals[k] for k in sorted(literals)) for type_name, literals in types.items()}
+        return {
+            type_name: tuple(literals[k] for k in sorted(literals))
+            for type_name, literals in types.items()
+        }
 
     # equations
 
@@ -137,10 +161,16 @@ class ModelReader(StatementReader):
         """Yield all equations, with the placeholders of for-equations replaced (see `unrolling`)."""
         replacements = dict(unroll_equations(self.json, "structured_equations"))
         for index, node in enumerate(self.json["equations"]):
-            equations = self._equation({**node, "residual": replacements.get(index, node["residual"])})
+            equations = self._equation(
+                {**node, "residual": replacements.get(index, node["residual"])}
+            )
             if [e.left for e in equations] != [e.left for e in self._equation(node)]:
                 raise_model_error(
-                    "this for-equation was not unrolled by the front end; write its equations one by one", self.locate(node)
+                    (
+                        "this for-equation was not unrolled by the front end; write its equations "
+                        "one by one"
+                    ),
+                    self.locate(node),
                 )
             yield from equations
 
@@ -148,45 +178,78 @@ class ModelReader(StatementReader):
         kind, residual = split_tagged(node["residual"])
         where = self.locate(node)
         if kind != "Binary" or residual["op"] != "Sub":
-            return [flat_model.Equation(self.read_expression(node["residual"]), syntax_tree.Literal(0.0, "Real"), where)]
+            return [
+                flat_model.Equation(
+                    self.read_expression(node["residual"]), syntax_tree.Literal(0.0, "Real"), where
+                )
+            ]
         if "Tuple" in residual["lhs"]:
-            return self._split_tuple(residual["lhs"]["Tuple"]["elements"], self.read_expression(residual["rhs"]), where)
+            return self._split_tuple(
+                residual["lhs"]["Tuple"]["elements"], self.read_expression(residual["rhs"]), where
+            )
         left, call = self.read_expression(residual["lhs"]), residual["rhs"].get("FunctionCall")
-        if call and isinstance(left, syntax_tree.Name) and left.name in self.json["record_instances"]:
+        if (
+            call
+            and isinstance(left, syntax_tree.Name)
+            and left.name in self.json["record_instances"]
+        ):
             fields = self._fields_of(left.name)
             return [
-                flat_model.Equation(syntax_tree.Name(left.name + f, where), self.read_field(call, f[1:]), where) for f in fields
+                flat_model.Equation(
+                    syntax_tree.Name(left.name + f, where), self.read_field(call, f[1:]), where
+                )
+                for f in fields
             ]
         right = self.read_expression(residual["rhs"])
         return [flat_model.Equation(a, b, where) for a, b in self._split_records(left, right)]
 
-    def _split_tuple(self, targets: list[Json], call: Expression, where: SourceLocation | None) -> list[flat_model.Equation]:
-        """Return one equation for each result of a function with several results; omitted results have no name."""
+    def _split_tuple(
+        self, targets: list[Json], call: Expression, where: SourceLocation | None
+    ) -> list[flat_model.Equation]:
+        """Return one equation for each result of a function with several results.
+
+        Omitted results have no name.
+        """
         if not isinstance(call, syntax_tree.Call):
-            raise_model_error("the right side of an equation with a tuple must be a function call", where)
+            raise_model_error(
+                "the right side of an equation with a tuple must be a function call", where
+            )
         return [
             flat_model.Equation(self.read_expression(target), replace(call, result=k), where)
             for k, target in enumerate(targets)
             if "Empty" not in target
         ]
 
-    def _split_records(self, left: Expression, right: Expression) -> list[tuple[Expression, Expression]]:
+    def _split_records(
+        self, left: Expression, right: Expression
+    ) -> list[tuple[Expression, Expression]]:
         """Return the pairs of fields of an equation between two records, or the pair itself for all other equations."""
         records = self.json["record_instances"]
         if not (isinstance(left, syntax_tree.Name) and left.name in records):
             return [(left, right)]
         if not (isinstance(right, syntax_tree.Name) and right.name in records):
             raise_model_error(
-                "a record can only be equated with a record variable; write one equation for each field", left.where
+                (
+                    "a record can only be equated with a record variable; write one equation for "
+                    "each field"
+                ),
+                left.where,
             )
         return [
-            (syntax_tree.Name(left.name + field, left.where), syntax_tree.Name(right.name + field, right.where))
+            (
+                syntax_tree.Name(left.name + field, left.where),
+                syntax_tree.Name(right.name + field, right.where),
+            )
             for field in self._fields_of(left.name)
         ]
 
     def _fields_of(self, record: str) -> list[str]:
         """Return the fields of a record variable, with a dot before each."""
-        return [name.removeprefix(record) for name in self.json["variables"] if name.startswith(f"{record}.")]
+        return [
+            name.removeprefix(record)
+            for name in self.json["variables"]
+            if name.startswith(f"{record}.")
+        ]
 
     def _declaration_equations(self) -> list[flat_model.Equation]:
         """Return the declaration equations (`Real y = 2*u;`) of all variables that are neither parameters nor constants."""
@@ -194,13 +257,18 @@ class ModelReader(StatementReader):
         return [
             flat_model.Equation(syntax_tree.Name(v.name, v.where), v.binding, v.where)
             for v in variables
-            if v.binding is not None and v.variability not in ("constant", "parameter") and not _is_default(v)
+            if v.binding is not None
+            and v.variability not in ("constant", "parameter")
+            and not _is_default(v)
         ]
 
     def read_when_chain(self, chain: Json) -> syntax_tree.When:
         """Convert a when-clause of an equation section, with its `elsewhen` branches."""
         blocks = [chain["first"], *chain["else_when"]]
-        branches = tuple((self.read_expression(block["condition"]), self._when_body(block["equations"])) for block in blocks)
+        branches = tuple(
+            (self.read_expression(block["condition"]), self._when_body(block["equations"]))
+            for block in blocks
+        )
         return syntax_tree.When(branches, self.locate(chain))
 
     def _when_body(self, nodes: list[Json]) -> Body:
@@ -208,30 +276,50 @@ class ModelReader(StatementReader):
 
     def _when_equation(self, kind: str, node: Json) -> Statement:
         if kind == "Conditional":
-            branches = tuple((self.read_expression(condition), self._when_body(body)) for condition, body in node["branches"])
-            return syntax_tree.IfStatement(branches, self._when_body(node["else_branch"] or []), self.locate(node))
+            branches = tuple(
+                (self.read_expression(condition), self._when_body(body))
+                for condition, body in node["branches"]
+            )
+            return syntax_tree.IfStatement(
+                branches, self._when_body(node["else_branch"] or []), self.locate(node)
+            )
         if kind == "Assert":
             return self._assert(node)
         where = self.locate(node)
         if kind == "Terminate":
             message = tuple(message_parts(self.read_expression(node["message"])))
-            return syntax_tree.Assert(syntax_tree.Literal(False, "Boolean"), message, where, terminates=True)
+            return syntax_tree.Assert(
+                syntax_tree.Literal(False, "Boolean"), message, where, terminates=True
+            )
         if kind not in ("Assign", "Reinit"):
             raise_model_error(f"{kind} in a when-equation is not supported", where)
         target = self._parse_target(node["target" if kind == "Assign" else "state"], where)
         statement = syntax_tree.Assign if kind == "Assign" else syntax_tree.Reinit
         return statement(target, self.read_expression(node["value"]), where)
 
-    def _parse_target(self, target: str, where: SourceLocation | None) -> syntax_tree.Name | syntax_tree.Index:
-        """Parse the target of a when-equation, given as text: a name, perhaps with constant subscripts."""
+    def _parse_target(
+        self, target: str, where: SourceLocation | None
+    ) -> syntax_tree.Name | syntax_tree.Index:
+        """Parse the target of a when-equation, given as text.
+
+        A name, perhaps with constant subscripts.
+        """
         if target in self.json["variables"]:
             return syntax_tree.Name(target, where)
         base, bracket, subscripts = target.rpartition("[")
         if not bracket or base not in self.json["variables"]:
-            raise_model_error(f'cannot assign "{target}" in a when-equation; write one equation for each variable', where)
+            raise_model_error(
+                (
+                    f'cannot assign "{target}" in a when-equation; write one equation for each '
+                    "variable"
+                ),
+                where,
+            )
         numbers = subscripts.rstrip("]").split(",")
         return syntax_tree.Index(
-            syntax_tree.Name(base, where), tuple(syntax_tree.Literal(int(k), "Integer") for k in numbers), where
+            syntax_tree.Name(base, where),
+            tuple(syntax_tree.Literal(int(k), "Integer") for k in numbers),
+            where,
         )
 
 
@@ -243,9 +331,16 @@ def _is_default(variable: flat_model.Variable) -> bool:
 
 def _with_default(variable: flat_model.Variable) -> flat_model.Variable:
     """Return an input of the model with its declared value as start value."""
-    return replace(variable, start=variable.binding, binding=None) if _is_default(variable) else variable
+    return (
+        replace(variable, start=variable.binding, binding=None)
+        if _is_default(variable)
+        else variable
+    )
 
 
 def _is_fixed(flags: list[bool] | bool | None) -> bool | None:
-    """Return the attribute `fixed`, or None if it is not given; an array is fixed if all its elements are."""
+    """Return the attribute `fixed`, or None if it is not given.
+
+    An array is fixed if all its elements are.
+    """
     return all(flags) if isinstance(flags, list) else flags

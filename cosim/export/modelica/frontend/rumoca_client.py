@@ -15,9 +15,11 @@ from ....core.errors import InputError, Problem
 from ....process.failure_attribution import describe_exit_status
 from .parts import assigned_values, removable_parts
 
-#: limits of the child process: processor time and wall time (s), private memory and size of the flat model (bytes)
+#: limits of the child process: processor time and wall time (s), private memory and size of the
+#: flat model (bytes)
 CPU_LIMIT, TIMEOUT, MEMORY_LIMIT, OUTPUT_LIMIT = 120, 900, 2 << 30, 1 << 28
-#: numbers of parts of a model that are changed to find the one that rumoca refuses, without and with packages
+#: numbers of parts of a model that are changed to find the one that rumoca refuses, without and
+#: with packages
 TRIALS, LIBRARY_TRIALS = 200, 3
 
 _PROGRAM = Path(__file__).with_name("rumoca_process.py")
@@ -40,14 +42,16 @@ def run_rumoca(
         files: All files that the model may use; the file of the model is the first one.
         packages: Folders of packages.
         model: Full name of the model.
-        text: Name under which the model's file is loaded, and its text; None for a member of a package.
+        text: Name under which the model's file is loaded, and its text; None for a member of a
+            package.
         declaration: Text of a further class, which is that of the model.
 
     Returns:
         The answer of `rumoca_process`.
 
     Raises:
-        InputError: rumoca crashed, did not end in time or exceeded a limit; names the file that it was reading.
+        InputError: rumoca crashed, did not end in time or exceeded a limit; names the file that it
+            was reading.
     """
     request = {
         "version": version,
@@ -72,7 +76,12 @@ def run_rumoca(
     present = [message["file"] for message in messages if "file" in message]
     if messages and "file" not in messages[-1]:
         return messages[-1]
-    raise InputError(Problem(f"the Modelica front end failed on this file: {reason}", present[-1] if present else str(files[0])))
+    raise InputError(
+        Problem(
+            f"the Modelica front end failed on this file: {reason}",
+            present[-1] if present else str(files[0]),
+        )
+    )
 
 
 def _run_process(request: bytes, output: Any, errors: Any) -> str:
@@ -82,11 +91,19 @@ def _run_process(request: bytes, output: Any, errors: Any) -> str:
     environment = {name: value for name, value in os.environ.items() if name != "MODELICAPATH"}
     try:
         process = subprocess.run(  # noqa: S603
-            command, input=request, stdout=output, stderr=errors, timeout=TIMEOUT, check=False, env=environment
+            command,
+            input=request,
+            stdout=output,
+            stderr=errors,
+            timeout=TIMEOUT,
+            check=False,
+            env=environment,
         )
     except subprocess.TimeoutExpired:
         return f"it did not end within {TIMEOUT:g} s"
-    return describe_exit_status(-process.returncode if process.returncode < 0 else process.returncode << 8)
+    return describe_exit_status(
+        -process.returncode if process.returncode < 0 else process.returncode << 8
+    )
 
 
 def _read_messages(output: Any) -> list[dict[str, Any]]:

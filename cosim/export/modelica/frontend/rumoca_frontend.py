@@ -1,8 +1,8 @@
 """Invocation of the front end rumoca, which flattens a model and returns it as JSON.
 
-Names are looked up in the file itself, in every package folder (a folder with `package.mo`) beside it, and in libraries
-(`libraries.py`). Other files beside it are never read. A file that belongs to a package (`within P;`) is loaded as a member of
-this package.
+Names are looked up in the file itself, in every package folder (a folder with `package.mo`) beside
+it, and in libraries (`libraries.py`). Other files beside it are never read. A file that belongs to
+a package (`within P;`) is loaded as a member of this package.
 """
 
 from __future__ import annotations
@@ -42,7 +42,8 @@ class ModelicaOptions:
 
     Attributes:
         library_path: Folders that are searched for libraries before those of MODELICAPATH.
-        values: Values of parameters by name, as JSON values or texts of Modelica expressions; also of structural parameters.
+        values: Values of parameters by name, as JSON values or texts of Modelica expressions; also
+            of structural parameters.
         supplement: Modelica text of further declarations and equations of the model.
     """
 
@@ -68,24 +69,39 @@ def flatten_model(
         The flat model as rumoca's JSON, and its sources.
 
     Raises:
-        InputError: The front end reports errors, for example syntax errors and unknown names, or a library is not found.
+        InputError: The front end reports errors, for example syntax errors and unknown names, or a
+            library is not found.
     """
     path = path.resolve()
     text = read_source(path)
     available, name = find_packages(path, text), model_name(path, text, model)
     declaration = modified_model(name, options.values, options.supplement)
     used = select_used_files(path, available, declaration)
-    libraries = find_libraries(used, library_folders(options.library_path), [package.name for package in available])
+    libraries = find_libraries(
+        used, library_folders(options.library_path), [package.name for package in available]
+    )
     of_libraries = {name for library in libraries for name in library.uses}
-    packages = [folder for folder in available if folder.name in of_libraries or any(f.is_relative_to(folder) for f in used)]
+    packages = [
+        folder
+        for folder in available
+        if folder.name in of_libraries or any(f.is_relative_to(folder) for f in used)
+    ]
     files = _with_package_files(path, packages)
     links = link_libraries(libraries) if libraries else None
-    sources = ModelicaSources(files, libraries, links, None if _is_member(path, text) else replace_terminate(text), used)
+    sources = ModelicaSources(
+        files, libraries, links, None if _is_member(path, text) else replace_terminate(text), used
+    )
     if not libraries:
         flat = json.loads(_flatten(sources, packages, name, declaration))
     else:
         contents = [(str(file), sha256(file.read_bytes()).hexdigest()) for file in files]
-        key = [RUMOCA_VERSION, name, declaration, contents, [(str(library.path), library.digest) for library in libraries]]
+        key = [
+            RUMOCA_VERSION,
+            name,
+            declaration,
+            contents,
+            [(str(library.path), library.digest) for library in libraries],
+        ]
         document = read_document(key)
         if document is None:
             document = _flatten(sources, packages, name, declaration)
@@ -96,8 +112,15 @@ def flatten_model(
 
 
 def _check_names(flat: Mapping[str, Any], values: Mapping[str, Any], model: str) -> None:
-    """Raise InputError if the model has no such parameters; the front end ignores modifiers without a component."""
-    known = [name for name, variable in flat["variables"].items() if "Parameter" in variable["variability"]]
+    """Raise InputError if the model has no such parameters.
+
+    The front end ignores modifiers without a component.
+    """
+    known = [
+        name
+        for name, variable in flat["variables"].items()
+        if "Parameter" in variable["variability"]
+    ]
     problems = [
         Problem(f'the model {model} has no parameter "{name}"{did_you_mean(name, known)}')
         for name in values
@@ -113,12 +136,20 @@ def modified_model(name: str, values: Mapping[str, Any], supplement: str = "") -
     Raises:
         InputError: A name is not that of a component, or a value cannot be one of a parameter.
     """
-    problems = [Problem("expected the name of a parameter", each) for each in values if not _REFERENCE.fullmatch(each)]
+    problems = [
+        Problem("expected the name of a parameter", each)
+        for each in values
+        if not _REFERENCE.fullmatch(each)
+    ]
     if problems:
         raise InputError(problems)
     modifiers = ", ".join(_modifier(*each) for each in values.items())
     base = f"{name}({modifiers})" if modifiers else name
-    return f"model {MODIFIED_MODEL} extends {base}; {supplement} end {MODIFIED_MODEL};" if modifiers or supplement else ""
+    return (
+        f"model {MODIFIED_MODEL} extends {base}; {supplement} end {MODIFIED_MODEL};"
+        if modifiers or supplement
+        else ""
+    )
 
 
 def _modifier(name: str, value: Any) -> str:
@@ -128,7 +159,10 @@ def _modifier(name: str, value: Any) -> str:
 
 
 def _expression(name: str, value: Any) -> str:
-    """Return the Modelica expression of a JSON value; a text that is a name in Modelica stands for itself."""
+    """Return the Modelica expression of a JSON value.
+
+    A text that is a name in Modelica stands for itself.
+    """
     if isinstance(value, bool):
         return str(value).lower()
     if isinstance(value, int | float):
@@ -136,11 +170,19 @@ def _expression(name: str, value: Any) -> str:
     if isinstance(value, list) and value:
         return "{" + ", ".join(_expression(name, each) for each in value) + "}"
     if isinstance(value, str):
-        return value if _REFERENCE.fullmatch(value) and "." in value else json.dumps(value, ensure_ascii=False)
-    raise InputError(Problem(f"found {value!r}, expected a number, true, false, a text or a list", name))
+        return (
+            value
+            if _REFERENCE.fullmatch(value) and "." in value
+            else json.dumps(value, ensure_ascii=False)
+        )
+    raise InputError(
+        Problem(f"found {value!r}, expected a number, true, false, a text or a list", name)
+    )
 
 
-def _flatten(sources: ModelicaSources, packages: Sequence[Path], name: str, declaration: str) -> str:
+def _flatten(
+    sources: ModelicaSources, packages: Sequence[Path], name: str, declaration: str
+) -> str:
     """Return the flat model as JSON text."""
     path, roots = sources.files[0], [*packages, *([sources.links] if sources.links else [])]
     text = None if sources.text is None else (display_name(path), sources.text)
@@ -151,7 +193,9 @@ def _flatten(sources: ModelicaSources, packages: Sequence[Path], name: str, decl
     if "syntax_errors" in answer:
         raise InputError(to_syntax_problem(*error) for error in answer["syntax_errors"])
     if "out_of_bounds" in answer:
-        found = dict.fromkeys((reason, sources.locate(span) or path) for reason, span in answer["out_of_bounds"])
+        found = dict.fromkeys(
+            (reason, sources.locate(span) or path) for reason, span in answer["out_of_bounds"]
+        )
         raise InputError(Problem(reason, str(place)) for reason, place in found)
     if "error" in answer:
         raise InputError(to_problems(answer, name, path, sources))
@@ -168,17 +212,24 @@ def read_source(path: Path) -> str:
     if not path.is_file():
         raise InputError(Problem("no such Modelica file", str(path)))
     if (size := path.stat().st_size) > MAX_SOURCE_SIZE:
-        raise InputError(Problem(f"the file has {size} bytes, expected at most {MAX_SOURCE_SIZE}", str(path)))
+        raise InputError(
+            Problem(f"the file has {size} bytes, expected at most {MAX_SOURCE_SIZE}", str(path))
+        )
     try:
         return path.read_text(encoding="utf-8")
     except UnicodeDecodeError as error:
-        raise InputError(Problem(f"the file is not UTF-8 text: {error.reason} at byte {error.start}", str(path))) from None
+        raise InputError(
+            Problem(f"the file is not UTF-8 text: {error.reason} at byte {error.start}", str(path))
+        ) from None
 
 
 def _version_problem(found: str | None) -> str:
     if found is None:
         return 'Modelica needs the compiler front end rumoca: pip install "fmi-cosim[build]"'
-    return f"found rumoca {found}, but only {RUMOCA_VERSION} is supported: pip install rumoca=={RUMOCA_VERSION}"
+    return (
+        f"found rumoca {found}, but only {RUMOCA_VERSION} is supported: pip install "
+        f"rumoca=={RUMOCA_VERSION}"
+    )
 
 
 def model_name(path: Path, text: str, model: str | None) -> str:
@@ -196,7 +247,9 @@ def model_name(path: Path, text: str, model: str | None) -> str:
 
 def _is_member(path: Path, text: str) -> bool:
     """Return whether a file belongs to a package that has further files."""
-    is_package = path.name == _PACKAGE_FILE and any(file != path for file in path.parent.rglob("*.mo"))
+    is_package = path.name == _PACKAGE_FILE and any(
+        file != path for file in path.parent.rglob("*.mo")
+    )
     return is_package or _WITHIN.search(text) is not None
 
 
@@ -207,13 +260,19 @@ def readable_files(path: Path) -> list[Path]:
 
 
 def needed_files(path: Path) -> list[Path]:
-    """Return a Modelica file and the files of packages that its classes need; see `select_used_files`."""
+    """Return a Modelica file and the files of packages that its classes need.
+
+    See `select_used_files`.
+    """
     path = path.resolve()
     return select_used_files(path, find_packages(path, read_source(path)))
 
 
 def _with_package_files(path: Path, packages: Sequence[Path]) -> list[Path]:
-    return [path, *(file for package in packages for file in sorted(package.rglob("*.mo")) if file != path)]
+    return [
+        path,
+        *(file for package in packages for file in sorted(package.rglob("*.mo")) if file != path),
+    ]
 
 
 def find_packages(path: Path, text: str) -> list[Path]:

@@ -36,17 +36,23 @@ class ModelicaSources:
     @cached_property
     def _by_hash(self) -> Mapping[int, Path]:
         """Files by rumoca's hash of their names."""
-        names = {display_name(file): file for file in self.files[:1]} | {str(file): file for file in self.files}
+        names = {display_name(file): file for file in self.files[:1]} | {
+            str(file): file for file in self.files
+        }
         for library in self.libraries:
             link = str(self.links and self.links / library.link_name)
-            names |= {link + str(file).removeprefix(str(library.path)): file for file in library.files}
+            names |= {
+                link + str(file).removeprefix(str(library.path)): file for file in library.files
+            }
         return {_fnv1a(name): file for name, file in names.items()}
 
     @property
     def packages(self) -> dict[str, Path]:
         """Folders of the top-level packages by their names."""
         tops = (
-            file.parent for file in self.files if file.name == "package.mo" and not (file.parent.parent / "package.mo").is_file()
+            file.parent
+            for file in self.files
+            if file.name == "package.mo" and not (file.parent.parent / "package.mo").is_file()
         )
         return {folder.name: folder for folder in tops} | {
             library.name: library.package_file.parent for library in self.libraries
@@ -60,8 +66,12 @@ class ModelicaSources:
         """Return the line with the declaration of a class in the file of the model, or the first line of this file."""
         path = self.files[0]
         text = path.read_text(encoding="utf-8")
-        declaration = re.search(_CLASS.format(re.escape(name.rpartition(".")[2])), text, re.MULTILINE)
-        return SourceLocation(path, text.count("\n", 0, declaration.end()) + 1 if declaration else 1)
+        declaration = re.search(
+            _CLASS.format(re.escape(name.rpartition(".")[2])), text, re.MULTILINE
+        )
+        return SourceLocation(
+            path, text.count("\n", 0, declaration.end()) + 1 if declaration else 1
+        )
 
     def locate_library_class(self, names: Iterable[str]) -> SourceLocation | None:
         """Return the declaration of the first class of a library, or of a package beside the model, among full names."""
@@ -73,16 +83,27 @@ class ModelicaSources:
 
     def locate_in_libraries(self, operators: Iterable[str]) -> SourceLocation | None:
         """Return the first place of an operator in the classes of libraries that the model uses."""
-        packages = {library.name: library.path for library in self.libraries if library.path.is_dir()}
+        packages = {
+            library.name: library.path for library in self.libraries if library.path.is_dir()
+        }
         code = self.files[0].read_text(encoding="utf-8")
-        return next((place for word in operators if packages and (place := find_operator(word, code, packages))), None)
+        return next(
+            (
+                place
+                for word in operators
+                if packages and (place := find_operator(word, code, packages))
+            ),
+            None,
+        )
 
     def locate(self, span: Mapping[str, int] | None) -> SourceLocation | None:
         """Return the line at which a span starts, or None for a span that is not in these files."""
         path = self._by_hash.get(span["source"]) if span else None
         if span is None or path is None:
             return None
-        content = path.read_bytes() if self.text is None or path != self.files[0] else self.text.encode()
+        content = (
+            path.read_bytes() if self.text is None or path != self.files[0] else self.text.encode()
+        )
         return SourceLocation(path, content.count(b"\n", 0, span["start"]) + 1)
 
 

@@ -8,12 +8,21 @@ from dataclasses import replace
 from typing import cast
 
 from ..model import flat_model, syntax_tree
-from ..model.syntax_tree import Body, Expression, SourceLocation, Statement, raise_model_error, referenced_variable
+from ..model.syntax_tree import (
+    Body,
+    Expression,
+    SourceLocation,
+    Statement,
+    raise_model_error,
+    referenced_variable,
+)
 from ..model.traversal import variable_names
 from .expression_reader import ExpressionReader, Json, is_object_constructor, split_tagged
 from .termination import MARK
 
-_DESTRUCTOR = re.compile(r'\bfunction\s+destructor\b.*?\bexternal\s*(?:"C"\s*)?(\w+)\s*\(', re.DOTALL)
+_DESTRUCTOR = re.compile(
+    r'\bfunction\s+destructor\b.*?\bexternal\s*(?:"C"\s*)?(\w+)\s*\(', re.DOTALL
+)
 
 
 class StatementReader(ExpressionReader):
@@ -21,13 +30,22 @@ class StatementReader(ExpressionReader):
 
     def read_body(self, nodes: list[Json]) -> Body:
         """Convert a list of statements."""
-        return tuple(statement for node in nodes for statement in self._statements(*split_tagged(node)))
+        return tuple(
+            statement for node in nodes for statement in self._statements(*split_tagged(node))
+        )
 
     def _statements(self, kind: str, node: Json) -> list[Statement]:
-        """Convert a statement; the assignment of a record constructor becomes one assignment for each field."""
+        """Convert a statement.
+
+        The assignment of a record constructor becomes one assignment for each field.
+        """
         call = node["value"].get("FunctionCall") if kind == "Assignment" else None
         function = self.json["functions"].get(call["name"]["name"]) if call else None
-        if call is None or function is None or not (call["is_constructor"] or self.fields(function["outputs"][0])):
+        if (
+            call is None
+            or function is None
+            or not (call["is_constructor"] or self.fields(function["outputs"][0]))
+        ):
             return [self._statement(kind, node)]
         where, target = self.locate(node), referenced_variable(self._target(node["comp"]))
         if not call["is_constructor"]:
@@ -37,7 +55,13 @@ class StatementReader(ExpressionReader):
         names = [local["name"] for local in function["inputs"]]
         values = [self.read_field(call, name) for name in names]
         if any(name.startswith(f"{target}.") for name in variable_names(values)):
-            raise_model_error(f"the new value of the record {target} reads its fields; assign to another record first", where)
+            raise_model_error(
+                (
+                    f"the new value of the record {target} reads its fields; assign to another "
+                    "record first"
+                ),
+                where,
+            )
         return [
             syntax_tree.Assign(syntax_tree.Name(f"{target}.{name}", where), value, where)
             for name, value in zip(names, values, strict=True)
@@ -45,17 +69,26 @@ class StatementReader(ExpressionReader):
 
     def _statement(self, kind: str, node: Json) -> Statement:
         readers: Mapping[str, Callable[[Json], Statement]] = {
-            "Assignment": lambda n: syntax_tree.Assign(self._target(n["comp"]), self.read_expression(n["value"]), self.locate(n)),
+            "Assignment": lambda n: syntax_tree.Assign(
+                self._target(n["comp"]), self.read_expression(n["value"]), self.locate(n)
+            ),
             "FunctionCall": self._multi_assign,
             "If": self._if_statement,
             "For": self._for,
             "While": lambda n: syntax_tree.While(
-                self.read_expression(n["block"]["cond"]), self.read_body(n["block"]["stmts"]), self.locate(n)
+                self.read_expression(n["block"]["cond"]),
+                self.read_body(n["block"]["stmts"]),
+                self.locate(n),
             ),
-            "Reinit": lambda n: syntax_tree.Reinit(self._target(n["variable"]), self.read_expression(n["value"]), self.locate(n)),
+            "Reinit": lambda n: syntax_tree.Reinit(
+                self._target(n["variable"]), self.read_expression(n["value"]), self.locate(n)
+            ),
             "Assert": self._assert,
             "When": lambda n: syntax_tree.When(
-                tuple((self.read_expression(block["cond"]), self.read_body(block["stmts"])) for block in n["blocks"]),
+                tuple(
+                    (self.read_expression(block["cond"]), self.read_body(block["stmts"]))
+                    for block in n["blocks"]
+                ),
                 self.locate(n),
             ),
         }
@@ -65,27 +98,44 @@ class StatementReader(ExpressionReader):
 
     def _target(self, component: Json) -> syntax_tree.Name | syntax_tree.Index:
         where, parts = self.locate(component), component["parts"]
-        owners = "".join(part["ident"] + self._constant_subscripts(part["subs"], where) + "." for part in parts[:-1])
+        owners = "".join(
+            part["ident"] + self._constant_subscripts(part["subs"], where) + "."
+            for part in parts[:-1]
+        )
         name = syntax_tree.Name(owners + parts[-1]["ident"], where)
         subscripts = self._subscripts(parts[-1]["subs"])
         return syntax_tree.Index(name, subscripts, where) if subscripts else name
 
     def _constant_subscripts(self, nodes: list[Json], where: SourceLocation | None) -> str:
-        """Return the constant subscripts of a component array as text; they are part of the flat name: "b[1]"."""
-        numbers = [payload["value"] for kind, payload in map(split_tagged, nodes) if kind == "Index"]
+        """Return the constant subscripts of a component array as text.
+
+        They are part of the flat name: "b[1]".
+        """
+        numbers = [
+            payload["value"] for kind, payload in map(split_tagged, nodes) if kind == "Index"
+        ]
         if len(numbers) != len(nodes):
-            raise_model_error("a component of an array can only be assigned with a constant subscript", where)
+            raise_model_error(
+                "a component of an array can only be assigned with a constant subscript", where
+            )
         return f"[{','.join(map(str, numbers))}]" if numbers else ""
 
     def _multi_assign(self, node: Json) -> syntax_tree.MultiAssign:
         where = self.locate(node)
         return syntax_tree.MultiAssign(
-            tuple(map(self._target, node["outputs"])), self._function_call(node["comp"], node["args"], where), where
+            tuple(map(self._target, node["outputs"])),
+            self._function_call(node["comp"], node["args"], where),
+            where,
         )
 
     def _if_statement(self, node: Json) -> syntax_tree.IfStatement:
-        branches = tuple((self.read_expression(block["cond"]), self.read_body(block["stmts"])) for block in node["cond_blocks"])
-        return syntax_tree.IfStatement(branches, self.read_body(node["else_block"] or []), self.locate(node))
+        branches = tuple(
+            (self.read_expression(block["cond"]), self.read_body(block["stmts"]))
+            for block in node["cond_blocks"]
+        )
+        return syntax_tree.IfStatement(
+            branches, self.read_body(node["else_block"] or []), self.locate(node)
+        )
 
     def _for(self, node: Json) -> syntax_tree.For:
         body = self.read_body(node["equations"])
@@ -107,7 +157,9 @@ class StatementReader(ExpressionReader):
         if isinstance(first, syntax_tree.Literal) and str(first.value).startswith(MARK):
             text = syntax_tree.Literal(str(first.value).removeprefix(MARK), "String")
             return syntax_tree.Assert(condition, (text, *others), where, terminates=True)
-        return syntax_tree.Assert(condition, (first, *others), where, warning=level is not None and level.value == 1)
+        return syntax_tree.Assert(
+            condition, (first, *others), where, warning=level is not None and level.value == 1
+        )
 
     def read_function(self, node: Json) -> flat_model.Function:
         """Convert a function.
@@ -122,21 +174,38 @@ class StatementReader(ExpressionReader):
         body, external = self.read_body(node["body"]), None
         if node["external"]:
             body, external = (self._external_call(node),), self._external_code(node)
-        return flat_model.Function(node["name"], inputs, outputs, local, body, self.locate(node), external)
+        return flat_model.Function(
+            node["name"], inputs, outputs, local, body, self.locate(node), external
+        )
 
     def _external_call(self, node: Json) -> syntax_tree.ExternalCall:
         external, where = node["external"], self.locate(node)
         if external["language"] not in ("C", "", None):
-            raise_model_error(f"found the language {external['language']} of an external function, expected C", where)
+            raise_model_error(
+                f"found the language {external['language']} of an external function, expected C",
+                where,
+            )
         name, result = external["function_name"], external["output_name"]
         arguments = tuple(map(self.read_expression, external["args"]))
-        return syntax_tree.ExternalCall(name, arguments, syntax_tree.Name(result) if result else None, where)
+        return syntax_tree.ExternalCall(
+            name, arguments, syntax_tree.Name(result) if result else None, where
+        )
 
     def _external_code(self, node: Json) -> flat_model.ExternalCode:
-        values = {item["name"][-1]: self.read_expression(item["value"]) for item in node["external"]["annotations"]}
-        include, directory, libraries = (_texts(values.get(key)) for key in ("Include", "IncludeDirectory", "LibraryDirectory"))
-        library, destructor = _texts(values.get("Library")), self._destructor(node) if is_object_constructor(node) else ""
-        return flat_model.ExternalCode("".join(include), "".join(directory), library, "".join(libraries), destructor)
+        values = {
+            item["name"][-1]: self.read_expression(item["value"])
+            for item in node["external"]["annotations"]
+        }
+        include, directory, libraries = (
+            _texts(values.get(key)) for key in ("Include", "IncludeDirectory", "LibraryDirectory")
+        )
+        library, destructor = (
+            _texts(values.get("Library")),
+            self._destructor(node) if is_object_constructor(node) else "",
+        )
+        return flat_model.ExternalCode(
+            "".join(include), "".join(directory), library, "".join(libraries), destructor
+        )
 
     def _destructor(self, constructor: Json) -> str:
         """Return the C function of the destructor of an external object, which the document does not contain."""
@@ -149,13 +218,22 @@ class StatementReader(ExpressionReader):
         """Convert a variable of a function; a record becomes one variable for each field."""
         fields = [self._local({**field, "default": None}) for field in self.fields(node)]
         names = self.scalar_names(node)
-        return [replace(each, name=name) for each, name in zip(fields, names, strict=True)] if fields else [self._local(node)]
+        return (
+            [replace(each, name=name) for each, name in zip(fields, names, strict=True)]
+            if fields
+            else [self._local(node)]
+        )
 
     def _local(self, node: Json) -> flat_model.FunctionVariable:
         where = self.locate(node)
-        dimensions = tuple(None if isinstance(d, syntax_tree.Colon) else d for d in self._subscripts(node["shape_expr"]))
+        dimensions = tuple(
+            None if isinstance(d, syntax_tree.Colon) else d
+            for d in self._subscripts(node["shape_expr"])
+        )
         kind = self._type(node["effective_type"]["canonical_type"])
-        return flat_model.FunctionVariable(node["name"], kind, dimensions, self._optional(node["default"]), where)
+        return flat_model.FunctionVariable(
+            node["name"], kind, dimensions, self._optional(node["default"]), where
+        )
 
 
 def message_parts(message: Expression) -> list[Expression]:

@@ -1,4 +1,7 @@
-"""Evaluation of Strings when a model is translated: the FMU contains them as literals in calls of functions only."""
+"""Evaluation of Strings when a model is translated.
+
+The FMU contains them as literals in calls of functions only.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +16,21 @@ from ..model.traversal import rewrite, variable_names, walk
 
 def string_parameters(model: Model) -> set[str]:
     """Return the parameters of type String, and those that determine the String arguments of a function."""
-    found = {v.name for v in model.variables.values() if v.type == "String" and v.variability == "parameter"}
+    found = {
+        v.name
+        for v in model.variables.values()
+        if v.type == "String" and v.variability == "parameter"
+    }
     for call in walk(_expressions(model)):
         if isinstance(call, Call):
-            found |= variable_names(tuple(a for a, local in _inputs(call, model) if local.type == "String"))
-    return {name for name in found if name in model.variables and model.variables[name].variability == "parameter"}
+            found |= variable_names(
+                tuple(a for a, local in _inputs(call, model) if local.type == "String")
+            )
+    return {
+        name
+        for name in found
+        if name in model.variables and model.variables[name].variability == "parameter"
+    }
 
 
 def fold_strings(model: Model) -> Model:
@@ -31,14 +44,24 @@ def fold_strings(model: Model) -> Model:
         if not isinstance(node, Call):
             return node
         pairs = _inputs(node, model)
-        return replace(node, arguments=tuple(_literal(a, model) if local.type == "String" else a for a, local in pairs))
+        return replace(
+            node,
+            arguments=tuple(
+                _literal(a, model) if local.type == "String" else a for a, local in pairs
+            ),
+        )
 
     fixed = ("parameter", "constant")
-    variables = {name: v for name, v in model.variables.items() if v.type != "String" or v.variability not in fixed}
+    variables = {
+        name: v
+        for name, v in model.variables.items()
+        if v.type != "String" or v.variability not in fixed
+    }
     return replace(
         model,
         variables={
-            name: replace(v, binding=rewrite(v.binding, fold), start=rewrite(v.start, fold)) for name, v in variables.items()
+            name: replace(v, binding=rewrite(v.binding, fold), start=rewrite(v.start, fold))
+            for name, v in variables.items()
         },
         equations=rewrite(model.equations, fold),
         algorithms=rewrite(model.algorithms, fold),

@@ -1,7 +1,8 @@
 """Unrolling of for-equations that the front end has unrolled only in part.
 
-For these, rumoca's document contains the equations of the first iterations and a template for all iterations. The equations of
-the other iterations are placeholders such as `der(x[3]) = 0.0`, in which only the left side is correct.
+For these, rumoca's document contains the equations of the first iterations and a template for all
+iterations. The equations of the other iterations are placeholders such as `der(x[3]) = 0.0`, in
+which only the left side is correct.
 """
 
 from __future__ import annotations
@@ -29,9 +30,14 @@ def unroll_equations(json: Json, section: str) -> Iterator[tuple[int, Json]]:
 
 
 def _unroll(family: Json) -> Iterator[tuple[int, Json]]:
-    """Generate the equations for all combinations of the loop indices; the last index varies fastest."""
+    """Generate the equations for all combinations of the loop indices.
+
+    The last index varies fastest.
+    """
     binders = family["domain"]["binders"]
-    ranges = [range(b["lower"], b["upper"] + (1 if b["step"] > 0 else -1), b["step"]) for b in binders]
+    ranges = [
+        range(b["lower"], b["upper"] + (1 if b["step"] > 0 else -1), b["step"]) for b in binders
+    ]
     bodies = family["template"]["body"]
     for number, (indices, body) in enumerate(product(product(*ranges), bodies)):
         yield (

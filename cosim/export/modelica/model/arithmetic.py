@@ -20,7 +20,10 @@ _INT32 = range(-(2**31), 2**31)
 
 
 class EvaluationError(Exception):
-    """Failure of a model during its evaluation, for example a violated assert(); the text is the reason."""
+    """Failure of a model during its evaluation, for example a violated assert().
+
+    The text is the reason.
+    """
 
     def __init__(self, reason: str, where: SourceLocation | None = None):
         super().__init__(f"{reason} ({where.file_and_line})" if where else reason)
@@ -31,7 +34,10 @@ def elementwise(function: Callable[..., Any], *arguments: Any) -> Any:
     if not any(isinstance(a, np.ndarray) for a in arguments):
         return function(*arguments)
     arrays = np.broadcast_arrays(*arguments)
-    results = [function(*(to_python_scalar(x) for x in elements)) for elements in zip(*(a.flat for a in arrays), strict=True)]
+    results = [
+        function(*(to_python_scalar(x) for x in elements))
+        for elements in zip(*(a.flat for a in arrays), strict=True)
+    ]
     return np.array(results).reshape(arrays[0].shape)
 
 
@@ -52,21 +58,39 @@ def check_int32(value: float | int) -> float | int:
 
 
 def matrix_product(left: np.ndarray, right: np.ndarray) -> Any:
-    """Return the matrix product, with sums from left to right as in the C code; NumPy may add in another order."""
+    """Return the matrix product, with sums from left to right as in the C code.
+
+    NumPy may add in another order.
+    """
     rows, columns = left.reshape(-1, left.shape[-1]), right.reshape(right.shape[0], -1)
     sums = [
-        [_sum([check_int32(to_python_scalar(a) * to_python_scalar(b)) for a, b in zip(r, c, strict=True)]) for c in columns.T]
+        [
+            _sum(
+                [
+                    check_int32(to_python_scalar(a) * to_python_scalar(b))
+                    for a, b in zip(r, c, strict=True)
+                ]
+            )
+            for c in columns.T
+        ]
         for r in rows
     ]
     return to_python_scalar(np.array(sums).reshape((*left.shape[:-1], *right.shape[1:]))[()])
 
 
 def _sum(values: Any) -> Any:
-    return reduce(lambda a, b: check_int32(a + b), map(to_python_scalar, np.asarray(values).flat)) if np.size(values) else 0
+    return (
+        reduce(lambda a, b: check_int32(a + b), map(to_python_scalar, np.asarray(values).flat))
+        if np.size(values)
+        else 0
+    )
 
 
 def solve_linear(a: list[list[float]], b: list[float]) -> list[float] | None:
-    """Return the solution of a linear system, with the operations of newton.h in the same order; None if it is singular."""
+    """Return the solution of a linear system, with the operations of newton.h in the same order.
+
+    None if it is singular.
+    """
     n = len(b)
     for column in range(n):
         pivot = column
@@ -105,7 +129,9 @@ def divide(a: float, b: float) -> float:
         return float(np.float64(a) / np.float64(b))
 
 
-def _with_ieee_results(function: Callable[..., float], at_pole: float = math.nan) -> Callable[..., float]:
+def _with_ieee_results(
+    function: Callable[..., float], at_pole: float = math.nan
+) -> Callable[..., float]:
     """Wrap a function of `math` so that it returns NaN, infinity or the value at its pole where Python raises an error."""
 
     def wrapped(*arguments: float) -> float:
@@ -125,8 +151,13 @@ def _floor_to_int32(x: float) -> int:
     return math.floor(x)
 
 
-def _real_or_integer(real: Callable[[float, float], float], whole: Callable[[int, int], int]) -> Callable[[Any, Any], Any]:
-    """Combine a function for Real and one for Integer arguments; for Integers division by zero is a failure."""
+def _real_or_integer(
+    real: Callable[[float, float], float], whole: Callable[[int, int], int]
+) -> Callable[[Any, Any], Any]:
+    """Combine a function for Real and one for Integer arguments.
+
+    For Integers division by zero is a failure.
+    """
 
     def wrapped(a: Any, b: Any) -> Any:
         if isinstance(a, float) or isinstance(b, float):
@@ -184,9 +215,24 @@ OPERATORS: Mapping[str, Callable[[Any, Any], Any]] = {
     "==": operator.eq,
     "<>": operator.ne,
 }
-_FUNCTIONS = (math.sin, math.cos, math.tan, math.asin, math.acos, math.atan, math.sinh, math.cosh, math.tanh, math.exp, math.sqrt)
+_FUNCTIONS = (
+    math.sin,
+    math.cos,
+    math.tan,
+    math.asin,
+    math.acos,
+    math.atan,
+    math.sinh,
+    math.cosh,
+    math.tanh,
+    math.exp,
+    math.sqrt,
+)
 _MATH_FUNCTIONS = {function.__name__: _with_ieee_results(function) for function in _FUNCTIONS}
-_MATH_FUNCTIONS |= {function.__name__: _with_ieee_results(function, -math.inf) for function in (math.log, math.log10)}
+_MATH_FUNCTIONS |= {
+    function.__name__: _with_ieee_results(function, -math.inf)
+    for function in (math.log, math.log10)
+}
 _MATH_FUNCTIONS |= {"floor": lambda x: float(np.floor(x)), "ceil": lambda x: float(np.ceil(x))}
 BUILTINS: Mapping[str, Callable[..., Any]] = {
     **{name: partial(elementwise, function) for name, function in _MATH_FUNCTIONS.items()},
@@ -200,8 +246,12 @@ BUILTINS: Mapping[str, Callable[..., Any]] = {
     "fill": lambda value, *sizes: np.full(sizes, value),
     "homotopy": lambda actual, _: actual,
     "identity": lambda n: np.eye(n, dtype=np.int64),
-    "integer": lambda x: elementwise(lambda y: _floor_to_int32(y) if isinstance(y, float) else y, x),
-    "linspace": lambda first, last, n: np.array([first + (last - first) * k / (n - 1) for k in range(n)]),
+    "integer": lambda x: elementwise(
+        lambda y: _floor_to_int32(y) if isinstance(y, float) else y, x
+    ),
+    "linspace": lambda first, last, n: np.array(
+        [first + (last - first) * k / (n - 1) for k in range(n)]
+    ),
     "max": _maximum,
     "min": _minimum,
     "mod": _real_or_integer(lambda a, b: a - float(np.floor(divide(a, b))) * b, operator.mod),
@@ -211,7 +261,9 @@ BUILTINS: Mapping[str, Callable[..., Any]] = {
     "product": lambda x: reduce(lambda a, b: check_int32(a * b), _flat_elements((x,))),
     "rows": lambda *parts: np.concatenate([_as_matrix(part) for part in parts], axis=0),
     "scalar": lambda x: to_python_scalar(np.asarray(x).flat[0]),
-    "rem": _real_or_integer(lambda a, b: a - float(np.trunc(divide(a, b))) * b, lambda a, b: a - b * _quotient(a, b)),
+    "rem": _real_or_integer(
+        lambda a, b: a - float(np.trunc(divide(a, b))) * b, lambda a, b: a - b * _quotient(a, b)
+    ),
     "sign": lambda x: elementwise(lambda y: (y > 0) - (y < 0), x),
     "size": _size,
     "sum": _sum,

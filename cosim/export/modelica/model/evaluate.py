@@ -42,7 +42,13 @@ def convert_to_type(value: Any, type_name: str, shape: tuple[int, ...]) -> Any:
         return np.array(np.broadcast_to(np.asarray(value, DTYPES[type_name]), shape))
     if type_name == "String":
         return str(value or "")
-    return float(value) if type_name == "Real" else bool(value) if type_name == "Boolean" else int(value)
+    return (
+        float(value)
+        if type_name == "Real"
+        else bool(value)
+        if type_name == "Boolean"
+        else int(value)
+    )
 
 
 def _scale_of(derivatives: list[float], values: list[float]) -> float:
@@ -65,7 +71,8 @@ class Evaluator:
     values: MutableMapping[str, Any]
     #: variable -> value before the current event
     pre_values: MutableMapping[str, Any] = field(default_factory=dict)
-    #: ("due", k): clock k ticks in the current event; ("risen", k): edge detector k has detected a rising edge
+    #: ("due", k): clock k ticks in the current event; ("risen", k): edge detector k has detected a
+    #: rising edge
     event_flags: dict[tuple[str, int], bool] = field(default_factory=dict)
     #: edge detector -> its condition at the previous event
     previous_conditions: dict[int, bool] = field(default_factory=dict)
@@ -101,7 +108,9 @@ class Evaluator:
             self._store(target, value)
 
     def _ifstatement(self, node: syntax_tree.IfStatement) -> None:
-        self.execute(next((body for condition, body in node.branches if self(condition)), node.otherwise))
+        self.execute(
+            next((body for condition, body in node.branches if self(condition)), node.otherwise)
+        )
 
     def _for(self, node: syntax_tree.For) -> None:
         shadowed = self.values.get(node.index)
@@ -117,7 +126,10 @@ class Evaluator:
         fraction, merit, scale, changes = 1.0, math.inf, [math.inf] * len(node.unknowns), None
         for _ in range(NEWTON_ITERATIONS):
             residual = [float(self(item)) for item in node.residuals]
-            if changes and not (largest_ratio(residual, scale) <= merit or largest_ratio(residual, scale) <= RESIDUAL_ROUNDING):
+            if changes and not (
+                largest_ratio(residual, scale) <= merit
+                or largest_ratio(residual, scale) <= RESIDUAL_ROUNDING
+            ):
                 fraction /= 2
                 for unknown, change in zip(node.unknowns, changes, strict=True):
                     self._store(unknown, float(self(unknown)) + fraction * change)
@@ -153,13 +165,24 @@ class Evaluator:
             raise EvaluationError("".join(map(self._as_text, node.message)), node.where)
 
     def _as_text(self, node: Expression) -> str:
-        """Return the value of an expression as in a composed message: Reals with 6 significant digits."""
+        """Return the value of an expression as in a composed message.
+
+        Reals with 6 significant digits.
+        """
         value = self(node)
-        return f"{value:g}" if isinstance(value, float) else str(value).lower() if isinstance(value, bool) else str(value)
+        return (
+            f"{value:g}"
+            if isinstance(value, float)
+            else str(value).lower()
+            if isinstance(value, bool)
+            else str(value)
+        )
 
     def _edgedetector(self, node: syntax_tree.EdgeDetector) -> None:
         condition = bool(self(node.condition))
-        self.event_flags["risen", node.index] = condition and not self.previous_conditions.get(node.index, True)
+        self.event_flags["risen", node.index] = condition and not self.previous_conditions.get(
+            node.index, True
+        )
         self.previous_conditions[node.index] = condition
 
     # expressions
@@ -196,11 +219,17 @@ class Evaluator:
         return np.arange(self(node.start), self(node.stop) + (1 if step > 0 else -1), step)
 
     def _if(self, node: syntax_tree.If) -> Any:
-        return self(next((value for condition, value in node.branches if self(condition)), node.otherwise))
+        return self(
+            next((value for condition, value in node.branches if self(condition)), node.otherwise)
+        )
 
     def _unary(self, node: syntax_tree.Unary) -> Any:
         value = self(node.operand)
-        return elementwise(operator.not_, value) if node.operator == "not" else elementwise(lambda x: check_int32(-x), value)
+        return (
+            elementwise(operator.not_, value)
+            if node.operator == "not"
+            else elementwise(lambda x: check_int32(-x), value)
+        )
 
     def _binary(self, node: syntax_tree.Binary) -> Any:
         if node.operator == "and":
@@ -219,9 +248,13 @@ class Evaluator:
         return to_python_scalar(base[self._indices(node, base.shape)])
 
     def _indices(self, node: syntax_tree.Index, shape: tuple[int, ...]) -> tuple[Any, ...]:
-        return tuple(self._index_of(s, n, node) for s, n in zip(node.subscripts, shape, strict=False))
+        return tuple(
+            self._index_of(s, n, node) for s, n in zip(node.subscripts, shape, strict=False)
+        )
 
-    def _index_of(self, subscript: Expression | syntax_tree.Colon, size: int, node: syntax_tree.Index) -> Any:
+    def _index_of(
+        self, subscript: Expression | syntax_tree.Colon, size: int, node: syntax_tree.Index
+    ) -> Any:
         if isinstance(subscript, syntax_tree.Colon):
             return slice(None)
         index = self(subscript)
@@ -234,7 +267,10 @@ class Evaluator:
         return self._call_function(node)[node.result]
 
     def _call_function(self, node: syntax_tree.Call) -> list[Any]:
-        function, arguments = self.functions[node.function], [self(argument) for argument in node.arguments]
+        function, arguments = (
+            self.functions[node.function],
+            [self(argument) for argument in node.arguments],
+        )
         scope = Evaluator(self.functions, {})
         for local, value in zip(function.inputs, arguments, strict=True):
             scope.values[local.name] = convert_to_type(value, local.type, np.shape(value))
@@ -253,7 +289,9 @@ class Evaluator:
         assert function.external
         if function.external.library is None:
             return
-        results = function.external.library.call(function, [self(argument) for argument in node.arguments])
+        results = function.external.library.call(
+            function, [self(argument) for argument in node.arguments]
+        )
         for k, value in results.items():
             target = node.result if k < 0 else node.arguments[k]
             assert isinstance(target, syntax_tree.Name)
@@ -261,7 +299,9 @@ class Evaluator:
 
     def _declare(self, local: FunctionVariable) -> None:
         shape = tuple(int(self(d)) for d in local.dimensions if d is not None)
-        self.values[local.name] = convert_to_type(self(local.default) if local.default is not None else 0, local.type, shape)
+        self.values[local.name] = convert_to_type(
+            self(local.default) if local.default is not None else 0, local.type, shape
+        )
 
     def _builtin(self, node: syntax_tree.Builtin) -> Any:
         if node.name in ("due", "risen"):
@@ -271,11 +311,15 @@ class Evaluator:
         if node.name == "smooth":
             return self(node.arguments[1])
         if node.name == "past":
-            return self.past(int(self(node.arguments[0])), self.values["time"] - self(node.arguments[1]))
+            return self.past(
+                int(self(node.arguments[0])), self.values["time"] - self(node.arguments[1])
+            )
         return BUILTINS[node.name](*map(self, node.arguments))
 
     def _evaluate_pre(self, node: syntax_tree.Builtin) -> Any:
-        previous = Evaluator(self.functions, ChainMap(self.pre_values, self.values))(node.arguments[0])
+        previous = Evaluator(self.functions, ChainMap(self.pre_values, self.values))(
+            node.arguments[0]
+        )
         if node.name == "pre":
             return previous
         current = self(node.arguments[0])

@@ -1,8 +1,9 @@
 """The flat model: a flattened Modelica model as immutable data.
 
-The front end produces it; causality analysis, code generation and the interpreter use it. In a flat model components,
-connections and modifiers are resolved, names are dotted ("pid.kp"), and for-equations are unrolled. Types are "Real",
-"Integer", "Boolean", "Enumeration" (an Integer, counted from 1), "String" and "ExternalObject".
+The front end produces it; causality analysis, code generation and the interpreter use it. In a flat
+model components, connections and modifiers are resolved, names are dotted ("pid.kp"), and
+for-equations are unrolled. Types are "Real", "Integer", "Boolean", "Enumeration" (an Integer,
+counted from 1), "String" and "ExternalObject".
 """
 
 from __future__ import annotations
@@ -70,7 +71,10 @@ class CallableLibrary(Protocol):
     """External functions that can be called."""
 
     def call(self, function: Function, inputs: Sequence[Any]) -> dict[int, Any]:
-        """Return the outputs of a C function by the numbers of the arguments; the result has the number -1."""
+        """Return the outputs of a C function by the numbers of the arguments.
+
+        The result has the number -1.
+        """
 
 
 @dataclass(frozen=True, slots=True)
@@ -110,7 +114,10 @@ SAMPLED = "$sampled "
 
 @dataclass(frozen=True, slots=True)
 class Relation:
-    """A comparison that changes between events; `name` is the Boolean variable that holds its value until the next event."""
+    """A comparison that changes between events.
+
+    `name` is the Boolean variable that holds its value until the next event.
+    """
 
     name: str
     condition: Binary
@@ -134,7 +141,8 @@ class Hybrid:
     remembered: tuple[str, ...]
     #: variables of `remembered` whose change in an event requires another evaluation
     iterated: tuple[str, ...]
-    #: variables of `remembered` whose stored value is the one before the first of several events at the same time
+    #: variables of `remembered` whose stored value is the one before the first of several events at
+    #: the same time
     sampled: tuple[str, ...] = ()
 
 

@@ -1,4 +1,6 @@
-"""Syntax tree of a flat model: expressions and statements as immutable data, with their source locations.
+"""Syntax tree of a flat model.
+
+Expressions and statements as immutable data, with their source locations.
 
 The attribute `where` of a node is its location in the source; it does not take part in comparisons.
 """
@@ -33,9 +35,12 @@ def raise_model_error(message: str, where: SourceLocation | None) -> NoReturn:
     raise InputError(Problem(message, str(where or "")))
 
 
-Expression: TypeAlias = "Literal | Name | Index | Unary | Binary | If | Array | Comprehension | Range | Builtin | Call"
+Expression: TypeAlias = (
+    "Literal | Name | Index | Unary | Binary | If | Array | Comprehension | Range | Builtin | Call"
+)
 Statement: TypeAlias = (
-    "Assign | MultiAssign | IfStatement | For | While | Assert | When | Reinit | EdgeDetector | Solve | ExternalCall"
+    "Assign | MultiAssign | IfStatement | For | While | Assert | When | Reinit | EdgeDetector | "
+    "Solve | ExternalCall"
 )
 Body: TypeAlias = "tuple[Statement, ...]"
 
@@ -85,7 +90,10 @@ class Unary:
 
 @dataclass(frozen=True, slots=True)
 class Binary:
-    """A binary operation; the operators are those of Modelica, with ".+", ".-", ".*", "./" and ".^" for elementwise ones."""
+    """A binary operation.
+
+    The operators are those of Modelica, with ".+", ".-", ".*", "./" and ".^" for elementwise ones.
+    """
 
     operator: str
     left: Expression
@@ -200,7 +208,10 @@ class While:
 
 @dataclass(frozen=True, slots=True)
 class Reinit:
-    """A `reinit` of a continuous state; it takes effect after all equations of the event have been evaluated."""
+    """A `reinit` of a continuous state.
+
+    It takes effect after all equations of the event have been evaluated.
+    """
 
     target: Name | Index
     value: Expression
@@ -229,7 +240,10 @@ class Solve:
 
 @dataclass(frozen=True, slots=True)
 class ExternalCall:
-    """The call of a C function, the body of an external function: `result = function(arguments)`."""
+    """The call of a C function, the body of an external function.
+
+    `result = function(arguments)`.
+    """
 
     function: str
     #: names of inputs, of outputs (passed by pointers), or expressions
@@ -240,7 +254,10 @@ class ExternalCall:
 
 @dataclass(frozen=True, slots=True)
 class Assert:
-    """An `assert` or `terminate`; the message consists of String literals and of expressions whose values become text."""
+    """An `assert` or `terminate`.
+
+    The message consists of String literals and of expressions whose values become text.
+    """
 
     condition: Expression
     message: tuple[Expression, ...]
@@ -253,7 +270,10 @@ class Assert:
 
 @dataclass(frozen=True, slots=True)
 class When:
-    """A when-clause, `when ... elsewhen ... end when`; in an equation section the order of its body has no meaning."""
+    """A when-clause, `when ... elsewhen ... end when`.
+
+    In an equation section the order of its body has no meaning.
+    """
 
     branches: tuple[tuple[Expression, Body], ...]
     where: SourceLocation | None = field(default=None, compare=False)
@@ -261,7 +281,9 @@ class When:
 
 @dataclass(frozen=True, slots=True)
 class EdgeDetector:
-    """A comparison of a condition with its value at the previous event; sets the flag risen(index) at a rising edge.
+    """A comparison of a condition with its value at the previous event.
+
+    Sets the flag risen(index) at a rising edge.
 
     It is inserted by the analysis of when-clauses.
     """

@@ -7,7 +7,10 @@ from .syntax_tree import Colon, Expression
 
 
 def to_text(node: Expression | Colon) -> str:
-    """Return an expression as Modelica text; operands that are operations themselves are in parentheses."""
+    """Return an expression as Modelica text.
+
+    Operands that are operations themselves are in parentheses.
+    """
     if isinstance(node, syntax_tree.Literal):
         return str(node.value).lower() if isinstance(node.value, bool) else str(node.value)
     if isinstance(node, syntax_tree.Name):

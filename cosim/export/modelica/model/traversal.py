@@ -48,7 +48,12 @@ def rewrite(node: Any, change: Callable[[Any], Any]) -> Any:
         return tuple(rewrite(item, change) for item in node)
     if not is_dataclass(node) or isinstance(node, type):
         return node
-    return change(replace(node, **{field.name: rewrite(getattr(node, field.name), change) for field in fields(node)}))
+    return change(
+        replace(
+            node,
+            **{field.name: rewrite(getattr(node, field.name), change) for field in fields(node)},
+        )
+    )
 
 
 def unroll(node: Comprehension, values: Sequence[Literal]) -> Array:
@@ -61,7 +66,9 @@ def unroll(node: Comprehension, values: Sequence[Literal]) -> Array:
 
 
 def rewrite_outermost(node: Any, change: Callable[[Any], Any]) -> Any:
-    """Return the tree with nodes replaced from the root downwards; replaced nodes are not visited again.
+    """Return the tree with nodes replaced from the root downwards.
+
+    Replaced nodes are not visited again.
 
     Args:
         node: A node, or a tuple of nodes.
@@ -73,11 +80,20 @@ def rewrite_outermost(node: Any, change: Callable[[Any], Any]) -> Any:
         return node
     if (changed := change(node)) is not None:
         return changed
-    return replace(node, **{field.name: rewrite_outermost(getattr(node, field.name), change) for field in fields(node)})
+    return replace(
+        node,
+        **{
+            field.name: rewrite_outermost(getattr(node, field.name), change)
+            for field in fields(node)
+        },
+    )
 
 
 def read_references(node: Any) -> Iterator[Name | Index]:
-    """Yield the references whose current value is read: neither assignment targets nor arguments of pre()."""
+    """Yield the references whose current value is read.
+
+    Neither assignment targets nor arguments of pre().
+    """
     if isinstance(node, Assign):
         yield from _references_in_subscripts(node.target)
         yield from read_references(node.value)
@@ -86,7 +102,11 @@ def read_references(node: Any) -> Iterator[Name | Index]:
             yield from _references_in_subscripts(target)
         yield from read_references(node.call)
     elif isinstance(node, Solve):
-        yield from (item for item in read_references((node.residuals, node.jacobian)) if item not in node.unknowns)
+        yield from (
+            item
+            for item in read_references((node.residuals, node.jacobian))
+            if item not in node.unknowns
+        )
     elif isinstance(node, Name) or (isinstance(node, Index) and _has_literal_subscripts(node)):
         yield node
     elif isinstance(node, tuple) and not isinstance(node, SourceLocation | Colon):
@@ -133,7 +153,11 @@ def composed_asserts(node: Any) -> list[Assert]:
     """Return the assertions whose message is composed at run time, a warning or that of a `terminate`."""
     asserts = [item for item in walk(node) if isinstance(item, Assert)]
     return [
-        item for item in asserts if item.warning or item.terminates or not all(isinstance(part, Literal) for part in item.message)
+        item
+        for item in asserts
+        if item.warning
+        or item.terminates
+        or not all(isinstance(part, Literal) for part in item.message)
     ]
 
 

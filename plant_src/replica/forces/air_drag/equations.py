@@ -8,13 +8,23 @@ from cosim.export.fmu.block import Block
 
 from ....vehicles.common.interface import scalar_variable, vector_variables
 from ....vehicles.strider import parameters as p
-from ..force_model import VESSEL_INPUTS, force_model, load_outputs, planar_velocity, tunable_parameter
+from ..force_model import (
+    VESSEL_INPUTS,
+    force_model,
+    load_outputs,
+    planar_velocity,
+    tunable_parameter,
+)
 
 VARIABLES = (
     *VESSEL_INPUTS,
-    *vector_variables("water", "xy", "N", "hydrodynamic force, vessel body frame, at the centre of mass", "input"),
+    *vector_variables(
+        "water", "xy", "N", "hydrodynamic force, vessel body frame, at the centre of mass", "input"
+    ),
     scalar_variable("water.n", "N.m", "hydrodynamic moment about z"),
-    tunable_parameter("coefficient", p.AIR_DRAG, "kg/m", "drag per square of the velocity, along and across"),
+    tunable_parameter(
+        "coefficient", p.AIR_DRAG, "kg/m", "drag per square of the velocity, along and across"
+    ),
     *load_outputs("load of water and air"),
 )
 
@@ -27,4 +37,9 @@ def loads(inputs: ca.SX, coefficient: ca.SX) -> ca.SX:
 
 def block() -> Block:
     """Return the block of the FMU `air_drag`."""
-    return force_model("air_drag", "Drag of still air on a vessel, added to the load of the water", VARIABLES, loads)
+    return force_model(
+        "air_drag",
+        "Drag of still air on a vessel, added to the load of the water",
+        VARIABLES,
+        loads,
+    )

@@ -1,4 +1,7 @@
-"""Linear damping of sway and yaw, equations 12 and 13 of the paper, once for each hull; surge has no damping."""
+"""Linear damping of sway and yaw, equations 12 and 13 of the paper, once for each hull.
+
+Surge has no damping.
+"""
 
 from __future__ import annotations
 
@@ -7,11 +10,19 @@ import casadi as ca
 from cosim.export.fmu.block import Block
 
 from ....vehicles.strider import parameters as p
-from ..force_model import VESSEL_INPUTS, force_model, load_outputs, planar_velocity, tunable_parameter
+from ..force_model import (
+    VESSEL_INPUTS,
+    force_model,
+    load_outputs,
+    planar_velocity,
+    tunable_parameter,
+)
 
 VARIABLES = (
     *VESSEL_INPUTS,
-    tunable_parameter("hulls", float(p.HULL_COUNT), "1", "number of hulls; 1: as the paper's equations read"),
+    tunable_parameter(
+        "hulls", float(p.HULL_COUNT), "1", "number of hulls; 1: as the paper's equations read"
+    ),
     tunable_parameter("Y_v", p.Y_V, "kg/s", "side force of one hull per sway velocity"),
     tunable_parameter("Y_r", p.Y_R, "kg.m/s", "side force of one hull per yaw rate"),
     tunable_parameter("N_v", p.N_V, "kg.m/s", "yaw moment of one hull per sway velocity"),
@@ -29,4 +40,6 @@ def loads(motion: ca.SX, parameters: ca.SX) -> ca.SX:
 
 def block() -> Block:
     """Return the block of the FMU `hull_hydrodynamics`."""
-    return force_model("hull_hydrodynamics", "Hydrodynamic load on the hulls of a vessel", VARIABLES, loads)
+    return force_model(
+        "hull_hydrodynamics", "Hydrodynamic load on the hulls of a vessel", VARIABLES, loads
+    )

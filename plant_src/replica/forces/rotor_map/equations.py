@@ -10,21 +10,39 @@ from cosim.export.fmu.block import Block
 
 from ..force_model import force_model, tunable_parameter
 
-#: thrust and torque of a rotor over its squared speed as in the published model (N s2/rad2, N m s2/rad2); Table 2 of the paper
-#: misprints the power of the first one, and its 2.38e-9 for the second one cannot turn the vehicle
+#: thrust and torque of a rotor over its squared speed as in the published model (N s2/rad2, N m
+#: s2/rad2); Table 2 of the paper misprints the power of the first one, and its 2.38e-9 for the
+#: second one cannot turn the vehicle
 THRUST_COEFFICIENT, TORQUE_COEFFICIENT = 9.148e-6, 2.38e-7
 
 MAX_SPEED = 5000 * 0.10471976  # rad/s; the factor from 1/min is rounded as published
 
 VARIABLES = (
     Variable(
-        "throttle", causality="input", start=(0.0,) * 4, unit=parse_unit("%"), shape=(4,), description="acts within 0 to 100"
+        "throttle",
+        causality="input",
+        start=(0.0,) * 4,
+        unit=parse_unit("%"),
+        shape=(4,),
+        description="acts within 0 to 100",
     ),
     tunable_parameter("thrust_coefficient", THRUST_COEFFICIENT, "N.s2/rad2", "CT"),
     tunable_parameter("torque_coefficient", TORQUE_COEFFICIENT, "N.m.s2/rad2", "CD"),
     tunable_parameter("max_speed", MAX_SPEED, "rad/s", "rotor speed at full throttle"),
-    Variable("thrust", causality="output", unit=parse_unit("N"), shape=(4,), description="along the body's up"),
-    Variable("torque", causality="output", unit=parse_unit("N.m"), shape=(4,), description="of the propeller"),
+    Variable(
+        "thrust",
+        causality="output",
+        unit=parse_unit("N"),
+        shape=(4,),
+        description="along the body's up",
+    ),
+    Variable(
+        "torque",
+        causality="output",
+        unit=parse_unit("N.m"),
+        shape=(4,),
+        description="of the propeller",
+    ),
 )
 
 
@@ -37,4 +55,6 @@ def loads(throttle: ca.SX, parameters: ca.SX) -> ca.SX:
 
 def block() -> Block:
     """Return the block of the FMU `rotor_map`."""
-    return force_model("rotor_map", "Thrust and torque of four rotors from their throttles", VARIABLES, loads)
+    return force_model(
+        "rotor_map", "Thrust and torque of four rotors from their throttles", VARIABLES, loads
+    )

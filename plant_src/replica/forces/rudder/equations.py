@@ -1,6 +1,9 @@
-"""Lift of the rudder: proportional to a sine of the angle of attack up to the stall angle, constant beyond.
+"""Lift of the rudder.
 
-`inflow_sign` is the sign of the yaw rate in the inflow angle: +1 as published, -1 for a rudder behind the centre of mass.
+Proportional to a sine of the angle of attack up to the stall angle, constant beyond.
+
+`inflow_sign` is the sign of the yaw rate in the inflow angle: +1 as published, -1 for a rudder
+behind the centre of mass.
 """
 
 from __future__ import annotations
@@ -18,12 +21,26 @@ from ..force_model import VESSEL_INPUTS, force_model, planar_velocity, tunable_p
 
 VARIABLES = (
     *VESSEL_INPUTS,
-    scalar_variable("rudder_angle", "rad", "deflection; positive: trailing edge and bow to starboard"),
-    tunable_parameter("inflow_sign", 1.0, "1", "sign of the yaw rate in the inflow angle: 1 as published, -1 physical"),
+    scalar_variable(
+        "rudder_angle", "rad", "deflection; positive: trailing edge and bow to starboard"
+    ),
+    tunable_parameter(
+        "inflow_sign",
+        1.0,
+        "1",
+        "sign of the yaw rate in the inflow angle: 1 as published, -1 physical",
+    ),
     tunable_parameter("arm", p.RUDDER_ARM, "m", "distance of the rudder from the centre of mass"),
     tunable_parameter("area", p.RUDDER_AREA, "m2", "area of the blade"),
-    tunable_parameter("max_lift_coefficient", p.RUDDER_MAX_LIFT_COEFFICIENT, "1", "at and beyond the stall angle"),
-    tunable_parameter("stall_angle", p.STALL_ANGLE, "rad", "angle of attack from which on the lift no longer grows"),
+    tunable_parameter(
+        "max_lift_coefficient", p.RUDDER_MAX_LIFT_COEFFICIENT, "1", "at and beyond the stall angle"
+    ),
+    tunable_parameter(
+        "stall_angle",
+        p.STALL_ANGLE,
+        "rad",
+        "angle of attack from which on the lift no longer grows",
+    ),
     tunable_parameter("density", p.WATER_DENSITY, "kg/m3", "of the water"),
     *vector_variables("force", "xy", "N", "vessel body frame, at the rudder"),
 )

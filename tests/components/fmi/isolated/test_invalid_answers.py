@@ -37,7 +37,18 @@ def test_a_valid_value_is_returned(convert, value, expected):
 
 
 #: values that fit none of the functions, as far as they are not named there
-INVALID = ["x", [], {}, [1, 2, 3, 4], ["a", False, False], [0.5, 1, True], {"a": 1}, [[1], 2], [None], object()]
+INVALID = [
+    "x",
+    [],
+    {},
+    [1, 2, 3, 4],
+    ["a", False, False],
+    [0.5, 1, True],
+    {"a": 1},
+    [[1], 2],
+    [None],
+    object(),
+]
 
 
 @pytest.mark.parametrize(
@@ -60,7 +71,9 @@ def test_a_value_of_another_form_is_refused(convert, fitting, more):
             convert(value)
 
 
-@pytest.mark.parametrize("line", [b"[" * 100_000, b"{", b"\xff", b'{"bytes": 3}', b'{"bytes": "x"}', b"1" * 5000, b""])
+@pytest.mark.parametrize(
+    "line", [b"[" * 100_000, b"{", b"\xff", b'{"bytes": 3}', b'{"bytes": "x"}', b"1" * 5000, b""]
+)
 def test_a_line_that_is_not_json_is_refused(line):
     with pytest.raises(INVALID_ANSWER_ERRORS):
         decode_line(line)
@@ -68,12 +81,16 @@ def test_a_line_that_is_not_json_is_refused(line):
 
 def test_a_reported_error_is_one_of_the_component_itself():
     with pytest.raises(ComponentError, match=r"lag: fmi2DoStep failed at t = 0\.5 s: no"):
-        answers.raise_reported_error({"component_error": ["innocent", "fmi2DoStep", "no", 0.5]}, "lag")
+        answers.raise_reported_error(
+            {"component_error": ["innocent", "fmi2DoStep", "no", 0.5]}, "lag"
+        )
     with pytest.raises(InputError, match="no such file"):
         answers.raise_reported_error({"input_error": ["no such file"]}, "lag")
 
 
-@pytest.mark.parametrize("error", [{"component_error": 1}, {"component_error": ["a"]}, {"input_error": 3}, None])
+@pytest.mark.parametrize(
+    "error", [{"component_error": 1}, {"component_error": ["a"]}, {"input_error": 3}, None]
+)
 def test_an_invalid_report_of_an_error_is_refused(error):
     with pytest.raises(INVALID_ANSWER_ERRORS):
         answers.raise_reported_error(error, "lag")

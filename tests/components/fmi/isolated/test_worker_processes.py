@@ -43,15 +43,21 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
 def block(values: int = 1) -> SharedMemoryBlock:
     variables = [Variable(f"x{i}") for i in range(values)]
-    return SharedMemoryBlock(Ports(variables, {np.dtype(np.float64): np.zeros(values)}), Ports([], {}))
+    return SharedMemoryBlock(
+        Ports(variables, {np.dtype(np.float64): np.zeros(values)}), Ports([], {})
+    )
 
 
 @pytest.fixture
 def worker():
-    """Function that starts a worker process which answers each command with the result of a function."""
+    """Function that starts a worker process which answers each command with the result of a
+    function.
+    """
     started = []
 
-    def start(answer: Callable[[bytes], bytes], shared: SharedMemoryBlock | None = None) -> WorkerProcess:
+    def start(
+        answer: Callable[[bytes], bytes], shared: SharedMemoryBlock | None = None
+    ) -> WorkerProcess:
         def serve(commands: int, answers: int) -> None:
             poller = SpinningPoller([commands])
             while line := read_line(commands, poller):
@@ -92,7 +98,10 @@ def test_unsuccessful_spinning_is_skipped_ever_longer(monkeypatch):
     reader, writer = os.pipe()
     poll, polls = select.poll(), []
     counted = SimpleNamespace(register=poll.register, unregister=poll.unregister)
-    counted.poll = lambda milliseconds: (polls.append(milliseconds == 0), poll.poll(min(milliseconds, 1)))[1]
+    counted.poll = lambda milliseconds: (
+        polls.append(milliseconds == 0),
+        poll.poll(min(milliseconds, 1)),
+    )[1]
     monkeypatch.setattr(select, "poll", lambda: counted)
     poller = SpinningPoller([reader])
 
@@ -211,9 +220,19 @@ def test_many_runs_leave_no_descriptors_files_and_processes(children, probe, tmp
     descriptors = sorted(DESCRIPTORS.iterdir())
     for fail_time in (1e9, 0.025):
         for _ in range(5):
-            built = make_system(isolated_instances(probe, "a", "b"), "a.y > b.u", start_values={"a": {"fail_time": fail_time}})
+            built = make_system(
+                isolated_instances(probe, "a", "b"),
+                "a.y > b.u",
+                start_values={"a": {"fail_time": fail_time}},
+            )
             outcome = simulate(
-                built, Settings(exact_fraction(0), exact_fraction("1/10"), exact_fraction("1/100"), {"b.y": endpoint("b.y")})
+                built,
+                Settings(
+                    exact_fraction(0),
+                    exact_fraction("1/10"),
+                    exact_fraction("1/100"),
+                    {"b.y": endpoint("b.y")},
+                ),
             )
             assert (outcome.failure is None) == (fail_time == 1e9)
     assert sorted(DESCRIPTORS.iterdir()) == descriptors

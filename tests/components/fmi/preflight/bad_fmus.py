@@ -26,7 +26,9 @@ def read_members(fmu: Path) -> dict[str, bytes]:
 
 @dataclass(frozen=True)
 class Member:
-    """Member of an archive; `local` and `central` replace fields of its local file header and central directory header."""
+    """Member of an archive; `local` and `central` replace fields of its local file header and
+    central directory header.
+    """
 
     name: str | bytes
     content: bytes = b""
@@ -82,11 +84,19 @@ class Member:
         f = self.fields() | self.central
         numbers = (0x314, 20, f["flags"], f["method"], 0, 33, f["crc"], f["compressed"], f["size"])
         lengths = (len(f["name"]), len(f["extra"]), 0, 0, 0)
-        return struct.pack("<4s6H3L5H2L", b"PK\1\2", *numbers, *lengths, f["mode"] << 16, offset) + f["name"] + f["extra"]
+        return (
+            struct.pack("<4s6H3L5H2L", b"PK\1\2", *numbers, *lengths, f["mode"] << 16, offset)
+            + f["name"]
+            + f["extra"]
+        )
 
 
-def pack_archive(members: Iterable[Member], comment: bytes = b"", count: int | None = None, front: bytes = b"") -> bytes:
-    """Write an archive; `count` replaces the number of members, `front` is data before the first one."""
+def pack_archive(
+    members: Iterable[Member], comment: bytes = b"", count: int | None = None, front: bytes = b""
+) -> bytes:
+    """Write an archive; `count` replaces the number of members, `front` is data before the first
+    one.
+    """
     body, directory, number = bytearray(front), bytearray(), 0
     for member in members:
         directory += member.central_header(len(body) if member.offset is None else member.offset)
@@ -94,7 +104,9 @@ def pack_archive(members: Iterable[Member], comment: bytes = b"", count: int | N
         if member.offset is None:
             body += member.local_header() + member.data + member.trailing_bytes
     number = number if count is None else count
-    end = struct.pack("<4s4H2LH", b"PK\5\6", 0, 0, number, number, len(directory), len(body), len(comment))
+    end = struct.pack(
+        "<4s4H2LH", b"PK\5\6", 0, 0, number, number, len(directory), len(body), len(comment)
+    )
     return bytes(body + directory + end + comment)
 
 

@@ -1,4 +1,6 @@
-"""Hostile and damaged archives: refused by the rule they break, before anything of them is written or run."""
+"""Hostile and damaged archives: refused by the rule they break, before anything of them is written
+or run.
+"""
 
 import os
 import socket
@@ -29,7 +31,14 @@ def with_extra(change):
 
 def overlapping(good):
     """Two names for the same bytes."""
-    return pack_archive([*good, replace(good[0], name="resources/again", offset=0, central={"name": b"resources/again"})])
+    return pack_archive(
+        [
+            *good,
+            replace(
+                good[0], name="resources/again", offset=0, central={"name": b"resources/again"}
+            ),
+        ]
+    )
 
 
 def nested(good):
@@ -48,7 +57,11 @@ def two_ends(good):
 
 NAMES = {
     "parent": ("../evil.txt", "archive.name", 'contains an empty, "." or ".." part'),
-    "parent inside": ("resources/../../evil.txt", "archive.name", 'contains an empty, "." or ".." part'),
+    "parent inside": (
+        "resources/../../evil.txt",
+        "archive.name",
+        'contains an empty, "." or ".." part',
+    ),
     "absolute": ("/etc/evil.txt", "archive.name", "relative path"),
     "double slash": ("resources//evil.txt", "archive.name", "contains an empty"),
     "backslash": ("..\\evil.txt", "archive.name", '".." part'),
@@ -67,30 +80,96 @@ NAMES = {
     "below a file": ("modelDescription.xml/evil", "archive.collision", "which is a file"),
 }
 HEADERS = {
-    "symbolic link": (with_extra(lambda m: with_headers(m, mode=0o120777)), "archive.kind", "is a symbolic link"),
+    "symbolic link": (
+        with_extra(lambda m: with_headers(m, mode=0o120777)),
+        "archive.kind",
+        "is a symbolic link",
+    ),
     "device": (with_extra(lambda m: with_headers(m, mode=0o060644)), "archive.kind", "is a device"),
-    "pipe": (with_extra(lambda m: with_headers(m, mode=0o010644)), "archive.kind", "is a named pipe"),
-    "folder with content": (with_member("resources/x/"), "archive.kind", "is a folder with 4 bytes"),
-    "encrypted": (with_extra(lambda m: with_headers(m, flags=0x801)), "archive.encryption", "is encrypted"),
-    "strongly encrypted": (with_extra(lambda m: with_headers(m, flags=0x841)), "archive.encryption", "is encrypted"),
-    "LZMA": (with_extra(lambda m: with_headers(m, method=14)), "archive.compression", "method 14, expected 0 (stored) or 8"),
-    "other name": (with_extra(lambda m: replace(m, local={"name": b"resources/evil"})), "archive.header", "has name"),
-    "other size": (with_extra(lambda m: replace(m, local={"size": 1})), "archive.header", "has size 1"),
-    "other method": (with_extra(lambda m: replace(m, local={"method": 0})), "archive.header", "has method 0"),
-    "other CRC": (with_extra(lambda m: replace(m, local={"crc": 5})), "archive.header", "has CRC 5"),
-    "no header": (lambda good: pack_archive([*good, replace(EXTRA, offset=7)]), "archive.header", "found no member at byte 7"),
-    "offset beyond": (lambda good: pack_archive([*good, replace(EXTRA, offset=2**32 - 2)]), "archive.header", "found no member"),
+    "pipe": (
+        with_extra(lambda m: with_headers(m, mode=0o010644)),
+        "archive.kind",
+        "is a named pipe",
+    ),
+    "folder with content": (
+        with_member("resources/x/"),
+        "archive.kind",
+        "is a folder with 4 bytes",
+    ),
+    "encrypted": (
+        with_extra(lambda m: with_headers(m, flags=0x801)),
+        "archive.encryption",
+        "is encrypted",
+    ),
+    "strongly encrypted": (
+        with_extra(lambda m: with_headers(m, flags=0x841)),
+        "archive.encryption",
+        "is encrypted",
+    ),
+    "LZMA": (
+        with_extra(lambda m: with_headers(m, method=14)),
+        "archive.compression",
+        "method 14, expected 0 (stored) or 8",
+    ),
+    "other name": (
+        with_extra(lambda m: replace(m, local={"name": b"resources/evil"})),
+        "archive.header",
+        "has name",
+    ),
+    "other size": (
+        with_extra(lambda m: replace(m, local={"size": 1})),
+        "archive.header",
+        "has size 1",
+    ),
+    "other method": (
+        with_extra(lambda m: replace(m, local={"method": 0})),
+        "archive.header",
+        "has method 0",
+    ),
+    "other CRC": (
+        with_extra(lambda m: replace(m, local={"crc": 5})),
+        "archive.header",
+        "has CRC 5",
+    ),
+    "no header": (
+        lambda good: pack_archive([*good, replace(EXTRA, offset=7)]),
+        "archive.header",
+        "found no member at byte 7",
+    ),
+    "offset beyond": (
+        lambda good: pack_archive([*good, replace(EXTRA, offset=2**32 - 2)]),
+        "archive.header",
+        "found no member",
+    ),
     "same bytes": (overlapping, "archive.header", "has name"),
-    "same header": (lambda good: pack_archive([*good, replace(good[0], offset=0)]), "archive.overlap", "shares its bytes"),
+    "same header": (
+        lambda good: pack_archive([*good, replace(good[0], offset=0)]),
+        "archive.overlap",
+        "shares its bytes",
+    ),
     "nested": (nested, "archive.overlap", "shares its bytes"),
-    "longer than the archive": (with_extra(lambda m: with_headers(m, compressed=10**6)), "archive.overlap", "shares its bytes"),
+    "longer than the archive": (
+        with_extra(lambda m: with_headers(m, compressed=10**6)),
+        "archive.overlap",
+        "shares its bytes",
+    ),
 }
 DATA = {
     "wrong CRC": (with_extra(lambda m: with_headers(m, crc=5)), "archive.data", "found CRC"),
-    "too short": (with_extra(lambda m: with_headers(m, size=999)), "archive.data", "found 250 bytes, expected 999"),
-    "too long": (with_extra(lambda m: with_headers(m, size=9)), "archive.data", "found more bytes, expected 9"),
+    "too short": (
+        with_extra(lambda m: with_headers(m, size=999)),
+        "archive.data",
+        "found 250 bytes, expected 999",
+    ),
+    "too long": (
+        with_extra(lambda m: with_headers(m, size=9)),
+        "archive.data",
+        "found more bytes, expected 9",
+    ),
     "no deflate stream": (
-        with_extra(lambda m: replace(m, deflated=False, local={"method": 8}, central={"method": 8})),
+        with_extra(
+            lambda m: replace(m, deflated=False, local={"method": 8}, central={"method": 8})
+        ),
         "archive.data",
         "damaged",
     ),
@@ -103,12 +182,32 @@ DATA = {
 STRUCTURE = {
     "empty file": (lambda _: b"", "archive.zip", "is not an FMU: it is not a ZIP file"),
     "text": (lambda _: b"hello" * 100, "archive.zip", "is not an FMU: it is not a ZIP file"),
-    "no members": (lambda _: pack_archive([]), "archive.description", "no member 'modelDescription.xml'"),
-    "cut in half": (lambda good: pack_archive(good)[: len(pack_archive(good)) // 2], "archive.zip", "its end is missing"),
+    "no members": (
+        lambda _: pack_archive([]),
+        "archive.description",
+        "no member 'modelDescription.xml'",
+    ),
+    "cut in half": (
+        lambda good: pack_archive(good)[: len(pack_archive(good)) // 2],
+        "archive.zip",
+        "its end is missing",
+    ),
     "cut at the end": (lambda good: pack_archive(good)[:-1], "archive.zip", "its end is missing"),
-    "cut at the front": (lambda good: pack_archive(good)[100:], "archive.contents", "should end at byte"),
-    "data in front": (lambda good: b"#!/bin/sh\n" + pack_archive(good), "archive.contents", "should end at byte"),
-    "data behind": (lambda good: pack_archive(good) + b"more", "archive.trailing-data", "found 4 bytes behind the end"),
+    "cut at the front": (
+        lambda good: pack_archive(good)[100:],
+        "archive.contents",
+        "should end at byte",
+    ),
+    "data in front": (
+        lambda good: b"#!/bin/sh\n" + pack_archive(good),
+        "archive.contents",
+        "should end at byte",
+    ),
+    "data behind": (
+        lambda good: pack_archive(good) + b"more",
+        "archive.trailing-data",
+        "found 4 bytes behind the end",
+    ),
     "two ends": (two_ends, "archive.trailing-data", "a second end"),
     "several disks": (
         lambda good: pack_archive(good)[:-18] + b"\1\0\1\0" + pack_archive(good)[-14:],
@@ -116,7 +215,11 @@ STRUCTURE = {
         "several parts",
     ),
     "too many listed": (lambda good: pack_archive(good, count=99), "archive.contents", "damaged"),
-    "too few listed": (lambda good: pack_archive(good, count=1), "archive.contents", "bytes longer than its 1 header"),
+    "too few listed": (
+        lambda good: pack_archive(good, count=1),
+        "archive.contents",
+        "bytes longer than its 1 header",
+    ),
     "10001 members": (
         lambda good: pack_archive([*good, *(Member(f"resources/{i}") for i in range(10_000))]),
         "archive.contents",
@@ -133,7 +236,12 @@ STRUCTURE = {
         "expected at most 200 times",
     ),
 }
-CASES = {name: (with_member(path), rule, words) for name, (path, rule, words) in NAMES.items()} | HEADERS | DATA | STRUCTURE
+CASES = (
+    {name: (with_member(path), rule, words) for name, (path, rule, words) in NAMES.items()}
+    | HEADERS
+    | DATA
+    | STRUCTURE
+)
 
 
 @pytest.mark.parametrize("case", CASES)
@@ -162,7 +270,9 @@ def test_a_good_fmu_has_no_findings(version, probes):
     [
         Member("resources/"),
         Member("resources/größe.txt", b"x"),
-        Member("resources/größe.txt".encode("cp437"), b"x", local={"flags": 0}, central={"flags": 0}),
+        Member(
+            "resources/größe.txt".encode("cp437"), b"x", local={"flags": 0}, central={"flags": 0}
+        ),
         Member("resources/stored", b"x", deflated=False),
         with_headers(EXTRA, mode=0),
         with_headers(EXTRA, mode=0o100755),
@@ -177,11 +287,22 @@ def test_a_good_fmu_has_no_findings(version, probes):
             local={
                 "compressed": 2**32 - 1,
                 "size": 2**32 - 1,
-                "extra": b"\1\0\x10\0" + len(EXTRA.content).to_bytes(8, "little") + len(EXTRA.data).to_bytes(8, "little"),
+                "extra": b"\1\0\x10\0"
+                + len(EXTRA.content).to_bytes(8, "little")
+                + len(EXTRA.data).to_bytes(8, "little"),
             },
         ),
     ],
-    ids=["folder", "UTF-8", "code page 437", "stored", "no mode", "executable", "sizes behind the data", "ZIP64"],
+    ids=[
+        "folder",
+        "UTF-8",
+        "code page 437",
+        "stored",
+        "no mode",
+        "executable",
+        "sizes behind the data",
+        "ZIP64",
+    ],
 )
 def test_archives_of_common_tools_are_accepted(harmless, good, tmp_path):
     path = tmp_path / "good.fmu"
@@ -189,7 +310,11 @@ def test_archives_of_common_tools_are_accepted(harmless, good, tmp_path):
     assert find_problems(path) == []
     file = FmuFile(path)
     folder = file.acquire()
-    assert (folder / harmless.name if isinstance(harmless.name, str) else folder / harmless.name.decode("cp437")).exists()
+    assert (
+        folder / harmless.name
+        if isinstance(harmless.name, str)
+        else folder / harmless.name.decode("cp437")
+    ).exists()
     file.release()
 
 
@@ -197,7 +322,9 @@ def test_archives_of_common_tools_are_accepted(harmless, good, tmp_path):
 def test_bytes_between_members_are_a_warning(front, good, tmp_path):
     path = tmp_path / "gap.fmu"
     path.write_bytes(pack_archive(members(good[2]), front=front))
-    assert [(f.rule.name, f.rule.severity) for f in find_problems(path)] == [("archive.gap", "warning")]
+    assert [(f.rule.name, f.rule.severity) for f in find_problems(path)] == [
+        ("archive.gap", "warning")
+    ]
     assert FmuFile(path).description.model_name == "Probe"
 
 
@@ -249,7 +376,11 @@ def test_the_caller_sets_the_limits(limits, words, good, tmp_path):
 
 def test_a_member_with_a_false_size_needs_no_memory(good, tmp_path):
     path = tmp_path / "bomb.fmu"
-    path.write_bytes(pack_archive([*members(good[2]), with_headers(Member("resources/zeros", bytes(1 << 25)), size=1000)]))
+    path.write_bytes(
+        pack_archive(
+            [*members(good[2]), with_headers(Member("resources/zeros", bytes(1 << 25)), size=1000)]
+        )
+    )
     tracemalloc.start()
     assert "found more bytes, expected 1000" in refusal_message(path)
     assert tracemalloc.get_traced_memory()[1] < 2**22
@@ -259,7 +390,9 @@ def test_a_member_with_a_false_size_needs_no_memory(good, tmp_path):
 def test_a_huge_central_directory_is_not_read(good, tmp_path):
     path = tmp_path / "bad.fmu"
     path.write_bytes(pack_archive([*members(good[2]), with_headers(EXTRA, extra=bytes(60_000))]))
-    with pytest.raises(InputError, match=r"found a central directory of 60[0-9]+ bytes, expected at most 12288"):
+    with pytest.raises(
+        InputError, match=r"found a central directory of 60[0-9]+ bytes, expected at most 12288"
+    ):
         _ = FmuFile(path, PreflightLimits(max_members=3)).description
 
 
@@ -273,7 +406,11 @@ def test_only_the_first_of_many_problems_are_listed(good, tmp_path):
 
 def test_deeply_nested_folders_are_checked_quickly(good, tmp_path):
     path = tmp_path / "deep.fmu"
-    path.write_bytes(pack_archive([*members(good[2]), *(Member("a/" * 500 + str(i), deflated=False) for i in range(9000))]))
+    path.write_bytes(
+        pack_archive(
+            [*members(good[2]), *(Member("a/" * 500 + str(i), deflated=False) for i in range(9000))]
+        )
+    )
     begin = time.process_time()
     assert "is nested 500 folders deep" in refusal_message(path)
     assert time.process_time() - begin < 2
@@ -281,7 +418,11 @@ def test_deeply_nested_folders_are_checked_quickly(good, tmp_path):
 
 def test_all_problems_of_an_archive_are_reported_together(good, tmp_path):
     path = tmp_path / "bad.fmu"
-    path.write_bytes(pack_archive([*members(good[2]), Member("../a"), Member("/b"), with_headers(EXTRA, mode=0o120777)]))
+    path.write_bytes(
+        pack_archive(
+            [*members(good[2]), Member("../a"), Member("/b"), with_headers(EXTRA, mode=0o120777)]
+        )
+    )
     assert len(refusal_message(path).splitlines()) == 3
 
 
@@ -307,10 +448,16 @@ def test_extraction_writes_exactly_the_members(good, tmp_path):
     assert not folder.exists()
 
 
-@pytest.mark.parametrize("unused", ["sources/model.c", "documentation/index.html", "binaries/amiga/model.so"])
+@pytest.mark.parametrize(
+    "unused", ["sources/model.c", "documentation/index.html", "binaries/amiga/model.so"]
+)
 def test_what_a_run_does_not_use_is_not_extracted(good, tmp_path, unused):
     path = tmp_path / "good.fmu"
-    path.write_bytes(pack_archive([*members(good[2]), Member(unused, b"unused"), Member("binariesX/a", b"used"), EXTRA]))
+    path.write_bytes(
+        pack_archive(
+            [*members(good[2]), Member(unused, b"unused"), Member("binariesX/a", b"used"), EXTRA]
+        )
+    )
     file = FmuFile(path)
     folder = file.acquire()
     assert not (folder / unused).parent.exists()

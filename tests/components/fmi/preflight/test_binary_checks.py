@@ -20,7 +20,9 @@ from cosim.export.fmu.compiler import find_compiler
 
 LIBRARY = f"binaries/{fmpy.platform}/probe.so"
 FMUS = sorted(resources.root().glob("fmus/**/*.fmu"))
-linux = pytest.mark.skipif(sys.platform != "linux" or struct.calcsize("P") != 8, reason="needs 64-bit ELF libraries")
+linux = pytest.mark.skipif(
+    sys.platform != "linux" or struct.calcsize("P") != 8, reason="needs 64-bit ELF libraries"
+)
 pytestmark = linux
 
 
@@ -39,8 +41,16 @@ def segment(kind, field, value):
     """The library with a field of its first program header of a kind replaced."""
 
     def change(library):
-        table, size, count = struct.unpack_from("<Q", library, 32)[0], 56, struct.unpack_from("<H", library, 56)[0]
-        place = next(table + i * size for i in range(count) if struct.unpack_from("<L", library, table + i * size)[0] == kind)
+        table, size, count = (
+            struct.unpack_from("<Q", library, 32)[0],
+            56,
+            struct.unpack_from("<H", library, 56)[0],
+        )
+        place = next(
+            table + i * size
+            for i in range(count)
+            if struct.unpack_from("<L", library, table + i * size)[0] == kind
+        )
         return patched(place + field, "<Q", value)(library)
 
     return change
@@ -78,13 +88,18 @@ def compiled(folder, name, code, *options):
     """A shared library made of C code."""
     (folder / f"{name}.c").write_text(code)
     library = folder / f"{name}.so"
-    subprocess.run([*find_compiler(), "-shared", "-fPIC", folder / f"{name}.c", *options, "-o", library], check=True)
+    subprocess.run(
+        [*find_compiler(), "-shared", "-fPIC", folder / f"{name}.c", *options, "-o", library],
+        check=True,
+    )
     return library
 
 
 @pytest.fixture
 def fmu(good, tmp_path):
-    """Function that writes the valid FMU with another library, or with the library under another name."""
+    """Function that writes the valid FMU with another library, or with the library under another
+    name.
+    """
 
     def make(library, name=LIBRARY):
         path = tmp_path / "bad.fmu"
@@ -100,7 +115,9 @@ def test_damaged_and_foreign_libraries_are_refused(case, good, fmu):
     change, words = DAMAGED[case]
     path = fmu(change(good[2][LIBRARY]))
     assert f'"{path}": {LIBRARY}: the library cannot be loaded: it ' in refusal_message(path)
-    assert [(f.rule.name, words in f.message) for f in find_problems(path)] == [("binary.format", True)]
+    assert [(f.rule.name, words in f.message) for f in find_problems(path)] == [
+        ("binary.format", True)
+    ]
 
 
 @pytest.mark.parametrize("share", [0.02, 0.1, 0.3, 0.6, 0.9])
@@ -117,18 +134,25 @@ def test_a_missing_function_is_named(good, fmu):
 
 
 def test_many_missing_functions_are_counted(fmu, tmp_path):
-    text = refusal_message(fmu(compiled(tmp_path, "empty", "int unrelated(void) { return 0; }\n").read_bytes()))
+    text = refusal_message(
+        fmu(compiled(tmp_path, "empty", "int unrelated(void) { return 0; }\n").read_bytes())
+    )
     assert "does not export fmi2DoStep, " in text
     assert "and 13 more [binary.functions" in text
 
 
 def test_hidden_and_undefined_functions_do_not_count(tmp_path):
     source = (
-        '__attribute__((visibility("hidden"))) int a(void){return 0;} extern int b(void); int c(void){return b();} static int d;'
+        '__attribute__((visibility("hidden"))) int a(void){return 0;} extern int b(void); int '
+        "c(void){return b();} static int d;"
     )
     for style in ("gnu", "sysv", "both"):
-        library = compiled(tmp_path, style, source + "int *e(void){return &d;}", f"-Wl,--hash-style={style}")
-        assert {"a", "b", "c", "d", "e"} & elf.read_library(library.read_bytes(), current_platform().architecture).exports == {
+        library = compiled(
+            tmp_path, style, source + "int *e(void){return &d;}", f"-Wl,--hash-style={style}"
+        )
+        assert {"a", "b", "c", "d", "e"} & elf.read_library(
+            library.read_bytes(), current_platform().architecture
+        ).exports == {
             "c",
             "e",
         }
@@ -141,7 +165,10 @@ def test_exports_are_those_listed_by_nm(path):
     folder = file.acquire()
     (library,) = (folder / "binaries").glob(f"*linux*/{file.description.model_identifier}.so")
     listed = subprocess.run(
-        [shutil.which("nm"), "-D", "--defined-only", library], capture_output=True, text=True, check=True
+        [shutil.which("nm"), "-D", "--defined-only", library],
+        capture_output=True,
+        text=True,
+        check=True,
     ).stdout
     names = {row.split()[-1].partition("@")[0] for row in listed.splitlines()}
     assert elf.read_library(library.read_bytes(), current_platform().architecture).exports == names
@@ -158,12 +185,20 @@ FMPY_CLASSES = [
 
 @pytest.mark.parametrize(("version", "interface", "fmpy_class"), FMPY_CLASSES)
 def test_the_standard_functions_are_those_of_fmpy(version, interface, fmpy_class):
-    assert {name for name in dir(fmpy_class) if name.startswith(f"fmi{version}")} == standard_functions(version, interface)
+    assert {
+        name for name in dir(fmpy_class) if name.startswith(f"fmi{version}")
+    } == standard_functions(version, interface)
 
 
 def test_a_missing_dependency_is_a_warning(fmu, tmp_path):
     compiled(tmp_path, "libnowhere", "int other(void) { return 1; }\n")
-    user = compiled(tmp_path, "user", "extern int other(void); int use(void) { return other(); }\n", f"-L{tmp_path}", "-lnowhere")
+    user = compiled(
+        tmp_path,
+        "user",
+        "extern int other(void); int use(void) { return other(); }\n",
+        f"-L{tmp_path}",
+        "-lnowhere",
+    )
     findings = find_problems(fmu(user.read_bytes()))
     assert [(f.rule.name, f.rule.severity) for f in findings] == [
         ("binary.functions", "error"),
@@ -177,12 +212,37 @@ def test_a_missing_dependency_is_a_warning(fmu, tmp_path):
 
 
 WRONG_VERSIONS = {
-    "other version": (2, b"\0002.0\0", b"\0001.0\0", 'fmi2GetVersion returns "1.0", expected "2.0"'),
-    "later version": (2, b"\0002.0\0", b"\0002.1\0", 'fmi2GetVersion returns "2.1", expected "2.0"'),
-    "control character": (2, b"\0002.0\0", b"\0002\x1b0\0", 'fmi2GetVersion returns "2\\x1b0", expected "2.0"'),
+    "other version": (
+        2,
+        b"\0002.0\0",
+        b"\0001.0\0",
+        'fmi2GetVersion returns "1.0", expected "2.0"',
+    ),
+    "later version": (
+        2,
+        b"\0002.0\0",
+        b"\0002.1\0",
+        'fmi2GetVersion returns "2.1", expected "2.0"',
+    ),
+    "control character": (
+        2,
+        b"\0002.0\0",
+        b"\0002\x1b0\0",
+        'fmi2GetVersion returns "2\\x1b0", expected "2.0"',
+    ),
     "no version": (2, b"\0002.0\0", b"\0\0.0\0", 'fmi2GetVersion returns "", expected "2.0"'),
-    "other platform": (2, b"default\0", b"Default\0", 'fmi2GetTypesPlatform returns "Default", expected "default"'),
-    "standard of 1.0": (2, b"default\0", b"std\0\0\0\0\0", 'fmi2GetTypesPlatform returns "std", expected "default"'),
+    "other platform": (
+        2,
+        b"default\0",
+        b"Default\0",
+        'fmi2GetTypesPlatform returns "Default", expected "default"',
+    ),
+    "standard of 1.0": (
+        2,
+        b"default\0",
+        b"std\0\0\0\0\0",
+        'fmi2GetTypesPlatform returns "std", expected "default"',
+    ),
     "version 2": (3, b"\0003.0\0", b"\0002.0\0", 'fmi3GetVersion returns "2.0", expected "3.0"'),
     "a draft": (3, b"\0003.0\0", b"\0003.b\0", 'fmi3GetVersion returns "3.b", expected "3.0"'),
 }
@@ -212,32 +272,46 @@ def test_another_platform_is_reported_with_the_existing_ones(fmu):
     path = fmu(b"MZ", "binaries/win32/probe.dll")
     this = current_platform()
     expected = (
-        f"has no binary for {this.platform_tuple} ({this.fmi2_platform}); it has: win32; 32-bit libraries for Windows cannot"
+        f"has no binary for {this.platform_tuple} ({this.fmi2_platform}); it has: win32; 32-bit "
+        "libraries for Windows cannot"
     )
     assert expected in refusal_message(path)
     assert FmuFile(path).description.platforms == ["win32"]
 
 
-@pytest.mark.skipif(current_platform().platform_tuple != "x86_64-linux", reason="Windows libraries run under Wine on Linux only")
+@pytest.mark.skipif(
+    current_platform().platform_tuple != "x86_64-linux",
+    reason="Windows libraries run under Wine on Linux only",
+)
 def test_a_library_for_windows_is_a_warning(fmu):
     problems = find_problems(fmu(b"MZ", "binaries/win64/probe.dll"))
-    assert [(f.rule.name, f.rule.severity) for f in problems] == [("binary.windows-only", "warning")]
+    assert [(f.rule.name, f.rule.severity) for f in problems] == [
+        ("binary.windows-only", "warning")
+    ]
 
 
 def test_sources_alone_are_compiled_when_the_fmu_is_used(fmu):
     path = fmu(b"int x;", "sources/model.c")
     assert FmuFile(path).must_be_compiled
-    assert [(f.rule.name, f.rule.severity) for f in find_problems(path)] == [("binary.sources-only", "warning")]
+    assert [(f.rule.name, f.rule.severity) for f in find_problems(path)] == [
+        ("binary.sources-only", "warning")
+    ]
 
 
 def test_the_library_must_have_the_name_of_the_model_identifier(good, fmu):
     path = fmu(good[2][LIBRARY], LIBRARY.replace("probe", "other"))
-    words = f"the library cannot be loaded: {LIBRARY} does not exist; found: {LIBRARY.replace('probe', 'other')}"
+    words = (
+        f"the library cannot be loaded: {LIBRARY} does not exist; found: "
+        f"{LIBRARY.replace('probe', 'other')}"
+    )
     assert words in refusal_message(path)
 
 
 def test_the_platform_names_are_those_of_fmpy():
-    assert (current_platform().fmi2_platform, current_platform().platform_tuple) == (fmpy.platform, fmpy.platform_tuple)
+    assert (current_platform().fmi2_platform, current_platform().platform_tuple) == (
+        fmpy.platform,
+        fmpy.platform_tuple,
+    )
     assert current_platform().suffix == fmpy.sharedLibraryExtension
 
 

@@ -3,7 +3,8 @@
 import pytest
 from bad_fmus import find_problems, refusal_message, with_change, with_description
 
-#: case -> (FMI version, text of the valid description, its replacement, rule, line, part of the message)
+#: case -> (FMI version, text of the valid description, its replacement, rule, line, part of the
+#: message)
 ERRORS = {
     "type of other kind": (
         2,
@@ -13,7 +14,14 @@ ERRORS = {
         17,
         'type "Mode" is Enumeration, but the variable is Int32',
     ),
-    "absolute identifier": (3, 'Identifier="probe"', 'Identifier="/tmp/evil"', "model.library-name", 3, "expected a file name"),
+    "absolute identifier": (
+        3,
+        'Identifier="probe"',
+        'Identifier="/tmp/evil"',
+        "model.library-name",
+        3,
+        "expected a file name",
+    ),
     "path in identifier": (
         2,
         'Identifier="probe"',
@@ -22,13 +30,48 @@ ERRORS = {
         3,
         '"../../evil", expected a file',
     ),
-    "version 1.1": (2, 'fmiVersion="2.0"', 'fmiVersion="1.1"', "model.version", 2, "is an FMI 1.1 FMU; FMI 1.0, 2.0 and 3.0 are"),
-    "version 4.0": (2, 'fmiVersion="2.0"', 'fmiVersion="4.0"', "model.version", 2, "is an FMI 4.0 FMU"),
-    "version 2.1": (2, 'fmiVersion="2.0"', 'fmiVersion="2.1"', "model.version", 2, "is an FMI 2.1 FMU"),
-    "beta version": (3, 'fmiVersion="3.0"', 'fmiVersion="3.0-beta.1"', "model.version", 2, "is an FMI 3.0-beta.1 FMU"),
+    "version 1.1": (
+        2,
+        'fmiVersion="2.0"',
+        'fmiVersion="1.1"',
+        "model.version",
+        2,
+        "is an FMI 1.1 FMU; FMI 1.0, 2.0 and 3.0 are",
+    ),
+    "version 4.0": (
+        2,
+        'fmiVersion="2.0"',
+        'fmiVersion="4.0"',
+        "model.version",
+        2,
+        "is an FMI 4.0 FMU",
+    ),
+    "version 2.1": (
+        2,
+        'fmiVersion="2.0"',
+        'fmiVersion="2.1"',
+        "model.version",
+        2,
+        "is an FMI 2.1 FMU",
+    ),
+    "beta version": (
+        3,
+        'fmiVersion="3.0"',
+        'fmiVersion="3.0-beta.1"',
+        "model.version",
+        2,
+        "is an FMI 3.0-beta.1 FMU",
+    ),
     "no version": (2, 'fmiVersion="2.0"', "", "model.version", 2, "lacks the attribute fmiVersion"),
     "no guid": (2, 'guid="probe"', "", "model.token", 2, "lacks the attribute guid"),
-    "no token": (3, 'instantiationToken="probe"', "", "model.token", 2, "lacks the attribute instantiationToken"),
+    "no token": (
+        3,
+        'instantiationToken="probe"',
+        "",
+        "model.token",
+        2,
+        "lacks the attribute instantiationToken",
+    ),
     "only scheduled execution": (
         2,
         "<CoSimulation ",
@@ -37,7 +80,14 @@ ERRORS = {
         2,
         "offers neither Co-Simulation nor",
     ),
-    "no identifier": (2, ' modelIdentifier="probe"', "", "model.library-name", 3, 'found modelIdentifier ""'),
+    "no identifier": (
+        2,
+        ' modelIdentifier="probe"',
+        "",
+        "model.library-name",
+        3,
+        'found modelIdentifier ""',
+    ),
     "two interfaces": (
         2,
         "<UnitDef",
@@ -54,9 +104,30 @@ ERRORS = {
         12,
         "<ModelVariables> occurs 2 times",
     ),
-    "unit twice": (2, '<Unit name="m">', '<Unit name="deg"/><Unit name="m">', "unit.unique", 6, 'unit "deg" is defined twice'),
-    "unit exponent": (2, '<BaseUnit m="1"/>', '<BaseUnit m="x"/>', "unit.base", 6, 'found m="x", expected an integer'),
-    "unit factor": (2, 'factor="0.017453292519943295"', 'factor="0"', "unit.base", 5, 'found factor="0"'),
+    "unit twice": (
+        2,
+        '<Unit name="m">',
+        '<Unit name="deg"/><Unit name="m">',
+        "unit.unique",
+        6,
+        'unit "deg" is defined twice',
+    ),
+    "unit exponent": (
+        2,
+        '<BaseUnit m="1"/>',
+        '<BaseUnit m="x"/>',
+        "unit.base",
+        6,
+        'found m="x", expected an integer',
+    ),
+    "unit factor": (
+        2,
+        'factor="0.017453292519943295"',
+        'factor="0"',
+        "unit.base",
+        5,
+        'found factor="0"',
+    ),
     "type twice": (
         2,
         "</TypeDefinitions>",
@@ -81,16 +152,79 @@ ERRORS = {
         9,
         'the item "off" of enumeration "Mode" occurs twice',
     ),
-    "value twice": (3, 'name="on" value="2"', 'name="on" value="1"', "type.items", 6, 'the value "1" of enumeration'),
+    "value twice": (
+        3,
+        'name="on" value="2"',
+        'name="on" value="1"',
+        "type.items",
+        6,
+        'the value "1" of enumeration',
+    ),
     "no name": (2, 'name="u" ', "", "variable.name", 13, 'found the variable name ""'),
-    "name with line end": (2, 'name="u" ', 'name="u&#10;v" ', "variable.name", 13, r'name "u\nv", expected one without'),
-    "no type": (2, '<Real start="0" unit="m"/>', "", "variable.type", 13, "has no type that this FMI version defines"),
-    "type of FMI 2": (3, '<Float64 name="u"', '<Real name="u"', "variable.type", 11, "has no type that this FMI version defines"),
-    "causality": (2, 'causality="input"', 'causality="inptu"', "variable.word", 13, 'causality="inptu"; did you mean "input"?'),
-    "variability": (2, 'variability="tunable"', 'variability="always"', "variable.word", 15, 'found variability="always"'),
-    "initial": (2, 'initial="calculated"', 'initial="maybe"', "variable.word", 14, 'found initial="maybe"'),
-    "no reference": (2, 'name="u" valueReference="0"', 'name="u"', "reference.value", 13, 'found valueReference=""'),
-    "negative reference": (3, 'valueReference="1"', 'valueReference="-1"', "reference.value", 11, 'found valueReference="-1"'),
+    "name with line end": (
+        2,
+        'name="u" ',
+        'name="u&#10;v" ',
+        "variable.name",
+        13,
+        r'name "u\nv", expected one without',
+    ),
+    "no type": (
+        2,
+        '<Real start="0" unit="m"/>',
+        "",
+        "variable.type",
+        13,
+        "has no type that this FMI version defines",
+    ),
+    "type of FMI 2": (
+        3,
+        '<Float64 name="u"',
+        '<Real name="u"',
+        "variable.type",
+        11,
+        "has no type that this FMI version defines",
+    ),
+    "causality": (
+        2,
+        'causality="input"',
+        'causality="inptu"',
+        "variable.word",
+        13,
+        'causality="inptu"; did you mean "input"?',
+    ),
+    "variability": (
+        2,
+        'variability="tunable"',
+        'variability="always"',
+        "variable.word",
+        15,
+        'found variability="always"',
+    ),
+    "initial": (
+        2,
+        'initial="calculated"',
+        'initial="maybe"',
+        "variable.word",
+        14,
+        'found initial="maybe"',
+    ),
+    "no reference": (
+        2,
+        'name="u" valueReference="0"',
+        'name="u"',
+        "reference.value",
+        13,
+        'found valueReference=""',
+    ),
+    "negative reference": (
+        3,
+        'valueReference="1"',
+        'valueReference="-1"',
+        "reference.value",
+        11,
+        'found valueReference="-1"',
+    ),
     "large reference": (
         2,
         'name="u" valueReference="0"',
@@ -115,7 +249,14 @@ ERRORS = {
         12,
         'has the same value reference as "u", expected',
     ),
-    "derivative": (2, '<Real unit="m"/>', '<Real unit="m" derivative="99"/>', "variable.derivative", 14, 'found derivative="99"'),
+    "derivative": (
+        2,
+        '<Real unit="m"/>',
+        '<Real unit="m" derivative="99"/>',
+        "variable.derivative",
+        14,
+        'found derivative="99"',
+    ),
     "derivative of text": (
         3,
         'initial="calculated" unit="m"',
@@ -124,8 +265,22 @@ ERRORS = {
         12,
         'found derivative="60"',
     ),
-    "clock": (3, 'start="0" unit="m"', 'start="0" clocks="2"', "variable.clocks", 11, 'found "2" in its clocks'),
-    "NaN": (2, '<Real start="0"', '<Real start="NaN"', "start.finite", 13, "found start value NaN, expected a finite number"),
+    "clock": (
+        3,
+        'start="0" unit="m"',
+        'start="0" clocks="2"',
+        "variable.clocks",
+        11,
+        'found "2" in its clocks',
+    ),
+    "NaN": (
+        2,
+        '<Real start="0"',
+        '<Real start="NaN"',
+        "start.finite",
+        13,
+        "found start value NaN, expected a finite number",
+    ),
     "infinite input": (
         3,
         'causality="input" start="0" unit',
@@ -134,7 +289,14 @@ ERRORS = {
         11,
         "found start value INF",
     ),
-    "too large": (2, '<Real start="0"', '<Real start="1e999"', "start.finite", 13, "found start value 1e999"),
+    "too large": (
+        2,
+        '<Real start="0"',
+        '<Real start="1e999"',
+        "start.finite",
+        13,
+        "found start value 1e999",
+    ),
     "word": (
         2,
         '<Real start="0"',
@@ -143,10 +305,31 @@ ERRORS = {
         13,
         'start value "zero" of variable "u" is not a valid Float64',
     ),
-    "underscore": (2, '<Real start="0"', '<Real start="1_0"', "start.value", 13, 'start value "1_0"'),
+    "underscore": (
+        2,
+        '<Real start="0"',
+        '<Real start="1_0"',
+        "start.value",
+        13,
+        'start value "1_0"',
+    ),
     "C's nan": (2, '<Real start="0"', '<Real start="nan"', "start.value", 13, 'start value "nan"'),
-    "fraction": (2, '<Integer start="0"', '<Integer start="0.5"', "start.value", 17, "is not a valid Int32"),
-    "integer range": (2, '<Integer start="0"', '<Integer start="2147483648"', "start.value", 17, "is not a valid Int32"),
+    "fraction": (
+        2,
+        '<Integer start="0"',
+        '<Integer start="0.5"',
+        "start.value",
+        17,
+        "is not a valid Int32",
+    ),
+    "integer range": (
+        2,
+        '<Integer start="0"',
+        '<Integer start="2147483648"',
+        "start.value",
+        17,
+        "is not a valid Int32",
+    ),
     "byte range": (
         3,
         'name="uint8_in" valueReference="22" causality="input" start="0"',
@@ -155,9 +338,30 @@ ERRORS = {
         21,
         "is not a valid UInt8",
     ),
-    "truth": (2, '<Boolean start="false"', '<Boolean start="False"', "start.value", 22, "is not a valid Boolean"),
-    "too few starts": (3, 'start="1 2 3"', 'start="1 2"', "start.count", 15, "found 2 start values, expected 3"),
-    "many starts": (2, '<Real start="0"', '<Real start="0 0"', "start.count", 13, "found 2 start values, expected 1"),
+    "truth": (
+        2,
+        '<Boolean start="false"',
+        '<Boolean start="False"',
+        "start.value",
+        22,
+        "is not a valid Boolean",
+    ),
+    "too few starts": (
+        3,
+        'start="1 2 3"',
+        'start="1 2"',
+        "start.count",
+        15,
+        "found 2 start values, expected 3",
+    ),
+    "many starts": (
+        2,
+        '<Real start="0"',
+        '<Real start="0 0"',
+        "start.count",
+        13,
+        "found 2 start values, expected 1",
+    ),
     "no dimension": (
         3,
         '<Dimension start="3"/>',
@@ -166,7 +370,14 @@ ERRORS = {
         15,
         'a dimension with start="0", expected',
     ),
-    "empty dimension": (3, '<Dimension start="3"/>', "<Dimension/>", "variable.dimension", 15, "found a dimension with nothing"),
+    "empty dimension": (
+        3,
+        '<Dimension start="3"/>',
+        "<Dimension/>",
+        "variable.dimension",
+        15,
+        "found a dimension with nothing",
+    ),
     "dimension of input": (
         3,
         '<Dimension start="3"/>',
@@ -178,7 +389,8 @@ ERRORS = {
     "dimension of itself": (
         3,
         '<Float64 name="u"',
-        '<UInt64 name="n" valueReference="77" causality="structuralParameter" start="3"><Dimension valueReference="77"/></UInt64>'
+        '<UInt64 name="n" valueReference="77" causality="structuralParameter" '
+        'start="3"><Dimension valueReference="77"/></UInt64>'
         '<Float64 name="u"',
         "variable.dimension",
         11,
@@ -195,7 +407,10 @@ ERRORS = {
     "many arrays": (
         3,
         '<Float64 name="u"',
-        "".join(f'<Float64 name="b{i}" valueReference="{90 + i}"><Dimension start="1000000"/></Float64>' for i in range(3))
+        "".join(
+            f'<Float64 name="b{i}" valueReference="{90 + i}"><Dimension start="1000000"/></Float64>'
+            for i in range(3)
+        )
         + '<Float64 name="u"',
         "variable.size",
         11,
@@ -204,7 +419,8 @@ ERRORS = {
     "many aliases of an array": (
         3,
         '<Float64 name="u"',
-        '<Float64 name="b" valueReference="90"><Dimension start="1000000"/><Alias name="c"/><Alias name="d"/></Float64>'
+        '<Float64 name="b" valueReference="90"><Dimension start="1000000"/><Alias '
+        'name="c"/><Alias name="d"/></Float64>'
         '<Float64 name="u"',
         "variable.size",
         11,
@@ -245,7 +461,9 @@ def test_errors_are_refused(name, good, tmp_path):
     (line_found,) = [row for row in text.splitlines() if words in row]
     assert line_found.startswith(f'"{path}": modelDescription.xml:{line}: ')
     assert f" [{rule}, FMI " in line_found or f" [{rule}, limits]" in line_found
-    assert (rule, "error", line) in [(f.rule.name, f.rule.severity, f.line) for f in find_problems(path)]
+    assert (rule, "error", line) in [
+        (f.rule.name, f.rule.severity, f.line) for f in find_problems(path)
+    ]
 
 
 def test_all_problems_are_reported_together(good, tmp_path):

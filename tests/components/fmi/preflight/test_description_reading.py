@@ -23,7 +23,8 @@ def numbers(expected):
     if expected.start is None or expected.type in ("String", "Binary"):
         return expected.start
     words = tuple(
-        {"true": 1.0, "false": 0.0}.get(word) if word in ("true", "false") else float(word) for word in expected.start.split()
+        {"true": 1.0, "false": 0.0}.get(word) if word in ("true", "false") else float(word)
+        for word in expected.start.split()
     )
     return words[0] if len(words) == 1 else words
 
@@ -35,12 +36,17 @@ def check_like_fmpy(path):
         expected.modelName,
         expected.instantiationToken,
     )
-    assert (description.description, description.generation_tool) == (expected.description or "", expected.generationTool or "")
+    assert (description.description, description.generation_tool) == (
+        expected.description or "",
+        expected.generationTool or "",
+    )
     assert description.model_identifier == expected.coSimulation.modelIdentifier
     assert description.has_state == expected.coSimulation.canGetAndSetFMUstate
     assert description.once_per_process == expected.coSimulation.canBeInstantiatedOnlyOncePerProcess
     assert description.needs_execution_tool == expected.coSimulation.needsExecutionTool
-    assert sorted(description.value_references.items()) == sorted((v.name, v.valueReference) for v in expected.modelVariables)
+    assert sorted(description.value_references.items()) == sorted(
+        (v.name, v.valueReference) for v in expected.modelVariables
+    )
     variables = {variable.name: variable for variable in description.variables}
     assert len(variables) == len(expected.modelVariables)
     for other in expected.modelVariables:
@@ -103,18 +109,35 @@ def test_features_of_fmi3(tmp_path):
     description = FmuFile(path).description
     found = {variable.name: variable for variable in description.variables}
     assert (found["a"].shape, found["a"].start) == ((2, 3), (1.0, 2.0, 3.0, 4.0, 5.0, 6.0))
-    assert (found["speed"].unit.factor, found["speed"].minimum, found["speed"].maximum) == (0.2777777777777778, 0.0, 300.0)
-    assert (found["turn"].unit.factor, found["turn"].relative_quantity, found["speed"].relative_quantity) == (
+    assert (found["speed"].unit.factor, found["speed"].minimum, found["speed"].maximum) == (
+        0.2777777777777778,
+        0.0,
+        300.0,
+    )
+    assert (
+        found["turn"].unit.factor,
+        found["turn"].relative_quantity,
+        found["speed"].relative_quantity,
+    ) == (
         math.pi / 180,
         True,
         False,
     )
-    assert found["gauge"].unit == Unit("bar(g)", ())  # a unit without BaseUnit whose name is not a known unit
+    assert found["gauge"].unit == Unit(
+        "bar(g)", ()
+    )  # a unit without BaseUnit whose name is not a known unit
     assert found["flow"].unit == parse_unit("m³/s")  # a unit that is not defined
     assert found["a"].unit is None
     assert found["mode"].items == (("off", -1), ("on", 4))
-    assert (found["v"].description, found["speed"].description, found["v"].start) == ("short", "a speed", 50.0)
+    assert (found["v"].description, found["speed"].description, found["v"].start) == (
+        "short",
+        "a speed",
+        50.0,
+    )
     assert description.value_references["v"] == description.value_references["speed"] == 2
     assert (found["b"].start, found["i"].start, found["n"].variability) == ("00ff", -128, "fixed")
-    assert (description.default_experiment.start_time, float(description.default_experiment.stop_time)) == (1, 2.5)
+    assert (
+        description.default_experiment.start_time,
+        float(description.default_experiment.stop_time),
+    ) == (1, 2.5)
     assert (description.once_per_process, description.has_state) == (True, False)

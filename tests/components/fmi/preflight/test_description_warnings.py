@@ -1,11 +1,14 @@
-"""Harmless violations of the standard are warnings: each is found by its rule, at its line, and the FMU is accepted."""
+"""Harmless violations of the standard are warnings: each is found by its rule, at its line, and the
+FMU is accepted.
+"""
 
 import pytest
 from bad_fmus import find_problems, with_change, with_description
 
 from cosim.components.fmi import FmuFile
 
-#: case -> (FMI version, text of the valid description, its replacement, rule, line, part of the message)
+#: case -> (FMI version, text of the valid description, its replacement, rule, line, part of the
+#: message)
 WARNINGS = {
     "alias twice": (
         3,
@@ -15,9 +18,30 @@ WARNINGS = {
         13,
         'name "u" is already used in line 11',
     ),
-    "name twice": (2, 'name="y" ', 'name="u" ', "variable.unique", 14, 'the variable name "u" is already used in line 13'),
-    "stop time": (2, 'stopTime="2"', 'stopTime="NaN"', "experiment.value", 11, 'found stopTime="NaN", expected a finite number'),
-    "step size": (3, 'stepSize="0.01"', 'stepSize="fast"', "experiment.value", 8, 'found stepSize="fast"'),
+    "name twice": (
+        2,
+        'name="y" ',
+        'name="u" ',
+        "variable.unique",
+        14,
+        'the variable name "u" is already used in line 13',
+    ),
+    "stop time": (
+        2,
+        'stopTime="2"',
+        'stopTime="NaN"',
+        "experiment.value",
+        11,
+        'found stopTime="NaN", expected a finite number',
+    ),
+    "step size": (
+        3,
+        'stepSize="0.01"',
+        'stepSize="fast"',
+        "experiment.value",
+        8,
+        'found stepSize="fast"',
+    ),
     "fixed input": (
         2,
         'name="u" valueR',
@@ -107,7 +131,14 @@ WARNINGS = {
         'found start value 3, expected an item of "Mode"',
     ),
     "limits": (2, 'min="-10"', 'min="20"', "variable.limits", 15, "min 20 is above max 10"),
-    "limit": (2, 'min="-10"', 'min="low"', "variable.limit-value", 15, 'found min="low", expected a number'),
+    "limit": (
+        2,
+        'min="-10"',
+        'min="low"',
+        "variable.limit-value",
+        15,
+        'found min="low", expected a number',
+    ),
     "wide limit": (
         2,
         '<Integer start="0"/>',
@@ -116,7 +147,14 @@ WARNINGS = {
         17,
         'found min="one"',
     ),
-    "no model name": (2, 'modelName="Probe"', 'modelName=""', "model.name", 2, "lacks the attribute modelName"),
+    "no model name": (
+        2,
+        'modelName="Probe"',
+        'modelName=""',
+        "model.name",
+        2,
+        "lacks the attribute modelName",
+    ),
     "no items": (
         2,
         "</TypeDefinitions>",
@@ -133,8 +171,22 @@ WARNINGS = {
         11,
         "found stopTime -1, expected more than the startTime 0",
     ),
-    "no step": (2, 'stepSize="0.01"', 'stepSize="0"', "experiment.order", 11, "found stepSize 0, expected more than 0"),
-    "tolerance": (3, 'stopTime="2"', 'stopTime="2" tolerance="-1"', "experiment.order", 8, "found tolerance -1"),
+    "no step": (
+        2,
+        'stepSize="0.01"',
+        'stepSize="0"',
+        "experiment.order",
+        11,
+        "found stepSize 0, expected more than 0",
+    ),
+    "tolerance": (
+        3,
+        'stopTime="2"',
+        'stopTime="2" tolerance="-1"',
+        "experiment.order",
+        8,
+        "found tolerance -1",
+    ),
     "category twice": (
         2,
         "<DefaultExp",
@@ -161,7 +213,10 @@ WARNINGS = {
     ),
     "no time": (
         3,
-        '<Float64 name="time" valueReference="0" causality="independent" variability="continuous"/>',
+        (
+            '<Float64 name="time" valueReference="0" causality="independent" '
+            'variability="continuous"/>'
+        ),
         "",
         "variable.independent",
         2,
@@ -175,7 +230,14 @@ WARNINGS = {
         15,
         "another unit",
     ),
-    "unit": (2, 'start="0" unit="m"', 'start="0" unit="mm"', "variable.unit", 13, 'the unit "mm" is not defined'),
+    "unit": (
+        2,
+        'start="0" unit="m"',
+        'start="0" unit="mm"',
+        "variable.unit",
+        13,
+        'the unit "mm" is not defined',
+    ),
     "display unit": (
         3,
         'start="0" unit="m"',
@@ -272,7 +334,14 @@ WARNINGS = {
         28,
         'found "often", expected one of',
     ),
-    "unknown attribute": (2, 'modelName="Probe"', 'modelName="Probe" colour="red"', "xml.schema", 2, "'colour' is not allowed"),
+    "unknown attribute": (
+        2,
+        'modelName="Probe"',
+        'modelName="Probe" colour="red"',
+        "xml.schema",
+        2,
+        "'colour' is not allowed",
+    ),
     "misplaced element": (
         3,
         "<UnitDefinitions>",
@@ -295,15 +364,23 @@ def test_warnings_are_reported_but_do_not_prevent_a_run(name, good, tmp_path):
 
 
 def structured(name, good, folder):
-    text = good[2]["modelDescription.xml"].decode().replace('guid="probe"', 'guid="probe" variableNamingConvention="structured"')
+    text = (
+        good[2]["modelDescription.xml"]
+        .decode()
+        .replace('guid="probe"', 'guid="probe" variableNamingConvention="structured"')
+    )
     return with_description(text.replace('name="u"', f'name="{name}"'), good[2], folder)
 
 
-@pytest.mark.parametrize("name", ["a", "a.b[1,2].c", "der(a.b)", "der(a,2)", "'any thing (1)'.x", "_1"])
+@pytest.mark.parametrize(
+    "name", ["a", "a.b[1,2].c", "der(a.b)", "der(a,2)", "'any thing (1)'.x", "_1"]
+)
 def test_structured_names_are_recognized(name, good, tmp_path):
     assert find_problems(structured(name, good, tmp_path)) == []
 
 
 @pytest.mark.parametrize("name", ["a..b", "1a", "a[", "a[1", "a b", "der(a", "a.", "'a"])
 def test_other_names_break_the_convention(name, good, tmp_path):
-    assert [f.rule.name for f in find_problems(structured(name, good, tmp_path))] == ["variable.convention"]
+    assert [f.rule.name for f in find_problems(structured(name, good, tmp_path))] == [
+        "variable.convention"
+    ]

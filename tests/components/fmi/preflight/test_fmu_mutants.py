@@ -1,4 +1,6 @@
-"""Random changes to valid FMUs: each result is either accepted or refused with an InputError, in limited time."""
+"""Random changes to valid FMUs: each result is either accepted or refused with an InputError, in
+limited time.
+"""
 
 import random
 import time
@@ -14,7 +16,8 @@ from cosim.components.fmi.preflight.validation import validate_fmu
 from cosim.core import resources
 from cosim.core.errors import InputError
 
-#: mutants for each FMI version or library; the fuzz tests make 100 000 archives and as many model descriptions
+#: mutants for each FMI version or library; the fuzz tests make 100 000 archives and as many model
+#: descriptions
 SHORT = 150
 WORDS = (
     b"",
@@ -43,14 +46,18 @@ def seeded_random(seed):
 
 
 def mutate(content, rng):
-    """Make one to four changes: bytes are flipped, removed, repeated, or replaced by random bytes or by one of WORDS."""
+    """Make one to four changes: bytes are flipped, removed, repeated, or replaced by random bytes
+    or by one of WORDS.
+    """
     content = bytearray(content)
     for _ in range(rng.randint(1, 4)):
         begin = rng.randrange(len(content) + 1)
         length = min(rng.choice((1, 1, 2, 4, 30, 300)), len(content) - begin)
         piece = content[begin : begin + length]
         flipped = bytes(b ^ 1 << rng.randrange(8) for b in piece)
-        content[begin : begin + length] = rng.choice((flipped, b"", piece * 2, rng.choice(WORDS), rng.randbytes(length)))
+        content[begin : begin + length] = rng.choice(
+            (flipped, b"", piece * 2, rng.choice(WORDS), rng.randbytes(length))
+        )
     return bytes(content)
 
 
@@ -105,7 +112,19 @@ def test_mutated_attributes(version, count, good, tmp_path):
     rng = seeded_random(version)
     pieces = good[version]["modelDescription.xml"].split(b'"')
     values = sorted(
-        {*pieces[1::2], b"", b"-1", b"NaN", b"INF", b"1e999", b"99999999999999999999999", b"\xc3\xa9", b" 1 ", b"0x1", b"a b"}
+        {
+            *pieces[1::2],
+            b"",
+            b"-1",
+            b"NaN",
+            b"INF",
+            b"1e999",
+            b"99999999999999999999999",
+            b"\xc3\xa9",
+            b" 1 ",
+            b"0x1",
+            b"a b",
+        }
     )
     others = members(good[version])[1:]
     path = tmp_path / "mutant.fmu"
@@ -114,7 +133,9 @@ def test_mutated_attributes(version, count, good, tmp_path):
         changed = list(pieces)
         for _ in range(rng.randint(1, 3)):
             changed[rng.randrange(3, len(pieces) // 2) * 2 + 1] = rng.choice(values)
-        path.write_bytes(pack_archive([Member("modelDescription.xml", b'"'.join(changed)), *others]))
+        path.write_bytes(
+            pack_archive([Member("modelDescription.xml", b'"'.join(changed)), *others])
+        )
         results.append(outcome(path))
     assert set(results) == {"accepted", "refused"}
 
@@ -128,7 +149,11 @@ def test_mutated_libraries(name, count):
     results = set()
     for _ in range(count):
         # most changes are made in the headers and tables at the beginning
-        content = mutate(library[:8192], rng) + library[8192:] if rng.random() < 0.8 else mutate(library, rng)
+        content = (
+            mutate(library[:8192], rng) + library[8192:]
+            if rng.random() < 0.8
+            else mutate(library, rng)
+        )
         begin = time.process_time()
         try:
             results.add(type(elf.read_library(content, current_platform().architecture)))

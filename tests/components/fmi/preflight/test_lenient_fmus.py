@@ -1,4 +1,6 @@
-"""FMUs that deviate from the standard in ways that do not change their results: they run, with one line of warning."""
+"""FMUs that deviate from the standard in ways that do not change their results: they run, with one
+line of warning.
+"""
 
 from __future__ import annotations
 
@@ -21,7 +23,10 @@ def described(old: str, new: str, identifier: str = "probe") -> Change:
         text = files["modelDescription.xml"].decode()
         assert old in text
         changed = files | {"modelDescription.xml": text.replace(old, new, 1).encode()}
-        return [(name.replace("/probe.so", f"/{identifier}.so"), content) for name, content in changed.items()]
+        return [
+            (name.replace("/probe.so", f"/{identifier}.so"), content)
+            for name, content in changed.items()
+        ]
 
     return change
 
@@ -43,23 +48,41 @@ DEVIATIONS: dict[str, tuple[int, Change, str]] = {
         described('causality="input"><Start value=""/>', 'causality="input" start="text">'),
         "xml.schema",
     ),
-    "input without start": (2, described('<Real start="0" unit="m"/>', '<Real unit="m"/>'), "start.missing"),
+    "input without start": (
+        2,
+        described('<Real start="0" unit="m"/>', '<Real unit="m"/>'),
+        "start.missing",
+    ),
     "empty token": (2, described('guid="probe"', 'guid=""'), "model.empty-token"),
     "constant parameter": (
         2,
-        described('causality="parameter" variability="tunable"', 'causality="parameter" variability="constant"'),
+        described(
+            'causality="parameter" variability="tunable"',
+            'causality="parameter" variability="constant"',
+        ),
         "variable.combination",
     ),
     "continuous Boolean": (
         2,
-        described('causality="input" variability="discrete"><Boolean', 'causality="input" variability="continuous"><Boolean'),
+        described(
+            'causality="input" variability="discrete"><Boolean',
+            'causality="input" variability="continuous"><Boolean',
+        ),
         "variable.continuous",
     ),
     "names that begin with ./": (2, renamed(lambda name: f"./{name}"), "archive.name-form"),
     "backslashes": (2, renamed(lambda name: name.replace("/", "\\")), "archive.name-form"),
     "entry ./": (2, lambda files: [("./", b""), *files.items()], "archive.name-form"),
-    "folder twice": (2, lambda files: [("extra/", b""), ("extra/", b""), *files.items()], "archive.repeated"),
-    "file twice": (2, lambda files: [("extra/a.txt", b"a"), ("extra/a.txt", b"a"), *files.items()], "archive.repeated"),
+    "folder twice": (
+        2,
+        lambda files: [("extra/", b""), ("extra/", b""), *files.items()],
+        "archive.repeated",
+    ),
+    "file twice": (
+        2,
+        lambda files: [("extra/a.txt", b"a"), ("extra/a.txt", b"a"), *files.items()],
+        "archive.repeated",
+    ),
 }
 
 
@@ -67,8 +90,12 @@ DEVIATIONS: dict[str, tuple[int, Change, str]] = {
 def test_a_harmless_deviation_is_a_warning(case, good, tmp_path):
     version, change, rule = DEVIATIONS[case]
     path = tmp_path / "deviating.fmu"
-    path.write_bytes(pack_archive(member for pair in change(good[version]) for member in members(dict([pair]))))
-    assert rule in {finding.rule.name for finding in find_problems(path) if finding.rule.severity == "warning"}
+    path.write_bytes(
+        pack_archive(member for pair in change(good[version]) for member in members(dict([pair])))
+    )
+    assert rule in {
+        finding.rule.name for finding in find_problems(path) if finding.rule.severity == "warning"
+    }
     done = run_cosim("simulate", path)
     assert (done.returncode, "y = 0.0175" in done.stdout) == (0, True), done
     assert len(done.stderr.splitlines()) == (rule != "xml.schema"), done.stderr
@@ -76,14 +103,18 @@ def test_a_harmless_deviation_is_a_warning(case, good, tmp_path):
 
 def test_a_missing_function_that_no_capability_promises_is_not_needed(good, tmp_path):
     library = (
-        good[2][LIBRARY].replace(b"fmi2GetFMUstate\0", b"fmi2GetNothing_\0").replace(b"fmi2CancelStep\0", b"fmi2Cancel_Ste\0")
+        good[2][LIBRARY]
+        .replace(b"fmi2GetFMUstate\0", b"fmi2GetNothing_\0")
+        .replace(b"fmi2CancelStep\0", b"fmi2Cancel_Ste\0")
     )
     path = tmp_path / "old.fmu"
     path.write_bytes(pack_archive(members(good[2] | {LIBRARY: library})))
     promised = [f.message for f in find_problems(path) if f.rule.name == "binary.functions"]
     assert promised == ["the library does not export fmi2GetFMUstate"]
     text = good[2]["modelDescription.xml"].replace(b'canGetAndSetFMUstate="true"', b"")
-    path.write_bytes(pack_archive(members(good[2] | {LIBRARY: library, "modelDescription.xml": text})))
+    path.write_bytes(
+        pack_archive(members(good[2] | {LIBRARY: library, "modelDescription.xml": text}))
+    )
     findings = {(f.rule.name, f.rule.severity) for f in find_problems(path)}
     assert findings == {("binary.unused-functions", "warning")}
     assert run_cosim("simulate", path).returncode == 0

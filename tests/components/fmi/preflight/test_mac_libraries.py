@@ -60,37 +60,52 @@ def universal_library():
     offsets = [4096, 4096 + len(parts[0])]
     entries = zip((macho.MACHINES[a] for a in sorted(MACHINES)), offsets, parts, strict=True)
     head = b"\xca\xfe\xba\xbe" + struct.pack(">L", 2)
-    head += b"".join(struct.pack(">5L", machine, 0, offset, len(part), 12) for machine, offset, part in entries)
+    head += b"".join(
+        struct.pack(">5L", machine, 0, offset, len(part), 12) for machine, offset, part in entries
+    )
     return head.ljust(4096, b"\0") + parts[0] + parts[1]
 
 
 def test_a_real_library_exports_the_functions_of_fmi(library, architecture):
     exports = macho.read_library(library, architecture).exports
-    assert standard_functions(2, "co-simulation") | standard_functions(3, "co-simulation") <= exports
+    assert (
+        standard_functions(2, "co-simulation") | standard_functions(3, "co-simulation") <= exports
+    )
 
 
 def test_symbol_table_and_export_trie_agree(library, architecture):
     """The linker writes both tables of a library."""
-    symbols = macho.read_library(without_commands(library, macho._EXPORT_TRIE_COMMANDS), architecture).exports
+    symbols = macho.read_library(
+        without_commands(library, macho._EXPORT_TRIE_COMMANDS), architecture
+    ).exports
     tree = macho.read_library(without_commands(library, {macho._LC_SYMTAB}), architecture).exports
     assert symbols == tree == macho.read_library(library, architecture).exports
 
 
 def test_the_part_for_the_architecture_is_read_from_a_universal_library(library, architecture):
-    assert macho.read_library(universal_library(), architecture) == macho.read_library(library, architecture)
+    assert macho.read_library(universal_library(), architecture) == macho.read_library(
+        library, architecture
+    )
     real = (FMPY / "logging/darwin64/logging.dylib").read_bytes()
     assert macho.read_library(real, architecture).exports == {"addLoggerProxy"}
 
 
 def test_a_missing_function_is_named(library, architecture):
-    changed = without_commands(library, macho._EXPORT_TRIE_COMMANDS).replace(b"_fmi2DoStep\0", b"_fmi2DoSteq\0")
-    assert standard_functions(2, "co-simulation") - macho.read_library(changed, architecture).exports == {"fmi2DoStep"}
+    changed = without_commands(library, macho._EXPORT_TRIE_COMMANDS).replace(
+        b"_fmi2DoStep\0", b"_fmi2DoSteq\0"
+    )
+    assert standard_functions(2, "co-simulation") - macho.read_library(
+        changed, architecture
+    ).exports == {"fmi2DoStep"}
 
 
 DAMAGED = {
     "empty": (lambda _: b"", "is not a macOS library"),
     "ELF": (lambda library: b"\x7fELF" + library[4:], "is not a macOS library"),
-    "only a magic number": (lambda library: library[:4], "is truncated: it refers to byte 4, but has 4"),
+    "only a magic number": (
+        lambda library: library[:4],
+        "is truncated: it refers to byte 4, but has 4",
+    ),
     "cut": (lambda library: library[: len(library) // 2], "is truncated: a segment ends at byte"),
     "32 bit": (lambda library: b"\xce\xfa\xed\xfe" + library[4:], "is built for 32 bit"),
     "unknown machine": (patched(4, "<L", 99), "is built for machine 0x63"),
@@ -100,8 +115,14 @@ DAMAGED = {
     "command beyond": (patched(36, "<L", 2**31), "has damaged load commands"),
     "more commands": (patched(16, "<L", 10**6), "has damaged load commands"),
     "universal, cut": (lambda _: universal_library()[:9000], "is truncated: the part for"),
-    "universal, for nobody": (lambda _: universal_library()[:4] + bytes(8), "is built for no architecture"),
-    "universal, countless": (lambda _: universal_library()[:4] + b"\xff" * 4, "claims 4294967295 architectures"),
+    "universal, for nobody": (
+        lambda _: universal_library()[:4] + bytes(8),
+        "is built for no architecture",
+    ),
+    "universal, countless": (
+        lambda _: universal_library()[:4] + b"\xff" * 4,
+        "claims 4294967295 architectures",
+    ),
 }
 
 
@@ -114,7 +135,9 @@ def test_damaged_libraries_are_refused(case, library, architecture):
 
 def test_another_architecture_is_refused(library, architecture):
     other = MACHINES[architecture]
-    with pytest.raises(InvalidLibraryError, match=f"is built for {architecture}; this machine is {other}"):
+    with pytest.raises(
+        InvalidLibraryError, match=f"is built for {architecture}; this machine is {other}"
+    ):
         macho.read_library(library, other)
 
 
@@ -122,12 +145,21 @@ def test_another_architecture_is_refused(library, architecture):
 def test_an_fmu_is_checked_for_macos(content, good, tmp_path, library, architecture):
     """The content of the library decides, not its name."""
     machine = FmuPlatform("darwin", architecture, ".dylib")
-    files = {"modelDescription.xml": good[2]["modelDescription.xml"], "binaries/darwin64/probe.dylib": content or library}
+    files = {
+        "modelDescription.xml": good[2]["modelDescription.xml"],
+        "binaries/darwin64/probe.dylib": content or library,
+    }
     path = tmp_path / "mac.fmu"
     path.write_bytes(pack_archive(members(files)))
     with open_regular_file(path) as file:
         findings = list(
-            check_binary(Archive(file, DEFAULT_LIMITS), examine(path).model, "co-simulation", machine, DEFAULT_LIMITS)
+            check_binary(
+                Archive(file, DEFAULT_LIMITS),
+                examine(path).model,
+                "co-simulation",
+                machine,
+                DEFAULT_LIMITS,
+            )
         )
     assert [finding.rule.name for finding in findings] == (["binary.format"] if content else [])
 
@@ -142,5 +174,7 @@ def test_mutants_are_read_or_refused(library, architecture):
         try:
             outcomes.add(type(macho.read_library(bytes(content), architecture)))
         except InvalidLibraryError as error:
-            outcomes.add(InvalidLibraryError if str(error).startswith(("is ", "has ")) else str(error))
+            outcomes.add(
+                InvalidLibraryError if str(error).startswith(("is ", "has ")) else str(error)
+            )
     assert outcomes == {SharedLibrary, InvalidLibraryError}

@@ -36,7 +36,16 @@ def test_a_real_library_exports_the_functions_of_fmi(library):
 def test_an_fmu_with_a_windows_library_is_accepted():
     with open_regular_file(FMU) as file:
         assert (
-            list(check_binary(Archive(file, DEFAULT_LIMITS), examine(FMU).model, "co-simulation", WINDOWS, DEFAULT_LIMITS)) == []
+            list(
+                check_binary(
+                    Archive(file, DEFAULT_LIMITS),
+                    examine(FMU).model,
+                    "co-simulation",
+                    WINDOWS,
+                    DEFAULT_LIMITS,
+                )
+            )
+            == []
         )
 
 
@@ -55,11 +64,26 @@ DAMAGED = {
     "only a header": (lambda dll: dll[:60], "is truncated: it refers to byte 60"),
     "header beyond": (lambda dll: patched(dll, 0x3C, "<L", 2**31), "has a damaged PE header"),
     "cut": (lambda dll: dll[:-2000], "is truncated: a section ends at byte"),
-    "ARM": (lambda dll: patched(dll, header(dll) + 4, "<H", 0xAA64), "is built for aarch64; this machine is x86_64"),
-    "32 bit": (lambda dll: patched(dll, header(dll) + 4, "<H", 0x14C), "is built for x86; this machine is x86_64"),
-    "program": (lambda dll: patched(dll, header(dll) + 22, "<H", 0x22), "is a program, expected a library"),
-    "optional header": (lambda dll: patched(dll, header(dll) + 24, "<H", 7), "has a damaged PE header"),
-    "exports elsewhere": (lambda dll: patched(dll, header(dll) + 24 + 112, "<L", 2**31), "is in no section"),
+    "ARM": (
+        lambda dll: patched(dll, header(dll) + 4, "<H", 0xAA64),
+        "is built for aarch64; this machine is x86_64",
+    ),
+    "32 bit": (
+        lambda dll: patched(dll, header(dll) + 4, "<H", 0x14C),
+        "is built for x86; this machine is x86_64",
+    ),
+    "program": (
+        lambda dll: patched(dll, header(dll) + 22, "<H", 0x22),
+        "is a program, expected a library",
+    ),
+    "optional header": (
+        lambda dll: patched(dll, header(dll) + 24, "<H", 7),
+        "has a damaged PE header",
+    ),
+    "exports elsewhere": (
+        lambda dll: patched(dll, header(dll) + 24 + 112, "<L", 2**31),
+        "is in no section",
+    ),
 }
 
 
@@ -71,7 +95,10 @@ def test_damaged_libraries_are_refused(case, library):
 
 
 def test_a_library_without_export_table(library):
-    assert pe.read_library(patched(library, header(library) + 24 + 112, "<L", 0), "x86_64").exports == frozenset()
+    assert (
+        pe.read_library(patched(library, header(library) + 24 + 112, "<L", 0), "x86_64").exports
+        == frozenset()
+    )
 
 
 def test_mutants_are_read_or_refused(library):

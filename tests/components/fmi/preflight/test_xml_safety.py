@@ -1,4 +1,6 @@
-"""Dangerous and malformed XML is refused quickly and with its line, without access to other files and the network."""
+"""Dangerous and malformed XML is refused quickly and with its line, without access to other files
+and the network.
+"""
 
 import re
 import socket
@@ -40,46 +42,132 @@ def many_attributes(xml):
 
 LONG = "x" * (1 << 21)
 CASES = {
-    "long description": (edited("a lag", LONG), "xml.size", ':2: <fmiModelDescription> has attribute "description" with 2097'),
+    "long description": (
+        edited("a lag", LONG),
+        "xml.size",
+        ':2: <fmiModelDescription> has attribute "description" with 2097',
+    ),
     "long name": (
         edited('name="y"', f'name="{LONG}"'),
         "xml.size",
         '> has attribute "name" with 2097152 characters, ',
     ),
-    "long start": (edited('start=""', f'start="{LONG}"'), "xml.size", 'has attribute "start" with 2097152 characters'),
-    "long text": (edited("</ModelVariables>", f"</ModelVariables>{LONG}"), "xml.size", "<ModelVariables> has text with 20971"),
-    "endless description": (edited("a lag", LONG * 6), "xml.size", "has an attribute or text with more than 1048576 characters"),
-    "DOCTYPE": (with_prolog("<!DOCTYPE fmiModelDescription>"), "xml.doctype", ":2: found a DOCTYPE"),
-    "billion laughs": (with_prolog(f'<!DOCTYPE x [<!ENTITY l0 "ha">{LAUGHS}]>'), "xml.doctype", ":2: found a DOCTYPE"),
-    "file entity": (with_prolog('<!DOCTYPE x [<!ENTITY e SYSTEM "file:///etc/passwd">]>'), "xml.doctype", "found a DOCTYPE"),
-    "parameter entity": (with_prolog('<!DOCTYPE x [<!ENTITY % e SYSTEM "http://127.0.0.1/x"> %e;]>'), "xml.doctype", "DOCTYPE"),
-    "external DTD": (with_prolog('<!DOCTYPE x SYSTEM "http://127.0.0.1/x.dtd">'), "xml.doctype", "found a DOCTYPE"),
-    "late DOCTYPE": (with_prolog("<!-- a\n-->\n<!DOCTYPE x>"), "xml.doctype", ":4: found a DOCTYPE"),
-    "DOCTYPE in UTF-16": (
-        lambda xml: with_prolog("<!DOCTYPE x>")(xml).decode().replace("UTF-8", "UTF-16").encode("utf-16"),
+    "long start": (
+        edited('start=""', f'start="{LONG}"'),
+        "xml.size",
+        'has attribute "start" with 2097152 characters',
+    ),
+    "long text": (
+        edited("</ModelVariables>", f"</ModelVariables>{LONG}"),
+        "xml.size",
+        "<ModelVariables> has text with 20971",
+    ),
+    "endless description": (
+        edited("a lag", LONG * 6),
+        "xml.size",
+        "has an attribute or text with more than 1048576 characters",
+    ),
+    "DOCTYPE": (
+        with_prolog("<!DOCTYPE fmiModelDescription>"),
         "xml.doctype",
         ":2: found a DOCTYPE",
     ),
-    "UTF-16 without mark": (lambda xml: xml.decode().encode("utf-16-le"), "xml.encoding", "null characters"),
+    "billion laughs": (
+        with_prolog(f'<!DOCTYPE x [<!ENTITY l0 "ha">{LAUGHS}]>'),
+        "xml.doctype",
+        ":2: found a DOCTYPE",
+    ),
+    "file entity": (
+        with_prolog('<!DOCTYPE x [<!ENTITY e SYSTEM "file:///etc/passwd">]>'),
+        "xml.doctype",
+        "found a DOCTYPE",
+    ),
+    "parameter entity": (
+        with_prolog('<!DOCTYPE x [<!ENTITY % e SYSTEM "http://127.0.0.1/x"> %e;]>'),
+        "xml.doctype",
+        "DOCTYPE",
+    ),
+    "external DTD": (
+        with_prolog('<!DOCTYPE x SYSTEM "http://127.0.0.1/x.dtd">'),
+        "xml.doctype",
+        "found a DOCTYPE",
+    ),
+    "late DOCTYPE": (
+        with_prolog("<!-- a\n-->\n<!DOCTYPE x>"),
+        "xml.doctype",
+        ":4: found a DOCTYPE",
+    ),
+    "DOCTYPE in UTF-16": (
+        lambda xml: (
+            with_prolog("<!DOCTYPE x>")(xml).decode().replace("UTF-8", "UTF-16").encode("utf-16")
+        ),
+        "xml.doctype",
+        ":2: found a DOCTYPE",
+    ),
+    "UTF-16 without mark": (
+        lambda xml: xml.decode().encode("utf-16-le"),
+        "xml.encoding",
+        "null characters",
+    ),
     "UTF-32": (lambda xml: xml.decode().encode("utf-32"), "xml.encoding", "null characters"),
-    "UTF-7": (edited('"UTF-8"', '"UTF-7"'), "xml.encoding", 'found encoding "utf-7", expected "UTF-8"'),
+    "UTF-7": (
+        edited('"UTF-8"', '"UTF-7"'),
+        "xml.encoding",
+        'found encoding "utf-7", expected "UTF-8"',
+    ),
     "EBCDIC": (edited('"UTF-8"', '"IBM037"'), "xml.encoding", 'found encoding "ibm037"'),
     "no such encoding": (edited('"UTF-8"', '"x-none"'), "xml.encoding", 'found encoding "x-none"'),
     "wrong bytes": (edited("a lag", b"a l\xff\xfeg"), "xml.encoding", ":2: is not utf-8 text"),
-    "undefined entity": (edited("a lag", "&secret;"), "xml.syntax", ":2: is not well-formed XML: Entity 'secret' not defined"),
-    "cut in the middle": (lambda xml: xml[: len(xml) // 2], "xml.syntax", "is not well-formed XML: "),
+    "undefined entity": (
+        edited("a lag", "&secret;"),
+        "xml.syntax",
+        ":2: is not well-formed XML: Entity 'secret' not defined",
+    ),
+    "cut in the middle": (
+        lambda xml: xml[: len(xml) // 2],
+        "xml.syntax",
+        "is not well-formed XML: ",
+    ),
     "empty": (lambda _: b"", "xml.syntax", "is not well-formed XML"),
     "text": (lambda _: b"hello", "xml.syntax", ":1: is not well-formed XML: Start tag expected"),
     "binary": (lambda _: bytes(range(1, 128)), "xml.syntax", "is not well-formed XML"),
-    "wrong end tag": (edited("</ModelVariables>", "</ModelVariable>"), "xml.syntax", "tag mismatch: ModelVariables"),
-    "attribute twice": (edited('name="u"', 'name="u" name="v"'), "xml.syntax", "Attribute name redefined"),
-    "control character": (edited("a lag", "a\x07lag"), "xml.syntax", ":2: is not well-formed XML: "),
-    "control reference": (edited("a lag", "a&#7;lag"), "xml.syntax", "is not well-formed XML: xmlParseCharRef"),
+    "wrong end tag": (
+        edited("</ModelVariables>", "</ModelVariable>"),
+        "xml.syntax",
+        "tag mismatch: ModelVariables",
+    ),
+    "attribute twice": (
+        edited('name="u"', 'name="u" name="v"'),
+        "xml.syntax",
+        "Attribute name redefined",
+    ),
+    "control character": (
+        edited("a lag", "a\x07lag"),
+        "xml.syntax",
+        ":2: is not well-formed XML: ",
+    ),
+    "control reference": (
+        edited("a lag", "a&#7;lag"),
+        "xml.syntax",
+        "is not well-formed XML: xmlParseCharRef",
+    ),
     "two roots": (lambda xml: xml + b"<more/>", "xml.syntax", "Extra content at the end"),
     "too deep": (deep, "xml.syntax", "Excessive depth"),
-    "too many attributes": (many_attributes, "xml.size", "<DefaultExperiment> has more than 100 attributes"),
-    "other root": (lambda _: b"<fmu/>", "model.root", ":1: found <fmu>, expected <fmiModelDescription>"),
-    "namespace": (edited("<fmiModelDescription ", '<fmiModelDescription xmlns="urn:x" '), "model.root", "found <{urn:x}"),
+    "too many attributes": (
+        many_attributes,
+        "xml.size",
+        "<DefaultExperiment> has more than 100 attributes",
+    ),
+    "other root": (
+        lambda _: b"<fmu/>",
+        "model.root",
+        ":1: found <fmu>, expected <fmiModelDescription>",
+    ),
+    "namespace": (
+        edited("<fmiModelDescription ", '<fmiModelDescription xmlns="urn:x" '),
+        "model.root",
+        "found <{urn:x}",
+    ),
 }
 
 
@@ -122,7 +210,8 @@ def test_bad_xml_is_refused(case, good, tmp_path):
 def test_no_network_connection_is_made(prolog, good, tmp_path):
     path = tmp_path / "calling.fmu"
     schema = (
-        ' xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" xsi:noNamespaceSchemaLocation="http://127.0.0.1:{port}/x.xsd" '
+        ' xmlns:xsi="http://www.w3.org/2001/XMLSchema-instance" '
+        'xsi:noNamespaceSchemaLocation="http://127.0.0.1:{port}/x.xsd" '
     )
     with listener() as (port, connections):
         xml = with_prolog(prolog.format(port=port))(good[2]["modelDescription.xml"])
@@ -132,7 +221,9 @@ def test_no_network_connection_is_made(prolog, good, tmp_path):
         assert connections == []
 
 
-@pytest.mark.parametrize("member", ["sources/buildDescription.xml", "terminalsAndIcons/terminalsAndIcons.xml"])
+@pytest.mark.parametrize(
+    "member", ["sources/buildDescription.xml", "terminalsAndIcons/terminalsAndIcons.xml"]
+)
 def test_other_xml_files_are_checked_too(member, good, tmp_path):
     path = tmp_path / "bad.fmu"
     xml = b'<!DOCTYPE x [<!ENTITY e SYSTEM "file:///etc/passwd">]><fmiBuildDescription>&e;</fmiBuildDescription>'
@@ -141,12 +232,16 @@ def test_other_xml_files_are_checked_too(member, good, tmp_path):
     assert (finding.rule.name, finding.location) == ("xml.doctype", f"{member}:1")
 
 
-@pytest.mark.parametrize("encoding", ["utf-8-sig", "utf-16", "iso-8859-1", "windows-1252", "us-ascii"])
+@pytest.mark.parametrize(
+    "encoding", ["utf-8-sig", "utf-16", "iso-8859-1", "windows-1252", "us-ascii"]
+)
 def test_unambiguous_encodings_are_read(encoding, good, tmp_path):
     path = tmp_path / "good.fmu"
     text = good[2]["modelDescription.xml"].decode().replace("UTF-8", encoding.removesuffix("-sig"))
     text = text.replace("a lag", "a lag" if encoding == "us-ascii" else "ein Glätter")
-    path.write_bytes(pack_archive(members(good[2] | {"modelDescription.xml": text.encode(encoding)})))
+    path.write_bytes(
+        pack_archive(members(good[2] | {"modelDescription.xml": text.encode(encoding)}))
+    )
     description = FmuFile(path).description
     assert description.description.startswith("a lag" if encoding == "us-ascii" else "ein Glätter")
     assert len(description.variables) == 13
@@ -158,14 +253,22 @@ def test_unambiguous_encodings_are_read(encoding, good, tmp_path):
         lambda xml: xml.replace(b"a lag", b"a" * 9_000_000),
         lambda xml: xml.replace(b"<Unit ", b"<a/>" * 400_000 + b"<Unit ", 1),
         lambda xml: xml.replace(b"<ModelVariables>", b"<a/>" * 200_000 + b"<ModelVariables>", 1),
-        lambda xml: xml.replace(b"</ModelVariables>", b"<ScalarVariable/>" * 50_000 + b"</ModelVariables>", 1),
-        lambda xml: xml.replace(b'index="2"', b'index="2" dependencies="' + b"0 " * 10**6 + b'"', 1),
+        lambda xml: xml.replace(
+            b"</ModelVariables>", b"<ScalarVariable/>" * 50_000 + b"</ModelVariables>", 1
+        ),
+        lambda xml: xml.replace(
+            b'index="2"', b'index="2" dependencies="' + b"0 " * 10**6 + b'"', 1
+        ),
     ],
     ids=["a long text", "many units", "many parts", "many bad variables", "many dependencies"],
 )
 def test_large_xml_is_checked_quickly(xml, good, tmp_path):
     path = tmp_path / "large.fmu"
-    path.write_bytes(pack_archive(members(good[2] | {"modelDescription.xml": xml(good[2]["modelDescription.xml"])})))
+    path.write_bytes(
+        pack_archive(
+            members(good[2] | {"modelDescription.xml": xml(good[2]["modelDescription.xml"])})
+        )
+    )
     begin = time.process_time()
     find_problems(path)
     assert time.process_time() - begin < 2
@@ -178,10 +281,16 @@ def test_very_many_tags_are_refused_before_they_are_parsed(good, tmp_path):
     assert "tags, expected at most 1000000" in refusal_message(path)
 
 
-@pytest.mark.parametrize("case", [case for case, (_, rule, _) in CASES.items() if rule.startswith("xml.")])
+@pytest.mark.parametrize(
+    "case", [case for case, (_, rule, _) in CASES.items() if rule.startswith("xml.")]
+)
 def test_descriptions_to_be_exported_are_checked_too(case, good, tmp_path):
-    """FMPy's XML reader has no such checks, so an unsafe description of C or Python sources must not reach it."""
+    """FMPy's XML reader has no such checks, so an unsafe description of C or Python sources must
+    not reach it.
+    """
     change, rule, words = CASES[case]
     with pytest.raises(InputError, match=re.escape(rule)) as error:
-        validate_description(change(good[2]["modelDescription.xml"]), tmp_path / "modelDescription.xml")
+        validate_description(
+            change(good[2]["modelDescription.xml"]), tmp_path / "modelDescription.xml"
+        )
     assert words in str(error.value)

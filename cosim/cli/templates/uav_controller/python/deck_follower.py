@@ -1,4 +1,7 @@
-"""Quadcopter controller as a PythonFMU class: it flies above the deck; it runs in process or, exported, as an FMU."""
+"""Quadcopter controller as a PythonFMU class: it flies above the deck.
+
+It runs in process or, exported, as an FMU.
+"""
 
 from __future__ import annotations
 
@@ -22,7 +25,13 @@ class DeckFollower(Fmi2Slave):
         **{f"vehicle.rates.{axis}": "rad/s" for axis in "pqr"},
         **{"altitude_command": "m", "yaw_command": "rad", "acceleration_limit": "m/s2"},
         **{"position_bandwidth": "rad/s", "attitude_bandwidth": "rad/s", "yaw_bandwidth": "rad/s"},
-        **{"mass": "kg", "inertia_xy": "kg.m2", "inertia_z": "kg.m2", "arm": "m", "torque_per_thrust": "m"},
+        **{
+            "mass": "kg",
+            "inertia_xy": "kg.m2",
+            "inertia_z": "kg.m2",
+            "arm": "m",
+            "torque_per_thrust": "m",
+        },
         **{"thrust_coefficient": "N.s2/rad2", "rotor_speed_limit": "rad/s"},
         **{f"rotor_speed[{i}]": "rad/s" for i in (1, 2, 3, 4)},
     }
@@ -30,11 +39,15 @@ class DeckFollower(Fmi2Slave):
     def __init__(self, **arguments: object):
         super().__init__(**arguments)
         self.vehicle = SimpleNamespace(
-            attitude=SimpleNamespace(roll=0.0, pitch=0.0, yaw=0.0), rates=SimpleNamespace(p=0.0, q=0.0, r=0.0)
+            attitude=SimpleNamespace(roll=0.0, pitch=0.0, yaw=0.0),
+            rates=SimpleNamespace(p=0.0, q=0.0, r=0.0),
         )
         self.target = SimpleNamespace()
         for owner in (self.vehicle, self.target):
-            owner.position, owner.velocity = SimpleNamespace(x=0.0, y=0.0, z=0.0), SimpleNamespace(x=0.0, y=0.0, z=0.0)
+            owner.position, owner.velocity = (
+                SimpleNamespace(x=0.0, y=0.0, z=0.0),
+                SimpleNamespace(x=0.0, y=0.0, z=0.0),
+            )
         self.altitude_command, self.yaw_command = 2.0, 0.0
         self.position_bandwidth, self.attitude_bandwidth, self.yaw_bandwidth = 1.2, 8.0, 2.0
         self.acceleration_limit = 3.0
@@ -51,9 +64,17 @@ class DeckFollower(Fmi2Slave):
             if name.startswith(inputs):
                 self.register_variable(Real(name, causality=Fmi2Causality.input))
             elif not name.startswith("rotor_speed["):
-                self.register_variable(Real(name, causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable))
+                self.register_variable(
+                    Real(
+                        name, causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable
+                    )
+                )
         for i in range(4):
-            output = Real(f"rotor_speed[{i + 1}]", causality=Fmi2Causality.output, getter=lambda i=i: self.rotor_speed[i])
+            output = Real(
+                f"rotor_speed[{i + 1}]",
+                causality=Fmi2Causality.output,
+                getter=lambda i=i: self.rotor_speed[i],
+            )
             self.register_variable(output)
 
     def do_step(self, current_time: float, step_size: float) -> bool:
@@ -76,7 +97,9 @@ class DeckFollower(Fmi2Slave):
         w = self.position_bandwidth
         return limited(w * w * error + 2 * w * rate, self.acceleration_limit)
 
-    def _attitude_command(self, acceleration: tuple[float, float, float]) -> tuple[float, float, float]:
+    def _attitude_command(
+        self, acceleration: tuple[float, float, float]
+    ) -> tuple[float, float, float]:
         """Return roll and pitch angle (rad) and thrust (N) for an acceleration.
 
         A positive pitch angle lowers the nose, a positive roll angle raises the left side.
@@ -95,14 +118,25 @@ class DeckFollower(Fmi2Slave):
         return (
             self.inertia_xy * (w * w * (roll - attitude.roll) - 1.6 * w * rates.p),
             self.inertia_xy * (w * w * (pitch - attitude.pitch) - 1.6 * w * rates.q),
-            self.inertia_z * (w_yaw * w_yaw * math.atan2(math.sin(turn), math.cos(turn)) - 1.6 * w_yaw * rates.r),
+            self.inertia_z
+            * (w_yaw * w_yaw * math.atan2(math.sin(turn), math.cos(turn)) - 1.6 * w_yaw * rates.r),
         )
 
     def _rotor_speeds(self, thrust: float, torques: tuple[float, float, float]) -> list[float]:
-        """Return the speeds of the rotors front, left, rear, right (rad/s); front and rear turn the body counter-clockwise."""
-        x, y, z = torques[0] / (2 * self.arm), torques[1] / (2 * self.arm), torques[2] / (4 * self.torque_per_thrust)
+        """Return the speeds of the rotors front, left, rear, right (rad/s).
+
+        Front and rear turn the body counter-clockwise.
+        """
+        x, y, z = (
+            torques[0] / (2 * self.arm),
+            torques[1] / (2 * self.arm),
+            torques[2] / (4 * self.torque_per_thrust),
+        )
         thrusts = (thrust / 4 - y + z, thrust / 4 + x - z, thrust / 4 + y + z, thrust / 4 - x - z)
-        return [min(math.sqrt(max(one, 0.0) / self.thrust_coefficient), self.rotor_speed_limit) for one in thrusts]
+        return [
+            min(math.sqrt(max(one, 0.0) / self.thrust_coefficient), self.rotor_speed_limit)
+            for one in thrusts
+        ]
 
 
 def limited(value: float, limit: float) -> float:

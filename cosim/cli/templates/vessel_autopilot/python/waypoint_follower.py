@@ -1,4 +1,7 @@
-"""Vessel autopilot along waypoints as a PythonFMU class; it runs in process or, exported, as an FMU."""
+"""Vessel autopilot along waypoints as a PythonFMU class.
+
+It runs in process or, exported, as an FMU.
+"""
 
 from __future__ import annotations
 
@@ -13,14 +16,23 @@ INPUT_UNITS = {
     **{"vehicle.velocity_body.u": "m/s", "vehicle.rates.r": "rad/s"},
 }
 PARAMETER_UNITS = {
-    **{"speed_command": "m/s", "acceptance_radius": "m", "speed_P": "N.s/m", "speed_I": "N/m", "thrust_limit": "N"},
+    **{
+        "speed_command": "m/s",
+        "acceptance_radius": "m",
+        "speed_P": "N.s/m",
+        "speed_I": "N/m",
+        "thrust_limit": "N",
+    },
     **{"course_P": "1", "course_D": "s", "rudder_limit": "rad"},
 }
 OUTPUT_UNITS = {"thrust": "N", "rudder_angle": "rad"}
 
 
 class WaypointFollower(Fmi2Slave):
-    """Autopilot that passes waypoints at a speed and then stops; SI units, angles in rad, yaw counter-clockwise from east."""
+    """Autopilot that passes waypoints at a speed and then stops.
+
+    SI units, angles in rad, yaw counter-clockwise from east.
+    """
 
     description = "Passes waypoints at a speed"
     units = {
@@ -55,7 +67,10 @@ class WaypointFollower(Fmi2Slave):
         for name in ("waypoint_x", "waypoint_y"):
             values = getattr(self, name)
             for i in WAYPOINTS:
-                access = {"getter": lambda v=values, i=i: v[i], "setter": lambda value, v=values, i=i: v.__setitem__(i, value)}
+                access = {
+                    "getter": lambda v=values, i=i: v[i],
+                    "setter": lambda value, v=values, i=i: v.__setitem__(i, value),
+                }
                 self.register_variable(Real(f"{name}[{i + 1}]", **access, **tunable))
         for name in OUTPUT_UNITS:
             self.register_variable(Real(name, causality=Fmi2Causality.output))
@@ -68,14 +83,20 @@ class WaypointFollower(Fmi2Slave):
             self.thrust = self.rudder_angle = 0.0
             return True
         position = self.vehicle.position
-        east, north = self.waypoint_x[self.reached] - position.x, self.waypoint_y[self.reached] - position.y
+        east, north = (
+            self.waypoint_x[self.reached] - position.x,
+            self.waypoint_y[self.reached] - position.y,
+        )
         self.reached += math.hypot(east, north) < self.acceptance_radius
         self.thrust = self._thrust(self.speed_command - self.vehicle.velocity_body.u, step_size)
         self.rudder_angle = self._rudder_angle(self.vehicle.attitude.yaw - math.atan2(north, east))
         return True
 
     def _thrust(self, error: float, step_size: float) -> float:
-        """Return the thrust of a PI controller of the speed; its integral is constant while the thrust is at its limit."""
+        """Return the thrust of a PI controller of the speed.
+
+        Its integral is constant while the thrust is at its limit.
+        """
         thrust = self.speed_P * error + self.speed_integral
         if abs(thrust) < self.thrust_limit:
             self.speed_integral += self.speed_I * step_size * error
@@ -87,7 +108,9 @@ class WaypointFollower(Fmi2Slave):
         A positive rudder angle turns the bow to starboard, which reduces the yaw angle.
         """
         error = math.atan2(math.sin(error), math.cos(error))
-        return limited(self.course_P * error + self.course_D * self.vehicle.rates.r, self.rudder_limit)
+        return limited(
+            self.course_P * error + self.course_D * self.vehicle.rates.r, self.rudder_limit
+        )
 
 
 def limited(value: float, limit: float) -> float:
