@@ -9,10 +9,10 @@ import click
 
 from ...core.errors import InputError
 from ...core.text import count_noun
+from ...report.tables import print_table
 from ..analysis_options import scenario_options, split_names
 from ..messages import print_json, print_log
 from ..output_options import json_option
-from ..study_options import print_table
 
 if TYPE_CHECKING:
     from ...analysis.trimming import Trim
