@@ -251,6 +251,9 @@ class Simulation:
     def set(self, name: str, value: Any) -> None:
         """Set an input without connection or a tunable parameter; it acts in the next step.
 
+        The component receives the value at the begin of the next step, or before the next call of
+        `get` or `save` that needs a component. If it refuses it, this call fails.
+
         Args:
             name: Name of the variable, of a list of variables with indices, or of a vector.
             value: The value, in the unit of the variable; a list for an array or a vector.
@@ -258,7 +261,6 @@ class Simulation:
         Raises:
             InputError: There is no such variable, it cannot be set now, or it does not accept the
                 value.
-            ComponentError: The component failed.
         """
         with self._lock:
             self._variables.set(name, value, self._running())
