@@ -222,7 +222,7 @@ def _modelica_files(factory: ComponentFactory) -> Iterator[Path]:
     """Yield the Modelica sources of components, and the files of packages from which FMUs in the user's cache were built."""
     yield from factory.modelica_files
     if factory.cached_fmus:
-        from ..export.modelica.frontend.rumoca_frontend import needed_files
+        from ..export.modelica.frontend.model_files import needed_files
 
         for source in factory.cached_fmus.values():
             yield from needed_files(source)
