@@ -1,23 +1,40 @@
-"""Compiled part of the contact scheme (`plant_src/physics/body.py`), as CasADi functions that a vehicle's binary exports.
+"""Compiled part of the contact scheme (`plant_src/physics/body.py`), as CasADi functions.
 
-    contact_initialize  parameters -> constants (of `ContinuousModel.derived_parameters`, or the parameters), initial state as
-                        the predicted state of a step, its twist (twice) and its pose in Bullet
-    contact_predict     state, inputs, environment inputs (the last inputs of the model), constants, step size, reference
-                        position, safe distance -> state, predicted state after a step without contact, the constant twist that
-                        leads there, that twist again, pose in Bullet, endpoints of the centre of mass, step status
-    contact_correct     state at the start, predicted state, commanded twist, Bullet's twist, constants, step size
-                        -> state, magnitude of the contact impulse (0 without contact), outputs
+A vehicle's binary exports them:
 
-Each kind of body has further arguments and results: a free body the orientation of its principal axes, a planar one its
-vertical load, a floating one its contact impulse. Floating vessels also export `water_elevation` (`common/water_surface.py`),
-and multirotors `surroundings` (`multirotor/surroundings.py`).
+`contact_initialize`
+    Parameters -> constants (of `ContinuousModel.derived_parameters`, or the parameters), initial
+    state as the predicted state of a step, its twist (twice) and its pose in Bullet.
+`contact_predict`
+    State, inputs, environment inputs (the last inputs of the model), constants, step size,
+    reference position, safe distance -> state, predicted state after a step without contact, the
+    constant twist that leads there, that twist again, pose in Bullet, endpoints of the centre of
+    mass, step status.
+`contact_correct`
+    State at the start, predicted state, commanded twist, Bullet's twist, constants, step size ->
+    state, magnitude of the contact impulse (0 without contact), outputs.
 
-The twist that Bullet changes in contact, times the mass and inertia of Bullet's body, gives the contact impulse. Divided by the
-mass and inertia of the vehicle it is added to the predicted velocity. In contact the published velocity is Bullet's mean velocity
-of the step; the velocity of the equations belongs to the end of the step and is not zero at rest. The pose in contact follows
+Each kind of body has further arguments and results: a free body the orientation of its principal
+axes, a planar one its vertical load, a body in water its contact impulse. Floating vessels also
+export `water_elevation` (`water_surface.py`), and multirotors `surroundings`
+(`multirotor/surroundings.py`).
+
+The twist that Bullet changes in contact, times the mass and inertia of Bullet's body, gives the
+contact impulse. Divided by the mass and inertia of the vehicle it is added to the predicted
+velocity. In contact the published velocity is Bullet's mean velocity of the step; the velocity of
+the equations belongs to the end of the step and is not zero at rest. The pose in contact follows
 from Bullet's twist, because Bullet moves a body with its velocity at the end of the step.
 
-A pose in Bullet is (position, quaternion x y z w), a twist (velocity, angular velocity), both in the world frame.
+A vehicle in water responds to a load differently from Bullet's free body: the water adds mass,
+restoring and damping. Therefore the contact impulse of the previous step acts as a constant force
+while the equations predict (constant in world axes, which conserves momentum), and Bullet receives
+the predicted twist without its effect. Bullet then finds the whole impulse again, and the
+difference to the previous one changes the velocity by the mass matrix with the added mass. In
+steady contact both are equal, so that the motion is that of the equations with the contact force
+included.
+
+A pose in Bullet is (position, quaternion x y z w), a twist (velocity, angular velocity), both in
+the world frame.
 """
 
 from __future__ import annotations
@@ -31,7 +48,7 @@ from cosim.export.equations.model import ContinuousModel
 
 from . import kinematics
 from .interface import ENVIRONMENT_INPUTS
-from .rigid_body import RigidBody
+from .rigid_body import RigidBody, motion_of_state
 from .step_status import INVALID_STATE, LEAVES_SAFE_BOX, MAX_STATE_NORM, MAY_FAIL
 
 #: longest step of the world (s)
@@ -77,18 +94,9 @@ class FreeContactMaps:
         arguments = predict_symbols(self.model)
         state, end, step = arguments[0], predicted_state(self.model, *arguments[:5]), arguments[4]
         (axes,) = create_symbols(principal_axes=4)
-        linear = (end[0:3] - state[0:3]) / step
-        angular = (
-            kinematics.rotation_vector(
-                kinematics.quaternion_product(end[3:7], kinematics.conjugate(state[3:7]))
-            )
-            / step
-        )
-        # cancels the gyroscopic torque that Bullet adds to its body
-        torque = ca.cross(
-            angular, self.rigid_body(arguments[3]).inertia_in_world(state[3:7]) @ angular
-        )
-        twist, endpoints = ca.vertcat(linear, angular), ca.vertcat(state[0:3], end[0:3])
+        twist, endpoints = mean_twist(state, end, step), ca.vertcat(state[0:3], end[0:3])
+        inertia = self.rigid_body(arguments[3]).inertia_in_world(state[3:7])
+        torque = gyroscopic_torque(inertia, twist[3:6])
         may_fail = ca.logic_or(
             self._may_be_in_water(end, *arguments[2:5:2]), is_upside_down(end[3:7])
         )
@@ -118,17 +126,10 @@ class FreeContactMaps:
         rates = rigid.inverse_inertia @ (to_body @ (rigid.inertia_in_world(start[3:7]) @ angular))
         velocity, others = predicted[7:13] + ca.vertcat(linear, rates), predicted[13:]
         impulse = contact_impulse(rigid.mass * ca.norm_2(linear))
-        rotation = kinematics.quaternion_from_rotation_vector(bullet_twist[3:6] * step)
-        orientation = kinematics.quaternion_product(rotation, start[3:7])
-        pose = ca.vertcat(
-            start[0:3] + bullet_twist[0:3] * step, kinematics.normalised_quaternion(orientation)
-        )
-        published = ca.vertcat(
-            pose,
-            bullet_twist[0:3],
-            kinematics.rotation_matrix(orientation).T @ bullet_twist[3:6],
-            others,
-        )
+        position, orientation = moved_pose(start, bullet_twist, step)
+        pose = ca.vertcat(position, kinematics.normalised_quaternion(orientation))
+        rates_in_contact = kinematics.rotation_matrix(orientation).T @ bullet_twist[3:6]
+        published = ca.vertcat(pose, bullet_twist[0:3], rates_in_contact, others)
         corrected = ca.vertcat(pose, velocity, others)
         return correct_function(arguments, impulse, predicted, corrected, self.observe, published)
 
@@ -230,7 +231,7 @@ def is_upside_down(orientation: ca.SX) -> ca.SX:
 
 
 def step_status(end: ca.SX, endpoints: ca.SX, arguments: list[ca.SX], may_fail: ca.SX) -> ca.SX:
-    """Return the code (`step_status.py`) of a predicted step.
+    """Return the code (`interface.py`) of a predicted step.
 
     Args:
         end: Predicted state.
@@ -254,6 +255,115 @@ def contact_impulse(impulse: ca.SX) -> ca.SX:
 
 
 def principal_pose(state: ca.SX, axes: ca.SX) -> ca.SX:
-    """Return the pose in Bullet of a body whose principal axes have the orientation `axes` in the body frame."""
+    """Return the pose in Bullet of a body whose principal axes have the orientation `axes`.
+
+    The orientation is that in the body frame (quaternion x y z w).
+    """
     orientation = kinematics.quaternion_product(state[3:7], ca.vertcat(axes[3], axes[0:3]))
     return ca.vertcat(state[0:3], orientation[1:4], orientation[0])
+
+
+def mean_twist(start: ca.SX, end: ca.SX, step: ca.SX) -> ca.SX:
+    """Return the constant twist (6) that moves a body from the pose of one state to another's."""
+    turn = kinematics.quaternion_product(end[3:7], kinematics.conjugate(start[3:7]))
+    return ca.vertcat((end[0:3] - start[0:3]) / step, kinematics.rotation_vector(turn) / step)
+
+
+def moved_pose(start: ca.SX, twist: ca.SX, step: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Return position and quaternion, of about unit length, after a step with a constant twist."""
+    rotation = kinematics.quaternion_from_rotation_vector(twist[3:6] * step)
+    return start[0:3] + twist[0:3] * step, kinematics.quaternion_product(rotation, start[3:7])
+
+
+def gyroscopic_torque(inertia: ca.SX, rates: ca.SX) -> ca.SX:
+    """Return the torque (N m) that cancels the gyroscopic torque which Bullet adds to its body."""
+    return ca.cross(rates, inertia @ rates)
+
+
+def impulse_of_twist(change: ca.SX, mass: ca.SX, inertia: ca.SX) -> tuple[ca.SX, ca.SX]:
+    """Return the impulse (6) that changes the twist of Bullet's body, and its magnitude.
+
+    Args:
+        change: Change of the twist, shape (6,).
+        mass: Mass of the body (kg).
+        inertia: Its inertia (kg m2, world frame), shape (3, 3).
+
+    Returns:
+        Impulse (N s, N m s), 0 if it is a rounding error, and the magnitude of its linear part.
+    """
+    linear, angular = mass * change[0:3], inertia @ change[3:6]
+    magnitude = contact_impulse(ca.norm_2(linear))
+    impulse = ca.if_else(magnitude > 0, ca.vertcat(linear, angular), ca.SX.zeros(TWIST_SIZE))
+    return impulse + 0 * magnitude, magnitude  # NaN remains NaN
+
+
+@dataclass(frozen=True)
+class SubmergedContactMaps:
+    """Contact functions of a free rigid body in water.
+
+    The argument `contact_impulse` is the impulse in the last step (N s, N m s about the centre of
+    mass, world frame).
+
+    Attributes:
+        model: Equations of the vehicle as they are exported; its environment inputs are the current
+            (x, y) and the water level.
+        rigid_body: Function from the constants to mass and inertia.
+        velocity_change: Function from the upward axis of the world (body frame), the depth of the
+            centre of mass (m), the constants and an impulse (6, body frame) to the change of
+            velocity and rates (6, body frame), with the added mass.
+    """
+
+    model: ContinuousModel
+    rigid_body: Callable[[ca.SX], RigidBody]
+    velocity_change: Callable[[ca.SX, ca.SX, ca.SX, ca.SX], ca.SX]
+
+    def functions(self) -> list[ca.Function]:
+        """Return the functions to export."""
+        return [
+            free_initialize_function(self.model),
+            self._predict_function(),
+            self._correct_function(),
+        ]
+
+    def _predict_function(self) -> ca.Function:
+        arguments = predict_symbols(self.model)
+        state, inputs, environment_inputs, constants, step = arguments[:5]
+        axes, impulse = create_symbols(principal_axes=4, contact_impulse=TWIST_SIZE)
+        # the external loads are the first inputs
+        loaded = ca.vertcat(inputs[:TWIST_SIZE] + impulse / step, inputs[TWIST_SIZE:])
+        end = predicted_state(self.model, state, loaded, environment_inputs, constants, step)
+        moved = mean_twist(state, end, step)
+        body, to_world = self.rigid_body(constants), kinematics.rotation_matrix(state[3:7])
+        turned = to_world @ (body.inverse_inertia @ (to_world.T @ impulse[3:6]))
+        twist = ca.vertcat(moved[0:3] - impulse[0:3] / body.mass, moved[3:6] - turned)
+        torque = gyroscopic_torque(body.inertia_in_world(state[3:7]), twist[3:6])
+        endpoints = ca.vertcat(state[0:3], end[0:3])
+        status = step_status(end, endpoints, arguments, ca.SX(0))
+        pose = principal_pose(state, axes)
+        results = [state, end, twist, twist, torque, pose, impulse, endpoints, status]
+        return ca.Function("contact_predict", [*arguments, axes, impulse], results)
+
+    def _correct_function(self) -> ca.Function:
+        arguments = correct_symbols(self.model)
+        start, predicted, twist, bullet_twist, constants, step = arguments
+        environment_inputs, previous = create_symbols(
+            environment_inputs=3, previous_contact_impulse=TWIST_SIZE
+        )
+        body, to_world = self.rigid_body(constants), kinematics.rotation_matrix(predicted[3:7])
+        inertia = body.inertia_in_world(start[3:7])
+        impulse, magnitude = impulse_of_twist(bullet_twist - twist, body.mass, inertia)
+        in_contact = ca.logic_or(magnitude > 0, ca.norm_2(previous) > 0)
+        surplus = impulse - previous
+        surplus = ca.vertcat(to_world.T @ surplus[0:3], to_world.T @ surplus[3:6])
+        up, depth = to_world[2, :].T, environment_inputs[-1] - predicted[2]
+        gained = self.velocity_change(up, depth, constants, surplus)
+        position, orientation = moved_pose(start, bullet_twist, step)
+        orientation = kinematics.normalised_quaternion(orientation)
+        velocity = predicted[7:13] + ca.vertcat(to_world @ gained[0:3], gained[3:6])
+        corrected = ca.vertcat(position, orientation, velocity, predicted[13:])
+        state = ca.if_else(in_contact, corrected, predicted)
+        rates = kinematics.rotation_matrix(orientation).T @ bullet_twist[3:6]
+        mean = ca.vertcat(bullet_twist[0:3], rates)
+        published = ca.vertcat(state[0:7], ca.if_else(magnitude > 0, mean, state[7:13]), state[13:])
+        results = [state, magnitude, motion_of_state(published), impulse]
+        return ca.Function("contact_correct", [*arguments, environment_inputs, previous], results)

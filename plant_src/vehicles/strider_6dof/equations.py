@@ -17,24 +17,25 @@ from ..strider.equations import (
     hull_constants,
     hull_loads,
     race_velocity_squared,
+    resistance,
     rudder_loads,
 )
-from ..strider.geometry import DECK_CENTRE
 from ..strider.parameters import (
     CENTRE_OF_MASS_HEIGHT,
+    DECK_CENTRE,
     GRAVITY,
     HULL_BEAM,
     INERTIA,
     MASS,
     WATER_DENSITY,
 )
-from ..strider.resistance import resistance
-from ..vessel import floating_maps, vessel_equations
+from ..vessel import vessel_equations
+from ..vessel import vessel_equations as floating_maps
 from ..vessel.hull import Hull, LoadArguments, load_of_force_at
 from ..vessel.strips import Immersion, TwinHull, equivalent_strips, immersion
 from . import parameters as p
-from .geometry import BODY
 from .interface import VARIABLES
+from .parameters import BODY
 
 _ORIGIN = ca.SX.zeros(3)  # of the body frame; the centre of mass
 _STRIPS = equivalent_strips(

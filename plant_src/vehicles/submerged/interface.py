@@ -27,14 +27,7 @@ from ..common.interface import (
     initial_variables,
     scalar_variable,
 )
-from .craft import Craft
-
-#: parameter -> description of its matrix (6, 6)
-MATRICES = {
-    "added_mass": "added mass about the centre of mass",
-    "linear_damping": "load over velocity relative to the water",
-    "quadratic_damping": "load over squared velocity relative to the water",
-}
+from .craft import MATRICES, Craft
 
 #: number of parts of the displaced volume
 OCTANTS = 8

@@ -1,16 +1,4 @@
-"""Equations of motion of a floating vessel in six degrees of freedom.
-
-`vehicles/README.md` has them with their sources.
-
-Fossen (2021), Handbook of Marine Craft Hydrodynamics and Motion Control, 2nd edition, chapters 3, 6
-and 10, converted to world frame ENU and body frame forward-left-up. The origin O of the body frame
-is fixed in the hull and need not be the centre of mass. nu = (u, v, w, p, q, r) holds surge, sway
-and heave velocity of O (m/s) and roll, pitch and yaw rate (rad/s), body frame. Loads tau = (X, Y,
-Z, K, M, N) are forces (N) and moments about O (N m), body frame.
-
-State: position of O (m, world frame), unit quaternion, nu, time (s), and the states of the
-actuators.
-"""
+"""Equations of motion of a floating vessel in six degrees of freedom."""
 
 from __future__ import annotations
 
@@ -22,8 +10,16 @@ import casadi as ca
 from ..common import kinematics
 from ..common.interface import VESSEL_STATES
 from ..common.named_values import NamedValues
-from .strips import Strips
-from .wave_loads import WaterMotion, water_motion
+from .strips import (
+    GRAVITY,
+    STRIP_COUNT,
+    Immersion,
+    Strips,
+    TwinHull,
+    WaterMotion,
+    immersion,
+    water_motion,
+)
 
 
 @dataclass(frozen=True)
@@ -303,3 +299,54 @@ def rigid_body_mass_matrix(mass: ca.SX, centre: ca.SX, inertia: ca.SX) -> ca.SX:
     """
     to_centre = transformation_matrix(centre)
     return to_centre.T @ ca.diagcat(mass * ca.SX.eye(3), inertia) @ to_centre
+
+
+@dataclass(frozen=True)
+class Ballast:
+    """Weight of a vessel and density of the water.
+
+    Attributes:
+        mass: Mass (kg).
+        centre_of_mass: Centre of mass from O (m, body frame), shape (3,).
+        water_density: Density of the water (kg/m3).
+    """
+
+    mass: ca.SX
+    centre_of_mass: ca.SX
+    water_density: ca.SX
+
+
+def weight_and_buoyancy(under_water: Immersion, up: ca.SX, ballast: Ballast) -> ca.SX:
+    """Return the load tau (6) of weight and buoyancy for the vertical axis in the body frame."""
+    weight = load_of_force_at(ballast.centre_of_mass, -GRAVITY * ballast.mass * up)
+    density = GRAVITY * ballast.water_density
+    return weight + density * ca.vertcat(under_water.volume * up, ca.cross(under_water.moment, up))
+
+
+def improved_equilibrium(state: ca.SX, hull: TwinHull, ballast: Ballast, stiffness: ca.SX) -> ca.SX:
+    """Return height of O (m), roll and pitch (rad) after one step of Newton's method towards the equilibrium in still water.
+
+    Args:
+        state: Height, roll and pitch before the step, shape (3,).
+        hull: Hulls.
+        ballast: Weight of the vessel.
+        stiffness: Stiffness of heave (N/m), roll and pitch (N m/rad) at the centre of the waterplane, shape (3,).
+    """
+    middle = hull.strips.centre
+    up = upward_axis(state)
+    load = weight_and_buoyancy(immersion(hull, up, state[0], ca.SX.zeros(STRIP_COUNT)), up, ballast)
+    force, moment = ca.dot(load[0:3], up), load[3:6] - ca.cross(middle, load[0:3])
+    angles = moment[0:2] / stiffness[1:3]
+    return state + ca.vertcat(force / stiffness[0] + middle[0] * angles[1], angles)
+
+
+def attitude_at(state: ca.SX) -> ca.SX:
+    """Return the rotation matrix body to world frame for height, roll and pitch with the yaw angle 0."""
+    return kinematics.rotation_matrix(
+        kinematics.quaternion_from_euler(state[1], state[2], ca.SX(0))
+    )
+
+
+def upward_axis(state: ca.SX) -> ca.SX:
+    """Return the vertical axis of the world in the body frame for height, roll and pitch, shape (3,)."""
+    return attitude_at(state)[2, :].T

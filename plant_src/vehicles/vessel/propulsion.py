@@ -1,12 +1,4 @@
-"""Loads of propellers and rudders of vessels that are given by data, as CasADi expressions.
-
-    T_i = e_i (c_i n_i |n_i| - k_i |n_i| u_i)          u_i = a_i . (v_r + w x r_i)
-
-n_i is the speed, c_i the thrust coefficient of its sense of rotation, k_i the loss by axial inflow,
-a_i the axis turned by the azimuth angle, e_i the immersed fraction of the height of the propeller.
-Rudders are those of `rudder.py`; the race of a propeller adds 2 max(c_i n_i |n_i|, 0) / (rho A_i)
-to the squared velocity, as in the momentum theory of the actuator disc.
-"""
+"""Loads of propellers and rudders."""
 
 from __future__ import annotations
 
@@ -17,10 +9,9 @@ import casadi as ca
 
 from cosim.export.equations.simd_sum import sum_over_rows
 
-from ..common.elementary_functions import sine_and_cosine
+from ..common.elementary_functions import arctangent, sine_and_cosine, sine_of_right_angle_share
 from ..common.named_values import NamedValues
 from .actuators import MAX_PROPELLERS, MAX_RUDDERS, MIN_TIME_CONSTANT
-from .rudder import rudder_force
 
 _PROPELLER_ROW = 13
 _RUDDER_ROW = 7
@@ -192,3 +183,34 @@ def _table(columns: Sequence[ca.SX], rows: int) -> ca.SX:
     """Return a table with `rows` rows, of which those beyond the columns are 0."""
     filled = [ca.vertcat(column, ca.SX.zeros(rows - column.numel())) for column in columns]
     return ca.horzcat(*filled)
+
+
+def rudder_force(
+    u: ca.SX,
+    v: ca.SX,
+    race: ca.SX,
+    angle: ca.SX,
+    turn: tuple[ca.SX, ca.SX],
+    pressure_area: ca.SX,
+    stall_angle: ca.SX,
+) -> tuple[ca.SX, ca.SX]:
+    """Return surge and sway force (N).
+
+    The lift is a sine of the angle of attack up to the stall angle.
+
+    Args:
+        u: Surge velocity relative to the water at the rudder (m/s); the lift changes its sign when
+            going astern.
+        v: Sway velocity relative to the water at the rudder (m/s).
+        race: What a propeller adds to the squared velocity at the rudder (m2/s2).
+        angle: Rudder angle (rad).
+        turn: Sine and cosine of the rudder angle.
+        pressure_area: rho / 2 times maximum lift coefficient times area (kg/m).
+        stall_angle: Angle of attack beyond which the lift is constant (rad).
+    """
+    pressure = ca.fabs(u) * u + race
+    ahead = ca.sign(pressure)
+    inflow_angle = arctangent(ahead * v, ca.sqrt(ca.fabs(pressure)))
+    attack = ca.fmin(1, ca.fmax(-1, (angle - inflow_angle) / stall_angle))
+    lift = pressure_area * pressure * sine_of_right_angle_share(attack)
+    return -lift * turn[0], lift * turn[1]

@@ -1,11 +1,4 @@
-"""Strips of a twin hull: buoyancy of boxes cut by the surface of the water.
-
-Each hull is divided into `STATION_COUNT` boxes of equal length. Their spacing and their distance
-from the centre line are those of points with the moments of inertia of the waterplane, so that the
-static stiffness is exact. A hull that leaves the water loses its buoyancy, so that the righting
-moment has a limit, and the vessel can capsize. The bottoms are level, or each station has its own
-(`TwinHull.boxes`).
-"""
+"""Strips of a twin hull: buoyancy and waves."""
 
 from __future__ import annotations
 
@@ -13,6 +6,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import casadi as ca
+
+from cosim.export.equations.simd_sum import sum_over_rows
+
+from ..common.elementary_functions import sine_and_cosine
+from ..common.interface import MAX_WAVE_COMPONENTS
 
 #: stations of each hull; `wave_loads` has equations for this number
 STATION_COUNT = 5
@@ -183,3 +181,156 @@ def _cut(hull: TwinHull, box: Box, up: ca.SX, height: ca.SX) -> tuple[ca.SX, ca.
     scale = 1 / extent
     base = height + up[0] * centre[0] + up[1] * centre[1] + up[2] * box.middle
     return scale, depth * depth * up[2] * scale / 2, base
+
+
+GRAVITY = 9.81  # m/s2
+
+_COLUMN_COUNT = (
+    8  # of the wave table: amplitude, kx, ky, frequency, phase, velocity along x, y and z
+)
+
+
+@dataclass(frozen=True)
+class WaterMotion:
+    """Motion of the water at a hull.
+
+    Rotations are those of the plane through the strips, about the horizontal axes ahead and to
+    port.
+
+    Attributes:
+        elevations: Elevation above the still water at each strip (m), shape (STRIP_COUNT,).
+        heave: Mean elevation (m).
+        slopes: Roll and pitch angle of the surface (rad), shape (2,).
+        velocity: Mean velocity (m/s, world frame), shape (3,).
+        rates: Mean roll and pitch rate (rad/s), shape (2,).
+        acceleration: Mean acceleration (m/s2, world frame), shape (3,).
+        angular_acceleration: Mean roll and pitch acceleration (rad/s2), shape (2,).
+    """
+
+    elevations: ca.SX
+    heave: ca.SX
+    slopes: ca.SX
+    velocity: ca.SX
+    rates: ca.SX
+    acceleration: ca.SX
+    angular_acceleration: ca.SX
+
+
+def wave_table(
+    hull: TwinHull, amplitude: ca.SX, frequency: ca.SX, direction: ca.SX, phase: ca.SX
+) -> ca.SX:
+    """Return the table of components for `water_motion`, column by column.
+
+    Args:
+        hull: Dimensions of the hull.
+        amplitude: Amplitudes (m), shape (MAX_WAVE_COMPONENTS,) like the following arguments.
+        frequency: Angular frequencies (rad/s).
+        direction: Directions of propagation, counter-clockwise from x (rad).
+        phase: Phases at the origin (rad).
+    """
+    number = frequency**2 / GRAVITY
+    east, north = ca.cos(direction), ca.sin(direction)
+    mean_over_beam = amplitude * ca.exp(-(number**2) * hull.beam**2 / 24)
+    speed = frequency * ca.exp(-number * hull.draught / 2)
+    return ca.vertcat(
+        mean_over_beam,
+        number * east,
+        number * north,
+        frequency,
+        phase,
+        speed * east,
+        speed * north,
+        speed,
+    )
+
+
+def _wave_term() -> ca.Function:
+    """Return the function of one component.
+
+    Elevations of the strips, velocities, rates and accelerations.
+
+    Elevation, velocity and acceleration of a rigid mean m of the wave exp(i angle) are Re(m), w
+    Im(m) and -w^2 Re(m).
+    """
+    common, row = ca.SX.sym("common", 7), ca.SX.sym("row", _COLUMN_COUNT)
+    x, y, time, ahead_x, ahead_y, port_x, port_y = ca.vertsplit(common)
+    amplitude, kx, ky, frequency, phase, *speeds = ca.vertsplit(row)
+    sine, cosine = (
+        amplitude * value for value in sine_and_cosine(kx * x + ky * y - frequency * time + phase)
+    )
+    sine_across, cosine_across = sine_and_cosine(kx * port_x + ky * port_y)
+    sine_1, cosine_1 = sine_and_cosine(kx * ahead_x + ky * ahead_y)
+    sine_2, cosine_2 = 2 * sine_1 * cosine_1, 2 * cosine_1 * cosine_1 - 1
+    elevations = []
+    for side in (1, -1):
+        real = cosine * cosine_across - side * sine * sine_across
+        imaginary = sine * cosine_across + side * cosine * sine_across
+        (near, near_slope), (far, far_slope) = (
+            (real * c, imaginary * s) for c, s in ((cosine_1, sine_1), (cosine_2, sine_2))
+        )
+        elevations += [far - far_slope, near - near_slope, real, near + near_slope, far + far_slope]
+    mean, gradient = 1 + 2 * (cosine_1 + cosine_2), sine_1 + 2 * sine_2
+    heave = cosine_across * mean
+    real, imaginary = heave * cosine, heave * sine
+    roll, pitch = sine_across * mean, cosine_across * gradient
+    east, north, down = speeds
+    velocities = [
+        east * real,
+        north * real,
+        down * imaginary,
+        down * roll * cosine,
+        -down * pitch * cosine,
+    ]
+    east, north, down = (frequency * speed for speed in speeds)
+    accelerations = [
+        east * imaginary,
+        north * imaginary,
+        -down * real,
+        down * roll * sine,
+        -down * pitch * sine,
+    ]
+    return ca.Function(
+        "wave", [common, row], [ca.vertcat(*elevations, *velocities, *accelerations)]
+    )
+
+
+#: sum over all components, which the equations call as a loop in C
+WAVE_SUM = sum_over_rows("waves", _wave_term(), MAX_WAVE_COMPONENTS)
+
+
+def water_motion(
+    position: ca.SX,
+    attitude: ca.SX,
+    time: ca.SX,
+    strips: Strips,
+    gain: ca.SX,
+    count: ca.SX,
+    table: ca.SX,
+) -> WaterMotion:
+    """Return the motion of the water at the strips of a hull.
+
+    Args:
+        position: Centre of the strips (m, world frame), shape (2,).
+        attitude: Rotation matrix body to world frame.
+        time: Time of the waves (s).
+        strips: Positions of the strips.
+        gain: Factor on all amplitudes.
+        count: Number of components.
+        table: Components from `wave_table`.
+    """
+    common = ca.vertcat(
+        position, time, strips.spacing * attitude[0:2, 0], strips.offset * attitude[0:2, 1]
+    )
+    total = gain * WAVE_SUM(common, count, ca.reshape(table, MAX_WAVE_COMPONENTS, _COLUMN_COUNT))
+    elevations, rates, accelerations = ca.vertsplit(
+        total, [0, STRIP_COUNT, STRIP_COUNT + 5, STRIP_COUNT + 10]
+    )
+    scale = strips.mean_scale
+    return WaterMotion(
+        elevations,
+        *strips.fit_plane(elevations),
+        scale[0] * rates[0:3],
+        scale[1:3] * rates[3:5],
+        scale[0] * accelerations[0:3],
+        scale[1:3] * accelerations[3:5],
+    )

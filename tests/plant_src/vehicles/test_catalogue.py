@@ -13,12 +13,12 @@ from cosim.core import resources
 from plant_src.catalogue import MODELS, SLOTS, VEHICLE_MODELS
 from plant_src.vehicles.common.interface import ENVIRONMENT_INPUTS
 from plant_src.vehicles.multirotor.airframe import MAX_ROTORS
-from plant_src.vehicles.multirotor.multirotor_equations import MultirotorEquations
-from plant_src.vehicles.planar_vessel.planar_equations import PlanarEquations
+from plant_src.vehicles.multirotor.equations import MultirotorEquations
+from plant_src.vehicles.planar_vessel.equations import PlanarEquations
 from plant_src.vehicles.planar_vessel.planar_vessel import PlanarVessel
 from plant_src.vehicles.submerged.craft import MAX_THRUSTERS
-from plant_src.vehicles.submerged.submerged_equations import SubmergedEquations
-from plant_src.vehicles.surface_vessel.floating_equations import FloatingEquations
+from plant_src.vehicles.submerged.equations import SubmergedEquations
+from plant_src.vehicles.surface_vessel.equations import FloatingEquations
 from plant_src.vehicles.surface_vessel.surface_vessel import SurfaceVessel
 
 ALL = pytest.mark.parametrize("name", MODELS)
