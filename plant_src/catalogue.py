@@ -245,3 +245,8 @@ def models_of(vehicle: Any) -> Mapping[str, Model]:
             ]
         )
     return VEHICLE_MODELS[vehicle]
+
+
+def default_model(vehicle: Any) -> Model:
+    """Return the model of a vehicle with its first motion, see `models_of`."""
+    return next(iter(models_of(vehicle).values()))

@@ -15,8 +15,8 @@ from ..core import resources
 from ..core.errors import CosimError, InputError, Problem
 from .fmu.block import Block
 from .fmu.compiler import compiler_version, find_compiler
+from .fmu.model_description import DESCRIPTION_FILE
 from .fmu.package import write_fmu
-from .fmu.validation import DESCRIPTION_FILE
 from .foreign.c_sources import write_c_fmu
 from .foreign.python_class import write_python_fmu
 
