@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import InputError, write_error
+from ..core.errors import InputError
+from ..results.files import write_file
 
 #: formats of `LinearModel.write`
 SUFFIXES = (".json", ".csv", ".mat")
@@ -114,13 +115,8 @@ class LinearModel:
         """
         if file.suffix not in SUFFIXES:
             raise InputError(f"{file}: expected a file name with {', '.join(SUFFIXES)}")
-        try:
-            file.parent.mkdir(parents=True, exist_ok=True)
-            file.write_bytes(
-                {".json": self._json, ".csv": self._csv, ".mat": self._mat}[file.suffix]()
-            )
-        except OSError as error:
-            raise write_error(f"cannot write {file}: {error.strerror}", error) from None
+        writers = {".json": self._json, ".csv": self._csv, ".mat": self._mat}
+        write_file(file, writers[file.suffix]())
 
     def _json(self) -> bytes:
         return (json.dumps(self.to_dict(), indent=1) + "\n").encode()

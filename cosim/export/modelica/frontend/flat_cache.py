@@ -17,7 +17,7 @@ from typing import Any
 
 from ....core.errors import CosimError, write_error
 from ....core.resources import cache_directory
-from ....results.files import writing_atomically
+from ....results.files import write_file
 from .libraries import Library
 
 
@@ -30,8 +30,9 @@ def read_document(key: Sequence[Any]) -> str | None:
 
 def store_document(key: Sequence[Any], document: str) -> None:
     """Store a flat model under a key, if the cache can be written."""
-    with suppress(CosimError), writing_atomically(_document_file(key)) as temporary:
-        temporary.write_bytes(gzip.compress(document.encode(), compresslevel=1, mtime=0))
+    with suppress(CosimError):
+        content = gzip.compress(document.encode(), compresslevel=1, mtime=0)
+        write_file(_document_file(key), content)
 
 
 def link_libraries(libraries: Sequence[Library]) -> Path:

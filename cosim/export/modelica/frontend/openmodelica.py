@@ -17,6 +17,7 @@ from pathlib import Path
 from tempfile import TemporaryDirectory
 
 from ....core.errors import InputError, Problem
+from ....results.files import write_file
 from .rumoca_frontend import find_packages, model_name, read_source
 
 _ERROR = re.compile(
@@ -49,8 +50,7 @@ def export_with_omc(path: Path, target: Path, model: str | None = None) -> None:
         fmu = next(Path(folder).glob("*.fmu"), None)
         if fmu is None:
             raise InputError(_parse_errors(log, path))
-        target.parent.mkdir(parents=True, exist_ok=True)
-        shutil.move(fmu, target)
+        write_file(target, fmu.read_bytes())
 
 
 def _script(path: Path, model: str | None) -> str:
