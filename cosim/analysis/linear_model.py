@@ -113,8 +113,7 @@ class LinearModel:
             InputError: The name of the file has another suffix.
             OutputError: The file cannot be written.
         """
-        if file.suffix not in SUFFIXES:
-            raise InputError(f"{file}: expected a file name with {', '.join(SUFFIXES)}")
+        check_suffix(file)
         writers = {".json": self._json, ".csv": self._csv, ".mat": self._mat}
         write_file(file, writers[file.suffix]())
 
@@ -147,3 +146,9 @@ class LinearModel:
         savemat(stream, {**matrices, "Ts": self.step or 0.0, **names})
         # the header of the file holds the time of writing, which would make equal models differ
         return b"MATLAB 5.0 MAT-file, linear model".ljust(116) + stream.getvalue()[116:]
+
+
+def check_suffix(file: Path) -> None:
+    """Raise InputError if `LinearModel.write` has no format for a file of this name."""
+    if file.suffix not in SUFFIXES:
+        raise InputError(f"{file}: expected a file name with {', '.join(SUFFIXES)}")

@@ -154,10 +154,11 @@ def remove_files(directory: Path, *names: str) -> None:
         InputError: A file cannot be removed.
     """
     try:
+        targets = []
         for path in map(directory.joinpath, names):
-            target = paths.file_to_replace(path)
-            if target is None:
-                continue
+            targets.append(paths.file_to_replace(path))
+        for target in filter(None, targets):  # only now, so that all are kept if one is refused
+            path = target
             target.unlink(missing_ok=True)
             for part in target.parent.glob(f".{glob.escape(target.name)}.*{_PART_SUFFIX}"):
                 part.unlink(missing_ok=True)
