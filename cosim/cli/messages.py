@@ -7,7 +7,7 @@ import logging
 import sys
 from collections.abc import Iterable
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import click
 
@@ -16,6 +16,9 @@ from ..core.json_values import parse_object
 from ..core.text import SPACES, escape_control_characters
 from ..process.standard_streams import unescaped
 from . import current_command_line
+
+if TYPE_CHECKING:
+    from ..studies.regression import RegressionOutcome
 
 #: lowest level of printed messages, by `CommandLine.verbosity`
 _LEVELS = {-1: logging.WARNING, 0: logging.INFO, 1: logging.DEBUG}
@@ -80,12 +83,18 @@ def print_json(value: Any) -> None:
     )
 
 
-def print_verdict(passed: bool) -> None:
-    """Print the word "passed" or "FAILED", coloured on a terminal, without a line break."""
-    word = (
-        click.style("passed", fg="green") if passed else click.style("FAILED", fg="red", bold=True)
-    )
+def print_outcome(outcome: RegressionOutcome) -> None:
+    """Print a line about a scenario and its problems; with --quiet, print only the problems."""
+    if outcome.code and current_command_line().verbosity < 0:
+        for line in outcome.details:
+            click.echo(f"{outcome.name}: {line}", err=True)
+    word = click.style("passed", fg="green")
+    if outcome.code:
+        word = click.style("FAILED", fg="red", bold=True)
     click.echo(word, nl=False, file=unescaped(sys.stdout))
+    click.echo(f"  {outcome.name:<28} {outcome.summary:<24} {outcome.seconds:5.1f} s")
+    for line in outcome.details:
+        click.echo(f"        {line}")
 
 
 def log_problems(problems: Iterable[Problem]) -> None:

@@ -12,7 +12,7 @@ import pytest
 from cosim_command import run_cosim
 from fault_fmu import FaultFmus, build_library
 
-from cosim.cli.bench_table import print_side_by_side
+from cosim.cli.bench_output import print_side_by_side
 from cosim.core import resources
 from cosim.studies.controller_bench.page import BenchedController
 from cosim.studies.controller_bench.ranking import ScenarioKpis, rank

@@ -41,7 +41,9 @@ def parameter(name: str) -> dict[str, object]:
 
 FILES = {
     "plain.json": scenario(),
-    "figure.json": scenario(figures=[{"name": "picture", "python": "cosim:plant_src/figures.py:path"}]),
+    "figure.json": scenario(
+        figures=[{"name": "picture", "python": "cosim:plant_src/figures.py:path"}]
+    ),
     "unknown_variable.json": scenario(components={"pilot": component({"no": 1.0})}),
     "unknown_kpi.json": scenario(kpis=[kpi("no")]),
     "unknown_signal.json": scenario(kpis=[kpi("final", signal="pilot.no")]),
@@ -70,6 +72,9 @@ def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (folder / name).write_text(json.dumps(content))
     (folder / "existing").mkdir()
     (folder / "existing" / "result.csv").write_text("of an earlier run")
+    trials = folder / "existing" / "usv_heading" / "heading_controller" / "scenarios"
+    trials.mkdir(parents=True)
+    (trials / "plain.json").write_text("of an earlier benchmark")
     (folder / "file").write_text("no folder")
     (folder / "blocked" / "run.json").mkdir(parents=True)
     (folder / "blocked" / "result.csv").write_text("of an earlier run")
@@ -139,6 +144,7 @@ bench-controller broken.py:A --role uav_altitude --scenarios plain.json
 bench-controller FMU --role uav_altitude --scenarios plain.json
 bench-controller FMU --role uav_position --scenarios plain.json
 bench-controller FMU --role uav_position --set no=1 --scenarios plain.json
+bench-controller HEADING --role usv_heading --scenarios plain.json --output-dir existing
 bench-controller FMU --role no
 linearize plain.json --inputs pilot.no --outputs pilot.x --output new/model.json
 linearize plain.json INPUTS --output new/model.json --output model.txt

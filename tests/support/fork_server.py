@@ -51,15 +51,14 @@ PRELOADED = (
         f"cli.commands.{name}"
         for name in ("bench_controller", "check", "regress", "run", "simulate", "sweep")
     ),
-    "cli.bench_table",
+    "cli.bench_output",
     "cli.messages",
     "components.fmi.isolated.isolated_fmu",
     "process.sandbox.bubblewrap",
     "process.supervised_child",
     "process.supervisor",
     "scenario.plausibility",
-    "studies.controller_bench.page",
-    "studies.controller_bench.step_cost",
+    "studies.controller_bench.trials",
 )
 #: modules that the commands import late, and some that those import by name
 OTHERS = (

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ...core.text import count_noun
+from ...report.tables import print_table
 from ..analysis_options import (
     print_notes,
     scenario_options,
@@ -17,7 +18,6 @@ from ..analysis_options import (
 )
 from ..messages import print_json, print_log
 from ..output_options import json_option
-from ..study_options import print_table
 
 if TYPE_CHECKING:
     from ...analysis.linear_model import LinearModel

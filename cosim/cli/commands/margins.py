@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ...core.errors import InputError
+from ...report.tables import print_table
 from ..analysis_options import (
     print_notes,
     scenario_options,
@@ -19,7 +20,6 @@ from ..analysis_options import (
 )
 from ..messages import print_json, print_log
 from ..output_options import json_option
-from ..study_options import print_table
 
 if TYPE_CHECKING:
     from ...analysis.loop_margins import LoopMargins

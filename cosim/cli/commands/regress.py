@@ -10,19 +10,16 @@ import click
 
 from ...core.processors import available_processors
 from ...core.text import count_noun
-from ...studies.regression import RegressionOutcome, accept_command
+from ...studies.regression import EXIT_CODE_SEVERITY, accept_command
 from ...studies.regression_runs import default_folder, run_regressions
-from .. import current_command_line
 from ..completion import complete_scenario
 from ..forked_commands import forked_commands
-from ..messages import print_json, print_verdict
+from ..messages import print_json, print_outcome
 from ..output_options import json_option
 
 if TYPE_CHECKING:
     from ...report.junit import JUnitCase
-
-#: exit codes from the most to the least severe; the most severe one is returned
-EXIT_CODE_SEVERITY = (130, 70, 2, 1, 3, 0)
+    from ...studies.regression import RegressionOutcome
 
 
 @click.command()
@@ -104,17 +101,6 @@ def command(
         if accepted := [outcome.accept for outcome in outcomes if outcome.accept]:
             click.echo(accept_command(accepted))
     return min((outcome.code for outcome in outcomes), key=EXIT_CODE_SEVERITY.index)
-
-
-def print_outcome(outcome: RegressionOutcome) -> None:
-    """Print a line about a scenario and its problems; with --quiet, print only the problems."""
-    if outcome.code and current_command_line().verbosity < 0:
-        for line in outcome.details:
-            click.echo(f"{outcome.name}: {line}", err=True)
-    print_verdict(outcome.code == 0)
-    click.echo(f"  {outcome.name:<28} {outcome.summary:<24} {outcome.seconds:5.1f} s")
-    for line in outcome.details:
-        click.echo(f"        {line}")
 
 
 def _junit_case(outcome: RegressionOutcome) -> JUnitCase:
