@@ -18,7 +18,7 @@ import numpy as np
 
 from cosim.core import resources
 from cosim.core.errors import InputError
-from cosim.results.files import write_file
+from cosim.results.files import writing_atomically
 
 if TYPE_CHECKING:
     from ctypes import _NamedFuncPointer
@@ -93,7 +93,8 @@ def _extract_to_cache(content: bytes, cache_folder: Path, name: str) -> Path:
     """
     path = cache_folder / f"{sha256(content).hexdigest()[:20]}-{name}"
     if not _has_content(path, content):
-        write_file(path, content)
+        with writing_atomically(path) as temporary:
+            temporary.write_bytes(content)
     return path
 
 

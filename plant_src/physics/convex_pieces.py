@@ -5,7 +5,7 @@ from __future__ import annotations
 from hashlib import sha256
 
 from cosim.core import resources
-from cosim.results.files import write_file
+from cosim.results.files import writing_atomically
 
 from ..vehicles.common.shapes import ConvexPiece
 
@@ -20,5 +20,6 @@ def mesh_file(piece: ConvexPiece) -> str:
     content = "\n".join([*lines, ""]).encode()
     path = resources.cache_directory() / "meshes" / f"{sha256(content).hexdigest()[:20]}.obj"
     if not path.exists():
-        write_file(path, content)
+        with writing_atomically(path) as temporary:
+            temporary.write_bytes(content)
     return str(path)
