@@ -28,7 +28,7 @@ from .preflight import (
     raise_errors,
 )
 from .preflight.binary import can_be_compiled
-from .preflight.fmu_platform import current_platform
+from .preflight.platforms import current_platform
 
 
 @dataclass(frozen=True)

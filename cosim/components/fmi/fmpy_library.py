@@ -13,8 +13,8 @@ from ...core.errors import InputError
 from .c_functions import FunctionTable
 from .description import FmuDescription
 from .file import FmuFile
-from .preflight.fmu_platform import current_platform
 from .preflight.functions import function_prefix
+from .preflight.platforms import current_platform
 
 
 class MissingFunctionError(Exception):

@@ -31,7 +31,7 @@ from .fmpy_library import MissingFunctionError, load_library
 from .function_calls import DISCARD, OK, FunctionCaller
 from .instance_settings import InstanceSettings
 from .preflight.binary import version_deviations
-from .preflight.library import EXPECTED_TEXTS
+from .preflight.platforms import EXPECTED_TEXTS
 
 
 class FmuInstance(FunctionCaller, Component):
