@@ -4,8 +4,7 @@ from __future__ import annotations
 
 RUN_MODULES = (
     "cosim.api.execution",
-    "cosim.components.conformance",
-    "cosim.components.fmi.isolated.isolated_fmu",
+    "cosim.components.fmi.isolated",
     "cosim.components.python_class",
     "cosim.components.python_fmu",
     "cosim.engine.native_executor",
