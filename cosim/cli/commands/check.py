@@ -92,7 +92,7 @@ def _warnings(prepared: PreparedRun, logged: Sequence[str]) -> list[Problem]:
 
 def _describe(prepared: PreparedRun, warnings: Sequence[Problem]) -> dict[str, Any]:
     """Return the expanded system as JSON."""
-    from ...scenario.recommendation import recommend
+    from ...scenario.stages import recommend
 
     times = prepared.settings
     return {
@@ -178,7 +178,7 @@ def _print_nested_stages(stages: Sequence[Stage], indent: str) -> None:
 
 
 def _print_recommendation(prepared: PreparedRun) -> None:
-    from ...scenario.recommendation import recommend
+    from ...scenario.stages import recommend
 
     click.echo("\nrecommendation for the order")
     for line in recommend(prepared.system):

@@ -36,9 +36,8 @@ def command(name: str, base: str, directory: Path, force: bool) -> None:
     A shipped scenario is extended by its name, so that the new file runs wherever cosim is
     installed.
     """
-    from ...scenario.extending_file import extending_scenario
     from ...scenario.file_paths import find_scenario
-    from ...scenario.nested_systems import load_scenario
+    from ...scenario.nested_systems import extending_scenario, load_scenario
     from ...scenario.schema import SCENARIO_NAME
 
     if not re.match(SCENARIO_NAME, name):

@@ -25,9 +25,14 @@ from zipfile import ZipFile
 
 from ...components.python_import import read_with_relative_imports, with_imported_siblings
 from ...core.errors import InputError, Problem
-from ..fmu.archive import content_token, write_archive
-from ..fmu.model_description import Element, add_units, to_bytes
-from ..fmu.validation import DESCRIPTION_FILE, validate_description
+from ..fmu.model_description import (
+    DESCRIPTION_FILE,
+    Element,
+    add_units,
+    to_bytes,
+    validate_description,
+)
+from ..fmu.package import content_token, write_archive
 
 _PROGRAM = Path(__file__).with_name("pythonfmu_program.py")
 #: files of cosim that the FMU contains beside the source

@@ -24,8 +24,8 @@ from ...core.errors import InputError
 from ...core.resources import cache_directory
 from ...process.output_lock import LOCK_FILE, waiting_for_lock
 from ..cache import cached_file
-from ..fmu.archive import write_archive
 from ..fmu.compiler import compiler_version, find_compiler, ziglang_command
+from ..fmu.package import write_archive
 
 _SOURCES = Path(__file__).parent / "wine"
 #: the second one is Debian's, whose program `wine` is a script that prints advice

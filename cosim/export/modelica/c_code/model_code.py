@@ -10,14 +10,20 @@ from typing import Any
 import numpy as np
 
 from ..causality.interpreter import Interpreter
-from ..causality.matching import is_input
 from ..causality.schedule import finite_variables, pre_variables, start_value
-from ..model.flat_model import Variable, derivative_name, owning_component
+from ..model.flat_model import Variable, derivative_name, is_input, owning_component
 from ..model.syntax_tree import Body, Name, Solve, SourceLocation, Statement, referenced_variable
 from ..model.traversal import assigned_references, walk
-from .c_values import C_TYPES, CExpression, CValue, c_literal, scalar_value
+from .c_values import (
+    C_TYPES,
+    CExpression,
+    CValue,
+    c_literal,
+    function_definition,
+    scalar_value,
+    uses_variable,
+)
 from .exchange_code import exchange_functions, has_exchange, indicator_lines
-from .formatting import function_definition, uses_variable
 from .functions import FunctionTranslator
 from .header import has_messages, struct_member, struct_members
 from .model_step import continuous_step_body, sampled_step_body

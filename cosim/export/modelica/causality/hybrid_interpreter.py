@@ -13,11 +13,10 @@ import numpy as np
 
 from ....core.errors import ComponentError
 from ..model.arithmetic import EvaluationError, divide
-from ..model.flat_model import Model, derivative_name, is_integrated, previous_name
+from ..model.flat_model import Model, derivative_name, is_input, is_integrated, previous_name
 from .dormand_prince import ERROR, NODES, WEIGHTS, weighted_sum
-from .event_limits import MAX_EVENTS, MAX_PASSES, chattering_reason, endless_reason, iterated_names
+from .hybrid import MAX_EVENTS, MAX_PASSES, chattering_reason, endless_reason, iterated_names
 from .interpreter import TICK_TOLERANCE, Interpreter
-from .matching import is_input
 from .past_values import PAST_VALUES, PastValues
 
 RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-7, 1e-9

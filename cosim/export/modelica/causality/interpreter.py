@@ -16,8 +16,7 @@ import numpy as np
 from ....core.errors import ComponentError
 from ..model.arithmetic import EvaluationError, divide
 from ..model.evaluate import Evaluator, convert_to_type
-from ..model.flat_model import Model, derivative_name
-from .matching import is_input
+from ..model.flat_model import Model, derivative_name, is_input
 from .parameter_roles import classify_parameters
 from .schedule import build_schedule, finite_variables, pre_variables, start_value
 

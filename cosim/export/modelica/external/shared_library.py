@@ -22,8 +22,7 @@ from ....results.files import writing_atomically
 from ...fmu.compiler import compile_library
 from ..model.arithmetic import EvaluationError
 from ..model.flat_model import Function
-from .calls import Argument, CallSignature, call_signature
-from .sources import external_archives, external_files
+from .c_files import Argument, CallSignature, call_signature, external_archives, external_files
 
 _C_TYPES: dict[str, Any] = {
     "Real": ctypes.c_double,

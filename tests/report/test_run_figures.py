@@ -1,4 +1,4 @@
-"""Figures of a supervised run, drawn in separate processes that are prepared while it simulates."""
+"""Figures of a supervised run: files, report and failures."""
 
 import json
 from pathlib import Path
@@ -75,7 +75,8 @@ def test_figures_and_report_are_those_of_a_run_in_one_process(tmp_path):
         ("failing", "failing failed: ValueError: no data for this (own.py:15)"),
         (
             "crashing",
-            "crashing failed: the process was ended by signal 11 (SIGSEGV, segmentation fault)",
+            "crashing failed: the process was ended by signal 11 (SIGSEGV, segmentation fault) "
+            "(own.py:18)",
         ),
         ("ending", "ending failed: it ended the process with exit code 0"),
         ("number", "number failed: returned int, expected a matplotlib.figure.Figure"),
