@@ -367,6 +367,10 @@ def _remembered(section: Any) -> set[str]:
 
 #: evaluations of the equations in an event, and events in a communication step
 MAX_PASSES, MAX_EVENTS = 100, 100_000
+#: events at a distance (s) up to this one are at the same time for clocked sample() operators
+SAME_TIME = 1e-9
+#: number of stored values of the argument of a delay()
+PAST_VALUES = 2048
 
 
 def iterated_names(hybrid: Hybrid) -> Sequence[str]:

@@ -184,6 +184,12 @@ def start_value(model: Model, name: str) -> Expression:
     return variable.start or _ZERO.get(variable.type, Literal(1, "Enumeration"))
 
 
+def declared_value(model: Model, name: str) -> Expression:
+    """Return the binding of a parameter, or its start expression without one."""
+    binding = model.variables[name].binding
+    return start_value(model, name) if binding is None else binding
+
+
 def pre_variables(model: Model, body: Body) -> list[str]:
     """Return the variables of which the statements use the value before the event, in order of declaration."""
     used = {name for name, _ in pre_references(body)}
