@@ -151,7 +151,7 @@ def cached_fmu(source: Path, model: str | None, library_path: Sequence[Path] = (
         OutputError: The disk is full or defective.
     """
     from .modelica.frontend.libraries import find_libraries, library_folders
-    from .modelica.frontend.rumoca_frontend import readable_files
+    from .modelica.frontend.model_files import readable_files
 
     classified = classify_source(source, model)
     files = readable_files(source)

@@ -20,7 +20,7 @@ from .c_values import (
     scalar_value,
     sum_terms,
 )
-from .subscripts import SubscriptLowering
+from .lowering import SubscriptLowering
 
 _TRIGONOMETRIC_FUNCTIONS = ("sin", "cos", "tan", "asin", "acos", "atan", "sinh", "cosh", "tanh")
 _MATH_FUNCTIONS = (*_TRIGONOMETRIC_FUNCTIONS, "exp", "log", "log10", "sqrt", "ceil", "floor")

@@ -6,7 +6,8 @@ Identifiers, types, operator precedence and element access of arrays.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+import textwrap
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import reduce
 from math import prod
@@ -77,7 +78,6 @@ PRECEDENCE = {
     "/": 10,
     "unary": 12,
 }
-
 
 #: least precedence of the left and the right operand without parentheses; higher than C requires
 #: where gcc would warn
@@ -223,3 +223,36 @@ def sum_terms(type_name: str, terms: list[CExpression]) -> CExpression:
     if type_name == "Real":
         return reduce(lambda a, b: infix("+", a, b), terms)
     return reduce(lambda a, b: c_call("add", "m", a, b), terms)
+
+
+_WIDTH = 118
+
+
+def function_definition(head: str, body: Iterable[str]) -> str:
+    """Return a C function definition with the given signature and unindented lines of its body."""
+    return "\n".join([head, "{", *wrap_lines(body), "}"])
+
+
+def wrap_lines(lines: Iterable[str]) -> Iterator[str]:
+    """Yield the lines indented by one level.
+
+    Long lines are wrapped, except those with text in quotation marks.
+    """
+    for line in lines:
+        if '"' in line:
+            yield "    " + line
+            continue
+        indent = " " * (8 + len(line) - len(line.lstrip()))
+        yield from textwrap.wrap(
+            "    " + line,
+            _WIDTH,
+            subsequent_indent=indent,
+            break_long_words=False,
+            break_on_hyphens=False,
+            drop_whitespace=True,
+        ) or [""]
+
+
+def uses_variable(name: str, lines: Iterable[str]) -> bool:
+    """Return whether a C variable with this name (not a struct member) occurs in the lines."""
+    return any(re.search(rf"(?<![\w>.]){re.escape(name)}\b", line) for line in lines)

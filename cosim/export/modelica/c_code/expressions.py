@@ -29,7 +29,7 @@ from .c_values import (
     sum_terms,
     variable_value,
 )
-from .subscripts import SubscriptLowering
+from .lowering import SubscriptLowering
 
 _ARITHMETIC = {"+": "add", "-": "subtract", "*": "multiply"}
 _COMPARISONS = {"<": "<", "<=": "<=", ">": ">", ">=": ">=", "==": "==", "<>": "!="}

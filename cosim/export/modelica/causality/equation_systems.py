@@ -10,6 +10,7 @@ from dataclasses import dataclass
 
 from ....core.errors import InputError, Problem
 from ..model.flat_model import Equation, Model
+from ..model.scalars import ScalarKey, reference_of, scalar_keys
 from ..model.syntax_tree import (
     Assign,
     Binary,
@@ -25,28 +26,13 @@ from ..model.syntax_tree import (
     raise_model_error,
 )
 from ..model.traversal import has_builtin, read_references, rewrite, rewrite_outermost
-from .assignment import match, strongly_connected_components
 from .differentiation import ZERO, Differentiation, divide, negate, subtract
-from .matching import ScalarKey, scalar_keys
+from .matching import match, strongly_connected_components
 from .scalar_equations import EquationSplitter
 
 #: steps from the simplified to the actual expressions of homotopy()
 _CONTINUATION_STEPS = 10
 _DISCRETE_TYPES = ("Integer", "Boolean", "Enumeration")
-
-
-def reference_of(key: ScalarKey, model: Model) -> Name | Index:
-    """Return the reference of a scalar."""
-    name, number = key
-    shape, position = model.variables[name].shape, list[int]()
-    for size in reversed(shape):
-        position.insert(0, number % size)
-        number //= size
-    return (
-        Index(Name(name), tuple(Literal(k + 1, "Integer") for k in position))
-        if shape
-        else Name(name)
-    )
 
 
 class SingularError(InputError):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import reduce
@@ -59,6 +58,15 @@ _ELEMENTWISE = _MATH_FUNCTIONS | {
 }
 
 
+class _ShapeEvaluator(Evaluator):
+    """Evaluator of expressions of which only the shape matters."""
+
+    def _builtin(self, node: Builtin) -> Any:
+        if node.name in ("due", "risen", "past"):
+            return False
+        return super()._builtin(node)
+
+
 class EquationSplitter:
     """Splitting of the equations of one model.
 
@@ -71,10 +79,7 @@ class EquationSplitter:
             for v in model.variables.values()
             if v.type != "String"
         }
-        flags: defaultdict[tuple[str, int], bool] = defaultdict(bool)
-        self._evaluate = Evaluator(
-            _uncalled(model.functions), {**values, "time": 0.0}, dict(values), flags
-        )
+        self._evaluate = _ShapeEvaluator(_uncalled(model.functions), {**values, "time": 0.0})
 
     def split(self, equation: Equation) -> Iterator[Equation]:
         """Yield one equation for each element.

@@ -13,7 +13,7 @@ from typing import Any
 
 from ..model import syntax_tree
 from ..model.syntax_tree import Expression, SourceLocation, raise_model_error
-from .sources import ModelicaSources
+from .model_files import ModelicaSources
 
 Json = Mapping[str, Any]
 

@@ -86,41 +86,6 @@ def _sum(values: Any) -> Any:
     )
 
 
-def solve_linear(a: list[list[float]], b: list[float]) -> list[float] | None:
-    """Return the solution of a linear system, with the operations of newton.h in the same order.
-
-    None if it is singular.
-    """
-    n = len(b)
-    for column in range(n):
-        pivot = column
-        for row in range(column + 1, n):
-            if abs(a[row][column]) > abs(a[pivot][column]):
-                pivot = row
-        if not abs(a[pivot][column]) > 0:
-            return None
-        a[column], a[pivot], b[column], b[pivot] = a[pivot], a[column], b[pivot], b[column]
-        for row in range(column + 1, n):
-            factor = divide(a[row][column], a[column][column])
-            for k in range(column, n):
-                a[row][k] -= factor * a[column][k]
-            b[row] -= factor * b[column]
-    for row in range(n - 1, -1, -1):
-        for k in range(row + 1, n):
-            b[row] -= a[row][k] * b[k]
-        b[row] = divide(b[row], a[row][row])
-    return b
-
-
-def largest_ratio(residual: list[float], scale: list[float]) -> float:
-    """Return the largest residual over its scale, as newton.h."""
-    largest = 0.0
-    for value, unit in zip(residual, scale, strict=True):
-        if not (ratio := divide(abs(value), unit)) <= largest:
-            largest = ratio
-    return largest
-
-
 def divide(a: float, b: float) -> float:
     """Return `a / b` as defined by IEEE 754, also for b = 0."""
     if b != 0:
@@ -239,10 +204,12 @@ BUILTINS: Mapping[str, Callable[..., Any]] = {
     "abs": lambda x: elementwise(lambda y: check_int32(abs(y)), x),
     "atan2": math.atan2,
     "cat": lambda _, *arrays: np.concatenate(arrays),
+    "change": lambda _: False,
     "columns": lambda *parts: np.concatenate([_as_matrix(part) for part in parts], axis=1),
     "cross": _cross,
     "diagonal": lambda x: np.diag(np.asarray(x)),
     "div": _real_or_integer(lambda a, b: float(np.trunc(divide(a, b))), _quotient),
+    "edge": lambda _: False,
     "fill": lambda value, *sizes: np.full(sizes, value),
     "homotopy": lambda actual, _: actual,
     "identity": lambda n: np.eye(n, dtype=np.int64),
@@ -258,6 +225,7 @@ BUILTINS: Mapping[str, Callable[..., Any]] = {
     "ndims": np.ndim,
     "noEvent": lambda x: x,
     "ones": lambda *sizes: np.ones(sizes, np.int64),
+    "pre": lambda x: x,
     "product": lambda x: reduce(lambda a, b: check_int32(a * b), _flat_elements((x,))),
     "rows": lambda *parts: np.concatenate([_as_matrix(part) for part in parts], axis=0),
     "scalar": lambda x: to_python_scalar(np.asarray(x).flat[0]),
@@ -266,6 +234,7 @@ BUILTINS: Mapping[str, Callable[..., Any]] = {
     ),
     "sign": lambda x: elementwise(lambda y: (y > 0) - (y < 0), x),
     "size": _size,
+    "smooth": lambda _, x: x,
     "sum": _sum,
     "transpose": np.transpose,
     "vector": np.ravel,
