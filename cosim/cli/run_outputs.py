@@ -22,7 +22,6 @@ from .unfinished_runs import writing_results
 if TYPE_CHECKING:
     from ..api import Execution
     from ..engine.pacer import LatePolicy
-    from ..report.drawing_process import DrawingProcess
     from ..results import Result
     from ..results.checks import CheckOutcome
     from ..scenario import PreparedRun
@@ -62,7 +61,6 @@ class RunOutcome:
         prepared: the run as it was prepared.
         execution: its result or failure.
         began: `time.perf_counter()` before the scenario was loaded (s).
-        drawing: process that draws the figures; None to draw them in this process.
         files: names of the files that the summary lists.
     """
 
@@ -70,7 +68,6 @@ class RunOutcome:
     prepared: PreparedRun
     execution: Execution
     began: float
-    drawing: DrawingProcess | None = None
     files: list[str] = field(default_factory=list)
 
     @property
@@ -144,13 +141,8 @@ def _write_result_files(outcome: RunOutcome) -> None:
     from ..process.run_files.folder import remove_run_files, run_folder
     from ..results.result import write_run
 
-    drawing, rows = outcome.drawing, run_folder()
-    if drawing and rows:
-        drawing.start(outcome.result, rows, outcome.folder)
-    with writing_results(outcome.result, rows, outcome.shown_folder):
+    with writing_results(outcome.result, run_folder(), outcome.shown_folder):
         write_run(outcome.result, outcome.folder)
-    if drawing and rows:
-        drawing.wait_until_read()
     remove_run_files()
     outcome.files.extend(("result.csv", "kpis.json", "run.json"))
 
@@ -183,25 +175,16 @@ def _write_report(outcome: RunOutcome) -> None:
 
 def _write_figures(outcome: RunOutcome) -> Iterator[tuple[str, str]]:
     """Write the figures, and yield name and SVG text of each."""
-    for i, spec in enumerate(outcome.prepared.spec.figures):
-        picture = (
-            outcome.drawing.picture(spec.name, spec.python.rpartition(":")[2])
-            if outcome.drawing
-            else None
-        )
-        picture = picture or _draw_figure(outcome, i)
-        outcome.files.append(f"{spec.name}.png")
-        yield spec.name, picture
-
-
-def _draw_figure(outcome: RunOutcome, i: int) -> str:
-    """Write a figure in this process, and return its SVG text."""
+    from ..process.journal import calling_component
     from ..report.figures import draw_figure, figure_to_svg, save_figure
 
-    name, function, arguments = outcome.prepared.figures()[i]
-    figure = draw_figure(outcome.result, name, function, arguments)
-    save_figure(figure, outcome.folder / f"{name}.png")
-    return figure_to_svg(figure)
+    for name, function, arguments in outcome.prepared.figures():
+        with calling_component(f'figure "{name}"', function.__name__):
+            figure = draw_figure(outcome.result, name, function, arguments)
+            save_figure(figure, outcome.folder / f"{name}.png")
+            picture = figure_to_svg(figure)
+        outcome.files.append(f"{name}.png")
+        yield name, picture
 
 
 def _print_summary(outcome: RunOutcome) -> None:

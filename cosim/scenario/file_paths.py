@@ -9,7 +9,7 @@ from typing import Any, TypeGuard
 
 from ..core import paths, resources
 from ..core.errors import InputError, did_you_mean
-from .json_pointer import pointer_keys
+from .json_document import pointer_keys
 
 #: returns the new text of a path
 PathChange = Callable[[str], str]

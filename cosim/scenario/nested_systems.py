@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass, field
@@ -9,21 +10,19 @@ from pathlib import Path
 from typing import Any
 
 from ..components.python_import import package_files
-from ..core import paths
+from ..core import paths, resources
 from ..core.errors import InputError, Problem
 from ..core.json_values import copy_json
 from ..core.size_limits import MAX_LEVELS
 from ..core.text import shorten
-from . import json_pointer
-from .dict_document import document_of_dict
 from .evaluation_schema import CallSpec
 from .expanded_size import SystemFile, check_expanded_size
 from .extension import expand_document, read_system_document
 from .file_paths import change_paths, find_scenario, relocating
-from .json_document import Document
+from .json_document import Document, pointer_keys, set_value
 from .schema import NestedSpec, PortsSpec, ScenarioSpec, SystemSpec, ports_of
 from .schema_types import accepted
-from .settings import apply_settings
+from .settings import apply_settings, document_of_dict
 from .validation import validate_document
 
 _LEGAL_NAME = re.compile("[A-Za-z_][A-Za-z0-9_]*")
@@ -213,7 +212,7 @@ def _find_seed_problems(
             )
         elif pointer.split("/")[1] in invalid_keys:
             continue
-        elif problem := json_pointer.set_value(copy_json(document.value), pointer, 0):
+        elif problem := set_value(copy_json(document.value), pointer, 0):
             yield Problem(problem, document.where(("seeds", i)))
 
 
@@ -294,3 +293,55 @@ def _make_node(file: SystemFile, prefix: str = "") -> Node:
         name: _make_node(child, node.full_name(name)) for name, child in file.children.items()
     }
     return node
+
+
+def extending_scenario(
+    base: str | Path,
+    folder: Path,
+    name: str,
+    description: str,
+    settings: Mapping[str, Any] | None = None,
+    settings_folder: Path | None = None,
+) -> dict[str, Any]:
+    """Return the content of a scenario file that extends another one.
+
+    Args:
+        base: Path of a scenario file, or name of a shipped scenario. A shipped scenario is extended
+            by its name, so that the new file runs wherever cosim is installed.
+        folder: Folder of the new file.
+        name: Name of the new scenario.
+        description: Its description.
+        settings: Changed values by names of variables or JSON pointers, as for `cosim.load`.
+        settings_folder: Folder that paths in the values of JSON pointers start from; None: the
+            working directory.
+
+    Raises:
+        InputError: The base does not exist, or a JSON pointer leads nowhere.
+    """
+    found = find_scenario(base)
+    is_shipped = found.resolve().parent == (resources.root() / "scenarios").resolve()
+    extended = found.stem if is_shipped else os.path.relpath(found, folder).replace(os.sep, "/")
+    changed = (
+        load_scenario(found, settings, settings_folder).root.document.value if settings else {}
+    )
+    values: dict[str, Any] = {}
+    for key in settings or {}:
+        if key.startswith("/"):
+            _copy_pointed(changed, values, pointer_keys(key))
+    values = change_paths(values, relocating(found.parent, folder))
+    for key, value in (settings or {}).items():
+        if not key.startswith("/"):
+            component, _, variable = key.partition(".")
+            values.setdefault("components", {}).setdefault(component, {}).setdefault(
+                "parameters", {}
+            )[variable] = value
+    return {"extends": extended, "name": name, "description": description, **values}
+
+
+def _copy_pointed(source: Any, target: dict[str, Any], keys: list[str]) -> None:
+    """Copy the value that keys lead to; a list on the way is copied as a whole."""
+    key, *rest = keys
+    if rest and isinstance(source.get(key), dict):
+        _copy_pointed(source[key], target.setdefault(key, {}), rest)
+    else:
+        target[key] = source[key]

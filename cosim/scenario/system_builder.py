@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
@@ -22,18 +22,22 @@ from ..engine.pacer import LatePolicy
 from ..engine.plan import Plan, compile_plan
 from ..engine.settings import Event, Settings
 from ..process.journal import Deadlines, current_journal
-from .assigned_values import iterate_assignments, values_by_component
 from .component_factory import ComponentFactory
 from .component_schema import SOURCES
 from .function_arguments import FunctionResolver, without_placeholders
-from .name_resolution import SlotIndex, UnknownNameError, check_assignment, resolve_name
+from .name_resolution import (
+    SlotIndex,
+    UnknownNameError,
+    check_assignment,
+    iterate_assignments,
+    resolve_name,
+    values_by_component,
+)
 from .named_functions import find_function_problems
 from .nested_systems import Node, Scenario
-from .problem_locations import located_problems
-from .recorded_signals import SignalSelector
+from .recorded_signals import SignalSelector, StopConditionReader
 from .schema_types import accepted
 from .stages import StagePlanner, parallel_mode
-from .stop_conditions import StopConditionReader
 from .wiring import Wiring
 
 #: prefix of the components made from input profiles: inputs.0, inputs.1, ...
@@ -366,3 +370,38 @@ class SystemBuilder:
             for each in error.problems
         ]
         self._add_problems(InputError(problems), node, "components", name)
+
+
+#: settings whose times must fit the communication points
+_TIMED_SETTINGS = (("stop_time",), ("record",), ("events",))
+
+
+def located_problems(root: Node, problems: Iterable[Problem]) -> Iterator[Problem]:
+    """Yield the problems of a system with the locations of their subjects, without those that follow from invalid times.
+
+    Args:
+        root: The scenario.
+        problems: Problems that `check_run` found.
+    """
+    return (
+        _with_location(root, problem) for problem in problems if not _is_consequence(root, problem)
+    )
+
+
+def _is_consequence(root: Node, problem: Problem) -> bool:
+    """Return True if a problem with times only follows from an invalid start time, stop time or step size."""
+    times = {"stop_time", "step_size", "start_time"} & root.invalid_keys
+    return bool(times) and (
+        problem.subject[:1] in _TIMED_SETTINGS
+        or problem.subject[-1:] in (("period",), ("step_size",))
+    )
+
+
+def _with_location(root: Node, problem: Problem) -> Problem:
+    if problem.where or not problem.subject:
+        return problem
+    key, *rest = problem.subject
+    if key == "components" and rest and (found := root.find_component(rest[0])):
+        node, name = found
+        return replace(problem, where=node.where("components", name, *rest[1:]), subject=())
+    return replace(problem, where=root.where(*problem.subject), subject=())

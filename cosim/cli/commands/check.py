@@ -92,7 +92,7 @@ def _warnings(prepared: PreparedRun, logged: Sequence[str]) -> list[Problem]:
 
 def _describe(prepared: PreparedRun, warnings: Sequence[Problem]) -> dict[str, Any]:
     """Return the expanded system as JSON."""
-    from ...scenario.recommendation import recommend
+    from ...scenario.stages import recommend
 
     times = prepared.settings
     return {
@@ -138,7 +138,7 @@ def _print_components(prepared: PreparedRun) -> None:
 
 
 def _print_processes(prepared: PreparedRun, isolation: str, sandbox: str | None) -> None:
-    from ...components.fmi.isolated.isolated_fmu import IsolatedFmu
+    from ...components.fmi.isolated import IsolatedFmu
 
     components = prepared.system.components
     isolated = {
@@ -178,7 +178,7 @@ def _print_nested_stages(stages: Sequence[Stage], indent: str) -> None:
 
 
 def _print_recommendation(prepared: PreparedRun) -> None:
-    from ...scenario.recommendation import recommend
+    from ...scenario.stages import recommend
 
     click.echo("\nrecommendation for the order")
     for line in recommend(prepared.system):

@@ -170,7 +170,6 @@ def _tool_findings() -> Iterator[Finding]:
     except (InputError, OSError) as error:
         yield Finding("tools", "C compiler", str(error), "missing")
     yield _windows_finding()
-    yield _program_finding("OpenModelica", "omc", "--version")
     yield from _library_findings()
 
 

@@ -5,7 +5,6 @@ from __future__ import annotations
 import keyword
 import re
 import shlex
-import shutil
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -193,16 +192,16 @@ def _substitute(text: str, names: Mapping[str, str]) -> str:
 
 
 def _write_files(files: Mapping[Path, str], plants: Iterable[Path], force: bool) -> None:
+    from ...results.files import write_file
+
     present = [path for path in (*files, *plants) if path.exists()]
     if present and not force:
         raise InputError([Problem("exists; --force overwrites it", str(path)) for path in present])
     for path, text in files.items():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)
+        write_file(path, text)
         click.echo(path)
     for plant in plants:
-        plant.parent.mkdir(exist_ok=True)
-        shutil.copyfile(resources.root() / "fmus" / plant.name, plant)
+        write_file(plant, (resources.root() / "fmus" / plant.name).read_bytes())
         click.echo(plant)
 
 

@@ -36,9 +36,9 @@ def command(name: str, base: str, directory: Path, force: bool) -> None:
     A shipped scenario is extended by its name, so that the new file runs wherever cosim is
     installed.
     """
-    from ...scenario.extending_file import extending_scenario
+    from ...results.files import write_file
     from ...scenario.file_paths import find_scenario
-    from ...scenario.nested_systems import load_scenario
+    from ...scenario.nested_systems import extending_scenario, load_scenario
     from ...scenario.schema import SCENARIO_NAME
 
     if not re.match(SCENARIO_NAME, name):
@@ -49,12 +49,10 @@ def command(name: str, base: str, directory: Path, force: bool) -> None:
     file, found = directory / f"{name}.json", find_scenario(base)
     if file.exists() and not force:
         raise InputError([Problem("exists; --force overwrites it", str(file))])
-    content = extending_scenario(base, directory, name, f"{found.stem} with changes")
-    directory.mkdir(parents=True, exist_ok=True)
-    file.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    if problems := load_scenario(file).problems:
-        file.unlink()
+    if problems := load_scenario(found).problems:
         raise InputError(problems)
+    content = extending_scenario(base, directory, name, f"{found.stem} with changes")
+    write_file(file, json.dumps(content, indent=1) + "\n")
     path = shlex.quote(str(file))
     click.echo(
         f"{file}\n\nPrint all keys that it can change:\n  cosim check {path} --expanded\nRun it:\n "

@@ -27,7 +27,6 @@ if TYPE_CHECKING:
 
     from ...api import Simulation
     from ...engine.plan_run import Observer
-    from ...report.drawing_process import DrawingProcess
     from ...scenario import PreparedRun
 
 RESULT_FILES = (
@@ -146,10 +145,7 @@ def _run_scenario(options: RunOptions, locks: LockKeeper, link: Connection | Non
     warnings = messages.print_log()
     _require_packages(options)
     began = time.perf_counter()
-    with (
-        _drawing_process(options) as drawing,
-        _load(options, None if link else options.real_time) as simulation,
-    ):
+    with _load(options, None if link else options.real_time) as simulation:
         prepared = simulation.prepared
         folder = options.output_folder(prepared.spec.name).absolute()
         _prepare_folder(prepared, options, locks)
@@ -167,28 +163,8 @@ def _run_scenario(options: RunOptions, locks: LockKeeper, link: Connection | Non
             if control:
                 execution.result.metadata["live_events"] = control.finish()
             return supervision.results_written(
-                write_outputs(RunOutcome(options, prepared, execution, began, drawing))
+                write_outputs(RunOutcome(options, prepared, execution, began))
             )
-
-
-@contextmanager
-def _drawing_process(options: RunOptions) -> Iterator[DrawingProcess | None]:
-    """Yield a process that prepares to draw the figures of the scenario.
-
-    None without a report or a supervisor.
-    """
-    from ...process.journal import current_journal
-
-    if options.no_report or current_journal() is None:
-        yield None
-        return
-    from ...report.drawing_process import DrawingProcess
-    from ...scenario import import_figures
-    from ...scenario.settings import parse_settings
-
-    settings = parse_settings(options.settings)
-    with DrawingProcess(lambda: import_figures(options.scenario, settings)) as process:
-        yield process
 
 
 def _require_packages(options: RunOptions) -> None:

@@ -95,8 +95,8 @@ def _numbers(texts: tuple[str, ...]) -> dict[str, float]:
 
 def _write_scenario(file: Path, scenario: str, settings: dict[str, Any]) -> None:
     from ...results.files import write_json
-    from ...scenario.extending_file import extending_scenario
     from ...scenario.file_paths import find_scenario
+    from ...scenario.nested_systems import extending_scenario
 
     description = f"{find_scenario(scenario).stem}, started at its operating point"
     file.parent.mkdir(parents=True, exist_ok=True)

@@ -24,7 +24,7 @@ from pathlib import Path
 from signal import ITIMER_REAL, SIG_DFL, SIGALRM, SIGKILL, setitimer, signal
 from typing import Any
 
-from ...api.run_modules import RUN_MODULES
+from ...api.execution import RUN_MODULES
 from ...components.fmi import FmuFile
 from ...components.python_import import load_object
 from ...core.errors import CosimError
