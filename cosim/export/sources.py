@@ -10,7 +10,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..components.sibling_imports import with_imported_siblings
+from ..components.python_import import with_imported_siblings
 from ..core import resources
 from ..core.errors import CosimError, InputError, Problem
 from .fmu.block import Block

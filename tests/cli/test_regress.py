@@ -9,7 +9,7 @@ from click.testing import CliRunner
 from cosim_command import run_cosim
 from lxml import etree
 
-from cosim.cli.commands.regress import regress
+from cosim.cli.commands import regress as regress_command
 from cosim.studies import regression_runs
 from cosim.studies.regression import RegressionOutcome
 
@@ -203,7 +203,7 @@ def test_a_folder_without_scenarios_is_told_that_the_shipped_ones_are_run(folder
     )
     assert (
         "no folder scenarios/ here: the shipped scenarios are run\n"
-        in CliRunner().invoke(regress).stderr
+        in CliRunner().invoke(regress_command.regress).stderr
     )
 
 

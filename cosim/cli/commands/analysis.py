@@ -207,10 +207,13 @@ def linearize(
     given order. A component that cannot return to a saved state (FMI: canGetAndSetFMUState) is
     refused.
     """
+    from ...analysis.linear_model import check_suffix
     from ...analysis.linearization import linearize
     from ...scenario.settings import parse_settings
 
     print_log()
+    for file in files:
+        check_suffix(file)
     model = linearize(
         scenario,
         _split_names(inputs),

@@ -137,7 +137,7 @@ def _print_components(prepared: PreparedRun) -> None:
 
 
 def _print_processes(prepared: PreparedRun, isolation: str, sandbox: str | None) -> None:
-    from ...components.fmi.isolated.isolated_fmu import IsolatedFmu
+    from ...components.fmi.isolated import IsolatedFmu
 
     components = prepared.system.components
     isolated = {

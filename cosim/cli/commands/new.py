@@ -6,7 +6,6 @@ import json
 import keyword
 import re
 import shlex
-import shutil
 import sys
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
@@ -188,16 +187,16 @@ def _substitute(text: str, names: Mapping[str, str]) -> str:
 
 
 def _write_files(files: Mapping[Path, str], plants: Iterable[Path], force: bool) -> None:
+    from ...results.files import write_file
+
     present = [path for path in (*files, *plants) if path.exists()]
     if present and not force:
         raise InputError([Problem("exists; --force overwrites it", str(path)) for path in present])
     for path, text in files.items():
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(text)
+        write_file(path, text)
         click.echo(path)
     for plant in plants:
-        plant.parent.mkdir(exist_ok=True)
-        shutil.copyfile(resources.root() / "fmus" / plant.name, plant)
+        write_file(plant, (resources.root() / "fmus" / plant.name).read_bytes())
         click.echo(plant)
 
 
@@ -231,6 +230,7 @@ def scenario(name: str, base: str, directory: Path, force: bool) -> None:
     A shipped scenario is extended by its name, so that the new file runs wherever cosim is
     installed.
     """
+    from ...results.files import write_file
     from ...scenario.file_paths import find_scenario
     from ...scenario.nested_systems import extending_scenario, load_scenario
     from ...scenario.schema import SCENARIO_NAME
@@ -243,12 +243,10 @@ def scenario(name: str, base: str, directory: Path, force: bool) -> None:
     file, found = directory / f"{name}.json", find_scenario(base)
     if file.exists() and not force:
         raise InputError([Problem("exists; --force overwrites it", str(file))])
-    content = extending_scenario(base, directory, name, f"{found.stem} with changes")
-    directory.mkdir(parents=True, exist_ok=True)
-    file.write_text(json.dumps(content, indent=1) + "\n", encoding="utf-8")
-    if problems := load_scenario(file).problems:
-        file.unlink()
+    if problems := load_scenario(found).problems:
         raise InputError(problems)
+    content = extending_scenario(base, directory, name, f"{found.stem} with changes")
+    write_file(file, json.dumps(content, indent=1) + "\n")
     path = shlex.quote(str(file))
     click.echo(
         f"{file}\n\nPrint all keys that it can change:\n  cosim check {path} --expanded\nRun it:\n "

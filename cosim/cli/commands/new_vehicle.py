@@ -68,15 +68,16 @@ def vehicle(
     needed. With --urdf, the rotors, thrusters or propellers in the file of --from may have a "link"
     of the URDF file in place of position and axis.
     """
+    from ...results.files import write_file
+
     if not re.fullmatch(r"[A-Za-z_]\w*", name):
         raise InputError(f'"{name}" is not a name of a vehicle: expected letters, digits and "_"')
     file, source = directory / f"{name}.json", read_document(_find_vehicle(base))
     if file.exists() and not force:
         raise InputError([Problem("exists; --force overwrites it", str(file))])
     vehicle = _vehicle(source, name, urdf, mesh, mesh_scale)
-    directory.mkdir(parents=True, exist_ok=True)
     text = json.dumps(vehicle.data, indent=4) + "\n" if urdf or mesh else source.text
-    file.write_text(text, encoding="utf-8")
+    write_file(file, text)
     for warning in vehicle.warnings:
         click.echo(f"WARNING {warning}", err=True)
     build = shlex.join(["cosim", "build", str(file), "--output", str(file.with_suffix(".fmu"))])

@@ -145,6 +145,10 @@ def regress(
     folders = scenarios or [default_folder()]
     if not scenarios and folders != [Path("scenarios")]:
         click.echo("no folder scenarios/ here: the shipped scenarios are run", err=True)
+    if junit:
+        from ...results.files import check_output_file
+
+        check_output_file(junit.absolute())
     outcomes = []
     count = jobs or available_processors()
     for outcome in run_regressions(folders, update, output_dir, count, forked_commands):

@@ -1,12 +1,15 @@
-"""Settings of one FMU instance."""
+"""Settings of one FMU instance and of its worker process."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from fractions import Fraction
+from functools import partial
+from pathlib import Path
 from typing import Any, Literal
 
+from ...process.journal import Deadlines
 from .description import DefaultExperiment, FmuDescription
 from .preflight import Interface
 
@@ -96,3 +99,37 @@ class InstanceSettings:
             return {"method": "cvode", "tolerance": self.solver_tolerance(experiment)}
         step_size = self.solver_step_size(experiment)
         return {"method": self.method, "step_size": None if step_size is None else float(step_size)}
+
+
+@dataclass(frozen=True)
+class Isolation:
+    """Settings of a worker process.
+
+    Attributes:
+        deadlines: Largest wall times of calls into the FMU (s).
+        sandbox: Restrict the worker process: it reads only its own files and libraries, writes only
+            to its temporary folder, and has no network and no other processes.
+    """
+
+    deadlines: Deadlines = field(default_factory=Deadlines)
+    sandbox: bool = False
+
+    def worker_setup(self, fmu: Path, temporary: Path, importer: int) -> Callable[[], None]:
+        """Create the function that a worker process calls before it loads foreign code.
+
+        Args:
+            fmu: Folder of the extracted FMU.
+            temporary: Folder for temporary files of the FMU.
+            importer: Process id of the importer; the worker process ends with it.
+
+        Returns:
+            A function that enters the sandbox. It raises InputError if this system does not support
+            the required restrictions.
+        """
+        from ...process.sandbox import SandboxSettings, enter_sandbox, interpreter_folders
+
+        readable = (fmu, *interpreter_folders()) if self.sandbox else ()
+        settings = SandboxSettings(
+            readable=readable, writable=(temporary,), confine=self.sandbox, parent=importer
+        )
+        return partial(enter_sandbox, settings)

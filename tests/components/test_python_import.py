@@ -6,8 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from cosim.components.python_import import load_object, package_files
-from cosim.components.sibling_imports import read_with_relative_imports
+from cosim.components.python_import import load_object, package_files, read_with_relative_imports
 from cosim.core.errors import InputError
 
 MAIN = """\

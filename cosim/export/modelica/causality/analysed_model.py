@@ -1,18 +1,17 @@
-"""Roles of parameters.
-
-Settable, fixed or dependent, and the order in which dependent parameters are computed.
-"""
+"""Result of the analysis of a model: its schedule, the roles of its parameters and its default values."""
 
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from graphlib import CycleError, TopologicalSorter
+from typing import Any
 
-from ..model.flat_model import Model, Variable
+from ..model.evaluate import Evaluator, convert_to_type
+from ..model.flat_model import Model, Variable, is_input
 from ..model.syntax_tree import raise_model_error
 from ..model.traversal import variable_names
-from .schedule import Schedule
+from .schedule import Schedule, build_schedule, declared_value, start_value
 
 
 @dataclass(frozen=True)
@@ -102,3 +101,49 @@ def _is_open(parameter: Variable, model: Model) -> bool:
         or parameter.protected
         or parameter.name in model.structural
     )
+
+
+class AnalysedModel:
+    """A flat model with its schedule, the roles of its parameters and its default values.
+
+    Scalars are float, int or bool, arrays are NumPy arrays.
+
+    Args:
+        model: The flat model, with continuous states introduced.
+
+    Raises:
+        EvaluationError: A default value cannot be computed.
+        InputError: The model has structural errors, for example an algebraic loop.
+    """
+
+    def __init__(self, model: Model):
+        self.model = model
+        self.schedule = build_schedule(model)
+        self.parameter_roles = classify_parameters(model, self.schedule)
+        #: variable -> value
+        self.values: dict[str, Any] = {}
+        self.evaluate = Evaluator(model.functions, self.values)
+        for variable in model.variables.values():
+            self.assign(variable.name, 1 if variable.type == "Enumeration" else 0)
+        for name in (*self.parameter_roles.settable, *self.parameter_roles.fixed):
+            self.assign(name, self.evaluate(declared_value(model, name)))
+        self.update_dependent_parameters()
+        self.apply_start_values(inputs=True)
+
+    def assign(self, name: str, value: Any) -> None:
+        """Set a variable to a value of its type and shape."""
+        variable = self.model.variables[name]
+        self.values[name] = convert_to_type(value, variable.type, variable.shape)
+
+    def update_dependent_parameters(self) -> None:
+        """Compute the parameters that depend on others."""
+        for name in self.parameter_roles.dependent:
+            self.assign(name, self.evaluate(declared_value(self.model, name)))
+
+    def apply_start_values(self, inputs: bool) -> None:
+        """Set all variables that are not parameters to their start values; inputs only if `inputs`."""
+        for variable in self.model.variables.values():
+            if variable.variability not in ("parameter", "constant") and (
+                inputs or not is_input(variable)
+            ):
+                self.assign(variable.name, self.evaluate(start_value(self.model, variable.name)))

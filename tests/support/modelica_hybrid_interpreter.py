@@ -10,18 +10,29 @@ from collections.abc import Callable, Iterator, Sequence
 from typing import Any, NoReturn
 
 import numpy as np
+from modelica_interpreter import TICK_TOLERANCE, Interpreter
 
-from ....core.errors import ComponentError
-from ..model.arithmetic import EvaluationError, divide
-from ..model.flat_model import Model, derivative_name, is_input, is_integrated, previous_name
-from .dormand_prince import ERROR, NODES, WEIGHTS, weighted_sum
-from .hybrid import MAX_EVENTS, MAX_PASSES, chattering_reason, endless_reason, iterated_names
-from .interpreter import TICK_TOLERANCE, Interpreter
-from .past_values import PAST_VALUES, PastValues
+from cosim.core.errors import ComponentError
+from cosim.export.modelica.causality.analysed_model import AnalysedModel
+from cosim.export.modelica.causality.hybrid import (
+    MAX_EVENTS,
+    MAX_PASSES,
+    PAST_VALUES,
+    SAME_TIME,
+    chattering_reason,
+    endless_reason,
+    iterated_names,
+)
+from cosim.export.modelica.model.arithmetic import EvaluationError, divide
+from cosim.export.modelica.model.flat_model import (
+    Model,
+    derivative_name,
+    is_input,
+    is_integrated,
+    previous_name,
+)
 
 RELATIVE_TOLERANCE, ABSOLUTE_TOLERANCE = 1e-7, 1e-9
-#: events at a distance (s) up to this one are at the same time for clocked sample() operators
-SAME_TIME = 1e-9
 
 _COMPARISONS: dict[str, Callable[[float, float], bool]] = {
     "<": lambda a, b: a < b,
@@ -29,15 +40,67 @@ _COMPARISONS: dict[str, Callable[[float, float], bool]] = {
     ">": lambda a, b: a > b,
     ">=": lambda a, b: a >= b,
 }
+#: times of the stages, weights of the slopes of each stage, and those of the error, as fractions of
+#: the step
+NODES = (0.0, 1 / 5, 3 / 10, 4 / 5, 8 / 9, 1.0, 1.0)
+WEIGHTS: Sequence[Sequence[float]] = (
+    (),
+    (1 / 5,),
+    (3 / 40, 9 / 40),
+    (44 / 45, -56 / 15, 32 / 9),
+    (19372 / 6561, -25360 / 2187, 64448 / 6561, -212 / 729),
+    (9017 / 3168, -355 / 33, 46732 / 5247, 49 / 176, -5103 / 18656),
+    (35 / 384, 0.0, 500 / 1113, 125 / 192, -2187 / 6784, 11 / 84),
+)
+ERROR = (71 / 57600, 0.0, -71 / 16695, 71 / 1920, -17253 / 339200, 22 / 525, -1 / 40)
+
+
+class PastValues:
+    """Ring buffer of the values of the argument of a delay()."""
+
+    def __init__(self) -> None:
+        self._values: list[tuple[float, float]] = []
+
+    def record(self, time: float, value: float, spacing: float) -> None:
+        """Append a value; see `record_value` in past.h."""
+        values = self._values
+        if values and values[-1] == (time, value):
+            return
+        if (
+            len(values) > 1
+            and values[-1][0] < time
+            and time - values[-2][0] < spacing
+            and values[-2][0] < values[-1][0]
+        ):
+            values[-1] = (time, value)
+            return
+        values.append((time, value))
+        del values[:-PAST_VALUES]
+
+    def value(self, time: float) -> float:
+        """Return the value at a time by linear interpolation; see `past_value` in past.h."""
+        low, high, at = 0, len(self._values), time + 1e-12 * (1 + abs(time))
+        while high - low > 1:
+            middle = (low + high) // 2
+            if self._values[middle][0] <= at:
+                low = middle
+            else:
+                high = middle
+        start, value = self._values[low]
+        if low + 1 >= len(self._values) or time <= start:
+            return value
+        end, next_value = self._values[low + 1]
+        return value + (next_value - value) * ((time - start) / (end - start))
 
 
 class HybridInterpreter(Interpreter):
     """An instance of a model with event iteration."""
 
-    def __init__(self, model: Model):
+    def __init__(self, analysed: AnalysedModel):
+        super().__init__(analysed)
+        model = analysed.model
         assert model.hybrid
         self._hybrid = model.hybrid
-        super().__init__(model)
         self._inputs = [name for name in self._hybrid.remembered if is_input(model.variables[name])]
         self._states = list(_elements(model, model.states))
         self._rates = list(_elements(model, [derivative_name(name) for name in model.states]))
@@ -63,7 +126,7 @@ class HybridInterpreter(Interpreter):
         """
         self._step, self._event_time = 0.0, -math.inf
         self._past[:] = [PastValues() for _ in self._hybrid.delays]
-        self._apply_start_values(inputs=False)
+        self.apply_start_values(inputs=False)
         self.evaluate.previous_conditions.clear()
         self._start_clocks(time)
         self.values["time"] = time
@@ -334,3 +397,12 @@ def _elements(model: Model, names: Sequence[str]) -> Iterator[tuple[str, int | N
 def _element(values: Any, key: tuple[str, int | None]) -> float:
     name, index = key
     return float(values[name] if index is None else values[name].flat[index])
+
+
+def weighted_sum(weights: Sequence[float], slopes: Sequence[Sequence[float]], index: int) -> float:
+    """Return the sum of the slopes of a state, each with its weight."""
+    total = 0.0
+    for weight, row in zip(weights, slopes, strict=True):
+        if weight:
+            total += weight * row[index]
+    return total
