@@ -21,7 +21,6 @@ from .vehicles.multirotor.airframe import MAX_ROTORS, MultirotorReader
 from .vehicles.otter import interface as otter_interface
 from .vehicles.otter import parameters as otter
 from .vehicles.otter import parameters as otter_parameters
-from .vehicles.otter_mss import interface as otter_mss_interface
 from .vehicles.planar_vessel import interface as planar_vessel_interface
 from .vehicles.planar_vessel.planar_vessel import PlanarVesselReader
 from .vehicles.strider import interface as strider_interface
@@ -56,7 +55,6 @@ def multirotor_model(name: str, data: Mapping[str, Any]) -> Model:
         multirotor_interface.states(MAX_ROTORS),
         vehicle.body(),
         vehicle.crash_speed,
-        constant_count=multirotor_interface.constant_count(airframe, MAX_ROTORS),
         airframe=airframe,
         body_of=lambda given: vehicle.body(mass=given["mass"], inertia=inertia_of(given)),
         equations="multirotor",
@@ -74,7 +72,6 @@ def submerged_model(name: str, data: Mapping[str, Any]) -> Model:
         submerged_interface.states(MAX_THRUSTERS),
         vehicle.body(),
         vehicle.crash_speed,
-        constant_count=submerged_interface.constant_count(craft, MAX_THRUSTERS),
         craft=craft,
         body_of=lambda given: vehicle.body(mass=given["mass"], inertia=inertia_of(given)),
         equations="submerged",
@@ -93,7 +90,6 @@ def surface_vessel_model(name: str, data: Mapping[str, Any]) -> Model:
         vehicle.body(),
         vehicle.crash_speed,
         is_vessel=True,
-        constant_count=surface_vessel_interface.constant_count(SLOTS),
         boat=vessel,
         body_of=lambda given: vehicle.body(mass=given["mass"], inertia=inertia_of(given)),
         equations="surface_vessel",
@@ -113,7 +109,6 @@ def planar_vessel_model(name: str, data: Mapping[str, Any]) -> Model:
         vehicle.crash_speed,
         is_vessel=True,
         motion="planar",
-        constant_count=planar_vessel_interface.constant_count(SLOTS),
         boat=vessel,
         body_of=lambda given: vehicle.body(mass=given["mass"], yaw_inertia=given["yaw_inertia"]),
         equations="planar_vessel",
@@ -180,7 +175,6 @@ MODELS = {
             strider_parameters.CRASH_SPEED,
             is_vessel=True,
             motion="planar",
-            constant_count=strider_interface.CONSTANT_COUNT,
             hulls=strider_interface.HULLS,
         ),
         Model(
@@ -191,7 +185,6 @@ MODELS = {
             strider_parameters.CRASH_SPEED,
             is_vessel=True,
             vehicle="strider",
-            constant_count=strider_6dof_interface.CONSTANT_COUNT,
             hulls=strider_interface.HULLS,
         ),
         Model(
@@ -201,7 +194,6 @@ MODELS = {
             otter.BODY,
             otter_parameters.CRASH_SPEED,
             is_vessel=True,
-            constant_count=otter_interface.CONSTANT_COUNT,
         ),
         Model(
             "otter_mss",
@@ -210,7 +202,6 @@ MODELS = {
             otter.BODY,
             otter_parameters.CRASH_SPEED,
             is_vessel=True,
-            constant_count=otter_mss_interface.CONSTANT_COUNT,
         ),
     )
 }

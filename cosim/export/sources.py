@@ -10,7 +10,7 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..components.sibling_imports import with_imported_siblings
+from ..components.python_import import with_imported_siblings
 from ..core import resources
 from ..core.errors import CosimError, InputError, Problem
 from .fmu.block import Block
@@ -158,9 +158,10 @@ SOURCE_KINDS = (
 
 
 def find_sources(root: Path) -> list[Source]:
-    """Return all sources below `root`, sorted by the names of their FMUs.
+    """Return all sources below `root`, sorted by the names of their FMUs; Python classes come last.
 
-    Files whose names begin with an underscore are ignored.
+    Files whose names begin with an underscore are ignored. The plant as a Python class runs the
+    equations of other FMUs when it is exported, so these are built before.
 
     Raises:
         InputError: Two sources have the same FMU name.
@@ -183,7 +184,7 @@ def find_sources(root: Path) -> list[Source]:
                 for a, b in clashes
             ]
         )
-    return sources
+    return sorted(sources, key=lambda source: source.kind.load_block is None)
 
 
 def vehicle_files(root: Path) -> dict[str, Path]:

@@ -6,7 +6,7 @@ from typing import Any, Literal
 
 from pydantic import ConfigDict, model_validator
 
-from ..components.fmi.instance_settings import Method
+from ..components.fmi.settings import Method
 from .schema_types import Period, Spec, Value, key
 
 #: keys of the sources of a component

@@ -28,7 +28,7 @@ from matplotlib.figure import Figure
 from quick_compiler import compile_without_optimization
 
 from cosim.cli import main
-from cosim.components.fmi import file_cache
+from cosim.components.fmi import file
 from cosim.components.python_import import load_object
 from cosim.core import resources
 from cosim.engine import ExecutorKind, executor_class, plan_run
@@ -36,7 +36,7 @@ from cosim.report.figures import figure_style, figure_to_svg
 
 PRELOADED = (
     "api.single_fmu",
-    "components.conformance",
+    "components.python_class",
     "components.fmi",
     "components.input_table",
     "components.python_fmu",
@@ -53,7 +53,7 @@ PRELOADED = (
     ),
     "cli.bench_output",
     "cli.messages",
-    "components.fmi.isolated.isolated_fmu",
+    "components.fmi.isolated",
     "process.sandbox.bubblewrap",
     "process.supervised_child",
     "process.supervisor",
@@ -228,7 +228,7 @@ def run_observed(arguments: list[str]) -> None:
     try:
         main(arguments)
     finally:
-        file_cache.remove_idle_folders()
+        file.remove_idle_folders()
         after = process_state()
         report.write_text(
             "\n".join(

@@ -21,7 +21,7 @@ from ...components.fmi import FmuFile, Interface
 from ...components.fmi.preflight import open_regular_file
 from ...components.fmi.preflight.archive import Archive
 from ...components.fmi.preflight.findings import DESCRIPTION_FILE, FatalFindingError
-from ...components.fmi.preflight.fmu_platform import current_platform
+from ...components.fmi.preflight.platforms import current_platform
 from ...components.fmi.preflight.xml import parse_xml
 from ...core.errors import InputError, did_you_mean
 from ..cache import cached_file

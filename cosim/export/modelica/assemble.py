@@ -14,13 +14,12 @@ from ...core.errors import InputError, Problem, abbreviate_names
 from ..fmu.block import Block, BlockVariable, Exchange
 from .c_code import generate_c
 from .c_code.exchange_code import has_exchange, indicator_count
+from .causality.analysed_model import AnalysedModel
 from .causality.clock_inference import clock_parameters
 from .causality.clocked_partitions import resolve_clocks
 from .causality.continuous_states import introduce_derivatives, reduce_states
 from .causality.equation_systems import SingularError
 from .causality.hybrid import prepare_hybrid
-from .causality.hybrid_interpreter import HybridInterpreter
-from .causality.interpreter import Interpreter
 from .external.c_files import external_archives
 from .external.shared_library import callable_functions
 from .fmi_variables import FMI_TYPES, block_variables
@@ -55,27 +54,26 @@ def load_block(
             and line.
     """
     with _refusing_deep_nesting(path):
-        return _load_block(path, model, options)
+        return _block(*analyse_file(path, model, options))
 
 
-def _load_block(path: Path, model: str | None, options: ModelicaOptions) -> Block:
-    defaults, sources = _flatten(path, model, options)
+def _block(analysed: AnalysedModel, sources: ModelicaSources) -> Block:
     folder = _source_root(sources.used)
     names = {str(file.relative_to(folder)): file for file in sources.used}
     return Block(
-        identifier=re.sub(r"\W", "_", defaults.model.name.rpartition(".")[2]),
-        description=defaults.model.description,
-        variables=block_variables(defaults),
+        identifier=re.sub(r"\W", "_", analysed.model.name.rpartition(".")[2]),
+        description=analysed.model.description,
+        variables=block_variables(analysed),
         step_size=min(
-            (float(defaults.evaluate(clock.period)) for clock in defaults.schedule.clocks),
+            (float(analysed.evaluate(clock.period)) for clock in analysed.schedule.clocks),
             default=_DEFAULT_STEP_SIZE,
         ),
-        files=generate_c(defaults, sorted(names), sources.packages),
+        files=generate_c(analysed, sorted(names), sources.packages),
         resources=names,
         archives=external_archives(
-            (f for f in defaults.model.functions.values() if f.external), sources.packages
+            (f for f in analysed.model.functions.values() if f.external), sources.packages
         ),
-        exchange=_exchange(defaults.model) if has_exchange(defaults.model) else None,
+        exchange=_exchange(analysed.model) if has_exchange(analysed.model) else None,
     )
 
 
@@ -97,10 +95,10 @@ def _exchange(model: Model) -> Exchange:
     )
 
 
-def load_interpreter(
+def analyse_file(
     path: Path, model: str | None = None, options: ModelicaOptions = DEFAULT_OPTIONS
-) -> Interpreter:
-    """Create an interpreter of a Modelica model with default parameters.
+) -> tuple[AnalysedModel, ModelicaSources]:
+    """Return a model of a Modelica file after causality analysis, and its sources.
 
     Args:
         path: The Modelica file.
@@ -111,7 +109,7 @@ def load_interpreter(
         InputError: The model has errors or uses unsupported features.
     """
     with _refusing_deep_nesting(path):
-        return _flatten(path, model, options)[0]
+        return _flatten(path, model, options)
 
 
 @contextmanager
@@ -129,7 +127,7 @@ def _refusing_deep_nesting(path: Path) -> Iterator[None]:
 
 def _flatten(
     path: Path, model: str | None, options: ModelicaOptions
-) -> tuple[Interpreter, ModelicaSources]:
+) -> tuple[AnalysedModel, ModelicaSources]:
     try:
         json, sources = flatten_model(Path(path), model, options)
     except InputError as error:
@@ -141,8 +139,8 @@ def _flatten(
     return analyse(json, sources, model or Path(path).stem), sources
 
 
-def analyse(json: Mapping[str, Any], sources: ModelicaSources, name: str) -> Interpreter:
-    """Convert the document of the front end to an interpreter of the model."""
+def analyse(json: Mapping[str, Any], sources: ModelicaSources, name: str) -> AnalysedModel:
+    """Convert the document of the front end to an analysed model."""
     flat = ModelReader(json, sources).read_model(name)
     structural = (
         flat.structural
@@ -162,7 +160,7 @@ def analyse(json: Mapping[str, Any], sources: ModelicaSources, name: str) -> Int
     )
     _check_types(flat)
     try:
-        return HybridInterpreter(flat) if flat.hybrid else Interpreter(flat)
+        return AnalysedModel(flat)
     except EvaluationError as error:
         where = str(sources.files[0]) if sources.files else ""
         raise InputError(

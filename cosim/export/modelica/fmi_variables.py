@@ -14,7 +14,7 @@ from ...core.errors import InputError, Problem, abbreviate_names
 from ...core.units import parse_unit
 from ..fmu.block import BlockVariable
 from .c_code.header import struct_members
-from .causality.interpreter import Interpreter
+from .causality.analysed_model import AnalysedModel
 from .model.flat_model import Model, Variable, is_input
 from .model.syntax_tree import raise_model_error
 
@@ -67,34 +67,34 @@ FMI_TYPES = {
 }
 
 
-def block_variables(defaults: Interpreter) -> list[BlockVariable]:
+def block_variables(analysed: AnalysedModel) -> list[BlockVariable]:
     """Return the variables of the FMU.
 
     Raises:
         InputError: An input or output has an unknown unit, or enumerations have the same name.
     """
-    names = struct_members(defaults.model)
+    names = struct_members(analysed.model)
     roles = [
-        (v, role) for v in defaults.model.variables.values() if (role := _fmi_role(v, defaults))
+        (v, role) for v in analysed.model.variables.values() if (role := _fmi_role(v, analysed))
     ]
     dropped = check_units(roles)
     known = ((replace(v, unit="") if v.unit in dropped else v, role) for v, role in roles)
-    return [_block_variable(v, names[v.name], role, defaults) for v, role in known]
+    return [_block_variable(v, names[v.name], role, analysed) for v, role in known]
 
 
-def _fmi_role(variable: Variable, defaults: Interpreter) -> FmiRole | None:
+def _fmi_role(variable: Variable, analysed: AnalysedModel) -> FmiRole | None:
     """Return causality and variability of a variable in the FMU, or None if the FMU does not contain it.
 
     The FMU contains the inputs and outputs of the model itself, and all parameters that are neither protected nor set by a
     modifier. Structural parameters are constants. The FMU of a model with states, event iteration or a library contains all
     other variables too.
     """
-    roles = defaults.parameter_roles
+    roles = analysed.parameter_roles
     if variable.type == "ExternalObject":
         return None
     if variable.name in roles.settable:
         return "parameter", "fixed" if variable.name in roles.clock_parameters else "tunable"
-    if variable.name in defaults.model.structural and not variable.protected:
+    if variable.name in analysed.model.structural and not variable.protected:
         return "local", "constant"
     if variable.variability == "parameter":
         return (
@@ -103,14 +103,14 @@ def _fmi_role(variable: Variable, defaults: Interpreter) -> FmiRole | None:
             else ("calculatedParameter", "tunable")
         )
     continuous = variable.type == "Real" and bool(
-        defaults.model.states or not defaults.schedule.clocks
+        analysed.model.states or not analysed.schedule.clocks
     )
     if is_input(variable):
         return "input", "continuous" if variable.type == "Real" else "discrete"
     if variable.causality == "output" and variable.top_level:
         return "output", "continuous" if continuous else "discrete"
     if (
-        (defaults.model.hybrid or defaults.model.uses_library or defaults.model.states)
+        (analysed.model.hybrid or analysed.model.uses_library or analysed.model.states)
         and not variable.name.startswith(("$", "pre("))
         and 0 not in variable.shape
     ):
@@ -122,7 +122,7 @@ def _fmi_role(variable: Variable, defaults: Interpreter) -> FmiRole | None:
 
 
 def _block_variable(
-    variable: Variable, member: str, role: FmiRole, defaults: Interpreter
+    variable: Variable, member: str, role: FmiRole, analysed: AnalysedModel
 ) -> BlockVariable:
     return BlockVariable(
         name=variable.name,
@@ -130,17 +130,17 @@ def _block_variable(
         type=FMI_TYPES[variable.type],
         causality=role[0],
         variability=role[1],
-        start=_to_python(defaults.get(variable.name)),
+        start=_to_python(analysed.values[variable.name]),
         unit=variable.unit,
         shape=variable.shape,
         description=variable.description,
         minimum=None
         if variable.minimum is None
-        else float(np.min(defaults.evaluate(variable.minimum))),
+        else float(np.min(analysed.evaluate(variable.minimum))),
         maximum=None
         if variable.maximum is None
-        else float(np.max(defaults.evaluate(variable.maximum))),
-        enumeration=tuple((literal, "") for literal in _literals(variable, defaults.model)),
+        else float(np.max(analysed.evaluate(variable.maximum))),
+        enumeration=tuple((literal, "") for literal in _literals(variable, analysed.model)),
         type_name=variable.enumeration,
         quantity=variable.quantity,
     )

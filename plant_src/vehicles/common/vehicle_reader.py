@@ -10,7 +10,7 @@ source:
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import product
 from typing import Any, ClassVar, Generic, Protocol, TypeVar
@@ -354,7 +354,7 @@ class VehicleReader(QuantityReader, Generic[_Vehicle]):
 
     keys: Sequence[str]
     optional_keys: Sequence[str]
-    vehicle_class: type[_Vehicle]
+    vehicle_class: Callable[..., _Vehicle]
 
     def read_values(self, data: Mapping[str, Any]) -> dict[str, Any]:
         """Read the attributes of the vehicle without its name, and its collision shape "boxes"."""

@@ -50,7 +50,7 @@ from cosim.export.equations.fmu_code import as_block
 from cosim.export.equations.model import ContinuousModel, runge_kutta_4
 from cosim.export.fmu.block import Block
 
-from ..common import contact_maps
+from ..common.contact_maps import FreeContactMaps, create_symbols
 from ..common.interface import WORLD_OUTPUTS
 from ..common.named_values import ConstantsMap, NamedValues, values_by_name, variables_of
 from ..common.rigid_body import (
@@ -288,9 +288,8 @@ def free_step(equations: MultirotorEquations) -> Callee:
     for name, (rows, columns) in equations.constants.shapes.items():
         names += [name] * rows * columns
     state_count = len(states(equations.slots))
-    arguments = contact_maps.create_symbols(
-        state=state_count, inputs=len(inputs), constants=len(names), step=1
-    )
+    sizes = {"state": state_count, "inputs": len(inputs), "constants": len(names), "step": 1}
+    arguments = [*create_symbols(**sizes).values()]
     plain = ca.Function("plain_step", arguments, [equations.step_without_effects(*arguments)])
     full = ca.Function("step_with_effects", arguments, [equations.step_with_effects(*arguments)])
     wet = ca.Function("step_in_water", arguments, [equations.step_in_water(*arguments)])
@@ -362,9 +361,7 @@ def multirotor_block(airframe: Airframe, description: str, rotor_slots: int | No
         callees=[step, *functions.callees, surroundings_callee, SURFACE_SUM],
         free_step=step.function,
     )
-    maps = contact_maps.FreeContactMaps(
-        model, lambda c: rigid_body(equations.constants.by_name(c)), motion_of_state
-    )
+    maps = FreeContactMaps(model, lambda c: rigid_body(equations.constants.by_name(c)))
     return as_block(model, [*maps.functions(), surroundings])
 
 

@@ -12,7 +12,6 @@ from dataclasses import replace
 from cosim.core.component import Variable
 from cosim.core.units import parse_unit
 
-from ..common.element_labels import element_labels
 from ..common.inertia import inertia_variables
 from ..common.interface import (
     CURRENT_INPUTS,
@@ -24,6 +23,7 @@ from ..common.interface import (
     WATER_LEVEL_INPUT,
     WIND_INPUTS,
     WORLD_OUTPUTS,
+    element_labels,
     initial_variables,
     scalar_variable,
 )
@@ -74,17 +74,6 @@ def states(rotor_slots: int) -> tuple[str, ...]:
 def table_rows(rotor_slots: int) -> int:
     """Return the number of rows of the table of rotors."""
     return -(-rotor_slots // _TABLE_ROW_MULTIPLE) * _TABLE_ROW_MULTIPLE
-
-
-def constant_count(airframe: Airframe, rotor_slots: int) -> int:
-    """Return the number of constants that the equations derive from the parameters (`multirotor_equations.derive_constants`)."""
-    parameters = (
-        variable
-        for variable in variables(airframe, rotor_slots)
-        if variable.causality == "parameter"
-    )
-    given = sum(len(variable.scalar_names) for variable in parameters)
-    return given + 11 + ROTOR_TABLE_COLUMNS * table_rows(rotor_slots) + 9 * rotor_slots
 
 
 def _rigid_body_variables(airframe: Airframe) -> tuple[Variable, ...]:

@@ -241,7 +241,7 @@ def create_reductions(slots: int) -> Callee:
     z = ca.fmax(height, MIN_HEIGHT_RATIO * radius)
     reductions = []
     for i in range(slots):
-        reduction = 0
+        reduction = ca.SX(0)
         for j in range(slots):
             d2 = (x[i] - x[j]) ** 2 + (y[i] - y[j]) ** 2 + 4 * z**2
             reduction += ca.if_else(count > j, radius**2 / 2 * z / (d2 * ca.sqrt(d2)), 0)

@@ -7,13 +7,10 @@ from functools import partial
 import casadi as ca
 
 from cosim.export.equations.c_code import call_in_c
-from cosim.export.equations.fmu_code import as_block
 from cosim.export.fmu.block import Block
 
 from ..common import kinematics
 from ..common.named_values import NamedValues, initial_parameters
-from ..vessel import vessel_equations
-from ..vessel import vessel_equations as floating_maps
 from ..vessel.hull import (
     Ballast,
     Frame,
@@ -26,6 +23,7 @@ from ..vessel.hull import (
     weight_and_buoyancy,
 )
 from ..vessel.strips import STATION_COUNT, STRIP_COUNT, Box, TwinHull, equivalent_strips, immersion
+from ..vessel.vessel_equations import VesselModel, constant_body, floating_block, wave_table_of
 from . import parameters as p
 from .interface import PROPELLER_STATES, VARIABLES
 from .loads import (
@@ -132,7 +130,7 @@ def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
         "drag": cross_flow_drag(volume / (2 * p.BLOCK_COEFFICIENT * p.PONTOON_BEAM * p.LENGTH)),
         "propeller_time_constant": parameters["propeller_time_constant"],
         "wave.count": parameters["wave.count"],
-        "wave_table": vessel_equations.wave_table_of(parameters, pontoons),
+        "wave_table": wave_table_of(parameters, pontoons),
         "equilibrium": equilibrium,
     }
 
@@ -214,7 +212,7 @@ def water_loads(constants: NamedValues, now: LoadArguments) -> ca.SX:
     return ca.vertcat(to_level @ static[0:3], to_level @ static[3:6]) + under_water.wetness * moving
 
 
-VESSEL = vessel_equations.VesselModel(
+VESSEL = VesselModel(
     "otter",
     "Maritime Robotics Otter with a landing deck, afloat",
     VARIABLES,
@@ -226,10 +224,4 @@ VESSEL = vessel_equations.VesselModel(
 
 def block() -> Block:
     """Return the Otter for export."""
-    model = otter_model(VESSEL)
-    return as_block(
-        model,
-        floating_maps.FloatingContactMaps(
-            model, VESSEL, floating_maps.constant_body(BODY)
-        ).functions(),
-    )
+    return floating_block(otter_model(VESSEL), VESSEL, constant_body(BODY))

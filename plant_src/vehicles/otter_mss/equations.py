@@ -7,7 +7,6 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from cosim.export.equations.fmu_code import as_block
 from cosim.export.fmu.block import Block
 
 from ..common import kinematics
@@ -26,10 +25,9 @@ from ..otter.loads import (
 )
 from ..otter.parameters import BODY
 from ..vessel import hull as vessel
-from ..vessel import vessel_equations
-from ..vessel import vessel_equations as floating_maps
 from ..vessel.hull import Frame, Hull, LoadArguments, load_of_force_at, transformation_matrix
 from ..vessel.strips import TwinHull, equivalent_strips
+from ..vessel.vessel_equations import VesselModel, constant_body, floating_block, wave_table_of
 
 
 @dataclass(frozen=True)
@@ -78,7 +76,7 @@ def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
     payload, own = parameters["payload_mass"], mass_properties(parameters)
     added = added_mass(own.inertia)
     mass_matrix = vessel.rigid_body_mass_matrix(own.mass, own.centre, own.inertia) + ca.diag(added)
-    floating = hydrostatics.hydrostatics(own.mass, own.centre)
+    floating = hydrostatics(own.mass, own.centre)
     constants = {
         **initial_parameters(parameters),
         "mass": own.mass,
@@ -95,7 +93,7 @@ def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
         "payload_position": parameters["payload_position"],
         "propeller_time_constant": parameters["propeller_time_constant"],
         "wave.count": parameters["wave.count"],
-        "wave_table": vessel_equations.wave_table_of(parameters, _twin_hull(floating.mean_draught)),
+        "wave_table": wave_table_of(parameters, _twin_hull(floating.mean_draught)),
     }
     return constants | {"equilibrium": _equilibrium(constants)}
 
@@ -182,7 +180,7 @@ def restoring(constants: NamedValues, now: LoadArguments) -> ca.SX:
     return ca.vertcat(0, 0, load, 0)
 
 
-VESSEL = vessel_equations.VesselModel(
+VESSEL = VesselModel(
     "otter_mss",
     "Maritime Robotics Otter of MSS with linear restoring",
     VARIABLES,
@@ -194,10 +192,4 @@ VESSEL = vessel_equations.VesselModel(
 
 def block() -> Block:
     """Return the Otter of MSS for export."""
-    model = otter_model(VESSEL)
-    return as_block(
-        model,
-        floating_maps.FloatingContactMaps(
-            model, VESSEL, floating_maps.constant_body(BODY)
-        ).functions(),
-    )
+    return floating_block(otter_model(VESSEL), VESSEL, constant_body(BODY))

@@ -1,4 +1,17 @@
-"""Equations of motion of a vessel in the horizontal plane that is given by data."""
+"""Equations of motion of a vessel in the horizontal plane that is given by data.
+
+State: position of the centre of mass (m, world frame), yaw angle, surge and sway velocity of the
+centre of mass, yaw rate, and propeller speeds. With nu = (u, v, r) of the origin O, the current
+nu_c in body axes and nu_r = nu - nu_c (Fossen 2021, Handbook of Marine Craft Hydrodynamics and
+Motion Control, 2nd edition, chapters 3 and 6, in the axes forward-left-up):
+
+    (M_RB + M_A) (nu' - nu_c') = tau - C_RB nu_r - C_A(nu_r) nu_r - D nu_r
+                                 - (|u_r| D_u + |v_r| D_v + |r| D_r) nu_r - d nu_r^3
+    nu_c' = (r v_c, -r u_c, 0)
+
+tau are the loads of propellers, rudders and air, and the external load at the centre of mass. One
+binary holds the equations of all planar vessels; all values are parameters.
+"""
 
 from __future__ import annotations
 
@@ -15,10 +28,15 @@ from cosim.export.fmu.block import Block
 from ..common import kinematics
 from ..common.elementary_functions import sine_and_cosine
 from ..common.interface import WORLD_OUTPUTS
-from ..common.named_values import ConstantsMap, NamedValues, values_by_name, variables_of
+from ..common.named_values import (
+    ConstantsMap,
+    NamedValues,
+    square_matrix,
+    values_by_name,
+    variables_of,
+)
 from ..vessel import planar_maps, propulsion
 from ..vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS, Propeller
-from ..vessel.called_rate import with_called_rate
 from .interface import states, variables
 from .planar_vessel import PlanarVessel
 
@@ -81,7 +99,7 @@ class PlanarEquations:
                 known["mass"], known["yaw_inertia"], known["height"] + known["centre_of_mass"][2]
             )
 
-        model = with_called_rate(self.model)
+        model = self.model.with_called_derivatives()
         return as_block(model, planar_maps.PlanarContactMaps(model, body, self.observe).functions())
 
 
@@ -96,13 +114,8 @@ def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
         **{name: value for name, value in parameters.items() if name != "rudder_propeller"},
         **propulsion.derive_races(parameters),
         "rigid_body_mass": rigid,
-        "inverse_mass_matrix": ca.inv(rigid + _matrix(parameters["added_mass"])),
+        "inverse_mass_matrix": ca.inv(rigid + square_matrix(parameters["added_mass"])),
     }
-
-
-def _matrix(elements: ca.SX) -> ca.SX:
-    """Return the matrix (3, 3) whose rows follow each other in `elements`."""
-    return ca.reshape(elements, 3, 3).T
 
 
 def rate(state: ca.SX, inputs: NamedValues, constants: NamedValues) -> ca.SX:
@@ -119,9 +132,8 @@ def rate(state: ca.SX, inputs: NamedValues, constants: NamedValues) -> ca.SX:
     load = water_loads(actuators, relative, inputs, constants) + air_load(air, constants)
     load += _load_at(constants["centre_of_mass"], to_body @ inputs["external_force"][0:2])
     load += ca.vertcat(0, 0, inputs["external_torque.z"])
-    load -= coriolis(constants["rigid_body_mass"], relative) + coriolis(
-        _matrix(constants["coriolis_added_mass"]), relative
-    )
+    added = square_matrix(constants["coriolis_added_mass"])
+    load -= coriolis(constants["rigid_body_mass"], relative) + coriolis(added, relative)
     acceleration = constants["inverse_mass_matrix"] @ load + current_rate(current, r)
     yaw_acceleration = acceleration[2]
     centre = acceleration[0:2] + yaw_acceleration * ca.vertcat(-y, x)
@@ -132,12 +144,15 @@ def rate(state: ca.SX, inputs: NamedValues, constants: NamedValues) -> ca.SX:
 
 
 def current_rate(current: ca.SX, r: ca.SX) -> ca.SX:
-    """Return the time derivative of a steady current in body axes (m/s2), because the vessel turns with the rate r (rad/s)."""
+    """Return the time derivative of a steady current in the axes of a turning vessel (m/s2).
+
+    The vessel turns with the rate r (rad/s).
+    """
     return ca.vertcat(r * current[1], -r * current[0], 0)
 
 
 def coriolis(mass: ca.SX, nu: ca.SX) -> ca.SX:
-    """Return C(nu) nu of a mass matrix (3, 3)."""
+    """Return C(nu) nu of a mass matrix (3, 3) (Fossen 2021, section 3.3, in three velocities)."""
     momentum = mass @ nu
     return ca.vertcat(
         -nu[2] * momentum[1], nu[2] * momentum[0], nu[0] * momentum[1] - nu[1] * momentum[0]
@@ -148,11 +163,10 @@ def water_loads(
     actuators: ca.SX, relative: ca.SX, inputs: NamedValues, constants: NamedValues
 ) -> ca.SX:
     """Return the load (X, Y, N) about O of water, propellers and rudders."""
-    load = _matrix(constants["linear_damping"]) @ relative
+    load = square_matrix(constants["linear_damping"]) @ relative
     for k, letter in enumerate("uvr"):
-        load += ca.fabs(relative[k]) * (
-            _matrix(constants[f"quadratic_damping.{letter}"]) @ relative
-        )
+        matrix = square_matrix(constants[f"quadratic_damping.{letter}"])
+        load += ca.fabs(relative[k]) * (matrix @ relative)
     load += ca.vertcat(*(constants[f"cubic_damping.{letter}"] for letter in "uvr")) * relative**3
     speed = propulsion.speeds(actuators, inputs, constants)
     flow = ca.vertcat(relative[0:2], 0, 0, 0, relative[2])
@@ -164,7 +178,7 @@ def water_loads(
 
 
 def air_load(air: ca.SX, constants: NamedValues) -> ca.SX:
-    """Return the load (X, Y, N) about O of the air for a velocity relative to it (m/s, shape (2,))."""
+    """Return the load (X, Y, N) about O of the air for a velocity relative to it (m/s, (2,))."""
     return _load_at(constants["air_centre"], -constants["air_drag"] * ca.fabs(air) * air)
 
 

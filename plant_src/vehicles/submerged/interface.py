@@ -15,7 +15,6 @@ import numpy as np
 from cosim.core.component import Variable
 from cosim.core.units import parse_unit
 
-from ..common.element_labels import element_labels
 from ..common.inertia import inertia_variables
 from ..common.interface import (
     CURRENT_INPUTS,
@@ -24,6 +23,7 @@ from ..common.interface import (
     MOTION_OUTPUTS,
     WATER_LEVEL_INPUT,
     WORLD_OUTPUTS,
+    element_labels,
     initial_variables,
     scalar_variable,
 )
@@ -61,21 +61,6 @@ def variables(craft: Craft, thruster_slots: int | None = None) -> tuple[Variable
 def states(thruster_slots: int) -> tuple[str, ...]:
     """Return the names of the states: those of the rigid body, then the thruster speeds."""
     return (*FREE_STATES, *(f"thruster_speed[{number}]" for number in range(1, thruster_slots + 1)))
-
-
-def constant_count(craft: Craft, thruster_slots: int) -> int:
-    """Return the number of constants that the equations derive from the parameters (`submerged_equations.derive_constants`)."""
-    parameters = (
-        variable
-        for variable in variables(craft, thruster_slots)
-        if variable.causality == "parameter"
-    )
-    return (
-        sum(len(variable.scalar_names) for variable in parameters)
-        + 9
-        + 3 * OCTANTS
-        + 6 * thruster_slots
-    )
 
 
 def _water_parameters(craft: Craft) -> Iterator[Variable]:

@@ -1,23 +1,25 @@
-"""Loads of a floating vessel that is given by data."""
+"""Loads of a floating vessel that is given by data.
+
+`vessel/hull.py` has the equations of motion, README.md the loads. One binary holds the equations of
+all floating vessels; all values are parameters.
+"""
 
 from __future__ import annotations
 
 from functools import cached_property
+from itertools import product
 
 import casadi as ca
 import numpy as np
 
 from cosim.core.component import Variable
 from cosim.export.equations.c_code import call_in_c
-from cosim.export.equations.fmu_code import as_block
 from cosim.export.fmu.block import Block
 
-from ..common.named_values import NamedValues
+from ..common.named_values import NamedValues, square_matrix
 from ..common.rigid_body import symmetric_matrix
-from ..vessel import propulsion, vessel_equations
-from ..vessel import vessel_equations as floating_maps
+from ..vessel import propulsion
 from ..vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS, Propeller
-from ..vessel.called_rate import with_called_rate
 from ..vessel.hull import (
     Ballast,
     Hull,
@@ -28,6 +30,7 @@ from ..vessel.hull import (
     weight_and_buoyancy,
 )
 from ..vessel.strips import GRAVITY, Strips, TwinHull, equivalent_strips, immersion
+from ..vessel.vessel_equations import BulletBody, VesselModel, floating_block, wave_table_of
 from .interface import states, variables
 from .surface_vessel import HullForm, SurfaceVessel
 
@@ -40,29 +43,30 @@ _EQUILIBRIUM_STEPS = 40
 #: parameters that are no constants of the equations, because others are derived from them
 _REPLACED = (
     "rudder_propeller",
-    *(f"wave.{name}" for name in ("amplitude", "frequency", "direction", "phase")),
+    "wave.amplitude",
+    "wave.frequency",
+    "wave.direction",
+    "wave.phase",
 )
 
 
 #: constants that determine the equilibrium
 _HYDROSTATICS = (
-    *(
-        "mass",
-        "water_density",
-        "centre_of_mass.x",
-        "centre_of_mass.y",
-        "centre_of_mass.z",
-        "transverse_moment",
-    ),
-    *(
-        "longitudinal_moment",
-        "waterplane_area",
-        "waterplane_centre",
-        "strip_beam",
-        "hull_depth",
-        "hull_bottom",
-    ),
-    *("strip_spacing", "strip_offset", "draught"),
+    "mass",
+    "water_density",
+    "centre_of_mass.x",
+    "centre_of_mass.y",
+    "centre_of_mass.z",
+    "transverse_moment",
+    "longitudinal_moment",
+    "waterplane_area",
+    "waterplane_centre",
+    "strip_beam",
+    "hull_depth",
+    "hull_bottom",
+    "strip_spacing",
+    "strip_offset",
+    "draught",
 )
 
 
@@ -83,9 +87,9 @@ class FloatingEquations:
         self.slots, self.identifier, self.description = slots, identifier, description
 
     @cached_property
-    def model(self) -> vessel_equations.VesselModel:
+    def model(self) -> VesselModel:
         """Model of the vessel."""
-        return vessel_equations.VesselModel(
+        return VesselModel(
             self.identifier,
             self.description,
             self.variables,
@@ -98,15 +102,13 @@ class FloatingEquations:
 
     def block(self) -> Block:
         """Return the vessel for export: its FMU and the contact functions of the world."""
-        model = with_called_rate(self.model.create_continuous_model())
+        model = self.model.create_continuous_model().with_called_derivatives()
 
-        def body(constants: ca.SX) -> floating_maps.BulletBody:
+        def body(constants: ca.SX) -> BulletBody:
             known = self.model.constants.by_name(constants)
-            return floating_maps.BulletBody(known["mass"], ca.diag(known["inertia_tensor"]))
+            return BulletBody(known["mass"], ca.diag(known["inertia_tensor"]))
 
-        return as_block(
-            model, floating_maps.FloatingContactMaps(model, self.model, body).functions()
-        )
+        return floating_block(model, self.model, body)
 
 
 def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
@@ -119,6 +121,7 @@ def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
         (parameters["transverse_moment"], parameters["longitudinal_moment"]),
         parameters["waterplane_area"],
     )
+    depth = draught(parameters)
     constants = {
         **{name: value for name, value in parameters.items() if name not in _REPLACED},
         **propulsion.derive_races(parameters),
@@ -126,12 +129,11 @@ def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
         "inverse_mass_matrix": ca.inv(mass_matrix),
         "strip_spacing": strips.spacing,
         "strip_offset": strips.offset,
-        "draught": draught(parameters),
-        "centre_of_buoyancy": _waterplane_centre(parameters)
-        - ca.vertcat(0, 0, draught(parameters) / 2),
+        "draught": depth,
+        "centre_of_buoyancy": _waterplane_centre(parameters) - ca.vertcat(0, 0, depth / 2),
     }
     named = NamedValues(constants)
-    table = vessel_equations.wave_table_of(parameters, twin_hull(named))
+    table = wave_table_of(parameters, twin_hull(named))
     return constants | {"equilibrium": _equilibrium(named), "wave_table": table}
 
 
@@ -144,12 +146,6 @@ def _waterplane_centre(parameters: NamedValues) -> ca.SX:
     return ca.vertcat(
         parameters["waterplane_centre"], 0, parameters["hull_bottom"] + draught(parameters)
     )
-
-
-def square_matrix(elements: ca.SX) -> ca.SX:
-    """Return the matrix whose rows follow each other in `elements`."""
-    size = round(elements.numel() ** 0.5)
-    return ca.reshape(elements, size, size).T
 
 
 def twin_hull(constants: NamedValues) -> TwinHull:
@@ -168,7 +164,10 @@ def twin_hull(constants: NamedValues) -> TwinHull:
 
 
 def _equilibrium(constants: NamedValues) -> ca.SX:
-    """Return height of O (m), roll and pitch (rad) at rest, by Newton's method with the stiffness of the upright hull."""
+    """Return height of O (m), roll and pitch (rad) at rest.
+
+    By Newton's method with the constant stiffness of the upright hull.
+    """
     symbols = NamedValues({name: ca.SX.sym(name) for name in _HYDROSTATICS})
     state = ca.SX.sym("state", 3)
     improve = ca.Function(
@@ -236,45 +235,44 @@ def water_loads(constants: NamedValues, now: LoadArguments) -> ca.SX:
     thrust = propulsion.propeller_loads(
         speed, now.relative_velocity, depth, up - surface, now.inputs, constants
     )
-    return (
-        weight_and_buoyancy(under_water, up, ballast(constants))
-        + under_water.wetness * moving
-        + thrust
-    )
+    static = weight_and_buoyancy(under_water, up, ballast(constants))
+    return static + under_water.wetness * moving + thrust
 
 
 def damping(constants: NamedValues, flow: ca.SX) -> ca.SX:
-    """Return tau of the linear and quadratic damping for the velocity relative to the water, shape (6,)."""
-    linear, quadratic = (
-        square_matrix(constants[f"{name}_damping"]) for name in ("linear", "quadratic")
-    )
+    """Return tau of the damping for the velocity relative to the water, shape (6,).
+
+    -D nu_r - D_q (|nu_r| nu_r), products by elements (Fossen 2021, section 6.4).
+    """
+    linear = square_matrix(constants["linear_damping"])
+    quadratic = square_matrix(constants["quadratic_damping"])
     return -(linear @ flow + quadratic @ (ca.fabs(flow) * flow))
 
 
 def vertical_drag(constants: NamedValues, flow: ca.SX) -> ca.SX:
-    """Return tau of the drag of the bottoms, which acts at four points around the centre of the waterplane."""
-    coefficient = (
-        constants["water_density"]
-        / 8
-        * constants["vertical_drag_coefficient"]
-        * constants["waterplane_area"]
-    )
+    """Return tau of the drag of the bottoms.
+
+    It acts at four points around the centre of the waterplane, whose mean squared distances are
+    those of the bottoms.
+    """
+    pressure = constants["water_density"] / 8 * constants["vertical_drag_coefficient"]
+    coefficient = pressure * constants["waterplane_area"]
     load = ca.SX.zeros(6)
-    for ahead in (-1, 1):
-        for side in (-1, 1):
-            x, y = (
-                constants["waterplane_centre"] + ahead * constants["drag_point.x"],
-                side * constants["drag_point.y"],
-            )
-            speed = flow[2] + y * flow[3] - x * flow[4]
-            load += load_of_force_at(
-                ca.vertcat(x, y, 0), ca.vertcat(0, 0, -coefficient * ca.fabs(speed) * speed)
-            )
+    for ahead, side in product((-1, 1), repeat=2):
+        x = constants["waterplane_centre"] + ahead * constants["drag_point.x"]
+        y = side * constants["drag_point.y"]
+        speed = flow[2] + y * flow[3] - x * flow[4]
+        drag = -coefficient * ca.fabs(speed) * speed
+        load += load_of_force_at(ca.vertcat(x, y, 0), ca.vertcat(0, 0, drag))
     return load
 
 
 def cross_flow_drag(constants: NamedValues, flow: ca.SX) -> ca.SX:
-    """Return tau of the cross-flow drag along the hull, at half of the draught (Fossen 2021, section 6.4)."""
+    """Return tau of the cross-flow drag along the hull, at half of the draught.
+
+    Each station is a section in transverse flow, whose velocity grows with the yaw rate (Fossen
+    2021, section 6.4).
+    """
     length, depth = constants["hull_length"], constants["draught"]
     spacing = length / (DRAG_STATIONS - 1)
     coefficient = (
@@ -293,9 +291,8 @@ def cross_flow_drag(constants: NamedValues, flow: ca.SX) -> ca.SX:
 def wind_loads(constants: NamedValues, now: LoadArguments) -> ca.SX:
     """Return tau of the air."""
     air = now.air_relative_velocity[0:2]
-    return load_of_force_at(
-        constants["air_centre"], ca.vertcat(-constants["air_drag"] * ca.fabs(air) * air, 0)
-    )
+    force = ca.vertcat(-constants["air_drag"] * ca.fabs(air) * air, 0)
+    return load_of_force_at(constants["air_centre"], force)
 
 
 def surface_vessel_block(

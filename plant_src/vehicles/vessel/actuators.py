@@ -14,8 +14,7 @@ from dataclasses import dataclass
 from cosim.core.component import Variable
 from cosim.core.units import parse_unit
 
-from ..common.element_labels import element_labels
-from ..common.interface import parameter
+from ..common.interface import element_labels, parameter
 from ..common.shapes import Vector
 
 #: largest numbers of propellers and rudders
@@ -217,9 +216,3 @@ def _command(name: str, unit: str, description: str, slots: int) -> Variable:
         shape=shape,
         description=description,
     )
-
-
-def parameter_count(slots: tuple[int, int]) -> int:
-    """Return the number of scalar parameters of the actuators."""
-    counts = (6 + len(PROPELLER_ARRAYS), 3 + len(RUDDER_ARRAYS))
-    return sum(1 + count * size for count, size in zip(counts, slots, strict=True) if size)

@@ -21,9 +21,9 @@ from cosim.core.errors import InputError, Problem
 from cosim.core.units import parse_unit
 
 from ...json_reader import JsonPath
-from ..common.inertia import eigenvalue_problems, symmetry_problems
+from ..common.inertia import Boxes, eigenvalue_problems, symmetry_problems
 from ..common.interface import parameter
-from ..common.shapes import Vector
+from ..common.shapes import Body, Vector
 from ..common.vehicle_reader import Collision, CollisionBox, VehicleReader
 from .actuators import MAX_PROPELLERS, MAX_RUDDERS, MIN_TIME_CONSTANT, Propeller, Rudder
 
@@ -98,6 +98,10 @@ class Boat:
     def problem(self, text: str, *subject: str) -> Problem:
         """Return a problem of an attribute."""
         return Problem(text, f"vessel {self.name}: {'.'.join(subject)}", subject)
+
+    def body(self, boxes: Boxes) -> Body:
+        """Return the rigid body for Bullet with this collision shape."""
+        raise NotImplementedError
 
     @property
     def slots(self) -> tuple[int, int]:

@@ -1,4 +1,4 @@
-"""Equations of a vessel in six degrees of freedom as a model for export."""
+"""Equations of a vessel in six degrees of freedom as a model for export, and its contact functions."""
 
 from __future__ import annotations
 
@@ -11,25 +11,31 @@ import casadi as ca
 
 from cosim.core.component import Variable
 from cosim.export.equations.c_code import Callee
+from cosim.export.equations.fmu_code import as_block
 from cosim.export.equations.model import ContinuousModel
+from cosim.export.fmu.block import Block
 
 from ..common import kinematics
 from ..common.contact_maps import (
     TWIST_SIZE,
-    contact_impulse,
     correct_symbols,
     create_symbols,
+    gyroscopic_torque,
+    impulse_correct_function,
+    impulse_of_twist,
+    initialize_function,
     is_upside_down,
-    parameters_and_constants,
+    mean_twist,
+    moved_pose,
+    predict_function,
     predict_symbols,
     predicted_state,
-    step_status,
 )
 from ..common.interface import VESSEL_STATES, WORLD_OUTPUTS
 from ..common.named_values import ConstantsMap, NamedValues, values_by_name, variables_of
 from ..common.shapes import Body
 from ..common.water_surface import SURFACE_SUM, create_elevation_function
-from .hull import Frame, Hull
+from .hull import Hull
 from .strips import WAVE_SUM, TwinHull, wave_table
 
 #: longest integration step (s); the motion of vessels is slow, and each stage evaluates the waves
@@ -37,7 +43,7 @@ MAX_STEP = 0.01
 
 
 def wave_table_of(parameters: NamedValues, hull: TwinHull) -> ca.SX:
-    """Return the table of wave components (`wave_loads.wave_table`) from the parameters `wave.*`."""
+    """Return the table of wave components (`strips.wave_table`) from the parameters `wave.*`."""
     return wave_table(
         hull,
         *(parameters[f"wave.{name}"] for name in ("amplitude", "frequency", "direction", "phase")),
@@ -122,23 +128,29 @@ def normalised_state(state: ca.SX) -> ca.SX:
     return ca.vertcat(state[0:3], kinematics.normalised_quaternion(state[3:7]), state[7:])
 
 
-class _Impulse(NamedTuple):
-    """Linear (N s) and angular (N m s, about the centre of mass) impulse, world frame."""
-
-    linear: ca.SX
-    angular: ca.SX
-
-
 class BulletBody(NamedTuple):
-    """Mass (kg) and moments of inertia about the body axes (kg m2, shape (3,)) of the body in Bullet."""
+    """Mass (kg) and moments of inertia about the body axes (kg m2) of the body in Bullet."""
 
     mass: ca.SX
     inertia: ca.SX
 
 
 def constant_body(body: Body) -> Callable[[ca.SX], BulletBody]:
-    """Return the function from the constants to mass and inertia of a body that does not depend on them."""
+    """Return the function from the constants to a body that does not depend on them."""
     return lambda _constants: BulletBody(ca.SX(body.mass), ca.SX(body.inertia))
+
+
+def floating_block(
+    model: ContinuousModel, vessel: VesselModel, body: Callable[[ca.SX], BulletBody]
+) -> Block:
+    """Return a vessel for export: its FMU and the contact functions of the world.
+
+    Args:
+        model: Equations of the vessel as they are exported.
+        vessel: The same equations by name.
+        body: Function from the constants to mass and inertia of the body in Bullet.
+    """
+    return as_block(model, FloatingContactMaps(model, vessel, body).functions())
 
 
 @dataclass(frozen=True)
@@ -164,79 +176,54 @@ class FloatingContactMaps:
     def functions(self) -> list[ca.Function]:
         """Return the functions to export."""
         return [
-            self._initialize_function(),
+            initialize_function(self.model, self._twist, lambda state, _: _bullet_pose(state)),
             self._predict_function(),
             self._correct_function(),
             create_elevation_function(),
         ]
 
-    def _initialize_function(self) -> ca.Function:
-        parameters, constants = parameters_and_constants(self.model)
-        state = self.model.initial_state(constants)
+    def _twist(self, state: ca.SX, constants: ca.SX) -> ca.SX:
         frame = self.vessel.hull_with(constants).frame(state[3:7])
-        twist = ca.vertcat(
-            frame.to_world @ state[7:10],
-            frame.attitude @ (frame.rates_to_angular_velocity @ state[10:13]),
-        )
-        return ca.Function(
-            "contact_initialize",
-            [parameters],
-            [constants, state, twist, twist, _bullet_pose(state)],
-        )
+        angular = frame.attitude @ (frame.rates_to_angular_velocity @ state[10:13])
+        return ca.vertcat(frame.to_world @ state[7:10], angular)
 
     def _predict_function(self) -> ca.Function:
-        arguments = predict_symbols(self.model)
-        state, inputs, environment_inputs, constants, step = arguments[:5]
-        (impulse,) = create_symbols(contact_impulse=6)
+        arguments = predict_symbols(self.model) | create_symbols(contact_impulse=TWIST_SIZE)
+        state, constants, step = arguments["state"], arguments["constants"], arguments["step_size"]
+        impulse = arguments["contact_impulse"]
         hull, attitude = self.vessel.hull_with(constants), kinematics.rotation_matrix(state[3:7])
-        loaded = self._inputs_with_contact_force(
-            inputs, _impulse_about_centre(hull, attitude, impulse), step
-        )
-        end = predicted_state(self.model, state, loaded, environment_inputs, constants, step)
-        linear = (end[0:3] - state[0:3]) / step
-        angular = (
-            kinematics.rotation_vector(
-                kinematics.quaternion_product(end[3:7], kinematics.conjugate(state[3:7]))
-            )
-            / step
-        )
+        load = _impulse_about_centre(hull, attitude, impulse) / step
+        end = predicted_state(self.model, arguments, self._loaded(arguments["inputs"], load))
+        moved = mean_twist(state, end, step)
         body = self.body(constants)
         inertia = _inertia_in_world(body, attitude)
-        twist = ca.vertcat(linear, angular) - ca.vertcat(
-            impulse[0:3] / body.mass, _angular_velocity_change(body, attitude, impulse[3:6])
-        )
-        torque = ca.cross(twist[3:6], inertia @ twist[3:6])
-        endpoints = ca.vertcat(state[0:3], end[0:3])
-        status = step_status(end, endpoints, arguments, is_upside_down(end[3:7]))
-        results = [
-            state,
+        turned = attitude @ ((attitude.T @ impulse[3:6]) / body.inertia)
+        twist = moved - ca.vertcat(impulse[0:3] / body.mass, turned)
+        return predict_function(
+            arguments,
             end,
             twist,
-            twist,
-            torque,
-            _bullet_pose(state),
-            impulse,
-            endpoints,
-            status,
-        ]
-        return ca.Function("contact_predict", [*arguments, impulse], results)
+            ca.vertcat(state[0:3], end[0:3]),
+            is_upside_down(end[3:7]),
+            compensating_torque=gyroscopic_torque(inertia, twist[3:6]),
+            bullet_pose=_bullet_pose(state),
+            previous_contact_impulse=impulse,
+        )
 
     def _correct_function(self) -> ca.Function:
         arguments = correct_symbols(self.model)
-        start, predicted, twist, bullet_twist, constants, step = arguments
-        (previous,) = create_symbols(previous_contact_impulse=6)
+        start, predicted, twist, bullet_twist, constants, step = arguments.values()
+        arguments |= create_symbols(previous_contact_impulse=TWIST_SIZE)
+        previous = arguments["previous_contact_impulse"]
         hull, attitude = self.vessel.hull_with(constants), kinematics.rotation_matrix(start[3:7])
-        change, body = bullet_twist - twist, self.body(constants)
-        linear, angular = body.mass * change[0:3], _inertia_in_world(body, attitude) @ change[3:6]
-        magnitude = contact_impulse(ca.norm_2(linear))
-        impulse = (
-            ca.if_else(magnitude > 0, ca.vertcat(linear, angular), ca.SX.zeros(6)) + 0 * magnitude
-        )
-        in_contact = ca.logic_or(magnitude > 0, ca.norm_2(previous) > 0)
+        body = self.body(constants)
+        inertia = _inertia_in_world(body, attitude)
+        impulse, magnitude = impulse_of_twist(bullet_twist - twist, body.mass, inertia)
         surplus = _impulse_about_centre(hull, attitude, impulse - previous)
-        pose = _integrate_pose(start, bullet_twist, step)
+        position, orientation = moved_pose(start, bullet_twist, step)
+        pose = ca.vertcat(position, kinematics.normalised_quaternion(orientation))
         before, frame = hull.frame(predicted[3:7]), hull.frame(pose[3:7])
-        nu = predicted[7:13] + hull.inverse_mass_matrix @ _impulse_load(hull, before, surplus)
+        nu = predicted[7:13] + hull.inverse_mass_matrix @ hull.load_at_centre(before, surplus)
         # the velocity in the world frame is kept, although Bullet has turned the body
         velocity = frame.to_world.T @ (before.to_world @ nu[0:3])
         corrected = ca.vertcat(pose, velocity, nu[3:6], predicted[13:])
@@ -244,56 +231,26 @@ class FloatingContactMaps:
             frame.to_world.T @ bullet_twist[0:3],
             ca.inv(frame.rates_to_angular_velocity) @ (frame.attitude.T @ bullet_twist[3:6]),
         )
-        state = ca.if_else(in_contact, corrected, predicted)
-        published = ca.vertcat(
-            state[0:7], ca.if_else(magnitude > 0, mean_nu, state[7:13]), state[13:]
-        )
-        return ca.Function(
-            "contact_correct",
-            [*arguments, previous],
-            [state, magnitude, hull.observe(published), impulse],
+        return impulse_correct_function(
+            arguments, impulse, magnitude, corrected, mean_nu, hull.observe
         )
 
-    def _inputs_with_contact_force(self, inputs: ca.SX, impulse: _Impulse, step: ca.SX) -> ca.SX:
-        """Return the inputs with the contact force, constant over the step, added to the external loads."""
+    def _loaded(self, inputs: ca.SX, load: ca.SX) -> ca.SX:
+        """Return the inputs with a load (6) added to the external loads."""
         names = [variable.name for variable in self.model.elements("input")]
         first = names.index("external_force.x")
-        load = ca.vertcat(impulse.linear, impulse.angular) / step
-        return ca.vertcat(
-            inputs[:first], inputs[first : first + TWIST_SIZE] + load, inputs[first + TWIST_SIZE :]
-        )
+        end = first + TWIST_SIZE
+        return ca.vertcat(inputs[:first], inputs[first:end] + load, inputs[end:])
 
 
 def _inertia_in_world(body: BulletBody, attitude: ca.SX) -> ca.SX:
     return attitude @ ca.diag(body.inertia) @ attitude.T
 
 
-def _angular_velocity_change(body: BulletBody, attitude: ca.SX, impulse: ca.SX) -> ca.SX:
-    """Return the change of angular velocity (rad/s, world frame) of Bullet's body by an angular impulse (N m s)."""
-    return attitude @ ((attitude.T @ impulse) / body.inertia)
-
-
-def _impulse_about_centre(hull: Hull, attitude: ca.SX, impulse: ca.SX) -> _Impulse:
+def _impulse_about_centre(hull: Hull, attitude: ca.SX, impulse: ca.SX) -> ca.SX:
     """Move an impulse (6) on O to the centre of mass."""
-    return _Impulse(
-        impulse[0:3], impulse[3:6] - ca.cross(attitude @ hull.centre_of_mass, impulse[0:3])
-    )
-
-
-def _impulse_load(hull: Hull, frame: Frame, impulse: _Impulse) -> ca.SX:
-    """Return the impulse as a generalised impulse (6) about O in the equations of motion."""
-    lever = frame.attitude @ hull.centre_of_mass
-    return frame.generalised_force(
-        impulse.linear, impulse.angular + ca.cross(lever, impulse.linear)
-    )
-
-
-def _integrate_pose(start: ca.SX, twist: ca.SX, step: ca.SX) -> ca.SX:
-    """Return position and quaternion after a step (s) with a constant twist."""
-    orientation = kinematics.quaternion_product(
-        kinematics.quaternion_from_rotation_vector(twist[3:6] * step), start[3:7]
-    )
-    return ca.vertcat(start[0:3] + twist[0:3] * step, kinematics.normalised_quaternion(orientation))
+    lever = attitude @ hull.centre_of_mass
+    return ca.vertcat(impulse[0:3], impulse[3:6] - ca.cross(lever, impulse[0:3]))
 
 
 def _bullet_pose(state: ca.SX) -> ca.SX:

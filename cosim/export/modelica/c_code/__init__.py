@@ -6,7 +6,7 @@ from collections.abc import Mapping, Sequence
 from importlib import resources
 from pathlib import Path
 
-from ..causality.interpreter import Interpreter
+from ..causality.analysed_model import AnalysedModel
 from ..external.c_files import external_files
 from .header import HeaderWriter
 from .hybrid_code import HybridCode
@@ -14,12 +14,12 @@ from .model_code import ModelCode
 
 
 def generate_c(
-    defaults: Interpreter, sources: Sequence[str], packages: Mapping[str, Path] | None = None
+    analysed: AnalysedModel, sources: Sequence[str], packages: Mapping[str, Path] | None = None
 ) -> dict[str, str]:
     """Generate the C files of a model.
 
     Args:
-        defaults: The model with its schedule and default values.
+        analysed: The model with its schedule and default values.
         sources: Names of the Modelica files, for a comment.
         packages: Top-level package -> its folder, for the files of external functions.
 
@@ -29,7 +29,7 @@ def generate_c(
     Raises:
         InputError: The model uses a feature that is not supported.
     """
-    code = (HybridCode if defaults.model.hybrid else ModelCode)(defaults)
+    code = (HybridCode if analysed.model.hybrid else ModelCode)(analysed)
     folder = resources.files(__package__ or "")
     texts = {
         name: folder.joinpath(name).read_text(encoding="utf-8")
@@ -37,9 +37,9 @@ def generate_c(
     }
     model_c = code.model_c()
     header = HeaderWriter(
-        defaults.model,
-        defaults.schedule,
-        defaults.parameter_roles,
+        analysed.model,
+        analysed.schedule,
+        analysed.parameter_roles,
         sources,
         len(code.functions.warnings),
     )

@@ -10,12 +10,12 @@ from dataclasses import dataclass
 
 from ..causality.hybrid import (
     MAX_PASSES,
+    PAST_VALUES,
+    SAME_TIME,
     chattering_reason,
     endless_reason,
     iterated_names,
 )
-from ..causality.hybrid_interpreter import SAME_TIME
-from ..causality.past_values import PAST_VALUES
 from ..model.flat_model import (
     Model,
     Relation,

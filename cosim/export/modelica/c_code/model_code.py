@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ..causality.interpreter import Interpreter
+from ..causality.analysed_model import AnalysedModel
 from ..causality.schedule import finite_variables, pre_variables, start_value
 from ..model.flat_model import Variable, derivative_name, is_input, owning_component
 from ..model.syntax_tree import Body, Name, Solve, SourceLocation, Statement, referenced_variable
@@ -61,15 +61,15 @@ class ModelCode:
     Collects the failure reasons and the functions of the model while it generates code.
     """
 
-    defaults: Interpreter
+    analysed: AnalysedModel
     reasons: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.reasons += _HYBRID_REASONS if self.defaults.model.hybrid else _STANDARD_REASONS
+        self.reasons += _HYBRID_REASONS if self.analysed.model.hybrid else _STANDARD_REASONS
         self.model, self.schedule, self.roles = (
-            self.defaults.model,
-            self.defaults.schedule,
-            self.defaults.parameter_roles,
+            self.analysed.model,
+            self.analysed.schedule,
+            self.analysed.parameter_roles,
         )
         self.members = struct_members(self.model)
         self.functions = FunctionTranslator(dict(self.model.functions), self._failure_code)
@@ -188,7 +188,7 @@ class ModelCode:
         for variable in [*constants, *filter(is_input, self.model.variables.values())]:
             lines += _assign_constant(
                 struct_member(variable, f"m->{self.members[variable.name]}"),
-                self.defaults.get(variable.name),
+                self.analysed.values[variable.name],
             )
         return [*lines, "model_parameters(m);", "start_variables(m);"]
 
