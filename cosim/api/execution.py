@@ -22,8 +22,7 @@ from ..scenario.input_limits import warn_exceeded_limits
 #: modules that a run imports, for processes from which runs are forked
 RUN_MODULES = (
     "cosim.api.execution",
-    "cosim.components.conformance",
-    "cosim.components.fmi.isolated.isolated_fmu",
+    "cosim.components.fmi.isolated",
     "cosim.components.python_class",
     "cosim.components.python_fmu",
     "cosim.engine.native_executor",

@@ -11,7 +11,7 @@ import mmap
 import struct
 import time as clock
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from enum import IntEnum
 from pathlib import Path
@@ -253,39 +253,43 @@ def calling_several_components() -> Iterator[None]:
 
 @contextmanager
 def calling_component(
-    component: str, function: str, deadline_name: str, time: float = math.nan
+    component: str, function: str, deadline_name: str | None = None, time: float = math.nan
 ) -> Iterator[None]:
     """Record a call into a component, outside the stepping loop, for the duration of the block.
 
     Args:
         component: Name of the component.
         function: Name of its function.
-        deadline_name: Attribute of `Deadlines` with the maximum duration.
+        deadline_name: Attribute of `Deadlines` with the maximum duration; None: no maximum.
         time: Simulation time (s); NaN outside the simulation.
 
     Raises:
         ComponentError: The block raised an exception, see `as_component_error`.
     """
     journal = _current
-    if journal is None or journal.is_shared:
-        with (
-            attributing_forks(lambda: (component, function)),
-            as_component_error(component, function, time),
-        ):
-            yield
-        return
+    with (
+        nullcontext()
+        if journal is None or journal.is_shared
+        else _recording_call(journal, component, function, deadline_name, time),
+        attributing_forks(lambda: (component, function)),
+        as_component_error(component, function, time),
+    ):
+        yield
+
+
+@contextmanager
+def _recording_call(
+    journal: Journal, component: str, function: str, deadline_name: str | None, time: float
+) -> Iterator[None]:
+    """Record a call and its deadline in the journal for the duration of the block."""
     phase, deadline, before = journal.phase, journal.deadline, journal.activity()
     journal.record_call(component, function, time)
     journal.enter_phase(
         Phase.RESULTS_WRITTEN if phase == Phase.RESULTS_WRITTEN else Phase.CALLING,
-        getattr(journal.deadlines, deadline_name),
+        getattr(journal.deadlines, deadline_name) if deadline_name else math.inf,
     )
     try:
-        with (
-            attributing_forks(lambda: (component, function)),
-            as_component_error(component, function, time),
-        ):
-            yield
+        yield
     finally:
         journal.record_call(before.component, before.function, before.time)
         journal.enter_phase(phase, deadline)

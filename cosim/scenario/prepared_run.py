@@ -38,7 +38,6 @@ from .named_functions import load_function, signal_problems
 from .nested_systems import Node, files_of_system, load_scenario
 from .overview import describe_software, describe_system
 from .schema import ScenarioSpec
-from .schema_types import accepted
 from .system_builder import PROFILE_PREFIX, SystemBuilder
 
 IsolationMode = Literal["fmu", "none"]
@@ -321,25 +320,6 @@ def _json_time(value: TimeValue) -> float | str:
         return number if exact_fraction(number) == exact else fraction_text(exact)
     except (ValueError, ArithmeticError):
         return str(plain)
-
-
-def import_figures(
-    scenario: str | Path, parameters: Mapping[str, Any] | None = None
-) -> list[NamedCall]:
-    """Import the figure functions of a scenario without loading its components.
-
-    Args:
-        scenario: See `load`.
-        parameters: See `load`.
-
-    Returns:
-        (name, function, arguments) of each figure.
-
-    Raises:
-        InputError: The scenario cannot be read, or a function cannot be imported.
-    """
-    loaded = load_scenario(scenario, parameters)
-    return _load_functions([spec for _, spec in accepted(loaded.spec.figures)], loaded.root.folder)
 
 
 @exclusive_process_state()  # as for `PreparedRun.metadata`

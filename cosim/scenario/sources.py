@@ -19,7 +19,7 @@ from pydantic import BaseModel, GetPydanticSchema, WithJsonSchema, create_model,
 from pydantic.fields import FieldInfo
 from pydantic_core.core_schema import no_info_plain_validator_function
 
-from ..components.fmi.instance_settings import Method
+from ..components.fmi.settings import Method
 from ..components.python_import import load_object
 from ..core.component import Component, Variable
 from ..core.errors import InputError, nearest_file
@@ -317,7 +317,7 @@ class ModelicaSource(_FmuBased):
 
     def used_files(self, folder: Path) -> Iterable[Path]:
         """Return the Modelica file, and those from which its model was built."""
-        from ..export.modelica.frontend.rumoca_frontend import needed_files
+        from ..export.modelica.frontend.model_files import needed_files
 
         files = list(self.files(folder))
         return [*files, *needed_files(files[0])]

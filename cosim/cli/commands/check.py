@@ -11,9 +11,8 @@ from ...core.errors import InputError, Problem
 from ...core.system import Group, Stage
 from ...core.text import count_noun
 from .. import strict_sandbox, supervision
-from ..completion import complete_scenario
 from ..messages import collect_log, print_json
-from ..output_options import json_option
+from ..options import complete_scenario, json_option
 
 if TYPE_CHECKING:
     from ...core.component import Variable
@@ -138,7 +137,7 @@ def _print_components(prepared: PreparedRun) -> None:
 
 
 def _print_processes(prepared: PreparedRun, isolation: str, sandbox: str | None) -> None:
-    from ...components.fmi.isolated.isolated_fmu import IsolatedFmu
+    from ...components.fmi.isolated import IsolatedFmu
 
     components = prepared.system.components
     isolated = {

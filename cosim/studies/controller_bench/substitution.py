@@ -85,6 +85,7 @@ class ControllerSubstitution:
         omissions: removed entries.
         applied_settings: values that the candidate gets, by the full names of its components and
             its own variables.
+        changed_files: content of the changed scenario and of its nested systems by path.
     """
 
     role: Role
@@ -95,13 +96,14 @@ class ControllerSubstitution:
     replaced_components: dict[str, str] = field(default_factory=dict)
     omissions: list[Omission] = field(default_factory=list)
     applied_settings: dict[str, dict[str, Any]] = field(default_factory=dict)
+    changed_files: dict[Path, dict[str, Any]] = field(default_factory=dict)
     _folder: Path = field(init=False)
 
-    def write(self, folder: Path) -> Path | None:
-        """Write the changed scenario and its nested systems to `folder` and return its path.
+    def substitute(self, folder: Path) -> Path | None:
+        """Change the scenario and its nested systems, as files in `folder` that are not yet written.
 
         Returns:
-            None if no component has the role, or if the file is not a scenario (has no components).
+            Path of the changed scenario among `changed_files`; None if no component has the role, or if the file is not a scenario (has no components).
 
         Raises:
             InputError: if the scenario is invalid.
@@ -116,8 +118,19 @@ class ControllerSubstitution:
         if not self.replaced_components:
             return None
         path = folder / self.file.name
-        write_json(self._prune_scenario(changed, renamed, origin), path)
+        self.changed_files[path] = self._prune_scenario(changed, renamed, origin)
         return path
+
+    def write(self, folder: Path) -> Path | None:
+        """Write the changed scenario and its nested systems to `folder`; see `substitute`."""
+        path = self.substitute(folder)
+        self.write_files()
+        return path
+
+    def write_files(self) -> None:
+        """Write the changed scenario and its nested systems."""
+        for path, content in self.changed_files.items():
+            write_json(content, path)
 
     # -- systems
     # -------------------------------------------------------------------------------------------------------
@@ -203,7 +216,7 @@ class ControllerSubstitution:
     def _substitute_nested(
         self, system: Mapping[str, Any], folder: Path, full_name: str
     ) -> tuple[Path, NameMap] | None:
-        """Write a nested system with the candidate.
+        """Change a nested system that contains a controller of the role.
 
         Return its path and name map, or None if no component has the role.
         """
@@ -213,7 +226,7 @@ class ControllerSubstitution:
             return None
         ports, lost = self._prune_ports(value.get("ports", {}), renamed)
         path = self._folder / "systems" / f"{self.file.stem}.{full_name}.json"
-        write_json({**value, "ports": ports}, path)
+        self.changed_files[path] = {**value, "ports": ports}
         shown = {
             port: inner
             for kind, named in value.get("ports", {}).items()

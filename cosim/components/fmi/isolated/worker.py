@@ -21,7 +21,7 @@ from ....process import journal as journals
 from ....process.forks import attributing_forks, report_forks, watch_forks
 from ....process.journal import CALL_NUMBER, OVERWRITTEN, Phase
 from ..instance import FmuInstance
-from .pipes import (
+from .messages import (
     STEP_COMMAND,
     STEP_DONE,
     SpinningPoller,
