@@ -49,7 +49,7 @@ ENTRY_POINTS = "cosim.sources"
 
 @dataclass(frozen=True)
 class Creation:
-    """What a source needs to create its component.
+    """Input of a source for the creation of its component.
 
     Attributes:
         name: Full name of the component, such as "uav.vtol".
