@@ -1,4 +1,4 @@
-"""What the commands use of the shipped plant: vehicle files and the schemas of its JSON files.
+"""Functions of the shipped plant that commands use: vehicle files, and schemas of its JSON files.
 
 No other module of cosim names the plant. It is imported only when a function needs it.
 """
