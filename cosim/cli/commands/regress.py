@@ -10,8 +10,12 @@ import click
 
 from ...core.processors import available_processors
 from ...core.text import count_noun
-from ...studies.regression import EXIT_CODE_SEVERITY, accept_command
-from ...studies.regression_runs import default_folder, run_regressions
+from ...studies.regression import (
+    EXIT_CODE_SEVERITY,
+    accept_command,
+    default_folder,
+    run_regressions,
+)
 from ..completion import complete_scenario
 from ..forked_commands import forked_commands
 from ..messages import print_json, print_outcome

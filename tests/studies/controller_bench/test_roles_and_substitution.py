@@ -18,14 +18,14 @@ from cosim.studies.controller_bench.candidate import (
     parse_source,
     read_interface,
 )
-from cosim.studies.controller_bench.role import read_role, read_role_file, role_names
-from cosim.studies.controller_bench.score import (
+from cosim.studies.controller_bench.ranking import (
     RunKpis,
     compare_kpis,
     compare_values,
     is_current,
     merge_senses,
 )
+from cosim.studies.controller_bench.role import read_role, read_role_file, role_names
 from cosim.studies.controller_bench.substitution import ControllerSubstitution
 
 ROOT = resources.root()
