@@ -16,7 +16,8 @@ from typing import Any
 from ..core.errors import InputError
 from ..results import Result
 from ..results.kpi import better, no_value, units
-from ..scenario.file_paths import change_paths, relocating
+from ..scenario.file_paths import relocating
+from ..scenario.sources import change_paths
 from .loop_margins import margins as loop_margins
 
 

@@ -15,7 +15,8 @@ from typing import Any, NamedTuple
 
 from ...core import resources
 from ...results.checks import CheckOutcome
-from ...scenario.file_paths import SHIPPED, PathChange, change_pointed, relocating
+from ...scenario.file_paths import SHIPPED, change_pointed, relocating
+from ...scenario.schema_types import PathChange
 from ..sweep import Sweep, SweepRow
 
 
