@@ -67,7 +67,7 @@ def save_after_crash(outcome: SupervisedOutcome, options: RunOptions) -> None:
 
     The report is written by another supervised process, because it calls functions of the user.
     """
-    from ..process.run_files.folder import read_metadata
+    from ..process.run_files import read_metadata
     from ..results import Result
     from ..results.non_finite import warn_non_finite
 

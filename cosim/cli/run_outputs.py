@@ -120,7 +120,7 @@ def write_outputs(outcome: RunOutcome) -> int:
 
 
 def _end_failed_run(outcome: RunOutcome, failure: BaseException) -> int:
-    from ..process.run_files.folder import remove_run_files, run_folder
+    from ..process.run_files import remove_run_files, run_folder
 
     outcome.result.metadata["failure"] = outcome.result.metadata["failure"] or str(
         failure
@@ -141,7 +141,7 @@ def _end_failed_run(outcome: RunOutcome, failure: BaseException) -> int:
 
 def _write_result_files(outcome: RunOutcome) -> None:
     """Write result.csv, kpis.json and run.json in place of the files of the unfinished run."""
-    from ..process.run_files.folder import remove_run_files, run_folder
+    from ..process.run_files import remove_run_files, run_folder
     from ..results.result import write_run
 
     drawing, rows = outcome.drawing, run_folder()

@@ -5,10 +5,11 @@ from __future__ import annotations
 import math
 import os
 import signal
+from collections.abc import Sequence
 
 from ..core.errors import ComponentError, join_alternatives
-from .journal import CALL_NUMBER, STEP_COUNT, Journal, Phase
-from .run_files.folder import read_header
+from .journal import CALL_NUMBER, Journal, Phase
+from .run_files import RowsFile
 
 
 def attribute_failure(journal: Journal, reason: str) -> ComponentError:
@@ -18,15 +19,12 @@ def attribute_failure(journal: Journal, reason: str) -> ComponentError:
         journal: Journal of the process that failed.
         reason: Description of the failure.
     """
-    header = read_header(journal.folder)
-    if journal.phase == Phase.STEPPING and header:
-        number, time = journal[CALL_NUMBER], header.time_at(journal[STEP_COUNT])
-        component, function = (
-            header.calls[number]
-            if 0 <= number < len(header.calls)
-            else ("the run", "moving values")
-        )
-        return ComponentError(component, function, reason, time)
+    calls = _calls_of_run(journal)
+    if journal.phase == Phase.STEPPING and calls is not None:
+        number = journal[CALL_NUMBER]
+        known = 0 <= number < len(calls)
+        component, function = calls[number] if known else ("the run", "moving values")
+        return ComponentError(component, function, reason, journal.step_time)
     if journal.phase in (Phase.CALLING, Phase.RESULTS_WRITTEN):
         activity = journal.activity()
         return ComponentError(
@@ -45,8 +43,7 @@ def unattributed_failure(journal: Journal, reason: str) -> ComponentError:
         journal: Journal of the process that failed.
         reason: Description of the failure.
     """
-    header = read_header(journal.folder)
-    names = dict.fromkeys(component for component, _ in header.calls) if header else {}
+    names = dict.fromkeys(component for component, _ in _calls_of_run(journal) or ())
     return ComponentError(join_alternatives(names) if names else "cosim", "the run", reason)
 
 
@@ -63,3 +60,9 @@ def describe_exit_status(status: int) -> str:
             f"{text}: out of memory, or killed from outside" if number == signal.SIGKILL else text
         )
     return f"it ended the process with exit code {os.WEXITSTATUS(status)}"
+
+
+def _calls_of_run(journal: Journal) -> Sequence[tuple[str, str]] | None:
+    """Return component and function of each call of the stepping loop; None before it begins."""
+    rows_file = RowsFile.open(journal.folder) if journal.folder else None
+    return rows_file.layout.calls if rows_file else None

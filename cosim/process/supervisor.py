@@ -36,7 +36,6 @@ from .journal import (
     Phase,
 )
 from .python_stack import innermost_line, request_stack
-from .run_files.live_csv_writer import LiveCsvWriter
 from .supervised_child import run_child
 from .temporary_folders import temporary_run_folder
 from .waiting_time import waiting_time
@@ -184,9 +183,8 @@ class _Supervisor:
         for descriptor in (self.reader, process):
             if descriptor >= 0:
                 poll.register(descriptor, select.POLLIN)
-        csv = LiveCsvWriter(self.journal)
         try:
-            status = self._poll_child(poll, csv)
+            status = self._poll_child(poll)
         finally:
             self._kill_descendants()
             self._output.forward()
@@ -195,11 +193,8 @@ class _Supervisor:
                 os.close(process)
         return self._outcome(status)
 
-    def _poll_child(self, poll: select.poll, csv: LiveCsvWriter) -> int:
-        """Forward output, check the deadline and update the CSV file until the child ends.
-
-        Return its status.
-        """
+    def _poll_child(self, poll: select.poll) -> int:
+        """Forward output and check the deadline until the child ends; return its status."""
         while True:
             try:
                 poll.poll(POLL_INTERVAL * 1000)
@@ -212,7 +207,6 @@ class _Supervisor:
                 if pid:
                     self._stop_time = time.monotonic() if os.WIFSTOPPED(status) else 0.0
                 self._check_deadline()
-                csv.update()
             except KeyboardInterrupt:
                 self._forward_interrupt()
 

@@ -15,7 +15,7 @@ from typing import IO, Any, NoReturn
 from ..core.errors import ComponentError
 from ..process.failure_attribution import describe_exit_status
 from ..process.journal import set_current_journal
-from ..process.run_files.folder import recover_recording
+from ..process.run_files import recover_recording
 from ..results import Kpis, Result
 from ..results.checks import CheckOutcome
 from .figures import draw_figure, draw_nothing, save_figure

@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import write_error
-from ..process.run_files.row_store import FileMapping
+from ..process.row_store import FileMapping
 
 #: suffix of files that are being written
 _PART_SUFFIX = ".part"

@@ -114,7 +114,7 @@ def _simulate(
     from ...core.errors import InputError, Problem
     from ...engine.disk_space import find_space_problems
     from ...engine.run_loop import simulating
-    from ...process.run_files.folder import keeping_run_files, remove_run_files, run_folder
+    from ...process.run_files import keeping_run_files, remove_run_files, run_folder
     from ...results.files import check_writable, remove_files
     from ...results.non_finite import warn_non_finite
     from ...results.result import describe_termination
@@ -139,7 +139,7 @@ def _simulate(
         if problems := find_space_problems(plan, output.parent, csv=True, replaced=replaced):
             raise InputError(problems)
         remove_files(output.parent, output.name)
-    with keeping_run_files(folder, output), simulating(plan) as run:
+    with keeping_run_files(folder, writes_csv=output is not None), simulating(plan) as run:
         warn_non_finite(run.recording)
         if output:
             _write_recording(run.recording, output, shown, run_folder())
