@@ -22,7 +22,6 @@ from .vehicles.multirotor.vehicle_data import read_multirotor
 from .vehicles.otter import geometry as otter
 from .vehicles.otter import interface as otter_interface
 from .vehicles.otter import parameters as otter_parameters
-from .vehicles.otter_mss import interface as otter_mss_interface
 from .vehicles.planar_vessel import interface as planar_vessel_interface
 from .vehicles.planar_vessel.vehicle_data import read_planar_vessel
 from .vehicles.strider import geometry as strider
@@ -58,7 +57,6 @@ def multirotor_model(name: str, data: Mapping[str, Any]) -> Model:
         multirotor_interface.states(MAX_ROTORS),
         airframe.body(vehicle.boxes_in),
         vehicle.crash_speed,
-        constant_count=multirotor_interface.constant_count(airframe, MAX_ROTORS),
         airframe=airframe,
         body_of=lambda given: vehicle.body_with(given["mass"], inertia_of(given)),
         equations="multirotor",
@@ -76,7 +74,6 @@ def submerged_model(name: str, data: Mapping[str, Any]) -> Model:
         submerged_interface.states(MAX_THRUSTERS),
         craft.body(vehicle.boxes_in),
         vehicle.crash_speed,
-        constant_count=submerged_interface.constant_count(craft, MAX_THRUSTERS),
         craft=craft,
         body_of=lambda given: vehicle.body_with(given["mass"], inertia_of(given)),
         equations="submerged",
@@ -95,7 +92,6 @@ def surface_vessel_model(name: str, data: Mapping[str, Any]) -> Model:
         vehicle.body_with(vessel.mass, vessel.inertia),
         vehicle.crash_speed,
         is_vessel=True,
-        constant_count=surface_vessel_interface.constant_count(SLOTS),
         boat=vessel,
         body_of=lambda given: vehicle.body_with(given["mass"], inertia_of(given)),
         equations="surface_vessel",
@@ -115,7 +111,6 @@ def planar_vessel_model(name: str, data: Mapping[str, Any]) -> Model:
         vehicle.crash_speed,
         is_vessel=True,
         motion="planar",
-        constant_count=planar_vessel_interface.constant_count(SLOTS),
         boat=vessel,
         body_of=lambda given: vehicle.body_with(given["mass"], given["yaw_inertia"]),
         equations="planar_vessel",
@@ -182,7 +177,6 @@ MODELS = {
             strider_parameters.CRASH_SPEED,
             is_vessel=True,
             motion="planar",
-            constant_count=strider_interface.CONSTANT_COUNT,
             hulls=strider_interface.HULLS,
         ),
         Model(
@@ -193,7 +187,6 @@ MODELS = {
             strider_parameters.CRASH_SPEED,
             is_vessel=True,
             vehicle="strider",
-            constant_count=strider_6dof_interface.CONSTANT_COUNT,
             hulls=strider_interface.HULLS,
         ),
         Model(
@@ -203,7 +196,6 @@ MODELS = {
             otter.BODY,
             otter_parameters.CRASH_SPEED,
             is_vessel=True,
-            constant_count=otter_interface.CONSTANT_COUNT,
         ),
         Model(
             "otter_mss",
@@ -212,7 +204,6 @@ MODELS = {
             otter.BODY,
             otter_parameters.CRASH_SPEED,
             is_vessel=True,
-            constant_count=otter_mss_interface.CONSTANT_COUNT,
         ),
     )
 }
@@ -254,3 +245,8 @@ def models_of(vehicle: Any) -> Mapping[str, Model]:
             ]
         )
     return VEHICLE_MODELS[vehicle]
+
+
+def default_model(vehicle: Any) -> Model:
+    """Return the model of a vehicle with its first motion, see `models_of`."""
+    return next(iter(models_of(vehicle).values()))

@@ -135,8 +135,8 @@ class World(Component):
     def video_frames(
         result: Result, camera: str, times: np.ndarray, size: tuple[int, int]
     ) -> Iterator[np.ndarray]:
-        """Render the frames of a video, see `scene.video`."""
-        from .scene.video import frames
+        """Render the frames of a video, see `scene.render`."""
+        from .scene.render import frames
 
         return frames(result, camera, times, size)
 

@@ -8,11 +8,11 @@ from typing import Any
 
 import numpy as np
 
-from ..api.scenario_runs import load
+from ..api.simulation import load
 from ..core.errors import InputError
 from ..core.system import Endpoint
 from ..scenario import PreparedRun
-from ..scenario.json_pointer import find_value, missing_value, pointer_keys
+from ..scenario.json_document import find_value, missing_value, pointer_keys
 from ..scenario.name_resolution import SlotIndex, UnknownNameError, resolve_name
 from ..scenario.nested_systems import load_scenario
 from .experiment import Scenario

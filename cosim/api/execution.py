@@ -17,7 +17,22 @@ from ..results.checks import CheckOutcome, Number, evaluate_all_checks, evaluate
 from ..results.kpi import NoValue, evaluate_kpis, kpi_notes, kpi_senses, kpi_units
 from ..results.non_finite import warn_non_finite
 from ..scenario import PreparedRun
-from .input_limits import warn_exceeded_limits
+from ..scenario.input_limits import warn_exceeded_limits
+
+#: modules that a run imports, for processes from which runs are forked
+RUN_MODULES = (
+    "cosim.api.execution",
+    "cosim.components.fmi.isolated",
+    "cosim.components.python_class",
+    "cosim.components.python_fmu",
+    "cosim.engine.native_executor",
+    "cosim.kpis",
+    "cosim.scenario.plausibility",
+    "fmpy.fmi1",
+    "fmpy.fmi2",
+    "fmpy.fmi3",
+    "numpy.random",
+)
 
 
 @dataclass(frozen=True)

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from typing import Any
+import sys
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, NamedTuple
 
 from ..core.component import Variable
 from ..core.errors import InputError, Problem, did_you_mean
@@ -25,6 +26,30 @@ from .arguments import expect
 Reader = Callable[[PlanRun], Any]
 
 
+class _RealList(NamedTuple):
+    """Real scalars that a list sets, with their limits, which were found settable before."""
+
+    component: str
+    names: Sequence[str]
+    is_array: bool
+    limits: Sequence[tuple[float, float]]
+
+    def accepts(self, value: Any) -> bool:
+        """Return whether a value is a list of as many numbers within the limits."""
+        if value.__class__ is not list or len(value) != len(self.limits):
+            return False
+        for number, (low, high) in zip(value, self.limits, strict=True):
+            if number.__class__ is not float or not low <= number <= high:
+                return False
+        return True
+
+    def values(self, value: list[float]) -> dict[str, Any]:
+        """Return the values by the names of the variables."""
+        if self.is_array:
+            return {self.names[0]: list(value)}
+        return dict(zip(self.names, value, strict=True))
+
+
 class VariableAccess:
     """Reads and sets variables by name; each name is resolved once."""
 
@@ -33,6 +58,7 @@ class VariableAccess:
         self._readers: dict[str, Reader] = {}
         self._targets: dict[str, list[Target]] = {}
         self._variables: dict[str, Mapping[str, Variable]] = {}
+        self._real_lists: dict[str, _RealList] = {}
         self._connected = {connection.target for connection in self._system.connections}
 
     def get(self, name: str, run: PlanRun) -> Any:
@@ -47,33 +73,40 @@ class VariableAccess:
     def set(self, name: str, value: Any, run: PlanRun) -> None:
         """Set a variable; see `Simulation.set`."""
         expect("name", name, isinstance(name, str), "the name of a variable")
+        value = value.tolist() if hasattr(value, "tolist") else value
+        known = self._real_lists.get(name)
+        if known and known.accepts(value):
+            run.set_in_next_step(known.component, known.values(value))
+            return
         for target in self._find_targets(name):
-            component = target.component
+            component, variables = target.component, self._variables_of(target.component)
             read = self._system.components[component].get
             try:
-                values = check_assignment(
-                    component, self._variables_of(component), target.prefix, value, True, read
-                )
+                values = check_assignment(component, variables, target.prefix, value, True, read)
             except (UnknownNameError, ValueError) as error:
                 raise InputError(Problem(str(error), f'set("{name}")')) from None
             for variable in values:
-                if reason := not_settable_reason(
-                    component, self._variables_of(component)[variable], self._connected
-                ):
-                    hint = (
-                        ""
-                        if "connection" in reason
-                        else "; load() and reset() take start values as `parameters`"
-                    )
-                    raise InputError(
-                        Problem(
-                            f"{reason}, it cannot be set during the simulation{hint}",
-                            f'set("{name}")',
-                        )
-                    )
-            with run.accessing(component, "set"):
-                for variable, each in values.items():
-                    self._system.components[component].set(variable, each)
+                if reason := not_settable_reason(component, variables[variable], self._connected):
+                    hint = "; load() and reset() take start values as `parameters`"
+                    text = f"{reason}, it cannot be set during the simulation"
+                    text += "" if "connection" in reason else hint
+                    raise InputError(Problem(text, f'set("{name}")'))
+            run.set_in_next_step(component, values)
+            if len(self._targets[name]) == 1 and isinstance(value, list):
+                self._remember_reals(name, component, [variables[each] for each in values])
+
+    def _remember_reals(self, name: str, component: str, variables: Sequence[Variable]) -> None:
+        """Remember real variables, or an array of them, which a list of numbers has set."""
+        array = variables[0] if len(variables) == 1 and len(variables[0].shape) == 1 else None
+        if any(each.type != "Float64" or (each.shape and each is not array) for each in variables):
+            return
+        limits = []
+        for each in variables:
+            low = -sys.float_info.max if each.minimum is None else each.minimum
+            high = sys.float_info.max if each.maximum is None else each.maximum
+            limits += [(low, high)] * len(each.scalar_names)
+        names = [each.name for each in variables]
+        self._real_lists[name] = _RealList(component, names, array is not None, limits)
 
     def _variables_of(self, component: str) -> Mapping[str, Variable]:
         if component not in self._variables:

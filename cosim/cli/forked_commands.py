@@ -20,7 +20,7 @@ from queue import SimpleQueue
 from subprocess import CompletedProcess
 from typing import NoReturn
 
-from ..api.run_modules import RUN_MODULES
+from ..api.execution import RUN_MODULES
 from ..studies.regression import CommandRunner, run_in_new_process
 from . import main
 

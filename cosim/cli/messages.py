@@ -1,13 +1,14 @@
-"""Printing of log messages of components and of warnings about the scenario to standard error."""
+"""Messages of commands: log of components, warnings, JSON, outcomes and progress."""
 
 from __future__ import annotations
 
 import json
 import logging
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
@@ -17,10 +18,21 @@ from ..core.text import SPACES, escape_control_characters
 from ..process.standard_streams import unescaped
 from . import current_command_line
 
+if TYPE_CHECKING:
+    from ..studies.regression import RegressionOutcome
+
 #: lowest level of printed messages, by `CommandLine.verbosity`
 _LEVELS = {-1: logging.WARNING, 0: logging.INFO, 1: logging.DEBUG}
 #: number of warnings collected for the report
 MAX_WARNINGS = 200
+
+
+class _LogPrinter(logging.StreamHandler[TextIO]):
+    """Handler that prints messages to standard error."""
+
+    def __init__(self) -> None:
+        super().__init__(sys.stderr)
+        self.setFormatter(logging.Formatter("%(levelname)s %(message)s"))
 
 
 class _WarningCollector(logging.Handler):
@@ -44,21 +56,26 @@ def print_log() -> list[str]:
     Returns:
         The list that collects the texts of warnings and errors.
     """
-    handler, collector = logging.StreamHandler(sys.stderr), _WarningCollector()
-    handler.setFormatter(logging.Formatter("%(levelname)s %(message)s"))
+    texts = collect_log()
     logger = logging.getLogger("cosim")
-    logger.handlers[:] = [handler, collector]
+    logger.addHandler(_LogPrinter())
     logger.setLevel(_LEVELS[current_command_line().verbosity])
-    return collector.texts
+    return texts
 
 
 def collect_log() -> list[str]:
-    """Print no message of the logger "cosim" from now on.
+    """Collect the following warnings and errors of the logger "cosim", and print none of them.
 
-    Return the list that collects the texts of warnings and errors.
+    The handlers of a program that calls a command stay.
+
+    Returns:
+        The list that collects their texts.
     """
-    collector = _WarningCollector()
-    logging.getLogger("cosim").handlers[:] = [collector]
+    logger, collector = logging.getLogger("cosim"), _WarningCollector()
+    for handler in logger.handlers[:]:
+        if isinstance(handler, _LogPrinter | _WarningCollector):  # of an earlier command
+            logger.removeHandler(handler)
+    logger.addHandler(collector)
     return collector.texts
 
 
@@ -80,12 +97,18 @@ def print_json(value: Any) -> None:
     )
 
 
-def print_verdict(passed: bool) -> None:
-    """Print the word "passed" or "FAILED", coloured on a terminal, without a line break."""
-    word = (
-        click.style("passed", fg="green") if passed else click.style("FAILED", fg="red", bold=True)
-    )
+def print_outcome(outcome: RegressionOutcome) -> None:
+    """Print a line about a scenario and its problems; with --quiet, print only the problems."""
+    if outcome.code and current_command_line().verbosity < 0:
+        for line in outcome.details:
+            click.echo(f"{outcome.name}: {line}", err=True)
+    word = click.style("passed", fg="green")
+    if outcome.code:
+        word = click.style("FAILED", fg="red", bold=True)
     click.echo(word, nl=False, file=unescaped(sys.stdout))
+    click.echo(f"  {outcome.name:<28} {outcome.summary:<24} {outcome.seconds:5.1f} s")
+    for line in outcome.details:
+        click.echo(f"        {line}")
 
 
 def log_problems(problems: Iterable[Problem]) -> None:
@@ -114,3 +137,36 @@ def warn_overwriting(folder: Path, about: str, kind: str, file: Path) -> None:
             "--output-dir keeps both"
         )
         click.echo(text, err=True)
+
+
+@contextmanager
+def progress_bar(description: str) -> Iterator[Callable[[int, int], None] | None]:
+    """Show a progress bar and yield the function that updates it with (finished, total).
+
+    None without a terminal.
+    """
+    if not sys.stderr.isatty() or current_command_line().verbosity < 0:
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TaskProgressColumn,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    from ..report.tables import cell_text
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(
+        *columns, console=Console(file=unescaped(sys.stderr)), transient=True
+    ) as progress:
+        task = progress.add_task(cell_text(description))
+        yield lambda finished, total: progress.update(task, completed=finished, total=total)

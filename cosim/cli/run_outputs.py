@@ -1,4 +1,4 @@
-"""Files and text that `cosim run` produces from a run that has ended."""
+"""Files and text that `cosim run` produces from a run that has ended or failed."""
 
 from __future__ import annotations
 
@@ -13,16 +13,15 @@ import click
 
 from ..core.errors import CosimError, OutputError
 from ..core.text import count_noun
-from . import current_command_line, exit_code_of, report_error
-from .failed_runs import report_failed_run, write_partial_result
-from .messages import print_json
-from .run_summary import summarize_run
+from ..process.journal import STEP_COUNT
+from . import current_command_line, exit_code_of, report_error, supervision
+from .messages import print_json, print_log
 from .unfinished_runs import writing_results
 
 if TYPE_CHECKING:
     from ..api import Execution
     from ..engine.pacer import LatePolicy
-    from ..report.drawing_process import DrawingProcess
+    from ..process.supervisor import SupervisedOutcome
     from ..results import Result
     from ..results.checks import CheckOutcome
     from ..scenario import PreparedRun
@@ -62,7 +61,6 @@ class RunOutcome:
         prepared: the run as it was prepared.
         execution: its result or failure.
         began: `time.perf_counter()` before the scenario was loaded (s).
-        drawing: process that draws the figures; None to draw them in this process.
         files: names of the files that the summary lists.
     """
 
@@ -70,7 +68,6 @@ class RunOutcome:
     prepared: PreparedRun
     execution: Execution
     began: float
-    drawing: DrawingProcess | None = None
     files: list[str] = field(default_factory=list)
 
     @property
@@ -114,7 +111,9 @@ def write_outputs(outcome: RunOutcome) -> int:
         write(outcome)
     if outcome.options.as_json and not outcome.execution.failure:
         print_json(
-            summarize_run(outcome.result, outcome.checks, outcome.shown_folder, outcome.files, code)
+            _summarize_run(
+                outcome.result, outcome.checks, outcome.shown_folder, outcome.files, code
+            )
         )
     return code
 
@@ -122,14 +121,13 @@ def write_outputs(outcome: RunOutcome) -> int:
 def _end_failed_run(outcome: RunOutcome, failure: BaseException) -> int:
     from ..process.run_files import remove_run_files, run_folder
 
-    outcome.result.metadata["failure"] = outcome.result.metadata["failure"] or str(
-        failure
-    )  # a KPI may have failed
+    metadata = outcome.result.metadata
+    metadata["failure"] = metadata["failure"] or str(failure)  # a KPI may have failed
     try:
-        write_partial_result(outcome.result, outcome.folder, outcome.shown_folder, run_folder())
+        _write_partial_result(outcome.result, outcome.folder, outcome.shown_folder, run_folder())
         remove_run_files()
         if not isinstance(failure, KeyboardInterrupt):
-            report_failed_run(
+            _report_failed_run(
                 outcome.result, outcome.folder, outcome.options, exit_code_of(failure)
             )
     except CosimError as error:
@@ -139,18 +137,86 @@ def _end_failed_run(outcome: RunOutcome, failure: BaseException) -> int:
     return report_error(failure, current_command_line())
 
 
+def _write_partial_result(
+    partial: Result, folder: Path, shown_folder: Path, unfinished: Path | None
+) -> None:
+    """Write the rows recorded before a failure, if there are any; see `writing_results`."""
+    from ..results.result import write_run
+
+    if len(partial.time):
+        with writing_results(partial, unfinished, shown_folder):
+            write_run(partial, folder)
+        rows = count_noun(len(partial.time), "row")
+        click.echo(f"{rows} until t = {partial.time[-1]:g} s kept in {shown_folder}", err=True)
+
+
+def _report_failed_run(partial: Result, folder: Path, options: RunOptions, exit_code: int) -> int:
+    """Write the report of a run that failed, and print its summary for --json.
+
+    Args:
+        partial: what was recorded until the failure, already written.
+        folder: the output directory.
+        options: options of the command.
+        exit_code: exit code of the command.
+
+    Returns:
+        The exit code.
+    """
+    from ..report.finished_run import write_folder_report
+
+    files = ["result.csv", "run.json"] if len(partial.time) else []
+    if files and not options.no_report:
+        try:
+            write_folder_report(folder, folder / "report.html")
+            files.append("report.html")
+        except CosimError as error:
+            click.echo(f"no report: {error}", err=True)
+    if options.as_json:
+        print_json(_summarize_run(partial, (), folder, files, exit_code))
+    return exit_code
+
+
+def save_after_crash(outcome: SupervisedOutcome, options: RunOptions) -> None:
+    """Write the rows of a child process that crashed, was killed or was interrupted.
+
+    A crash also has a report.
+
+    The report is written by another supervised process, because it calls functions of the user.
+    """
+    from ..process.run_files import read_metadata
+    from ..results import Result
+    from ..results.non_finite import warn_non_finite
+
+    folder = outcome.journal.folder
+    if folder is not None:
+        failure = "interrupted" if outcome.interrupted else str(outcome.failure)
+        metadata = {
+            **read_metadata(folder),
+            "macro_steps": outcome.journal[STEP_COUNT],
+            "failure": failure,
+        }
+        recording = supervision.recover_outcome_recording(outcome)
+        if metadata.get("scenario", {}).get("non_finite") != "allow":
+            print_log()
+            metadata["non_finite"] = warn_non_finite(recording)
+        partial = Result(recording, metadata=metadata)
+        _write_partial_result(partial, folder.parent, folder.parent, folder)
+        if outcome.failure:
+            code = outcome.failure.exit_code
+            supervision.run_supervised_command(
+                lambda: _report_failed_run(partial, folder.parent, options, code),
+                "run",
+                lambda _outcome: None,
+            )
+
+
 def _write_result_files(outcome: RunOutcome) -> None:
     """Write result.csv, kpis.json and run.json in place of the files of the unfinished run."""
     from ..process.run_files import remove_run_files, run_folder
     from ..results.result import write_run
 
-    drawing, rows = outcome.drawing, run_folder()
-    if drawing and rows:
-        drawing.start(outcome.result, rows, outcome.folder)
-    with writing_results(outcome.result, rows, outcome.shown_folder):
+    with writing_results(outcome.result, run_folder(), outcome.shown_folder):
         write_run(outcome.result, outcome.folder)
-    if drawing and rows:
-        drawing.wait_until_read()
     remove_run_files()
     outcome.files.extend(("result.csv", "kpis.json", "run.json"))
 
@@ -183,25 +249,16 @@ def _write_report(outcome: RunOutcome) -> None:
 
 def _write_figures(outcome: RunOutcome) -> Iterator[tuple[str, str]]:
     """Write the figures, and yield name and SVG text of each."""
-    for i, spec in enumerate(outcome.prepared.spec.figures):
-        picture = (
-            outcome.drawing.picture(spec.name, spec.python.rpartition(":")[2])
-            if outcome.drawing
-            else None
-        )
-        picture = picture or _draw_figure(outcome, i)
-        outcome.files.append(f"{spec.name}.png")
-        yield spec.name, picture
-
-
-def _draw_figure(outcome: RunOutcome, i: int) -> str:
-    """Write a figure in this process, and return its SVG text."""
+    from ..process.journal import calling_component
     from ..report.figures import draw_figure, figure_to_svg, save_figure
 
-    name, function, arguments = outcome.prepared.figures()[i]
-    figure = draw_figure(outcome.result, name, function, arguments)
-    save_figure(figure, outcome.folder / f"{name}.png")
-    return figure_to_svg(figure)
+    for name, function, arguments in outcome.prepared.figures():
+        with calling_component(f'figure "{name}"', function.__name__):
+            figure = draw_figure(outcome.result, name, function, arguments)
+            save_figure(figure, outcome.folder / f"{name}.png")
+            picture = figure_to_svg(figure)
+        outcome.files.append(f"{name}.png")
+        yield name, picture
 
 
 def _print_summary(outcome: RunOutcome) -> None:
@@ -266,6 +323,41 @@ def _write_mcap(outcome: RunOutcome) -> None:
         from ..report.scene import build_scene
 
         outcome.result.to_mcap(outcome.folder / "result.mcap", build_scene(outcome.result.metadata))
+
+
+def _summarize_run(
+    result: Result,
+    checks: Sequence[CheckOutcome],
+    folder: Path,
+    files: Sequence[str],
+    exit_code: int,
+) -> dict[str, Any]:
+    """Return the JSON value that `cosim run --json` prints.
+
+    Args:
+        result: the result; after a failure, what was recorded until then.
+        checks: outcomes of the checks.
+        folder: the output directory.
+        files: names of the files in it.
+        exit_code: exit code of the command.
+    """
+    about, times = result.metadata, result.time
+    return {
+        "name": about.get("name"),
+        "exit_code": exit_code,
+        "failure": about.get("failure"),
+        "termination": result.termination or None,
+        "start_time": times[0] if len(times) else None,
+        "end_time": times[-1] if len(times) else None,
+        "loop_seconds": result.timing.get("loop_seconds"),
+        "kpis": dict(result.kpis),
+        "checks": [
+            {**check.check, "value": check.value, "passed": check.passed} for check in checks
+        ],
+        "warnings": about.get("warnings", []),
+        "folder": folder,
+        "files": files,
+    }
 
 
 #: outputs of a run that reached its end, in this order

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import sys
 import time
-from collections.abc import Callable, Iterable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -18,7 +18,7 @@ from ..core.processors import available_processors
 from ..core.size_limits import MAX_RUNS
 from ..core.text import count_noun
 from . import current_command_line
-from .csv_options import csv_options
+from .options import csv_option
 
 if TYPE_CHECKING:
     from ..studies.execution.job import Record
@@ -53,7 +53,7 @@ _retry = click.option(
 
 def study_options(command: Callable[..., int]) -> Callable[..., int]:
     """Add the options `--workers`, `--scheduler`, `--max-runs`, `--retry-failed` and `--excel-safe` to a command."""
-    return _workers(_scheduler(_max_runs(_retry(csv_options(command)))))
+    return _workers(_scheduler(_max_runs(_retry(csv_option(command)))))
 
 
 def open_run_store(folder: Path, retry: bool) -> RunStore:
@@ -177,22 +177,3 @@ class _ProgressLines:
         if time.monotonic() - self._last > _LINE_INTERVAL:
             self._last = time.monotonic()
             click.echo(text, err=True)
-
-
-def print_table(header: Sequence[str], rows: Iterable[Sequence[str]]) -> None:
-    """Print a table whose first column and column "unit" are text; the others are numbers."""
-    from rich import box
-    from rich.table import Table
-
-    from ..report.tables import cell_text, table_console
-
-    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
-    for i, name in enumerate(header):
-        table.add_column(
-            cell_text(name),
-            justify="left" if i == 0 or name == "unit" else "right",
-            overflow="fold",
-        )
-    for row in rows:
-        table.add_row(*map(cell_text, row))
-    table_console(width=200).print(table, "")

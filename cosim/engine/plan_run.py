@@ -22,14 +22,15 @@ from ..core.errors import ComponentError, InputError, Problem, join_alternatives
 from ..core.recording import Recording
 from ..core.stopwatch import Stopwatch
 from ..process.float_mode import default_float_mode, is_default
-from ..process.forks import attributing_forks, report_forks
 from ..process.journal import (
     MARKER_SIZE,
     OVERWRITTEN,
     Journal,
     Phase,
+    attributing_forks,
     calling_component,
     current_journal,
+    report_forks,
     suspending_deadline,
 )
 from ..process.process_state import call_restoring_process_state, restoring_process_state
@@ -120,6 +121,8 @@ class PlanRun:
             component.runs_foreign_code for component in self._components.values()
         )
         self._event_points = sorted(n for n in plan.events if n < plan.grid.count)
+        #: values to set in the next step: name of a component and values by variable
+        self._pending: list[tuple[str, Mapping[str, Any]]] = []
         self.is_finished = self._is_initialized = self._is_closed = False
         self._states = ComponentStates(self._components, self.accessing)
 
@@ -183,6 +186,11 @@ class PlanRun:
     def _run_to_stops(self, end: int, observers: Sequence[Observer]) -> None:
         """Run up to `end`, interrupted at events and whenever the observers are called."""
         executor, begin, events = self.executor, self.executor.completed_steps, self._event_points
+        if self._pending:
+            self._set_pending()
+        if not (observers or events or self._pacer or self._step_hook):
+            executor.run(end)
+            return
         observed = range(begin, end, max(1, (end - begin) // 100)) if observers else ()
         between = (
             events[bisect_left(events, begin) : bisect_right(events, end)] if events else events
@@ -217,6 +225,24 @@ class PlanRun:
                 for variable, value in values.items():
                     self._components[name].set(variable, value)
 
+    def set_in_next_step(self, component: str, values: Mapping[str, Any]) -> None:
+        """Set variables of a component before the next call of a component.
+
+        Until then nothing is called, so that the process needs no protection.
+
+        Args:
+            component: name of the component.
+            values: checked values by the names of tunable parameters and unconnected inputs.
+        """
+        self._pending.append((component, values))
+
+    def _set_pending(self) -> None:
+        pending, self._pending = self._pending, []
+        for component, values in pending:
+            with calling_component(component, "set", "step", self.executor.time):
+                for variable, value in values.items():
+                    self._components[component].set(variable, value)
+
     @contextmanager
     def accessing(self, component: str, function: str) -> Iterator[None]:
         """Protect the process from a component whose function is called between two steps in this block.
@@ -228,10 +254,12 @@ class PlanRun:
         try:
             with (
                 default_float_mode(),
-                restoring_process_state(component),
-                calling_component(component, function, "step", time),
+                restoring_process_state(component if not self._pending else self._names),
             ):
-                yield
+                if self._pending:
+                    self._set_pending()
+                with calling_component(component, function, "step", time):
+                    yield
         except ComponentError as error:
             self.failure = error
             raise

@@ -10,13 +10,13 @@ from itertools import pairwise
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..components.sibling_imports import with_imported_siblings
+from ..components.python_import import with_imported_siblings
 from ..core import resources
 from ..core.errors import CosimError, InputError, Problem
 from .fmu.block import Block
 from .fmu.compiler import compiler_version, find_compiler
+from .fmu.model_description import DESCRIPTION_FILE
 from .fmu.package import write_fmu
-from .fmu.validation import DESCRIPTION_FILE
 from .foreign.c_sources import write_c_fmu
 from .foreign.python_class import write_python_fmu
 
@@ -158,9 +158,10 @@ SOURCE_KINDS = (
 
 
 def find_sources(root: Path) -> list[Source]:
-    """Return all sources below `root`, sorted by the names of their FMUs.
+    """Return all sources below `root`, sorted by the names of their FMUs; Python classes come last.
 
-    Files whose names begin with an underscore are ignored.
+    Files whose names begin with an underscore are ignored. The plant as a Python class runs the
+    equations of other FMUs when it is exported, so these are built before.
 
     Raises:
         InputError: Two sources have the same FMU name.
@@ -183,7 +184,7 @@ def find_sources(root: Path) -> list[Source]:
                 for a, b in clashes
             ]
         )
-    return sources
+    return sorted(sources, key=lambda source: source.kind.load_block is None)
 
 
 def vehicle_files(root: Path) -> dict[str, Path]:

@@ -6,18 +6,21 @@ stepping loop with its deadline. A process without a supervisor has no journal.
 
 from __future__ import annotations
 
+import ctypes
 import math
 import mmap
+import os
 import struct
-from collections.abc import Iterator
-from contextlib import contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ..core import component_log
 from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, CosimError, describe_exception
-from .forks import attributing_forks
 
 #: size of a journal (bytes)
 JOURNAL_SIZE = 4 * 4096
@@ -119,7 +122,7 @@ class Journal:
     def exclude_from_forks(self) -> None:
         """Make later forks of this process crash at their first access to the journal (Linux).
 
-        See `process.forks`.
+        See `process.journal`.
         """
         if hasattr(mmap, "MADV_DONTFORK"):
             self.memory.madvise(mmap.MADV_DONTFORK)
@@ -192,6 +195,69 @@ class Journal:
         return str(data[:size].decode("utf-8", "replace"))
 
 
+#: returns component and function of the present call
+CallDescription = Callable[[], tuple[str, str]]
+
+_describe_call: CallDescription | None = None
+#: calls that have forked this process, and whether they were reported
+_noted_calls: dict[tuple[str, str], bool] = {}
+
+
+class attributing_forks:  # noqa: N801  # a generator as context manager would take twice as long
+    """Attribute forks in the block to the present call, and end a copy of this process that reaches the end of the block."""
+
+    def __init__(self, describe_call: CallDescription | None):
+        """Prepare the block.
+
+        Args:
+            describe_call: Returns component and function of the present call; None for forks that
+                are not made by foreign code.
+        """
+        self._inner = describe_call
+
+    def __enter__(self) -> None:
+        global _describe_call
+        self._process, self._outer, _describe_call = os.getpid(), _describe_call, self._inner
+
+    def __exit__(self, *error: object) -> None:
+        global _describe_call
+        _describe_call = self._outer
+        if os.getpid() != self._process:
+            os._exit(1)
+
+
+def report_forks() -> None:
+    """Warn once of each call that has forked this process."""
+    for (component, function), reported in _noted_calls.items():
+        if not reported:
+            text = f"{function} forked the process; a copy that returns from the call is ended"
+            component_log.log_message(component, component_log.WARNING, text)
+            _noted_calls[component, function] = True
+
+
+@cache
+def watch_forks() -> None:
+    """Note the present call at each fork from now on.
+
+    For processes that end without finalizing the interpreter.
+    """
+    library = ctypes.CDLL(None)
+    register = getattr(library, "pthread_atfork", None) or getattr(
+        library, "__register_atfork", None
+    )
+    if register:
+        register(None, _note_fork_callback, None, None)
+
+
+def _note_fork() -> None:
+    """Note the present call; called in the process that forks, after the fork."""
+    if _describe_call:
+        _noted_calls.setdefault(_describe_call(), False)
+
+
+_note_fork_callback = ctypes.CFUNCTYPE(None)(_note_fork)
+
+
 _current: Journal | None = None
 
 
@@ -222,39 +288,43 @@ def calling_several_components() -> Iterator[None]:
 
 @contextmanager
 def calling_component(
-    component: str, function: str, deadline_name: str, time: float = math.nan
+    component: str, function: str, deadline_name: str | None = None, time: float = math.nan
 ) -> Iterator[None]:
     """Record a call into a component, outside the stepping loop, for the duration of the block.
 
     Args:
         component: Name of the component.
         function: Name of its function.
-        deadline_name: Attribute of `Deadlines` with the maximum duration.
+        deadline_name: Attribute of `Deadlines` with the maximum duration; None: no maximum.
         time: Simulation time (s); NaN outside the simulation.
 
     Raises:
         ComponentError: The block raised an exception, see `as_component_error`.
     """
     journal = _current
-    if journal is None or journal.is_shared:
-        with (
-            attributing_forks(lambda: (component, function)),
-            as_component_error(component, function, time),
-        ):
-            yield
-        return
+    with (
+        nullcontext()
+        if journal is None or journal.is_shared
+        else _recording_call(journal, component, function, deadline_name, time),
+        attributing_forks(lambda: (component, function)),
+        as_component_error(component, function, time),
+    ):
+        yield
+
+
+@contextmanager
+def _recording_call(
+    journal: Journal, component: str, function: str, deadline_name: str | None, time: float
+) -> Iterator[None]:
+    """Record a call and its deadline in the journal for the duration of the block."""
     phase, deadline, before = journal.phase, journal.deadline, journal.activity()
     journal.record_call(component, function, time)
     journal.enter_phase(
         Phase.RESULTS_WRITTEN if phase == Phase.RESULTS_WRITTEN else Phase.CALLING,
-        getattr(journal.deadlines, deadline_name),
+        getattr(journal.deadlines, deadline_name) if deadline_name else math.inf,
     )
     try:
-        with (
-            attributing_forks(lambda: (component, function)),
-            as_component_error(component, function, time),
-        ):
-            yield
+        yield
     finally:
         journal.record_call(before.component, before.function, before.time)
         journal.enter_phase(phase, deadline)

@@ -8,9 +8,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from io import BytesIO, StringIO
+from io import StringIO
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, cast
 
 from ..results import Result
 from ..results.files import writing_atomically
@@ -50,9 +50,6 @@ STYLE: Mapping[Any, Any] = {
     "ytick.color": "#444444",
     "ytick.labelsize": 7,
 }
-
-#: keeps SVG files reproducible
-_SVG_METADATA: dict[str, Any] = {"Date": None, "Creator": None}
 
 
 @contextmanager
@@ -114,28 +111,26 @@ def save_figure(figure: Figure, path: Path) -> None:
 
     Atomically, without dates and versions.
     """
-    with figure_style(), writing_atomically(path) as temporary:
-        metadata = {"Software": None} if path.suffix == ".png" else _SVG_METADATA
-        figure.savefig(temporary, format=path.suffix[1:], dpi="figure", metadata=metadata)
+    with writing_atomically(path) as temporary:
+        if path.suffix == ".png":
+            from matplotlib.backends.backend_agg import FigureCanvasAgg
+
+            with figure_style():
+                cast(Any, FigureCanvasAgg(figure)).print_png(temporary, metadata={"Software": None})
+        else:
+            temporary.write_text(figure_to_svg(figure), encoding="utf-8", newline="\n")
 
 
 def figure_to_svg(figure: Figure) -> str:
     """Return a figure as the text of an SVG file, without dates and versions."""
-    text = StringIO()
+    from matplotlib.backends.backend_svg import FigureCanvasSVG
+
+    text, dpi = StringIO(), figure.dpi
     with figure_style():
-        figure.savefig(text, format="svg", dpi="figure", metadata=_SVG_METADATA)
+        # the layout is fixed, so `Figure.savefig`, which draws twice, is not needed
+        cast(Any, FigureCanvasSVG(figure)).print_svg(text, metadata={"Date": None, "Creator": None})
+    figure.set_dpi(dpi)  # print_svg has changed it
     return text.getvalue()
-
-
-def draw_nothing() -> None:
-    """Draw axes without curves, so that matplotlib imports its modules and fills its caches."""
-    from matplotlib.figure import Figure
-
-    with figure_style():
-        figure = Figure()
-        figure.subplots().set_title("0")
-        figure.savefig(BytesIO(), format="png")
-    figure_to_svg(figure)
 
 
 def draw_figures(

@@ -8,15 +8,16 @@ from __future__ import annotations
 import math
 import os
 import sys
-from collections.abc import Mapping, Sequence
-from typing import TYPE_CHECKING, TextIO
+from collections.abc import Collection, Iterable, Mapping, Sequence
+from typing import TYPE_CHECKING, Literal, TextIO
 
 from ..core.text import escape_control_characters
 from ..process.standard_streams import unescaped
-from ..results.checks import CheckOutcome, Number
 
 if TYPE_CHECKING:
-    from rich.console import Console
+    from rich.text import Text
+
+    from ..results.checks import CheckOutcome, Number
 
 MAX_LINE_WIDTH = 1000  # characters, of output that is not a terminal
 
@@ -88,19 +89,34 @@ def _has_colours(file: TextIO) -> bool:
     )
 
 
-def table_console(file: TextIO | None = None, width: int = MAX_LINE_WIDTH) -> Console:
-    """Return a console for tables; the cells have to be made by `cell_text`.
+def print_table(
+    header: Sequence[str],
+    rows: Iterable[Sequence[str | Text]],
+    right: Collection[str] | None = None,
+) -> None:
+    """Print a table and an empty line on standard output.
 
     Args:
-        file: The output stream; default: standard output.
-        width: Characters of a line unless the output is a terminal.
+        header: Names of the columns.
+        rows: Texts of the cells; a Rich text may have a colour.
+        right: Names of the columns that are aligned to the right; None: all but the first one and
+            "unit", which are texts.
     """
+    from rich import box
     from rich.console import Console
+    from rich.table import Table
 
-    console = Console(file=unescaped(file or sys.stdout), highlight=False)
+    table = Table(box=box.SIMPLE_HEAD, pad_edge=False, show_edge=False)
+    for i, name in enumerate(header):
+        is_number = (i > 0 and name != "unit") if right is None else name in right
+        justify: Literal["left", "right"] = "right" if is_number else "left"
+        table.add_column(cell_text(name), justify=justify, overflow="fold")
+    for row in rows:
+        table.add_row(*(cell_text(cell) if isinstance(cell, str) else cell for cell in row))
+    console = Console(file=unescaped(sys.stdout), highlight=False)
     if not console.is_terminal:
-        console.width = width
-    return console
+        console.width = MAX_LINE_WIDTH
+    console.print(table, "")
 
 
 def cell_text(text: str) -> str:

@@ -2,14 +2,13 @@
 
 from .file_paths import find_scenario
 from .nested_systems import load_scenario
-from .prepared_run import IsolationMode, PreparedRun, import_figures, load
+from .prepared_run import IsolationMode, PreparedRun, load
 from .schema import json_schema
 
 __all__ = [
     "IsolationMode",
     "PreparedRun",
     "find_scenario",
-    "import_figures",
     "json_schema",
     "load",
     "load_scenario",

@@ -16,7 +16,7 @@ from typing import Any, TypeVar
 from ..core.component import Component, Variable
 from ..core.errors import Problem, did_you_mean
 from .evaluation_schema import CallSpec, FunctionSpec
-from .json_pointer import find_value, missing_value, pointer_keys
+from .json_document import find_value, missing_value, pointer_keys
 from .name_resolution import Target, UnknownNameError, resolve_name
 from .named_functions import (
     RECORDED_INPUTS,

@@ -1,8 +1,8 @@
 """Files that the arguments of components name, for example vehicle files and meshes.
 
 A text in "arguments" of a component or of the scene that ends in ".json" stands for the content of
-this file, and the name of an STL, OBJ or GLB file at the key "mesh" for its triangles
-(`mesh_files.py`). Paths start from the folder of the file that contains the text.
+this file, and the name of an STL, OBJ or GLB file at the key "mesh" for its triangles. Paths start
+from the folder of the file that contains the text.
 """
 
 from __future__ import annotations
@@ -12,10 +12,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..core.errors import InputError, Problem
-from . import mesh_files
-from .json_document import Document, JsonPath, Origin, read_document
-from .mesh_files import read_mesh
+from .json_document import Document, JsonPath, Origin, path_in_system, read_document
 
 SUFFIX = ".json"
 
@@ -75,9 +75,11 @@ def include_in_setting(
         documents[path] = file
         return file.value
 
-    is_argument = tuple(keys[:2]) == ("scene", "arguments") or (
-        len(keys) > 2 and (keys[0], keys[2]) == ("components", "arguments")
-    )
+    match path_in_system(keys):
+        case ["scene", "arguments", *_] | ["components", _, "arguments", *_]:
+            is_argument = True
+        case _:
+            is_argument = False
     return (_replace_names(value, (), read) if is_argument else value), files, documents
 
 
@@ -93,7 +95,7 @@ def _replace_names(value: Any, path: JsonPath, content: Callable[[str, JsonPath]
 def _names_file(text: str, path: JsonPath) -> bool:
     """Return whether a text names a file to include."""
     return text.endswith(SUFFIX) or (
-        path[-1:] == ("mesh",) and text.lower().endswith(mesh_files.SUFFIXES)
+        path[-1:] == ("mesh",) and text.lower().endswith(MESH_SUFFIXES)
     )
 
 
@@ -137,3 +139,36 @@ class _Inclusion:
         self.invalid_paths += [(*path, *each) for each in file.invalid_paths]
         self.origins |= {(*path, *each): Origin(file, each) for each in file.offsets}
         return file.value
+
+
+#: ends of the names of mesh files
+MESH_SUFFIXES = (".stl", ".obj", ".glb")
+
+_DIGITS = 6  # of coordinates
+
+
+def read_mesh(file: Path) -> dict[str, Any]:
+    """Return the triangles of a mesh file as {"vertices": [[x, y, z], ...], "faces".
+
+    [[a, b, c], ...]}.
+
+    Raises:
+        InputError: trimesh is not installed, or the file cannot be read or has no triangles.
+    """
+    try:
+        import trimesh
+    except ModuleNotFoundError:
+        raise InputError(
+            Problem('reading meshes needs trimesh: pip install "fmi-cosim[mesh]"', str(file))
+        ) from None
+    try:
+        mesh: Any = trimesh.load(file, force="mesh")
+        corners = np.round(np.asarray(mesh.triangles, np.float64).reshape(-1, 3), _DIGITS)
+    except Exception as error:
+        raise InputError(Problem(f"cannot be read: {error}", str(file))) from None
+    if not len(corners):
+        raise InputError(Problem("contains no triangles", str(file)))
+    vertices, faces = np.unique(
+        corners + 0.0, axis=0, return_inverse=True
+    )  # + 0.0: no negative zeros
+    return {"vertices": vertices.tolist(), "faces": faces.reshape(-1, 3).tolist()}

@@ -1,4 +1,4 @@
-"""Strict JSON reader that keeps the line and column of every value.
+"""Strict JSON reader that keeps the line and column of every value, and JSON pointers (RFC 6901).
 
 Duplicate keys, NaN, Infinity and numbers too large for a double are collected as problems with line
 and column, and reading continues. Text that is not JSON at all raises InputError.
@@ -10,19 +10,20 @@ import json
 import math
 import re
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
-from ..core.errors import InputError, Problem, nearest_file
+from ..core.errors import InputError, Problem, abbreviate_names, nearest_file, nearest_name
 from ..core.json_values import copy_json
 from ..core.paths import open_text
-from ..core.text import acceptable_text, shorten, text_problem
+from ..core.text import acceptable_text, count_noun, shorten, text_problem
 
 #: keys and indices from the root of a document to a value
 JsonPath = tuple["str | int", ...]
+T = TypeVar("T")
 _DECODER = json.JSONDecoder()
 _WHITESPACE = re.compile(r"[ \t\r\n]*")
 _LITERAL = re.compile(r"-?Infinity|NaN|true|false|null|-?(?:0|[1-9]\d*)(?:\.\d+)?(?:[eE][-+]?\d+)?")
@@ -46,11 +47,13 @@ class Document:
     origins: Mapping[JsonPath, Origin] = field(default_factory=dict)
     #: the other files from which the value is merged
     bases: tuple[Path, ...] = ()
-    #: Python classes and objects by the names of the components that they implement; from a dict or
+    #: Python classes and objects by the paths of the components that they implement; from a dict or
     #: from settings
-    objects: Mapping[str, Any] = field(default_factory=dict)
+    objects: Mapping[JsonPath, Any] = field(default_factory=dict)
     #: paths of the values of other files that are removed
     removed: set[JsonPath] = field(default_factory=set)
+    #: paths of the inline nested systems that extend a file
+    complete_systems: Set[JsonPath] = frozenset()
     #: JSON pointers of the caller's settings by the paths of the values that they set
     settings: dict[JsonPath, str] = field(default_factory=dict)
     #: files that these settings name, by the paths of the values that are read from them
@@ -101,18 +104,38 @@ class Document:
 
     def refuse_objects(self, reason: str, classes: bool) -> None:
         """Raise InputError with this reason if components are Python objects, or (if `classes`) Python classes."""
-        if names := [
-            name for name, target in self.objects.items() if classes or not callable(target)
-        ]:
-            kind = "class or object" if classes else "object"
-            raise InputError(
-                [
-                    Problem(
-                        f"{reason}: found a Python {kind}",
-                        self.where(("components", names[0], "python")),
-                    )
-                ]
-            )
+        for path, target in self.objects.items():
+            if classes or not callable(target):
+                kind = "class or object" if classes else "object"
+                where = self.where((*path, "python"))
+                raise InputError(Problem(f"{reason}: found a Python {kind}", where))
+
+    def part(self, path: JsonPath) -> Document:
+        """Return the object at a path, an inline nested system, as a document of its own.
+
+        Its problems are located in this document.
+        """
+        value = self.value
+        for key in path:
+            value = value[key]
+
+        def below(paths: Iterable[JsonPath]) -> list[JsonPath]:
+            return [each[len(path) :] for each in paths if each[: len(path)] == path]
+
+        return Document(
+            self.file,
+            "",
+            value,
+            origins={(): Origin(self, path)},
+            invalid_paths=below(self.invalid_paths),
+            removed=set(below(self.removed)),
+            objects={each: self.objects[*path, *each] for each in below(self.objects)},
+            settings={each: self.settings[*path, *each] for each in below(self.settings)},
+            set_documents={
+                each: self.set_documents[*path, *each] for each in below(self.set_documents)
+            },
+            is_dict=self.is_dict,
+        )
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -139,6 +162,17 @@ class Origin(NamedTuple):
 
     document: Document
     path: JsonPath
+
+
+def path_in_system(path: Sequence[T]) -> Sequence[T]:
+    """Return the part of a path that lies in the innermost inline nested system.
+
+    >>> path_in_system(("components", "uav", "system", "connections", 0))
+    ('connections', 0)
+    """
+    while len(path) > 3 and (path[0], path[2]) == ("components", "system"):
+        path = path[3:]
+    return path
 
 
 def json_path(path: Sequence[str | int]) -> str:
@@ -305,3 +339,96 @@ class _JsonParser:
     def problem(self, path: JsonPath, message: str) -> None:
         self.document.problems.append(Problem(message, self.document.where(path)))
         self.document.invalid_paths.append(path)
+
+
+#: keys of objects that are created when a value in them is set
+_OPTIONAL_OBJECTS = ("parameters", "arguments")
+
+
+def pointer_keys(pointer: str) -> list[str]:
+    """Return the keys and indices of a JSON pointer.
+
+    >>> pointer_keys("/components/uav/and~1or")
+    ['components', 'uav', 'and/or']
+    """
+    return [key.replace("~1", "/").replace("~0", "~") for key in pointer[1:].split("/")]
+
+
+def find_value(value: Any, keys: Sequence[str]) -> tuple[Any, int]:
+    """Follow keys and indices into a JSON value.
+
+    Returns:
+        The deepest value that exists, and the number of keys that lead to it.
+    """
+    for depth, key in enumerate(keys):
+        if isinstance(value, dict) and key in value:
+            value = value[key]
+        elif isinstance(value, list) and key.isdigit() and int(key) < len(value):
+            value = value[int(key)]
+        else:
+            return value, depth
+    return value, len(keys)
+
+
+def missing_value(document: Any, pointer: str) -> str:
+    """Return the message about a JSON pointer to no value, with the keys at the deepest place that exists.
+
+    >>> missing_value({"environment": {"sea_state": 2, "seed": 1}}, "/environment/waves/direction")
+    'the scenario has no "/environment/waves"; "environment" has: sea_state, seed'
+    """
+    keys = pointer_keys(pointer)
+    value, depth = find_value(document, keys)
+    return (
+        "the scenario has no "
+        f'"/{"/".join(keys[: depth + 1])}"{_present_keys(keys[:depth], keys[depth], value)}'
+    )
+
+
+def _present_keys(place: Sequence[str], key: str, value: Any) -> str:
+    """Return a hint for the end of a message.
+
+    The key at a place that another one probably means, else all keys there.
+    """
+    owner = f'"{shorten(place[-1])}"' if place else "it"
+    if isinstance(value, list):
+        return f"; {owner} has {count_noun(len(value), 'element')}"
+    if not isinstance(value, dict) or not value:
+        return ""
+    near = nearest_name(key, (*value, *_OPTIONAL_OBJECTS))
+    return (
+        f'; did you mean "{near}"?'
+        if near
+        else f"; {owner} has: {abbreviate_names(map(shorten, value), 12)}"
+    )
+
+
+def set_value(document: Any, pointer: str, value: Any) -> str:
+    """Set a value in a JSON document.
+
+    Only the last key, and "parameters" or "arguments" before it, may be new.
+
+    Returns:
+        The problem, or "".
+    """
+    keys = pointer_keys(pointer)
+    target, depth = find_value(document, keys[:-1])
+    if depth == len(keys) - 2 and keys[depth] in _OPTIONAL_OBJECTS and isinstance(target, dict):
+        target, depth = target.setdefault(keys[depth], {}), depth + 1
+    if depth < len(keys) - 1:
+        return missing_value(document, pointer)
+    if isinstance(target, dict):
+        target[keys[-1]] = value
+    elif isinstance(target, list) and keys[-1].isdigit() and int(keys[-1]) < len(target):
+        target[int(keys[-1])] = value
+    else:
+        return missing_value(document, pointer)
+    return ""
+
+
+def value_path(document: Any, pointer: str) -> tuple[str | int, ...]:
+    """Return the keys and indices that lead to an existing value, with indices of lists as integers."""
+    path: list[str | int] = []
+    for key in pointer_keys(pointer):
+        path.append(int(key) if isinstance(document, list) else key)
+        document = document[path[-1]]
+    return tuple(path)

@@ -1,17 +1,225 @@
-"""Inputs that nothing feeds or sets, although they probably lack a connection."""
+"""Inputs that nothing feeds or sets, although they probably lack a connection.
+
+Outputs that have the names of inputs, in the file in which the connection is missing, are the
+connections that a warning proposes.
+"""
 
 from __future__ import annotations
 
 import difflib
-from collections.abc import Iterator
+import re
+from collections import defaultdict
+from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
+from functools import cached_property
+from typing import NamedTuple
 
 from ..core.compatibility import incompatibility
 from ..core.component import Component, Variable
 from ..core.errors import abbreviate_names
 from ..core.system import Endpoint, System
-from .fitting_outputs import MissingConnection, OutputFinder, Place, VariablesByEndpoint
 from .nested_systems import Node
 from .system_builder import PROFILE_PREFIX
+
+VariablesByEndpoint = dict[Endpoint, Variable]
+
+
+class Place(NamedTuple):
+    """Scalar as connections name it.
+
+    The enclosing system, its component or nested system, and the name below that.
+    """
+
+    system: str
+    member: str
+    scalar: str
+
+    @property
+    def member_name(self) -> str:
+        """Full name of the component or nested system."""
+        return f"{self.system}.{self.member}" if self.system else self.member
+
+    def __str__(self) -> str:
+        return f"{self.member_name}.{self.scalar}"
+
+
+class MissingConnection(NamedTuple):
+    """Connection that would feed unconnected inputs of one component or nested system.
+
+    Attributes:
+        target: Input or prefix of inputs.
+        sources: All outputs or prefixes of outputs that fit; those of the same vehicle come first.
+        inputs: The inputs, with the scalars of components behind them.
+    """
+
+    target: str
+    sources: Sequence[str]
+    inputs: Mapping[Place, Sequence[Endpoint]]
+
+
+class OutputFinder:
+    """Finder of outputs that fit inputs.
+
+    Args:
+        root: The scenario.
+        system: Its system.
+    """
+
+    def __init__(self, root: Node, system: System) -> None:
+        self._root, self._system = root, system
+
+    def place_of(self, end: Endpoint) -> Place:
+        """Return the outermost name of an input: that of a port if a nested system publishes it."""
+        *systems, member = end.component.split(".")
+        scalar = end.scalar
+        while systems and (port := _port_of(self._node(systems), f"{member}.{scalar}")):
+            member, scalar = systems.pop(), port
+        return Place(".".join(systems), member, scalar)
+
+    def outputs_beside(self, place: Place) -> Iterator[tuple[Place, Variable]]:
+        """Yield the outputs that can be connected in the file of an input, with their variables."""
+        for output, variable in self._outputs.items():
+            if output.system == place.system and output.member != place.member:
+                yield output, variable
+
+    def missing_connections(self, unconnected: VariablesByEndpoint) -> Iterator[MissingConnection]:
+        """Yield the connections that have outputs for unconnected inputs, the largest of each component first."""
+        ends: dict[Place, list[Endpoint]] = defaultdict(list)
+        for end in unconnected:
+            ends[self.place_of(end)].append(end)
+        members: dict[str, list[Place]] = defaultdict(list)
+        for place in ends:
+            members[place.member_name].append(place)
+        for places in members.values():
+            pairs: dict[tuple[str, str], list[Place]] = defaultdict(list)
+            for place in places:
+                for pair in self._pairs(place, [unconnected[end] for end in ends[place]]):
+                    pairs[pair].append(place)
+            for target, sources, covered in _largest_first(pairs):
+                near = [source for source in sources if places[0].member in source.split(".")]
+                base = _common_variable([str(place)[len(target) :] for place in covered])
+                names = [source + base for source in dict.fromkeys((*near, *sources))]
+                yield MissingConnection(
+                    target + base, names, {place: ends[place] for place in covered}
+                )
+
+    def _pairs(self, place: Place, variables: Sequence[Variable]) -> set[tuple[str, str]]:
+        """Return pairs of prefixes (of inputs, of outputs) whose connection would feed an input.
+
+        The names must be equal without the prefix of the input, and without prefixes of the output.
+        A last part alone ("x") is no name; as whole name of an input it may follow one prefix of
+        outputs. Instead of a nested system a pair has its port.
+        """
+        first, _, rest = place.scalar.partition(".")
+        pairs = set()
+        for prefix, name in (
+            (place.member_name, place.scalar),
+            (f"{place.member_name}.{first}", rest),
+        ):
+            for source, output, variable in self._outputs_by_end.get((place.system, name), ()):
+                prefixes = source.count(".") - output.member_name.count(".")
+                is_name = "." in name or prefixes <= (name == place.scalar)
+                if (
+                    is_name
+                    and output.member != place.member
+                    and not any(incompatibility(variable, each) for each in variables)
+                ):
+                    port = (
+                        "." + re.split(r"[.\[]", name)[0]
+                        if self._nested_systems & {prefix, source}
+                        else ""
+                    )
+                    pairs.add((prefix + port, source + port))
+        return pairs
+
+    @cached_property
+    def _nested_systems(self) -> Set[str]:
+        """Full names of all nested systems, of which connections name ports."""
+        return {node.full_name(name) for node in self._root.walk() for name in node.children}
+
+    def _node(self, systems: Iterable[str]) -> Node:
+        node = self._root
+        for system in systems:
+            node = node.children[system]
+        return node
+
+    @cached_property
+    def _outputs(self) -> Mapping[Place, Variable]:
+        """All outputs of components and ports."""
+        outputs: dict[Place, Variable] = {}
+        for name, slots in self._system.slots.items():
+            system, _, member = name.rpartition(".")
+            outputs |= {
+                Place(system, member, slot): v
+                for slot, (v, _) in slots.items()
+                if v.causality == "output"
+            }
+        for alias, end in self._system.aliases.items():
+            outputs[self._place_of_alias(alias)] = self._system.find_element(end).variable
+        return outputs
+
+    def _place_of_alias(self, alias: str) -> Place:
+        systems: list[str] = []
+        node, rest = self._root, alias
+        while (name := rest.partition(".")[0]) in node.children:
+            systems.append(name)
+            node, rest = node.children[name], rest.partition(".")[2]
+        return Place(".".join(systems[:-1]), systems[-1], rest)
+
+    @cached_property
+    def _outputs_by_end(self) -> Mapping[tuple[str, str], Sequence[tuple[str, Place, Variable]]]:
+        """Outputs by system and name without prefixes, each with the prefix that is left out."""
+        found: dict[tuple[str, str], list[tuple[str, Place, Variable]]] = defaultdict(list)
+        for place, variable in self._outputs.items():
+            prefix, rest = place.member_name, place.scalar
+            while rest:
+                found[place.system, rest].append((prefix, place, variable))
+                first, _, rest = rest.partition(".")
+                prefix = f"{prefix}.{first}"
+        return found
+
+
+def _port_of(node: Node, name: str) -> str:
+    """Return the port that publishes an inner input of a nested system, with the rest of the name.
+
+    "" if there is none.
+    """
+    for port, prefixes in node.ports.inputs.items():
+        for prefix in prefixes:
+            if name == prefix or name.startswith((f"{prefix}.", f"{prefix}[")):
+                return port + name[len(prefix) :]
+    return ""
+
+
+def _largest_first(
+    pairs: Mapping[tuple[str, str], Sequence[Place]],
+) -> Iterator[tuple[str, list[str], list[Place]]]:
+    """Yield (prefix of inputs, prefixes of outputs that feed the same inputs, these inputs) until no input is left."""
+    left = {pair: list(pairs[pair]) for pair in sorted(pairs)}
+    while left:
+        (target, _), covered = max(left.items(), key=lambda item: len(item[1]))
+        yield (
+            target,
+            [
+                source
+                for (other, source), places in left.items()
+                if (other, places) == (target, covered)
+            ],
+            covered,
+        )
+        rest = {
+            pair: [place for place in places if place not in covered]
+            for pair, places in left.items()
+        }
+        left = {pair: places for pair, places in rest.items() if places}
+
+
+def _common_variable(ends: Sequence[str]) -> str:
+    """Return the name that ends of names have in common if they are one scalar, or elements of one array; else ""."""
+    names = {end.partition("[")[0] for end in ends}
+    if len(ends) == 1:
+        return ends[0]
+    return names.pop() if len(names) == 1 else ""
+
 
 #: number of inputs, and of outputs that fit them, that a warning names
 _MAX_NAMES = 4

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import re
 from bisect import bisect_left
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections import defaultdict
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from typing import Any, NamedTuple
 
 from ..core.component import Component, Variable
@@ -250,3 +252,46 @@ def vector_names(variables: Mapping[str, Variable], prefix: str) -> list[str]:
         if len(found) > 1 and len(kinds) == 1 and not found[0].shape
         else []
     )
+
+
+class Assignment(NamedTuple):
+    """Assignment of a value to the variable `name` in the system `node`.
+
+    `where` is its place, for messages.
+    """
+
+    node: Node
+    name: str
+    value: Any
+    where: str
+
+
+def iterate_assignments(root: Node, settings: Mapping[str, Any]) -> Iterator[Assignment]:
+    """Yield the assignments of start values.
+
+    Outer systems override nested ones, and the caller's settings override both.
+    """
+    for node in root.walk():
+        for name, spec in node.spec.components.items():
+            for variable, value in spec.parameters.items():
+                yield Assignment(
+                    node,
+                    f"{name}.{variable}",
+                    value,
+                    node.where("components", name, "parameters", variable),
+                )
+    for name, value in settings.items():
+        yield Assignment(root, name, value, f'setting "{name}"')
+
+
+def values_by_component(root: Node, settings: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
+    """Return the assigned values by full name of the component and name of the variable.
+
+    Unknown names are left out.
+    """
+    values: dict[str, dict[str, Any]] = defaultdict(dict)
+    for node, name, value, _ in iterate_assignments(root, settings):
+        with suppress(UnknownNameError):
+            for target in resolve_name(node, name, ("parameters", "inputs"), include_inner=True):
+                values[target.component][target.prefix] = value
+    return values

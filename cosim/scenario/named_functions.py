@@ -13,9 +13,9 @@ from ..components.python_import import load_object
 from ..core.errors import Problem, did_you_mean, nearest_file
 from ..core.paths import is_file
 from ..results.checks import kpi_hint
-from .argument_types import argument_problem
 from .evaluation_schema import CallSpec, FunctionSpec
 from .function_definitions import (
+    argument_problem,
     function_definition,
     function_definitions,
     kpi_value_names,

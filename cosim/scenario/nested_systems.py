@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 import re
 from collections.abc import Iterator, Mapping, Set
 from dataclasses import dataclass, field
@@ -9,21 +10,20 @@ from pathlib import Path
 from typing import Any
 
 from ..components.python_import import package_files
-from ..core import paths
+from ..core import paths, resources
 from ..core.errors import InputError, Problem
 from ..core.json_values import copy_json
 from ..core.size_limits import MAX_LEVELS
 from ..core.text import shorten
-from . import json_pointer
-from .dict_document import document_of_dict
 from .evaluation_schema import CallSpec
 from .expanded_size import SystemFile, check_expanded_size
 from .extension import expand_document, read_system_document
-from .file_paths import change_paths, find_scenario, relocating
-from .json_document import Document
+from .file_paths import find_scenario, relocating
+from .json_document import Document, pointer_keys, set_value
 from .schema import NestedSpec, PortsSpec, ScenarioSpec, SystemSpec, ports_of
 from .schema_types import accepted
-from .settings import apply_settings
+from .settings import apply_settings, document_of_dict
+from .sources import change_paths
 from .validation import validate_document
 
 _LEGAL_NAME = re.compile("[A-Za-z_][A-Za-z0-9_]*")
@@ -92,10 +92,10 @@ class Node:
 
     def leaves(self) -> Iterator[tuple[Node, str]]:
         """Yield (system, name) of every valid component that is not a nested system, in the order of the files."""
-        for name, component in self.spec.components.items():
+        for name in self.spec.components:
             if name in self.children:
                 yield from self.children[name].leaves()
-            elif name not in self.invalid_components and component.system is None:
+            elif name not in self.invalid_components:
                 yield self, name
 
 
@@ -125,29 +125,34 @@ class Scenario:
         return change_paths(value, relocating(self.root.folder, None))
 
     def files(self) -> list[Path]:
-        """Return all files that the scenario names, whether they exist or not.
+        """Return all files that the scenario names, whether they exist or not."""
+        return list(files_of_system(self.root, self.spec))
 
-        These are the scenario and its nested systems, sources with their packages, input profiles,
-        KPIs and figures.
-        """
-        files = [file for node in self.root.walk() for file in node.document.files]
-        files += [self.root.folder / spec.file for _, spec in accepted(self.spec.inputs)]
-        functions: list[CallSpec] = [
-            spec for _, spec in (*accepted(self.spec.kpis), *accepted(self.spec.figures))
-        ]
-        functions += [self.spec.scene] if self.spec.scene else []
-        python = [
-            self.root.folder / spec.python.rpartition(":")[0]
-            for spec in functions
-            if ".py:" in spec.python
-        ]
-        for node, name in self.root.leaves():
-            spec = node.spec.components[name]
-            if spec.python:
-                python.append(node.folder / spec.python.rpartition(":")[0])
-            else:
-                files.append(node.folder / (spec.fmu or (spec.modelica or "").rpartition(":")[0]))
-        return [*files, *package_files(python)]
+
+def files_of_system(root: Node, spec: ScenarioSpec, is_loaded: bool = False) -> set[Path]:
+    """Return all files that a scenario depends on.
+
+    These are the scenario and its nested systems, sources with their packages, input profiles,
+    KPIs and figures.
+
+    Args:
+        root: The scenario.
+        spec: Its specification.
+        is_loaded: The components exist, so that the files from which they were built are known.
+    """
+    files: list[Path] = []
+    for node in root.walk():
+        files += node.document.files
+    for _, profile in accepted(spec.inputs):
+        files += profile.files(root.folder)
+    calls: list[CallSpec] = [each for _, each in (*accepted(spec.kpis), *accepted(spec.figures))]
+    for call in (*calls, spec.scene) if spec.scene else calls:
+        files += [root.folder / path for path in call.paths]
+    for node, name in root.leaves():
+        source = node.spec.components[name]
+        files += source.used_files(node.folder) if is_loaded else source.files(node.folder)
+    python = [file for file in files if file.suffix == ".py"]
+    return {*files, *package_files(python)}
 
 
 def open_scenario(scenario: str | Path | Mapping[str, Any]) -> Document:
@@ -213,7 +218,7 @@ def _find_seed_problems(
             )
         elif pointer.split("/")[1] in invalid_keys:
             continue
-        elif problem := json_pointer.set_value(copy_json(document.value), pointer, 0):
+        elif problem := set_value(copy_json(document.value), pointer, 0):
             yield Problem(problem, document.where(("seeds", i)))
 
 
@@ -249,17 +254,36 @@ class _SystemReader:
         file = SystemFile(document, spec, invalid_keys, invalid_components, {})
         ancestors = (*ancestors, paths.resolve_path(document.file))
         for name, component in spec.components.items():
-            if component.system is not None:
-                if child := self._read_nested(file, name, component.system, ancestors):
+            if component.nested_system is not None:
+                if child := self._read_nested(file, name, component.nested_system, ancestors):
                     file.children[name] = child
                 else:
                     invalid_components.add(name)
         return file
 
     def _read_nested(
+        self,
+        parent: SystemFile,
+        name: str,
+        system: str | dict[str, Any],
+        ancestors: tuple[Path, ...],
+    ) -> SystemFile | None:
+        """Return the file of a nested system, or None if it cannot be used.
+
+        An inline system is a part of the file of its parent.
+        """
+        if isinstance(system, str):
+            return self._read_nested_file(parent, name, system, ancestors)
+        place = ("components", name, "system")
+        if len(ancestors) + 1 > MAX_LEVELS:
+            text = f'the nested system "{name}" is nested more than {MAX_LEVELS} levels deep'
+            self.problems.append(Problem(text, parent.document.where(place)))
+            return None
+        return self.read(parent.document.part(place), NestedSpec, ancestors)
+
+    def _read_nested_file(
         self, parent: SystemFile, name: str, path: str, ancestors: tuple[Path, ...]
     ) -> SystemFile | None:
-        """Return the file of a nested system, or None if it cannot be used."""
         file = parent.document.file.parent / path
         key = (
             paths.resolve_path(file.parent) / file.name
@@ -294,3 +318,55 @@ def _make_node(file: SystemFile, prefix: str = "") -> Node:
         name: _make_node(child, node.full_name(name)) for name, child in file.children.items()
     }
     return node
+
+
+def extending_scenario(
+    base: str | Path,
+    folder: Path,
+    name: str,
+    description: str,
+    settings: Mapping[str, Any] | None = None,
+    settings_folder: Path | None = None,
+) -> dict[str, Any]:
+    """Return the content of a scenario file that extends another one.
+
+    Args:
+        base: Path of a scenario file, or name of a shipped scenario. A shipped scenario is extended
+            by its name, so that the new file runs wherever cosim is installed.
+        folder: Folder of the new file.
+        name: Name of the new scenario.
+        description: Its description.
+        settings: Changed values by names of variables or JSON pointers, as for `cosim.load`.
+        settings_folder: Folder that paths in the values of JSON pointers start from; None: the
+            working directory.
+
+    Raises:
+        InputError: The base does not exist, or a JSON pointer leads nowhere.
+    """
+    found = find_scenario(base)
+    is_shipped = found.resolve().parent == (resources.root() / "scenarios").resolve()
+    extended = found.stem if is_shipped else os.path.relpath(found, folder).replace(os.sep, "/")
+    changed = (
+        load_scenario(found, settings, settings_folder).root.document.value if settings else {}
+    )
+    values: dict[str, Any] = {}
+    for key in settings or {}:
+        if key.startswith("/"):
+            _copy_pointed(changed, values, pointer_keys(key))
+    values = change_paths(values, relocating(found.parent, folder))
+    for key, value in (settings or {}).items():
+        if not key.startswith("/"):
+            component, _, variable = key.partition(".")
+            values.setdefault("components", {}).setdefault(component, {}).setdefault(
+                "parameters", {}
+            )[variable] = value
+    return {"extends": extended, "name": name, "description": description, **values}
+
+
+def _copy_pointed(source: Any, target: dict[str, Any], keys: list[str]) -> None:
+    """Copy the value that keys lead to; a list on the way is copied as a whole."""
+    key, *rest = keys
+    if rest and isinstance(source.get(key), dict):
+        _copy_pointed(source[key], target.setdefault(key, {}), rest)
+    else:
+        target[key] = source[key]

@@ -15,9 +15,8 @@ from ..core.errors import Problem, abbreviate_names
 from ..core.paths import is_file
 from ..core.system import Endpoint
 from ..engine.transfer_plan import unit_conversion
-from .fitting_outputs import VariablesByEndpoint
 from .input_limits import set_excesses
-from .missing_connections import find_missing_connections
+from .missing_connections import VariablesByEndpoint, find_missing_connections
 
 if TYPE_CHECKING:
     from .prepared_run import PreparedRun

@@ -1,13 +1,24 @@
-"""Stages of a scenario and its nested systems."""
+"""Stages of a scenario and its nested systems, and the recommendation of a better algorithm."""
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from typing import NamedTuple
 
 from ..core.component import Component
-from ..core.graph import ordered_groups
-from ..core.system import Connection, Group, Iteration, Parallel, Stage
+from ..core.errors import abbreviate_names
+from ..core.graph import ordered_groups, strong_components
+from ..core.system import (
+    Connection,
+    Endpoint,
+    Group,
+    Iteration,
+    Parallel,
+    Stage,
+    System,
+    component_names,
+    iterate_groups,
+)
 from .nested_systems import Node
 from .schema import SystemSpec
 
@@ -134,3 +145,150 @@ def parallel_mode(spec: SystemSpec) -> Parallel:
 def _iteration_settings(spec: SystemSpec) -> Iteration | None:
     settings = spec.algorithm.iteration if spec.algorithm else None
     return Iteration(settings.tolerance, settings.limit, settings.method) if settings else None
+
+
+def recommend(system: System) -> list[str]:
+    """Return what would make the results more accurate, one line each with the reason.
+
+    Or one line that the algorithm fits.
+    """
+    inner = [
+        c for c in system.connections if not c.delay and c.source.component != c.target.component
+    ]
+    feeders: dict[str, set[str]] = {name: set() for name in system.components}
+    for connection in inner:
+        feeders[connection.target.component].add(connection.source.component)
+    groups = ordered_groups(feeders)
+    iterated = {
+        name
+        for group in iterate_groups(system.stages)
+        if group.iteration
+        for name in component_names(group.stages)
+    }
+    lines = list(_late_values(system, inner, groups))
+    within = [c for c in system.connections if not c.delay]
+    for group in (group for group in groups if not iterated.issuperset(group)):
+        lines += _coupling(
+            system,
+            [c for c in within if {c.source.component, c.target.component} <= set(group)],
+            group,
+        )
+    return lines or [
+        (
+            "none: components get values of the same step; only values that are fed back are one "
+            "step old, or iterated"
+        )
+    ]
+
+
+def _late_values(
+    system: System, connections: Sequence[Connection], groups: Sequence[Sequence[str]]
+) -> Iterator[str]:
+    """Yield a line if values are one step old although their reader does not feed their source."""
+    number = {name: i for i, group in enumerate(groups) for name in group}
+    position = dict(_positions(system.stages))
+    late = [
+        c
+        for c in connections
+        if number[c.source.component] != number[c.target.component]
+        and not _steps_earlier(position[c.source.component], position[c.target.component])
+        and not c.source.component.startswith("inputs.")
+    ]
+    if late:
+        names = abbreviate_names(
+            dict.fromkeys(f"{c.source.component} -> {c.target.component}" for c in late)
+        )
+        yield (
+            f'leave out "stages": the values of {names} are one step late, although nothing flows '
+            "back"
+        )
+
+
+def _coupling(
+    system: System, connections: Sequence[Connection], group: Sequence[str]
+) -> Iterator[str]:
+    """Yield a line about components that depend on each other, if their coupling can be solved better."""
+    names = abbreviate_names(group)
+    fixed = [
+        name for name in group if not system.components[name].has_state or name in system.periods
+    ]
+    is_direct = bool(_declared_loops(system, connections))
+    linear = {c for c in connections if c.interpolation == "linear"}
+    can_be_linear = [c for c in connections if _can_be_linear(system, c)]
+    position = dict(_positions(system.stages))
+    if is_direct and not fixed:
+        yield (
+            f'"iteration": {{"method": "newton"}} for {names}: their outputs depend directly on '
+            "each other, "
+            "and all of them can return to a state"
+        )
+        return
+    if is_direct:
+        yield (
+            f"a smaller step size: outputs of {names} form an algebraic loop, and one of them is "
+            "a step late; "
+            f"an iteration is not possible, because {abbreviate_names(fixed)} cannot repeat a step"
+        )
+    if len(group) == 1:
+        return
+    if can_be_linear and not linear:
+        targets = abbreviate_names(dict.fromkeys(c.target.component for c in can_be_linear))
+        yield (
+            f'"interpolation": "linear" for connections between {names}: {targets} can '
+            "interpolate, which raises the order to 2"
+        )
+    elif not linear and not any(
+        _steps_earlier(position[a], position[b]) for a in group for b in group
+    ):
+        yield (
+            f"one stage for each of {names}: they depend on each other, and later stages get "
+            "values of the end of the step"
+        )
+
+
+def _can_be_linear(system: System, connection: Connection) -> bool:
+    ends = (connection.source, connection.target)
+    types = {system.find_element(end).variable.type for end in ends}
+    has_period = any(end.component in system.periods for end in ends)
+    return (
+        system.components[connection.target.component].interpolates_inputs
+        and types == {"Float64"}
+        and not has_period
+    )
+
+
+def _declared_loops(system: System, connections: Sequence[Connection]) -> list[list[Endpoint]]:
+    """Return the loops of direct dependencies that the components declare."""
+    successors: dict[Endpoint, list[Endpoint]] = {}
+    for connection in connections:
+        successors.setdefault(connection.source, []).append(connection.target)
+    for end in dict.fromkeys(connection.target for connection in connections):
+        dependencies: Mapping[str, frozenset[str]] = system.components[end.component].dependencies
+        variable = system.find_element(end).variable.name
+        outputs = [source for source in successors if source.component == end.component]
+        direct = [
+            o
+            for o in outputs
+            if variable in dependencies.get(system.find_element(o).variable.name, ())
+        ]
+        successors.setdefault(end, []).extend(direct)
+    return [loop for loop in strong_components(successors) if len(loop) > 1]
+
+
+#: number of the stage, and of the member within it, at each level of nested systems
+_Position = tuple[tuple[int, int], ...]
+
+
+def _positions(stages: Sequence[Stage], prefix: _Position = ()) -> Iterator[tuple[str, _Position]]:
+    """Yield (component, position) of all components."""
+    for i, stage in enumerate(stages):
+        for k, member in enumerate(stage):
+            if isinstance(member, Group):
+                yield from _positions(member.stages, (*prefix, (i, k)))
+            else:
+                yield member, (*prefix, (i, k))
+
+
+def _steps_earlier(one: _Position, other: _Position) -> bool:
+    """Return whether the stage of one position steps before that of another one."""
+    return next((a[0] < b[0] for a, b in zip(one, other, strict=False) if a != b), False)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections import defaultdict
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from ..components.fmi import FmuFile, Isolation
-from ..components.input_table import read_input_table
 from ..core import component_log
 from ..core.component import Component, Variable, count_scalars
 from ..core.errors import InputError, Problem, merge_problems
@@ -22,18 +21,22 @@ from ..engine.pacer import LatePolicy
 from ..engine.plan import Plan, compile_plan
 from ..engine.settings import Event, Settings
 from ..process.journal import Deadlines, current_journal
-from .assigned_values import iterate_assignments, values_by_component
 from .component_factory import ComponentFactory
-from .component_schema import SOURCES
 from .function_arguments import FunctionResolver, without_placeholders
-from .name_resolution import SlotIndex, UnknownNameError, check_assignment, resolve_name
+from .name_resolution import (
+    SlotIndex,
+    UnknownNameError,
+    check_assignment,
+    iterate_assignments,
+    resolve_name,
+    values_by_component,
+)
 from .named_functions import find_function_problems
 from .nested_systems import Node, Scenario
-from .problem_locations import located_problems
-from .recorded_signals import SignalSelector
+from .recorded_signals import SignalSelector, StopConditionReader
 from .schema_types import accepted
+from .sources import Creation
 from .stages import StagePlanner, parallel_mode
-from .stop_conditions import StopConditionReader
 from .wiring import Wiring
 
 #: prefix of the components made from input profiles: inputs.0, inputs.1, ...
@@ -141,7 +144,14 @@ class SystemBuilder:
         for node, name in self.root.leaves():
             full_name = node.full_name(name)
             try:
-                component = self.component_factory.create(node, name, values.get(full_name, {}))
+                creation = Creation(
+                    full_name,
+                    node.folder,
+                    values.get(full_name, {}),
+                    node.document.objects.get(("components", name)),
+                    self.component_factory,
+                )
+                component = node.spec.components[name].create(creation)
                 self.components[full_name] = component
                 for warning in component.warnings:
                     place = node.where("components", name, *warning.subject)
@@ -157,9 +167,7 @@ class SystemBuilder:
         self.profiles = [f"{PROFILE_PREFIX}.{i}" for i, _ in accepted(self.spec.inputs)]
         for i, spec in accepted(self.spec.inputs):
             try:
-                table = read_input_table(
-                    self.root.folder / spec.file, self._targets(spec.to), spec.interpolation
-                )
+                table = spec.create(self.root.folder, self._targets(spec.to))
                 self.components[f"{PROFILE_PREFIX}.{i}"] = table
             except InputError as error:
                 self.profiles.remove(f"{PROFILE_PREFIX}.{i}")
@@ -356,13 +364,45 @@ class SystemBuilder:
 
         Those without a subject belong to its source if the caller has set the source.
         """
-        source = next(
-            each for each in SOURCES if getattr(node.spec.components[name], each) is not None
-        )
-        path = ("components", name, source)
+        path = ("components", name, node.spec.components[name].KEY)
         where = node.where(*path) if path in node.document.settings else ""
         problems = [
             each if each.subject else replace(each, where=each.where or where)
             for each in error.problems
         ]
         self._add_problems(InputError(problems), node, "components", name)
+
+
+#: settings whose times must fit the communication points
+_TIMED_SETTINGS = (("stop_time",), ("record",), ("events",))
+
+
+def located_problems(root: Node, problems: Iterable[Problem]) -> Iterator[Problem]:
+    """Yield the problems of a system with the locations of their subjects, without those that follow from invalid times.
+
+    Args:
+        root: The scenario.
+        problems: Problems that `check_run` found.
+    """
+    return (
+        _with_location(root, problem) for problem in problems if not _is_consequence(root, problem)
+    )
+
+
+def _is_consequence(root: Node, problem: Problem) -> bool:
+    """Return True if a problem with times only follows from an invalid start time, stop time or step size."""
+    times = {"stop_time", "step_size", "start_time"} & root.invalid_keys
+    return bool(times) and (
+        problem.subject[:1] in _TIMED_SETTINGS
+        or problem.subject[-1:] in (("period",), ("step_size",))
+    )
+
+
+def _with_location(root: Node, problem: Problem) -> Problem:
+    if problem.where or not problem.subject:
+        return problem
+    key, *rest = problem.subject
+    if key == "components" and rest and (found := root.find_component(rest[0])):
+        node, name = found
+        return replace(problem, where=node.where("components", name, *rest[1:]), subject=())
+    return replace(problem, where=root.where(*problem.subject), subject=())

@@ -15,10 +15,9 @@ from ..core import paths, resources
 from ..core.errors import InputError, Problem, did_you_mean, nearest_file
 from ..core.size_limits import MAX_RUNS, require_at_most
 from ..scenario import load_scenario
-from ..scenario.dict_document import document_of_dict
 from ..scenario.file_paths import find_scenario
-from ..scenario.json_document import Document, json_path, read_document
-from ..scenario.json_pointer import pointer_keys
+from ..scenario.json_document import Document, json_path, pointer_keys, read_document
+from ..scenario.settings import document_of_dict
 from ..scenario.validation import schema_problems
 from .schema import StudySpec
 

@@ -28,6 +28,9 @@ if TYPE_CHECKING:
 #: keys of a scenario that state expectations of its results
 EXPECTATION_KEYS = ("checks", "reference")
 
+#: exit codes from the most to the least severe; the most severe one is returned
+EXIT_CODE_SEVERITY = (130, 70, 2, 1, 3, 0)
+
 
 def has_keys(file: Path, *groups: Sequence[str]) -> bool:
     """Return whether a JSON file, or one that it extends, has a key of each group.

@@ -5,7 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Iterator, Mapping
 from typing import Any, NamedTuple
 
-from ..scenario.json_pointer import pointer_keys
+from ..scenario.json_document import pointer_keys
 from ..scenario.schema_types import PlacedError
 
 

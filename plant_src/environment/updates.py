@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..physics.compiled_equations import bind_arrays, load_library
 from .coloured_noise import BLOCK_LENGTH, GRID_STEP
 from .current import Current
 from .sea import Sea
@@ -169,15 +168,16 @@ class SurroundingsUpdate:
             highest_water,
             surfaces.update,
         )
-        sea_values, waves = np.array([0.0, 1.0, len(sea.phase), 0.0]), sea.component_table()
+        sea_values = np.array([0.0, 1.0, len(sea.phase), 0.0])
         self._sea: Any = sea_values.data
+        shared = {
+            "sea": sea_values,
+            "waves": sea.component_table(),
+            "surface_count": surfaces.count,
+            "surface_rows": surfaces.rows,
+        }
         self._calls = [
-            bind_arrays(
-                load_library(body.model.binary).surroundings,
-                [body.outputs, _disc(body), sea_values, waves, surfaces.count, surfaces.rows],
-                [body.environment_inputs[_input_index(body, "ground_distance") :]],
-            )
-            for body in multirotors
+            body.equations.bind("surroundings", shared | _own_arrays(body)) for body in multirotors
         ]
 
     def update(self, time: float) -> None:
@@ -189,7 +189,13 @@ class SurroundingsUpdate:
             call()
 
 
-def _disc(body: ContactBody) -> np.ndarray:
-    """Return the argument `disc` of the compiled function `surroundings`."""
+def _own_arrays(body: ContactBody) -> dict[str, np.ndarray]:
+    """Return the arguments and results of the compiled function `surroundings` of one vehicle."""
+    sizes = body.equations.functions["surroundings"].sizes
     (x, y, z), radius = body.model.rotor_disc or ((0.0, 0.0, 0.0), 0.0)
-    return np.array([x, y, z, radius, _reach(body)])
+    inputs = body.environment_inputs[_input_index(body, "ground_distance") :]
+    return {
+        "pose": body.outputs[: sizes["pose"]],
+        "disc": np.array([x, y, z, radius, _reach(body)]),
+        "surroundings": inputs[: sizes["surroundings"]],
+    }

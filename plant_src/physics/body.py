@@ -15,8 +15,8 @@ is known without Bullet: Bullet steps only bodies that are near something (`clea
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Mapping, Sequence
-from typing import TYPE_CHECKING, Any, ClassVar
+from collections.abc import Mapping, Sequence
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -25,14 +25,12 @@ from ..vehicles.common.shapes import Body, Box, ConvexPiece, Shape
 from ..vehicles.common.step_status import MAX_STATE_NORM
 from .clearance import BoundingBox
 from .client import pybullet
-from .compiled_equations import bind_arrays, load_library
 from .convex_pieces import mesh_file
 
 if TYPE_CHECKING:
-    from ctypes import _NamedFuncPointer
-
     from ..placement import Platform, VehiclePlacement
     from ..vehicles.model import Model
+    from .compiled_equations import CompiledEquations
 
 #: first x coordinate of inactive bodies (m), beyond the reach of any vehicle, and distance between
 #: them (m)
@@ -41,20 +39,8 @@ IDENTITY_QUATERNION = (0.0, 0.0, 0.0, 1.0)
 
 _MAX_VELOCITY = 1e6  # m/s, rad/s; Bullet silently limits velocities to 100 by default
 
-#: names of the arrays that are arguments and results of a compiled function
-ArrayNames = tuple[Sequence[str], Sequence[str]]
-
-#: arguments and results that all vehicles' `contact_predict` have in common
-PREDICT_ARGUMENTS = (
-    "state",
-    "inputs",
-    "environment_inputs",
-    "constants",
-    "step_size",
-    "reference_position",
-    "safe_distance",
-)
-PREDICT_RESULTS = ("start_state", "predicted_state", "commanded_twist", "bullet_twist")
+#: arrays of the compiled equations that are no state of a vehicle, or a part of another array
+_FIXED_ARRAYS = ("constants", "principal_axes", "step_size", "motion")
 
 
 class InvalidStateError(Exception):
@@ -74,6 +60,7 @@ class ContactBody:
     Attributes:
         name: Name of the vehicle.
         model: Model of the vehicle.
+        equations: Its compiled equations.
         body_id: Number of the body in Bullet.
         inputs: Real inputs of the model in order, in one or several parts.
         outputs: Real outputs in order; `correct` writes the motion, `contacts.py` the contact
@@ -88,42 +75,35 @@ class ContactBody:
         correct: Function without arguments: apply Bullet's twist and publish the outputs.
     """
 
-    ARRAY_SIZES: ClassVar[Mapping[str, int]] = {
-        "commanded_twist": 6,
-        "bullet_twist": 6,
-        "bullet_pose": 7,
-    }
-    INITIALIZE_ARRAYS: ClassVar[ArrayNames] = (
-        ("parameters",),
-        ("constants", "predicted_state", "commanded_twist", "bullet_twist", "bullet_pose"),
-    )
-    PREDICT_ARRAYS: ClassVar[ArrayNames]
-    CORRECT_ARRAYS: ClassVar[ArrayNames] = (
-        (*PREDICT_RESULTS, "constants", "step_size"),
-        ("state", "impulse_magnitude", "outputs"),
-    )
     #: maximal coordinates halve Bullet's time, but its saved states lack the inertia of such a body
     #: in world axes
     USE_MAXIMAL_COORDINATES = False
 
-    def __init__(self, client: int, vehicle: VehiclePlacement, arrays: Mapping[str, np.ndarray]):
+    def __init__(
+        self,
+        client: int,
+        vehicle: VehiclePlacement,
+        equations: CompiledEquations,
+        arrays: Mapping[str, np.ndarray],
+    ):
         """Create the body in Bullet and initialize the equations.
 
         Args:
             client: Number of the Bullet client.
             vehicle: Vehicle to create.
-            arrays: Arrays of the sizes that `array_sizes` returns, and "step_size" (s), which all
+            equations: Compiled equations of its model.
+            arrays: Arrays of the sizes that `state_sizes` returns, and "step_size" (s), which all
                 vehicles share.
         """
         self.name, self.model, self._client = vehicle.name, vehicle.model, client
-        parameters = np.array(vehicle.model.equation_parameters(vehicle.parameters))
-        constants = (
-            vehicle.model.constant_count
-            if vehicle.model.constant_count is not None
-            else len(parameters)
-        )
-        fixed = {"parameters": parameters, "principal_axes": np.array(vehicle.body.axes)}
-        self._arrays = arrays = {**arrays, **fixed, "constants": np.zeros(constants)}
+        self.equations = equations
+        self._arrays = arrays = {
+            **arrays,
+            "parameters": np.array(vehicle.model.equation_parameters(vehicle.parameters)),
+            "principal_axes": np.array(vehicle.body.axes),
+            "constants": np.zeros(equations.sizes["constants"]),
+            "motion": arrays["outputs"][: equations.sizes["motion"]],
+        }
         self.inputs = [arrays["inputs"][place] for place in vehicle.model.input_places]
         self.outputs = arrays["outputs"]
         self.parameters = np.array(vehicle.parameters)
@@ -137,33 +117,12 @@ class ContactBody:
         self.compensating_torque: Any = (
             arrays["compensating_torque"].data if "compensating_torque" in arrays else None
         )
-        library = load_library(vehicle.model.binary)
-        self.predict = self._bind(library.contact_predict, self.PREDICT_ARRAYS)
-        self.correct = self._bind(library.contact_correct, self.CORRECT_ARRAYS)
-        self._bind(library.contact_initialize, self.INITIALIZE_ARRAYS)()
+        self.predict = equations.bind("contact_predict", arrays)
+        self.correct = equations.bind("contact_correct", arrays)
+        equations.bind("contact_initialize", arrays)()
         self.correct()
         self.body_id = self._create_body(vehicle)
         self.reset_pose()
-
-    @classmethod
-    def array_sizes(cls, model: Model) -> dict[str, int]:
-        """Return the arrays of a vehicle in a world, as name to size."""
-        inputs = {"inputs": model.input_count, "environment_inputs": len(model.environment_inputs)}
-        states = dict.fromkeys(("state", "start_state", "predicted_state"), len(model.states))
-        clearance = {"endpoints": 6, "reference_position": 3, "safe_distance": 3}
-        scalars = {"step_status": 1, "impulse_magnitude": 1}
-        return {
-            **states,
-            **cls.ARRAY_SIZES,
-            **inputs,
-            "outputs": len(model.slots("output")),
-            **clearance,
-            **scalars,
-        }
-
-    def _bind(self, function: _NamedFuncPointer, names: ArrayNames) -> Callable[[], None]:
-        arguments, results = ([self._arrays[name] for name in side] for side in names)
-        return bind_arrays(function, arguments, results)
 
     def _create_body(self, vehicle: VehiclePlacement) -> int:
         """Create the body in Bullet and return its number."""
@@ -218,21 +177,12 @@ class ContactBody:
         )
 
 
-class FreeBody(ContactBody):
-    """A vehicle in six degrees of freedom.
-
-    Its frame in Bullet has the principal axes of inertia.
-    """
-
-    ARRAY_SIZES = {**ContactBody.ARRAY_SIZES, "compensating_torque": 3}
-    INITIALIZE_ARRAYS: ClassVar[ArrayNames] = (
-        ("parameters", "principal_axes"),
-        ContactBody.INITIALIZE_ARRAYS[1],
-    )
-    PREDICT_ARRAYS: ClassVar[ArrayNames] = (
-        (*PREDICT_ARGUMENTS, "principal_axes"),
-        (*PREDICT_RESULTS, "compensating_torque", "bullet_pose", "endpoints", "step_status"),
-    )
+def state_sizes(model: Model, equations: CompiledEquations) -> dict[str, int]:
+    """Return the arrays that hold the state of a vehicle in a world, as name to size."""
+    functions = equations.functions
+    sizes = functions["contact_predict"].sizes | functions["contact_correct"].sizes
+    own = {name: size for name, size in sizes.items() if name not in _FIXED_ARRAYS}
+    return own | {"outputs": len(model.slots("output"))}
 
 
 def create_compound_shape(boxes: Sequence[Shape], client: int) -> int:

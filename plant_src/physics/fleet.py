@@ -12,9 +12,10 @@ import numpy as np
 
 from ..placement import VehiclePlacement
 from ..vehicles.common.step_status import INVALID_STATE, LEAVES_SAFE_BOX, MAY_FAIL
-from .body import ContactBody, InvalidStateError
+from .body import ContactBody, InvalidStateError, state_sizes
 from .clearance import BoundingBox, Clearance
 from .client import pybullet
+from .compiled_equations import CompiledEquations
 from .contact_memory import ContactMemory
 from .contacts import Contacts, touching_pairs
 from .failures import Failures
@@ -78,12 +79,16 @@ class Fleet:
         fixed_names: Mapping[int, str],
     ):
         self._client, self._flags = client, flags
+        equations = [CompiledEquations(vehicle.model) for vehicle in vehicles]
         self._memory = memory = VehicleArrays(
-            [body_class(vehicle.model).array_sizes(vehicle.model) for vehicle in vehicles]
+            [
+                state_sizes(vehicle.model, own)
+                for vehicle, own in zip(vehicles, equations, strict=True)
+            ]
         )
         self.bodies: list[ContactBody] = [
-            body_class(vehicle.model)(client, vehicle, {**arrays, "step_size": step_size})
-            for vehicle, arrays in zip(vehicles, memory.of_vehicle, strict=True)
+            body_class(vehicle.model)(client, vehicle, own, {**arrays, "step_size": step_size})
+            for vehicle, own, arrays in zip(vehicles, equations, memory.of_vehicle, strict=True)
         ]
         self.inputs, self.outputs = (
             memory.of_all_vehicles["inputs"],

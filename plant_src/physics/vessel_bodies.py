@@ -11,9 +11,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..vehicles.common.shapes import Body
-from .body import PREDICT_ARGUMENTS, PREDICT_RESULTS, ContactBody, FreeBody
+from .body import ContactBody
 from .clearance import BoundingBox
-from .compiled_equations import bind_arrays, load_library
 
 if TYPE_CHECKING:
     from ..placement import VehiclePlacement
@@ -34,28 +33,6 @@ class FloatingBody(ContactBody):
     Its equations predict with the contact impulse of the previous step.
     """
 
-    ARRAY_SIZES = {
-        **ContactBody.ARRAY_SIZES,
-        "compensating_torque": 3,
-        "contact_impulse": 6,
-        "previous_contact_impulse": 6,
-    }
-    PREDICT_ARRAYS = (
-        (*PREDICT_ARGUMENTS, "contact_impulse"),
-        (
-            *PREDICT_RESULTS,
-            "compensating_torque",
-            "bullet_pose",
-            "previous_contact_impulse",
-            "endpoints",
-            "step_status",
-        ),
-    )
-    CORRECT_ARRAYS = (
-        (*ContactBody.CORRECT_ARRAYS[0], "previous_contact_impulse"),
-        (*ContactBody.CORRECT_ARRAYS[1], "contact_impulse"),
-    )
-
     def elevation_function(self, wave_count: int, waves: np.ndarray) -> Callable[[float], float]:
         """Return a function of time (s) for the water elevation (m, above still water) at the vessel.
 
@@ -64,12 +41,13 @@ class FloatingBody(ContactBody):
             waves: Table of the components, see `environment.sea.Sea.component_table`.
         """
         place_and_time, result = np.zeros(3), np.zeros(1)
-        count = np.full(1, float(wave_count))
-        call = bind_arrays(
-            load_library(self.model.binary).water_elevation,
-            [place_and_time, count, waves],
-            [result],
-        )
+        arrays = {
+            "place_and_time": place_and_time,
+            "wave_count": np.full(1, float(wave_count)),
+            "waves": waves,
+            "elevation": result,
+        }
+        call = self.equations.bind("water_elevation", arrays)
         arguments, elevations, outputs = place_and_time.data, result.data, self.outputs.data
 
         def elevation(time: float) -> float:
@@ -78,24 +56,6 @@ class FloatingBody(ContactBody):
             return elevations[0]
 
         return elevation
-
-
-class SubmergedBody(ContactBody):
-    """A submerged vehicle.
-
-    Its frame in Bullet has the principal axes, and it predicts with the previous contact impulse.
-    """
-
-    ARRAY_SIZES = FloatingBody.ARRAY_SIZES
-    INITIALIZE_ARRAYS = FreeBody.INITIALIZE_ARRAYS
-    PREDICT_ARRAYS = (
-        (*PREDICT_ARGUMENTS, "principal_axes", "contact_impulse"),
-        FloatingBody.PREDICT_ARRAYS[1],
-    )
-    CORRECT_ARRAYS = (
-        (*ContactBody.CORRECT_ARRAYS[0], "environment_inputs", "previous_contact_impulse"),
-        FloatingBody.CORRECT_ARRAYS[1],
-    )
 
 
 class PlanarBody(ContactBody):
@@ -107,16 +67,7 @@ class PlanarBody(ContactBody):
     lift improved by the secant method.
     """
 
-    ARRAY_SIZES = {**ContactBody.ARRAY_SIZES, "vertical_load": 3, "previous_vertical_load": 2}
     USE_MAXIMAL_COORDINATES = True  # the inertia about the world's z axis is constant
-    PREDICT_ARRAYS = (
-        (*PREDICT_ARGUMENTS, "vertical_load"),
-        (*PREDICT_RESULTS, "bullet_pose", "previous_vertical_load", "endpoints", "step_status"),
-    )
-    CORRECT_ARRAYS = (
-        (*ContactBody.CORRECT_ARRAYS[0], "previous_vertical_load"),
-        (*ContactBody.CORRECT_ARRAYS[1], "vertical_load"),
-    )
 
     @staticmethod
     def bounding_box(body: Body) -> BoundingBox:
@@ -170,6 +121,4 @@ def body_class(model: Model) -> type[ContactBody]:
     """Return the contact body class for the motion of `model`."""
     if model.motion == "planar":
         return PlanarBody
-    if model.craft:
-        return SubmergedBody
-    return FloatingBody if model.is_vessel else FreeBody
+    return FloatingBody if model.is_vessel else ContactBody

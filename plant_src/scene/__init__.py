@@ -1,1 +1,1 @@
-"""Pictures and videos of a mission on a lake, rendered in software without a graphics card or display."""
+"""Pictures and videos of a mission on a lake, rendered in software without a display."""

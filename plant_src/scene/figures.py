@@ -12,7 +12,6 @@ from matplotlib.patheffects import withStroke
 from cosim.core.errors import InputError
 from cosim.results import Result
 
-from .cameras import UP
 from .mission import Mission, mission_of_result
 from .render import Scene, find_camera
 
@@ -29,7 +28,9 @@ def ghosts(
     interval: float = 1.0,
     pixels: Sequence[int] = IMAGE_SIZE,
 ) -> Figure:
-    """Draw the vehicles at several times in one picture with increasing opacity (figure 17 of the paper).
+    """Draw the vehicles at several times in one picture (figure 17 of the paper).
+
+    The opacity increases with the time.
 
     The time is written above the first vehicle.
 
@@ -45,7 +46,8 @@ def ghosts(
         Figure of page width.
 
     Raises:
-        InputError: `camera` is unknown, the time span is empty or the result has no plant with vehicles.
+        InputError: `camera` is unknown, the time span is empty or the result has no plant with
+            vehicles.
     """
     mission = mission_of_result(result)
     rows = _ghost_rows(mission, start, stop, interval)
@@ -83,7 +85,8 @@ def _write_times(
     """Write the time (s) above each position of the first vehicle."""
     view = find_camera(camera)(mission, rows[-1])
     vehicle = next(iter(mission.vehicles))
-    above = np.array([mission.position(vehicle, row) for row in rows]) + 0.22 * UP
+    above = np.array([mission.position(vehicle, row) for row in rows])
+    above[:, 2] += 0.22
     for row, (x, y) in zip(rows, view.pixels(above, width, height).tolist(), strict=True):
         text = axes.text(
             x,

@@ -1,30 +1,29 @@
-"""Renderer for pictures of a mission at one time, or at several times in one picture."""
+"""Renderer for pictures and videos of a mission, at one or several times in one picture."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Self
 
 import numpy as np
 
 from cosim.core.errors import InputError, did_you_mean
+from cosim.results import Result
 
-from .cameras import CAMERAS, View
-from .mission import Mission
-from .parts import static_parts, tree_parts
-from .shores import add_land
-from .sky_and_water import (
+from .landscape import (
     FAR_HILLS_COLOUR,
     HAZE_DISTANCE,
     Rays,
+    add_land,
     horizon_row,
     pixel_rays,
     sky_colour,
     water_distance,
     water_pixels,
 )
-from .solid_renderer import Picture, SolidRenderer
-from .vehicle_parts import vehicle_parts
+from .mission import CAMERAS, Mission, mission_of_result
+from .parts import static_parts, tree_parts, vehicle_parts
+from .solid_renderer import Picture, SolidRenderer, View
 
 
 class Layer:
@@ -193,10 +192,8 @@ class Scene:
         Raises:
             InputError: `camera` is unknown.
         """
-        view, size = (
-            find_camera(camera)(self.mission, rows[-1]),
-            (supersampling * width, supersampling * height),
-        )
+        view = find_camera(camera)(self.mission, rows[-1])
+        size = (supersampling * width, supersampling * height)
         background = self._background(view, size)
         below = background.mirrored.copy()
         reflected = self._blend_vehicles(below, view.mirrored(), rows, opacities)
@@ -221,9 +218,8 @@ class Scene:
         changed = np.zeros((height, width), bool)
         for row, opacity in zip(rows, opacities, strict=True):
             self._set_poses(row)
-            changed.reshape(-1)[
-                layer.blend(self.vehicles.render(view, width, height, shadow=True), opacity)
-            ] = True
+            picture = self.vehicles.render(view, width, height, shadow=True)
+            changed.reshape(-1)[layer.blend(picture, opacity)] = True
         return changed
 
     def _set_poses(self, row: int) -> None:
@@ -231,6 +227,28 @@ class Scene:
             self.vehicles.set_pose(
                 index, self.mission.position(vehicle, row), self.mission.orientation(vehicle, row)
             )
+
+
+def frames(
+    result: Result, camera: str, moments: np.ndarray, size: tuple[int, int]
+) -> Iterator[np.ndarray]:
+    """Yield the frames of a video.
+
+    Args:
+        result: Recorded mission.
+        camera: Name of the camera (`mission.py`).
+        moments: Times of the frames (s).
+        size: Width and height (pixels), both even.
+
+    Yields:
+        Frames, uint8 (height, width, 3).
+
+    Raises:
+        InputError: `camera` is unknown or the result has no plant with vehicles.
+    """
+    with Scene(mission_of_result(result)) as scene:
+        for row in np.searchsorted(result.time, moments - 1e-9).tolist():
+            yield scene.render(camera, [row], [1.0], *size, supersampling=1)
 
 
 def find_camera(name: str) -> Callable[[Mission, int], View]:

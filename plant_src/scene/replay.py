@@ -7,25 +7,22 @@ green, blue in 0 ... 1.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
-from itertools import cycle
+from itertools import chain, cycle
 from typing import Any
 
 import numpy as np
 
-from ..catalogue import models_of
+from ..catalogue import default_model
 from ..environment import sea
 from ..environment.sea import Sea
 from ..obstacles import obstacles_of
-from .parts import static_parts
-from .vehicle_parts import vehicle_parts
+from .parts import static_parts, vehicle_parts
 
 Scene = dict[str, Any]
 
 #: colours of the paths of multirotors and vessels; the first of each is that of the figures
-MULTIROTOR_COLOURS, VESSEL_COLOURS = (
-    ("#0072b2", "#56b4e9", "#cc79a7", "#7a5fb5"),
-    ("#d55e00", "#e69f00", "#009e73", "#b8860b"),
-)
+MULTIROTOR_COLOURS = ("#0072b2", "#56b4e9", "#cc79a7", "#7a5fb5")
+VESSEL_COLOURS = ("#d55e00", "#e69f00", "#009e73", "#b8860b")
 
 #: colour of crashes and ditchings
 FAILURE_COLOUR = "#c62828"
@@ -77,7 +74,10 @@ def free(scenario: Mapping[str, Any], vehicles: Mapping[str, Any]) -> Scene:
 
 
 def published_simulator_scene(name: str, scenario: Mapping[str, Any]) -> Scene:
-    """Return the scene of the replica's world, with its attitude angles converted to the conventions of the plant."""
+    """Return the scene of the replica's world.
+
+    Its attitude angles are converted to the conventions of the plant.
+    """
     scene = world_scene(name, scenario, {"uav": "ar_drone", "usv": "strider"})
     uav, usv = (f"{name}.{vehicle}.attitude" for vehicle in ("uav", "usv"))
     attitudes: list[list[Any]] = [
@@ -97,14 +97,13 @@ def _waves(components: Sea) -> list[Scene]:
 
 def _scene(vehicles: Mapping[str, Any], scenario: Mapping[str, Any]) -> Scene:
     colours = {False: cycle(MULTIROTOR_COLOURS), True: cycle(VESSEL_COLOURS)}
-    has_landings = any(
-        next(iter(models_of(vehicle).values())).airframe for vehicle in vehicles.values()
-    )
+    models = {name: default_model(vehicle) for name, vehicle in vehicles.items()}
+    has_landings = any(model.airframe for model in models.values())
     bodies = [
-        _body_scene(name, vehicle, next(colours[_is_vessel(vehicle)]), has_landings)
+        _body_scene(name, vehicle, next(colours[models[name].is_vessel]), has_landings)
         for name, vehicle in vehicles.items()
     ]
-    vessels = [name for name, vehicle in vehicles.items() if _is_vessel(vehicle)]
+    vessels = [name for name, model in models.items() if model.is_vessel]
     flying = [name for name in vehicles if name not in vessels]
     colour_of = {body["name"]: body["colour"] for body in bodies}
     return {
@@ -122,7 +121,7 @@ def _scene(vehicles: Mapping[str, Any], scenario: Mapping[str, Any]) -> Scene:
             }
             for name in flying
         ],
-        "marks": [mark for name in vehicles for mark in _failure_marks(name)],
+        "marks": [*chain.from_iterable(map(_failure_marks, vehicles))],
         "plots": _plot_patterns(flying[:1], vessels[:1]),
     }
 
@@ -135,10 +134,6 @@ def _failure_marks(name: str) -> Iterator[Scene]:
             "colour": FAILURE_COLOUR,
             "on": name,
         }
-
-
-def _is_vessel(vehicle: Any) -> bool:
-    return next(iter(models_of(vehicle).values())).is_vessel
 
 
 def _short_name(name: str) -> str:
@@ -161,7 +156,10 @@ def _body_scene(name: str, vehicle: Any, colour: str, has_landings: bool) -> Sce
 
 
 def _waypoint_markers(scenario: Mapping[str, Any]) -> Iterator[Scene]:
-    """Yield the waypoints in the parameters `waypoint_x`, `waypoint_y` of all components and nested systems."""
+    """Yield the waypoints of all components and nested systems.
+
+    They are those of the parameters `waypoint_x` and `waypoint_y`.
+    """
     for component in scenario["components"].values():
         parameters = component.get("parameters", {})
         for key, x in parameters.items():

@@ -2,19 +2,19 @@
 
 from __future__ import annotations
 
-from .counter_based_noise import gauss_markov_factors
-from .sampled_sensor import Measurement, SampledSensor, timing_variables
+from .counter_based_noise import advance_gauss_markov
+from .signal_component import Measurement, SampledSensor, timing_variables
 from .variable_declarations import real_parameter, real_variable, seed_parameter
 
-#: p = p0 (1 - L z / T0)^EXPONENT with the lapse rate L and the temperature T0 at sea level (ISO
-#: 2533)
+#: p = p0 (1 - L z / T0)^EXPONENT of ISO 2533, with the lapse rate L and the temperature T0 at sea
+#: level; the exponent is g M / (R L) with the molar mass M of air and the gas constant R
 STANDARD_PRESSURE = 101325.0  # Pa
 _LAPSE_PER_METRE = 0.0065 / 288.15  # 1/m
 _EXPONENT = 9.80665 * 0.0289644 / (8.31446 * 0.0065)
 
 
 def pressure_at(altitude: float, at_zero: float = STANDARD_PRESSURE) -> float:
-    """Return the pressure (Pa) at `altitude` (m) for the pressure `at_zero` (Pa) at z = 0 (ISO 2533)."""
+    """Return the pressure (Pa) at `altitude` (m) if it is `at_zero` (Pa) at z = 0 (ISO 2533)."""
     return float(at_zero * (1 - _LAPSE_PER_METRE * altitude) ** _EXPONENT)
 
 
@@ -44,7 +44,7 @@ class Barometer(SampledSensor):
 
     state_attributes = (*SampledSensor.state_attributes, "_drift")
     random_number_count = 2
-    _drift: float
+    _drift = 0.0
 
     def __init__(self, instance_name: str, seed: int = 0):
         super().__init__(
@@ -72,12 +72,9 @@ class Barometer(SampledSensor):
     def measure(self, number: int, elapsed: float) -> Measurement:
         """Return pressure (Pa) and pressure altitude (m); see `SampledSensor.measure`."""
         p, (white, slow) = self.parameters, self.noise[number]
-        if elapsed:
-            keep, drive = gauss_markov_factors(p["drift"], p["correlation_time"], elapsed)
-            self._drift = keep * self._drift + drive * slow
-        else:
-            self._drift = p["drift"] * slow
-        pressure = (
-            pressure_at(self.inputs[0], p["pressure_at_zero"]) + self._drift + p["noise"] * white
+        self._drift = advance_gauss_markov(
+            self._drift, p["drift"], p["correlation_time"], elapsed, slow
         )
+        true = pressure_at(self.inputs[0], p["pressure_at_zero"])
+        pressure = true + self._drift + p["noise"] * white
         return (pressure, altitude_at(pressure)), ()

@@ -2,9 +2,8 @@
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -12,44 +11,27 @@ import numpy as np
 
 from ..catalogue import VEHICLE_MODELS
 from ..json_reader import JsonReader
-from ..physics.client import pybullet
-from ..scene.cameras import UP, View
-from ..scene.parts import Part, platform_parts
-from ..scene.sky_and_water import (
+from ..scene.landscape import (
     HAZE_DISTANCE,
     HORIZON_COLOUR,
     WATER_COLOUR,
     pixel_rays,
     sky_colour,
 )
-from ..scene.solid_renderer import SolidRenderer
-from ..scene.vehicle_parts import vehicle_parts
-from .pinhole_camera import camera_attitude
-from .rotations import quaternion_product, to_world
-from .sampled_sensor import Measurement, SampledSensor, timing_variables
-from .variable_declarations import pose_inputs, raise_problems, real_parameter, real_variable
+from ..scene.parts import platform_parts, vehicle_parts
+from ..scene.solid_renderer import SolidRenderer, View
+from .marker_camera import camera_attitude, mounting_parameters
+from .rotations import add_scaled, quaternion_product, to_world
+from .signal_component import Measurement, SampledSensor, timing_variables
+from .variable_declarations import (
+    check_arguments,
+    pose_inputs,
+    read_platforms,
+    real_parameter,
+    real_variable,
+)
 
 _POSE_SIZE = 7  # scalars of a position and an orientation
-
-
-@dataclass(frozen=True)
-class OrientedView(View):
-    """View with an arbitrary upward direction `up` (world axes)."""
-
-    up: np.ndarray = field(default_factory=lambda: UP)
-
-    def matrix(self) -> list[float]:
-        """Return the view matrix, see `View.matrix`."""
-        return list(
-            pybullet.computeViewMatrix(self.eye.tolist(), self.target.tolist(), self.up.tolist())
-        )
-
-    def axes(self) -> np.ndarray:
-        """Return the axes of the camera, see `View.axes`."""
-        ahead = (self.target - self.eye) / np.linalg.norm(self.target - self.eye)
-        right = np.cross(ahead, self.up)
-        right /= np.linalg.norm(right)
-        return np.stack([right, np.cross(right, ahead), ahead])
 
 
 class Camera(SampledSensor):
@@ -93,52 +75,29 @@ class Camera(SampledSensor):
             for name, kind in reader.read_named_objects(vehicles, ("vehicles",)).items()
         }
         reader.choice(carrier, ("carrier",), list(kinds) or ["uav"])
-        for i in (0, 1):
-            reader.integer(
-                size[i] if isinstance(size, list | tuple) and len(size) == 2 else size,
-                ("size",),
-                8,
-                4096,
-            )
-        decks = [
-            _platform_parts(reader, name, spec)
-            for name, spec in reader.read_named_objects(platforms or {}, ("platforms",)).items()
-        ]
-        raise_problems(reader)
+        edges = size if isinstance(size, list | tuple) and len(size) == 2 else [size]
+        for edge in edges:
+            reader.integer(edge, ("size",), 8, 4096)
+        decks = [platform_parts(*box) for box in read_platforms(reader, platforms or {})]
+        check_arguments(reader)
+        poses, (tilt, mounting) = map(pose_inputs, kinds), mounting_parameters()
         super().__init__(
             instance_name,
             [
-                *(variable for name in kinds for variable in pose_inputs(name)),
-                real_parameter(
-                    "tilt",
-                    "rad",
-                    0.0,
-                    "of the camera, from straight down to ahead",
-                    -math.pi,
-                    math.pi,
-                ),
+                *chain.from_iterable(poses),
+                tilt,
                 real_parameter("angle", "rad", 0.8, "opening from top to bottom", 0.05, 2.5),
-                real_variable(
-                    "mounting",
-                    "m",
-                    "parameter",
-                    (0.0, 0.0, 0.0),
-                    "place of the camera, body axes",
-                    shape=(3,),
-                ),
+                mounting,
                 real_variable("frames", "1", "output", description="pictures written so far"),
                 *timing_variables(1.0),
             ],
         )
-        self._folder, self._size, self._carrier = (
-            Path(folder),
-            (int(size[0]), int(size[1])),
-            list(kinds).index(carrier),
-        )
+        self._folder, self._carrier = Path(folder), list(kinds).index(carrier)
+        self._size = (int(size[0]), int(size[1]))
         visible_parts = [
             vehicle_parts(kind) if name != carrier else [] for name, kind in kinds.items()
         ]
-        self._renderer = SolidRenderer(*visible_parts, [part for deck in decks for part in deck])
+        self._renderer = SolidRenderer(*visible_parts, [*chain.from_iterable(decks)])
 
     def measure(self, number: int, elapsed: float) -> Measurement:
         """Write picture `number` and return the count of pictures."""
@@ -154,20 +113,17 @@ class Camera(SampledSensor):
             x, y, z, qw, qx, qy, qz = self.inputs[_POSE_SIZE * index : _POSE_SIZE * (index + 1)]
             self._renderer.set_pose(index, (x, y, z), (qx, qy, qz, qw))
         view = self._view()
-        solids, background = (
-            self._renderer.render(view, *self._size, shadow=True),
-            _render_background(view, *self._size),
-        )
+        solids = self._renderer.render(view, *self._size, shadow=True)
+        background = _render_background(view, *self._size)
         return np.where(np.isfinite(solids.depth)[..., None], solids.colour, background)
 
     def _view(self) -> View:
         pose = self.inputs[_POSE_SIZE * self._carrier : _POSE_SIZE * (self._carrier + 1)]
         camera = quaternion_product(pose[3:], camera_attitude(self.parameters["tilt"]))
-        eye = np.array(pose[:3]) + to_world(pose[3:], self.parameters["mounting"])
-        ahead, up = (
-            np.array(to_world(camera, axis)) for axis in ((0.0, 0.0, 1.0), (0.0, -1.0, 0.0))
-        )
-        return OrientedView(eye, eye + ahead, self.parameters["angle"], up)
+        eye = add_scaled(pose, 1.0, to_world(pose[3:], self.parameters["mounting"]))
+        target = add_scaled(eye, 1.0, to_world(camera, (0.0, 0.0, 1.0)))
+        up = to_world(camera, (0.0, -1.0, 0.0))
+        return View(np.array(eye), np.array(target), self.parameters["angle"], up)
 
     def free(self) -> None:
         """Disconnect the Bullet client."""
@@ -187,12 +143,3 @@ def _render_background(view: View, width: int, height: int) -> np.ndarray:
         np.rint(255 * np.clip(colour, 0, 1)).astype(np.uint8).T.reshape(height, width, 3)
     )
     return picture
-
-
-def _platform_parts(reader: JsonReader, name: str, spec: Any) -> list[Part]:
-    path = ("platforms", name)
-    spec = reader.read_object(spec, path, ("size", "position"), ())
-    size, position = (
-        reader.vector(spec.get(key, [1.0] * 3), (*path, key), "xyz") for key in ("size", "position")
-    )
-    return list(platform_parts(size, position))

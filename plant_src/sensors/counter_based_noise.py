@@ -15,8 +15,9 @@ class CounterBasedNoise:
     """Rows of independent standard normal numbers; row n depends on the key and n only.
 
     The generator is Philox (Salmon et al., "Parallel random numbers: as easy as 1, 2, 3", 2011), a
-    function of a key and a counter. The key is hashed, so that neighbouring seeds, and equal seeds
-    of sensors with different names, give independent numbers.
+    function of a key and a counter. A step that is repeated after a rollback therefore draws the
+    same numbers, and a state contains no generator. The key is hashed, so that neighbouring seeds,
+    and equal seeds of sensors with different names, give independent numbers.
 
     Args:
         width: Numbers per row.
@@ -65,3 +66,16 @@ def gauss_markov_factors(
     """
     keep = math.exp(-elapsed / correlation_time)
     return keep, sigma * math.sqrt(-math.expm1(-2 * elapsed / correlation_time))
+
+
+def advance_gauss_markov(
+    value: float, sigma: float, correlation_time: float, elapsed: float, normal: float
+) -> float:
+    """Return the next value of a process of `gauss_markov_factors` for a standard normal number.
+
+    The first value (`elapsed` is 0) is drawn from the stationary distribution.
+    """
+    if not elapsed:
+        return sigma * normal
+    keep, drive = gauss_markov_factors(sigma, correlation_time, elapsed)
+    return keep * value + drive * normal

@@ -1,42 +1,38 @@
-"""Estimator of the motion of a landing deck from the vessel's GNSS receiver and from a marker on the deck."""
+"""Estimator of the motion of a landing deck.
+
+Its measurements come from the vessel's GNSS receiver and from a marker on the deck.
+"""
 
 from __future__ import annotations
 
 from collections.abc import Sequence
 
-from .history import History
-from .rotations import Vector, to_world
+from .navigation import History
+from .rotations import add_scaled, difference, to_world
 from .signal_component import SignalComponent
-from .variable_declarations import pose_inputs, real_parameter, real_variable, vector_variables
+from .variable_declarations import pose_inputs, real_variable, share_parameter, vector_variables
 
 #: inputs by quantity
-_VEHICLE_POSE, _FIX_POSITION, _FIX_VELOCITY, _FIX_TIME = (
-    slice(0, 7),
-    slice(7, 10),
-    slice(10, 13),
-    13,
-)
-_SIGHT_POSITION, _SIGHT_TIME = slice(14, 17), 17
+_VEHICLE_POSE, _FIX_POSITION, _FIX_VELOCITY = slice(0, 7), slice(7, 10), slice(10, 13)
+_FIX_TIME, _SIGHT_POSITION, _SIGHT_TIME = 13, slice(14, 17), 17
 #: entries of the history by quantity
-_POSITION, _VELOCITY, _VEHICLE_POSITION, _VEHICLE_ORIENTATION = (
-    slice(0, 3),
-    slice(3, 6),
-    slice(6, 9),
-    slice(9, 13),
-)
+_POSITION, _VELOCITY = slice(0, 3), slice(3, 6)
+_VEHICLE_POSITION, _VEHICLE_ORIENTATION = slice(6, 9), slice(9, 13)
 
 
 class DeckTracker(SignalComponent):
-    """Filter with fixed gains for position and velocity of a deck (an alpha-beta filter for delayed measurements).
+    """Filter with fixed gains for position and velocity of a deck.
 
-    Between measurements the position is extrapolated with the velocity. A GNSS fix corrects position and velocity, a marker
-    measurement corrects the position, each by its gain times the error at the time of the sample. The pose of the vehicle at
-    that time converts the marker measurement to the world frame. Near the marker the estimate is therefore relative to the
-    estimated pose of the vehicle.
+    It is an alpha-beta filter for delayed measurements (Bar-Shalom, Li and Kirubarajan, "Estimation
+    with Applications to Tracking and Navigation", 2001, section 6.5). Between measurements the
+    position is extrapolated with the velocity. A GNSS fix corrects position and velocity, a marker
+    measurement corrects the position, each by its gain times the error at the time of the sample.
+    The pose of the vehicle at that time converts the marker measurement to the world frame. Near
+    the marker the estimate is therefore relative to the estimated pose of the vehicle.
 
-    Inputs: `vehicle.position` (m, world) and `vehicle.orientation` (estimated pose), `gnss.position`, `.velocity`, `.time` (of
-    the deck), `marker.position`, `.time` (of a `MarkerCamera`). Outputs: `position.x|y|z` (m, world), `velocity.x|y|z` (m/s,
-    world).
+    Inputs: `vehicle.position` (m, world) and `vehicle.orientation` (estimated pose),
+    `gnss.position`, `.velocity`, `.time` (of the deck), `marker.position`, `.time` (of a
+    `MarkerCamera`). Outputs: `position.x|y|z` (m, world), `velocity.x|y|z` (m/s, world).
 
     Args:
         instance_name: Name of the component.
@@ -56,29 +52,14 @@ class DeckTracker(SignalComponent):
                 real_variable("gnss.time", "s", "input"),
                 *vector_variables("marker.position", "xyz", "m", "input"),
                 real_variable("marker.time", "s", "input"),
-                real_parameter(
-                    "fix_gain",
-                    "1",
-                    0.2,
-                    "share of the position error that a fix takes away",
-                    0.0,
-                    1.0,
+                share_parameter(
+                    "fix_gain", 0.2, "share of the position error that a fix takes away"
                 ),
-                real_parameter(
-                    "velocity_gain",
-                    "1",
-                    0.6,
-                    "share of the velocity error that a fix takes away",
-                    0.0,
-                    1.0,
+                share_parameter(
+                    "velocity_gain", 0.6, "share of the velocity error that a fix takes away"
                 ),
-                real_parameter(
-                    "sight_gain",
-                    "1",
-                    0.2,
-                    "share of the position error that a sight takes away",
-                    0.0,
-                    1.0,
+                share_parameter(
+                    "sight_gain", 0.2, "share of the position error that a sight takes away"
                 ),
                 *vector_variables("position", "xyz", "m", "output"),
                 *vector_variables("velocity", "xyz", "m/s", "output"),
@@ -94,25 +75,20 @@ class DeckTracker(SignalComponent):
 
     def advance(self, now: float, step_size: float) -> None:
         """Extrapolate by one step, then apply new measurements in the order of their times."""
-        i, (x, y, z), (u, v, w) = self.inputs, self._position, self._velocity
-        self._position = x + step_size * u, y + step_size * v, z + step_size * w
+        i, p = self.inputs, self.parameters
+        self._position = add_scaled(self._position, step_size, self._velocity)
         self._history.add(now, (*self._position, *self._velocity, *i[_VEHICLE_POSE]))
         for time in sorted({i[_FIX_TIME], i[_SIGHT_TIME]} - {self._fix_time, self._sight_time}):
             past = self._history.at(time)
             if time == i[_FIX_TIME]:
-                self._correct_position(i[_FIX_POSITION], past, self.parameters["fix_gain"])
+                self._correct_position(i[_FIX_POSITION], past, p["fix_gain"])
                 self._velocity = _corrected(
-                    self._velocity,
-                    i[_FIX_VELOCITY],
-                    past[_VELOCITY],
-                    self.parameters["velocity_gain"],
+                    self._velocity, i[_FIX_VELOCITY], past[_VELOCITY], p["velocity_gain"]
                 )
             if time == i[_SIGHT_TIME]:
                 offset = to_world(past[_VEHICLE_ORIENTATION], i[_SIGHT_POSITION])
-                position = [
-                    own + part for own, part in zip(past[_VEHICLE_POSITION], offset, strict=True)
-                ]
-                self._correct_position(position, past, self.parameters["sight_gain"])
+                position = add_scaled(past[_VEHICLE_POSITION], 1.0, offset)
+                self._correct_position(position, past, p["sight_gain"])
         self._fix_time, self._sight_time = i[_FIX_TIME], i[_SIGHT_TIME]
         self.outputs = (*self._position, *self._velocity)
 
@@ -124,7 +100,6 @@ class DeckTracker(SignalComponent):
 
 def _corrected(
     present: Sequence[float], measured: Sequence[float], past: Sequence[float], gain: float
-) -> Vector:
-    """Return the present estimate plus `gain` times the error of the past estimate at the time of the measurement."""
-    x, y, z = (a + gain * (b - c) for a, b, c in zip(present, measured, past, strict=True))
-    return x, y, z
+) -> Sequence[float]:
+    """Return the estimate plus `gain` times the error of the estimate when it was measured."""
+    return add_scaled(present, gain, difference(measured, past))

@@ -8,6 +8,8 @@ from collections import deque
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
+import numpy as np
+
 from cosim.core.component import Variable
 from cosim.core.errors import did_you_mean
 from cosim.core.units import parse_unit
@@ -16,8 +18,7 @@ from ..json_reader import JsonReader
 from .signal_component import SignalComponent
 from .variable_declarations import (
     boolean_variable,
-    check_seed,
-    raise_problems,
+    check_arguments,
     real_parameter,
     real_variable,
     seed_parameter,
@@ -38,9 +39,10 @@ _TIME_TOLERANCE = 1e-9  # s, rounding error of times
 
 
 class SignalFault(SignalComponent):
-    """Fault block: transparent from the inputs `input.NAME` to the outputs `NAME` until a parameter activates a fault.
+    """Fault block, transparent until a parameter activates a fault.
 
-    Error model, in this order: `delay` (s), factor `gain.NAME`, offset `bias.NAME`, white noise with the standard deviation
+    Its inputs are `input.NAME`, its outputs `NAME` for each signal. Error model, in this order:
+    `delay` (s), factor `gain.NAME`, offset `bias.NAME`, white noise with the standard deviation
     `noise.NAME`, then `mode` for the signals with `affected.NAME`:
 
     - normal: no further change
@@ -48,14 +50,15 @@ class SignalFault(SignalComponent):
     - stuck: outputs `value.NAME`; `valid` stays true
     - missing: like frozen, and `valid` is false
 
-    All parameters are tunable, so that events of a scenario can set them. A delay that grows holds the outputs until enough
-    samples are stored.
+    All parameters are tunable, so that events of a scenario can set them. A delay that grows holds
+    the outputs until enough samples are stored.
 
     Args:
         instance_name: Name of the component.
-        signals: Unit of each signal by name, "" without unit; "rotor_speed[4]" declares an array of four.
-        gain_of: Quantity that the gain multiplies: "signal", or "square" for a gain of the thrust of a rotor speed (0.7 of
-            the thrust is sqrt(0.7) of the speed).
+        signals: Unit of each signal by name, "" without unit; "rotor_speed[4]" declares an array of
+            four.
+        gain_of: Quantity that the gain multiplies: "signal", or "square" for a gain of the thrust
+            of a rotor speed (0.7 of the thrust is sqrt(0.7) of the speed).
         seed: Seed of the noise, together with the name of the component.
 
     Raises:
@@ -71,11 +74,9 @@ class SignalFault(SignalComponent):
         mode = Variable(
             "mode", "String", "parameter", "tunable", "normal", description=", ".join(FAULT_MODES)
         )
-        variables = [
-            variable
-            for name, (unit, shape) in shapes.items()
-            for variable in _signal_variables(name, unit, shape)
-        ]
+        variables = []
+        for name, (unit, shape) in shapes.items():
+            variables += _signal_variables(name, unit, shape)
         valid = boolean_variable("valid", "output", "false while the mode is missing")
         super().__init__(
             instance_name,
@@ -100,20 +101,18 @@ class SignalFault(SignalComponent):
         self._stuck = self._parameters_of("value") if mode == "stuck" else None
         self._factors = [self._factor(gain) for gain in self._parameters_of("gain")]
         self._biases, self._sigmas = self._parameters_of("bias"), self._parameters_of("noise")
-        changed = (
-            any(self._is_held)
-            or any(self._biases)
-            or any(self._sigmas)
-            or any(f != 1 for f in self._factors)
-        )
         self._delay = self.parameters["delay"]
-        self._is_inactive = not changed and not self._delay
+        self._is_inactive = not (
+            any([*self._is_held, *self._biases, *self._sigmas, self._delay])
+            or any(factor != 1 for factor in self._factors)
+        )
         self.flags = (not (mode == "missing" and any(affected)),)
 
     def _parameters_of(self, kind: str) -> list[Any]:
         """Return the parameters `kind.NAME` of all signals as a flat list."""
-        values = (self.parameters[f"{kind}.{name}"] for name in self._names)
-        return [x for value in values for x in (value if isinstance(value, list) else [value])]
+        arrays = [np.ravel(self.parameters[f"{kind}.{name}"]) for name in self._names]
+        values: list[Any] = np.concatenate(arrays).tolist()
+        return values
 
     def initialise(self) -> None:
         """Set the initial outputs."""
@@ -190,6 +189,5 @@ def _read_signals(
     if signals == {}:
         reader.add_problem(("signals",), "found no signal, expected at least one")
     reader.choice(gain_of, ("gain_of",), list(GAIN_FUNCTIONS))
-    check_seed(reader, seed)
-    raise_problems(reader)
+    check_arguments(reader, seed)
     return shapes

@@ -11,32 +11,77 @@ b_0 (normal), the bias b (a first-order Gauss-Markov process driven by white noi
 bias walk), the noise density N, the step size h and a standard normal n. The Allan deviation is N /
 sqrt(tau) for short averaging times and K sqrt(tau / 3) for long ones that are well below the
 correlation time.
+
+Sources of the default values; [typical] is a common value that no data sheet has:
+
+- [BMI088] Bosch Sensortec BMI088, data sheet BST-BMI088-DS001
+- [ADIS] Analog Devices ADIS16448 as in the RotorS simulator (Furrer et al., "RotorS - A modular
+  Gazebo MAV simulator framework", 2016; gazebo_imu_plugin.h), which doubles the densities of the
+  data sheet
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import NamedTuple
 
 from cosim.core.component import Variable
 
 from ..json_reader import JsonReader
 from .counter_based_noise import CounterBasedNoise, gauss_markov_factors
-from .device_data import IMU_DEVICES, Numbers
-from .rotations import Vector, midpoint_attitude, to_body
+from .rotations import IDENTITY_MATRIX, Vector, matrix_product, midpoint_attitude, to_body
 from .signal_component import SignalComponent
 from .variable_declarations import (
-    check_seed,
-    raise_problems,
+    array_parameter,
+    check_arguments,
+    orientation_inputs,
     real_parameter,
-    real_variable,
     seed_parameter,
     vector_variables,
 )
 
 GRAVITY = 9.81  # m/s2, as in the equations of the vehicles
-_IDENTITY = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+_DEGREE, _MILLI_G, _HOUR = math.radians(1.0), 9.81e-3, 3600.0
+
+#: noise_density (unit/sqrt(Hz)), bias_walk (unit/s/sqrt(Hz)), correlation_time (s), turn_on_bias
+#: and range (unit); rad/s and m/s2
+IMU_DEVICES: Mapping[str, Mapping[str, Mapping[str, float]]] = {
+    "bmi088": {
+        "gyroscope": {
+            "noise_density": 0.014 * _DEGREE,  # [BMI088]
+            # sigma sqrt(2 / correlation_time) of a Gauss-Markov process with the bias stability of
+            # 2 deg/h [BMI088]
+            "bias_walk": 2.0 * _DEGREE / _HOUR * math.sqrt(2 / 1000.0),
+            "correlation_time": 1000.0,  # [ADIS]
+            "turn_on_bias": 1.0 * _DEGREE,  # zero-rate offset [BMI088]
+            "range": 2000.0 * _DEGREE,  # [BMI088]
+        },
+        "accelerometer": {
+            "noise_density": 0.175 * _MILLI_G,  # [BMI088]
+            "bias_walk": 0.02 * _MILLI_G * math.sqrt(2 / 300.0),  # of 0.02 mg [typical]
+            "correlation_time": 300.0,  # [ADIS]
+            "turn_on_bias": 20.0 * _MILLI_G,  # zero-g offset [BMI088]
+            "range": 24.0e3 * _MILLI_G,  # [BMI088]
+        },
+    },
+    "adis16448": {
+        "gyroscope": {
+            "noise_density": 2 * 35.0 / _HOUR * _DEGREE,
+            "bias_walk": 2 * 4.0 / _HOUR * _DEGREE,
+            "correlation_time": 1000.0,
+            "turn_on_bias": 0.5 * _DEGREE,
+            "range": 1000.0 * _DEGREE,
+        },
+        "accelerometer": {
+            "noise_density": 2 * 2.0e-3,
+            "bias_walk": 2 * 3.0e-3,
+            "correlation_time": 300.0,
+            "turn_on_bias": 20.0 * _MILLI_G,
+            "range": 18.0e3 * _MILLI_G,
+        },
+    },
+}
 
 
 class _TriadCoefficients(NamedTuple):
@@ -67,7 +112,7 @@ class Imu(SignalComponent):
     Args:
         instance_name: Name of the component.
         seed: Seed of all random numbers, together with the name of the component.
-        device: Set of default values (`device_data.py`): "bmi088" or "adis16448". Each value is a
+        device: Set of default values (`IMU_DEVICES`): "bmi088" or "adis16448". Each value is a
             parameter.
 
     Raises:
@@ -80,22 +125,18 @@ class Imu(SignalComponent):
     def __init__(self, instance_name: str, seed: int = 0, device: str = "bmi088"):
         reader = JsonReader()
         device = reader.choice(device, ("device",), list(IMU_DEVICES))
-        check_seed(reader, seed)
-        raise_problems(reader)
+        check_arguments(reader, seed)
         super().__init__(
             instance_name,
             [
                 *vector_variables("vehicle.velocity", "xyz", "m/s", "input"),
-                *(
-                    real_variable(f"vehicle.orientation.{part}", "1", "input", float(part == "w"))
-                    for part in "wxyz"
-                ),
+                *orientation_inputs("vehicle"),
                 *vector_variables("vehicle.rates", "pqr", "rad/s", "input"),
                 *_triad_parameters("gyroscope", "rad/s", IMU_DEVICES[device]["gyroscope"]),
                 *_triad_parameters("accelerometer", "m/s2", IMU_DEVICES[device]["accelerometer"]),
                 seed_parameter(seed),
-                *vector_variables("acceleration", "xyz", "m/s2", "output", text="specific force"),
-                *vector_variables("rates", "pqr", "rad/s", "output", text="angular velocity"),
+                *vector_variables("acceleration", "xyz", "m/s2", "output", "specific force"),
+                *vector_variables("rates", "pqr", "rad/s", "output", "angular velocity"),
             ],
         )
         self._step_size = 0.01
@@ -112,16 +153,14 @@ class Imu(SignalComponent):
             for name, value in self.parameters.items()
             if name.startswith(kind)
         }
-        matrix, offset = (
-            p["matrix"],
-            [c + p["turn_on_bias"] * n for c, n in zip(p["bias"], turn_on, strict=True)],
-        )
+        x, y, z = (c + p["turn_on_bias"] * n for c, n in zip(p["bias"], turn_on, strict=True))
+        # stationary standard deviation of a process that white noise of this density drives
         sigma = p["bias_walk"] * math.sqrt(p["correlation_time"] / 2)
         keep, drive = gauss_markov_factors(sigma, p["correlation_time"], self._step_size)
         white = p["noise_density"] / math.sqrt(self._step_size)
         return _TriadCoefficients(
-            None if tuple(matrix) == _IDENTITY else matrix,
-            (offset[0], offset[1], offset[2]),
+            None if tuple(p["matrix"]) == IDENTITY_MATRIX else p["matrix"],
+            (x, y, z),
             white,
             keep,
             drive,
@@ -163,7 +202,13 @@ class Imu(SignalComponent):
         )
 
     def _set_outputs(self, force: Vector, attitude: Sequence[float], row: Sequence[float]) -> None:
-        """Set the outputs from the specific force (m/s2, world axes) and the attitude (quaternion, body to world)."""
+        """Set the outputs.
+
+        Args:
+            force: Specific force (m/s2, world axes).
+            attitude: Unit quaternion, body to world.
+            row: Random numbers of the step.
+        """
         x, y, z = _measured_axes(
             self._accelerometer, to_body(attitude, force), self._biases[:3], row
         )
@@ -180,10 +225,7 @@ def _measured_axes(
 ) -> Vector:
     """Apply the error model to the true values of three axes."""
     matrix, (offset_x, offset_y, offset_z), sigma, _, _, limit = triad
-    x, y, z = true
-    if matrix:
-        a, b, c, d, e, f, g, h, i = matrix
-        x, y, z = a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
+    x, y, z = matrix_product(matrix, true) if matrix else true
     x += offset_x + bias[0] + sigma * row[0]
     y += offset_y + bias[1] + sigma * row[1]
     z += offset_z + bias[2] + sigma * row[2]
@@ -192,7 +234,7 @@ def _measured_axes(
     return max(-limit, min(limit, x)), max(-limit, min(limit, y)), max(-limit, min(limit, z))
 
 
-def _triad_parameters(kind: str, unit: str, numbers: Numbers) -> list[Variable]:
+def _triad_parameters(kind: str, unit: str, numbers: Mapping[str, float]) -> list[Variable]:
     # densities have no declared unit: FMI units have integer exponents, unit/sqrt(Hz) does not
     return [
         real_parameter(
@@ -221,13 +263,8 @@ def _triad_parameters(kind: str, unit: str, numbers: Numbers) -> list[Variable]:
             "standard deviation of the bias at turn-on",
         ),
         real_parameter(f"{kind}.range", unit, numbers["range"], "largest value that is measured"),
-        real_variable(f"{kind}.bias", unit, "parameter", (0.0,) * 3, "constant bias", shape=(3,)),
-        real_variable(
-            f"{kind}.matrix",
-            "1",
-            "parameter",
-            _IDENTITY,
-            "scale and misalignment, row by row",
-            shape=(9,),
+        array_parameter(f"{kind}.bias", unit, (0.0,) * 3, "constant bias"),
+        array_parameter(
+            f"{kind}.matrix", "1", IDENTITY_MATRIX, "scale and misalignment, row by row"
         ),
     ]

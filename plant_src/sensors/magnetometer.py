@@ -4,13 +4,27 @@ from __future__ import annotations
 
 import math
 
-from .rotations import euler_angles, to_body
-from .sampled_sensor import Measurement, SampledSensor, timing_variables
-from .variable_declarations import real_parameter, real_variable, seed_parameter, vector_variables
+from cosim.core.component import Variable
+
+from .rotations import IDENTITY_MATRIX, euler_angles, matrix_product, to_body
+from .signal_component import Measurement, SampledSensor, timing_variables
+from .variable_declarations import (
+    array_parameter,
+    orientation_inputs,
+    real_parameter,
+    real_variable,
+    seed_parameter,
+    vector_variables,
+)
 
 #: field of the Earth, east, north, up (T): rounded value of the World Magnetic Model 2025 at about
 #: 40 degrees north in Europe
 EARTH_FIELD = (0.5e-6, 25.5e-6, -37.0e-6)
+
+
+def earth_parameter() -> Variable:
+    """Declare the parameter `earth`, the field of the Earth (T)."""
+    return array_parameter("earth", "T", EARTH_FIELD, "field of the Earth: east, north, up")
 
 
 class Magnetometer(SampledSensor):
@@ -36,41 +50,20 @@ class Magnetometer(SampledSensor):
     random_number_count = 3
 
     def __init__(self, instance_name: str, seed: int = 0):
-        identity = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
         super().__init__(
             instance_name,
             [
-                *(
-                    real_variable(f"vehicle.orientation.{part}", "1", "input", float(part == "w"))
-                    for part in "wxyz"
+                *orientation_inputs("vehicle"),
+                earth_parameter(),
+                array_parameter(
+                    "hard_iron", "T", (0.0,) * 3, "field of the vehicle itself, body axes"
                 ),
-                real_variable(
-                    "earth",
-                    "T",
-                    "parameter",
-                    EARTH_FIELD,
-                    "field of the Earth: east, north, up",
-                    shape=(3,),
-                ),
-                real_variable(
-                    "hard_iron",
-                    "T",
-                    "parameter",
-                    (0.0,) * 3,
-                    "field of the vehicle itself, body axes",
-                    shape=(3,),
-                ),
-                real_variable(
-                    "soft_iron",
-                    "1",
-                    "parameter",
-                    identity,
-                    "distortion by the vehicle, row by row",
-                    shape=(9,),
+                array_parameter(
+                    "soft_iron", "1", IDENTITY_MATRIX, "distortion by the vehicle, row by row"
                 ),
                 real_parameter("noise", "T", 0.3e-6, "standard deviation of the white noise"),
                 seed_parameter(seed),
-                *vector_variables("field", "xyz", "T", "output", text="measured field"),
+                *vector_variables("field", "xyz", "T", "output", "measured field"),
                 real_variable("yaw", "rad", "output", description="heading"),
                 *timing_variables(50.0),
             ],
@@ -79,9 +72,7 @@ class Magnetometer(SampledSensor):
     def measure(self, number: int, elapsed: float) -> Measurement:
         """Return the field (T, body axes) and the heading (rad); see `SampledSensor.measure`."""
         p, row = self.parameters, self.noise[number]
-        x, y, z = to_body(self.inputs, p["earth"])
-        a, b, c, d, e, f, g, h, i = p["soft_iron"]
-        distorted = (a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z)
+        distorted = matrix_product(p["soft_iron"], to_body(self.inputs, p["earth"]))
         field = [
             soft + hard + p["noise"] * n
             for soft, hard, n in zip(distorted, p["hard_iron"], row, strict=True)
@@ -89,7 +80,11 @@ class Magnetometer(SampledSensor):
         return (*field, self._heading(field)), ()
 
     def _heading(self, field: list[float]) -> float:
-        """Return the heading (rad) from the field in body axes, rotated by the true roll and pitch."""
+        """Return the heading (rad) from the field in body axes.
+
+        The true roll and pitch level the field; the heading is the angle between its horizontal
+        part and that of the field of the Earth.
+        """
         roll, pitch, _ = euler_angles(self.inputs)
         x, y, z = field
         left, up = y * math.cos(roll) - z * math.sin(roll), y * math.sin(roll) + z * math.cos(roll)

@@ -11,15 +11,17 @@ Engineering Practice 18 (2010).
 from __future__ import annotations
 
 import math
+from collections import deque
 from collections.abc import Sequence
 
-from .history import History
 from .imu import GRAVITY
-from .magnetometer import EARTH_FIELD
+from .magnetometer import earth_parameter
 from .rotations import (
     Quaternion,
     Vector,
+    add_scaled,
     cross,
+    difference,
     euler_angles,
     midpoint_attitude,
     normalised_quaternion,
@@ -29,23 +31,48 @@ from .rotations import (
     to_world,
 )
 from .signal_component import SignalComponent
-from .variable_declarations import real_parameter, real_variable, vector_variables
+from .variable_declarations import (
+    EULER_ANGLES,
+    real_parameter,
+    real_variable,
+    share_parameter,
+    vector_variables,
+)
+
+_TIME_TOLERANCE = 1e-9  # s, rounding error of times
 
 #: inputs by quantity
 _FORCE, _RATES, _FIX_POSITION, _FIX_VELOCITY = slice(0, 3), slice(3, 6), slice(6, 9), slice(9, 12)
 _FIX_TIME, _FIELD, _FIELD_TIME = 12, slice(13, 16), 16
 
-_STATE_ATTRIBUTES = (
-    "_position",
-    "_velocity",
-    "_orientation",
-    "_gyro_bias",
-    "_force_bias",
-    "_history",
-    "_alignment_count",
-    "_fix_time",
-    "_field_time",
-)
+
+class History:
+    """Values of the last `span` (s) by time.
+
+    A measurement arrives with a latency; its error is evaluated against the estimate that was
+    valid when it was taken.
+    """
+
+    def __init__(self, span: float = 1.0):
+        self._span, self._entries = span, deque[tuple[float, Sequence[float]]]()
+
+    def add(self, now: float, values: Sequence[float]) -> None:
+        """Append the values at `now` (s), which must be later than all stored times."""
+        self._entries.append((now, values))
+        if self._entries[0][0] < now - self._span:
+            self._entries.popleft()
+
+    def at(self, time: float) -> Sequence[float]:
+        """Return the oldest values stored at or after `time` (s).
+
+        The newest ones if all are older.
+        """
+        result = self._entries[-1]
+        for entry in reversed(self._entries):
+            if entry[0] < time - _TIME_TOLERANCE:
+                break
+            result = entry
+        return result[1]
 
 
 class Navigation(SignalComponent):
@@ -66,7 +93,17 @@ class Navigation(SignalComponent):
         instance_name: Name of the component.
     """
 
-    state_attributes = _STATE_ATTRIBUTES
+    state_attributes = (
+        "_position",
+        "_velocity",
+        "_orientation",
+        "_gyro_bias",
+        "_force_bias",
+        "_history",
+        "_alignment_count",
+        "_fix_time",
+        "_field_time",
+    )
     _position: Sequence[float]
     _velocity: Sequence[float]
     _orientation: Quaternion
@@ -87,32 +124,17 @@ class Navigation(SignalComponent):
                 real_parameter(
                     "alignment_time", "s", 1.0, "in which the vehicle stands still and level"
                 ),
-                real_parameter(
-                    "position_gain",
-                    "1",
-                    0.3,
-                    "share of the position error that a fix takes away",
-                    0.0,
-                    1.0,
+                share_parameter(
+                    "position_gain", 0.3, "share of the position error that a fix takes away"
                 ),
-                real_parameter(
-                    "velocity_gain",
-                    "1",
-                    0.15,
-                    "share of the velocity error that a fix takes away",
-                    0.0,
-                    1.0,
+                share_parameter(
+                    "velocity_gain", 0.15, "share of the velocity error that a fix takes away"
                 ),
-                real_parameter(
-                    "tilt_gain", "1", 0.03, "turn by a fix, times g, per velocity error", 0.0, 1.0
-                ),
-                real_parameter(
+                share_parameter("tilt_gain", 0.03, "turn by a fix, times g, per velocity error"),
+                share_parameter(
                     "heading_gain",
-                    "1",
                     0.02,
                     "share of the heading error that a sample of the field takes away",
-                    0.0,
-                    1.0,
                 ),
                 real_parameter(
                     "bias_gain",
@@ -120,20 +142,10 @@ class Navigation(SignalComponent):
                     0.05,
                     "change of the gyroscopes' bias per turn by a correction",
                 ),
-                real_variable(
-                    "earth",
-                    "T",
-                    "parameter",
-                    EARTH_FIELD,
-                    "field of the Earth: east, north, up",
-                    shape=(3,),
-                ),
+                earth_parameter(),
                 *vector_variables("position", "xyz", "m", "output"),
-                *(real_variable(f"orientation.{part}", "1", "output") for part in "wxyz"),
-                *(
-                    real_variable(f"attitude.{angle}", "rad", "output")
-                    for angle in ("roll", "pitch", "yaw")
-                ),
+                *vector_variables("orientation", "wxyz", "1", "output"),
+                *vector_variables("attitude", EULER_ANGLES, "rad", "output"),
                 *vector_variables("velocity", "xyz", "m/s", "output"),
                 *vector_variables("velocity_body", "uvw", "m/s", "output"),
                 *vector_variables("rates", "pqr", "rad/s", "output"),
@@ -143,11 +155,8 @@ class Navigation(SignalComponent):
     def initialise(self) -> None:
         """Start the alignment with the first measurements."""
         i = self.inputs
-        self._position, self._velocity, self._orientation = (
-            i[_FIX_POSITION],
-            (0.0, 0.0, 0.0),
-            self._level_attitude(),
-        )
+        self._position, self._velocity = i[_FIX_POSITION], (0.0, 0.0, 0.0)
+        self._orientation = self._level_attitude()
         self._gyro_bias, self._force_bias = i[_RATES], (i[0], i[1], i[2] - GRAVITY)
         self._history, self._alignment_count = History(), 1
         self._fix_time, self._field_time = i[_FIX_TIME], i[_FIELD_TIME]
@@ -187,14 +196,8 @@ class Navigation(SignalComponent):
 
     def _integrate(self, h: float) -> None:
         """Integrate rates and specific force over a step `h` (s)."""
-        (p, q, r), (bias_p, bias_q, bias_r), before = (
-            self.inputs[_RATES],
-            self._gyro_bias,
-            self._orientation,
-        )
-        rotation = quaternion_from_rotation_vector(
-            ((p - bias_p) * h, (q - bias_q) * h, (r - bias_r) * h)
-        )
+        before, (p, q, r) = self._orientation, difference(self.inputs[_RATES], self._gyro_bias)
+        rotation = quaternion_from_rotation_vector((p * h, q * h, r * h))
         self._orientation = normalised_quaternion(quaternion_product(before, rotation))
         x, y, z = self._force(midpoint_attitude(before, self._orientation))
         u, v, w = self._velocity
@@ -208,28 +211,21 @@ class Navigation(SignalComponent):
 
     def _force(self, orientation: Sequence[float]) -> Vector:
         """Return the specific force without bias (m/s2, world axes)."""
-        (a, b, c), (x, y, z) = self.inputs[_FORCE], self._force_bias
-        return to_world(orientation, (a - x, b - y, c - z))
+        return to_world(orientation, difference(self.inputs[_FORCE], self._force_bias))
 
     def _correct_by_fix(self) -> None:
         """Correct position, velocity and attitude by the errors at the time of the fix."""
         p, i, past = self.parameters, self.inputs, self._history.at(self.inputs[_FIX_TIME])
-        x, y, z = (
-            measured - estimate
-            for measured, estimate in zip(i[_FIX_POSITION], past[:3], strict=True)
-        )
-        u, v, w = (
-            measured - estimate
-            for measured, estimate in zip(i[_FIX_VELOCITY], past[3:], strict=True)
-        )
-        self._position = _add_scaled(self._position, p["position_gain"], (x, y, z))
-        self._velocity = _add_scaled(self._velocity, p["velocity_gain"], (u, v, w))
-        a, b, c = cross(self._force(self._orientation), (u, v, w))
+        position_error = difference(i[_FIX_POSITION], past[:3])
+        velocity_error = difference(i[_FIX_VELOCITY], past[3:])
+        self._position = add_scaled(self._position, p["position_gain"], position_error)
+        self._velocity = add_scaled(self._velocity, p["velocity_gain"], velocity_error)
+        a, b, c = cross(self._force(self._orientation), velocity_error)
         gain = p["tilt_gain"] / GRAVITY**2
         self._rotate((gain * a, gain * b, gain * c), p["bias_gain"])
 
     def _correct_heading(self, gain: float, bias_gain: float) -> None:
-        """Correct the heading by `gain` times the angle between the measured field and that of the Earth."""
+        """Correct the heading by `gain` times the angle from the measured field to the Earth's."""
         east, north, _ = self.parameters["earth"]
         x, y, _ = to_world(self._orientation, self.inputs[_FIELD])
         self._rotate(
@@ -237,7 +233,10 @@ class Navigation(SignalComponent):
         )
 
     def _rotate(self, rotation: Vector, bias_gain: float) -> None:
-        """Correct the attitude by a rotation vector (rad, world axes) and the gyroscope bias in proportion to it."""
+        """Correct the attitude by a rotation vector (rad, world axes).
+
+        The bias of the gyroscopes, which let the attitude drift, changes in proportion to it.
+        """
         (p, q, r), (a, b, c) = self._gyro_bias, to_body(self._orientation, rotation)
         self._gyro_bias = p - bias_gain * a, q - bias_gain * b, r - bias_gain * c
         self._orientation = quaternion_product(
@@ -247,28 +246,16 @@ class Navigation(SignalComponent):
     def _publish(self) -> None:
         """Set the outputs from the estimates."""
         q = self._orientation
-        rates = [
-            rate - bias for rate, bias in zip(self.inputs[_RATES], self._gyro_bias, strict=True)
-        ]
         self.outputs = (
             *self._position,
             *q,
             *euler_angles(q),
             *self._velocity,
             *to_body(q, self._velocity),
-            *rates,
+            *difference(self.inputs[_RATES], self._gyro_bias),
         )
-
-
-def _add_scaled(vector: Sequence[float], gain: float, change: Vector) -> Vector:
-    """Return vector + gain * change."""
-    return vector[0] + gain * change[0], vector[1] + gain * change[1], vector[2] + gain * change[2]
 
 
 def _interpolate(old: Sequence[float], new: Sequence[float], share: float) -> Vector:
     """Return old + share * (new - old)."""
-    return (
-        old[0] + share * (new[0] - old[0]),
-        old[1] + share * (new[1] - old[1]),
-        old[2] + share * (new[2] - old[2]),
-    )
+    return add_scaled(old, share, difference(new, old))

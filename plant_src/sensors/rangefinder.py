@@ -1,9 +1,10 @@
-"""Rangefinder: distance along a beam to the nearest deck, platform or the water, by ray casting in Bullet."""
+"""Rangefinder: distance along a beam to a deck, a platform or the water, by ray casting."""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from typing import Any
 
 from ..catalogue import VEHICLE_MODELS
@@ -11,13 +12,14 @@ from ..json_reader import JsonReader
 from ..physics.body import create_compound_shape
 from ..physics.client import pybullet
 from ..vehicles.common.shapes import Box, Shape
-from .rotations import Vector, to_world
-from .sampled_sensor import Measurement, SampledSensor, timing_variables
+from .rotations import Vector, add_scaled, to_world
+from .signal_component import Measurement, SampledSensor, timing_variables
 from .variable_declarations import (
+    array_parameter,
     boolean_variable,
-    check_seed,
+    check_arguments,
     pose_inputs,
-    raise_problems,
+    read_platforms,
     real_parameter,
     real_variable,
     seed_parameter,
@@ -66,36 +68,24 @@ class Rangefinder(SampledSensor):
     ):
         reader = JsonReader()
         bodies = _read_vessels(reader, vessels or {})
-        boxes = _read_platforms(reader, platforms or {})
-        check_seed(reader, seed)
-        raise_problems(reader)
+        boxes = read_platforms(reader, platforms or {})
+        check_arguments(reader, seed)
+        deck_inputs = [pose_inputs(name, "deck.position") for name in bodies]
         super().__init__(
             instance_name,
             [
                 *pose_inputs("vehicle"),
-                *(variable for name in bodies for variable in pose_inputs(name, "deck.position")),
+                *chain.from_iterable(deck_inputs),
                 real_parameter("noise_floor", "m", 0.02, "standard deviation close by"),
                 real_parameter(
                     "noise_share", "1", 0.01 / 3, "standard deviation per distance far away"
                 ),
                 real_parameter("nearest", "m", 0.1, "smallest distance that is measured"),
                 real_parameter("farthest", "m", 12.0, "largest distance that is measured"),
-                real_variable(
-                    "mounting",
-                    "m",
-                    "parameter",
-                    (0.0, 0.0, 0.0),
-                    "place on the vehicle, body axes",
-                    shape=(3,),
+                array_parameter(
+                    "mounting", "m", (0.0, 0.0, 0.0), "place on the vehicle, body axes"
                 ),
-                real_variable(
-                    "direction",
-                    "1",
-                    "parameter",
-                    (0.0, 0.0, -1.0),
-                    "of the beam, body axes",
-                    shape=(3,),
-                ),
+                array_parameter("direction", "1", (0.0, 0.0, -1.0), "of the beam, body axes"),
                 seed_parameter(seed),
                 real_variable("distance", "m", "output"),
                 *timing_variables(100.0),
@@ -104,10 +94,9 @@ class Rangefinder(SampledSensor):
         )
         self._water = water
         self._client = pybullet.connect(pybullet.DIRECT)
-        for size, position in boxes:
-            self._add_body(
-                [Box((size[0] / 2, size[1] / 2, size[2] / 2), (0.0, 0.0, 0.0))], position
-            )
+        for (length, width, height), position in boxes:
+            half_extents = (length / 2, width / 2, height / 2)
+            self._add_body([Box(half_extents, (0.0, 0.0, 0.0))], position)
         self._bodies = [self._add_body(body, (0.0, 0.0, 0.0)) for body in bodies.values()]
 
     def _add_body(self, boxes: Sequence[Shape], position: Sequence[float]) -> int:
@@ -126,27 +115,25 @@ class Rangefinder(SampledSensor):
         p, true = self.parameters, self._distance()
         if not p["nearest"] <= true <= p["farthest"]:
             return (p["farthest"],), (False,)
-        return (true + max(p["noise_floor"], p["noise_share"] * true) * self.noise[number][0],), (
-            True,
-        )
+        sigma = max(p["noise_floor"], p["noise_share"] * true)
+        return (true + sigma * self.noise[number][0],), (True,)
 
     def _distance(self) -> float:
         """Return the true distance (m) along the beam; infinite without an object in reach."""
-        x, y, z = self.inputs[:3]
-        a, b, c = to_world(self.inputs[3:7], self.parameters["mounting"])
-        start = (x + a, y + b, z + c)
-        beam = to_world(self.inputs[3:7], self._direction)
+        attitude = self.inputs[3:7]
+        start = add_scaled(self.inputs, 1.0, to_world(attitude, self.parameters["mounting"]))
+        beam = to_world(attitude, self._direction)
         return min(self._to_solids(start, beam), self._to_water(start, beam))
 
     def _to_solids(self, start: Vector, beam: Vector) -> float:
-        """Return the distance (m) from `start` (m, world) along the unit vector `beam` to vessels and platforms."""
+        """Return the distance (m) from `start` (m, world) along a unit vector to the solids."""
         for number, body in enumerate(self._bodies, 1):
             x, y, z, qw, qx, qy, qz = self.inputs[_POSE_SIZE * number : _POSE_SIZE * (number + 1)]
             pybullet.resetBasePositionAndOrientation(
                 body, (x, y, z), (qx, qy, qz, qw), physicsClientId=self._client
             )
         reach = self.parameters["farthest"] * 1.01
-        end = [origin + reach * part for origin, part in zip(start, beam, strict=True)]
+        end = add_scaled(start, reach, beam)
         (hit,) = pybullet.rayTest(start, end, physicsClientId=self._client)
         return hit[_HIT_FRACTION] * reach if hit[_HIT_BODY] >= 0 else math.inf
 
@@ -179,19 +166,3 @@ def _relative_to_deck(boxes: Sequence[Shape]) -> Sequence[Shape]:
     a, b, c = boxes[0].position
     top = c + boxes[0].half_extents[2]
     return [box.moved((-a, -b, -top)) for box in boxes]
-
-
-def _read_platforms(
-    reader: JsonReader, platforms: Any
-) -> Sequence[tuple[Sequence[float], Sequence[float]]]:
-    """Return edges and centre of each platform (m)."""
-    boxes = []
-    for name, spec in reader.read_named_objects(platforms, ("platforms",)).items():
-        path = ("platforms", name)
-        spec = reader.read_object(spec, path, ("size", "position"), ())
-        vectors = [
-            reader.vector(spec.get(key, [1.0] * 3), (*path, key), "xyz")
-            for key in ("size", "position")
-        ]
-        boxes.append((vectors[0], vectors[1]))
-    return boxes

@@ -1,4 +1,4 @@
-"""Rotations of three-component vectors in plain floats, which are faster than NumPy arrays of this size.
+"""Rotations of vectors in plain floats, which are faster than NumPy arrays of three numbers.
 
 Quaternions are (w, x, y, z), of unit length, and rotate body axes to world axes.
 """
@@ -10,6 +10,16 @@ from collections.abc import Sequence
 
 Vector = tuple[float, float, float]
 Quaternion = tuple[float, float, float, float]
+
+#: identity matrix (3, 3), row by row
+IDENTITY_MATRIX = (1.0, 0.0, 0.0, 0.0, 1.0, 0.0, 0.0, 0.0, 1.0)
+
+
+def matrix_product(matrix: Sequence[float], v: Sequence[float]) -> Vector:
+    """Return the product of a matrix (3, 3), row by row, with a vector."""
+    a, b, c, d, e, f, g, h, i = matrix
+    x, y, z = v
+    return a * x + b * y + c * z, d * x + e * y + f * z, g * x + h * y + i * z
 
 
 def to_world(q: Sequence[float], v: Sequence[float]) -> Vector:
@@ -77,16 +87,16 @@ def euler_angles(q: Sequence[float]) -> Vector:
     return roll, pitch, math.atan2(2 * (w * z + x * y), 1 - 2 * (y * y + z * z))
 
 
-def quaternion_from_euler(roll: float, pitch: float, yaw: float) -> Quaternion:
-    """Return the quaternion of roll, pitch and yaw (rad, ZYX)."""
-    about_z, about_y, about_x = (
-        quaternion_from_rotation_vector((0.0, 0.0, yaw)),
-        quaternion_from_rotation_vector((0.0, pitch, 0.0)),
-        quaternion_from_rotation_vector((roll, 0.0, 0.0)),
-    )
-    return quaternion_product(quaternion_product(about_z, about_y), about_x)
-
-
 def cross(a: Sequence[float], b: Sequence[float]) -> Vector:
     """Return the vector product a x b."""
     return a[1] * b[2] - a[2] * b[1], a[2] * b[0] - a[0] * b[2], a[0] * b[1] - a[1] * b[0]
+
+
+def add_scaled(vector: Sequence[float], gain: float, change: Sequence[float]) -> Vector:
+    """Return vector + gain * change."""
+    return vector[0] + gain * change[0], vector[1] + gain * change[1], vector[2] + gain * change[2]
+
+
+def difference(a: Sequence[float], b: Sequence[float]) -> Vector:
+    """Return a - b."""
+    return a[0] - b[0], a[1] - b[1], a[2] - b[2]

@@ -1,10 +1,11 @@
-"""Base class of components with few real inputs and outputs: sensors, estimators and faults."""
+"""Base classes of sensors, estimators and faults: few real inputs and outputs."""
 
 from __future__ import annotations
 
 import ctypes
 import math
 import struct
+from collections import deque
 from collections.abc import Sequence
 from copy import deepcopy
 from typing import Any
@@ -16,8 +17,18 @@ from cosim.core.errors import ComponentError, did_you_mean
 
 from ..variable_views import recorded_others
 from .counter_based_noise import CounterBasedNoise
+from .variable_declarations import real_parameter, real_variable
 
 _FLOAT, _FLAG = DTYPES["Float64"], DTYPES["Boolean"]
+
+#: attributes that belong to the state of every component
+_STATE_ATTRIBUTES = ("inputs", "outputs", "flags", "parameters", "start_time", "_initializing")
+
+#: rounding errors of a sample number and of a time (s)
+_SAMPLE_TOLERANCE, _TIME_TOLERANCE = 1e-6, 1e-9
+
+#: values of the real outputs without `time`, and of the Boolean outputs
+Measurement = tuple[Sequence[float], Sequence[bool]]
 
 
 class SignalComponent(Component):
@@ -55,15 +66,10 @@ class SignalComponent(Component):
         inputs = [v for v in variables if v.causality == "input"]
         outputs = [v for v in variables if v.causality == "output"]
         self._ranges = {"input": _variable_ranges(inputs), "output": _variable_ranges(outputs)}
-        self.inputs: Sequence[float] = tuple(
-            x for v in inputs for x in np.ravel(_flat_value(v, v.start)).tolist()
-        )
-        self.outputs: Sequence[float] = (0.0,) * sum(
-            len(v.scalar_names) for v in outputs if v.dtype == _FLOAT
-        )
-        self.flags: Sequence[bool] = (False,) * sum(
-            len(v.scalar_names) for v in outputs if v.dtype == _FLAG
-        )
+        starts = [np.ravel(_flat_value(v, v.start)) for v in inputs]
+        self.inputs: Sequence[float] = tuple(np.concatenate([[], *starts]).tolist())
+        self.outputs: Sequence[float] = (0.0,) * _scalar_count(outputs, _FLOAT)
+        self.flags: Sequence[bool] = (False,) * _scalar_count(outputs, _FLAG)
         self._input_data: Any = np.array(self.inputs).data
         self._output_data: Any = np.array(self.outputs).data
         self._flag_data: Any = np.array(self.flags, _FLAG).data
@@ -72,8 +78,7 @@ class SignalComponent(Component):
         self._write_flags = struct.Struct(f"{len(self.flags)}?").pack_into
         self._initializing, self.start_time = False, 0.0
 
-    # -- for subclasses
-    # ------------------------------------------------------------------------------------------------
+    # -- for subclasses ----------------------------------------------------------------------------
 
     def apply_parameters(self) -> None:
         """Compute values that depend on parameters; called after every change.
@@ -92,8 +97,7 @@ class SignalComponent(Component):
         """Set outputs and state at `now` (s), the end of a step of `step_size` (s)."""
         raise NotImplementedError
 
-    # -- variables
-    # -----------------------------------------------------------------------------------------------------
+    # -- variables ---------------------------------------------------------------------------------
 
     def _variable(self, name: str, function: str) -> Variable:
         """Return the variable `name`. Raises ComponentError if it does not exist."""
@@ -129,18 +133,14 @@ class SignalComponent(Component):
         if variable.causality == "parameter":
             return deepcopy(self.parameters[name])
         first, end = self._ranges[variable.causality][name]
-        values = (
-            self.inputs
-            if variable.causality == "input"
-            else self.flags
-            if variable.dtype == _FLAG
-            else self.outputs
-        )
+        if variable.causality == "input":
+            values: Sequence[Any] = self.inputs
+        else:
+            values = self.flags if variable.dtype == _FLAG else self.outputs
         scalars = list(values[first:end])
         return scalars if variable.shape else scalars[0]
 
-    # -- life cycle
-    # ----------------------------------------------------------------------------------------------------
+    # -- life cycle --------------------------------------------------------------------------------
 
     def bind(self, inputs: Ports, outputs: Ports) -> None:
         """Take the arrays of the engine."""
@@ -199,16 +199,10 @@ class SignalComponent(Component):
 
     def get_state(self) -> Any:
         """Return a copy of the state."""
-        names = (
-            "inputs",
-            "outputs",
-            "flags",
-            "parameters",
-            "start_time",
-            "_initializing",
-            *self.state_attributes,
-        )
-        return {name: deepcopy(getattr(self, name)) for name in names}
+        return {
+            name: deepcopy(getattr(self, name))
+            for name in (*_STATE_ATTRIBUTES, *self.state_attributes)
+        }
 
     def set_state(self, state: Any) -> None:
         """Restore a state; it stays valid."""
@@ -224,6 +218,75 @@ class SignalComponent(Component):
 
     def free(self) -> None:
         """Do nothing: there are no resources."""
+
+
+class SampledSensor(SignalComponent):
+    """Sensor with a sample rate and a latency.
+
+    The last real output is the `time` (s) of the sample.
+
+    Sample n is taken at the end of the first step that reaches start + n / `rate` and is published
+    `latency` (s) later. Sample 0 is published at the start.
+    """
+
+    state_attributes: tuple[str, ...] = ("_number", "_sample_time", "_pending")
+
+    def measure(self, number: int, elapsed: float) -> Measurement:
+        """Take a sample.
+
+        Args:
+            number: Number of the sample; selects the row of random numbers.
+            elapsed: Time since the last sample (s), 0 for the first one.
+
+        Returns:
+            Real outputs without `time`, and Boolean outputs. Empty real outputs leave the last
+            values and their time.
+        """
+        raise NotImplementedError
+
+    def initialise(self) -> None:
+        """Take and publish sample 0."""
+        self._number, self._sample_time = 0, self.start_time
+        self._pending = deque[tuple[float, float, Measurement]]()
+        self.outputs = (0.0,) * len(self.outputs)
+        self._publish(self.start_time, self.measure(0, 0.0))
+
+    def advance(self, now: float, step_size: float) -> None:
+        """Take a sample that is due and publish those whose latency has passed."""
+        number = int((now - self.start_time) * self.parameters["rate"] + _SAMPLE_TOLERANCE)
+        if number > self._number:
+            measurement = self.measure(number, now - self._sample_time)
+            self._number, self._sample_time = number, now
+            self._pending.append(
+                (now + self.parameters["latency"] - _TIME_TOLERANCE, now, measurement)
+            )
+        while self._pending and self._pending[0][0] <= now:
+            _, taken, measurement = self._pending.popleft()
+            self._publish(taken, measurement)
+
+    def _publish(self, taken: float, measurement: Measurement) -> None:
+        values, self.flags = measurement
+        if values:
+            self.outputs = (*values, taken)
+
+
+def timing_variables(rate: float, latency: float = 0.0) -> list[Variable]:
+    """Declare the parameters `rate` (Hz) and `latency` (s) and the output `time`.
+
+    The latter must be the last real output.
+    """
+    return [
+        real_variable(
+            "rate", "Hz", "parameter", rate, "samples per second", minimum=1e-3, variability="fixed"
+        ),
+        real_parameter("latency", "s", latency, "from the sample to its output"),
+        real_variable("time", "s", "output", description="when the sample was taken"),
+    ]
+
+
+def _scalar_count(variables: Sequence[Variable], dtype: np.dtype[Any]) -> int:
+    """Return the number of scalars of a dtype."""
+    return sum(len(v.scalar_names) for v in variables if v.dtype == dtype)
 
 
 def _variable_ranges(variables: Sequence[Variable]) -> dict[str, tuple[int, int]]:

@@ -3,24 +3,40 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from cosim.core.component import Causality, Variability, Variable
 from cosim.core.errors import InputError
 from cosim.core.units import parse_unit
 
-from ..json_reader import JsonReader
+from ..json_reader import JsonReader, Numbers
+
+EULER_ANGLES = ("roll", "pitch", "yaw")
 
 
-def check_seed(reader: JsonReader, seed: Any) -> None:
-    """Add a problem to `reader` unless `seed` is an integer from 0 to 2^31 - 1."""
+def check_arguments(reader: JsonReader, seed: Any = 0) -> None:
+    """Raise InputError with all problems that `reader` has collected, and that of `seed`.
+
+    A seed is an integer from 0 to 2^31 - 1.
+    """
     reader.integer(seed, ("seed",), 0, 2**31 - 1)
-
-
-def raise_problems(reader: JsonReader) -> None:
-    """Raise InputError with all problems that `reader` has collected, if there are any."""
     if reader.problems:
         raise InputError(reader.problems)
+
+
+def read_platforms(reader: JsonReader, platforms: Any) -> list[tuple[Numbers, Numbers]]:
+    """Read edges and centre (m) of platforms, given as in the arguments of the plant."""
+    boxes = []
+    for name, spec in reader.read_named_objects(platforms, ("platforms",)).items():
+        path = ("platforms", name)
+        spec = reader.read_object(spec, path, ("size", "position"), ())
+        size, position = (
+            reader.vector(spec.get(key, [1.0] * 3), (*path, key), "xyz")
+            for key in ("size", "position")
+        )
+        boxes.append((size, position))
+    return boxes
 
 
 def real_variable(
@@ -71,15 +87,14 @@ def real_variable(
 
 def vector_variables(
     name: str,
-    axes: str,
+    axes: Sequence[str],
     unit: str,
     causality: Causality,
-    start: float | None = None,
     text: str = "",
 ) -> list[Variable]:
-    """Declare the real variables `name.AXIS`, one for each letter of `axes`."""
+    """Declare the real variables `name.AXIS`, one for each of `axes`."""
     return [
-        real_variable(f"{name}.{axis}", unit, causality, start, f"{text}: {axis}" if text else "")
+        real_variable(f"{name}.{axis}", unit, causality, None, f"{text}: {axis}" if text else "")
         for axis in axes
     ]
 
@@ -87,7 +102,7 @@ def vector_variables(
 def real_parameter(
     name: str,
     unit: str,
-    start: Any,
+    start: float,
     description: str,
     minimum: float | None = 0.0,
     maximum: float | None = None,
@@ -98,14 +113,22 @@ def real_parameter(
     )
 
 
+def share_parameter(name: str, start: float, description: str) -> Variable:
+    """Declare a tunable parameter from 0 to 1."""
+    return real_parameter(name, "1", start, description, 0.0, 1.0)
+
+
+def array_parameter(name: str, unit: str, start: tuple[float, ...], description: str) -> Variable:
+    """Declare a tunable parameter that is an array of as many elements as `start` has."""
+    return real_variable(name, unit, "parameter", start, description, shape=(len(start),))
+
+
 def seed_parameter(seed: int) -> Variable:
     """Declare the parameter `seed`.
 
     Raises InputError if `seed` is not an integer from 0 to 2^31 - 1.
     """
-    reader = JsonReader()
-    check_seed(reader, seed)
-    raise_problems(reader)
+    check_arguments(JsonReader(), seed)
     return Variable(
         "seed", "Int32", "parameter", "fixed", seed, description="of all random numbers", minimum=0
     )
@@ -119,6 +142,14 @@ def boolean_variable(
     return Variable(name, "Boolean", causality, kind, start, description=description)
 
 
+def orientation_inputs(name: str) -> list[Variable]:
+    """Declare the inputs `name.orientation.w|x|y|z` (unit quaternion, body to world)."""
+    return [
+        real_variable(f"{name}.orientation.{part}", "1", "input", float(part == "w"))
+        for part in "wxyz"
+    ]
+
+
 def pose_inputs(name: str, position: str = "position") -> list[Variable]:
     """Declare the inputs of a pose.
 
@@ -130,8 +161,4 @@ def pose_inputs(name: str, position: str = "position") -> list[Variable]:
         `name.position.x|y|z` (m, world) and `name.orientation.w|x|y|z` (unit quaternion, body to
         world), 7 scalars.
     """
-    orientation = [
-        real_variable(f"{name}.orientation.{part}", "1", "input", float(part == "w"))
-        for part in "wxyz"
-    ]
-    return [*vector_variables(f"{name}.{position}", "xyz", "m", "input"), *orientation]
+    return [*vector_variables(f"{name}.{position}", "xyz", "m", "input"), *orientation_inputs(name)]

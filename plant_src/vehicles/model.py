@@ -10,6 +10,7 @@ from itertools import islice
 import numpy as np
 
 from cosim.core.component import Causality, Variable
+from cosim.export.equations.exported_interface import describe_variables
 
 from .common.interface import ENVIRONMENT_INPUTS
 from .common.shapes import Body, Vector
@@ -32,8 +33,6 @@ class Model:
         is_vessel: Whether the vehicle floats and has a landing deck.
         vehicle: Name of the vehicle in scenarios if it differs from `name`.
         motion: "planar" or "6dof"; distinguishes models of the same vehicle.
-        constant_count: Number of constants that the equations derive from the parameters, or None
-            if they use the parameters.
         airframe: Data of a multirotor.
         craft: Data of a submerged vehicle.
         boat: Data of a vessel that is given by a file.
@@ -55,7 +54,6 @@ class Model:
     is_vessel: bool = False
     vehicle: str = ""
     motion: str = "6dof"
-    constant_count: int | None = None
     airframe: Airframe | None = None
     craft: Craft | None = None
     boat: Boat | None = None
@@ -69,6 +67,11 @@ class Model:
     def binary(self) -> str:
         """Name of the FMU whose binary has the equations."""
         return self.equations or self.name
+
+    @cached_property
+    def equation_variables_text(self) -> str:
+        """Variables and states of the equations in words, which their binary must repeat."""
+        return describe_variables(self.layout or self.interface, self.states)
 
     @property
     def rotor_disc(self) -> tuple[Vector, float] | None:

@@ -2,6 +2,7 @@
 
 import asyncio
 import gc
+import math
 import os
 import subprocess
 import sys
@@ -74,6 +75,57 @@ def test_what_is_set_acts_in_the_next_step(simulation):
     simulation.set("g.k", 10)
     simulation.step()
     assert simulation.get("g.y") == 36.0
+
+
+@pytest.mark.parametrize("name", ["a.rotor_speed", "a.external_force"])
+def test_lists_of_numbers_are_checked_each_time_that_they_are_set(name):
+    system = {"a": {"fmu": "cosim:fmus/ar_drone.fmu"}}
+    with cosim.load(
+        {"name": "x", "stop_time": 1, "step_size": 0.01, "components": system}
+    ) as drone:
+        size = len(drone.get(name))
+        for factor in (1.0, 2.0):
+            values = [factor * i for i in range(1, size + 1)]
+            drone.set(name, values)
+            values[0] = 7.0  # the caller's list is not kept
+            assert drone.get(name) == [factor * i for i in range(1, size + 1)]
+        for wrong in ([math.nan] * size, [1.0] * (size + 1), ["1"] * size, 1.0, [1e400] * size):
+            assert f'set("{name}")' in refusal(drone.set, name, wrong)
+        drone.set(name, np.ones(size, np.float32))
+        assert drone.get(name) == [1.0] * size
+
+
+SULKING = """
+from pythonfmu import Fmi2Causality, Fmi2Slave, Real
+
+
+class Sulking(Fmi2Slave):
+    def __init__(self, **kwargs):
+        super().__init__(**kwargs)
+        self.u = 0.0
+        self.register_variable(Real("u", causality=Fmi2Causality.input, start=0.0))
+
+    def __setattr__(self, name, value):
+        if name == "u" and value < 0:
+            raise ValueError("u is negative")
+        super().__setattr__(name, value)
+
+    def do_step(self, current_time, step_size):
+        return True
+"""
+
+
+def test_a_component_that_fails_to_set_a_value_fails_the_next_step(tmp_path):
+    (tmp_path / "sulking.py").write_text(SULKING)
+    system = {"a": {"python": f"{tmp_path}/sulking.py:Sulking"}}
+    with cosim.load({"name": "x", "stop_time": 1, "step_size": 0.1, "components": system}) as run:
+        run.set("a.u", 1.0)
+        run.step()
+        run.set("a.u", -1.0)
+        with pytest.raises(
+            cosim.ComponentError, match=r"a: set failed at .*ValueError: u is negative"
+        ):
+            run.step()
 
 
 def test_arrays_and_ports_are_read_by_their_names(demo):

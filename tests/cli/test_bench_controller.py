@@ -12,7 +12,7 @@ import pytest
 from cosim_command import run_cosim
 from fault_fmu import FaultFmus, build_library
 
-from cosim.cli.bench_table import print_side_by_side
+from cosim.cli.bench_output import print_side_by_side
 from cosim.core import resources
 from cosim.studies.controller_bench.page import BenchedController
 from cosim.studies.controller_bench.ranking import ScenarioKpis, rank
@@ -457,7 +457,7 @@ def test_several_controllers_are_shown_side_by_side_with_their_costs(folder):
         "order: passed checks, then passed scenarios, then the goals of the role",
         differ,
     ]
-    rows = [line.split() for line in lines[lines.index("") + 3 : cost_line - 2]]
+    rows = [line.split() for line in lines[lines.index("") + 3 : cost_line - 3]]
     assert rows[0][:7] == ["strider_autopilot", "1", "of", "1", "2", "of", "2"]
     costs = {row[0]: float(row[-2]) for row in rows}
     ratios = {row[0]: float(row[-1]) for row in rows}

@@ -470,23 +470,6 @@ def test_info_prints_properties_and_variables(probe):
     assert 'did you mean "multirotor_controller"?' in cosim("info", "multirotor_controler").stderr
 
 
-def test_openmodelica_requires_a_source_and_a_target(tmp_path):
-    (tmp_path / "M.mo").write_text("model M\nend M;\n")
-    without_target = cosim("build", tmp_path / "M.mo", "--modelica-compiler", "omc")
-    assert (without_target.returncode, "requires --output" in without_target.stderr) == (2, True)
-    environment = {**os.environ, "PATH": str(tmp_path)}
-    missing = cosim(
-        "build",
-        tmp_path / "M.mo",
-        "--output",
-        tmp_path / "m.fmu",
-        "--modelica-compiler",
-        "omc",
-        env=environment,
-    )
-    assert (missing.returncode, "OpenModelica is not installed" in missing.stderr) == (2, True)
-
-
 def test_the_schema_describes_scenarios():
     printed = json.loads(cosim("schema").stdout)
     assert printed["else"] == {"$ref": "#/$defs/Scenario"}

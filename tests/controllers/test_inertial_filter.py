@@ -16,7 +16,7 @@ from scipy.stats import chi2
 
 import cosim
 from cosim.core import resources
-from plant_src.sensors.device_data import IMU_DEVICES
+from plant_src.sensors.imu import IMU_DEVICES
 
 HEADERS = resources.root() / "controllers/modelica/Estimation/Resources/Include"
 COMPILER = shutil.which("cc") or shutil.which("gcc") or "cc"

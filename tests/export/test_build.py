@@ -13,7 +13,7 @@ from fmpy import simulate_fmu
 from fmpy.validation import validate_fmu
 
 from cosim.core.errors import InputError
-from cosim.export import behaviour
+from cosim.export import build_check
 from cosim.export.build import build, build_to, cached_fmu, read_manifest
 from cosim.export.build_check import check_fmus
 from cosim.export.sources import classify_source, find_sources, snake_case, tool_version
@@ -115,7 +115,7 @@ def root(built_once, tmp_path):
 def forked(monkeypatch):
     """Simulate FMUs in forked processes, which start faster than new ones."""
     context = multiprocessing.get_context("fork")
-    monkeypatch.setattr(behaviour.multiprocessing, "get_context", lambda _kind: context)
+    monkeypatch.setattr(build_check.multiprocessing, "get_context", lambda _kind: context)
 
 
 def messages(root):

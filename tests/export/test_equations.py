@@ -16,6 +16,12 @@ import pytest
 from cosim.core import resources
 from cosim.core.component import Variable
 from cosim.core.units import parse_unit
+from cosim.export.equations.exported_interface import (
+    ExportedFunction,
+    describe_variables,
+    interface_hash,
+    read_functions,
+)
 from cosim.export.equations.fmu_code import as_block
 from cosim.export.equations.model import ContinuousModel, static_model
 from cosim.export.fmu.block import Block
@@ -302,3 +308,51 @@ def test_structural_zeros_of_a_result_are_written(tmp_path: Path) -> None:
 def test_an_operation_without_counterpart_in_c_is_refused() -> None:
     with pytest.raises(ValueError, match=r"probe: the CasADi operation .* has no counterpart in C"):
         as_block(oscillator(), [ca.Function("probe", [a], [ca.erf(a)])])
+
+
+def exported_text(compiled: Compiled, name: str) -> str:
+    return ctypes.string_at(
+        ctypes.addressof(ctypes.c_char.in_dll(compiled.library, f"equations_{name}"))
+    ).decode()
+
+
+def test_the_binary_describes_its_variables_and_arrays(tmp_path: Path) -> None:
+    matrix = ca.SX.sym("m", 2, 2)
+    probe = ca.Function("probe", [a, matrix], [matrix @ ca.vertcat(a, 1)], ["gain", "m"], ["y"])
+    model = oscillator()
+    compiled = Compiled(as_block(model, [probe]), tmp_path)
+    assert exported_text(compiled, "variables").splitlines() == [
+        "state x",
+        "state v",
+        "parameter stiffness (Float64, no unit)",
+        "parameter initial.x (Float64, m)",
+        "input force[2] (Float64, N)",
+        "output x (Float64, m)",
+        "output left (Boolean, no unit)",
+        "output energy (Float64, J)",
+    ]
+    declared = describe_variables(model.variables, model.states)
+    assert exported_text(compiled, "hash") == interface_hash(declared)
+    functions = read_functions(exported_text(compiled, "functions"))
+    assert functions == {"probe": ExportedFunction({"gain": 1, "m": 4}, {"y": 2})}
+
+
+def test_the_sizes_in_the_binary_are_those_of_the_equations(tmp_path: Path) -> None:
+    for count in (3, 4):
+        vector = ca.SX.sym("v", count)
+        probe = ca.Function("probe", [vector], [2 * vector], ["v"], ["doubled"])
+        (folder := tmp_path / str(count)).mkdir()
+        compiled = Compiled(as_block(oscillator(), [probe]), folder)
+        functions = read_functions(exported_text(compiled, "functions"))
+        assert functions["probe"].sizes == {"v": count, "doubled": count}
+
+
+def test_a_name_for_arrays_of_two_sizes_is_refused() -> None:
+    functions = [
+        ca.Function(f"probe{size}", [ca.SX.sym("v", size)], [ca.SX(1)], ["v"], ["y"])
+        for size in (2, 3)
+    ]
+    with pytest.raises(
+        ValueError, match=r'probe3: the array "v" has 3 elements, and 2 in another function'
+    ):
+        as_block(oscillator(), functions)

@@ -16,7 +16,7 @@ import pytest
 from cosim.core.errors import InputError, OutputError
 from cosim.export.build import cached_fmu
 from cosim.export.cache import _is_intact
-from cosim.export.fmu.archive import write_archive
+from cosim.export.fmu.package import write_archive
 
 MODELICA = """
 block Doubler

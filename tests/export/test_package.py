@@ -10,9 +10,8 @@ import pytest
 from fmpy import read_model_description, simulate_fmu
 
 from cosim.core.errors import InputError
-from cosim.export.fmu.archive import write_archive
 from cosim.export.fmu.compiler import find_compiler
-from cosim.export.fmu.package import write_fmu
+from cosim.export.fmu.package import write_archive, write_fmu
 
 
 def test_the_same_block_gives_the_same_bytes(block, version, fmu, tmp_path):

@@ -3,7 +3,7 @@
 import json
 
 import cosim
-from cosim.components.fmi import file, file_cache, instance
+from cosim.components.fmi import file, instance
 
 
 def ring(folder, probe, size):
@@ -26,7 +26,7 @@ def ring(folder, probe, size):
 
 
 def test_one_file_is_extracted_and_loaded_once(tmp_path, probe, monkeypatch):
-    file_cache.remove_idle_folders()
+    file.remove_idle_folders()
     extracted, loaded = [], []
     extract, load_library = file.extract, instance.load_library
     monkeypatch.setattr(file, "extract", lambda *args: extracted.append(args) or extract(*args))

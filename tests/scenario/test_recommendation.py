@@ -6,7 +6,7 @@ from fakes import gain
 from systems import make_system
 
 from cosim.core.system import Group, Iteration
-from cosim.scenario.recommendation import recommend
+from cosim.scenario.stages import recommend
 
 LOOP = "a.y > b.u, b.y > a.u"
 

@@ -24,22 +24,22 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any
 
+from matplotlib.figure import Figure
 from quick_compiler import compile_without_optimization
 
 from cosim.cli import main
-from cosim.components.fmi import file_cache
+from cosim.components.fmi import file
 from cosim.components.python_import import load_object
 from cosim.core import resources
 from cosim.engine import ExecutorKind, executor_class, plan_run
-from cosim.report.figures import draw_nothing
+from cosim.report.figures import figure_style, figure_to_svg
 
 PRELOADED = (
     "api.single_fmu",
-    "components.conformance",
+    "components.python_class",
     "components.fmi",
     "components.input_table",
     "components.python_fmu",
-    "report.drawing_process",
     "report.figures",
     "report.finished_run",
     "report.junit",
@@ -51,15 +51,14 @@ PRELOADED = (
         f"cli.commands.{name}"
         for name in ("bench_controller", "check", "regress", "run", "simulate", "sweep")
     ),
-    "cli.bench_table",
+    "cli.bench_output",
     "cli.messages",
-    "components.fmi.isolated.isolated_fmu",
+    "components.fmi.isolated",
     "process.sandbox.bubblewrap",
-    "process.supervised_child",
+    "process.supervisor",
     "process.supervisor",
     "scenario.plausibility",
-    "studies.controller_bench.page",
-    "studies.controller_bench.step_cost",
+    "studies.controller_bench.trials",
 )
 #: modules that the commands import late, and some that those import by name
 OTHERS = (
@@ -229,7 +228,7 @@ def run_observed(arguments: list[str]) -> None:
     try:
         main(arguments)
     finally:
-        file_cache.remove_idle_folders()
+        file.remove_idle_folders()
         after = process_state()
         report.write_text(
             "\n".join(
@@ -250,7 +249,10 @@ if __name__ == "__main__":
         import_module(module)
     for reference in SHIPPED:
         load_object(reference, resources.root() / "plant_src")
-    draw_nothing()
+    with figure_style():  # fills caches of matplotlib
+        figure = Figure()
+        figure.subplots().set_title("0")
+    figure_to_svg(figure)
     gc.freeze()
     request = serve_requests()
     if request:

@@ -12,7 +12,7 @@ from multiprocessing.reduction import DupFd
 from types import SimpleNamespace
 from typing import Any
 
-from cosim.api.run_modules import RUN_MODULES
+from cosim.api.execution import RUN_MODULES
 from cosim.studies.execution import fork_server
 
 _CONTEXT = multiprocessing.get_context("forkserver")

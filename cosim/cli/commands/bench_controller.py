@@ -5,28 +5,30 @@ from __future__ import annotations
 import json
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
 from pathlib import Path
-from shutil import rmtree
 from typing import TYPE_CHECKING, Any
 
 import click
 
-from ...core.errors import ComponentError, InputError, Problem
+from ...core.errors import ComponentError, InputError
 from ...core.processors import available_processors
+from ...studies.regression import EXIT_CODE_SEVERITY
 from ...studies.regression_runs import check_unique_names, default_folder, find_scenario_files
 from .. import supervision
-from ..bench_notes import BenchProgress, print_omissions, print_trial
-from ..bench_table import print_ranking, print_side_by_side
-from ..bench_trial import ControllerTrial, ControllerTrials, run_trials
-from ..completion import complete_role, complete_scenario
+from ..bench_output import (
+    BenchProgress,
+    print_omissions,
+    print_ranking,
+    print_side_by_side,
+    print_trial,
+)
 from ..forked_commands import forked_commands
 from ..messages import print_json
-from ..output_options import json_option
-from .regress import EXIT_CODE_SEVERITY
+from ..options import complete_role, complete_scenario, json_option
 
 if TYPE_CHECKING:
-    from ...studies.regression import CommandRunner
+    from ...studies.controller_bench.trials import ControllerTrials, TrialResult
 
 #: file in which the child process that examines the candidate returns its results
 _PREPARED_FILE = "bench.json"
@@ -223,160 +225,64 @@ class _Bench:
 
     def _run_trials(self, source: str, settings: Mapping[str, Any]) -> ControllerTrials:
         from ...studies.controller_bench.candidate import parse_source
-        from ...studies.controller_bench.ranking import rank
+        from ...studies.controller_bench.trials import run_trials, write_scenarios
 
         name = parse_source(source).name
         folder = self.output_dir / Path(self.role).stem / name
+        file = folder / _PREPARED_FILE
         prepared = _in_child(
-            lambda: _write_scenarios(source, self.role, self.files, folder, settings),
-            folder / _PREPARED_FILE,
+            lambda: write_scenarios(source, self.role, self.files, folder, settings, file), file
         )
-        results = []
+
+        def show(result: TrialResult) -> None:
+            if not self.as_json:
+                print_trial(result, name)
+
+        shipped = self.output_dir / "shipped"
         with forked_commands(self.jobs) as run_command:
-            trials = _make_trials(
-                prepared["scenarios"], folder, self.output_dir / "shipped", run_command
-            )
-            for result in run_trials(trials, self.jobs):
-                results.append(result)
-                if not self.as_json:
-                    print_trial(result, name)
-        ranking = rank(
-            [result.kpis for result in results if result.is_applicable], prepared["goals"]
-        )
-        return ControllerTrials(source, name, prepared, results, ranking)
+            return run_trials(source, prepared, folder, shipped, run_command, self.jobs, show)
 
     def _measure_costs(self, everything: Sequence[ControllerTrials]) -> tuple[str, list[float]]:
-        """Return the name of the reference, its processor time per step (s) and that of each controller, in a child process.
+        """Measure the processor time per step (s) of the controllers in a child process.
 
-        The cost of a controller that does not run to its end in any scenario is NaN, and so are all if the process crashes.
+        The cost of a controller that does not run to its end in any scenario is NaN, and so are all
+        if the process crashes.
+
+        Returns:
+            Name of the reference, its cost, and the cost of each controller.
         """
+        from ...studies.controller_bench.trials import write_costs
+
         file = self.output_dir / Path(self.role).stem / _COSTS_FILE
-        measured = {
-            i: (trials.source, scenario)
-            for i, trials in enumerate(everything)
-            if (scenario := trials.first_finished())
-        }
+        measured: dict[str, tuple[str, Mapping[str, str]]] = {}
+        for trials in everything:
+            scenario = trials.first_finished()
+            if scenario:
+                measured[trials.name] = (trials.source, scenario)
         found: Mapping[str, Any] = {"reference": "", "costs": [None] * (1 + len(measured))}
         try:
             if measured:
-                found = _in_child(lambda: _write_costs(self.role, [*measured.values()], file), file)
+                found = _in_child(lambda: write_costs(self.role, [*measured.values()], file), file)
         except _RefusedError:  # the child process has printed why
             pass
         except ComponentError as error:
             click.echo(f"WARNING no cost is measured: {error}", err=True)
-        reference_cost, *costs = (
-            math.nan if cost is None else float(cost) for cost in found["costs"]
-        )
-        cost_of = dict(zip(measured, costs, strict=True))
-        return found["reference"], [
-            reference_cost,
-            *(cost_of.get(i, math.nan) for i in range(len(everything))),
-        ]
+        costs = [math.nan if cost is None else float(cost) for cost in found["costs"]]
+        cost_of = dict(zip(measured, costs[1:], strict=True))
+        names = [trials.name for trials in everything]
+        return found["reference"], [costs[0], *(cost_of.get(name, math.nan) for name in names)]
 
 
-def _in_child(work: Callable[[], int], file: Path) -> Any:
+def _in_child(work: Callable[[], None], file: Path) -> Any:
     """Do work that executes foreign code in a child process.
 
     Return the content of the JSON file that it writes.
     """
-    if code := supervision.run_supervised_command(work, "run", lambda _outcome: None):
+
+    def run() -> int:
+        work()
+        return 0
+
+    if code := supervision.run_supervised_command(run, "run", lambda _outcome: None):
         raise _RefusedError(code)
     return json.loads(file.read_text(encoding="utf-8"))
-
-
-def _write_costs(
-    role_name: str, measured: Sequence[tuple[str, Mapping[str, str]]], file: Path
-) -> int:
-    from ...results.files import write_json
-    from ...studies.controller_bench.role import read_role
-    from ...studies.controller_bench.step_cost import MeasuredController, measure_step_costs
-
-    reference = str(read_role(role_name).cost_reference or measured[0][0])
-    controllers = [
-        MeasuredController(source, Path(each["file"]), each["component"])
-        for source, each in measured
-    ]
-    write_json(
-        {"reference": Path(reference).stem, "costs": measure_step_costs(controllers, reference)},
-        file,
-    )
-    return 0
-
-
-def _write_scenarios(
-    controller: str,
-    role_name: str,
-    files: Sequence[Path],
-    folder: Path,
-    settings: Mapping[str, Any],
-) -> int:
-    """Examine the candidate and write the scenarios that use it.
-
-    Runs in a child process, since it executes foreign code.
-    """
-    from ...results.files import write_json
-    from ...studies.controller_bench.candidate import (
-        interface_problems,
-        parse_source,
-        read_interface,
-    )
-    from ...studies.controller_bench.kpi_descriptions import describe_kpis
-    from ...studies.controller_bench.role import read_role
-    from ...studies.controller_bench.substitution import ControllerSubstitution
-
-    role, candidate = read_role(role_name), parse_source(controller)
-    variables = read_interface(candidate)
-    if problems := interface_problems(role, variables, settings):
-        raise InputError([Problem(problem.message, controller) for problem in problems])
-    rmtree(folder / "scenarios", ignore_errors=True)
-    written, omissions = [], []
-    for file in files:
-        substitution = ControllerSubstitution(role, candidate, variables, file, settings)
-        if path := substitution.write((folder / "scenarios").absolute()):
-            places, own_names = zip(*substitution.replaced_components.items(), strict=True)
-            own_name = ", ".join(dict.fromkeys(own_names))
-            ignored = list(
-                dict.fromkeys(each.lacking for each in substitution.omissions if not each.entry)
-            )
-            meanings = describe_kpis(
-                json.loads(path.read_text(encoding="utf-8"))["kpis"], path.parent
-            )
-            about = {
-                "own_name": own_name,
-                "ignored_settings": ignored,
-                "kpi_descriptions": meanings,
-            }
-            about["applied_settings"] = substitution.applied_settings
-            written.append({"file": path, "original": file, "component": places[0], **about})
-            omissions += [
-                {"scenario": file.stem, **asdict(each)}
-                for each in dict.fromkeys(substitution.omissions)
-            ]
-    if not written:
-        raise InputError(
-            f'no scenario has a component with the role "{role.name}": {role.description}'
-        )
-    write_json(
-        {"scenarios": written, "omissions": omissions, "goals": role.goals}, folder / _PREPARED_FILE
-    )
-    return 0
-
-
-def _make_trials(
-    written: Sequence[Mapping[str, Any]], folder: Path, shipped: Path, run_command: CommandRunner
-) -> list[ControllerTrial]:
-    """Return the trials of the written scenarios."""
-    return [
-        ControllerTrial(
-            file := Path(each["file"]),
-            Path(each["original"]),
-            each["own_name"],
-            each["ignored_settings"],
-            each["applied_settings"],
-            each["kpi_descriptions"],
-            folder / file.stem,
-            shipped / file.stem,
-            run_command,
-        )
-        for each in written
-    ]

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ...core.errors import CheckError, InputError, Problem, nearest_file
-from ..vehicle_files import read_vehicle_file
+from .new_vehicle import read_vehicle_file
 
 if TYPE_CHECKING:
     from ...export.build import BuildResult
@@ -31,12 +31,6 @@ if TYPE_CHECKING:
     type=click.Choice(["2", "3"]),
     default="2",
     help="FMI version of --output; default: 2.",
-)
-@click.option(
-    "--modelica-compiler",
-    type=click.Choice(["cosim", "omc"]),
-    default="cosim",
-    help="Compiler of Modelica for --output: that of cosim, or OpenModelica.",
 )
 @click.option(
     "--include",
@@ -70,7 +64,6 @@ def command(
     check: bool,
     output: Path | None,
     fmi_version: str,
-    modelica_compiler: str,
     include: tuple[Path, ...],
     library: tuple[Path, ...],
     values: tuple[str, ...],
@@ -82,10 +75,7 @@ def command(
     to fmus/manifest.json. --output exports a single source of your own. Of a Modelica file it
     exports the model with the name of the file, of a Python file the only PythonFMU class.
     file.mo:Package.Model or file.py:Class exports another one, without --output to a file with its
-    name in the working directory (model.fmu). With --output, --fmi selects the FMI version, and
-    --modelica-compiler omc exports models that need the Modelica Standard Library or features that
-    cosim's own compiler lacks; OpenModelica must be installed (this was written from its
-    documentation and not tried with it).
+    name in the working directory (model.fmu). With --output, --fmi selects the FMI version.
 
     Modelica models, equations and controllers in C require a C compiler, and Modelica models and
     equations the extra "build". --check is for changes of cosim itself: it compares the hashes of
@@ -120,16 +110,14 @@ def command(
 
             read_vehicle_file(source, examine_vehicle)
     if output is not None:
-        _build_one(named, output, int(fmi_version), modelica_compiler, include, library, values)
+        _build_one(named, output, int(fmi_version), include, library, values)
     else:
-        _refuse_options_of_one_source(fmi_version, modelica_compiler, include, values)
+        _refuse_options_of_one_source(fmi_version, include, values)
         build(files or None, root, _print_built)
     return 0
 
 
-def _refuse_options_of_one_source(
-    fmi: str, modelica_compiler: str, include: Sequence[Path], values: Sequence[str]
-) -> None:
+def _refuse_options_of_one_source(fmi: str, include: Sequence[Path], values: Sequence[str]) -> None:
     """Raise InputError for an option that is valid with --output only."""
     if fmi != "2":
         raise InputError("--fmi requires --output: fmus/ contains FMUs of both FMI versions")
@@ -142,24 +130,17 @@ def _refuse_options_of_one_source(
             "--include requires --output: the FMUs in fmus/ contain the files that their sources "
             "import"
         )
-    if modelica_compiler != "cosim":
-        raise InputError(
-            "--modelica-compiler omc requires --output: the FMUs in fmus/ are built by the "
-            "compiler of cosim"
-        )
 
 
 def _build_one(
     sources: Sequence[tuple[Path, str | None]],
     output: Path,
     fmi_version: int,
-    modelica_compiler: str,
     include: tuple[Path, ...],
     library: tuple[Path, ...],
     values: tuple[str, ...],
 ) -> None:
     from ...export.build import build_to
-    from ...export.modelica.frontend.openmodelica import export_with_omc
     from ...scenario.settings import parse_settings
 
     if len(sources) != 1:
@@ -171,20 +152,15 @@ def _build_one(
     source, member = sources[0]
     if not source.exists():
         raise InputError(Problem(f"does not exist{nearest_file(source)}", str(source)))
-    if modelica_compiler == "omc":
-        if fmi_version != 2:
-            raise InputError("--modelica-compiler omc exports FMI 2.0 only")
-        export_with_omc(source, output, member)
-    else:
-        build_to(
-            source,
-            member,
-            output,
-            fmi_version=fmi_version,
-            include=include,
-            library_path=library,
-            values=parse_settings(values),
-        )
+    build_to(
+        source,
+        member,
+        output,
+        fmi_version=fmi_version,
+        include=include,
+        library_path=library,
+        values=parse_settings(values),
+    )
     click.echo(f"{source}{f':{member}' if member else ''} -> {output}")
 
 

@@ -11,9 +11,8 @@ from ...core.errors import InputError, Problem
 from ...core.system import Group, Stage
 from ...core.text import count_noun
 from .. import strict_sandbox, supervision
-from ..completion import complete_scenario
 from ..messages import collect_log, print_json
-from ..output_options import json_option
+from ..options import complete_scenario, json_option
 
 if TYPE_CHECKING:
     from ...core.component import Variable
@@ -92,7 +91,7 @@ def _warnings(prepared: PreparedRun, logged: Sequence[str]) -> list[Problem]:
 
 def _describe(prepared: PreparedRun, warnings: Sequence[Problem]) -> dict[str, Any]:
     """Return the expanded system as JSON."""
-    from ...scenario.recommendation import recommend
+    from ...scenario.stages import recommend
 
     times = prepared.settings
     return {
@@ -138,7 +137,7 @@ def _print_components(prepared: PreparedRun) -> None:
 
 
 def _print_processes(prepared: PreparedRun, isolation: str, sandbox: str | None) -> None:
-    from ...components.fmi.isolated.isolated_fmu import IsolatedFmu
+    from ...components.fmi.isolated import IsolatedFmu
 
     components = prepared.system.components
     isolated = {
@@ -178,7 +177,7 @@ def _print_nested_stages(stages: Sequence[Stage], indent: str) -> None:
 
 
 def _print_recommendation(prepared: PreparedRun) -> None:
-    from ...scenario.recommendation import recommend
+    from ...scenario.stages import recommend
 
     click.echo("\nrecommendation for the order")
     for line in recommend(prepared.system):

@@ -19,7 +19,7 @@ import click
 from ...core.errors import InputError
 from ...core.processors import available_processors
 from ..messages import print_json
-from ..output_options import json_option
+from ..options import json_option
 
 if TYPE_CHECKING:
     from packaging.requirements import Requirement
@@ -170,7 +170,6 @@ def _tool_findings() -> Iterator[Finding]:
     except (InputError, OSError) as error:
         yield Finding("tools", "C compiler", str(error), "missing")
     yield _windows_finding()
-    yield _program_finding("OpenModelica", "omc", "--version")
     yield from _library_findings()
 
 

@@ -12,10 +12,10 @@ import click
 from ...core.errors import CosimError, InputError
 from ...core.processors import available_processors
 from ...core.text import count_noun
+from ...report.tables import print_table
 from .. import current_command_line, study_options
-from ..completion import complete_study
 from ..messages import print_json, warn_overwriting
-from ..output_options import json_option
+from ..options import complete_study, json_option
 
 if TYPE_CHECKING:
     from ...studies.execution.run_store import RunStore
@@ -163,9 +163,9 @@ def _print_summary(sweep: Sweep, summary: SweepSummary) -> None:
         for name, found in numbers
     ]
     if kpis:
-        study_options.print_table(["KPI", "unit", *columns], kpis)
+        print_table(["KPI", "unit", *columns], kpis)
     if sweep.criteria or summary.failed:
-        study_options.print_table(
+        print_table(
             ["runs", "n", "success", "95 % interval"],
             [_success_row(group) for group in _first(summary.groups, "success.csv")],
         )

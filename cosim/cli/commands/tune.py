@@ -10,10 +10,10 @@ import click
 
 from ...core.errors import CosimError, InputError
 from ...core.text import count_noun
+from ...report.tables import print_table
 from .. import study_options
-from ..completion import complete_study
 from ..messages import print_json
-from ..output_options import json_option
+from ..options import complete_study, json_option
 
 if TYPE_CHECKING:
     from ...studies.execution.run_store import RunStore
@@ -129,7 +129,7 @@ def _print_worst(search: WorstCase, files: list[Path]) -> None:
         [f"{each.severity:.3g}", *(f"{each.parameters[name]:.6g}" for name in names)]
         for each in shown
     ]
-    study_options.print_table(["severity", *names], rows)
+    print_table(["severity", *names], rows)
     for each, file in zip(shown, files, strict=False):
         click.echo(f"{each.reason}\n  cosim run {file}")
     broken = sum(not each.passed for each in search.attempts)
@@ -153,7 +153,7 @@ def _print_best(tuning: Tuning, best: Trial, folder: Path, failure: str | None) 
             *("-" if math.isnan(each.value) else f"{each.value:.6g}" for each in (first, best)),
         ]
     )
-    study_options.print_table(["", "start", "best"], rows)
+    print_table(["", "start", "best"], rows)
     if failure:
         click.echo(failure, err=True)
     settings = {**tuning.spec.settings, **tuning.spec.cases[0], **tuning.settings(best.parameters)}

@@ -10,9 +10,8 @@ from .fmi1 import Fmi1Instance
 from .fmi2 import Fmi2Instance
 from .fmi3_slave import Fmi3Slave
 from .instance import FmuInstance
-from .instance_settings import InstanceSettings, Method, SolverSettings
-from .isolated import Isolation
 from .preflight import Interface
+from .settings import InstanceSettings, Isolation, Method, SolverSettings
 
 __all__ = [
     "DefaultExperiment",
@@ -72,7 +71,7 @@ def create_component(
         classes = (Fmi1Instance, Fmi2Instance, Fmi3Slave)
     instance_class = classes[description.major - 1]
     if isolation:
-        from .isolated.isolated_fmu import IsolatedFmu
+        from .isolated import IsolatedFmu
 
         return IsolatedFmu(instance_class, file, instance_name, settings, isolation)
     return instance_class(file, instance_name, settings)

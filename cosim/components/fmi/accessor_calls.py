@@ -12,7 +12,7 @@ import numpy as np
 
 from ...core.component import NativeGetSet, Ports, PreparedCall, Variable
 from ...core.errors import InputError
-from .c_functions import FunctionTable, as_pointer, as_size, function_address
+from .library import FunctionTable, as_pointer, as_size, function_address
 
 #: ends of the names of the functions for slopes, by direction and by whether the FMI version is
 #: 3.0, which has none for inputs

@@ -8,7 +8,7 @@ from contextlib import suppress
 from pathlib import Path, PurePosixPath
 from zlib import crc32
 
-from ..sibling_imports import read_with_relative_imports
+from ..python_import import read_with_relative_imports
 from .file import FmuFile
 
 #: part of the warning about an FMU with changed sources

@@ -23,9 +23,14 @@ from ...core.unit_table import BASE_UNITS
 from ...core.units import Unit, named_unit
 from .preflight import DEFAULT_LIMITS, Examination, PreflightLimits, raise_errors
 from .preflight.binary import list_platforms
-from .preflight.model_description import Interface, ModelDescription, ModelVariable, UnitDefinition
-from .preflight.rules_values import dimension_size, read_limit
-from .preflight.values import parse_value
+from .preflight.model_description import (
+    Interface,
+    ModelDescription,
+    ModelVariable,
+    UnitDefinition,
+    parse_value,
+)
+from .preflight.rules_variables import dimension_size, read_limit
 
 #: valid causalities and variabilities by name, to convert text to their literal types
 _CAUSALITIES: Mapping[str, Causality] = {name: name for name in get_args(Causality)}

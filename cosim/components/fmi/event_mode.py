@@ -19,7 +19,7 @@ from .accessor_calls import AccessorCallFactory
 from .file import FmuFile
 from .function_calls import OK
 from .instance import FmuInstance
-from .instance_settings import InstanceSettings
+from .settings import InstanceSettings
 
 #: largest number of calls of fmi*NewDiscreteStates or fmi3UpdateDiscreteStates at one event
 MAX_EVENT_ITERATIONS = 1000

@@ -17,9 +17,9 @@ import numpy as np
 from ...core.component import NativeDoStep, PreparedCall, StepResult
 from . import log_callback
 from .accessor_calls import AccessorCallFactory
-from .c_functions import function_address
 from .function_calls import DISCARD, OK
 from .instance import FmuInstance
+from .library import function_address
 from .preflight.functions import ACCESSORS
 
 #: fmiTrue

@@ -8,9 +8,9 @@ from typing import Any
 
 from ...core.component import NativeDoStep, PreparedCall, StepResult
 from . import log_callback
-from .c_functions import function_address
 from .function_calls import DISCARD
 from .instance import FmuInstance
+from .library import function_address
 from .preflight.functions import ACCESSORS
 
 #: fmi2True

@@ -8,9 +8,9 @@ from typing import Any
 
 from ...core.component import NativeDoStep, NativeFlagCheck, PreparedCall, StepResult
 from ...core.errors import ComponentError
-from .c_functions import as_pointer, function_address
 from .function_calls import DISCARD, OK
 from .instance import FmuInstance
+from .library import as_pointer, function_address
 from .preflight.functions import ACCESSORS
 
 #: largest accepted size of one Binary value (bytes)

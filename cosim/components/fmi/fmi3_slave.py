@@ -15,7 +15,7 @@ from .event_mode import MAX_EVENTS_PER_STEP, EventModeInstance
 from .file import FmuFile
 from .fmi3 import STEP_FLAGS_CHECK, Fmi3Instance
 from .function_calls import OK, WARNING
-from .instance_settings import InstanceSettings
+from .settings import InstanceSettings
 
 #: relative to the step: a lastSuccessfulTime so close to its end has reached it
 _TIME_TOLERANCE = 1e-9

@@ -11,7 +11,7 @@ from ...core.errors import ComponentError
 from ...process import float_mode
 from ...process.journal import calling_component
 from .file import FmuFile
-from .fmpy_library import MissingFunctionError
+from .library import MissingFunctionError
 
 #: names of fmi2Status and fmi3Status by value; "pending" exists in FMI 2.0 only
 STATUS_NAMES = ("OK", "warning", "discard", "error", "fatal", "pending")

@@ -25,13 +25,12 @@ from ...process.journal import calling_component
 from ...process.process_state import restoring_process_state
 from . import log_callback
 from .accessor_calls import AccessorCallFactory
-from .c_functions import as_double, as_pointer
 from .file import FmuFile
-from .fmpy_library import MissingFunctionError, load_library
 from .function_calls import DISCARD, OK, FunctionCaller
-from .instance_settings import InstanceSettings
+from .library import MissingFunctionError, as_double, as_pointer, load_library
 from .preflight.binary import version_deviations
-from .preflight.library import EXPECTED_TEXTS
+from .preflight.platforms import EXPECTED_TEXTS
+from .settings import InstanceSettings
 
 
 class FmuInstance(FunctionCaller, Component):

@@ -13,6 +13,7 @@ import casadi as ca
 from ...core.component import Variable
 from ..fmu.block import Block, BlockVariable
 from .c_code import callee_definitions, function_definition
+from .exported_interface import interface_code
 from .model import ContinuousModel
 
 
@@ -88,7 +89,8 @@ def _source_text(model: ContinuousModel, exported: Sequence[ca.Function]) -> str
     functions = [*callee_definitions([*internal, *exported], model.callees).values()]
     functions += [function_definition("static", function) for function in internal]
     functions += [function_definition("MODEL_EXPORT", function) for function in exported]
-    return "\n".join([_INCLUDES, *functions, _block_interface(model)])
+    interface = interface_code(model.variables, model.states, exported) if exported else ""
+    return "\n".join([_INCLUDES, *functions, _block_interface(model)]) + interface
 
 
 def _casadi_functions(model: ContinuousModel) -> list[ca.Function]:

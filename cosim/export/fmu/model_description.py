@@ -1,12 +1,16 @@
-"""modelDescription.xml (FMI 2.0 and 3.0) and buildDescription.xml (FMI 3.0) of a block."""
+"""modelDescription.xml and buildDescription.xml of an FMU: contents and validation."""
 
 from __future__ import annotations
 
 from collections.abc import Collection, Mapping, Sequence
+from io import BytesIO
+from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
+from zipfile import ZipFile
 
 from ...core import units
+from ...core.errors import InputError, Problem
 from ...core.unit_table import BASE_UNITS
 from .block import Block, BlockVariable
 from .interface import TableRow, start_values, variable_table
@@ -333,3 +337,39 @@ def _format_value(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     return repr(value) if isinstance(value, float) else str(value)
+
+
+DESCRIPTION_FILE = "modelDescription.xml"
+
+
+def validate_description(description: bytes, source: Path) -> None:
+    """Validate a modelDescription.xml with FMPy.
+
+    FMPy's XML parser is not protected against entity expansion. Therefore the preflight parser,
+    which rejects such documents, reads the description first.
+
+    Args:
+        description: The contents of the file.
+        source: The source file that is named in the errors.
+
+    Raises:
+        InputError: The description is invalid (one problem for each error).
+    """
+    from fmpy import read_model_description
+    from fmpy.model_description import ValidationError
+
+    from ...components.fmi.preflight import DEFAULT_LIMITS
+    from ...components.fmi.preflight.findings import FatalFindingError, raise_errors
+    from ...components.fmi.preflight.xml import parse_xml
+
+    try:
+        parse_xml(description, DESCRIPTION_FILE, DEFAULT_LIMITS)
+    except FatalFindingError as error:
+        raise_errors(source, [error.finding])
+    archive = BytesIO()
+    with ZipFile(archive, "w") as file:
+        file.writestr(DESCRIPTION_FILE, description)
+    try:
+        read_model_description(archive, validate_variable_names=True, validate_model_structure=True)
+    except ValidationError as error:
+        raise InputError([Problem(problem, str(source)) for problem in error.problems]) from None

@@ -9,9 +9,8 @@ from pathlib import Path
 from xml.etree import ElementTree
 
 from ...core.errors import InputError, Problem, did_you_mean
-from ..fmu.archive import write_archive
-from ..fmu.package import compile_binary, fmi_headers
-from ..fmu.validation import DESCRIPTION_FILE, validate_description
+from ..fmu.model_description import DESCRIPTION_FILE, validate_description
+from ..fmu.package import compile_binary, fmi_headers, write_archive
 
 
 def write_c_fmu(description: Path, target: Path) -> list[Path]:

@@ -23,12 +23,16 @@ from typing import Any
 from xml.etree import ElementTree
 from zipfile import ZipFile
 
-from ...components.python_units import checked_units
-from ...components.sibling_imports import read_with_relative_imports, with_imported_siblings
+from ...components.python_import import read_with_relative_imports, with_imported_siblings
 from ...core.errors import InputError, Problem
-from ..fmu.archive import content_token, write_archive
-from ..fmu.model_description import Element, add_units, to_bytes
-from ..fmu.validation import DESCRIPTION_FILE, validate_description
+from ..fmu.model_description import (
+    DESCRIPTION_FILE,
+    Element,
+    add_units,
+    to_bytes,
+    validate_description,
+)
+from ..fmu.package import content_token, write_archive
 
 _PROGRAM = Path(__file__).with_name("pythonfmu_program.py")
 #: files of cosim that the FMU contains beside the source
@@ -188,6 +192,8 @@ def _build_with_pythonfmu(
 
 def _set_units(root: Element, units: Any, source: Path) -> None:
     """Set the unit of each variable that the class attribute `units` names."""
+    from ...components.python_fmu import checked_units
+
     elements = {variable.get("name", ""): variable[0] for variable in root.iter("ScalarVariable")}
     try:
         checked = checked_units(

@@ -21,12 +21,12 @@ from ...components.fmi import FmuFile, Interface
 from ...components.fmi.preflight import open_regular_file
 from ...components.fmi.preflight.archive import Archive
 from ...components.fmi.preflight.findings import DESCRIPTION_FILE, FatalFindingError
-from ...components.fmi.preflight.fmu_platform import current_platform
+from ...components.fmi.preflight.platforms import current_platform
 from ...components.fmi.preflight.xml import parse_xml
 from ...core.errors import InputError, did_you_mean
 from ..cache import cached_file
-from ..fmu.archive import write_archive
 from ..fmu.compiler import compiler_version, find_compiler
+from ..fmu.package import write_archive
 from .windows_fmus import find_wine, has_windows_binary, windows_fmu
 
 _SOURCES, _BUILD_DESCRIPTION = "sources/", "sources/buildDescription.xml"

@@ -19,13 +19,13 @@ from ...components.fmi import FmuFile
 from ...components.fmi.preflight import open_regular_file, raise_errors
 from ...components.fmi.preflight.archive import Archive
 from ...components.fmi.preflight.binary import WINDOWS, check_binary
-from ...components.fmi.preflight.fmu_platform import current_platform
+from ...components.fmi.preflight.platforms import current_platform
 from ...core.errors import InputError
 from ...core.resources import cache_directory
 from ...process.output_lock import LOCK_FILE, waiting_for_lock
 from ..cache import cached_file
-from ..fmu.archive import write_archive
 from ..fmu.compiler import compiler_version, find_compiler, ziglang_command
+from ..fmu.package import write_archive
 
 _SOURCES = Path(__file__).parent / "wine"
 #: the second one is Debian's, whose program `wine` is a script that prints advice

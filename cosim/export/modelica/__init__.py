@@ -89,7 +89,7 @@ Equations in any form:
 - Structural parameters (those that select equations or sizes) are constants of the FMU.
 """
 
-from .assemble import load_block, load_interpreter
+from .assemble import load_block
 from .frontend.rumoca_frontend import ModelicaOptions
 
-__all__ = ["ModelicaOptions", "load_block", "load_interpreter"]
+__all__ = ["ModelicaOptions", "load_block"]

@@ -1,51 +1,38 @@
-"""Compilation of a Modelica file to a block, and the FMI attributes of its variables."""
+"""Compilation of a Modelica file to a block."""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from math import prod
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-
-from ...core.errors import InputError, Problem
+from ...core.errors import InputError, Problem, abbreviate_names
 from ..fmu.block import Block, BlockVariable, Exchange
-from .c_code.emit import generate_c
+from .c_code import generate_c
 from .c_code.exchange_code import has_exchange, indicator_count
-from .c_code.header import struct_members
+from .causality.analysed_model import AnalysedModel
 from .causality.clock_inference import clock_parameters
 from .causality.clocked_partitions import resolve_clocks
-from .causality.continuous_states import introduce_derivatives
-from .causality.dependent_states import reduce_states
+from .causality.continuous_states import introduce_derivatives, reduce_states
+from .causality.equation_systems import SingularError
 from .causality.hybrid import prepare_hybrid
-from .causality.hybrid_interpreter import HybridInterpreter
-from .causality.interpreter import Interpreter
-from .causality.matching import is_input
-from .external.library import callable_functions
-from .external.sources import external_archives
-from .frontend.constants import fold_constants
+from .external.c_files import external_archives
+from .external.shared_library import callable_functions
+from .fmi_variables import FMI_TYPES, block_variables
+from .frontend.constants import fold_constants, fold_strings, string_parameters
 from .frontend.folded_branches import folded_parameters
+from .frontend.model_files import ModelicaSources
 from .frontend.reader import ModelReader
 from .frontend.rumoca_frontend import DEFAULT_OPTIONS, ModelicaOptions, flatten_model
-from .frontend.sources import ModelicaSources
-from .frontend.strings import fold_strings, string_parameters
-from .imbalance import explain_imbalance
 from .model.arithmetic import EvaluationError
-from .model.flat_model import Model, Variable, derivative_name
+from .model.flat_model import Model, derivative_name
 from .model.syntax_tree import raise_model_error
 from .model.traversal import variable_names
-from .units import FmiRole, check_units
 
-_FMI_TYPES = {
-    "Real": "Float64",
-    "Integer": "Int32",
-    "Boolean": "Boolean",
-    "Enumeration": "Enumeration",
-}
 _DEFAULT_STEP_SIZE = 0.01
 
 #: largest number of values of all variables; an array has one per element
@@ -67,27 +54,26 @@ def load_block(
             and line.
     """
     with _refusing_deep_nesting(path):
-        return _load_block(path, model, options)
+        return _block(*analyse_file(path, model, options))
 
 
-def _load_block(path: Path, model: str | None, options: ModelicaOptions) -> Block:
-    defaults, sources = _flatten(path, model, options)
+def _block(analysed: AnalysedModel, sources: ModelicaSources) -> Block:
     folder = _source_root(sources.used)
     names = {str(file.relative_to(folder)): file for file in sources.used}
     return Block(
-        identifier=re.sub(r"\W", "_", defaults.model.name.rpartition(".")[2]),
-        description=defaults.model.description,
-        variables=_block_variables(defaults),
+        identifier=re.sub(r"\W", "_", analysed.model.name.rpartition(".")[2]),
+        description=analysed.model.description,
+        variables=block_variables(analysed),
         step_size=min(
-            (float(defaults.evaluate(clock.period)) for clock in defaults.schedule.clocks),
+            (float(analysed.evaluate(clock.period)) for clock in analysed.schedule.clocks),
             default=_DEFAULT_STEP_SIZE,
         ),
-        files=generate_c(defaults, sorted(names), sources.packages),
+        files=generate_c(analysed, sorted(names), sources.packages),
         resources=names,
         archives=external_archives(
-            (f for f in defaults.model.functions.values() if f.external), sources.packages
+            (f for f in analysed.model.functions.values() if f.external), sources.packages
         ),
-        exchange=_exchange(defaults.model) if has_exchange(defaults.model) else None,
+        exchange=_exchange(analysed.model) if has_exchange(analysed.model) else None,
     )
 
 
@@ -109,10 +95,10 @@ def _exchange(model: Model) -> Exchange:
     )
 
 
-def load_interpreter(
+def analyse_file(
     path: Path, model: str | None = None, options: ModelicaOptions = DEFAULT_OPTIONS
-) -> Interpreter:
-    """Create an interpreter of a Modelica model with default parameters.
+) -> tuple[AnalysedModel, ModelicaSources]:
+    """Return a model of a Modelica file after causality analysis, and its sources.
 
     Args:
         path: The Modelica file.
@@ -123,7 +109,7 @@ def load_interpreter(
         InputError: The model has errors or uses unsupported features.
     """
     with _refusing_deep_nesting(path):
-        return _flatten(path, model, options)[0]
+        return _flatten(path, model, options)
 
 
 @contextmanager
@@ -141,7 +127,7 @@ def _refusing_deep_nesting(path: Path) -> Iterator[None]:
 
 def _flatten(
     path: Path, model: str | None, options: ModelicaOptions
-) -> tuple[Interpreter, ModelicaSources]:
+) -> tuple[AnalysedModel, ModelicaSources]:
     try:
         json, sources = flatten_model(Path(path), model, options)
     except InputError as error:
@@ -153,8 +139,8 @@ def _flatten(
     return analyse(json, sources, model or Path(path).stem), sources
 
 
-def analyse(json: Mapping[str, Any], sources: ModelicaSources, name: str) -> Interpreter:
-    """Convert the document of the front end to an interpreter of the model."""
+def analyse(json: Mapping[str, Any], sources: ModelicaSources, name: str) -> AnalysedModel:
+    """Convert the document of the front end to an analysed model."""
     flat = ModelReader(json, sources).read_model(name)
     structural = (
         flat.structural
@@ -174,7 +160,7 @@ def analyse(json: Mapping[str, Any], sources: ModelicaSources, name: str) -> Int
     )
     _check_types(flat)
     try:
-        return HybridInterpreter(flat) if flat.hybrid else Interpreter(flat)
+        return AnalysedModel(flat)
     except EvaluationError as error:
         where = str(sources.files[0]) if sources.files else ""
         raise InputError(
@@ -215,7 +201,7 @@ def _check_types(model: Model) -> None:
             and not variable.shape
         ):
             continue
-        if variable.type not in _FMI_TYPES:
+        if variable.type not in FMI_TYPES:
             raise_model_error(
                 f"{variable.name}: variables of type {variable.type} are not supported",
                 variable.where,
@@ -230,95 +216,57 @@ def _source_root(files: Sequence[Path]) -> Path:
     )
 
 
-def _block_variables(defaults: Interpreter) -> list[BlockVariable]:
-    names = struct_members(defaults.model)
-    roles = [
-        (v, role) for v in defaults.model.variables.values() if (role := _fmi_role(v, defaults))
-    ]
-    dropped = check_units(roles)
-    known = ((replace(v, unit="") if v.unit in dropped else v, role) for v, role in roles)
-    return [_block_variable(v, names[v.name], role, defaults) for v, role in known]
+_BALANCE = re.compile(r"unbalanced model: \d+ equations, \d+ unknowns \(balance = (-?\d+)\)")
+
+#: name of the variables that are added to a model with too many equations
+_ADDED = "cosimAdded"
 
 
-def _fmi_role(variable: Variable, defaults: Interpreter) -> FmiRole | None:
-    """Return causality and variability of a variable in the FMU, or None if the FMU does not contain it.
+def explain_imbalance(error: InputError, analyse: Callable[[str], object]) -> InputError:
+    """Return the error of a model with the names of variables and equations in messages about an unbalanced model.
 
-    The FMU contains the inputs and outputs of the model itself, and all parameters that are neither protected nor set by a
-    modifier. Structural parameters are constants. The FMU of a model with states, event iteration or a library contains all
-    other variables too.
+    Args:
+        error: The error.
+        analyse: Analyses the model with a text of further declarations and equations.
     """
-    roles = defaults.parameter_roles
-    if variable.type == "ExternalObject":
+    return InputError([_explain_problem(problem, analyse) for problem in error.problems])
+
+
+def _explain_problem(problem: Problem, analyse: Callable[[str], object]) -> Problem:
+    found = _BALANCE.search(problem.message)
+    if found is None:
+        return problem
+    balance = int(found[1])
+    try:
+        analyse(
+            f"Real {_ADDED}[{balance}];"
+            if balance > 0
+            else f"equation {'time = time; ' * -balance}"
+        )
+    except SingularError as singular:
+        cause = _undetermined(singular) if balance < 0 else _surplus(singular)
+        return replace(cause, message=f"{problem.message}: {cause.message}") if cause else problem
+    except InputError:
+        pass
+    return problem
+
+
+def _undetermined(singular: SingularError) -> Problem | None:
+    """Return the variables that no equation determines, with the place of the first one."""
+    if not singular.undetermined:
         return None
-    if variable.name in roles.settable:
-        return "parameter", "fixed" if variable.name in roles.clock_parameters else "tunable"
-    if variable.name in defaults.model.structural and not variable.protected:
-        return "local", "constant"
-    if variable.variability == "parameter":
-        return (
-            None
-            if variable.protected or variable.bound_by_modifier
-            else ("calculatedParameter", "tunable")
-        )
-    continuous = variable.type == "Real" and bool(
-        defaults.model.states or not defaults.schedule.clocks
+    names = abbreviate_names(name for name, _ in singular.undetermined)
+    return Problem(f"no equation determines {names}", str(singular.undetermined[0][1] or ""))
+
+
+def _surplus(singular: SingularError) -> Problem | None:
+    """Return the first equation that contradicts others."""
+    if not singular.surplus:
+        return None
+    where, names = singular.surplus[0]
+    others = (
+        f"the others determine {abbreviate_names(names)}"
+        if names
+        else "it contains no unknown variable"
     )
-    if is_input(variable):
-        return "input", "continuous" if variable.type == "Real" else "discrete"
-    if variable.causality == "output" and variable.top_level:
-        return "output", "continuous" if continuous else "discrete"
-    if (
-        (defaults.model.hybrid or defaults.model.uses_library or defaults.model.states)
-        and not variable.name.startswith(("$", "pre("))
-        and 0 not in variable.shape
-    ):
-        return (
-            "local",
-            "continuous" if continuous and variable.variability == "continuous" else "discrete",
-        )
-    return None
-
-
-def _block_variable(
-    variable: Variable, member: str, role: FmiRole, defaults: Interpreter
-) -> BlockVariable:
-    return BlockVariable(
-        name=variable.name,
-        member=member,
-        type=_FMI_TYPES[variable.type],
-        causality=role[0],
-        variability=role[1],
-        start=_to_python(defaults.get(variable.name)),
-        unit=variable.unit,
-        shape=variable.shape,
-        description=variable.description,
-        minimum=None
-        if variable.minimum is None
-        else float(np.min(defaults.evaluate(variable.minimum))),
-        maximum=None
-        if variable.maximum is None
-        else float(np.max(defaults.evaluate(variable.maximum))),
-        enumeration=tuple((literal, "") for literal in _literals(variable, defaults.model)),
-        type_name=variable.enumeration,
-        quantity=variable.quantity,
-    )
-
-
-def _literals(variable: Variable, model: Model) -> tuple[str, ...]:
-    """Return the literals of a variable's enumeration type; the type name may lack the package."""
-    name = variable.enumeration
-    candidates = {
-        literals
-        for key, literals in model.enumerations.items()
-        if name and f".{key}".endswith(f".{name}")
-    }
-    if len(candidates) > 1:
-        raise_model_error(
-            f'{variable.name}: several enumerations are named "{name}"; give them different names',
-            variable.where,
-        )
-    return next(iter(candidates), ())
-
-
-def _to_python(value: Any) -> Any:
-    return tuple(value.ravel().tolist()) if isinstance(value, np.ndarray) else value
+    return Problem(f"this equation is one too many, {others}", str(where or ""))

@@ -112,6 +112,10 @@ class KpiComparison:
     against_last: str
     checks: tuple[CheckOutcome, ...]
 
+    def check_results(self) -> list[dict[str, Any]]:
+        """Return the checks as JSON, each with its outcome."""
+        return [{**outcome.check, "passed": outcome.passed} for outcome in self.checks]
+
 
 def compare_kpis(
     candidate: RunKpis,

@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from ...results.files import write_json
-from ...scenario.extending_file import extending_scenario
+from ...scenario.nested_systems import extending_scenario
 from ..execution.bundle import cosim_fingerprint
 from ..worst_case import WorstCase
 from .table import write_csv_rows

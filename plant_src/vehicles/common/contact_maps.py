@@ -22,7 +22,7 @@ A pose in Bullet is (position, quaternion x y z w), a twist (velocity, angular v
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import casadi as ca
@@ -33,6 +33,32 @@ from . import kinematics
 from .interface import ENVIRONMENT_INPUTS
 from .rigid_body import RigidBody
 from .step_status import INVALID_STATE, LEAVES_SAFE_BOX, MAX_STATE_NORM, MAY_FAIL
+
+#: names of the arguments and results that every `contact_predict` has, see `predict_symbols`
+PREDICT_ARGUMENTS = (
+    "state",
+    "inputs",
+    "environment_inputs",
+    "constants",
+    "step_size",
+    "reference_position",
+    "safe_distance",
+)
+PREDICT_RESULTS = ("start_state", "predicted_state", "commanded_twist", "bullet_twist")
+#: names of the results that every `contact_initialize` has
+INITIALIZE_RESULTS = ("constants", *PREDICT_RESULTS[1:], "bullet_pose")
+#: names of the arguments and results that every `contact_correct` has, see `correct_symbols`
+CORRECT_ARGUMENTS = (*PREDICT_RESULTS, "constants", "step_size")
+CORRECT_RESULTS = ("state", "impulse_magnitude", "motion")
+#: names of the results of `contact_predict` of a free body, and of one with a contact impulse
+FREE_RESULTS = (
+    *PREDICT_RESULTS,
+    "compensating_torque",
+    "bullet_pose",
+    "endpoints",
+    "step_status",
+)
+IMPULSE_RESULTS = (*FREE_RESULTS[:-2], "previous_contact_impulse", *FREE_RESULTS[-2:])
 
 #: longest step of the world (s)
 MAX_WORLD_STEP = 0.01
@@ -94,7 +120,13 @@ class FreeContactMaps:
         )
         status = step_status(end, endpoints, arguments, may_fail)
         results = [state, end, twist, twist, torque, principal_pose(state, axes), endpoints, status]
-        return ca.Function("contact_predict", [*arguments, axes], results)
+        return ca.Function(
+            "contact_predict",
+            [*arguments, axes],
+            results,
+            [*PREDICT_ARGUMENTS, "principal_axes"],
+            FREE_RESULTS,
+        )
 
     def _may_be_in_water(self, end: ca.SX, environment_inputs: ca.SX, step: ca.SX) -> ca.SX:
         """Return whether the surface can reach the centre of mass in a step.
@@ -130,7 +162,15 @@ class FreeContactMaps:
             others,
         )
         corrected = ca.vertcat(pose, velocity, others)
-        return correct_function(arguments, impulse, predicted, corrected, self.observe, published)
+        return correct_function(
+            arguments,
+            CORRECT_ARGUMENTS,
+            impulse,
+            predicted,
+            corrected,
+            self.observe,
+            published,
+        )
 
 
 def free_initialize_function(model: ContinuousModel) -> ca.Function:
@@ -140,7 +180,8 @@ def free_initialize_function(model: ContinuousModel) -> ca.Function:
     state = model.initial_state(constants)
     twist = ca.vertcat(state[7:10], kinematics.rotation_matrix(state[3:7]) @ state[10:13])
     results = [constants, state, twist, twist, principal_pose(state, axes)]
-    return ca.Function("contact_initialize", [parameters, axes], results)
+    names = ["parameters", "principal_axes"], INITIALIZE_RESULTS
+    return ca.Function("contact_initialize", [parameters, axes], results, *names)
 
 
 def parameters_and_constants(model: ContinuousModel) -> tuple[ca.SX, ca.SX]:
@@ -200,14 +241,15 @@ def predicted_state(
 
 def correct_function(
     arguments: list[ca.SX],
+    names: Sequence[str],
     impulse: ca.SX,
     predicted: ca.SX,
     corrected: ca.SX,
     observe: Callable[[ca.SX], ca.SX],
     published: ca.SX,
-    *further_results: ca.SX,
+    **further_results: ca.SX,
 ) -> ca.Function:
-    """Return `contact_correct`.
+    """Return `contact_correct`, whose arguments have the given names.
 
     With contact it selects `corrected` and publishes `published`, else `predicted` for both.
     """
@@ -215,7 +257,11 @@ def correct_function(
         ca.if_else(impulse > 0, in_contact, predicted) for in_contact in (corrected, published)
     )
     return ca.Function(
-        "contact_correct", arguments, [state, impulse, observe(observed), *further_results]
+        "contact_correct",
+        arguments,
+        [state, impulse, observe(observed), *further_results.values()],
+        names,
+        [*CORRECT_RESULTS, *further_results],
     )
 
 

@@ -40,5 +40,9 @@ def create_elevation_function() -> ca.Function:
         ca.SX.sym("rows", MAX_WAVE_COMPONENTS, WAVE_COLUMNS),
     )
     return ca.Function(
-        "water_elevation", [place, count, ca.vec(rows)], [SURFACE_SUM(place, count, rows)]
+        "water_elevation",
+        [place, count, ca.vec(rows)],
+        [SURFACE_SUM(place, count, rows)],
+        ["place_and_time", "wave_count", "waves"],
+        ["elevation"],
     )

@@ -76,17 +76,6 @@ def table_rows(rotor_slots: int) -> int:
     return -(-rotor_slots // _TABLE_ROW_MULTIPLE) * _TABLE_ROW_MULTIPLE
 
 
-def constant_count(airframe: Airframe, rotor_slots: int) -> int:
-    """Return the number of constants that the equations derive from the parameters (`multirotor_equations.derive_constants`)."""
-    parameters = (
-        variable
-        for variable in variables(airframe, rotor_slots)
-        if variable.causality == "parameter"
-    )
-    given = sum(len(variable.scalar_names) for variable in parameters)
-    return given + 11 + ROTOR_TABLE_COLUMNS * table_rows(rotor_slots) + 9 * rotor_slots
-
-
 def _rigid_body_variables(airframe: Airframe) -> tuple[Variable, ...]:
     """Return mass and inertia; `airframe.Airframe` checks their values."""
     gravity = scalar_variable(

@@ -38,9 +38,9 @@ def create_surroundings_function() -> tuple[ca.Function, Callee]:
       that no crest exceeds (m).
     - waves: table of the components, shape (MAX_WAVE_COMPONENTS, WAVE_COLUMNS), see
       `environment.sea.Sea.component_table`.
-    - count: number of surfaces.
-    - surfaces: table of surfaces, one row after the other. It may have any number of rows in C, and
-      one in CasADi.
+    - surface_count: number of surfaces.
+    - surface_rows: table of surfaces, one row after the other. It may have any number of rows in C,
+      and one in CasADi.
 
     Its result has the shape (3,): distance (m) from the centre of the rotors to the surface below,
     0 under water; share (1) of the disc that is above this surface; height of the water (m) at the
@@ -51,8 +51,8 @@ def create_surroundings_function() -> tuple[ca.Function, Callee]:
         "disc": 5,
         "sea": 4,
         "waves": MAX_WAVE_COMPONENTS * WAVE_COLUMNS,
-        "count": 1,
-        "surfaces": SURFACE_COLUMNS,
+        "surface_count": 1,
+        "surface_rows": SURFACE_COLUMNS,
     }
     arguments = pose, disc, sea, waves, count, row = [
         ca.SX.sym(name, size) for name, size in sizes.items()
@@ -79,7 +79,8 @@ def create_surroundings_function() -> tuple[ca.Function, Callee]:
     )
     body = _SURROUNDINGS_C % {"columns": SURFACE_COLUMNS, "wave_height": MAX_WAVE_EFFECT_HEIGHT}
     callee = Callee(reference, body, [elevation, point, surface])
-    return ca.Function("surroundings", arguments, call_in_c(reference, *arguments)), callee
+    results = call_in_c(reference, *arguments)
+    return ca.Function("surroundings", arguments, results, [*sizes], ["surroundings"]), callee
 
 
 def _disc_centre_function() -> ca.Function:

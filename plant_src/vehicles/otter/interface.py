@@ -51,6 +51,3 @@ VARIABLES = (*PARAMETERS, *INPUTS, *MOTION_OUTPUTS, *DECK_OUTPUTS, *WORLD_OUTPUT
 
 #: actuator states
 PROPELLER_STATES = ("propeller_speed[1]", "propeller_speed[2]")
-
-#: number of constants that the equations derive from the parameters
-CONSTANT_COUNT = 617

@@ -16,7 +16,7 @@ from ..common.interface import (
     initial_variables,
     parameter,
 )
-from ..vessel.actuators import actuator_inputs, actuator_parameters, parameter_count
+from ..vessel.actuators import actuator_inputs, actuator_parameters
 from ..vessel.boat import boat_parameters, matrix_parameter
 from .planar_vessel import PlanarVessel
 
@@ -85,15 +85,4 @@ def states(propeller_slots: int) -> tuple[str, ...]:
     return (
         *_RIGID_BODY_STATES,
         *(f"propeller_speed[{number}]" for number in range(1, propeller_slots + 1)),
-    )
-
-
-def constant_count(slots: tuple[int, int]) -> int:
-    """Return the number of constants that the equations derive from the parameters (`planar_equations.derive_constants`)."""
-    boat = 3 + 1 + 3 * 9 + 2 + 3 + 3
-    rudders = (
-        slots[0] * slots[1] - slots[1] if slots[1] else 0
-    )  # the matrix of the races replaces `rudder_propeller`
-    return (
-        len(_INITIAL_PARAMETERS) + 2 + boat + 3 * 10 + 1 + parameter_count(slots) + rudders + 9 + 9
     )

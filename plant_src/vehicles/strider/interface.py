@@ -64,6 +64,3 @@ STATES = (
     "velocity_body.v",
     "rates.r",
 )
-
-#: number of constants that the equations derive from the parameters
-CONSTANT_COUNT = 8

@@ -19,6 +19,10 @@ from cosim.export.equations.model import ContinuousModel
 
 from ..common import kinematics
 from ..common.contact_maps import (
+    CORRECT_ARGUMENTS,
+    CORRECT_RESULTS,
+    IMPULSE_RESULTS,
+    PREDICT_ARGUMENTS,
     TWIST_SIZE,
     contact_impulse,
     correct_symbols,
@@ -84,7 +88,13 @@ class SubmergedContactMaps:
             endpoints,
             status,
         ]
-        return ca.Function("contact_predict", [*arguments, axes, impulse], results)
+        return ca.Function(
+            "contact_predict",
+            [*arguments, axes, impulse],
+            results,
+            [*PREDICT_ARGUMENTS, "principal_axes", "contact_impulse"],
+            IMPULSE_RESULTS,
+        )
 
     def _correct_function(self) -> ca.Function:
         start, predicted, twist, bullet_twist, constants, step = arguments = correct_symbols(
@@ -118,4 +128,10 @@ class SubmergedContactMaps:
         )
         published = ca.vertcat(state[0:7], ca.if_else(magnitude > 0, mean, state[7:13]), state[13:])
         results = [state, magnitude, motion_of_state(published), impulse]
-        return ca.Function("contact_correct", [*arguments, environment_inputs, previous], results)
+        return ca.Function(
+            "contact_correct",
+            [*arguments, environment_inputs, previous],
+            results,
+            [*CORRECT_ARGUMENTS, "environment_inputs", "previous_contact_impulse"],
+            [*CORRECT_RESULTS, "contact_impulse"],
+        )

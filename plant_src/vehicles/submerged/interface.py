@@ -70,21 +70,6 @@ def states(thruster_slots: int) -> tuple[str, ...]:
     return (*FREE_STATES, *(f"thruster_speed[{number}]" for number in range(1, thruster_slots + 1)))
 
 
-def constant_count(craft: Craft, thruster_slots: int) -> int:
-    """Return the number of constants that the equations derive from the parameters (`submerged_equations.derive_constants`)."""
-    parameters = (
-        variable
-        for variable in variables(craft, thruster_slots)
-        if variable.causality == "parameter"
-    )
-    return (
-        sum(len(variable.scalar_names) for variable in parameters)
-        + 9
-        + 3 * OCTANTS
-        + 6 * thruster_slots
-    )
-
-
 def _water_parameters(craft: Craft) -> Iterator[Variable]:
     yield _parameter("gravity", "m/s2", "gravitational acceleration", craft.gravity, 0.0)
     yield _parameter("water_density", "kg/m3", "density of the water", craft.water_density, 0.0)

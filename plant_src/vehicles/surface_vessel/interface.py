@@ -12,7 +12,6 @@ from ..common.interface import (
     DECK_OUTPUTS,
     EXTERNAL_LOADS,
     FLOATING_INITIAL_PARAMETERS,
-    MAX_WAVE_COMPONENTS,
     MOTION_OUTPUTS,
     VESSEL_STATES,
     WAVE_GAIN_INPUT,
@@ -22,15 +21,11 @@ from ..common.interface import (
     initial_variables,
     parameter,
 )
-from ..vessel.actuators import actuator_inputs, actuator_parameters, parameter_count
+from ..vessel.actuators import actuator_inputs, actuator_parameters
 from ..vessel.boat import boat_parameters, matrix_parameter
 from .surface_vessel import SurfaceVessel
 
 _INITIAL_PARAMETERS = (*initial_variables("xy", "uvw", "pqr"), *FLOATING_INITIAL_PARAMETERS)
-
-#: constants that the equations derive: inertia, inverse mass matrix, waterplane, equilibrium, wave
-#: table
-_DERIVED = 9 + 36 + 2 + 1 + 3 + 3 + 8 * MAX_WAVE_COMPONENTS
 
 
 def variables(vessel: SurfaceVessel, slots: tuple[int, int] | None = None) -> tuple[Variable, ...]:
@@ -127,13 +122,3 @@ def states(propeller_slots: int) -> tuple[str, ...]:
         *VESSEL_STATES,
         *(f"propeller_speed[{number}]" for number in range(1, propeller_slots + 1)),
     )
-
-
-def constant_count(slots: tuple[int, int]) -> int:
-    """Return the number of constants that the equations derive from the parameters (`equations.derive_constants`)."""
-    initial = len(_INITIAL_PARAMETERS)
-    boat = 3 + 1 + 3 * 36 + 2 + 3 + 3
-    rudders = (
-        slots[0] * slots[1] - slots[1] if slots[1] else 0
-    )  # the matrix of the races replaces `rudder_propeller`
-    return initial + 7 + boat + 36 + 12 + parameter_count(slots) + rudders + 1 + _DERIVED

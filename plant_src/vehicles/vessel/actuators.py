@@ -217,9 +217,3 @@ def _command(name: str, unit: str, description: str, slots: int) -> Variable:
         shape=shape,
         description=description,
     )
-
-
-def parameter_count(slots: tuple[int, int]) -> int:
-    """Return the number of scalar parameters of the actuators."""
-    counts = (6 + len(PROPELLER_ARRAYS), 3 + len(RUDDER_ARRAYS))
-    return sum(1 + count * size for count, size in zip(counts, slots, strict=True) if size)

@@ -20,6 +20,11 @@ from cosim.export.equations.model import ContinuousModel
 
 from ..common import kinematics
 from ..common.contact_maps import (
+    CORRECT_ARGUMENTS,
+    CORRECT_RESULTS,
+    IMPULSE_RESULTS,
+    INITIALIZE_RESULTS,
+    PREDICT_ARGUMENTS,
     TWIST_SIZE,
     contact_impulse,
     correct_symbols,
@@ -96,6 +101,8 @@ class FloatingContactMaps:
             "contact_initialize",
             [parameters],
             [constants, state, twist, twist, _bullet_pose(state)],
+            ["parameters"],
+            INITIALIZE_RESULTS,
         )
 
     def _predict_function(self) -> ca.Function:
@@ -133,7 +140,13 @@ class FloatingContactMaps:
             endpoints,
             status,
         ]
-        return ca.Function("contact_predict", [*arguments, impulse], results)
+        return ca.Function(
+            "contact_predict",
+            [*arguments, impulse],
+            results,
+            [*PREDICT_ARGUMENTS, "contact_impulse"],
+            IMPULSE_RESULTS,
+        )
 
     def _correct_function(self) -> ca.Function:
         arguments = correct_symbols(self.model)
@@ -166,6 +179,8 @@ class FloatingContactMaps:
             "contact_correct",
             [*arguments, previous],
             [state, magnitude, hull.observe(published), impulse],
+            [*CORRECT_ARGUMENTS, "previous_contact_impulse"],
+            [*CORRECT_RESULTS, "contact_impulse"],
         )
 
     def _inputs_with_contact_force(self, inputs: ca.SX, impulse: _Impulse, step: ca.SX) -> ca.SX:

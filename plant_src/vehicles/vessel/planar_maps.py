@@ -12,6 +12,10 @@ from cosim.export.equations.model import ContinuousModel
 
 from ..common import kinematics
 from ..common.contact_maps import (
+    CORRECT_ARGUMENTS,
+    INITIALIZE_RESULTS,
+    PREDICT_ARGUMENTS,
+    PREDICT_RESULTS,
     contact_impulse,
     correct_function,
     correct_symbols,
@@ -68,6 +72,8 @@ class PlanarContactMaps:
             "contact_initialize",
             [parameters],
             [constants, state, twist, twist, _bullet_pose(state, self.body(constants))],
+            ["parameters"],
+            INITIALIZE_RESULTS,
         )
 
     def _predict_function(self) -> ca.Function:
@@ -98,7 +104,20 @@ class PlanarContactMaps:
             endpoints,
             status,
         ]
-        return ca.Function("contact_predict", [*arguments, vertical_load], results)
+        names = (
+            *PREDICT_RESULTS,
+            "bullet_pose",
+            "previous_vertical_load",
+            "endpoints",
+            "step_status",
+        )
+        return ca.Function(
+            "contact_predict",
+            [*arguments, vertical_load],
+            results,
+            [*PREDICT_ARGUMENTS, "vertical_load"],
+            names,
+        )
 
     def _correct_function(self) -> ca.Function:
         start, predicted, twist, bullet_twist, constants, step = arguments = correct_symbols(
@@ -122,12 +141,13 @@ class PlanarContactMaps:
         corrected = ca.vertcat(pose, velocity, predicted[6:])
         return correct_function(
             [*arguments, previous_load],
+            [*CORRECT_ARGUMENTS, "previous_vertical_load"],
             impulse,
             predicted,
             corrected,
             lambda state: self.observe(state, constants),
             published,
-            vertical_load,
+            vertical_load=vertical_load,
         )
 
 

@@ -10,7 +10,6 @@ import pytest
 
 import cosim
 from cosim.components.fmi import file as fmu_file
-from cosim.components.fmi import file_cache
 
 
 @pytest.fixture
@@ -37,7 +36,7 @@ def simulate(fmu):
 
 def idle_folder(fmu):
     key = fmu_file.FmuFile(fmu)._key
-    return file_cache._idle_folders.get(key)
+    return fmu_file._idle_folders.get(key)
 
 
 def test_the_second_run_repeats_nothing(fmu, work):

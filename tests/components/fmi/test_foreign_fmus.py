@@ -10,7 +10,7 @@ from fakes import counter
 from probe_fmus import build_probe_fmu
 from systems import endpoint, make_system, run_system
 
-from cosim.components.fmi import FmuFile, Isolation, create_component, file_cache
+from cosim.components.fmi import FmuFile, Isolation, create_component, file
 from cosim.core.errors import ComponentError, InputError
 from cosim.core.time_grid import exact_fraction
 from cosim.engine.run_loop import simulate
@@ -237,7 +237,7 @@ def test_an_fmu_is_extracted_once_and_leaves_nothing_behind(
     )
     assert outcome.failure is None
     assert set(folder_counts) == {1}
-    file_cache.remove_idle_folders()
+    file.remove_idle_folders()
     assert list(tmp_path.iterdir()) == []
 
 

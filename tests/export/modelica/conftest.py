@@ -14,12 +14,11 @@ from typing import Any
 import numpy as np
 import pytest
 from frontend_server import run_forked
+from modelica_interpreter import Interpreter, load_interpreter
 
 from cosim.export.fmu.block import Block, BlockVariable
-from cosim.export.modelica import assemble, load_block, load_interpreter
-from cosim.export.modelica.causality.interpreter import Interpreter
+from cosim.export.modelica import assemble, load_block
 from cosim.export.modelica.frontend import rumoca_client
-from cosim.export.modelica.frontend.rumoca_frontend import DEFAULT_OPTIONS
 
 CTYPES = {
     "Float64": ctypes.c_double,
@@ -231,8 +230,8 @@ def compile_both(
         folder = tmp_path / "c" / path.stem
         folder.mkdir(parents=True)
         with monkeypatch.context() as patch:
-            flat = assemble._flatten(path, model, DEFAULT_OPTIONS)
-            patch.setattr(assemble, "_flatten", lambda *_arguments: flat)
+            analysed = assemble.analyse_file(path, model)
+            patch.setattr(assemble, "analyse_file", lambda *_arguments: analysed)
             return CompiledAndInterpreted(
                 CompiledBlock(load_block(path, model), folder), load_interpreter(path, model)
             )

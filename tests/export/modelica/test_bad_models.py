@@ -7,11 +7,11 @@ from __future__ import annotations
 import re
 
 import pytest
+from modelica_interpreter import Interpreter, load_interpreter
 
 from cosim.core.errors import ComponentError, InputError
 from cosim.export.fmu.interface import check_block
-from cosim.export.modelica import load_block, load_interpreter
-from cosim.export.modelica.causality.interpreter import Interpreter
+from cosim.export.modelica import load_block
 
 
 def in_model(declarations: str, equations: str = "y = u;") -> str:

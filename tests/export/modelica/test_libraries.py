@@ -8,11 +8,12 @@ from pathlib import Path
 import pytest
 from click.testing import CliRunner
 from fmpy import simulate_fmu
+from modelica_interpreter import load_interpreter
 
 import cosim
 from cosim.cli import cli
 from cosim.core.errors import InputError
-from cosim.export.modelica import ModelicaOptions, load_interpreter
+from cosim.export.modelica import ModelicaOptions
 from cosim.export.modelica.frontend import rumoca_frontend
 from cosim.export.modelica.frontend.libraries import find_libraries, libraries_in
 

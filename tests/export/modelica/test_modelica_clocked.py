@@ -8,9 +8,9 @@ import math
 
 import numpy as np
 import pytest
+from modelica_interpreter import load_interpreter
 
 from cosim.core.errors import InputError
-from cosim.export.modelica import load_interpreter
 
 STEP = 0.01
 

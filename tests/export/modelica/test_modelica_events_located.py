@@ -7,11 +7,11 @@ from __future__ import annotations
 import math
 import re
 
+import modelica_hybrid_interpreter as hybrid_interpreter
 import numpy as np
 import pytest
 
 from cosim.core.errors import ComponentError
-from cosim.export.modelica.causality import hybrid_interpreter
 
 BALL = """model Ball
   parameter Real e = 0.8;

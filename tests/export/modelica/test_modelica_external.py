@@ -12,10 +12,11 @@ import numpy as np
 import pytest
 from fmpy import extract, read_model_description, simulate_fmu
 from fmpy.fmi2 import FMU2Slave
+from modelica_interpreter import load_interpreter
 
 from cosim.core.errors import ComponentError, InputError
 from cosim.export.fmu.package import write_fmu
-from cosim.export.modelica import load_block, load_interpreter
+from cosim.export.modelica import load_block
 
 HEADER = """#include <stddef.h>
 double mean(const double *u, size_t n);

@@ -122,8 +122,8 @@ end M;""")
 
 
 def test_unknown_elements_of_the_front_ends_json_are_refused():
+    from cosim.export.modelica.frontend.model_files import ModelicaSources
     from cosim.export.modelica.frontend.reader import ModelReader
-    from cosim.export.modelica.frontend.sources import ModelicaSources
 
     reader = ModelReader({"enum_literal_ordinals": {}}, ModelicaSources([]))
     with pytest.raises(InputError, match="the expression Quantum is not supported"):

@@ -14,7 +14,7 @@ from plant_src.catalogue import MODELS
 from plant_src.environment import sea
 from plant_src.environment.sea import CALM, Sea
 from plant_src.environment.surfaces import SurfaceTable
-from plant_src.physics.compiled_equations import bind_arrays, load_library
+from plant_src.physics.compiled_equations import CompiledEquations
 from plant_src.placement import Platform
 from plant_src.vehicles.multirotor.surroundings import (
     MAX_WAVE_EFFECT_HEIGHT,
@@ -62,17 +62,16 @@ class Surroundings:
         self.sea = np.array([0.0, 1.0, len(sea.phase), sea.highest_elevation])
         table = SurfaceTable(vessels, platforms)
         table.update()
-        self.arguments = [
-            self.pose,
-            self.disc,
-            self.sea,
-            sea.component_table(),
-            table.count,
-            table.rows,
-        ]
-        self.call = bind_arrays(
-            load_library("multirotor").surroundings, self.arguments, [self.result]
-        )
+        self.arrays = {
+            "pose": self.pose,
+            "disc": self.disc,
+            "sea": self.sea,
+            "waves": sea.component_table(),
+            "surface_count": table.count,
+            "surface_rows": table.rows,
+            "surroundings": self.result,
+        }
+        self.call = CompiledEquations(MODELS["ar_drone"]).bind("surroundings", self.arrays)
 
     def at(
         self, x: float, y: float, z: float, time: float = 0.0, gain: float = 1.0
@@ -206,5 +205,6 @@ def test_the_c_code_and_its_casadi_function_agree(platforms: list[Platform]) -> 
         below.pose[:3] = random.uniform([3.5, -1.0, -0.5], [6.5, 1.0, 7.0])
         below.pose[3:] = Rotation.random(rng=random).as_quat(scalar_first=True)
         below.call()
-        expected = function(*(argument.ravel() for argument in below.arguments)).full().ravel()
+        arguments = [below.arrays[name].ravel() for name in function.name_in()]
+        expected = function(*arguments).full().ravel()
         np.testing.assert_allclose(below.result, expected, rtol=1e-12, atol=1e-12)

@@ -7,7 +7,7 @@ from scene_recording import scene_mission
 
 from cosim.core.errors import InputError
 from plant_src.scene.figures import ghosts
-from plant_src.scene.video import frames
+from plant_src.scene.render import frames
 
 PIXELS = (160, 80)
 

@@ -1,4 +1,4 @@
-"""The rendered scene: solids are where the mission has them, water and sky are where geometry says."""
+"""The rendered scene: solids are where the mission has them, water and sky follow geometry."""
 
 import math
 
@@ -9,14 +9,11 @@ from scene_recording import scene_mission
 from cosim.core.errors import InputError
 from plant_src.catalogue import VEHICLE_MODELS
 from plant_src.physics.client import pybullet
-from plant_src.scene.cameras import CAMERAS, NEAR, View
-from plant_src.scene.mission import mission_of_result
-from plant_src.scene.parts import Part
+from plant_src.scene.landscape import add_land, bank, pixel_rays, water_distance
+from plant_src.scene.mission import CAMERAS, mission_of_result
+from plant_src.scene.parts import Part, vehicle_parts
 from plant_src.scene.render import Layer, Scene
-from plant_src.scene.shores import add_land, bank
-from plant_src.scene.sky_and_water import pixel_rays, water_distance
-from plant_src.scene.solid_renderer import Picture, SolidRenderer
-from plant_src.scene.vehicle_parts import vehicle_parts
+from plant_src.scene.solid_renderer import NEAR, Picture, SolidRenderer, View
 
 SIZE = (160, 80)
 AHEAD = View(np.array([0.0, 0.0, 2.0]), np.array([10.0, 0.0, 2.0]))
@@ -79,7 +76,7 @@ def test_banks_look_like_boxes_of_their_size(eye, monkeypatch):
     around.
     """
     view = View(np.array(eye), np.array([9.0, 0.5, 0.1]))
-    monkeypatch.setattr("plant_src.scene.shores.BANKS", [ONE_BANK])
+    monkeypatch.setattr("plant_src.scene.landscape.BANKS", [ONE_BANK])
     found = Picture(np.zeros((80, 160, 3), np.uint8), np.full((80, 160), np.inf, np.float32))
     add_land(found, view, pixel_rays(view, *SIZE))
     with SolidRenderer([as_part(step) for step in ONE_BANK]) as stage:
@@ -103,7 +100,7 @@ def test_the_mirror_image_of_a_bank_shows_its_shore(monkeypatch):
     """Seen from below the water, in the picture upside down, land ends where it ends seen from
     above.
     """
-    monkeypatch.setattr("plant_src.scene.shores.BANKS", [ONE_BANK])
+    monkeypatch.setattr("plant_src.scene.landscape.BANKS", [ONE_BANK])
     view, pictures = View(np.array([0.0, 0.0, 3.0]), np.array([9.0, 0.5, 0.1])), []
     for one in (view, view.mirrored()):
         pictures.append(
@@ -115,7 +112,7 @@ def test_the_mirror_image_of_a_bank_shows_its_shore(monkeypatch):
 
 
 def test_land_hides_only_what_is_behind_it(monkeypatch):
-    monkeypatch.setattr("plant_src.scene.shores.BANKS", [ONE_BANK])
+    monkeypatch.setattr("plant_src.scene.landscape.BANKS", [ONE_BANK])
     view = View(np.array([0.0, 0.0, 3.0]), np.array([9.0, 0.5, 0.1]))
     near, far = (
         Picture(np.zeros((80, 160, 3), np.uint8), np.full((80, 160), depth, np.float32))

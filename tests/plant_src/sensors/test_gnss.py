@@ -19,7 +19,7 @@ POSITION = [f"position.{axis}" for axis in "xyz"]
 
 
 def moving(trial, steps):
-    """Step with position.x = time of the inputs; what is put out for it and as time of the sample."""
+    """Step with position.x = time; return the time, the position and the time of the sample."""
     rows = []
     for _ in range(steps):
         now = (trial.steps + 1) * 0.01

@@ -8,10 +8,8 @@ from scipy.spatial.transform import Rotation
 from sensor_harness import SensorHarness, with_parameters
 
 from plant_src.sensors.deck_tracker import DeckTracker
-from plant_src.sensors.history import History
 from plant_src.sensors.magnetometer import EARTH_FIELD
-from plant_src.sensors.navigation import Navigation
-from plant_src.sensors.rotations import quaternion_from_euler
+from plant_src.sensors.navigation import History, Navigation
 
 STEP, UP = 0.01, np.array([0, 0, 9.81])
 
@@ -141,7 +139,8 @@ def test_fixes_correct_an_attitude_error():
     flight = Flight()
     flight.fly(1.5)
     state = flight.trial.component.get_state()
-    state["_orientation"] = quaternion_from_euler(0.1, -0.1, 0.0)
+    x, y, z, w = Rotation.from_euler("ZYX", (0.0, -0.1, 0.1)).as_quat()
+    state["_orientation"] = (w, x, y, z)
     flight.trial.component.set_state(state)
     assert flight.fly(1.55, since=1.5)[2] > 0.1
     assert flight.fly(16, since=1.55)[2] < 0.014

@@ -16,7 +16,7 @@ from cosim.cli.commands.new_vehicle import command
 from cosim.core import resources
 from cosim.core.errors import InputError
 from plant_src.catalogue import model_from_data
-from plant_src.scene.vehicle_parts import vehicle_parts
+from plant_src.scene.parts import vehicle_parts
 from plant_src.vehicle_files import mesh_import
 from plant_src.vehicle_files.mesh_import import vehicle_from_mesh
 from plant_src.vehicle_files.urdf import vehicle_from_urdf

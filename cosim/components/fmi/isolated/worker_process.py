@@ -14,12 +14,23 @@ from typing import NoReturn
 
 from ....core import component_log
 from ....process.failure_attribution import describe_exit_status
-from ....process.foreign_output import ForeignOutput
-from ....process.forks import attributing_forks
-from ....process.journal import CALL_NUMBER, CHANGE_COUNT, Journal, suspending_deadline
+from ....process.journal import (
+    CALL_NUMBER,
+    CHANGE_COUNT,
+    Journal,
+    attributing_forks,
+    suspending_deadline,
+)
+from ....process.standard_streams import ForeignOutput
 from ....process.supervisor import POLL_INTERVAL
-from .answers import INVALID_ANSWER_ERRORS
-from .pipes import READ_SIZE, STEP_DONE, SpinningPoller, decode_line, write_line
+from .messages import (
+    INVALID_ANSWER_ERRORS,
+    READ_SIZE,
+    STEP_DONE,
+    SpinningPoller,
+    decode_line,
+    write_line,
+)
 
 #: wait (ms) that still counts for the deadline of the run's own supervisor
 _SHORT_WAIT = 20

@@ -1,16 +1,128 @@
-"""The functions of an FMU in Continuous-Time Mode, prepared for fixed arrays."""
+"""An FMU in Continuous-Time Mode, its linear inputs, and the interface of its integrators."""
 
 from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable, Mapping
-from typing import Any, NamedTuple
+from enum import IntFlag
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 
-from ....core.component import SUCCESS_STATUSES
-from ..c_functions import FunctionTable, as_pointer, as_size
-from .linear_inputs import LinearInputs
+from ....core.component import SUCCESS_STATUSES, Ports, PreparedCall
+from ..library import FunctionTable, as_pointer, as_size
+
+
+class EventKind(IntFlag):
+    """Reasons why an integration stops before the end of a communication step.
+
+    The same numbers as in `_fixed_step.c`.
+    """
+
+    STATE = 1
+    TIME = 2
+    STEP = 4
+    TERMINATION = 8
+
+
+class StepEvent(NamedTuple):
+    """Event at `time` (s)."""
+
+    kind: EventKind
+    time: float
+
+
+class Integrator(Protocol):
+    """Integrator of one FMU instance in Continuous-Time Mode."""
+
+    @property
+    def time(self) -> float:
+        """Time (s) to which the FMU has been integrated."""
+
+    def prepare_step(self, current_time: ctypes.c_double, step_size: float) -> PreparedCall:
+        """Prepare a call that integrates one communication step.
+
+        The call returns OK at its end and discard at an event or after a failure; called again, it
+        continues.
+
+        Args:
+            current_time: Memory from which the call reads the start of the step (s).
+            step_size: Length of the step (s).
+        """
+
+    def restart(self, time: float, next_event_time: float) -> None:
+        """Continue after a discontinuity.
+
+        Args:
+            time: Time of the discontinuity (s).
+            next_event_time: Time of the next time event (s); infinity if there is none.
+        """
+
+    def inputs_changed(self) -> None:
+        """Take into account that the inputs of the next step are not those of the last one."""
+
+    def take_event(self) -> StepEvent:
+        """Return the event at which the last call stopped.
+
+        Raises:
+            IntegrationError: The last call failed.
+        """
+
+    def close(self) -> None:
+        """Release the resources of the integrator."""
+        return
+
+
+_FLOAT64 = np.dtype(np.float64)
+
+
+class LinearInputs:
+    """Inputs with the value start + slope * (time - begin) in a communication step that begins at `begin` (s).
+
+    Attributes:
+        begin: Begin of the communication step (s).
+        references: Value references of the inputs.
+        array: Bound array with the values at the begin of the step.
+        indices: Indices of the inputs in `array`.
+        slopes: Time derivatives of the inputs (per s), a part of `array`.
+        values: Present values of the inputs.
+    """
+
+    def __init__(self, ports: Ports, value_references: Mapping[str, int]):
+        """Find the inputs for which the ports contain slopes, which follow all other variables of type Float64."""
+        variables = [variable for variable in ports.variables if variable.dtype == _FLOAT64]
+        positions, count = {}, 0
+        for variable in variables:
+            positions[variable.name] = range(count, count := count + len(variable.scalar_names))
+        inputs = [variable.derivative_of for variable in variables if variable.derivative_of]
+        self.begin = 0.0
+        self.references = np.array([value_references[name] for name in inputs], np.uint32)
+        self.indices = np.array([index for name in inputs for index in positions[name]], np.int64)
+        self.array = ports.arrays.get(_FLOAT64, np.zeros(0))
+        self.slopes = self.array[len(self.array) - len(self.indices) :]
+        self.values = np.zeros(len(self.indices))
+
+    def prepare(self, major: int, library: FunctionTable, handle: int, function: str) -> None:
+        """Prepare the call of the function that sets inputs of the FMU instance."""
+        self._function = library[function]
+        self._arguments = (
+            as_pointer(handle),
+            as_pointer(self.references.ctypes.data),
+            as_size(len(self.references)),
+            as_pointer(self.values.ctypes.data),
+            *((as_size(len(self.values)),) if major > 2 else ()),
+        )
+
+    def set(self, time: float) -> int:
+        """Set the inputs to their values at `time` (s), and return the status of the FMU.
+
+        OK if there are none.
+        """
+        if not len(self.references):
+            return SUCCESS_STATUSES[0]
+        self.values[:] = self.array[self.indices] + self.slopes * (time - self.begin)
+        status: int = self._function(*self._arguments)
+        return status
 
 
 class IntegrationError(Exception):

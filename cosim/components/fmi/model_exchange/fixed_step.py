@@ -14,11 +14,10 @@ import numpy as np
 
 from ....core.component import NativeDoStep, PreparedCall
 from ....core.time_grid import exact_fraction
-from ..c_functions import GilReleasingFunction, as_pointer, function_address
 from ..function_calls import DISCARD, OK
-from ..instance_settings import Method
-from .continuous_model import ContinuousModel, IntegrationError
-from .integrator import EventKind, Integrator, StepEvent
+from ..library import GilReleasingFunction, as_pointer, function_address
+from ..settings import Method
+from .continuous_model import ContinuousModel, EventKind, IntegrationError, Integrator, StepEvent
 
 try:
     from . import _fixed_step

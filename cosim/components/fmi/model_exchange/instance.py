@@ -16,11 +16,9 @@ from ..accessor_calls import AccessorCallFactory
 from ..event_mode import MAX_EVENTS_PER_STEP, EventModeInstance
 from ..file import FmuFile
 from ..function_calls import OK
-from ..instance_settings import InstanceSettings
-from .continuous_model import ContinuousModel, IntegrationError
+from ..settings import InstanceSettings
+from .continuous_model import ContinuousModel, EventKind, IntegrationError, Integrator, LinearInputs
 from .fixed_step import FixedStepIntegrator
-from .integrator import EventKind, Integrator
-from .linear_inputs import LinearInputs
 from .variable_step import VariableStepIntegrator
 
 

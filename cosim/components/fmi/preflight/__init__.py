@@ -11,14 +11,20 @@ from itertools import islice
 from pathlib import Path
 
 from ....core.errors import InputError
-from . import rules_model, rules_structure, rules_values, rules_variables
-from .archive import Archive, open_regular_file
+from . import rules_model, rules_variables
+from .archive import NAME_FORM, REPEATED, Archive, open_regular_file
 from .binary import check_binary
-from .findings import DESCRIPTION_FILE, FatalFindingError, Finding, Rule, raise_errors
-from .fmu_platform import current_platform
-from .limits import DEFAULT_LIMITS, PreflightLimits
+from .findings import (
+    DEFAULT_LIMITS,
+    DESCRIPTION_FILE,
+    FatalFindingError,
+    Finding,
+    PreflightLimits,
+    Rule,
+    raise_errors,
+)
 from .model_description import Interface, ModelDescription
-from .rules_archive import NAME_FORM, REPEATED
+from .platforms import current_platform
 from .xml import parse_xml
 from .xml_reader import check_repeated_elements, read_model
 
@@ -41,7 +47,7 @@ CHANGED = Rule("archive.changed", "limits")
 #: rules whose violations do not prevent a run, but may change its results
 RUN_WARNINGS = frozenset(
     {
-        *(NAME_FORM, REPEATED, rules_structure.OUTPUTS),
+        *(NAME_FORM, REPEATED, rules_model.OUTPUTS),
         *(rules_model.EMPTY_TOKEN, rules_model.IDENTIFIER, rules_model.EXPERIMENT_VALUE),
         *(
             rules_variables.UNIQUE,
@@ -50,7 +56,12 @@ RUN_WARNINGS = frozenset(
             rules_variables.CONTINUOUS,
             rules_variables.INITIAL_RULE,
         ),
-        *(rules_variables.DECLARED, rules_values.MISSING, rules_values.RANGE, rules_values.LIMIT),
+        *(
+            rules_variables.DECLARED,
+            rules_variables.MISSING,
+            rules_variables.RANGE,
+            rules_variables.LIMIT,
+        ),
     }
 )
 _MAX_FINDINGS_PER_CHECK = 100
@@ -59,8 +70,8 @@ _UNUSED_FOLDERS = ("documentation", "sources")
 _CHECKS: Sequence[Callable[[ModelDescription], Iterator[Finding]]] = (
     *rules_model.CHECKS,
     *rules_variables.CHECKS,
-    rules_values.check_starts,
-    *rules_structure.CHECKS,
+    rules_variables.check_starts,
+    *rules_model.STRUCTURE_CHECKS,
 )
 
 
@@ -122,7 +133,9 @@ def _examine_archive(archive: Archive, limits: PreflightLimits, result: Examinat
     result.findings += check_repeated_elements(root)
     for check in _CHECKS:
         result.findings += islice(check(model), _MAX_FINDINGS_PER_CHECK)
-    result.findings += islice(rules_values.check_dimensions(model, limits), _MAX_FINDINGS_PER_CHECK)
+    result.findings += islice(
+        rules_variables.check_dimensions(model, limits), _MAX_FINDINGS_PER_CHECK
+    )
     if not _has_errors(result.findings):
         for interface in model.interfaces:
             result.binary_findings[interface] = list(

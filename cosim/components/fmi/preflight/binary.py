@@ -9,12 +9,10 @@ from pathlib import Path
 from ....core.errors import abbreviate_names
 from . import elf, macho, pe
 from .archive import Archive
-from .findings import Finding, Rule, escape_unprintable
-from .fmu_platform import FmuPlatform
+from .findings import Finding, PreflightLimits, Rule, escape_unprintable
 from .functions import called_functions, standard_functions
-from .library import EXPECTED_TEXTS, InvalidLibraryError, SharedLibrary
-from .limits import PreflightLimits
 from .model_description import Interface, ModelDescription
+from .platforms import EXPECTED_TEXTS, FmuPlatform, InvalidLibraryError, SharedLibrary
 
 _BINARIES = "FMI 2.0.5 section 2.3, FMI 3.0.2 section 2.5.1"
 _FUNCTIONS = "FMI 2.0.5 sections 2.1 and 4.2, FMI 3.0.2 section 2.5"

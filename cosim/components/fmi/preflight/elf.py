@@ -11,7 +11,7 @@ import struct
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from .library import EXPECTED_TEXTS, InvalidLibraryError, SharedLibrary
+from .platforms import EXPECTED_TEXTS, InvalidLibraryError, SharedLibrary
 
 MAGIC = b"\x7fELF"
 #: (EI_CLASS, e_machine) of the supported architectures

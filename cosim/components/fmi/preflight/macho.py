@@ -8,7 +8,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 
-from .library import InvalidLibraryError, SharedLibrary
+from .platforms import InvalidLibraryError, SharedLibrary
 
 #: values of cputype by architecture
 MACHINES = {"x86_64": 0x01000007, "aarch64": 0x0100000C, "x86": 7}

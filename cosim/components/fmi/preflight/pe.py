@@ -9,7 +9,7 @@ import struct
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from .library import InvalidLibraryError, SharedLibrary
+from .platforms import InvalidLibraryError, SharedLibrary
 
 #: values of Machine by architecture
 MACHINES = {"x86_64": 0x8664, "aarch64": 0xAA64, "x86": 0x14C}

@@ -10,8 +10,7 @@ from typing import Any
 
 from lxml import etree
 
-from .findings import FatalFindingError, Rule
-from .limits import PreflightLimits
+from .findings import FatalFindingError, PreflightLimits, Rule
 
 SIZE = Rule("xml.size", "limits")
 ENCODING = Rule("xml.encoding", "FMI 2.0.5 section 2.2, FMI 3.0.2 section 2.4")

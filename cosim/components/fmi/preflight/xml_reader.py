@@ -7,7 +7,6 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
-from . import fmi1_reader
 from .findings import DESCRIPTION_FILE, FatalFindingError, Finding, Rule
 from .model_description import (
     Interface,
@@ -17,6 +16,69 @@ from .model_description import (
     UnitDefinition,
     Unknown,
 )
+
+#: causality and variability of FMI 1.0 that have another name in FMI 2.0
+_CAUSALITIES = {"internal": "local", "none": "local"}
+_STAND_ALONE, _TOOL = "CoSimulation_StandAlone", "CoSimulation_Tool"
+
+
+def _translate_fmi1_variable(attributes: Mapping[str, str]) -> dict[str, str]:
+    """Translate causality and variability of a variable.
+
+    A negated alias of an input or parameter becomes a local variable, because it cannot be set
+    without a change of its sign.
+
+    Args:
+        attributes: XML attributes of the variable and of its type element.
+    """
+    causality = attributes.get("causality", "internal")
+    variability = attributes.get("variability", "continuous")
+    causality = _CAUSALITIES.get(causality, causality)
+    if variability == "parameter":
+        causality, variability = (
+            ("output", "discrete") if causality == "output" else ("parameter", "fixed")
+        )
+    elif variability == "constant" and causality == "input":
+        causality = "local"
+    if attributes.get("alias") == "negatedAlias" and causality in ("input", "parameter"):
+        causality, variability = "local", "fixed" if variability == "fixed" else "discrete"
+    return {**attributes, "causality": causality, "variability": variability}
+
+
+def _read_fmi1_interfaces(root: Any) -> dict[Interface, dict[str, str]]:
+    """Read the interface of an FMU.
+
+    An FMI 1.0 FMU has exactly one, none if it only starts its tool.
+
+    Args:
+        root: Root element of modelDescription.xml.
+    """
+    identifier = {"modelIdentifier": root.get("modelIdentifier", "")}
+    if (implementation := root.find("Implementation")) is None:
+        return {"model-exchange": identifier}
+    if (stand_alone := implementation.find(_STAND_ALONE)) is None:
+        return {}
+    capabilities = stand_alone.find("Capabilities")
+    return {
+        "co-simulation": {
+            **({} if capabilities is None else dict(capabilities.items())),
+            **identifier,
+        }
+    }
+
+
+def _read_fmi1_units(root: Any) -> Iterator[UnitDefinition]:
+    """Read the units, of which FMI 1.0 gives only the names.
+
+    Args:
+        root: Root element of modelDescription.xml.
+    """
+    for element in root.iterfind("UnitDefinitions/BaseUnit"):
+        display = [
+            child.get("displayUnit", "") for child in element.iterfind("DisplayUnitDefinition")
+        ]
+        yield UnitDefinition(element.get("unit", ""), None, display, element.sourceline)
+
 
 _ROOT = "FMI 2.0.5 section 2.2.1, FMI 3.0.2 section 2.4.1"
 ROOT = Rule("model.root", _ROOT)
@@ -111,7 +173,7 @@ def read_model(root: Any) -> ModelDescription:
     return ModelDescription(
         major,
         _read_attributes(root),
-        fmi1_reader.read_interfaces(root) if major == 1 else _read_interfaces(root),
+        _read_fmi1_interfaces(root) if major == 1 else _read_interfaces(root),
         _read_attributes(root.find("DefaultExperiment")),
         [
             _read_variable(element, major, types_by_name)
@@ -119,7 +181,7 @@ def read_model(root: Any) -> ModelDescription:
         ],
         types,
         list(
-            fmi1_reader.read_units(root)
+            _read_fmi1_units(root)
             if major == 1
             else map(_read_unit, root.iterfind("UnitDefinitions/Unit"))
         ),
@@ -191,7 +253,7 @@ def _read_variable(
     type_element = _type_element(element, major)
     attributes = _read_attributes(type_element) | _read_attributes(element)
     if major == 1:
-        attributes = fmi1_reader.translate_variable(attributes)
+        attributes = _translate_fmi1_variable(attributes)
     kind = TYPE_NAMES[major].get(type_element.tag, "")
     causality = attributes.get("causality", "local")
     return ModelVariable(

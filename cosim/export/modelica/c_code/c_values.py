@@ -6,11 +6,14 @@ Identifiers, types, operator precedence and element access of arrays.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable
+import textwrap
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass
 from functools import reduce
 from math import prod
 from typing import NamedTuple
+
+from ..model.builtin_functions import BUILTIN_FUNCTIONS
 
 C_TYPES = {
     "Real": "double",
@@ -21,16 +24,18 @@ C_TYPES = {
     "ExternalObject": "uint64_t",
 }
 
-#: keywords of C, and the functions and local variables of the generated code
+#: keywords of C, and the functions and local variables of the generated code besides `c_functions`
+#: of the table of built-in functions
 _RESERVED_WORDS = """
-    auto break case char const continue default do double else enum extern float for goto if inline int long register restrict
-    return short signed sizeof static struct switch typedef union unsigned void volatile while bool true false NULL NAN INFINITY I
-    m time each due risen event fail element add subtract multiply divide modulo remainder_of absolute integer_of smaller larger
-    smaller_integer larger_integer square sign real_modulo real_remainder real_quotient
-    integrate advance derivatives runge_kutta System
-    acos asin atan atan2 ceil cos cosh exp fabs floor isfinite log log10 memcpy memset pow sin sinh sqrt tan tanh trunc
+    auto break case char const continue default do double else enum extern float for goto if inline
+    int long register restrict return short signed sizeof static struct switch typedef union
+    unsigned void volatile while bool true false NULL NAN INFINITY I
+    m time each due risen event fail element add subtract multiply square
+    integrate advance derivatives runge_kutta System isfinite memcpy memset pow trunc
 """
-_RESERVED = frozenset(_RESERVED_WORDS.split())
+_RESERVED = frozenset(_RESERVED_WORDS.split()).union(
+    *(function.c_functions for function in BUILTIN_FUNCTIONS.values())
+)
 _GENERATED_NAME = re.compile(r"tmp_\d+|holds_\d+|pre_\w+")
 
 
@@ -77,7 +82,6 @@ PRECEDENCE = {
     "/": 10,
     "unary": 12,
 }
-
 
 #: least precedence of the left and the right operand without parentheses; higher than C requires
 #: where gcc would warn
@@ -223,3 +227,36 @@ def sum_terms(type_name: str, terms: list[CExpression]) -> CExpression:
     if type_name == "Real":
         return reduce(lambda a, b: infix("+", a, b), terms)
     return reduce(lambda a, b: c_call("add", "m", a, b), terms)
+
+
+_WIDTH = 118
+
+
+def function_definition(head: str, body: Iterable[str]) -> str:
+    """Return a C function definition with the given signature and unindented lines of its body."""
+    return "\n".join([head, "{", *wrap_lines(body), "}"])
+
+
+def wrap_lines(lines: Iterable[str]) -> Iterator[str]:
+    """Yield the lines indented by one level.
+
+    Long lines are wrapped, except those with text in quotation marks.
+    """
+    for line in lines:
+        if '"' in line:
+            yield "    " + line
+            continue
+        indent = " " * (8 + len(line) - len(line.lstrip()))
+        yield from textwrap.wrap(
+            "    " + line,
+            _WIDTH,
+            subsequent_indent=indent,
+            break_long_words=False,
+            break_on_hyphens=False,
+            drop_whitespace=True,
+        ) or [""]
+
+
+def uses_variable(name: str, lines: Iterable[str]) -> bool:
+    """Return whether a C variable with this name (not a struct member) occurs in the lines."""
+    return any(re.search(rf"(?<![\w>.]){re.escape(name)}\b", line) for line in lines)

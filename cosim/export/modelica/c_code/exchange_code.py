@@ -8,7 +8,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Sequence
 
 from ..model.flat_model import Model, Relation, is_integrated
-from .formatting import function_definition
+from .c_values import function_definition
 from .statements import StatementLowering
 
 #: distance from a crossing at which its indicator changes its sign, so that the relation has

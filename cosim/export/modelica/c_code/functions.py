@@ -13,8 +13,7 @@ from ..model import syntax_tree
 from ..model.flat_model import Function, FunctionVariable
 from ..model.syntax_tree import SourceLocation, raise_model_error, referenced_variable
 from ..model.traversal import read_references, rewrite, variable_names, walk
-from .c_values import C_TYPES, CValue, c_identifier, variable_value
-from .formatting import uses_variable, wrap_lines
+from .c_values import C_TYPES, CValue, c_identifier, uses_variable, variable_value, wrap_lines
 from .lowering import FunctionInstance
 from .statements import StatementLowering
 

@@ -6,10 +6,9 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from ..causality.matching import is_input
-from ..causality.parameter_roles import ParameterRoles
+from ..causality.analysed_model import ParameterRoles
 from ..causality.schedule import Schedule
-from ..model.flat_model import Model, Variable, derivative_name, is_integrated
+from ..model.flat_model import Model, Variable, derivative_name, is_input, is_integrated
 from ..model.traversal import composed_asserts, has_terminate
 from .c_values import C_TYPES, CValue, c_identifier, variable_value
 from .exchange_code import exchange_declarations, has_exchange

@@ -5,24 +5,29 @@ The functions that hybrid.h and the communication step call.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 
-from ..causality.event_limits import (
-    MAX_EVENTS,
+from ..causality.hybrid import (
     MAX_PASSES,
+    PAST_VALUES,
+    SAME_TIME,
     chattering_reason,
     endless_reason,
     iterated_names,
 )
-from ..causality.matching import is_input
-from ..causality.past_values import PAST_VALUES
-from ..model.flat_model import Model, Relation, derivative_name, is_integrated, previous_name
+from ..model.flat_model import (
+    Model,
+    Relation,
+    derivative_name,
+    is_input,
+    is_integrated,
+    previous_name,
+)
 from ..model.syntax_tree import Assign, Name
-from .c_values import C_TYPES, CExpression, CValue, scalar_value
-from .event_code import copy_values, event_functions
-from .formatting import function_definition
+from .c_values import C_TYPES, CExpression, CValue, function_definition, scalar_value
 from .model_code import ModelCode
+from .model_step import hybrid_step_body
 from .statements import StatementLowering
 
 
@@ -254,59 +259,140 @@ def crossing_function(
     )
 
 
-def hybrid_step_body(clocks: int, continuous: bool, inputs_first: bool) -> list[str]:
-    """Generate the body of model_step.
+#: the value of a variable before an event, and the present one
+ValuePair = tuple[CValue, CValue]
 
-    `inputs_first`: changes of inputs are an event before a tick at the same time.
-    """
-    lines = ["const double end = time + step_size;", "m->failure = 0;"]
-    tick = ["const bool tick = false;", *["const double target = end;"] * continuous]
-    if clocks:
-        tick = [
-            f"bool due[{clocks}];",
-            f"const double next = next_event(m->clock, {clocks}, due);",
-            f"const bool tick = next < end - TOLERANCE * shortest_period(m->clock, {clocks});",
-            "const double target = tick ? next : end;",
-        ]
-    loop, at_start = [*tick], "count == 0"
-    if clocks:
-        loop += [
-            (
-                "const bool at_start = tick && next <= time + TOLERANCE * "
-                f"shortest_period(m->clock, {clocks});"
-            )
-        ] * (continuous or not inputs_first)
-        at_start += " && !at_start" * (not inputs_first)
-    input_event = f"if ({at_start} && (m->changed || inputs_changed(m)))"
-    loop += (
-        [f"{input_event} {{", "    event(m, time, NO_TICK);", "    m->event_time = -INFINITY;", "}"]
-        if inputs_first
-        else [f"{input_event} event(m, time, NO_TICK);"]
-    )
-    if continuous:
-        lines.append("double reached = time;")
-        loop += [
-            (
-                f"const bool crossing = {'!at_start && ' * bool(clocks)}advance(m, reached, "
-                "target, &reached);"
-            ),
-            "if (m->failure != 0) break;",
-            "if (crossing) {",
-            "    double z[RELATIONS];",
-            f"    if (count == {MAX_EVENTS}) fail(m, CHATTERING[crossed(m, reached, z)]);",
-            "    else event(m, reached, NO_TICK);",
-            "    continue;",
-            "}",
-        ]
-    loop += ["if (!tick) break;"]
-    if clocks:
-        loop += [
-            "event(m, target, due);",
-            f"for (int k = 0; k < {clocks}; k++) m->clock[k].ticks += due[k];",
-        ]
-    lines += [
-        "for (int count = 0; m->failure == 0; count++) {",
-        *("    " + line for line in loop),
-        "}",
+
+def copy_values(variables: Iterable[ValuePair]) -> list[str]:
+    """Generate the assignments `target = source` of scalars and arrays."""
+    return [
+        f"memcpy({target.pointer}, {source.pointer}, sizeof {target.pointer});"
+        if target.shape
+        else f"{target.text.code} = {source.text.code};"
+        for target, source in variables
     ]
-    return [*lines, "if (m->failure == 0) event(m, end, NO_TICK);", "return REASONS[m->failure];"]
+
+
+def _differs(a: CValue, b: CValue) -> str:
+    return (
+        f"memcmp({a.pointer}, {b.pointer}, sizeof {a.pointer}) != 0"
+        if a.shape
+        else f"{a.text.code} != {b.text.code}"
+    )
+
+
+def memory_functions(inputs: Sequence[ValuePair], others: Sequence[ValuePair]) -> list[str]:
+    """Generate `remember`, `remember_inputs` and `inputs_changed`.
+
+    Args:
+        inputs: The values before the event and the present values of inputs.
+        others: Those of all other remembered variables.
+    """
+    return [
+        "/* Stores the values before an event, or before another evaluation in the same event. */",
+        function_definition("static void remember(Model *m)", copy_values(others) or ["(void)m;"]),
+        function_definition(
+            "static void remember_inputs(Model *m)", copy_values(inputs) or ["(void)m;"]
+        ),
+        function_definition(
+            "static bool inputs_changed(const Model *m)",
+            ["(void)m;", f"return {_any_differs(inputs)};"],
+        ),
+    ]
+
+
+def event_functions(
+    model: Model,
+    values: Mapping[str, CValue],
+    evaluation: list[str],
+    endless: Mapping[str, str],
+    initial: list[str],
+    limits: list[str],
+) -> list[str]:
+    """Generate `evaluate`, `initialize` and `event`, and the functions that they use.
+
+    Args:
+        model: The flat model.
+        values: The C values of the variables.
+        evaluation: The statements of an evaluation of all equations.
+        endless: The failure code of an event iteration that does not end by the variable that
+            changes.
+        initial: The statements of the initialization.
+        limits: The statements that compute the values of continuous variables before an event.
+
+    Returns:
+        The function definitions.
+    """
+    assert model.hybrid
+    pairs = {name: (values[previous_name(name)], values[name]) for name in model.hybrid.remembered}
+    inputs = [name for name in pairs if is_input(model.variables[name])]
+    changes = _any_differs(pairs[name] for name in model.hybrid.iterated)
+    relations = _any_differs(pairs[relation.name] for relation in model.hybrid.relations)
+    causes = [f"if ({_differs(*pairs[name])}) return {code};" for name, code in endless.items()]
+    return [
+        *memory_functions(
+            [pairs[name] for name in inputs],
+            [pair for name, pair in pairs.items() if name not in {*inputs, *model.hybrid.sampled}],
+        ),
+        (
+            "/* Returns the failure of an event iteration in which a value changes in each "
+            "evaluation. */"
+        ),
+        function_definition(
+            "static int32_t endless(const Model *m)", ["(void)m;", *causes, "return 0;"]
+        ),
+        (
+            "/* Evaluates all equations; returns whether they must be evaluated again, since "
+            "values have changed. */"
+        ),
+        function_definition(
+            "static bool evaluate(Model *m, double time, const bool *due)",
+            ["(void)time;", "(void)due;", *evaluation, f"return m->failure == 0 && ({changes});"],
+        ),
+        function_definition(
+            "static void event(Model *m, double time, const bool *due)",
+            [
+                *limits,
+                *_sampled_lines(pairs[name] for name in model.hybrid.sampled),
+                *_event_lines(),
+            ],
+        ),
+        function_definition(
+            "static bool initialize(Model *m, double time)",
+            ["(void)time;", *initial, f"return m->failure == 0 && ({relations});"],
+        ),
+    ]
+
+
+def _any_differs(pairs: Iterable[ValuePair]) -> str:
+    return " || ".join(_differs(*pair) for pair in pairs) or "false"
+
+
+def _sampled_lines(pairs: Iterable[ValuePair]) -> list[str]:
+    copies = copy_values(pairs)
+    guarded = [
+        "if (time > m->event_time) {",
+        *(f"    {line}" for line in copies),
+        "}",
+        f"m->event_time = time + {SAME_TIME};",
+    ]
+    return guarded if copies else []
+
+
+def _event_lines() -> list[str]:
+    return [
+        "remember(m);",
+        "/* flags of ticks are true in the first evaluation only */",
+        (
+            "for (int pass = 0; (evaluate(m, time, due) || due != NO_TICK) && m->failure == 0; "
+            "pass++) {"
+        ),
+        f"    if (pass == {MAX_PASSES}) fail(m, endless(m));",
+        "    remember(m);",
+        "    remember_inputs(m);",
+        "    due = NO_TICK;",
+        "}",
+        "remember_inputs(m);",
+        "m->changed = false;",
+        "record(m, time);",
+    ]

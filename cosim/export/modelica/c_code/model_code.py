@@ -9,15 +9,21 @@ from typing import Any
 
 import numpy as np
 
-from ..causality.interpreter import Interpreter
-from ..causality.matching import is_input
+from ..causality.analysed_model import AnalysedModel
 from ..causality.schedule import finite_variables, pre_variables, start_value
-from ..model.flat_model import Variable, derivative_name, owning_component
+from ..model.flat_model import Variable, derivative_name, is_input, owning_component
 from ..model.syntax_tree import Body, Name, Solve, SourceLocation, Statement, referenced_variable
 from ..model.traversal import assigned_references, walk
-from .c_values import C_TYPES, CExpression, CValue, c_literal, scalar_value
+from .c_values import (
+    C_TYPES,
+    CExpression,
+    CValue,
+    c_literal,
+    function_definition,
+    scalar_value,
+    uses_variable,
+)
 from .exchange_code import exchange_functions, has_exchange, indicator_lines
-from .formatting import function_definition, uses_variable
 from .functions import FunctionTranslator
 from .header import has_messages, struct_member, struct_members
 from .model_step import continuous_step_body, sampled_step_body
@@ -55,15 +61,15 @@ class ModelCode:
     Collects the failure reasons and the functions of the model while it generates code.
     """
 
-    defaults: Interpreter
+    analysed: AnalysedModel
     reasons: list[str] = field(default_factory=list)
 
     def __post_init__(self) -> None:
-        self.reasons += _HYBRID_REASONS if self.defaults.model.hybrid else _STANDARD_REASONS
+        self.reasons += _HYBRID_REASONS if self.analysed.model.hybrid else _STANDARD_REASONS
         self.model, self.schedule, self.roles = (
-            self.defaults.model,
-            self.defaults.schedule,
-            self.defaults.parameter_roles,
+            self.analysed.model,
+            self.analysed.schedule,
+            self.analysed.parameter_roles,
         )
         self.members = struct_members(self.model)
         self.functions = FunctionTranslator(dict(self.model.functions), self._failure_code)
@@ -182,7 +188,7 @@ class ModelCode:
         for variable in [*constants, *filter(is_input, self.model.variables.values())]:
             lines += _assign_constant(
                 struct_member(variable, f"m->{self.members[variable.name]}"),
-                self.defaults.get(variable.name),
+                self.analysed.values[variable.name],
             )
         return [*lines, "model_parameters(m);", "start_variables(m);"]
 

@@ -5,6 +5,10 @@ The events of a communication step and the integration of continuous states betw
 
 from __future__ import annotations
 
+from ..causality.hybrid import (
+    MAX_EVENTS,
+)
+
 
 def sampled_step_body(clocks: int, event: str) -> list[str]:
     """Generate the body of model_step for a model without continuous states.
@@ -87,3 +91,61 @@ def _multi_clock_loop(clocks: int, tick: list[str]) -> list[str]:
         f"for (int k = 0; k < {clocks}; k++) m->clock[k].ticks += due[k];",
     ]
     return ["for (;;) {", *("    " + line for line in lines), "}"]
+
+
+def hybrid_step_body(clocks: int, continuous: bool, inputs_first: bool) -> list[str]:
+    """Generate the body of model_step.
+
+    `inputs_first`: changes of inputs are an event before a tick at the same time.
+    """
+    lines = ["const double end = time + step_size;", "m->failure = 0;"]
+    tick = ["const bool tick = false;", *["const double target = end;"] * continuous]
+    if clocks:
+        tick = [
+            f"bool due[{clocks}];",
+            f"const double next = next_event(m->clock, {clocks}, due);",
+            f"const bool tick = next < end - TOLERANCE * shortest_period(m->clock, {clocks});",
+            "const double target = tick ? next : end;",
+        ]
+    loop, at_start = [*tick], "count == 0"
+    if clocks:
+        loop += [
+            (
+                "const bool at_start = tick && next <= time + TOLERANCE * "
+                f"shortest_period(m->clock, {clocks});"
+            )
+        ] * (continuous or not inputs_first)
+        at_start += " && !at_start" * (not inputs_first)
+    input_event = f"if ({at_start} && (m->changed || inputs_changed(m)))"
+    loop += (
+        [f"{input_event} {{", "    event(m, time, NO_TICK);", "    m->event_time = -INFINITY;", "}"]
+        if inputs_first
+        else [f"{input_event} event(m, time, NO_TICK);"]
+    )
+    if continuous:
+        lines.append("double reached = time;")
+        loop += [
+            (
+                f"const bool crossing = {'!at_start && ' * bool(clocks)}advance(m, reached, "
+                "target, &reached);"
+            ),
+            "if (m->failure != 0) break;",
+            "if (crossing) {",
+            "    double z[RELATIONS];",
+            f"    if (count == {MAX_EVENTS}) fail(m, CHATTERING[crossed(m, reached, z)]);",
+            "    else event(m, reached, NO_TICK);",
+            "    continue;",
+            "}",
+        ]
+    loop += ["if (!tick) break;"]
+    if clocks:
+        loop += [
+            "event(m, target, due);",
+            f"for (int k = 0; k < {clocks}; k++) m->clock[k].ticks += due[k];",
+        ]
+    lines += [
+        "for (int count = 0; m->failure == 0; count++) {",
+        *("    " + line for line in loop),
+        "}",
+    ]
+    return [*lines, "if (m->failure == 0) event(m, end, NO_TICK);", "return REASONS[m->failure];"]

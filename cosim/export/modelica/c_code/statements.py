@@ -5,7 +5,7 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass, replace
 
-from ..external.calls import call_signature
+from ..external.c_files import call_signature
 from ..model import syntax_tree
 from ..model.syntax_tree import Body, Expression, Statement, raise_model_error
 from ..model.traversal import assigned_references, composed_asserts, read_references, variable_names

@@ -7,10 +7,12 @@ sets at a tick; the clocked equations remain equations.
 
 from __future__ import annotations
 
+from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
-from ..model.flat_model import SAMPLED, Equation, Model, Variable, internal_variable
+from ..model.builtin_functions import CLOCKED_OPERATORS, PRE_OPERATORS, ROUNDINGS
+from ..model.flat_model import SAMPLED, Equation, Model, Variable, internal_variable, is_input
 from ..model.syntax_tree import (
     Array,
     Assign,
@@ -28,9 +30,8 @@ from ..model.syntax_tree import (
     raise_model_error,
     referenced_variable,
 )
-from ..model.traversal import has_builtin, variable_names
+from ..model.traversal import assigned_references, has_builtin, variable_names, walk
 from .clock_inference import (
-    CLOCKED_OPERATORS,
     SECTIONS,
     ClockInference,
     Rate,
@@ -39,7 +40,6 @@ from .clock_inference import (
     is_sampler,
     samplers,
 )
-from .jumps import JumpSearch
 
 
 def resolve_clocks(model: Model) -> Model:
@@ -266,3 +266,83 @@ class _Replacement:
             enumeration="",
             variability="continuous",
         )
+
+
+_JUMPING = (
+    *CLOCKED_OPERATORS,
+    *PRE_OPERATORS,
+    *ROUNDINGS,
+    "sample",
+    "initial",
+    "delay",
+    "sign",
+)
+
+
+class JumpSearch:
+    """Dependences of the variables of a model, through all equations that contain them.
+
+    States, inputs and parameters depend on nothing here.
+    """
+
+    def __init__(self, model: Model):
+        self._model = model
+        calls = (
+            item
+            for item in walk(model.equations)
+            if isinstance(item, Builtin) and item.name == "der"
+        )
+        ends = {
+            referenced_variable(call.arguments[0])
+            for call in calls
+            if variable_names(call.arguments)
+        }
+        ends |= {
+            v.name
+            for v in model.variables.values()
+            if is_input(v) or v.variability in ("parameter", "constant")
+        }
+        self._ends = ends
+        self._assigned = {
+            referenced_variable(target)
+            for target in assigned_references((model.whens, model.algorithms))
+        }
+        self._equations: dict[str, list[Any]] = {}
+        for equation in model.equations:
+            for name in variable_names(equation):
+                self._equations.setdefault(name, []).append(equation)
+
+    def may_jump(self, expression: Expression) -> bool:
+        """Return whether the value of an expression can jump at an event that is not a change of an input."""
+        return any(self._jumps(tree) for tree in self._dependences(expression))
+
+    def is_held(self, expression: Expression) -> bool:
+        """Return whether an expression depends on a value that `hold()` keeps."""
+        return any(has_builtin(tree, "hold") for tree in self._dependences(expression))
+
+    def _dependences(self, expression: Expression) -> Iterator[Any]:
+        """Yield the expression, and all equations that contain variables on which it depends."""
+        pending, seen = [expression], set(self._ends)
+        while pending:
+            tree = pending.pop()
+            yield tree
+            for name in variable_names(tree) - seen:
+                seen.add(name)
+                pending += self._equations.get(name, ())
+
+    def _jumps(self, tree: Any) -> bool:
+        names = variable_names(tree) - self._ends
+        discrete = any(
+            name in self._assigned or _is_discrete(name, self._model.variables) for name in names
+        )
+        return (
+            discrete
+            or has_builtin(tree, *_JUMPING)
+            or any(isinstance(item, If) for item in walk(tree))
+        )
+
+
+def _is_discrete(name: str, variables: Mapping[str, Any]) -> bool:
+    return name in variables and (
+        variables[name].type != "Real" or variables[name].variability != "continuous"
+    )

@@ -16,10 +16,11 @@ equation determines `pre()` of a variable that equations determine. In such a mo
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
+from ..model.builtin_functions import PRE_OPERATORS, ROUNDINGS
 from ..model.flat_model import (
     SAMPLED,
     Delay,
@@ -29,6 +30,7 @@ from ..model.flat_model import (
     Relation,
     Variable,
     internal_variable,
+    is_input,
     previous_name,
 )
 from ..model.syntax_tree import (
@@ -49,15 +51,14 @@ from ..model.syntax_tree import (
     referenced_variable,
 )
 from ..model.traversal import (
-    PRE_OPERATORS,
     assigned_references,
     has_builtin,
     rewrite,
     rewrite_outermost,
+    to_text,
     variable_names,
     walk,
 )
-from .matching import is_input
 
 _SECTIONS = (
     "equations",
@@ -68,7 +69,6 @@ _SECTIONS = (
     "initial_algorithms",
 )
 _COMPARISONS = ("<", "<=", ">", ">=")
-_ROUNDINGS = ("floor", "ceil", "integer", "div", "mod", "rem")
 
 
 def prepare_hybrid(model: Model) -> Model:
@@ -247,7 +247,7 @@ class _Preparation:
         """Return whether a node rounds a value that changes between events."""
         return (
             isinstance(node, Builtin)
-            and node.name in _ROUNDINGS
+            and node.name in ROUNDINGS
             and self._changes_between_events(node.arguments)
         )
 
@@ -362,3 +362,35 @@ def _remembered(section: Any) -> set[str]:
         for call in calls
         if isinstance(call.arguments[0], Name | Index)
     }
+
+
+#: evaluations of the equations in an event, and events in a communication step
+MAX_PASSES, MAX_EVENTS = 100, 100_000
+#: events at a distance (s) up to this one are at the same time for clocked sample() operators
+SAME_TIME = 1e-9
+#: number of stored values of the argument of a delay()
+PAST_VALUES = 2048
+
+
+def iterated_names(hybrid: Hybrid) -> Sequence[str]:
+    """Return the variables that can require another evaluation in an event."""
+    return list(
+        dict.fromkeys((*hybrid.iterated, *(relation.name for relation in hybrid.relations)))
+    )
+
+
+def endless_reason(hybrid: Hybrid, name: str) -> str:
+    """Return the message of an event iteration that does not end, because a variable changes in each evaluation."""
+    condition = next(
+        (to_text(relation.condition) for relation in hybrid.relations if relation.name == name),
+        name,
+    )
+    return f"the event iteration does not end: {condition} changes in each evaluation"
+
+
+def chattering_reason(relation: Relation) -> str:
+    """Return the message of too many events in a communication step, the last one by this relation."""
+    return (
+        f"too many events in one step (chattering): {to_text(relation.condition)} changes again "
+        "and again"
+    )

@@ -1,190 +1,147 @@
-"""Matching: assignment of each continuous equation to the variable that it defines.
-
-Equations are not solved symbolically. Therefore one side must be a variable (`y = f(...)`, or a
-connection `a = b`).
-"""
+"""Maximum matching of scalar equations and unknowns, and the strongly connected components of the matched system."""
 
 from __future__ import annotations
 
-from collections.abc import Collection, Iterable, Mapping
-from itertools import product
-from math import prod
+from collections.abc import Collection, Hashable, Sequence
+from typing import TypeVar
 
-from ..model.flat_model import Equation, Model, Variable, previous_name
-from ..model.syntax_tree import (
-    Assign,
-    Builtin,
-    Colon,
-    Expression,
-    Index,
-    Literal,
-    Name,
-    raise_model_error,
-)
-
-#: a scalar: variable name and row-major index of the element
-ScalarKey = tuple[str, int]
+Key = TypeVar("Key", bound=Hashable)
 
 
-def scalar_keys(variables: Mapping[str, Variable], reference: Name | Index) -> set[ScalarKey]:
-    """Return the scalars that a reference denotes.
+def match(
+    candidates: Sequence[Sequence[Key]], optional: Sequence[Collection[Key]] = ()
+) -> dict[int, Key]:
+    """Assign an unknown to each equation, if possible.
 
-    With a non-literal subscript, all elements of the variable.
-    """
-    name = reference if isinstance(reference, Name) else reference.base
-    if not isinstance(name, Name) or (variable := variables.get(name.name)) is None:
-        return set()
-    shape = variable.shape
-    if isinstance(reference, Name) or not all(
-        isinstance(s, Literal | Colon) for s in reference.subscripts
-    ):
-        return {(name.name, k) for k in range(prod(shape))}
-    literals = [int(s.number) - 1 if isinstance(s, Literal) else None for s in reference.subscripts]
-    literals += [None] * (len(shape) - len(literals))
-    indices = [
-        range(n) if k is None else range(k, k + 1) for k, n in zip(literals, shape, strict=False)
-    ]
-    return {(name.name, _flat_index(index, shape)) for index in product(*indices)}
-
-
-def _flat_index(index: Iterable[int], shape: Iterable[int]) -> int:
-    result = 0
-    for k, n in zip(index, shape, strict=True):
-        result = result * n + k
-    return result
-
-
-def match_equations(model: Model, assigned: Collection[str]) -> list[Assign]:
-    """Match the continuous equations with variables.
-
-    An equation between two variables (`a = b`) defines the one that no other equation defines. It
-    is matched after the other equations have been matched.
+    Assignments without an alternative are made first, so that a system that can be solved in
+    sequence is.
 
     Args:
-        model: The flat model.
-        assigned: The variables that when-clauses and algorithms assign.
+        candidates: For each equation the unknowns for which it can be solved, the preferred ones
+            first.
+        optional: Groups of unknowns that have a value anyway. They are assigned only to equations
+            that cannot be assigned otherwise, those of the first group first.
 
     Returns:
-        The equations as assignments, in the order of the model.
-
-    Raises:
-        InputError: An equation defines no variable, or a variable has no equation.
+        Equation number -> unknown; equations that cannot be matched are missing.
     """
-    defined = {key for name in assigned for key in scalar_keys(model.variables, Name(name))}
-    for name in model.hybrid.remembered if model.hybrid else ():
-        defined |= scalar_keys(model.variables, Name(previous_name(name)))
-    for variable in model.variables.values():
-        if variable.variability in ("constant", "parameter") or is_input(variable):
-            defined |= scalar_keys(model.variables, Name(variable.name))
-    pending, matched = list(enumerate(model.equations)), dict[int, Assign]()
-    while pending:
-        unmatched = []
-        for number, equation in pending:
-            candidates = _candidates(model, equation, defined)
-            if len(candidates) == 1:
-                defined |= scalar_keys(model.variables, candidates[0].target)
-                matched[number] = candidates[0]
-            else:
-                unmatched.append((number, equation))
-        if len(unmatched) == len(pending):
-            _raise_unmatched([equation for _, equation in unmatched], model, defined)
-        pending = unmatched
-    _check_complete(model, defined)
-    return [matched[number] for number in sorted(matched)]
+    excluded = {key for group in optional for key in group}
+    options = [[key for key in keys if key not in excluded] for keys in candidates]
+    matched = _match_in_sequence(options)
+    owner = {key: number for number, key in matched.items()}
+    groups: list[Collection[Key]] = [[], *optional]
+    for group in groups:
+        excluded -= set(group)
+        options = [[key for key in keys if key not in excluded] for keys in candidates]
+        for number in range(len(options)):
+            if number not in matched:
+                _augment(number, options, matched, owner)
+    return matched
 
 
-def is_input(variable: Variable) -> bool:
-    """Return whether a variable is an input of the model itself.
+def _match_in_sequence(candidates: Sequence[Sequence[Key]]) -> dict[int, Key]:
+    """Repeat: assign an unknown to the only equation that contains it, or an equation to its only free unknown."""
+    equations_of: dict[Key, set[int]] = {}
+    for number, keys in enumerate(candidates):
+        for key in keys:
+            equations_of.setdefault(key, set()).add(number)
+    free = [set(keys) for keys in candidates]
+    matched: dict[int, Key] = {}
 
-    Neither one of a component nor a protected connector.
-    """
-    return variable.causality == "input" and variable.top_level and not variable.protected
+    def assign(number: int, key: Key) -> None:
+        matched[number] = key
+        for equation in equations_of.pop(key):
+            free[equation].discard(key)
+        for unknown in free[number]:
+            equations_of[unknown].discard(number)
+        free[number] = set()
+
+    progress = True
+    while progress:
+        progress = False
+        for number in range(len(candidates)):
+            if number not in matched and len(free[number]) == 1:
+                assign(number, next(iter(free[number])))
+                progress = True
+        for key in [key for key, numbers in equations_of.items() if len(numbers) == 1]:
+            if key in equations_of and len(equations_of[key]) == 1:
+                assign(next(iter(equations_of[key])), key)
+                progress = True
+    return matched
 
 
-def _candidates(model: Model, equation: Equation, defined: Collection[ScalarKey]) -> list[Assign]:
-    """Return the assignments of an undefined variable that are equivalent to the equation.
-
-    None, one or two.
-    """
-    sides = ((equation.left, equation.right), (equation.right, equation.left))
-    return [
-        Assign(side, other, equation.where)
-        for side, other in sides
-        if isinstance(side, Name | Index)
-        and (keys := scalar_keys(model.variables, side))
-        and not keys & set(defined)
-    ]
-
-
-def _raise_unmatched(
-    equations: list[Equation], model: Model, defined: Collection[ScalarKey]
+def _augment(
+    start: int, candidates: Sequence[Sequence[Key]], matched: dict[int, Key], owner: dict[Key, int]
 ) -> None:
-    equation = equations[0]
-    if _candidates(model, equation, defined):
-        names = ", ".join(
-            sorted(
-                {
-                    side.name
-                    for e in equations
-                    for side in (e.left, e.right)
-                    if isinstance(side, Name)
-                }
-            )
-        )
-        raise_model_error(
-            (
-                "these variables are only connected to each other, no equation gives them a "
-                f"value: {names}"
-            ),
-            equation.where,
-        )
-    raise_model_error(
-        (
-            "this equation defines no variable: one side must be a variable, or der() of one, that "
-            "no other equation defines"
-        ),
-        equation.where,
-    )
+    """Find an augmenting path from an unmatched equation by breadth-first search."""
+    reached_from: dict[Key, int] = {}
+    queue = [start]
+    for number in queue:
+        for key in candidates[number]:
+            if key in reached_from:
+                continue
+            reached_from[key] = number
+            if key in owner:
+                queue.append(owner[key])
+                continue
+            _flip(key, start, reached_from, matched, owner)
+            return
 
 
-def _check_complete(model: Model, defined: Collection[ScalarKey]) -> None:
-    for variable in model.variables.values():
-        if not scalar_keys(model.variables, Name(variable.name)) <= set(defined):
-            raise_model_error(f"no equation gives {variable.name} a value", variable.where)
+def _flip(
+    key: Key,
+    start: int,
+    reached_from: dict[Key, int],
+    matched: dict[int, Key],
+    owner: dict[Key, int],
+) -> None:
+    while True:
+        number = reached_from[key]
+        previous = matched.get(number)
+        matched[number], owner[key] = key, number
+        if number == start or previous is None:
+            return
+        key = previous
 
 
-def match_initial_equations(model: Model, assigned: Collection[str]) -> list[Assign]:
-    """Match the initial equations with variables; an equation `pre(x) = ...` defines x.
+def strongly_connected_components(successors: Sequence[Collection[int]]) -> list[list[int]]:
+    """Return the strongly connected components of a graph in reverse topological order (Tarjan's algorithm)."""
+    index: dict[int, int] = {}
+    low: dict[int, int] = {}
+    stack: list[int] = []
+    on_stack: set[int] = set()
+    components: list[list[int]] = []
+    for root in range(len(successors)):
+        if root in index:
+            continue
+        work = [(root, iter(sorted(successors[root])))]
+        index[root] = low[root] = len(index)
+        stack.append(root)
+        on_stack.add(root)
+        while work:
+            node, remaining = work[-1]
+            child = next(remaining, None)
+            if child is None:
+                work.pop()
+                if work:
+                    low[work[-1][0]] = min(low[work[-1][0]], low[node])
+                if low[node] == index[node]:
+                    components.append(_pop_component(node, stack, on_stack))
+            elif child not in index:
+                index[child] = low[child] = len(index)
+                stack.append(child)
+                on_stack.add(child)
+                work.append((child, iter(sorted(successors[child]))))
+            elif child in on_stack:
+                low[node] = min(low[node], index[child])
+    return components
 
-    Args:
-        model: The flat model.
-        assigned: The continuous states and the variables that when-clauses and algorithms assign.
 
-    Returns:
-        The initial equations as assignments.
-
-    Raises:
-        InputError: An initial equation defines none of these variables.
-    """
-    return [_initial_assignment(model, equation, assigned) for equation in model.initial_equations]
-
-
-def _initial_assignment(model: Model, equation: Equation, assigned: Collection[str]) -> Assign:
-    assignments = []
-    for side, other in ((equation.left, equation.right), (equation.right, equation.left)):
-        target: Expression = (
-            side.arguments[0] if isinstance(side, Builtin) and side.name == "pre" else side
-        )
-        if isinstance(target, Name | Index) and {
-            name for name, _ in scalar_keys(model.variables, target)
-        } & set(assigned):
-            assignments.append(Assign(target, other, equation.where))
-    if not assignments:
-        raise_model_error(
-            (
-                "one side of an initial equation must be a continuous state, or a variable that a "
-                "when-clause assigns"
-            ),
-            equation.where,
-        )
-    return assignments[0]
+def _pop_component(node: int, stack: list[int], on_stack: set[int]) -> list[int]:
+    component = []
+    while True:
+        member = stack.pop()
+        on_stack.discard(member)
+        component.append(member)
+        if member == node:
+            return sorted(component)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import replace
 from functools import reduce
@@ -13,6 +12,7 @@ import numpy as np
 
 from ..model import syntax_tree
 from ..model.arithmetic import EvaluationError
+from ..model.builtin_functions import BUILTIN_FUNCTIONS
 from ..model.evaluate import Evaluator, convert_to_type
 from ..model.flat_model import Equation, Function, Model
 from ..model.syntax_tree import (
@@ -30,33 +30,14 @@ from ..model.traversal import variable_names
 
 Position = tuple[int, ...]
 
-_MATH_FUNCTIONS = {
-    "sin",
-    "cos",
-    "tan",
-    "asin",
-    "acos",
-    "atan",
-    "sinh",
-    "cosh",
-    "tanh",
-    "exp",
-    "log",
-    "log10",
-    "sqrt",
-}
-_ELEMENTWISE = _MATH_FUNCTIONS | {
-    "ceil",
-    "floor",
-    "abs",
-    "sign",
-    "integer",
-    "noEvent",
-    "homotopy",
-    "pre",
-    "der",
-    "String",
-}
+
+class _ShapeEvaluator(Evaluator):
+    """Evaluator of expressions of which only the shape matters."""
+
+    def _builtin(self, node: Builtin) -> Any:
+        if node.name in ("due", "risen", "past"):
+            return False
+        return super()._builtin(node)
 
 
 class EquationSplitter:
@@ -71,10 +52,7 @@ class EquationSplitter:
             for v in model.variables.values()
             if v.type != "String"
         }
-        flags: defaultdict[tuple[str, int], bool] = defaultdict(bool)
-        self._evaluate = Evaluator(
-            _uncalled(model.functions), {**values, "time": 0.0}, dict(values), flags
-        )
+        self._evaluate = _ShapeEvaluator(_uncalled(model.functions), {**values, "time": 0.0})
 
     def split(self, equation: Equation) -> Iterator[Equation]:
         """Yield one equation for each element.
@@ -192,7 +170,7 @@ class EquationSplitter:
             return replace(node, arguments=(arguments[0], self.element(arguments[1], position)))
         if node.name == "delay":
             return replace(node, arguments=(self.element(arguments[0], position), *arguments[1:]))
-        if node.name in _ELEMENTWISE:
+        if BUILTIN_FUNCTIONS[node.name].is_elementwise:
             return replace(
                 node,
                 arguments=tuple(

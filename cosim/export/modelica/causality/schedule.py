@@ -10,9 +10,11 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, NamedTuple
 
-from ..model.flat_model import Model
+from ..model.builtin_functions import PRE_OPERATORS
+from ..model.flat_model import Model, derivative_name, is_input
+from ..model.scalars import ScalarKey, scalar_keys
 from ..model.syntax_tree import (
     Assign,
     Binary,
@@ -24,30 +26,32 @@ from ..model.syntax_tree import (
     Literal,
     Name,
     Reinit,
+    Statement,
     When,
     referenced_variable,
 )
 from ..model.traversal import (
     assigned_references,
-    pre_references,
+    has_builtin,
+    read_references,
     rewrite,
     rewrite_outermost,
+    variable_names,
     walk,
 )
-from .between_events import BetweenEvents, statements_between_events
 from .continuous_equations import solve_equations, solve_initial_equations
+from .dependency_graph import (
+    Node,
+    algorithm_nodes,
+    filter_statements,
+    make_node,
+    merge_statements,
+    required_nodes,
+    sort_topologically,
+    split_by_target,
+)
 from .hybrid import delay_number
-from .matching import ScalarKey
-from .nodes import algorithm_nodes, filter_statements, make_node, split_by_target
-from .topological_sort import Node, merge_statements, sort_topologically
 from .when_conditions import Clock, WhenConditions, tick_flag
-
-_TRUE, _FALSE = Literal(True, "Boolean"), Literal(False, "Boolean")
-_ZERO = {
-    "Real": Literal(0.0, "Real"),
-    "Integer": Literal(0, "Integer"),
-    "Boolean": Literal(False, "Boolean"),
-}
 
 
 @dataclass(frozen=True)
@@ -64,6 +68,113 @@ class Schedule:
     between: BetweenEvents
 
 
+class BetweenEvents(NamedTuple):
+    """Statements that are executed between events.
+
+    Attributes:
+        derivatives: Those that compute the derivatives of the states and the arguments of delay(),
+            with constant inputs.
+        indicators: Those that compute the operands of relations, with constant inputs.
+        continuous: All variables that change between events, with changing inputs (Model Exchange).
+        limits: Those that compute the values of continuous variables before an event, for pre(),
+            with constant inputs.
+    """
+
+    derivatives: Body
+    indicators: Body
+    continuous: Body
+    limits: Body = ()
+
+
+def statements_between_events(
+    model: Model, continuous: Iterable[Statement], held: set[ScalarKey]
+) -> BetweenEvents:
+    """Return the statements between events.
+
+    Args:
+        model: The model.
+        continuous: Its solved equations.
+        held: The scalars that keep their values between events.
+    """
+    statements = [s for s in continuous if not (model.hybrid and _is_discrete(model, s))]
+    nodes = [make_node(model, (_without_ticks(statement),)) for statement in statements]
+    nodes += [
+        node for body in model.algorithms for node in algorithm_nodes(model, body, lambda _: ())
+    ]
+    for node in nodes:
+        node.reads -= held
+    required = {
+        key
+        for name in model.states
+        for key in scalar_keys(model.variables, Name(derivative_name(name)))
+    }
+    order = sort_topologically(nodes)
+    if not model.hybrid:
+        return BetweenEvents(
+            merge_statements(required_nodes(order, required)), (), merge_statements(order)
+        )
+    required |= {(delay.name, 0) for delay in model.hybrid.delays}
+    operands = {
+        key
+        for reference in read_references(
+            tuple(relation.condition for relation in model.hybrid.relations)
+        )
+        for key in scalar_keys(model.variables, reference)
+    }
+    varying = _varying(model, order, model.states)
+    inputs = [v.name for v in model.variables.values() if is_input(v)]
+    remembered = {
+        key
+        for name in model.hybrid.remembered
+        if model.variables[name].type == "Real"
+        and name not in {*model.states, *inputs, *model.hybrid.iterated}
+        for key in scalar_keys(model.variables, Name(name))
+    }
+    return BetweenEvents(
+        merge_statements(required_nodes(varying, required)),
+        merge_statements(required_nodes(varying, operands)),
+        merge_statements(_varying(model, order, [*model.states, *inputs])),
+        merge_statements(required_nodes(varying, remembered)),
+    )
+
+
+def _varying(model: Model, order: Iterable[Node], sources: Iterable[str]) -> list[Node]:
+    """Return the sorted nodes whose values change between events, because they depend on the variables `sources` or on time."""
+    changing = {key for name in sources for key in scalar_keys(model.variables, Name(name))}
+    nodes = []
+    for node in order:
+        if (
+            node.reads & changing
+            or "time" in variable_names(node.statements)
+            or has_builtin(node.statements, "past")
+        ):
+            changing |= node.writes
+            nodes.append(node)
+    return nodes
+
+
+def _without_ticks(statement: Statement) -> Statement:
+    def change(node: Any) -> Any:
+        return (
+            Literal(False, "Boolean") if isinstance(node, Builtin) and node.name == "due" else node
+        )
+
+    result: Statement = rewrite(statement, change)
+    return result
+
+
+def _is_discrete(model: Model, statement: Statement) -> bool:
+    return isinstance(statement, Assign) and model.variables[statement.name].type != "Real"
+
+
+_TRUE, _FALSE = Literal(True, "Boolean"), Literal(False, "Boolean")
+_ZERO = {
+    "Real": Literal(0.0, "Real"),
+    "Integer": Literal(0, "Integer"),
+    "Boolean": Literal(False, "Boolean"),
+}
+
+
 def start_value(model: Model, name: str) -> Expression:
     """Return the start expression of a variable.
 
@@ -73,9 +184,19 @@ def start_value(model: Model, name: str) -> Expression:
     return variable.start or _ZERO.get(variable.type, Literal(1, "Enumeration"))
 
 
+def declared_value(model: Model, name: str) -> Expression:
+    """Return the binding of a parameter, or its start expression without one."""
+    binding = model.variables[name].binding
+    return start_value(model, name) if binding is None else binding
+
+
 def pre_variables(model: Model, body: Body) -> list[str]:
     """Return the variables of which the statements use the value before the event, in order of declaration."""
-    used = {name for name, _ in pre_references(body)}
+    used = {
+        referenced_variable(item.arguments[0])
+        for item in walk(body)
+        if isinstance(item, Builtin) and item.name in PRE_OPERATORS
+    }
     return [name for name in model.variables if name in used]
 
 

@@ -5,15 +5,15 @@ Unknown elements are errors, they are never ignored.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from itertools import product
 from typing import Any
 
 from ..model import flat_model, syntax_tree
 from ..model.syntax_tree import Body, Expression, SourceLocation, Statement, raise_model_error
 from .expression_reader import Json, split_tagged
 from .statement_reader import StatementReader, message_parts
-from .unrolling import unroll_equations
 
 
 class ModelReader(StatementReader):
@@ -344,3 +344,50 @@ def _is_fixed(flags: list[bool] | bool | None) -> bool | None:
     An array is fixed if all its elements are.
     """
     return all(flags) if isinstance(flags, list) else flags
+
+
+def unroll_equations(json: Json, section: str) -> Iterator[tuple[int, Json]]:
+    """Generate the equations of all for-equations that may have placeholders.
+
+    Args:
+        json: rumoca's document of the flat model.
+        section: The key of the for-equations.
+
+    Yields:
+        The index in the list of equations, and the equation that belongs there.
+    """
+    for family in json[section]:
+        if not family["interiors_materialized"]:
+            yield from _unroll(family)
+
+
+def _unroll(family: Json) -> Iterator[tuple[int, Json]]:
+    """Generate the equations for all combinations of the loop indices.
+
+    The last index varies fastest.
+    """
+    binders = family["domain"]["binders"]
+    ranges = [
+        range(b["lower"], b["upper"] + (1 if b["step"] > 0 else -1), b["step"]) for b in binders
+    ]
+    bodies = family["template"]["body"]
+    for number, (indices, body) in enumerate(product(product(*ranges), bodies)):
+        yield (
+            family["first_equation_index"] + number,
+            _substitute_indices(body, dict(zip(_index_names(binders), indices, strict=True))),
+        )
+
+
+def _index_names(binders: list[Json]) -> list[str]:
+    return [binder["display_name"] for binder in binders]
+
+
+def _substitute_indices(node: Any, indices: Mapping[str, int]) -> Any:
+    """Return the tree with the loop indices replaced by numbers."""
+    if isinstance(node, list):
+        return [_substitute_indices(item, indices) for item in node]
+    if not isinstance(node, dict):
+        return node
+    if "VarRef" in node and (number := indices.get(node["VarRef"]["name"]["name"])) is not None:
+        return {"Literal": {"value": {"Integer": number}}}
+    return {key: _substitute_indices(value, indices) for key, value in node.items()}

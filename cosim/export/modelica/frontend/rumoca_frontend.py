@@ -7,33 +7,41 @@ a package (`within P;`) is loaded as a member of this package.
 
 from __future__ import annotations
 
+import gzip
 import json
 import re
+import shutil
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field
 from hashlib import sha256
 from pathlib import Path
+from secrets import token_hex
 from typing import Any
 
-from ....core.errors import InputError, Problem, did_you_mean
-from .flat_cache import link_libraries, read_document, store_document
-from .libraries import find_libraries, library_folders
+from ....core.errors import CosimError, InputError, Problem, did_you_mean, write_error
+from ....core.resources import cache_directory
+from ....results.files import writing_atomically
+from .libraries import Library, find_libraries, library_folders
 from .messages import to_problems, to_syntax_problem
+from .model_files import (
+    ModelicaSources,
+    _is_member,
+    _with_package_files,
+    display_name,
+    find_packages,
+    model_name,
+    read_source,
+    replace_terminate,
+    select_used_files,
+)
 from .rumoca_client import run_rumoca
-from .sources import ModelicaSources, display_name
-from .termination import replace_terminate
-from .used_files import select_used_files
 
 RUMOCA_VERSION = "0.10.2"
-#: largest Modelica file (bytes)
-MAX_SOURCE_SIZE = 1 << 24
 
 #: name of a model with values of parameters; it extends the model of the file
 MODIFIED_MODEL = "CosimModifiedModel"
-
-_PACKAGE_FILE = "package.mo"
 _REFERENCE = re.compile(r"[A-Za-z_]\w*(\.[A-Za-z_]\w*)*")
-_WITHIN = re.compile(r"^\s*within\s+([\w.]+)\s*;", re.MULTILINE)
 
 
 @dataclass(frozen=True)
@@ -203,26 +211,6 @@ def _flatten(
     return flat
 
 
-def read_source(path: Path) -> str:
-    """Return the text of a Modelica file.
-
-    Raises:
-        InputError: There is no such file, it is too large, or it is not UTF-8 text.
-    """
-    if not path.is_file():
-        raise InputError(Problem("no such Modelica file", str(path)))
-    if (size := path.stat().st_size) > MAX_SOURCE_SIZE:
-        raise InputError(
-            Problem(f"the file has {size} bytes, expected at most {MAX_SOURCE_SIZE}", str(path))
-        )
-    try:
-        return path.read_text(encoding="utf-8")
-    except UnicodeDecodeError as error:
-        raise InputError(
-            Problem(f"the file is not UTF-8 text: {error.reason} at byte {error.start}", str(path))
-        ) from None
-
-
 def _version_problem(found: str | None) -> str:
     if found is None:
         return 'Modelica needs the compiler front end rumoca: pip install "fmi-cosim[build]"'
@@ -232,53 +220,54 @@ def _version_problem(found: str | None) -> str:
     )
 
 
-def model_name(path: Path, text: str, model: str | None) -> str:
-    """Return the full name of a model; the default is the model with the name of the file.
+def read_document(key: Sequence[Any]) -> str | None:
+    """Return the flat model with a key as JSON text, or None if the cache does not contain it undamaged."""
+    with suppress(OSError, EOFError, ValueError):
+        return gzip.decompress(_document_file(key).read_bytes()).decode()
+    return None
 
-    Args:
-        path: The Modelica file.
-        text: Its contents.
-        model: The name of the model, or None.
+
+def store_document(key: Sequence[Any], document: str) -> None:
+    """Store a flat model under a key, if the cache can be written."""
+    with suppress(CosimError), writing_atomically(_document_file(key)) as temporary:
+        temporary.write_bytes(gzip.compress(document.encode(), compresslevel=1, mtime=0))
+
+
+def link_libraries(libraries: Sequence[Library]) -> Path:
+    """Return a folder that contains a link to each library under its plain name and nothing else.
+
+    The folder depends on names and places of the libraries only, so that names of files in messages
+    of the front end are the same in each call.
+
+    Raises:
+        InputError: The cache cannot be written.
+        OutputError: The disk is full or defective.
     """
-    within = _WITHIN.search(text)
-    own = path.parent.name if path.name == _PACKAGE_FILE else path.stem
-    return model or (f"{within[1]}.{own}" if within else own)
+    links = {library.link_name: str(library.path) for library in libraries}
+    folder = _folder() / f"libraries-{_digest(links)}"
+    if folder.is_dir():
+        return folder
+    temporary = folder.with_name(f"{folder.name}.{token_hex(8)}")
+    try:
+        temporary.mkdir(parents=True)
+        for name, target in links.items():
+            (temporary / name).symlink_to(target)
+        with suppress(OSError):  # another process has created it
+            temporary.rename(folder)
+    except OSError as error:
+        raise write_error(f"cannot write {temporary}: {error}", error) from error
+    finally:
+        shutil.rmtree(temporary, ignore_errors=True)
+    return folder
 
 
-def _is_member(path: Path, text: str) -> bool:
-    """Return whether a file belongs to a package that has further files."""
-    is_package = path.name == _PACKAGE_FILE and any(
-        file != path for file in path.parent.rglob("*.mo")
-    )
-    return is_package or _WITHIN.search(text) is not None
+def _folder() -> Path:
+    return cache_directory() / "modelica"
 
 
-def readable_files(path: Path) -> list[Path]:
-    """Return a Modelica file and the files of all packages that it may use."""
-    path = path.resolve()
-    return _with_package_files(path, find_packages(path, read_source(path)))
+def _document_file(key: Sequence[Any]) -> Path:
+    return _folder() / f"{_digest(key)}.json.gz"
 
 
-def needed_files(path: Path) -> list[Path]:
-    """Return a Modelica file and the files of packages that its classes need.
-
-    See `select_used_files`.
-    """
-    path = path.resolve()
-    return select_used_files(path, find_packages(path, read_source(path)))
-
-
-def _with_package_files(path: Path, packages: Sequence[Path]) -> list[Path]:
-    return [
-        path,
-        *(file for package in packages for file in sorted(package.rglob("*.mo")) if file != path),
-    ]
-
-
-def find_packages(path: Path, text: str) -> list[Path]:
-    """Return the folders of the packages that a file may use, for the file and its contents `text`."""
-    folder = path.parent
-    if _is_member(path, text):
-        while (folder / _PACKAGE_FILE).is_file():
-            folder = folder.parent
-    return sorted(child for child in folder.iterdir() if (child / _PACKAGE_FILE).is_file())
+def _digest(value: Any) -> str:
+    return sha256(json.dumps(value).encode()).hexdigest()[:24]

@@ -18,7 +18,7 @@ from ..model.syntax_tree import (
 )
 from ..model.traversal import variable_names
 from .expression_reader import ExpressionReader, Json, is_object_constructor, split_tagged
-from .termination import MARK
+from .model_files import MARK
 
 _DESTRUCTOR = re.compile(
     r'\bfunction\s+destructor\b.*?\bexternal\s*(?:"C"\s*)?(\w+)\s*\(', re.DOTALL

@@ -2,33 +2,26 @@
 
 from __future__ import annotations
 
-import math
 import operator
-from collections import ChainMap
-from collections.abc import Callable, Mapping, MutableMapping
-from dataclasses import dataclass, field
+from collections.abc import Mapping, MutableMapping
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from . import syntax_tree
 from .arithmetic import (
-    BUILTINS,
     OPERATORS,
     EvaluationError,
     check_int32,
-    divide,
     elementwise,
-    largest_ratio,
     matrix_product,
-    solve_linear,
     to_python_scalar,
 )
+from .builtin_functions import BUILTIN_FUNCTIONS
 from .flat_model import Function, FunctionVariable
 from .syntax_tree import Body, Expression
 
-#: constants of newton.h
-NEWTON_ITERATIONS, SMALLEST_FRACTION, RESIDUAL_ROUNDING = 100, 1e-6, 1e-13
 DTYPES = {"Real": np.float64, "Integer": np.int64, "Enumeration": np.int64, "Boolean": np.bool_}
 
 
@@ -51,14 +44,6 @@ def convert_to_type(value: Any, type_name: str, shape: tuple[int, ...]) -> Any:
     )
 
 
-def _scale_of(derivatives: list[float], values: list[float]) -> float:
-    """Return the scale of a residual, the sum of |derivative| (1 + |unknown|) in the order of newton.h."""
-    scale = 0.0
-    for derivative, value in zip(derivatives, values, strict=True):
-        scale += abs(derivative) * (1 + abs(value))
-    return scale
-
-
 @dataclass
 class Evaluator:
     """Evaluator of expressions and statements in one scope: the model, or the body of a function.
@@ -69,16 +54,6 @@ class Evaluator:
     functions: Mapping[str, Function]
     #: variable -> current value
     values: MutableMapping[str, Any]
-    #: variable -> value before the current event
-    pre_values: MutableMapping[str, Any] = field(default_factory=dict)
-    #: ("due", k): clock k ticks in the current event; ("risen", k): edge detector k has detected a
-    #: rising edge
-    event_flags: dict[tuple[str, int], bool] = field(default_factory=dict)
-    #: edge detector -> its condition at the previous event
-    previous_conditions: dict[int, bool] = field(default_factory=dict)
-    #: value of the argument of delay() number k at a past time
-    past: Callable[[int, float], float] = lambda _index, _time: 0.0
-
     # statements
 
     def execute(self, body: Body) -> None:
@@ -121,41 +96,6 @@ class Evaluator:
         if shadowed is not None:
             self.values[node.index] = shadowed
 
-    def _solve(self, node: syntax_tree.Solve) -> None:
-        """Solve a system of equations as in newton.h."""
-        fraction, merit, scale, changes = 1.0, math.inf, [math.inf] * len(node.unknowns), None
-        for _ in range(NEWTON_ITERATIONS):
-            residual = [float(self(item)) for item in node.residuals]
-            if changes and not (
-                largest_ratio(residual, scale) <= merit
-                or largest_ratio(residual, scale) <= RESIDUAL_ROUNDING
-            ):
-                fraction /= 2
-                for unknown, change in zip(node.unknowns, changes, strict=True):
-                    self._store(unknown, float(self(unknown)) + fraction * change)
-                if not fraction > SMALLEST_FRACTION:
-                    break
-                continue
-            jacobian = [[float(self(item)) for item in row] for row in node.jacobian]
-            values = [float(self(unknown)) for unknown in node.unknowns]
-            scale = [_scale_of(row, values) for row in jacobian]
-            merit, fraction = largest_ratio(residual, scale), 1.0
-            changes = solve_linear(jacobian, residual)
-            if changes is None:
-                break
-            largest = 0.0
-            for unknown, before, change in zip(node.unknowns, values, changes, strict=True):
-                value = before - change
-                self._store(unknown, value)
-                ratio = divide(abs(change), 1 + abs(value))
-                if not ratio <= largest:
-                    largest = ratio
-            if largest <= 1e-11:
-                return
-            if not math.isfinite(largest):
-                break
-        raise EvaluationError("a system of equations has no solution", node.where)
-
     def _while(self, node: syntax_tree.While) -> None:
         while self(node.condition):
             self.execute(node.body)
@@ -177,13 +117,6 @@ class Evaluator:
             if isinstance(value, bool)
             else str(value)
         )
-
-    def _edgedetector(self, node: syntax_tree.EdgeDetector) -> None:
-        condition = bool(self(node.condition))
-        self.event_flags["risen", node.index] = condition and not self.previous_conditions.get(
-            node.index, True
-        )
-        self.previous_conditions[node.index] = condition
 
     # expressions
 
@@ -304,23 +237,7 @@ class Evaluator:
         )
 
     def _builtin(self, node: syntax_tree.Builtin) -> Any:
-        if node.name in ("due", "risen"):
-            return self.event_flags[node.name, self(node.arguments[0])]
-        if node.name in ("pre", "edge", "change"):
-            return self._evaluate_pre(node)
-        if node.name == "smooth":
-            return self(node.arguments[1])
-        if node.name == "past":
-            return self.past(
-                int(self(node.arguments[0])), self.values["time"] - self(node.arguments[1])
-            )
-        return BUILTINS[node.name](*map(self, node.arguments))
-
-    def _evaluate_pre(self, node: syntax_tree.Builtin) -> Any:
-        previous = Evaluator(self.functions, ChainMap(self.pre_values, self.values))(
-            node.arguments[0]
-        )
-        if node.name == "pre":
-            return previous
-        current = self(node.arguments[0])
-        return (current and not previous) if node.name == "edge" else current != previous
+        evaluate = BUILTIN_FUNCTIONS[node.name].evaluate
+        if evaluate is None:
+            raise KeyError(node.name)
+        return evaluate(*map(self, node.arguments))

@@ -13,7 +13,14 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Protocol
 from typing import Literal as OneOf
 
-from .syntax_tree import Assert, Binary, Body, Expression, SourceLocation, When
+from .syntax_tree import (
+    Assert,
+    Binary,
+    Body,
+    Expression,
+    SourceLocation,
+    When,
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -213,3 +220,11 @@ def previous_name(variable: str) -> str:
 def owning_component(name: str) -> str:
     """Return the component that a variable belongs to, or "" for the model itself."""
     return name.removeprefix("der(").removeprefix("pre(").rpartition(".")[0]
+
+
+def is_input(variable: Variable) -> bool:
+    """Return whether a variable is an input of the model itself.
+
+    Neither one of a component nor a protected connector.
+    """
+    return variable.causality == "input" and variable.top_level and not variable.protected

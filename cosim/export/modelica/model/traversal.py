@@ -1,4 +1,4 @@
-"""Traversal and rewriting of the syntax trees of a flat model."""
+"""Traversal, rewriting and Modelica text of the syntax trees of a flat model."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
+from . import syntax_tree
 from .syntax_tree import (
     Array,
     Assert,
@@ -13,17 +14,14 @@ from .syntax_tree import (
     Builtin,
     Colon,
     Comprehension,
+    Expression,
     Index,
     Literal,
     MultiAssign,
     Name,
     Solve,
     SourceLocation,
-    referenced_variable,
 )
-
-#: operators that use the value of a variable before the current event
-PRE_OPERATORS = ("pre", "edge", "change")
 
 
 def walk(node: Any) -> Iterator[Any]:
@@ -142,13 +140,6 @@ def assigned_references(node: Any) -> Iterator[Name | Index]:
             yield from item.unknowns
 
 
-def pre_references(node: Any) -> Iterator[tuple[str, Builtin]]:
-    """Yield the argument of each pre(), edge() and change() in a tree (the variable name), with the call."""
-    for item in walk(node):
-        if isinstance(item, Builtin) and item.name in PRE_OPERATORS:
-            yield referenced_variable(item.arguments[0]), item
-
-
 def composed_asserts(node: Any) -> list[Assert]:
     """Return the assertions whose message is composed at run time, a warning or that of a `terminate`."""
     asserts = [item for item in walk(node) if isinstance(item, Assert)]
@@ -169,3 +160,31 @@ def has_terminate(node: Any) -> bool:
 def has_builtin(node: Any, *builtins: str) -> bool:
     """Return whether a tree calls one of these built-in functions."""
     return any(isinstance(item, Builtin) and item.name in builtins for item in walk(node))
+
+
+def to_text(node: Expression | Colon) -> str:
+    """Return an expression as Modelica text.
+
+    Operands that are operations themselves are in parentheses.
+    """
+    if isinstance(node, syntax_tree.Literal):
+        return str(node.value).lower() if isinstance(node.value, bool) else str(node.value)
+    if isinstance(node, syntax_tree.Name):
+        return node.name
+    if isinstance(node, syntax_tree.Index):
+        return f"{to_text(node.base)}[{', '.join(map(to_text, node.subscripts))}]"
+    if isinstance(node, syntax_tree.Binary):
+        return f"{_operand(node.left)} {node.operator} {_operand(node.right)}"
+    if isinstance(node, syntax_tree.Unary):
+        return f"{node.operator}{' ' * (node.operator == 'not')}{_operand(node.operand)}"
+    if isinstance(node, syntax_tree.Builtin):
+        return f"{node.name}({', '.join(map(to_text, node.arguments))})"
+    if isinstance(node, syntax_tree.Call):
+        return f"{node.function}({', '.join(map(to_text, node.arguments))})"
+    if isinstance(node, syntax_tree.Array):
+        return f"{{{', '.join(map(to_text, node.elements))}}}"
+    return ":" if isinstance(node, Colon) else "..."
+
+
+def _operand(node: Expression) -> str:
+    return f"({to_text(node)})" if isinstance(node, syntax_tree.Binary) else to_text(node)

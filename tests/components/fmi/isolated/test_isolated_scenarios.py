@@ -16,7 +16,7 @@ from probe_fmus import HEADERS, PROBE_SOURCES
 
 import cosim
 from cosim import cli
-from cosim.components.fmi.isolated.isolated_fmu import IsolatedFmu
+from cosim.components.fmi.isolated import IsolatedFmu
 from cosim.core.errors import InputError
 from cosim.process.sandbox import find_available_sandboxes
 from cosim.scenario import PreparedRun, load

@@ -13,8 +13,8 @@ from fmpy.fmi3 import FMU3Model, FMU3Slave
 
 from cosim.components.fmi import FmuFile
 from cosim.components.fmi.preflight import elf
-from cosim.components.fmi.preflight.fmu_platform import FmuPlatform, current_platform
 from cosim.components.fmi.preflight.functions import standard_functions
+from cosim.components.fmi.preflight.platforms import FmuPlatform, current_platform
 from cosim.core import resources
 from cosim.export.fmu.compiler import find_compiler
 

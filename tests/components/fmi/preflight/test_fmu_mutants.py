@@ -10,8 +10,11 @@ from bad_fmus import Member, members, pack_archive, read_members
 
 from cosim.components.fmi import FmuFile
 from cosim.components.fmi.preflight import elf
-from cosim.components.fmi.preflight.fmu_platform import current_platform
-from cosim.components.fmi.preflight.library import InvalidLibraryError, SharedLibrary
+from cosim.components.fmi.preflight.platforms import (
+    InvalidLibraryError,
+    SharedLibrary,
+    current_platform,
+)
 from cosim.components.fmi.preflight.validation import validate_fmu
 from cosim.core import resources
 from cosim.core.errors import InputError

@@ -11,9 +11,8 @@ from bad_fmus import members, pack_archive
 from cosim.components.fmi.preflight import DEFAULT_LIMITS, examine, macho, open_regular_file
 from cosim.components.fmi.preflight.archive import Archive
 from cosim.components.fmi.preflight.binary import check_binary
-from cosim.components.fmi.preflight.fmu_platform import FmuPlatform
 from cosim.components.fmi.preflight.functions import standard_functions
-from cosim.components.fmi.preflight.library import InvalidLibraryError, SharedLibrary
+from cosim.components.fmi.preflight.platforms import FmuPlatform, InvalidLibraryError, SharedLibrary
 
 FMPY = Path(fmpy.__file__).parent
 MACHINES = {"aarch64": "x86_64", "x86_64": "aarch64"}

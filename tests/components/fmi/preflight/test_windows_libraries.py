@@ -9,9 +9,8 @@ from bad_fmus import read_members
 from cosim.components.fmi.preflight import DEFAULT_LIMITS, examine, open_regular_file, pe
 from cosim.components.fmi.preflight.archive import Archive
 from cosim.components.fmi.preflight.binary import check_binary
-from cosim.components.fmi.preflight.fmu_platform import FmuPlatform
 from cosim.components.fmi.preflight.functions import standard_functions
-from cosim.components.fmi.preflight.library import InvalidLibraryError
+from cosim.components.fmi.preflight.platforms import FmuPlatform, InvalidLibraryError
 from cosim.core import resources
 
 FMU = resources.root() / "fmus/python/vtol.fmu"
