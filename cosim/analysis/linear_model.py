@@ -12,7 +12,8 @@ from typing import Any
 
 import numpy as np
 
-from ..core.errors import InputError, write_error
+from ..core.errors import InputError
+from ..results.files import write_file
 
 #: formats of `LinearModel.write`
 SUFFIXES = (".json", ".csv", ".mat")
@@ -112,15 +113,9 @@ class LinearModel:
             InputError: The name of the file has another suffix.
             OutputError: The file cannot be written.
         """
-        if file.suffix not in SUFFIXES:
-            raise InputError(f"{file}: expected a file name with {', '.join(SUFFIXES)}")
-        try:
-            file.parent.mkdir(parents=True, exist_ok=True)
-            file.write_bytes(
-                {".json": self._json, ".csv": self._csv, ".mat": self._mat}[file.suffix]()
-            )
-        except OSError as error:
-            raise write_error(f"cannot write {file}: {error.strerror}", error) from None
+        check_suffix(file)
+        writers = {".json": self._json, ".csv": self._csv, ".mat": self._mat}
+        write_file(file, writers[file.suffix]())
 
     def _json(self) -> bytes:
         return (json.dumps(self.to_dict(), indent=1) + "\n").encode()
@@ -151,3 +146,9 @@ class LinearModel:
         savemat(stream, {**matrices, "Ts": self.step or 0.0, **names})
         # the header of the file holds the time of writing, which would make equal models differ
         return b"MATLAB 5.0 MAT-file, linear model".ljust(116) + stream.getvalue()[116:]
+
+
+def check_suffix(file: Path) -> None:
+    """Raise InputError if `LinearModel.write` has no format for a file of this name."""
+    if file.suffix not in SUFFIXES:
+        raise InputError(f"{file}: expected a file name with {', '.join(SUFFIXES)}")

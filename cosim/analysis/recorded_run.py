@@ -7,7 +7,8 @@ from typing import Any
 
 from ..core.errors import InputError
 from ..results import Result
-from ..scenario.file_paths import change_paths, relocating
+from ..scenario.file_paths import relocating
+from ..scenario.sources import change_paths
 
 
 def recorded_scenario(result: Result) -> dict[str, Any]:

@@ -161,6 +161,7 @@ def _output_folder(path: Path) -> Iterator[None]:
 
     created = [folder for folder in (path, *path.parents) if not folder.exists()]
     check_writable(path)
+    path.mkdir(parents=True, exist_ok=True)
     yield
     with suppress(OSError):
         for folder in created:

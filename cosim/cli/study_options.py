@@ -18,7 +18,7 @@ from ..core.processors import available_processors
 from ..core.size_limits import MAX_RUNS
 from ..core.text import count_noun
 from . import current_command_line
-from .csv_options import csv_options
+from .options import csv_option
 
 if TYPE_CHECKING:
     from ..studies.execution.job import Record
@@ -53,7 +53,7 @@ _retry = click.option(
 
 def study_options(command: Callable[..., int]) -> Callable[..., int]:
     """Add the options `--workers`, `--scheduler`, `--max-runs`, `--retry-failed` and `--excel-safe` to a command."""
-    return _workers(_scheduler(_max_runs(_retry(csv_options(command)))))
+    return _workers(_scheduler(_max_runs(_retry(csv_option(command)))))
 
 
 def open_run_store(folder: Path, retry: bool) -> RunStore:

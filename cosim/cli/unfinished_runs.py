@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from ..core.csv_text import BYTES_PER_NUMBER
 from ..core.errors import CosimError, InputError, OutputError
+from ..core.paths import resolve_path
 from ..core.text import count_noun
 from ..process.output_lock import LOCK_FILE
 
@@ -39,7 +40,12 @@ class OutputFiles:
 
     @classmethod
     def of_file(cls, file: Path) -> OutputFiles:
-        """Return the files that accompany the output file of `cosim simulate`."""
+        """Return the files that accompany the output file of `cosim simulate`.
+
+        They lie beside the file itself if `file` is a symbolic link to it.
+        """
+        if file.is_symlink():
+            file = resolve_path(file)
         return cls(
             file.with_name(f".{file.name}{_UNFINISHED_FOLDER}"),
             file.with_name(f".{file.name}{LOCK_FILE}"),

@@ -11,7 +11,7 @@ from typing import Any
 
 from ..core.errors import InputError, Problem, did_you_mean
 from ..core.json_values import parse_object
-from ..results.files import writing_atomically
+from ..results.files import write_file
 from .cache import cached_file, file_hash
 from .foreign.python_class import write_python_fmu
 from .sources import (
@@ -228,8 +228,7 @@ def read_manifest(root: Path) -> dict[str, Any]:
 
 
 def _write_manifest(manifest: Mapping[str, Any], root: Path) -> None:
-    with writing_atomically(root / MANIFEST) as temporary:
-        temporary.write_text(json.dumps(manifest, indent=1, sort_keys=True) + "\n")
+    write_file(root / MANIFEST, json.dumps(manifest, indent=1, sort_keys=True) + "\n")
 
 
 def _manifest_entry(

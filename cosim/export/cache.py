@@ -8,7 +8,7 @@ from pathlib import Path
 
 from ..core.resources import cache_directory
 from ..process.output_lock import LOCK_FILE, waiting_for_lock
-from ..results.files import remove_files, writing_atomically
+from ..results.files import remove_files, write_file
 
 
 def cached_file(key: str, name: str, build: Callable[[Path], object]) -> Path:
@@ -29,8 +29,7 @@ def cached_file(key: str, name: str, build: Callable[[Path], object]) -> Path:
             if not _is_intact(target):
                 remove_files(target.parent, target.name)
                 build(target)
-                with writing_atomically(_digest_file(target)) as temporary:
-                    temporary.write_text(file_hash(target))
+                write_file(_digest_file(target), file_hash(target))
     return target
 
 

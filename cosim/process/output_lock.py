@@ -43,15 +43,20 @@ def lock_descriptor(descriptor: int, wait: bool = False) -> None:
 
 
 class OutputLock:
-    """Locked file beside an output; its content describes the process that writes the output."""
+    """Locked file beside an output; its content describes the process that writes the output.
 
-    def __init__(self, path: Path, descriptor: int):
+    The folders that were created for it are removed with it if nothing was written to them.
+    """
+
+    def __init__(self, path: Path, descriptor: int, created_folders: int):
         self._path, self._descriptor = path, descriptor
+        self._created_folders = created_folders
 
     def release(self) -> None:
         """Remove the file and release the lock."""
         with suppress(OSError):
             self._path.unlink(missing_ok=True)
+            _remove_empty_folders(self._path, self._created_folders)
         os.close(self._descriptor)
 
     def send(self, connection: socket.socket) -> None:
@@ -59,7 +64,8 @@ class OutputLock:
 
         It stays locked on the way.
         """
-        socket.send_fds(connection, [os.fsencode(self._path)], [self._descriptor])
+        message = [bytes([self._created_folders]), os.fsencode(self._path)]
+        socket.send_fds(connection, message, [self._descriptor])
         os.close(self._descriptor)
 
     @classmethod
@@ -67,9 +73,9 @@ class OutputLock:
         """Return the lock that was sent through a connection; None if none was sent."""
         connection.setblocking(False)
         with suppress(BlockingIOError):
-            path, descriptors, _, _ = socket.recv_fds(connection, _MAX_PATH_SIZE, 1)
+            message, descriptors, _, _ = socket.recv_fds(connection, _MAX_PATH_SIZE, 1)
             if descriptors:
-                return cls(Path(os.fsdecode(path)), descriptors[0])
+                return cls(Path(os.fsdecode(message[1:])), descriptors[0], message[0])
         return None
 
 
@@ -77,7 +83,8 @@ def acquire_lock(path: Path, output: Path, process: int | None = None) -> Output
     """Create and lock a lock file.
 
     Args:
-        path: The lock file, in an existing folder.
+        path: The lock file. Missing folders are created; `OutputLock.release` removes them again if
+            they are empty then.
         output: The output that it locks, as messages show it.
         process: Id of the process that other commands name as the holder; default: this process.
 
@@ -85,8 +92,10 @@ def acquire_lock(path: Path, output: Path, process: int | None = None) -> Output
         InputError: Another process holds the lock, or the file cannot be written.
         OutputError: The disk is full or defective.
     """
+    created = sum(not folder.exists() for folder in path.parents)
     try:
-        lock = OutputLock(path, descriptor := _open_locked(path))
+        path.parent.mkdir(parents=True, exist_ok=True)
+        descriptor = _open_locked(path)
     except BlockingIOError:
         text = (
             f'"{output}" is in use by {_read_holder(path)}; wait until it has ended, or choose '
@@ -94,7 +103,10 @@ def acquire_lock(path: Path, output: Path, process: int | None = None) -> Output
         )
         raise InputError(text) from None
     except OSError as error:
+        with suppress(OSError):
+            _remove_empty_folders(path, created)
         raise write_error(f'cannot write to "{output}": {error.strerror or error}', error) from None
+    lock = OutputLock(path, descriptor, created)
     try:
         holder = {
             "process": process or os.getpid(),
@@ -107,6 +119,12 @@ def acquire_lock(path: Path, output: Path, process: int | None = None) -> Output
         lock.release()
         raise write_error(f'cannot write to "{output}": {error.strerror}', error) from None
     return lock
+
+
+def _remove_empty_folders(path: Path, count: int) -> None:
+    """Remove the innermost `count` folders of a path; raise OSError at one that is not empty."""
+    for folder in list(path.parents)[:count]:
+        folder.rmdir()
 
 
 @contextmanager

@@ -10,7 +10,7 @@ from typing import Any
 from ..core.errors import InputError
 from ..results import Result
 from ..results.checks import CheckOutcome
-from ..results.files import writing_atomically
+from ..results.files import write_file
 from .failure import find_failure
 from .pages import embed_json, render_page
 from .samples import is_constant, pack_run
@@ -111,8 +111,7 @@ def _write_page(
     text = render_page(
         "replay.html", title=title, description=description, data=embed_json(data), failed=failed
     )
-    with writing_atomically(path) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
+    write_file(path, text)
 
 
 def _description(result: Result) -> str:

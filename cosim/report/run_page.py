@@ -12,7 +12,7 @@ from ..core.errors import InputError
 from ..core.text import count_noun
 from ..results import Result
 from ..results.checks import CheckOutcome, Number
-from ..results.files import to_json_types, writing_atomically
+from ..results.files import to_json_types, write_file
 from .diagram import build_diagram
 from .failure import find_failure
 from .pages import embed_json, render_page, safe_markup
@@ -51,8 +51,7 @@ def write_report(
         OutputError: The disk is full or failed.
     """
     text = render_report(result, outcomes, figures)
-    with writing_atomically(path) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
+    write_file(path, text)
 
 
 def render_report(

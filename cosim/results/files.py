@@ -1,20 +1,27 @@
-"""Atomic writing of files: each is written under a temporary name and then renamed."""
+"""Atomic writing of files: each is written under a temporary name and then renamed.
+
+Every output of every command goes through `writing_atomically`. It follows symbolic links and
+replaces only regular files; a FIFO, a character device and /dev/stdout are written to directly.
+"""
 
 from __future__ import annotations
 
+import errno
 import glob
 import json
 import math
 import mmap
+import os
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
 from pathlib import Path
 from secrets import token_hex
-from tempfile import TemporaryFile
+from tempfile import TemporaryDirectory, TemporaryFile
 from typing import Any
 
 import numpy as np
 
+from ..core import paths
 from ..core.errors import write_error
 from ..process.run_files.row_store import FileMapping
 
@@ -47,39 +54,61 @@ def _memory_map(array: Any) -> mmap.mmap | FileMapping | None:
 
 @contextmanager
 def writing_atomically(path: str | Path) -> Iterator[Path]:
-    """Rename a temporary file to `path` at the end of the block, or remove it if the block raises.
+    """Replace `path` by a temporary file at the end of the block, unless the block raises.
 
     Args:
-        path: The file to write; missing folders are created.
+        path: The file to write; missing folders are created. A symbolic link is kept, and the file
+            that it leads to is replaced. A FIFO or character device is written to directly.
 
     Yields:
-        Path of the temporary file, in the same folder.
+        Path of the temporary file, in a folder that this process can write.
 
     Raises:
         InputError: The path cannot be written.
         OutputError: The disk is full or defective.
     """
     path = Path(path)
-    temporary = path.with_name(f".{path.name}.{token_hex(8)}{_PART_SUFFIX}")
     try:
         path.parent.mkdir(parents=True, exist_ok=True)
-        yield temporary
-        temporary.replace(path)
+        target = paths.file_to_replace(path)
+        if target is None:
+            with TemporaryDirectory() as folder:
+                temporary = Path(folder) / path.name
+                yield temporary
+                with temporary.open("rb") as content:
+                    paths.write_directly(content, path)
+            return
+        target.parent.mkdir(parents=True, exist_ok=True)
+        temporary = target.with_name(f".{target.name}.{token_hex(8)}{_PART_SUFFIX}")
+        try:
+            yield temporary
+            temporary.replace(target)
+        finally:
+            with suppress(OSError):
+                temporary.unlink()
     except OSError as error:
         raise write_error(f"cannot write {path}: {error}", error) from error
-    finally:
-        with suppress(OSError):
-            temporary.unlink()
+
+
+def write_file(path: str | Path, content: str | bytes) -> None:
+    """Write a whole file atomically, see `writing_atomically`; text is encoded as UTF-8."""
+    data = content if isinstance(content, bytes) else content.encode()
+    with writing_atomically(path) as temporary:
+        temporary.write_bytes(data)
 
 
 def check_writable(directory: Path) -> None:
-    """Create a folder if necessary.
+    """Check that files can be written to a folder, which need not exist; create nothing.
 
-    Raise OutputError or InputError if no file can be written there.
+    Raises:
+        InputError: The folder or its nearest existing parent cannot be written.
+        OutputError: The disk is full or defective.
     """
+    existing = next(path for path in (directory, *directory.parents) if path.exists())
     try:
-        directory.mkdir(parents=True, exist_ok=True)
-        with TemporaryFile(dir=directory):
+        if not existing.is_dir():
+            raise FileExistsError(errno.EEXIST, os.strerror(errno.EEXIST), str(existing))
+        with TemporaryFile(dir=existing):
             pass
     except OSError as error:
         raise write_error(
@@ -87,8 +116,34 @@ def check_writable(directory: Path) -> None:
         ) from None
 
 
+def check_output_file(path: Path) -> Path | None:
+    """Check that an output can be written, and return the file that it replaces.
+
+    Args:
+        path: The output; its folder need not exist.
+
+    Returns:
+        See `paths.file_to_replace`.
+
+    Raises:
+        InputError: The path cannot be written.
+        OutputError: The disk is full or defective.
+    """
+    try:
+        target = paths.file_to_replace(path)
+        if target is None and not os.access(path, os.W_OK):
+            raise PermissionError(errno.EACCES, os.strerror(errno.EACCES))
+    except OSError as error:
+        raise write_error(f'cannot write "{path}": {error.strerror or error}', error) from None
+    if target is not None:
+        check_writable(target.parent)
+    return target
+
+
 def remove_files(directory: Path, *names: str) -> None:
     """Remove files of earlier runs and their temporary files.
+
+    Symbolic links are kept, and so is what is no regular file; folders and sockets are refused.
 
     Args:
         directory: Folder of the files.
@@ -99,12 +154,14 @@ def remove_files(directory: Path, *names: str) -> None:
         InputError: A file cannot be removed.
     """
     try:
-        for name in names:
-            for path in (
-                directory / name,
-                *directory.glob(f".{glob.escape(name)}.*{_PART_SUFFIX}"),
-            ):
-                path.unlink(missing_ok=True)
+        targets = []
+        for path in map(directory.joinpath, names):
+            targets.append(paths.file_to_replace(path))
+        for target in filter(None, targets):  # only now, so that all are kept if one is refused
+            path = target
+            target.unlink(missing_ok=True)
+            for part in target.parent.glob(f".{glob.escape(target.name)}.*{_PART_SUFFIX}"):
+                part.unlink(missing_ok=True)
     except OSError as error:
         raise write_error(f'cannot replace "{path}": {error.strerror or error}', error) from None
 
@@ -112,8 +169,7 @@ def remove_files(directory: Path, *names: str) -> None:
 def write_json(data: Mapping[str, Any], path: str | Path) -> None:
     """Write `data` as JSON with an indent of two spaces; see `to_json_types` for the values."""
     text = json.dumps(to_json_types(data), indent=2, ensure_ascii=False, allow_nan=False)
-    with writing_atomically(path) as temporary:
-        temporary.write_text(text + "\n", encoding="utf-8", newline="\n")
+    write_file(path, text + "\n")
 
 
 def to_json_types(value: Any) -> Any:

@@ -23,10 +23,9 @@ from ..bench_output import (
     print_side_by_side,
     print_trial,
 )
-from ..completion import complete_role, complete_scenario
 from ..forked_commands import forked_commands
 from ..messages import print_json
-from ..output_options import json_option
+from ..options import complete_role, complete_scenario, json_option
 
 if TYPE_CHECKING:
     from ...studies.controller_bench.trials import ControllerTrials, TrialResult

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ...core.errors import CheckError, InputError, Problem, nearest_file
-from ..vehicle_files import read_vehicle_file
+from .new_vehicle import read_vehicle_file
 
 if TYPE_CHECKING:
     from ...export.build import BuildResult

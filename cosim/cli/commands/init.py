@@ -86,6 +86,8 @@ def _other_entries(directory: Path) -> list[str]:
 
 
 def _write_project(directory: Path) -> None:
+    from ...results.files import write_file
+
     placeholders = {
         "README.md": ("NAME", directory.resolve().name),
         "requirements.txt": ("COSIM", pip_requirement(pip_origin())),
@@ -93,14 +95,10 @@ def _write_project(directory: Path) -> None:
     for file, template in _PROJECT_FILES.items():
         path = directory / file
         text = template.read_text(encoding="utf-8")
-        path.parent.mkdir(parents=True, exist_ok=True)
-        path.write_text(
-            text.replace(*placeholders[file]) if file in placeholders else text, encoding="utf-8"
-        )
+        write_file(path, text.replace(*placeholders[file]) if file in placeholders else text)
         click.echo(path)
     plant = directory / _PLANT
-    plant.parent.mkdir(exist_ok=True)
-    shutil.copyfile(resources.root() / _PLANT, plant)
+    write_file(plant, (resources.root() / _PLANT).read_bytes())
     click.echo(plant)
 
 

@@ -5,15 +5,22 @@ from __future__ import annotations
 import json
 import re
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import click
 
 from ...core import resources
 from ...core.errors import InputError, Problem, did_you_mean
 from ...scenario.json_document import Document, read_document
+from ..options import new_file_options
+
+_Result = TypeVar("_Result")
+
+#: keys that a scenario or a study has, and a vehicle file has not
+_SCENARIO_KEYS = frozenset({"components", "extends", "scenario"})
 
 
 @click.command()
@@ -25,12 +32,7 @@ from ...scenario.json_document import Document, read_document
     metavar="VEHICLE",
     help="Vehicle file, or name of a shipped vehicle.",
 )
-@click.option(
-    "--directory",
-    type=click.Path(path_type=Path),
-    default=Path(),
-    help="Folder of the file; default: the working directory.",
-)
+@new_file_options()
 @click.option(
     "--urdf",
     type=click.Path(path_type=Path),
@@ -49,8 +51,7 @@ from ...scenario.json_document import Document, read_document
     default=1.0,
     help="Factor on the coordinates of --mesh, for example 0.001 for mm.",
 )
-@click.option("--force", is_flag=True, help="Overwrite an existing file.")
-def command(
+def vehicle(
     name: str,
     base: str,
     directory: Path,
@@ -67,15 +68,16 @@ def command(
     needed. With --urdf, the rotors, thrusters or propellers in the file of --from may have a "link"
     of the URDF file in place of position and axis.
     """
+    from ...results.files import write_file
+
     if not re.fullmatch(r"[A-Za-z_]\w*", name):
         raise InputError(f'"{name}" is not a name of a vehicle: expected letters, digits and "_"')
     file, source = directory / f"{name}.json", read_document(_find_vehicle(base))
     if file.exists() and not force:
         raise InputError([Problem("exists; --force overwrites it", str(file))])
     vehicle = _vehicle(source, name, urdf, mesh, mesh_scale)
-    directory.mkdir(parents=True, exist_ok=True)
     text = json.dumps(vehicle.data, indent=4) + "\n" if urdf or mesh else source.text
-    file.write_text(text, encoding="utf-8")
+    write_file(file, text)
     for warning in vehicle.warnings:
         click.echo(f"WARNING {warning}", err=True)
     build = shlex.join(["cosim", "build", str(file), "--output", str(file.with_suffix(".fmu"))])
@@ -199,3 +201,27 @@ def _find_vehicle(base: str) -> Path:
             f'no vehicle file and no shipped vehicle "{base}"{did_you_mean(base, files)}'
         )
     return files[base]
+
+
+def read_vehicle_file(file: Path, read: Callable[[Mapping[str, Any], str], _Result]) -> _Result:
+    """Return the result of `read` for the data in a vehicle file and the name of the file.
+
+    Raises:
+        InputError: The file is no vehicle file; each problem names file, line and column.
+    """
+    document = read_document(file)
+    if document.problems:
+        raise InputError(document.problems)
+    if not isinstance(document.value, dict):
+        raise InputError(Problem("expected an object, the data of a vehicle", document.where(())))
+    if "family" not in document.value and not _SCENARIO_KEYS.isdisjoint(document.value):
+        raise InputError(
+            f"{file} is a scenario or a study, expected a vehicle file; `cosim check {file}` "
+            "describes a scenario"
+        )
+    try:
+        return read(document.value, file.stem)
+    except InputError as error:
+        raise InputError(
+            [replace(each, where=document.where(each.subject[1:])) for each in error.problems]
+        ) from None

@@ -3,17 +3,17 @@
 from __future__ import annotations
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, NamedTuple
 
 import click
 
+from ...core.paths import duplicate_descriptor
 from ...core.text import count_noun
-from ...process.output_lock import LOCK_FILE, LockKeeper
+from ...process.output_lock import LOCK_FILE, LockKeeper, acquire_lock
 from ...process.temporary_folders import temporary_run_folder
 from .. import current_command_line, report_error, strict_sandbox, supervision
-from ..csv_options import csv_options
 from ..messages import print_json, print_line
-from ..output_options import json_option
+from ..options import csv_option, json_option
 from ..unfinished_runs import OutputFiles, writing_results
 
 if TYPE_CHECKING:
@@ -67,37 +67,65 @@ if TYPE_CHECKING:
     "an object with time (s) and the final values of the outputs by name; nothing with "
     "--output-file"
 )
-@csv_options
+@csv_option
 @supervision.supervision_options
 def command(isolation: str, sandbox: str | None, output_file: Path | None, **options: Any) -> int:
     """Simulate a single FMU (Co-Simulation or Model Exchange of FMI 1.0, 2.0 or 3.0) from its default start time."""
-    output = output_file.absolute() if output_file else None
+    output = _Output.check(output_file) if output_file else None
     if strict_sandbox.must_rerun(sandbox):
         return strict_sandbox.rerun_in_bubblewrap(
             [path for path in (options["fmu"], options["input_file"]) if path],
-            output and output.parent,
+            output and output.writable_folder,
         )
     with temporary_run_folder() as folder, LockKeeper() as locks:
-        unfinished = OutputFiles.of_file(output).unfinished if output else Path(folder) / "run"
+        unfinished = Path(folder) / "run"
+        if output and output.replaced:
+            unfinished = OutputFiles.of_file(output.replaced).unfinished
         return supervision.run_supervised_command(
             lambda: _simulate(
-                locks,
-                unfinished,
-                output,
-                output_file,
-                _isolation(isolation, bool(sandbox)),
-                **options,
+                locks, unfinished, output, _isolation(isolation, bool(sandbox)), **options
             ),
             isolation,
-            lambda outcome: _save_after_crash(outcome, output, output_file),
+            lambda outcome: _save_after_crash(outcome, output),
         )
+
+
+class _Output(NamedTuple):
+    """Output file of the command.
+
+    Attributes:
+        shown: The path as messages show it.
+        path: The same path, absolute; a duplicate in place of /dev/stdout, which a supervised
+            process redirects.
+        replaced: The file that is replaced, with symbolic links followed; None: a FIFO or a device
+            is written to directly.
+    """
+
+    shown: Path
+    path: Path
+    replaced: Path | None
+
+    @classmethod
+    def check(cls, shown: Path) -> _Output:
+        """Return the output, and raise an error if it cannot be written."""
+        from ...results.files import check_output_file
+
+        path = shown.absolute()
+        replaced = check_output_file(path)
+        return cls(shown, duplicate_descriptor(path), replaced)
+
+    @property
+    def writable_folder(self) -> Path | None:
+        """Folder that the command must be able to write; None for a device."""
+        if self.replaced:
+            return self.replaced.parent
+        return self.path.parent if self.path.is_fifo() else None
 
 
 def _simulate(
     locks: LockKeeper,
     folder: Path,
-    output: Path | None,
-    shown: Path | None,
+    output: _Output | None,
     fmu_isolation: Isolation | None,
     fmu: Path,
     stop_time: str | None,
@@ -115,34 +143,32 @@ def _simulate(
     from ...engine.disk_space import find_space_problems
     from ...engine.run_loop import simulating
     from ...process.run_files.folder import keeping_run_files, remove_run_files, run_folder
-    from ...results.files import check_writable, remove_files
+    from ...results.files import remove_files
     from ...results.non_finite import warn_non_finite
     from ...results.result import describe_termination
     from ...scenario.settings import parse_settings
     from .. import messages
 
     messages.print_log()
-    if output:
-        check_writable(output.parent)
     values = parse_settings(start_values)
     settings = InstanceSettings(tolerance, parse_solver(solver, solver_step_size or None))
     times = stop_time or None, step_size or None
     plan, warnings = compile_fmu(fmu, *times, input_file, values, None, fmu_isolation, settings)
     messages.log_problems(map(Problem, warnings))
-    if output and shown:
-        if (
-            run_lock := output.parent / LOCK_FILE
-        ).exists():  # the folder of a run, whose files are locked together
-            locks.lock(run_lock, shown.parent)
-        locks.lock(OutputFiles.of_file(output).lock, shown)
-        replaced = output.stat().st_size if output.is_file() else 0
-        if problems := find_space_problems(plan, output.parent, csv=True, replaced=replaced):
+    target = output.replaced if output else None
+    if output and target:
+        run_lock = target.parent / LOCK_FILE
+        if run_lock.exists():  # the folder of a run, whose files are locked together
+            acquire_lock(run_lock, output.shown.parent).release()  # refused while the run goes on
+        locks.lock(OutputFiles.of_file(target).lock, output.shown)
+        size = target.stat().st_size if target.is_file() else 0
+        if problems := find_space_problems(plan, target.parent, csv=True, replaced=size):
             raise InputError(problems)
-        remove_files(output.parent, output.name)
-    with keeping_run_files(folder, output), simulating(plan) as run:
+        remove_files(target.parent, target.name)
+    with keeping_run_files(folder, target), simulating(plan) as run:
         warn_non_finite(run.recording)
         if output:
-            _write_recording(run.recording, output, shown, run_folder())
+            _write_recording(run.recording, output, run_folder())
             remove_run_files()
         if run.failure:
             return supervision.results_written(report_error(run.failure, current_command_line()))
@@ -153,7 +179,7 @@ def _simulate(
         return supervision.results_written(0)
 
 
-def _save_after_crash(outcome: SupervisedOutcome, output: Path | None, shown: Path | None) -> None:
+def _save_after_crash(outcome: SupervisedOutcome, output: _Output | None) -> None:
     """Write the rows of a child process that crashed, was killed or was interrupted."""
     from ...results.non_finite import warn_non_finite
     from .. import messages
@@ -161,19 +187,18 @@ def _save_after_crash(outcome: SupervisedOutcome, output: Path | None, shown: Pa
     messages.print_log()
     recording = supervision.recover_outcome_recording(outcome)
     warn_non_finite(recording)
-    _write_recording(recording, output, shown, outcome.journal.folder)
+    _write_recording(recording, output, outcome.journal.folder)
 
 
-def _write_recording(
-    recording: Recording, output: Path | None, shown: Path | None, unfinished: Path | None
-) -> None:
+def _write_recording(recording: Recording, output: _Output | None, unfinished: Path | None) -> None:
+    """Write the CSV file; rows that cannot be written are kept beside it, if it is a file."""
     from ...results import Result
 
-    if output and shown and len(recording.time):
+    if output and len(recording.time):
         result = Result(recording)
-        with writing_results(result, unfinished, shown):
-            result.to_csv(output)
-        click.echo(f"{count_noun(len(recording.time), 'row')} in {shown}")
+        with writing_results(result, unfinished if output.replaced else None, output.shown):
+            result.to_csv(output.path)
+        click.echo(f"{count_noun(len(recording.time), 'row')} in {output.shown}")
 
 
 def _print_final_values(recording: Recording, as_json: bool) -> None:

@@ -14,9 +14,8 @@ from ...core.processors import available_processors
 from ...core.text import count_noun
 from ...report.tables import print_table
 from .. import current_command_line, study_options
-from ..completion import complete_study
 from ..messages import print_json, warn_overwriting
-from ..output_options import json_option
+from ..options import complete_study, json_option
 
 if TYPE_CHECKING:
     from ...studies.execution.run_store import RunStore

@@ -12,9 +12,8 @@ from ...core.errors import CosimError, InputError
 from ...core.text import count_noun
 from ...report.tables import print_table
 from .. import study_options
-from ..completion import complete_study
 from ..messages import print_json
-from ..output_options import json_option
+from ..options import complete_study, json_option
 
 if TYPE_CHECKING:
     from ...studies.execution.run_store import RunStore

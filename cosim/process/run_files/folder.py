@@ -23,6 +23,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from ...core.json_values import decode_object, parse_object
+from ...core.paths import file_to_replace
 from ..journal import current_journal
 
 if TYPE_CHECKING:
@@ -212,7 +213,8 @@ def keeping_run_files(
 
     Args:
         folder: Folder that is created; an existing one is replaced.
-        csv: CSV file that the supervisor updates during the run; None for none.
+        csv: CSV file that the supervisor updates during the run; None for none. A FIFO or device is
+            only written at the end of the run.
         metadata: Description of the run; None for none.
     """
     journal = current_journal()
@@ -221,7 +223,7 @@ def keeping_run_files(
         return
     shutil.rmtree(folder, ignore_errors=True)
     folder.mkdir(parents=True)
-    journal.set_run_files(folder, csv)
+    journal.set_run_files(folder, file_to_replace(csv) if csv else None)
     if metadata:
         write_metadata(folder, metadata)
     yield

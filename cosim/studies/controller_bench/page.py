@@ -17,7 +17,7 @@ from ...core.version import __version__
 from ...report.pages import render_page
 from ...report.tables import format_number
 from ...results.checks import CheckOutcome, Number, evaluate_all_checks
-from ...results.files import writing_atomically
+from ...results.files import write_file
 from .kpi_descriptions import kpi_description
 from .ranking import Ranking, ScenarioKpis
 from .score import RunKpis
@@ -113,8 +113,7 @@ def write_bench_page(
         meanings=_meanings(row for *_, rows in scenarios for row in rows),
         version=__version__,
     )
-    with writing_atomically(path) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
+    write_file(path, text)
 
 
 def _settings(scenario: str, controllers: Sequence[BenchedController]) -> dict[str, list[str]]:

@@ -315,15 +315,15 @@ def write_scenarios(
     if problems := interface_problems(role, variables, settings):
         raise InputError([Problem(problem.message, controller) for problem in problems])
     target = (folder / "scenarios").absolute()
-    rmtree(target, ignore_errors=True)
-    written, omissions = [], []
+    written, omissions, substitutions = [], [], []
     for original in files:
         substitution = ControllerSubstitution(role, candidate, variables, original, settings)
-        path = substitution.write(target)
+        path = substitution.substitute(target)
         if not path:
             continue
+        substitutions.append(substitution)
         lacking = [each.lacking for each in substitution.omissions if not each.entry]
-        kpis = json.loads(path.read_text(encoding="utf-8"))["kpis"]
+        kpis = substitution.changed_files[path]["kpis"]
         written.append(
             {
                 "file": path,
@@ -341,6 +341,9 @@ def write_scenarios(
         raise InputError(
             f'no scenario has a component with the role "{role.name}": {role.description}'
         )
+    rmtree(target, ignore_errors=True)
+    for substitution in substitutions:
+        substitution.write_files()
     write_json({"scenarios": written, "omissions": omissions, "goals": role.goals}, file)
 
 

@@ -14,7 +14,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from ...results.files import writing_atomically
+from ...results.files import write_file
 from .bundle import cosim_fingerprint, fmu_paths
 from .job import Job, RunKey, StudyContext
 from .worker_pool import WorkerPool
@@ -74,8 +74,7 @@ def store_contents(blobs: Mapping[str, bytes], dask_worker: Any) -> None:
     for sha, content in blobs.items():
         if sha256(content).hexdigest() != sha:
             raise ValueError(f"the content {sha} was damaged during the transfer")
-        with writing_atomically(folder / sha) as temporary:
-            temporary.write_bytes(content)
+        write_file(folder / sha, content)
 
 
 def run_job(

@@ -6,12 +6,14 @@ is synchronized with the disk every second. Unreadable lines are skipped.
 
 from __future__ import annotations
 
+import errno
 import os
 import time
 from collections.abc import Iterable, Iterator
 from dataclasses import replace
 from pathlib import Path
 
+from ...core import paths
 from ...core.errors import InputError, OutputError, write_error
 from ...process.output_lock import LOCK_FILE, acquire_lock
 from .job import Job, Record, RunKey
@@ -36,7 +38,8 @@ class RunStore:
         """Open the store of a folder, or create it.
 
         Args:
-            folder: an existing folder.
+            folder: folder of the file; it is created if necessary, and removed again if no record
+                is written to it.
             retry_failed: treat failed runs as not finished.
 
         Raises:
@@ -54,6 +57,9 @@ class RunStore:
 
     def _open(self, retry_failed: bool) -> None:
         try:
+            self._is_new = not self.path.exists()
+            if paths.file_to_replace(self.path) is None:
+                raise OSError(errno.EINVAL, "Not a regular file")
             self._file = os.open(self.path, os.O_RDWR | os.O_CREAT | os.O_APPEND, 0o666)
         except OSError as error:
             raise write_error(f'cannot write "{self.path}": {error.strerror}', error) from None
@@ -146,6 +152,8 @@ class RunStore:
         self._sync()
         self._reader.close()
         os.close(self._file)
+        if self._is_new and not self._size:
+            self.path.resolve().unlink(missing_ok=True)
         self._lock.release()
 
 

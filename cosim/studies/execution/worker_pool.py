@@ -16,7 +16,8 @@ from contextlib import suppress
 from typing import TYPE_CHECKING, Any
 
 from ...core.errors import ComponentError, CosimError, Problem
-from ...process.supervisor import STOP_TIMEOUT, has_ended, is_stopped
+from ...process.process_status import has_ended, is_stopped
+from ...process.supervisor import STOP_TIMEOUT
 from .job import FORK_REQUEST, READY, Job, Record, StudyContext
 
 if TYPE_CHECKING:

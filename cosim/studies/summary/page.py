@@ -11,7 +11,7 @@ from ...core.version import __version__
 from ...report.figures import figure_to_svg, save_figure
 from ...report.pages import render_page, safe_markup
 from ...results.checks import evaluate_checks
-from ...results.files import remove_files, writing_atomically
+from ...results.files import remove_files, write_file
 from ..design import Design
 from ..sweep import Sweep, SweepRow
 from .missed_criteria import criterion_limits
@@ -73,8 +73,7 @@ def write_sweep_page(
         version=__version__,
         file=sweep.study_file.document.file,
     )
-    with writing_atomically(folder / PAGE_FILE) as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
+    write_file(folder / PAGE_FILE, text)
 
 
 def _criterion(check: Mapping[str, Any], units: Mapping[str, str]) -> tuple[str, str]:
@@ -112,8 +111,7 @@ def _write_map(sweep: Sweep, map_: SuccessMap, folder: Path) -> dict[str, Any]:
     figure = draw_map(map_, lambda cell: _cell_link(sweep, cell, folder))
     save_figure(figure, folder / f"{map_.name}.png")
     text = figure_to_svg(figure).replace(' target="_blank"', "")
-    with writing_atomically(folder / f"{map_.name}.svg") as temporary:
-        temporary.write_text(text, encoding="utf-8", newline="\n")
+    write_file(folder / f"{map_.name}.svg", text)
     in_page = text[text.index("<svg") :].replace(
         f'"{PAGE_FILE}#', '"#'
     )  # a copy of the page may have another name

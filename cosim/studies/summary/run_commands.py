@@ -10,7 +10,8 @@ from pathlib import Path
 from typing import Any
 
 from ...core import resources
-from ...scenario.file_paths import SHIPPED, PathChange, change_pointed, relocating
+from ...scenario.file_paths import SHIPPED, change_pointed, relocating
+from ...scenario.schema_types import PathChange
 from ..sweep import Sweep
 
 

@@ -13,6 +13,8 @@ from functools import reduce
 from math import prod
 from typing import NamedTuple
 
+from ..model.builtin_functions import BUILTIN_FUNCTIONS
+
 C_TYPES = {
     "Real": "double",
     "Integer": "int32_t",
@@ -22,16 +24,18 @@ C_TYPES = {
     "ExternalObject": "uint64_t",
 }
 
-#: keywords of C, and the functions and local variables of the generated code
+#: keywords of C, and the functions and local variables of the generated code besides `c_functions`
+#: of the table of built-in functions
 _RESERVED_WORDS = """
-    auto break case char const continue default do double else enum extern float for goto if inline int long register restrict
-    return short signed sizeof static struct switch typedef union unsigned void volatile while bool true false NULL NAN INFINITY I
-    m time each due risen event fail element add subtract multiply divide modulo remainder_of absolute integer_of smaller larger
-    smaller_integer larger_integer square sign real_modulo real_remainder real_quotient
-    integrate advance derivatives runge_kutta System
-    acos asin atan atan2 ceil cos cosh exp fabs floor isfinite log log10 memcpy memset pow sin sinh sqrt tan tanh trunc
+    auto break case char const continue default do double else enum extern float for goto if inline
+    int long register restrict return short signed sizeof static struct switch typedef union
+    unsigned void volatile while bool true false NULL NAN INFINITY I
+    m time each due risen event fail element add subtract multiply square
+    integrate advance derivatives runge_kutta System isfinite memcpy memset pow trunc
 """
-_RESERVED = frozenset(_RESERVED_WORDS.split())
+_RESERVED = frozenset(_RESERVED_WORDS.split()).union(
+    *(function.c_functions for function in BUILTIN_FUNCTIONS.values())
+)
 _GENERATED_NAME = re.compile(r"tmp_\d+|holds_\d+|pre_\w+")
 
 

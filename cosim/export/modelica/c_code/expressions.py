@@ -13,7 +13,7 @@ from collections.abc import Callable
 from ..model import syntax_tree
 from ..model.syntax_tree import SourceLocation, raise_model_error
 from ..model.traversal import unroll
-from .builtin_functions import BUILTINS
+from .builtin_functions import BuiltinLowering
 from .c_values import (
     CExpression,
     CValue,
@@ -29,13 +29,12 @@ from .c_values import (
     sum_terms,
     variable_value,
 )
-from .lowering import SubscriptLowering
 
 _ARITHMETIC = {"+": "add", "-": "subtract", "*": "multiply"}
 _COMPARISONS = {"<": "<", "<=": "<=", ">": ">", ">=": ">=", "==": "==", "<>": "!="}
 
 
-class ExpressionLowering(SubscriptLowering):
+class ExpressionLowering(BuiltinLowering):
     """Lowering of expressions."""
 
     def _literal(self, node: syntax_tree.Literal) -> CValue:
@@ -249,11 +248,6 @@ class ExpressionLowering(SubscriptLowering):
         return result
 
     # functions
-
-    def _builtin(self, node: syntax_tree.Builtin) -> CValue:
-        if node.name not in BUILTINS:
-            raise_model_error(f"{node.name}() is not supported here", node.where)
-        return BUILTINS[node.name](self, node)
 
     def _call(self, node: syntax_tree.Call) -> CValue:
         return self.lower_call(node)[node.result]

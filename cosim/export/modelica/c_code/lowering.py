@@ -218,9 +218,7 @@ class Lowering:
             )
         return list(range(start, stop + (1 if step > 0 else -1), step))
 
-
-class SubscriptLowering(Lowering):
-    """Lowering of subscripted expressions such as `a[i]`."""
+    # subscripts
 
     def _index(self, node: syntax_tree.Index) -> CValue:
         base = self.lower(node.base)

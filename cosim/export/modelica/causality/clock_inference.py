@@ -12,6 +12,7 @@ from dataclasses import dataclass, fields, is_dataclass, replace
 from fractions import Fraction
 from typing import Any
 
+from ..model.builtin_functions import CLOCKED_OPERATORS, CONVERSIONS
 from ..model.evaluate import Evaluator
 from ..model.flat_model import Model
 from ..model.syntax_tree import (
@@ -26,8 +27,6 @@ from ..model.syntax_tree import (
 )
 from ..model.traversal import variable_names, walk
 
-CONVERSIONS = ("subSample", "superSample", "shiftSample", "backSample")
-CLOCKED_OPERATORS = (*CONVERSIONS, "hold", "noClock", "previous", "firstTick", "interval", "Clock")
 SECTIONS = ("equations", "whens", "algorithms", "asserts")
 
 

@@ -11,6 +11,7 @@ from collections.abc import Iterator, Mapping
 from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
+from ..model.builtin_functions import CLOCKED_OPERATORS, PRE_OPERATORS, ROUNDINGS
 from ..model.flat_model import SAMPLED, Equation, Model, Variable, internal_variable, is_input
 from ..model.syntax_tree import (
     Array,
@@ -29,9 +30,8 @@ from ..model.syntax_tree import (
     raise_model_error,
     referenced_variable,
 )
-from ..model.traversal import PRE_OPERATORS, assigned_references, has_builtin, variable_names, walk
+from ..model.traversal import assigned_references, has_builtin, variable_names, walk
 from .clock_inference import (
-    CLOCKED_OPERATORS,
     SECTIONS,
     ClockInference,
     Rate,
@@ -271,15 +271,10 @@ class _Replacement:
 _JUMPING = (
     *CLOCKED_OPERATORS,
     *PRE_OPERATORS,
+    *ROUNDINGS,
     "sample",
     "initial",
     "delay",
-    "floor",
-    "ceil",
-    "integer",
-    "div",
-    "mod",
-    "rem",
     "sign",
 )
 

@@ -5,7 +5,9 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping
 from typing import Any, TypeAlias
 
+from ..model.builtin_functions import BUILTIN_FUNCTIONS
 from ..model.flat_model import Function
+from ..model.simplification import ZERO, add, divide, multiply, negate, square, subtract
 from ..model.syntax_tree import (
     Assign,
     Binary,
@@ -21,67 +23,8 @@ from ..model.syntax_tree import (
 )
 from ..model.traversal import rewrite, variable_names
 
-ZERO, ONE = Literal(0.0, "Real"), Literal(1.0, "Real")
 #: derivative of a variable or of `time`; None where it is zero
 LeafDerivative: TypeAlias = "Callable[[Name | Index], Expression | None]"
-
-
-def add(a: Expression, b: Expression) -> Expression:
-    """Return a + b, without terms that are zero."""
-    return b if a == ZERO else a if b == ZERO else Binary("+", a, b)
-
-
-def subtract(a: Expression, b: Expression) -> Expression:
-    """Return a - b, without terms that are zero."""
-    return a if b == ZERO else negate(b) if a == ZERO else Binary("-", a, b)
-
-
-def multiply(a: Expression, b: Expression) -> Expression:
-    """Return a * b, simplified if one factor is zero or one."""
-    if ZERO in (a, b):
-        return ZERO
-    return b if a == ONE else a if b == ONE else Binary("*", a, b)
-
-
-def divide(a: Expression, b: Expression) -> Expression:
-    """Return a / b, simplified if a is zero or b is one."""
-    return ZERO if a == ZERO else a if b == ONE else Binary("/", a, b)
-
-
-def negate(a: Expression) -> Expression:
-    """Return -a."""
-    if isinstance(a, Literal) and a.type == "Real":
-        return Literal(-a.number if a.number else 0.0, "Real")
-    return a.operand if isinstance(a, Unary) and a.operator == "-" else Unary("-", a)
-
-
-def _function(name: str, *arguments: Expression) -> Expression:
-    return Builtin(name, arguments)
-
-
-def _square(x: Expression) -> Expression:
-    return Binary("^", x, Literal(2, "Integer"))
-
-
-#: derivative of each function with respect to its argument
-_DERIVATIVES: Mapping[str, Callable[[Expression], Expression]] = {
-    "sin": lambda x: _function("cos", x),
-    "cos": lambda x: negate(_function("sin", x)),
-    "tan": lambda x: add(ONE, _square(_function("tan", x))),
-    "asin": lambda x: divide(ONE, _function("sqrt", subtract(ONE, _square(x)))),
-    "acos": lambda x: negate(divide(ONE, _function("sqrt", subtract(ONE, _square(x))))),
-    "atan": lambda x: divide(ONE, add(ONE, _square(x))),
-    "sinh": lambda x: _function("cosh", x),
-    "cosh": lambda x: _function("sinh", x),
-    "tanh": lambda x: subtract(ONE, _square(_function("tanh", x))),
-    "exp": lambda x: _function("exp", x),
-    "log": lambda x: divide(ONE, x),
-    "log10": lambda x: divide(Literal(0.4342944819032518, "Real"), x),
-    "sqrt": lambda x: divide(Literal(0.5, "Real"), _function("sqrt", x)),
-    "abs": lambda x: If(
-        ((Builtin("noEvent", (Binary("<", x, ZERO),)), Literal(-1.0, "Real")),), ONE
-    ),
-}
 
 
 class Differentiation:
@@ -130,7 +73,7 @@ class Differentiation:
         if operator == "*":
             return add(multiply(self(a), b), multiply(a, self(b)))
         if operator == "/":
-            return subtract(divide(self(a), b), divide(multiply(a, self(b)), _square(b)))
+            return subtract(divide(self(a), b), divide(multiply(a, self(b)), square(b)))
         if operator != "^":
             raise_model_error(f"the operator {operator} cannot be differentiated", node.where)
         return self._power(a, b)
@@ -140,27 +83,12 @@ class Differentiation:
             lower = a if b.number == 2 else Binary("^", a, Literal(b.number - 1, b.type))
             return multiply(multiply(Literal(float(b.number), "Real"), lower), self(a))
         inner = multiply(divide(b, a), self(a))
-        return multiply(Binary("^", a, b), add(inner, multiply(_function("log", a), self(b))))
+        return multiply(Binary("^", a, b), add(inner, multiply(Builtin("log", (a,)), self(b))))
 
     def _builtin(self, node: Builtin) -> Expression:
-        arguments = node.arguments
-        if node.name in ("noEvent", "homotopy"):
-            return self(arguments[0])
-        if node.name == "smooth":
-            return self(arguments[1])
-        if node.name in ("min", "max") and len(arguments) == 2:
-            first = Binary("<" if node.name == "min" else ">", *arguments)
-            return If(((Builtin("noEvent", (first,)), self(arguments[0])),), self(arguments[1]))
-        if node.name == "atan2":
-            y, x = arguments
-            return divide(
-                subtract(multiply(x, self(y)), multiply(y, self(x))), add(_square(x), _square(y))
-            )
-        if node.name in ("pre", "sign", "integer", "floor", "ceil"):
-            return ZERO
-        if node.name not in _DERIVATIVES:
-            raise_model_error(f"{node.name}() cannot be differentiated", node.where)
-        return multiply(_DERIVATIVES[node.name](arguments[0]), self(arguments[0]))
+        derivative = BUILTIN_FUNCTIONS[node.name].derivative
+        result = derivative(self, *node.arguments) if derivative else None
+        return result or raise_model_error(f"{node.name}() cannot be differentiated", node.where)
 
 
 def inline_call(call: Call, functions: Mapping[str, Function]) -> Expression | None:

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 from ....core.errors import InputError, Problem
 from ..model.flat_model import Equation, Model
 from ..model.scalars import ScalarKey, reference_of, scalar_keys
+from ..model.simplification import ZERO, divide, negate, subtract, without_zeros
 from ..model.syntax_tree import (
     Assign,
     Binary,
@@ -26,7 +27,7 @@ from ..model.syntax_tree import (
     raise_model_error,
 )
 from ..model.traversal import has_builtin, read_references, rewrite, rewrite_outermost
-from .differentiation import ZERO, Differentiation, divide, negate, subtract
+from .differentiation import Differentiation
 from .matching import match, strongly_connected_components
 from .scalar_equations import EquationSplitter
 
@@ -245,7 +246,7 @@ class EquationSystem:
                 return None
             return ZERO if self._key_of(item) == {key} else item
 
-        result: Expression = _simplified(rewrite_outermost(node, substitute))
+        result: Expression = without_zeros(rewrite_outermost(node, substitute))
         return result
 
     def _system(self, equations: Sequence[Equation], keys: Sequence[ScalarKey]) -> Solve:
@@ -272,25 +273,3 @@ class EquationSystem:
 
 def _first_location(equations: Sequence[Equation]) -> SourceLocation | None:
     return next((equation.where for equation in equations if equation.where), None)
-
-
-def _simplified(node: Expression) -> Expression:
-    """Remove terms and factors that are zero."""
-    from ..model.syntax_tree import Unary
-    from .differentiation import add, multiply
-
-    operations = {"+": add, "-": subtract, "*": multiply, "/": divide}
-
-    def simplify(item: object) -> object:
-        if (
-            isinstance(item, Binary)
-            and item.operator.removeprefix(".") in operations
-            and ZERO in (item.left, item.right)
-        ):
-            if item.operator == "/" and item.right == ZERO:
-                return item
-            return operations[item.operator.removeprefix(".")](item.left, item.right)
-        return negate(item.operand) if isinstance(item, Unary) and item.operand == ZERO else item
-
-    result: Expression = rewrite(node, simplify)
-    return result

@@ -20,6 +20,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 from typing import Any
 
+from ..model.builtin_functions import PRE_OPERATORS, ROUNDINGS
 from ..model.flat_model import (
     SAMPLED,
     Delay,
@@ -50,7 +51,6 @@ from ..model.syntax_tree import (
     referenced_variable,
 )
 from ..model.traversal import (
-    PRE_OPERATORS,
     assigned_references,
     has_builtin,
     rewrite,
@@ -69,7 +69,6 @@ _SECTIONS = (
     "initial_algorithms",
 )
 _COMPARISONS = ("<", "<=", ">", ">=")
-_ROUNDINGS = ("floor", "ceil", "integer", "div", "mod", "rem")
 
 
 def prepare_hybrid(model: Model) -> Model:
@@ -248,7 +247,7 @@ class _Preparation:
         """Return whether a node rounds a value that changes between events."""
         return (
             isinstance(node, Builtin)
-            and node.name in _ROUNDINGS
+            and node.name in ROUNDINGS
             and self._changes_between_events(node.arguments)
         )
 

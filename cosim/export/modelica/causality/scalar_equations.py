@@ -12,6 +12,7 @@ import numpy as np
 
 from ..model import syntax_tree
 from ..model.arithmetic import EvaluationError
+from ..model.builtin_functions import BUILTIN_FUNCTIONS
 from ..model.evaluate import Evaluator, convert_to_type
 from ..model.flat_model import Equation, Function, Model
 from ..model.syntax_tree import (
@@ -28,34 +29,6 @@ from ..model.syntax_tree import (
 from ..model.traversal import variable_names
 
 Position = tuple[int, ...]
-
-_MATH_FUNCTIONS = {
-    "sin",
-    "cos",
-    "tan",
-    "asin",
-    "acos",
-    "atan",
-    "sinh",
-    "cosh",
-    "tanh",
-    "exp",
-    "log",
-    "log10",
-    "sqrt",
-}
-_ELEMENTWISE = _MATH_FUNCTIONS | {
-    "ceil",
-    "floor",
-    "abs",
-    "sign",
-    "integer",
-    "noEvent",
-    "homotopy",
-    "pre",
-    "der",
-    "String",
-}
 
 
 class _ShapeEvaluator(Evaluator):
@@ -197,7 +170,7 @@ class EquationSplitter:
             return replace(node, arguments=(arguments[0], self.element(arguments[1], position)))
         if node.name == "delay":
             return replace(node, arguments=(self.element(arguments[0], position), *arguments[1:]))
-        if node.name in _ELEMENTWISE:
+        if BUILTIN_FUNCTIONS[node.name].is_elementwise:
             return replace(
                 node,
                 arguments=tuple(

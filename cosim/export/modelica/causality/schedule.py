@@ -12,6 +12,7 @@ from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
+from ..model.builtin_functions import PRE_OPERATORS
 from ..model.flat_model import Model, derivative_name, is_input
 from ..model.scalars import ScalarKey, scalar_keys
 from ..model.syntax_tree import (
@@ -32,7 +33,6 @@ from ..model.syntax_tree import (
 from ..model.traversal import (
     assigned_references,
     has_builtin,
-    pre_references,
     read_references,
     rewrite,
     rewrite_outermost,
@@ -192,7 +192,11 @@ def declared_value(model: Model, name: str) -> Expression:
 
 def pre_variables(model: Model, body: Body) -> list[str]:
     """Return the variables of which the statements use the value before the event, in order of declaration."""
-    used = {name for name, _ in pre_references(body)}
+    used = {
+        referenced_variable(item.arguments[0])
+        for item in walk(body)
+        if isinstance(item, Builtin) and item.name in PRE_OPERATORS
+    }
     return [name for name in model.variables if name in used]
 
 

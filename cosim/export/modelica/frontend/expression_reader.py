@@ -12,6 +12,7 @@ from functools import cached_property
 from typing import Any
 
 from ..model import syntax_tree
+from ..model.builtin_functions import SPELLINGS
 from ..model.syntax_tree import Expression, SourceLocation, raise_model_error
 from .model_files import ModelicaSources
 
@@ -22,24 +23,7 @@ _OPERATORS = {
     "AddElem": ".+", "SubElem": ".-", "MulElem": ".*", "DivElem": "./", "ExpElem": ".^",
     "Lt": "<", "Le": "<=", "Gt": ">", "Ge": ">=", "Eq": "==", "Neq": "<>", "And": "and", "Or": "or",
 }  # fmt: skip
-_UNSUPPORTED_BUILTINS = {
-    "terminate": "terminate() is supported in when-equations only",
-}
 _INTEGER_OPERATORS = {"+": operator.add, "-": operator.sub, "*": operator.mul}
-_MODELICA_SPELLING = {
-    spelling.lower(): spelling
-    for spelling in (
-        "noEvent",
-        "outerProduct",
-        "Clock",
-        "noClock",
-        "subSample",
-        "superSample",
-        "shiftSample",
-        "backSample",
-        "firstTick",
-    )
-}
 
 
 def is_object_constructor(function: Json) -> bool:
@@ -257,10 +241,10 @@ class ExpressionReader:
         name = node["function"].lower()
         if name == "terminal":  # an FMU computes nothing after the last step
             return syntax_tree.Literal(False, "Boolean")
-        if name in _UNSUPPORTED_BUILTINS:
-            raise_model_error(_UNSUPPORTED_BUILTINS[name], self.locate(node))
+        if name == "terminate":
+            raise_model_error("terminate() is supported in when-equations only", self.locate(node))
         return syntax_tree.Builtin(
-            _MODELICA_SPELLING.get(name, name),
+            SPELLINGS.get(name, name),
             tuple(map(self.read_expression, node["args"])),
             self.locate(node),
         )

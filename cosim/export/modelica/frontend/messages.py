@@ -8,6 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from ....core.errors import Problem
+from ..model.builtin_functions import CLOCKED_OPERATORS, PRE_OPERATORS
 from ..model.syntax_tree import SourceLocation
 from .class_search import models_hint
 from .model_files import ModelicaSources
@@ -24,10 +25,8 @@ _PHASE = re.compile(
 )
 
 #: operators that a message may name without quotes
-_OPERATOR = re.compile(
-    r"\b(sample|hold|previous|subSample|superSample|shiftSample|backSample|noClock|interval|firstTick|Clock|"
-    r"der|pre|edge|change|delay|return|reinit|terminate)\b"
-)
+_OPERATORS = (*CLOCKED_OPERATORS, *PRE_OPERATORS, "sample", "der", "delay")
+_OPERATOR = re.compile(rf"\b({'|'.join(_OPERATORS)}|return|reinit|terminate)\b")
 
 #: messages that do not name their cause -> their meaning
 _MEANINGS = {

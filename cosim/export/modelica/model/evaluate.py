@@ -11,7 +11,6 @@ import numpy as np
 
 from . import syntax_tree
 from .arithmetic import (
-    BUILTINS,
     OPERATORS,
     EvaluationError,
     check_int32,
@@ -19,6 +18,7 @@ from .arithmetic import (
     matrix_product,
     to_python_scalar,
 )
+from .builtin_functions import BUILTIN_FUNCTIONS
 from .flat_model import Function, FunctionVariable
 from .syntax_tree import Body, Expression
 
@@ -237,4 +237,7 @@ class Evaluator:
         )
 
     def _builtin(self, node: syntax_tree.Builtin) -> Any:
-        return BUILTINS[node.name](*map(self, node.arguments))
+        evaluate = BUILTIN_FUNCTIONS[node.name].evaluate
+        if evaluate is None:
+            raise KeyError(node.name)
+        return evaluate(*map(self, node.arguments))

@@ -21,11 +21,7 @@ from .syntax_tree import (
     Name,
     Solve,
     SourceLocation,
-    referenced_variable,
 )
-
-#: operators that use the value of a variable before the current event
-PRE_OPERATORS = ("pre", "edge", "change")
 
 
 def walk(node: Any) -> Iterator[Any]:
@@ -142,13 +138,6 @@ def assigned_references(node: Any) -> Iterator[Name | Index]:
             yield from item.targets
         elif isinstance(item, Solve):
             yield from item.unknowns
-
-
-def pre_references(node: Any) -> Iterator[tuple[str, Builtin]]:
-    """Yield the argument of each pre(), edge() and change() in a tree (the variable name), with the call."""
-    for item in walk(node):
-        if isinstance(item, Builtin) and item.name in PRE_OPERATORS:
-            yield referenced_variable(item.arguments[0]), item
 
 
 def composed_asserts(node: Any) -> list[Assert]:

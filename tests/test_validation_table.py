@@ -1,9 +1,9 @@
-"""docs/validation.md says what the tests measure, and is made by running them."""
+"""docs/validation.csv says what the tests measure, and is made by running them."""
 
 from __future__ import annotations
 
 import ast
-import re
+import csv
 import subprocess
 import sys
 from collections.abc import Iterator
@@ -13,13 +13,13 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 from plant_validation import (
-    DOCUMENT,
+    TABLE,
     TESTS,
     MeasurementCheck,
     Statement,
     ValidationReport,
-    render_document,
     statement,
+    write_table,
 )
 
 FILE = "plant_src/sensors/test_barometer_and_magnetometer.py"
@@ -59,32 +59,24 @@ def literal(node: ast.expr, constants: dict[str, str]) -> str | float:
     return constants[node.id] if isinstance(node, ast.Name) else ast.literal_eval(node)
 
 
-def listed(text: str) -> Iterator[tuple[Statement, str, list[float]]]:
-    """The statements of the tables that tests write on a page, each with its case and numbers."""
-    parts = re.split(r"^###? (.*)$", text, flags=re.MULTILINE)
-    for model, section in zip(parts[1::2], parts[2::2], strict=True):
-        for row in (line for line in section.splitlines() if "](../tests/" in line):
-            quantity, unit, *numbers, limit, source, test = (
-                row.removeprefix("| ").removesuffix(" |").split(" | ")
-            )
-            name, file = re.fullmatch(r"\[(\w+)\]\(\.\./tests/(.*)\)", test).groups()
-            what, _, case = quantity.partition(" [")
-            values = [float(number.strip("< rel.") or 0) for number in numbers]
-            yield (
-                Statement(model, what, unit, limit, source, f"{file}::{name}"),
-                case.removesuffix("]"),
-                values,
-            )
+def listed(table: Path) -> Iterator[tuple[Statement, str, list[float]]]:
+    """The statements of a table that tests wrote, each with its case and numbers."""
+    with table.open(newline="") as file:
+        for row in csv.DictReader(file):
+            texts = [row[name] for name in ("reference", "measured", "deviation")]
+            values = [float(text.strip("< rel.") or 0) for text in texts]
+            names = ("model", "quantity", "unit", "limit", "source", "test")
+            yield Statement(*(row[name] for name in names)), row["case"], values
 
 
-def test_the_page_lists_exactly_what_the_tests_state() -> None:
+def test_the_table_lists_exactly_what_the_tests_state() -> None:
     files = [file for file in TESTS.rglob("test_*.py") if "measured(" in file.read_text()]
     made = {each for file in files for each in stated(file)}
     assert len(made) > 80
-    assert {each for each, _, _ in listed(DOCUMENT.read_text())} == made
+    assert {each for each, _, _ in listed(TABLE)} == made
 
 
-def test_running_with_the_option_writes_what_the_page_says(tmp_path: Path) -> None:
+def test_running_with_the_option_writes_what_the_table_says(tmp_path: Path) -> None:
     """Here a file's part of it, by a process of pytest-xdist."""
     run = [
         sys.executable,
@@ -93,12 +85,12 @@ def test_running_with_the_option_writes_what_the_page_says(tmp_path: Path) -> No
         "-n",
         "1",
         "--validation",
-        str(tmp_path / "page.md"),
+        str(tmp_path / "table.csv"),
         str(TESTS / FILE),
     ]
     subprocess.run(run, cwd=TESTS.parent, check=True, capture_output=True)
-    again = list(listed((tmp_path / "page.md").read_text()))
-    before = [row for row in listed(DOCUMENT.read_text()) if row[0].test.startswith(FILE)]
+    again = list(listed(tmp_path / "table.csv"))
+    before = [row for row in listed(TABLE) if row[0].test.startswith(FILE)]
     assert [row[:2] for row in again] == [row[:2] for row in before]
     for (_, _, found), (_, _, expected) in zip(again, before, strict=True):
         assert found == pytest.approx(expected, rel=1e-2, abs=1e-9)
@@ -140,20 +132,20 @@ def test_a_model_without_a_section_is_refused(stating: MeasurementCheck) -> None
 
 
 def test_of_several_values_the_worst_is_listed(
-    stating: MeasurementCheck, records: list[tuple[str, dict[str, object]]]
+    stating: MeasurementCheck, records: list[tuple[str, dict[str, object]]], tmp_path: Path
 ) -> None:
     for found in (1.001, [1.0, 0.996], 1.002):
         for case in ("10 s", "2 s"):
             stating("Otter", "speed", found, 1.0, "m/s", "theory", within=0.01, case=case)
-    rows = list(listed(render_document([record for _, record in records])))
-    assert [row[1:] for row in rows] == [
+    write_table([record for _, record in records], tmp_path / "table.csv")
+    assert [row[1:] for row in listed(tmp_path / "table.csv")] == [
         ("2 s", [1.0, 0.996, 0.004]),
         ("10 s", [1.0, 0.996, 0.004]),
     ]
 
 
 @pytest.mark.parametrize("exitstatus", [0, 1])
-def test_the_page_is_left_alone_when_tests_fail(tmp_path: Path, exitstatus: int) -> None:
-    (page := tmp_path / "page.md").write_text("before")
-    ValidationReport(page).pytest_sessionfinish(exitstatus)
-    assert (page.read_text() == "before") == bool(exitstatus)
+def test_the_table_is_left_alone_when_tests_fail(tmp_path: Path, exitstatus: int) -> None:
+    (table := tmp_path / "table.csv").write_text("before")
+    ValidationReport(table).pytest_sessionfinish(exitstatus)
+    assert (table.read_text() == "before") == bool(exitstatus)
