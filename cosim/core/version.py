@@ -1,3 +1,3 @@
 """Version of cosim; pyproject.toml reads it from here."""
 
-__version__ = "0.2.0"
+__version__ = "0.3.0"

@@ -22,14 +22,15 @@ from ..core.errors import ComponentError, InputError, Problem, join_alternatives
 from ..core.recording import Recording
 from ..core.stopwatch import Stopwatch
 from ..process.float_mode import default_float_mode, is_default
-from ..process.forks import attributing_forks, report_forks
 from ..process.journal import (
     MARKER_SIZE,
     OVERWRITTEN,
     Journal,
     Phase,
+    attributing_forks,
     calling_component,
     current_journal,
+    report_forks,
     suspending_deadline,
 )
 from ..process.process_state import call_restoring_process_state, restoring_process_state

@@ -6,19 +6,22 @@ stepping loop with its deadline. A process without a supervisor has no journal.
 
 from __future__ import annotations
 
+import ctypes
 import math
 import mmap
+import os
 import struct
 import time as clock
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
 from enum import IntEnum
+from functools import cache
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ..core import component_log
 from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, CosimError, describe_exception
-from .forks import attributing_forks
 
 #: size of a journal (bytes)
 JOURNAL_SIZE = 5 * 4096
@@ -129,7 +132,7 @@ class Journal:
     def exclude_from_forks(self) -> None:
         """Make later forks of this process crash at their first access to the journal (Linux).
 
-        See `process.forks`.
+        See `process.journal`.
         """
         if hasattr(mmap, "MADV_DONTFORK"):
             self.memory.madvise(mmap.MADV_DONTFORK)
@@ -221,6 +224,69 @@ class Journal:
     def _read_text(self, offset: int) -> str:
         size, data = struct.unpack_from(f"I{_MAX_TEXT_SIZE}s", self.memory, offset)
         return str(data[:size].decode("utf-8", "replace"))
+
+
+#: returns component and function of the present call
+CallDescription = Callable[[], tuple[str, str]]
+
+_describe_call: CallDescription | None = None
+#: calls that have forked this process, and whether they were reported
+_noted_calls: dict[tuple[str, str], bool] = {}
+
+
+class attributing_forks:  # noqa: N801  # a generator as context manager would take twice as long
+    """Attribute forks in the block to the present call, and end a copy of this process that reaches the end of the block."""
+
+    def __init__(self, describe_call: CallDescription | None):
+        """Prepare the block.
+
+        Args:
+            describe_call: Returns component and function of the present call; None for forks that
+                are not made by foreign code.
+        """
+        self._inner = describe_call
+
+    def __enter__(self) -> None:
+        global _describe_call
+        self._process, self._outer, _describe_call = os.getpid(), _describe_call, self._inner
+
+    def __exit__(self, *error: object) -> None:
+        global _describe_call
+        _describe_call = self._outer
+        if os.getpid() != self._process:
+            os._exit(1)
+
+
+def report_forks() -> None:
+    """Warn once of each call that has forked this process."""
+    for (component, function), reported in _noted_calls.items():
+        if not reported:
+            text = f"{function} forked the process; a copy that returns from the call is ended"
+            component_log.log_message(component, component_log.WARNING, text)
+            _noted_calls[component, function] = True
+
+
+@cache
+def watch_forks() -> None:
+    """Note the present call at each fork from now on.
+
+    For processes that end without finalizing the interpreter.
+    """
+    library = ctypes.CDLL(None)
+    register = getattr(library, "pthread_atfork", None) or getattr(
+        library, "__register_atfork", None
+    )
+    if register:
+        register(None, _note_fork_callback, None, None)
+
+
+def _note_fork() -> None:
+    """Note the present call; called in the process that forks, after the fork."""
+    if _describe_call:
+        _noted_calls.setdefault(_describe_call(), False)
+
+
+_note_fork_callback = ctypes.CFUNCTYPE(None)(_note_fork)
 
 
 _current: Journal | None = None

@@ -2,18 +2,18 @@
 
     python tests/benchmarks/fmu_coverage.py FOLDER [--environments DIR] [--only NAME ...]
     [--time-limit SECONDS]
-        [--document FILE] [--json FILE]
+        [--table FILE] [--json FILE]
 
 Tries each *.fmu below FOLDER in a process of its own with each importer, from the start to the stop
 time of its default experiment. An importer counts as successful if it reaches the stop time.
-Creates a virtual environment for each other importer below DIR, unless it exists. `--document`
-replaces the table between the marks `fmus` of that file (docs/interoperability.md). The FMUs
-contain foreign code, which runs with the rights of this process.
+Creates a virtual environment for each other importer below DIR, unless it exists. `--table` writes
+docs/public_fmus.csv. The FMUs contain foreign code, which runs with the rights of this process.
 """
 
 from __future__ import annotations
 
 import argparse
+import csv
 import json
 import os
 import signal
@@ -28,8 +28,8 @@ from typing import Any
 from xml.etree import ElementTree
 from zipfile import BadZipFile, ZipFile
 
-from peer_comparison import last_line, write_into
-from virtual_environments import environment, versions
+from peer_comparison import last_line
+from virtual_environments import environment
 
 from cosim.export.foreign.windows_fmus import find_wine, prepare_wine
 
@@ -151,40 +151,33 @@ def importer_commands(
     }
 
 
-def table(rows: Sequence[tuple[Subject, Mapping[str, Attempt]]]) -> list[str]:
-    """Return the lines of a Markdown table with a row per FMU."""
-    names = list(rows[0][1])
-    lines = [
-        "| FMU | tool | FMI | kinds | binary | " + " | ".join(names) + " |",
-        "|---" * (5 + len(names)) + "|",
-    ]
+def write_table(rows: Sequence[tuple[Subject, Mapping[str, Attempt]]], target: Path) -> None:
+    """Write a CSV file with a row per FMU."""
+    with target.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(["fmu", "tool", "fmi", "kinds", "binary", *rows[0][1]])
+        for subject, attempts in rows:
+            outcomes = ["yes" if each.reached_end else "no" for each in attempts.values()]
+            about = [subject.label, subject.tool, subject.version, subject.kinds, subject.binary]
+            writer.writerow([*about, *outcomes])
+
+
+def print_summary(rows: Sequence[tuple[Subject, Mapping[str, Attempt]]]) -> None:
+    """Print the number of successes by FMI version and kind of binary."""
+    totals, reached = Counter[tuple[str, str]](), Counter[tuple[str, str, str]]()
     for subject, attempts in rows:
-        cells = ["yes" if a.reached_end else "no" for a in attempts.values()]
-        lines.append(
-            f"| {' | '.join([subject.label, subject.tool, subject.version, subject.kinds, subject.binary, *cells])} |"
-        )
-    return lines
-
-
-def summary(rows: Sequence[tuple[Subject, Mapping[str, Attempt]]]) -> list[str]:
-    """Return the lines of a Markdown table with the number of successes by FMI version and kinds."""
-    names = list(rows[0][1])
-    totals = Counter((s.version[:1], s.kinds, s.binary) for s, _ in rows)
-    reached = Counter(
-        (s.version[:1], s.kinds, s.binary, n)
-        for s, attempts in rows
-        for n, a in attempts.items()
-        if a.reached_end
-    )
-    lines = [
-        "| FMI | kinds | binary | FMUs | " + " | ".join(names) + " |",
-        "|---" * (4 + len(names)) + "|",
-    ]
+        binary = "none for this machine"
+        if "linux64" in subject.binary:
+            binary = "Linux"
+        elif "sources" in subject.binary or "win64" in subject.binary:
+            binary = "sources or Windows only"
+        key = (subject.version[:1], binary)
+        totals[key] += 1
+        for name, each in attempts.items():
+            reached[*key, name] += each.reached_end
+    print("FMI | binary | FMUs |", " | ".join(rows[0][1]))
     for key, total in sorted(totals.items()):
-        lines.append(
-            f"| {' | '.join([*key, str(total), *(str(reached[*key, name]) for name in names)])} |"
-        )
-    return lines
+        print(*key, total, *(reached[*key, name] for name in rows[0][1]), sep=" | ")
 
 
 def main() -> None:
@@ -203,7 +196,7 @@ def main() -> None:
         metavar="SECONDS",
         help="for one FMU and one importer",
     )
-    parser.add_argument("--document", type=Path)
+    parser.add_argument("--table", type=Path, help="CSV file with a row per FMU")
     parser.add_argument(
         "--json",
         type=Path,
@@ -242,10 +235,9 @@ def main() -> None:
         if arguments.json:
             known[subject.label] = _as_json(subject, attempts)
             arguments.json.write_text(json.dumps(known, indent=1))
-    label = ", ".join(versions(python, [PEERS[name][1][0]]) for name, python in pythons.items())
-    text = "\n".join([*summary(rows), "", *table(rows), "", f"Measured beside {label}."])
-    if arguments.document:
-        write_into(arguments.document, text, "fmus")
+    print_summary(rows)
+    if arguments.table:
+        write_table(rows, arguments.table)
 
 
 def _as_json(subject: Subject, attempts: Mapping[str, Attempt]) -> dict[str, Any]:

@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from cosim.cli.commands.replay import command as replay
-from cosim.cli.commands.report import command as report
+from cosim.cli.commands.finished_runs import replay, report
 from cosim.cli.commands.run import command as run
 from cosim.core import resources
 from cosim.core.errors import InputError

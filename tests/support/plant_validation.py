@@ -1,4 +1,4 @@
-"""Validation of the plant: tests compare quantities with references, and docs/validation.md lists
+"""Validation of the plant: tests compare quantities with references, and docs/validation.csv lists
 the comparisons.
 
 A test requests the fixture `measured` and calls
@@ -7,14 +7,15 @@ A test requests the fixture `measured` and calls
     `otter.m`", within=5e-6)
 
 which fails if the values differ by more than the limit. `pytest tests -m "" --validation FILE` runs
-these tests and writes the document.
+these tests and writes the file.
 """
 
 from __future__ import annotations
 
+import csv
 import re
 import sys
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable
 from dataclasses import asdict, dataclass
 from itertools import groupby
 from pathlib import Path
@@ -25,9 +26,9 @@ import pytest
 from numpy.typing import ArrayLike
 
 TESTS = Path(__file__).parents[1]
-DOCUMENT = TESTS.parent / "docs/validation.md"
+TABLE = TESTS.parent / "docs/validation.csv"
 
-#: the sections of the document, in order
+#: models of the table, in order
 MODELS = (
     "AR.Drone 2.0",
     "Multirotors",
@@ -46,7 +47,7 @@ MODELS = (
     "Sensors",
     "Replica of the published simulator",
 )
-#: the sections of the part "Against measurements", whose text is in `MEASUREMENTS`
+#: vehicles that are compared with measurements; docs/validation_measurements.md describes these
 MEASURED_VEHICLES = (
     "AR.Drone 2.0 in flight",
     "BlueBoat",
@@ -58,38 +59,24 @@ MEASURED_VEHICLES = (
     "WAM-V 16",
 )
 
-INTRODUCTION = """# Validation
-
-This page compares every plant model with an independent reference. It contains the values that the tests measured. The page is
-written by this command:
-
-```text
-pytest tests -m "" --validation docs/validation.md
-```
-
-Do not edit this page by hand; the text of its last part, "Against measurements", is
-`tests/support/validation_against_measurements.md`.
-A comparison that exceeds its limit fails its test. `tests/test_validation_document.py` fails if this page and the tests list
-different comparisons. Speed is documented in [performance.md](performance.md).
-
-* *Reference* and *measured* are empty if the quantity is itself a deviation. If a
-  quantity has several values, the worst one is listed.
-* *Deviation* is absolute, or relative to the reference if it is marked "rel."; values below 1e-12 are rounding errors. *Exact*
-  means equal to the last bit.
-* *DOP853* is the eighth-order Runge-Kutta method of SciPy with tolerances of 1e-11 or less, applied to an independent
-  implementation of the equations in NumPy.
-"""
-#: text of the last part of the page: comparisons with data that the project does not contain
-MEASUREMENTS = Path(__file__).with_name("validation_against_measurements.md")
-COLUMNS = ("quantity", "unit", "reference", "measured", "deviation", "limit", "source", "test")
-#: the same of a table that compares with a vehicle
-VEHICLE_COLUMNS = ("quantity", "unit", "vehicle", "model", "difference", "limit", "source", "test")
+COLUMNS = (
+    "model",
+    "quantity",
+    "case",
+    "unit",
+    "reference",
+    "measured",
+    "deviation",
+    "limit",
+    "source",
+    "test",
+)
 
 
 @dataclass(frozen=True)
 class Statement:
     """A comparison without its values; `test` is its file (below tests/) and function, `limit` the
-    text in the document.
+    text in the table.
     """
 
     model: str
@@ -168,59 +155,36 @@ def worst_deviation(found: ArrayLike, expected: ArrayLike, relative: bool) -> di
     }
 
 
-def render_document(records: Sequence[dict[str, Any]]) -> str:
-    """Return the document: a table for each model, ordered by files, lines and cases."""
-    parts = [
-        INTRODUCTION,
-        *(
-            f"## {model}\n\n{table}"
-            for model in MODELS
-            if (table := render_table(records, model, COLUMNS))
-        ),
-    ]
-    text = MEASUREMENTS.read_text()
-    for vehicle in MEASURED_VEHICLES:
-        heading = f"### {vehicle}\n\n"
-        assert heading in text, f"{MEASUREMENTS.name} has no heading {heading.strip()!r}"
-        table = render_table(records, vehicle, VEHICLE_COLUMNS)
-        text = text.replace(heading, f"{heading}{table}\n" if table else heading)
-    return "\n".join([*parts, text])
+def write_table(records: Iterable[dict[str, Any]], target: Path) -> None:
+    """Write the table, ordered by models, files, lines and cases; of each case its worst row."""
+    with target.open("w", newline="") as file:
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(COLUMNS)
+        for _, case in groupby(sorted(records, key=sort_key), sort_key):
+            writer.writerow(table_row(max(case, key=lambda record: record["deviation"])))
 
 
-def render_table(records: Sequence[dict[str, Any]], model: str, columns: Sequence[str]) -> str:
-    """Return the table of a model, nothing if there are no records."""
-    rows = list(table_rows(record for record in records if record["model"] == model))
-    lines = [table_line(columns), table_line(["---"] * len(columns)), *map(table_line, rows)]
-    return "\n".join([*lines, ""]) if rows else ""
-
-
-def table_line(cells: Iterable[str]) -> str:
-    return f"| {' | '.join(cells)} |"
-
-
-def table_rows(records: Iterable[dict[str, Any]]) -> Iterator[list[str]]:
-    """Yield a row for each case of each quantity, with the largest deviation."""
-    for _, case in groupby(sorted(records, key=sort_key), sort_key):
-        yield table_row(max(case, key=lambda record: record["deviation"]))
-
-
-def sort_key(record: dict[str, Any]) -> tuple[str, int, str]:
-    """Return file, line and case of a record, with numbers padded so that 2 comes before 10."""
+def sort_key(record: dict[str, Any]) -> tuple[int, str, int, str]:
+    """Return model, file, line and case of a record; numbers are padded: 2 comes before 10."""
     case = re.sub(r"\d+", lambda number: number[0].zfill(9), record["case"])
-    return record["test"].partition("::")[0], record["line"], case
+    model = (MODELS + MEASURED_VEHICLES).index(record["model"])
+    return model, record["test"].partition("::")[0], record["line"], case
 
 
 def table_row(record: dict[str, Any]) -> list[str]:
-    file, _, test = record["test"].partition("::")
+    has_reference = bool(record["expected"])
+    is_relative = record["limit"].endswith("rel.")
     return [
-        f"{record['quantity']} [{record['case']}]" if record["case"] else record["quantity"],
+        record["model"],
+        record["quantity"],
+        record["case"],
         record["unit"],
-        *(f"{record[name]:.6g}" if record["expected"] else "" for name in ("expected", "found")),
-        format_deviation(record["deviation"])
-        + (" rel." if record["limit"].endswith("rel.") else ""),
+        f"{record['expected']:.6g}" if has_reference else "",
+        f"{record['found']:.6g}" if has_reference else "",
+        format_deviation(record["deviation"]) + (" rel." if is_relative else ""),
         record["limit"],
         record["source"],
-        f"[{test}](../tests/{file})",
+        record["test"],
     ]
 
 
@@ -232,7 +196,7 @@ def format_deviation(deviation: float) -> str:
 
 class ValidationReport:
     """pytest plugin that collects the records, also of pytest-xdist workers, and writes the
-    document if all tests passed.
+    table if all tests passed.
     """
 
     def __init__(self, target: Path):
@@ -245,7 +209,7 @@ class ValidationReport:
     @pytest.hookimpl(trylast=True)
     def pytest_sessionfinish(self, exitstatus: int) -> None:
         if exitstatus == 0:
-            self.target.write_text(render_document(self.records))
+            write_table(self.records, self.target)
 
     def pytest_terminal_summary(
         self, terminalreporter: pytest.TerminalReporter, exitstatus: int

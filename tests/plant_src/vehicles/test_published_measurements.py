@@ -1,4 +1,4 @@
-"""Models compared with measured vehicles; tests/support/validation_against_measurements.md
+"""Models compared with measured vehicles; docs/validation_measurements.md
 describes the measurements.
 """
 

@@ -18,8 +18,14 @@ from ....core.component import SUCCESS_STATUSES, NativeDoStep, PreparedCall, Ste
 from ....core.errors import ComponentError, InputError
 from ....process import float_mode
 from ....process import journal as journals
-from ....process.forks import attributing_forks, report_forks, watch_forks
-from ....process.journal import CALL_NUMBER, OVERWRITTEN, Phase
+from ....process.journal import (
+    CALL_NUMBER,
+    OVERWRITTEN,
+    Phase,
+    attributing_forks,
+    report_forks,
+    watch_forks,
+)
 from ..instance import FmuInstance
 from .messages import (
     STEP_COMMAND,
