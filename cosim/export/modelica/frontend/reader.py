@@ -147,9 +147,10 @@ class ModelReader(StatementReader):
             type_name, _, literal = key.rpartition(".")
             if not literal.startswith("'"):
                 types.setdefault(type_name, {})[ordinal] = literal
-        return {
-            name: tuple(map(literals.get, sorted(literals))) for name, literals in types.items()
-        }
+        enumerations = {}
+        for type_name, literals in types.items():
+            enumerations[type_name] = tuple(literals[k] for k in sorted(literals))
+        return enumerations
 
     # equations
 
