@@ -17,6 +17,8 @@ from typing import TYPE_CHECKING
 from ..core.errors import InputError
 from ..results import Result
 from ..results.files import writing_atomically
+from ..scenario.file_paths import relocating
+from ..scenario.sources import change_paths, kind_of
 from .frames import RENDER_METHOD, RenderJob, render_frames
 from .scene import flatten_components, static_method
 
@@ -77,7 +79,9 @@ def find_frame_source(result: Result) -> str:
             result.metadata["scenario"], folder
         ):
             if static_method(component, component_folder, RENDER_METHOD):
-                return str(component_folder / component["python"])
+                system = {"components": {"source": component}}
+                absolute = change_paths(system, relocating(component_folder, None))
+                return str(absolute["components"]["source"][kind_of(component).KEY])
     raise InputError(
         "no component of the scenario renders a video: none is a Python class with a static "
         f'method "{RENDER_METHOD}"'

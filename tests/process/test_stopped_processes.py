@@ -13,7 +13,8 @@ from tempfile import TemporaryFile
 import pytest
 
 from cosim.process.journal import JOURNAL_SIZE, Journal, Phase
-from cosim.process.supervisor import _Supervisor, is_stopped
+from cosim.process.process_status import is_stopped
+from cosim.process.supervisor import _Supervisor
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 

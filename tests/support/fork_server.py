@@ -55,7 +55,7 @@ PRELOADED = (
     "cli.messages",
     "components.fmi.isolated",
     "process.sandbox.bubblewrap",
-    "process.supervised_child",
+    "process.supervisor",
     "process.supervisor",
     "scenario.plausibility",
     "studies.controller_bench.trials",

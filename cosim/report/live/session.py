@@ -15,7 +15,7 @@ from threading import Condition, Lock, Thread
 from typing import Any
 
 from ...process.journal import ROW_COUNT, Journal
-from ...process.run_files.folder import read_header
+from ...process.run_files import RowsFile
 from .feed import RowFeed
 
 #: interval at which a request checks for new rows, and the longest time that it waits for them (s)
@@ -81,8 +81,8 @@ class LiveSession:
 
     def _handle_message(self, message: dict[str, Any]) -> None:
         folder = self._journal.folder
-        if "about" in message and folder and (header := read_header(folder)):
-            self.feed = RowFeed(folder, header, message["about"]["rows"])
+        if "about" in message and folder and (rows_file := RowsFile.open(folder)):
+            self.feed = RowFeed(rows_file, message["about"]["rows"])
             if not self._wait:
                 self._begin()
         changes: dict[str, Any] = {

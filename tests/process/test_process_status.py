@@ -7,7 +7,7 @@ from pathlib import Path
 
 import pytest
 
-from cosim.process.waiting_time import waiting_time
+from cosim.process.process_status import waiting_time
 
 
 @pytest.fixture
