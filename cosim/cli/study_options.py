@@ -85,7 +85,7 @@ def open_run_store(folder: Path, retry: bool) -> RunStore:
 def create_runner(study: Study, workers: int | None, scheduler: str | None) -> CheckingRunner:
     """Return the runner for the options `--workers` and `--scheduler`."""
     if scheduler is None:
-        from ..studies.execution.local import LocalRunner
+        from ..studies.execution.worker_pool import LocalRunner
 
         return LocalRunner(study.context, workers or available_processors())
     if workers is not None:

@@ -13,8 +13,12 @@ import click
 
 from ...core.errors import ComponentError, InputError
 from ...core.processors import available_processors
-from ...studies.regression import EXIT_CODE_SEVERITY
-from ...studies.regression_runs import check_unique_names, default_folder, find_scenario_files
+from ...studies.regression import (
+    EXIT_CODE_SEVERITY,
+    check_unique_names,
+    default_folder,
+    find_scenario_files,
+)
 from .. import supervision
 from ..bench_output import (
     BenchProgress,

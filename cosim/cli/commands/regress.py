@@ -143,8 +143,12 @@ def regress(
     Exit code 0: all passed; 1: a component failed; 2: a scenario was refused; 3: a check or
     comparison failed.
     """
-    from ...studies.regression import EXIT_CODE_SEVERITY, accept_command
-    from ...studies.regression_runs import default_folder, run_regressions
+    from ...studies.regression import (
+        EXIT_CODE_SEVERITY,
+        accept_command,
+        default_folder,
+        run_regressions,
+    )
     from ..forked_commands import forked_commands
 
     folders = scenarios or [default_folder()]

@@ -133,8 +133,7 @@ def _write_maps_and_page(
     workers: int | None,
 ) -> None:
     """Write the maps, the replays of their cells if required, and the page."""
-    from ...studies.summary.page import write_sweep_page
-    from ...studies.summary.replays import remove_foreign_replays, write_replays
+    from ...studies.summary.page import remove_foreign_replays, write_replays, write_sweep_page
     from ...studies.summary.success_map import success_maps
 
     maps = success_maps(sweep, sweep.rows(run_store))

@@ -11,7 +11,6 @@ from collections.abc import Mapping
 from contextlib import suppress
 from functools import cached_property
 from multiprocessing.connection import Connection
-from pathlib import Path
 from queue import Empty, Queue
 from threading import Condition, Lock, Thread
 from typing import Any
@@ -19,7 +18,8 @@ from typing import Any
 import numpy as np
 
 from ...process.journal import ROW_COUNT, Journal
-from ...process.run_files.folder import ROWS_FILE, RowsHeader, read_header
+from ...process.row_store import map_rows
+from ...process.run_files import SIGNALS, TIME, RowsFile
 
 #: interval at which a request checks for new rows, and the longest time that it waits for them (s)
 POLL_INTERVAL, LONG_POLL_TIMEOUT = 0.03, 10.0
@@ -40,17 +40,15 @@ class RowFeed:
     Used by the request threads of the supervising process.
 
     Args:
-        folder: The folder with the files of the run.
-        header: The description of its rows.
+        rows_file: The rows of the run.
         expected_rows: The number of rows of the complete run. Only every `stride`-th row is read if
             there are many.
     """
 
-    def __init__(self, folder: Path, header: RowsHeader, expected_rows: int):
-        self._header, self._dtype = header, header.dtype
-        self._path = folder / ROWS_FILE
-        self._file = self._path.open("rb")  # stays readable after the run has removed the file
-        self.columns = ["time", *(column.name for column in header.columns)]
+    def __init__(self, rows_file: RowsFile, expected_rows: int):
+        self._layout, self._dtype = rows_file.layout, rows_file.layout.dtype
+        self._file = rows_file.path.open("rb")  # stays readable after the run has removed the file
+        self.columns = ["time", *(column.name for column in self._layout.columns)]
         self.stride = max(1, -(-expected_rows * len(self.columns) // MAX_VALUES))
         #: number of rows of the complete run after downsampling
         self.capacity = (expected_rows - 1) // self.stride + 1
@@ -58,7 +56,7 @@ class RowFeed:
     @cached_property
     def units(self) -> Mapping[str, str]:
         """Unit of each signal, "" if unknown."""
-        return {column.name: column.unit for column in self._header.columns}
+        return {column.name: column.unit for column in self._layout.columns}
 
     def available(self, recorded: int) -> int:
         """Return the number of rows after downsampling when `recorded` rows have been recorded."""
@@ -69,23 +67,15 @@ class RowFeed:
 
         Float32, shape (columns, count).
         """
-        numbers = range(first * self.stride, (first + count) * self.stride, self.stride)
         table = np.empty((len(self.columns), count), "<f4")
-        table[0] = [self._header.time_at(row * self._header.steps_per_row) for row in numbers]
-        if count and self._dtype.itemsize:
-            rows = self._rows(numbers)
-            with np.errstate(over="ignore"):  # beyond float32 a value is shown as infinite
-                for column, name in enumerate(self.columns[1:], start=1):
-                    table[column] = rows[name]
+        span = max(0, (count - 1) * self.stride + 1)
+        # not read from the file, because threads that read at the same time share its position
+        rows = map_rows(self._file, self._dtype, first * self.stride, span)[:: self.stride]
+        table[0] = rows[TIME]
+        with np.errstate(over="ignore"):  # beyond float32 a value is shown as infinite
+            for column, name in enumerate(self.columns[1:], start=1):
+                table[column] = rows[SIGNALS][name]
         return table.tobytes()
-
-    def _rows(self, numbers: range) -> np.ndarray:
-        """Map rows into memory, because threads that read at the same time cannot share one file position."""
-        size = self._dtype.itemsize
-        mapped = np.memmap(
-            self._file, self._dtype, "r", numbers.start * size, (numbers[-1] - numbers.start + 1,)
-        )
-        return mapped[:: self.stride]
 
     def close(self) -> None:
         """Close the file of the rows."""
@@ -145,8 +135,8 @@ class LiveSession:
 
     def _handle_message(self, message: dict[str, Any]) -> None:
         folder = self._journal.folder
-        if "about" in message and folder and (header := read_header(folder)):
-            self.feed = RowFeed(folder, header, message["about"]["rows"])
+        if "about" in message and folder and (rows_file := RowsFile.open(folder)):
+            self.feed = RowFeed(rows_file, message["about"]["rows"])
             if not self._wait:
                 self._begin()
         changes: dict[str, Any] = {
