@@ -197,7 +197,7 @@ def _load(options: RunOptions, real_time: float | None) -> Simulation:
 
 def _prepare_folder(prepared: PreparedRun, options: RunOptions, locks: LockKeeper) -> None:
     """Check the figures and that results can be written, lock the output directory, and remove results of an earlier run."""
-    from ...engine.disk_space import find_space_problems
+    from ...engine.recorder import find_space_problems
     from ...results.files import check_writable, remove_files
 
     if not options.no_report and (problems := prepared.figure_problems()):
