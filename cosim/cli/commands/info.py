@@ -104,7 +104,7 @@ def _describe(source: str) -> tuple[Mapping[str, str], Sequence[Variable]]:
     if file.endswith(".py"):
         return _describe_class(source)
     if source.endswith(".json"):
-        from ...export.vehicle_files import describe_vehicle
+        from ...export.plant import describe_vehicle
 
         return read_vehicle_file(_find_fmu(source), describe_vehicle)
     if file.endswith(".mo"):

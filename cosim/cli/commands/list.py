@@ -75,10 +75,10 @@ def _schema(kind: str | None) -> dict[str, Any]:
             return study_json_schema(WorstCaseSpec)
         return study_json_schema(SweepSpec if kind == "sweep" else TuneSpec)
     if kind == "vehicle":
-        from ...export.sources import vehicle_file_schema
+        from ...export.plant import vehicle_file_schema
 
         return vehicle_file_schema()
-    from ...export.sources import WORLD, world_schema
+    from ...export.plant import WORLD, world_schema
     from ...scenario.extension_schema import editor_schema, with_arguments
 
     return with_arguments(editor_schema(kind == "nested"), WORLD, world_schema())

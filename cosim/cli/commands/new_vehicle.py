@@ -108,7 +108,7 @@ def _vehicle(
         InputError: A scenario would refuse the data; each problem names the file and the place in
             it.
     """
-    from ...export.vehicle_files import examine_vehicle, vehicle_from_mesh, vehicle_from_urdf
+    from ...export.plant import examine_vehicle, vehicle_from_mesh, vehicle_from_urdf
 
     if source.problems or not isinstance(source.value, dict):
         raise InputError(

@@ -1,4 +1,7 @@
-"""Import, examination and description of vehicle files, by the programs of the shipped plant."""
+"""Functions of the shipped plant that commands use: vehicle files, and schemas of its JSON files.
+
+No other module of cosim names the plant. It is imported only when a function needs it.
+"""
 
 from __future__ import annotations
 
@@ -6,15 +9,15 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from ..components.python_import import load_object
-from ..core import resources
+from ..components.python_import import import_shipped
 from ..core.component import Variable
 from ..core.errors import Problem
+from .fmu.block import Block
 
-_URDF_READER = "plant_src/vehicle_files/urdf.py:vehicle_from_urdf"
-_MESH_READER = "plant_src/vehicle_files/mesh_import.py:vehicle_from_mesh"
-_VEHICLE_CHECK = "plant_src/vehicle_files/summary.py:examine_vehicle"
-_DESCRIPTION = "plant_src/vehicle_files/summary.py:describe_vehicle"
+#: file and class of the world
+WORLD = "plant_src/world.py:World"
+#: file that makes the block of a vehicle file
+VEHICLE_PROGRAM = "plant_src/vehicle_files/block.py"
 
 #: data of a vehicle, its centre of mass in the frame of the imported file (m), and warnings
 ImportedVehicle = tuple[dict[str, Any], list[float], list[str]]
@@ -23,6 +26,13 @@ ImportedVehicle = tuple[dict[str, Any], list[float], list[str]]
 VehicleSummary = tuple[float, Any, Mapping[str, Any], Sequence[Problem], Mapping[str, str]]
 #: properties by name, and variables of a vehicle in a scenario
 VehicleDescription = tuple[Mapping[str, str], Sequence[Variable]]
+
+
+def _function(name: str) -> Callable[..., Any]:
+    """Return a function "module.name" of the plant."""
+    module, _, function = name.rpartition(".")
+    found: Callable[..., Any] = getattr(import_shipped(f"plant_src.{module}"), function)
+    return found
 
 
 def vehicle_from_urdf(urdf: Path, data: Mapping[str, Any]) -> ImportedVehicle:
@@ -38,10 +48,8 @@ def vehicle_from_urdf(urdf: Path, data: Mapping[str, Any]) -> ImportedVehicle:
     Raises:
         InputError: The URDF file cannot be read, or does not describe one rigid body.
     """
-    read: Callable[[Path, Mapping[str, Any]], ImportedVehicle] = load_object(
-        _URDF_READER, resources.root()
-    )
-    return read(urdf, data)
+    imported: ImportedVehicle = _function("vehicle_files.urdf.vehicle_from_urdf")(urdf, data)
+    return imported
 
 
 def vehicle_from_mesh(mesh: Path, data: Mapping[str, Any], scale: float) -> ImportedVehicle:
@@ -58,10 +66,9 @@ def vehicle_from_mesh(mesh: Path, data: Mapping[str, Any], scale: float) -> Impo
     Raises:
         InputError: The mesh cannot be read or encloses no volume, or the data have no mass.
     """
-    read: Callable[[Path, Mapping[str, Any], float], ImportedVehicle] = load_object(
-        _MESH_READER, resources.root()
-    )
-    return read(mesh, data, scale)
+    read = _function("vehicle_files.mesh_import.vehicle_from_mesh")
+    imported: ImportedVehicle = read(mesh, data, scale)
+    return imported
 
 
 def examine_vehicle(data: Mapping[str, Any], name: str) -> VehicleSummary:
@@ -75,19 +82,33 @@ def examine_vehicle(data: Mapping[str, Any], name: str) -> VehicleSummary:
         InputError: With all problems of the data; the subject of each begins with "arguments" and
             continues with the path.
     """
-    examine: Callable[[Mapping[str, Any], str], VehicleSummary] = load_object(
-        _VEHICLE_CHECK, resources.root()
-    )
-    return examine(data, name)
+    summary: VehicleSummary = _function("vehicle_files.summary.examine_vehicle")(data, name)
+    return summary
 
 
 def describe_vehicle(data: Mapping[str, Any], name: str) -> VehicleDescription:
-    """Return the properties of a vehicle that is given by its data, and its variables in a scenario.
+    """Return properties and variables of a vehicle that is given by its data.
 
     Raises:
         InputError: As of `examine_vehicle`.
     """
-    describe: Callable[[Mapping[str, Any], str], VehicleDescription] = load_object(
-        _DESCRIPTION, resources.root()
-    )
-    return describe(data, name)
+    described: VehicleDescription = _function("vehicle_files.summary.describe_vehicle")(data, name)
+    return described
+
+
+def vehicle_block(path: Path) -> Block:
+    """Return the block of a vehicle file. Raises InputError with all problems of the file."""
+    block: Block = _function("vehicle_files.block.vehicle_block")(path)
+    return block
+
+
+def world_schema() -> dict[str, Any]:
+    """Return the JSON Schema of the arguments of the world."""
+    schema: dict[str, Any] = _function("schemas.world.world_schema")()
+    return schema
+
+
+def vehicle_file_schema() -> dict[str, Any]:
+    """Return the JSON Schema of vehicle files."""
+    schema: dict[str, Any] = _function("schemas.vehicle.vehicle_schema")()
+    return schema
