@@ -3,7 +3,8 @@
 The optional extension modules and the bundle of shipped files.
 
 The wheel carries scenarios, FMUs, plant and controller sources as cosim/_bundle/ in the layout of
-the checkout.
+the checkout, because scenarios name the others by relative paths. The package `plant_src` of the
+wheel finds its modules there, so each file exists once.
 """
 
 import os
@@ -15,6 +16,12 @@ from setuptools import Extension, setup
 from setuptools.command.build_py import build_py
 
 BUNDLED = ("controllers", "fmus", "plant_src", "scenarios")
+PLANT_PACKAGE = '''"""Vehicles, world and sensors of cosim, in the bundle of its shipped files."""
+
+from cosim.core import resources
+
+__path__ = [str(resources.root() / "plant_src")]
+'''
 
 
 class BuildWithBundle(build_py):
@@ -22,14 +29,19 @@ class BuildWithBundle(build_py):
 
     def run(self) -> None:
         """Build the package, then copy the bundle into it."""
-        super().run()
         if self.editable_mode:
+            super().run()
             return
+        self.packages = [name for name in self.packages if name.partition(".")[0] != "plant_src"]
+        super().run()
         for name in BUNDLED:
             target = Path(self.build_lib) / "cosim" / "_bundle" / name
             shutil.copytree(
                 name, target, dirs_exist_ok=True, ignore=shutil.ignore_patterns("__pycache__")
             )
+        plant = Path(self.build_lib) / "plant_src" / "__init__.py"
+        plant.parent.mkdir(exist_ok=True)
+        plant.write_text(PLANT_PACKAGE, encoding="utf-8")
 
 
 def extension(name: str) -> Extension:

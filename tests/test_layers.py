@@ -36,7 +36,6 @@ PLANT_LAYERS = (
     "variable_views",
     "figure_style",
     "recorded_motion",
-    "manoeuvre_track",
     "vehicles",
     "placement",
     "obstacles",
@@ -47,7 +46,6 @@ PLANT_LAYERS = (
     "schemas",
     "world_settings",
     "deck_frame",
-    "landing_kpis",
     "kpis",
     "manoeuvres",
     "scene",
@@ -182,7 +180,7 @@ def test_only_the_build_names_files_of_the_plant():
     named = [path for path in sources("cosim") if "plant_src" in path.read_text()]
     assert {module_name(path) for path in named} <= {
         "cosim.export.sources",
-        "cosim.export.vehicle_files",
+        "cosim.export.plant",
     }
 
 

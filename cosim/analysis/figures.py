@@ -15,11 +15,11 @@ from matplotlib.figure import Figure
 from matplotlib.lines import Line2D
 
 from ..results import Result
+from .kpis import recorded_scenario
 from .linear_model import LinearModel
 from .linearization import linearize
 from .loop_margins import loop_margins
 from .loop_response import LoopResponse, measure_loops
-from .recorded_run import recorded_scenario
 
 #: width of a column of a two-column paper, and of the page (in)
 _COLUMN, _PAGE = 3.5, 7.16

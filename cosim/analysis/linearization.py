@@ -14,9 +14,15 @@ import numpy as np
 
 from ..core.errors import InputError
 from .experiment import Channels, Experiment, Scenario
-from .impulse_response import NONLINEAR, ImpulseResponses, measure_impulse_responses
+from .impulse_response import (
+    NONLINEAR,
+    ImpulseResponses,
+    Realization,
+    measure_impulse_responses,
+    misfit,
+    realize,
+)
 from .linear_model import LinearModel
-from .realization import Realization, misfit, realize
 
 #: largest error of the realized impulse responses, as a fraction of their peaks, without a hint
 MAX_MISFIT = 1e-4

@@ -17,10 +17,9 @@ from ..core.errors import InputError, did_you_mean
 from ..core.system import Endpoint
 from ..engine.perturbation import PerturbationTarget
 from .experiment import Experiment, Scenario
-from .impulse_response import NONLINEAR, measure_impulse_responses
+from .impulse_response import NONLINEAR, measure_impulse_responses, misfit, realize
 from .linear_model import LinearModel
 from .linearization import MAX_MISFIT, NO_EQUILIBRIUM
-from .realization import misfit, realize
 
 #: signal of an estimated frequency response
 Excitation = Literal["sines", "chirp"]

@@ -20,37 +20,52 @@ from ..core.errors import CosimError, did_you_mean
 from ..core.version import __version__
 from ..process.standard_streams import open_closed_streams, protected_stream
 
-#: module in `commands` and description of each command
+#: module in `commands`, ":" and its function unless that is `command`, and the description
 COMMANDS = {
     "run": ("run", "Run a scenario and write results, figures and a report."),
-    "check": ("check", "Check a scenario without running it and print the expanded system."),
-    "recover": ("recover", "Write the results of a run that could not be written when it ended."),
+    "check": (
+        "check",
+        "Check a scenario without running it and print the expanded system.",
+    ),
+    "recover": (
+        "recover",
+        "Write the results of a run that could not be written when it ended.",
+    ),
     "simulate": ("simulate", "Simulate a single FMU."),
-    "compare": ("compare", "Compare a result with a reference, signal by signal."),
+    "compare": ("regress:compare", "Compare a result with a reference, signal by signal."),
     "regress": (
-        "regress",
+        "regress:regress",
         "Run all scenarios that have checks or a reference, and compare their results with these.",
     ),
     "bench-controller": (
         "bench_controller",
         "Benchmark a controller in every scenario with its role.",
     ),
-    "sweep": ("sweep", "Run a scenario at many points: parameter studies and Monte Carlo."),
+    "sweep": (
+        "sweep",
+        "Run a scenario at many points: parameter studies and Monte Carlo.",
+    ),
     "tune": ("tune", "Find the parameters that minimise a KPI."),
-    "trim": ("trim", "Find values with which a scenario starts in equilibrium."),
+    "trim": ("analysis:trim", "Find values with which a scenario starts in equilibrium."),
     "linearize": (
-        "linearize",
+        "analysis:linearize",
         "Linearise a scenario, or some of its components, at a point in time.",
     ),
     "margins": (
-        "margins",
+        "analysis:margins",
         "Print the stability margins at the inputs and outputs of a controller.",
     ),
-    "plot": ("plot", "Draw the figures of finished runs again."),
-    "report": ("report", "Write the report of a finished run again."),
-    "replay": ("replay", "Write a page with the 3-D replay of one run, or of two runs to compare."),
+    "plot": ("finished_runs:plot", "Draw the figures of finished runs again."),
+    "report": ("finished_runs:report", "Write the report of a finished run again."),
+    "replay": (
+        "finished_runs:replay",
+        "Write a page with the 3-D replay of one run, or of two runs to compare.",
+    ),
     "info": ("info", "Print the properties and variables of an FMU."),
-    "validate": ("validate", "Validate FMUs against the FMI standard without running them."),
+    "validate": (
+        "validate",
+        "Validate FMUs against the FMI standard without running them.",
+    ),
     "build": ("build", "Export controllers and plants to fmus/."),
     "init": (
         "init",
@@ -58,10 +73,10 @@ COMMANDS = {
     ),
     "new": ("new", "Create a controller, a scenario, or a vehicle."),
     "list": (
-        "list",
+        "list:list_shipped",
         "List the shipped scenarios, sweeps, vehicle models, roles of controllers and KPIs.",
     ),
-    "schema": ("schema", "Print the JSON Schema of scenarios, sweeps or tunings."),
+    "schema": ("list:schema", "Print the JSON Schema of scenarios, sweeps or tunings."),
     "doctor": (
         "doctor",
         "Print which packages, tools and sandboxes are available on this machine.",
@@ -84,8 +99,10 @@ class _LazyGroup(click.Group):
         """Import the command called `name`; None if there is none."""
         if name not in COMMANDS:
             return None
-        command: click.Command = import_module(f".commands.{COMMANDS[name][0]}", __name__).command
-        import_module(".output_options", __name__).add_verbosity_options(command)
+        module, _, function = COMMANDS[name][0].partition(":")
+        imported = import_module(f".commands.{module}", __name__)
+        command: click.Command = getattr(imported, function or "command")
+        import_module(".options", __name__).add_verbosity_options(command)
         return command
 
     def resolve_command(
@@ -153,7 +170,10 @@ def main(arguments: list[str] | None = None) -> None:
 
 
 def _raise_collection_threshold() -> None:
-    """Let the cycle collector run rarely, because almost all objects of a command exist until its process ends."""
+    """Let the cycle collector run rarely.
+
+    Almost all objects of a command exist until its process ends.
+    """
     gc.set_threshold(_GC_THRESHOLD)
     atexit.register(gc.freeze)
 
@@ -177,7 +197,7 @@ def run_guarded(command: Callable[[], int], command_line: CommandLine) -> int:
 
 
 def report_error(error: BaseException, command_line: CommandLine) -> int:
-    """Print an error to standard error, with its traceback after --debug, and return the exit code for it."""
+    """Print an error to standard error and return its exit code; --debug adds the traceback."""
     if isinstance(error, click.ClickException):
         error.show()
         return error.exit_code

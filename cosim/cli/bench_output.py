@@ -20,8 +20,7 @@ if TYPE_CHECKING:
 
     from ..results.checks import Number
     from ..studies.controller_bench.page import BenchedController
-    from ..studies.controller_bench.ranking import Ranking
-    from ..studies.controller_bench.score import KpiComparison
+    from ..studies.controller_bench.ranking import KpiComparison, Ranking
     from ..studies.controller_bench.substitution import Omission
     from ..studies.controller_bench.trials import TrialResult
 

@@ -1,13 +1,14 @@
-"""Printing of log messages of components and of warnings about the scenario to standard error."""
+"""Messages of commands: log of components, warnings, JSON, outcomes and progress."""
 
 from __future__ import annotations
 
 import json
 import logging
 import sys
-from collections.abc import Iterable
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, TextIO
 
 import click
 
@@ -24,6 +25,14 @@ if TYPE_CHECKING:
 _LEVELS = {-1: logging.WARNING, 0: logging.INFO, 1: logging.DEBUG}
 #: number of warnings collected for the report
 MAX_WARNINGS = 200
+
+
+class _LogPrinter(logging.StreamHandler[TextIO]):
+    """Handler that prints messages to standard error."""
+
+    def __init__(self) -> None:
+        super().__init__(sys.stderr)
+        self.setFormatter(logging.Formatter("%(levelname)s %(message)s"))
 
 
 class _WarningCollector(logging.Handler):
@@ -47,21 +56,26 @@ def print_log() -> list[str]:
     Returns:
         The list that collects the texts of warnings and errors.
     """
-    handler, collector = logging.StreamHandler(sys.stderr), _WarningCollector()
-    handler.setFormatter(logging.Formatter("%(levelname)s %(message)s"))
+    texts = collect_log()
     logger = logging.getLogger("cosim")
-    logger.handlers[:] = [handler, collector]
+    logger.addHandler(_LogPrinter())
     logger.setLevel(_LEVELS[current_command_line().verbosity])
-    return collector.texts
+    return texts
 
 
 def collect_log() -> list[str]:
-    """Print no message of the logger "cosim" from now on.
+    """Collect the following warnings and errors of the logger "cosim", and print none of them.
 
-    Return the list that collects the texts of warnings and errors.
+    The handlers of a program that calls a command stay.
+
+    Returns:
+        The list that collects their texts.
     """
-    collector = _WarningCollector()
-    logging.getLogger("cosim").handlers[:] = [collector]
+    logger, collector = logging.getLogger("cosim"), _WarningCollector()
+    for handler in logger.handlers[:]:
+        if isinstance(handler, _LogPrinter | _WarningCollector):  # of an earlier command
+            logger.removeHandler(handler)
+    logger.addHandler(collector)
     return collector.texts
 
 
@@ -123,3 +137,36 @@ def warn_overwriting(folder: Path, about: str, kind: str, file: Path) -> None:
             "--output-dir keeps both"
         )
         click.echo(text, err=True)
+
+
+@contextmanager
+def progress_bar(description: str) -> Iterator[Callable[[int, int], None] | None]:
+    """Show a progress bar and yield the function that updates it with (finished, total).
+
+    None without a terminal.
+    """
+    if not sys.stderr.isatty() or current_command_line().verbosity < 0:
+        yield None
+        return
+    from rich.console import Console
+    from rich.progress import (
+        BarColumn,
+        Progress,
+        TaskProgressColumn,
+        TextColumn,
+        TimeRemainingColumn,
+    )
+
+    from ..report.tables import cell_text
+
+    columns = (
+        TextColumn("{task.description}"),
+        BarColumn(),
+        TaskProgressColumn(),
+        TimeRemainingColumn(),
+    )
+    with Progress(
+        *columns, console=Console(file=unescaped(sys.stderr)), transient=True
+    ) as progress:
+        task = progress.add_task(cell_text(description))
+        yield lambda finished, total: progress.update(task, completed=finished, total=total)

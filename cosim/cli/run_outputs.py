@@ -1,4 +1,4 @@
-"""Files and text that `cosim run` produces from a run that has ended."""
+"""Files and text that `cosim run` produces from a run that has ended or failed."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ import click
 
 from ..core.errors import CosimError, OutputError
 from ..core.text import count_noun
-from . import current_command_line, exit_code_of, report_error
-from .failed_runs import report_failed_run, write_partial_result
-from .messages import print_json
-from .run_summary import summarize_run
+from ..process.journal import STEP_COUNT
+from . import current_command_line, exit_code_of, report_error, supervision
+from .messages import print_json, print_log
 from .unfinished_runs import writing_results
 
 if TYPE_CHECKING:
     from ..api import Execution
     from ..engine.pacer import LatePolicy
+    from ..process.supervisor import SupervisedOutcome
     from ..results import Result
     from ..results.checks import CheckOutcome
     from ..scenario import PreparedRun
@@ -111,22 +111,23 @@ def write_outputs(outcome: RunOutcome) -> int:
         write(outcome)
     if outcome.options.as_json and not outcome.execution.failure:
         print_json(
-            summarize_run(outcome.result, outcome.checks, outcome.shown_folder, outcome.files, code)
+            _summarize_run(
+                outcome.result, outcome.checks, outcome.shown_folder, outcome.files, code
+            )
         )
     return code
 
 
 def _end_failed_run(outcome: RunOutcome, failure: BaseException) -> int:
-    from ..process.run_files.folder import remove_run_files, run_folder
+    from ..process.run_files import remove_run_files, run_folder
 
-    outcome.result.metadata["failure"] = outcome.result.metadata["failure"] or str(
-        failure
-    )  # a KPI may have failed
+    metadata = outcome.result.metadata
+    metadata["failure"] = metadata["failure"] or str(failure)  # a KPI may have failed
     try:
-        write_partial_result(outcome.result, outcome.folder, outcome.shown_folder, run_folder())
+        _write_partial_result(outcome.result, outcome.folder, outcome.shown_folder, run_folder())
         remove_run_files()
         if not isinstance(failure, KeyboardInterrupt):
-            report_failed_run(
+            _report_failed_run(
                 outcome.result, outcome.folder, outcome.options, exit_code_of(failure)
             )
     except CosimError as error:
@@ -136,9 +137,82 @@ def _end_failed_run(outcome: RunOutcome, failure: BaseException) -> int:
     return report_error(failure, current_command_line())
 
 
+def _write_partial_result(
+    partial: Result, folder: Path, shown_folder: Path, unfinished: Path | None
+) -> None:
+    """Write the rows recorded before a failure, if there are any; see `writing_results`."""
+    from ..results.result import write_run
+
+    if len(partial.time):
+        with writing_results(partial, unfinished, shown_folder):
+            write_run(partial, folder)
+        rows = count_noun(len(partial.time), "row")
+        click.echo(f"{rows} until t = {partial.time[-1]:g} s kept in {shown_folder}", err=True)
+
+
+def _report_failed_run(partial: Result, folder: Path, options: RunOptions, exit_code: int) -> int:
+    """Write the report of a run that failed, and print its summary for --json.
+
+    Args:
+        partial: what was recorded until the failure, already written.
+        folder: the output directory.
+        options: options of the command.
+        exit_code: exit code of the command.
+
+    Returns:
+        The exit code.
+    """
+    from ..report.run_page import write_folder_report
+
+    files = ["result.csv", "run.json"] if len(partial.time) else []
+    if files and not options.no_report:
+        try:
+            write_folder_report(folder, folder / "report.html")
+            files.append("report.html")
+        except CosimError as error:
+            click.echo(f"no report: {error}", err=True)
+    if options.as_json:
+        print_json(_summarize_run(partial, (), folder, files, exit_code))
+    return exit_code
+
+
+def save_after_crash(outcome: SupervisedOutcome, options: RunOptions) -> None:
+    """Write the rows of a child process that crashed, was killed or was interrupted.
+
+    A crash also has a report.
+
+    The report is written by another supervised process, because it calls functions of the user.
+    """
+    from ..process.run_files import read_metadata
+    from ..results import Result
+    from ..results.non_finite import warn_non_finite
+
+    folder = outcome.journal.folder
+    if folder is not None:
+        failure = "interrupted" if outcome.interrupted else str(outcome.failure)
+        metadata = {
+            **read_metadata(folder),
+            "macro_steps": outcome.journal[STEP_COUNT],
+            "failure": failure,
+        }
+        recording = supervision.recover_outcome_recording(outcome)
+        if metadata.get("scenario", {}).get("non_finite") != "allow":
+            print_log()
+            metadata["non_finite"] = warn_non_finite(recording)
+        partial = Result(recording, metadata=metadata)
+        _write_partial_result(partial, folder.parent, folder.parent, folder)
+        if outcome.failure:
+            code = outcome.failure.exit_code
+            supervision.run_supervised_command(
+                lambda: _report_failed_run(partial, folder.parent, options, code),
+                "run",
+                lambda _outcome: None,
+            )
+
+
 def _write_result_files(outcome: RunOutcome) -> None:
     """Write result.csv, kpis.json and run.json in place of the files of the unfinished run."""
-    from ..process.run_files.folder import remove_run_files, run_folder
+    from ..process.run_files import remove_run_files, run_folder
     from ..results.result import write_run
 
     with writing_results(outcome.result, run_folder(), outcome.shown_folder):
@@ -249,6 +323,41 @@ def _write_mcap(outcome: RunOutcome) -> None:
         from ..report.scene import build_scene
 
         outcome.result.to_mcap(outcome.folder / "result.mcap", build_scene(outcome.result.metadata))
+
+
+def _summarize_run(
+    result: Result,
+    checks: Sequence[CheckOutcome],
+    folder: Path,
+    files: Sequence[str],
+    exit_code: int,
+) -> dict[str, Any]:
+    """Return the JSON value that `cosim run --json` prints.
+
+    Args:
+        result: the result; after a failure, what was recorded until then.
+        checks: outcomes of the checks.
+        folder: the output directory.
+        files: names of the files in it.
+        exit_code: exit code of the command.
+    """
+    about, times = result.metadata, result.time
+    return {
+        "name": about.get("name"),
+        "exit_code": exit_code,
+        "failure": about.get("failure"),
+        "termination": result.termination or None,
+        "start_time": times[0] if len(times) else None,
+        "end_time": times[-1] if len(times) else None,
+        "loop_seconds": result.timing.get("loop_seconds"),
+        "kpis": dict(result.kpis),
+        "checks": [
+            {**check.check, "value": check.value, "passed": check.passed} for check in checks
+        ],
+        "warnings": about.get("warnings", []),
+        "folder": folder,
+        "files": files,
+    }
 
 
 #: outputs of a run that reached its end, in this order

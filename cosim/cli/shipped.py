@@ -6,8 +6,9 @@ Scenarios, sweeps, vehicle models, controllers, roles of controllers and KPIs.
 from __future__ import annotations
 
 import ast
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass
+from fnmatch import fnmatchcase
 from pathlib import Path
 
 from ..core import resources
@@ -36,34 +37,28 @@ class Entry:
     arguments: str = ""
 
 
+def _read_entry(path: Path) -> Entry:
+    """Return the entry of a JSON file, with its "description"."""
+    content = parse_object(path.read_text(encoding="utf-8"))
+    return Entry(path.stem, content.get("description", ""), str(path))
+
+
 def _list_documents(pattern: str) -> Iterator[Entry]:
-    """Yield the JSON files that match a pattern, with their "description"."""
-    for path in sorted(resources.root().glob(pattern)):
-        yield Entry(
-            path.stem,
-            parse_object(path.read_text(encoding="utf-8")).get("description", ""),
-            str(path),
-        )
+    """Return the entries of the JSON files that match a pattern."""
+    return map(_read_entry, sorted(resources.root().glob(pattern)))
 
 
 def _list_models() -> Iterator[Entry]:
-    """Yield the vehicle files with their "description", and the equations with a README file with its title."""
+    """Yield the vehicle files, and the equations whose folders have a README file."""
     from ..export.sources import find_sources
 
     for source in find_sources(resources.root()):
         readme = source.path.parent / "README.md"
         if source.kind.name == "vehicle file":
-            yield Entry(
-                source.name,
-                parse_object(source.path.read_text(encoding="utf-8"))["description"],
-                str(source.path),
-            )
+            yield _read_entry(source.path)
         elif source.kind.name == "equations" and readme.is_file():
-            yield Entry(
-                source.name,
-                readme.read_text(encoding="utf-8").partition("\n")[0].lstrip("# "),
-                str(readme),
-            )
+            title = readme.read_text(encoding="utf-8").partition("\n")[0].lstrip("# ")
+            yield Entry(source.name, title, str(readme))
 
 
 def shipped_fmus() -> dict[str, Path]:
@@ -89,35 +84,36 @@ def _list_controllers() -> Iterator[Entry]:
 
 
 def _list_kpis() -> Iterator[Entry]:
-    """Yield the KPI functions in the files from which shipped scenarios name KPIs, with the first lines of their docstrings."""
+    """Yield the KPI functions in the files from which shipped scenarios name KPIs.
+
+    The descriptions are the first lines of their docstrings.
+    """
     from ..scenario.function_definitions import function_definitions
 
     for name, path in sorted(_kpi_files().items()):
         for node in function_definitions(path).values():
-            if (
-                node.returns
-                and ast.unparse(node.returns) in _KPI_TYPES
-                and not node.name.startswith("_")
-            ):
+            returned = ast.unparse(node.returns) if node.returns else ""
+            if returned in _KPI_TYPES and not node.name.startswith("_"):
                 text = (ast.get_docstring(node) or "").partition("\n")[0]
                 arguments = ast.unparse(node.args).partition(", ")[2]  # without the result
                 yield Entry(f"{name}:{node.name}", text, str(path), arguments.replace("'", '"'))
 
 
 def _kpi_files() -> dict[str, Path]:
-    """Return the files of KPI functions by their names relative to the folder of shipped files, or as modules."""
-    folder, files = (
-        resources.root() / "scenarios",
-        {name: resources.package_folder() / file for name, file in _KPI_MODULES.items()},
-    )
-    for scenario in folder.glob("*.json"):
+    """Return the files of KPI functions.
+
+    The keys are modules, or paths relative to the folder of shipped files.
+    """
+    root = resources.root().resolve()
+    files = {name: resources.package_folder() / file for name, file in _KPI_MODULES.items()}
+    for scenario in (root / "scenarios").glob("*.json"):
         kpis = parse_object(scenario.read_text(encoding="utf-8")).get("kpis", [])
-        for kpi in (
-            kpis if isinstance(kpis, list) else ()
-        ):  # a scenario that extends another may change single KPIs
-            path = (folder / kpi["python"].rpartition(":")[0]).resolve()
+        if not isinstance(kpis, list):  # a scenario that extends another may change single KPIs
+            continue
+        for kpi in kpis:
+            path = (scenario.parent / kpi["python"].rpartition(":")[0]).resolve()
             if path.suffix == ".py":
-                files[path.relative_to(resources.root().resolve()).as_posix()] = path
+                files[path.relative_to(root).as_posix()] = path
     return files
 
 
@@ -130,3 +126,38 @@ CATALOGUE: Mapping[str, Callable[[], Iterator[Entry]]] = {
     "roles": lambda: _list_documents("scenarios/roles/*.json"),
     "kpis": _list_kpis,
 }
+
+#: patterns of names by the heading of a group; the first matching pattern counts, "*" is the group
+#: of all others
+SCENARIO_GROUPS: Mapping[str, tuple[str, ...]] = {
+    "demos of the paper": ("demo1_box", "demo2_sweep", "demo3_inverse_kinematics", "vtol_*"),
+    "demo 1 in other surroundings": ("demo1_waves", "demo1_wind", "demo1_current", "harbour"),
+    "landings in waves and on other vessels": (
+        "landing_waves",
+        "landing_on_otter",
+        "landing_on_helping_vessel",
+    ),
+    "landings on measurements alone": ("*_on_sensors",),
+    "faults": ("fault_*",),
+    "vessels": ("station_keeping", "path_in_current", "otter_*", "vehicle_library"),
+    "other vehicles and fleets": ("crazyflie_*", "survey_*", "rov_*", "fleet_*"),
+    "connections of FMUs": ("free_flight", "mapped_*"),
+    "timing runs of the paper": ("performance_*",),
+    "replica of the published simulator": ("*_replica",),
+    "others": ("*",),
+}
+
+
+def group_scenarios(entries: Iterable[Entry]) -> dict[str, list[Entry]]:
+    """Return the scenarios by the headings of their groups; empty groups are left out."""
+    found: dict[str, list[Entry]] = {heading: [] for heading in SCENARIO_GROUPS}
+    for entry in entries:
+        found[_heading(entry.name)].append(entry)
+    return {heading: group for heading, group in found.items() if group}
+
+
+def _heading(name: str) -> str:
+    for heading, patterns in SCENARIO_GROUPS.items():
+        if any(fnmatchcase(name, pattern) for pattern in patterns):
+            return heading
+    raise LookupError(name)  # not reached: "*" matches every name

@@ -18,7 +18,7 @@ from ..core.processors import available_processors
 from ..core.size_limits import MAX_RUNS
 from ..core.text import count_noun
 from . import current_command_line
-from .csv_options import csv_options
+from .options import csv_option
 
 if TYPE_CHECKING:
     from ..studies.execution.job import Record
@@ -53,7 +53,7 @@ _retry = click.option(
 
 def study_options(command: Callable[..., int]) -> Callable[..., int]:
     """Add the options `--workers`, `--scheduler`, `--max-runs`, `--retry-failed` and `--excel-safe` to a command."""
-    return _workers(_scheduler(_max_runs(_retry(csv_options(command)))))
+    return _workers(_scheduler(_max_runs(_retry(csv_option(command)))))
 
 
 def open_run_store(folder: Path, retry: bool) -> RunStore:
@@ -85,7 +85,7 @@ def open_run_store(folder: Path, retry: bool) -> RunStore:
 def create_runner(study: Study, workers: int | None, scheduler: str | None) -> CheckingRunner:
     """Return the runner for the options `--workers` and `--scheduler`."""
     if scheduler is None:
-        from ..studies.execution.local import LocalRunner
+        from ..studies.execution.worker_pool import LocalRunner
 
         return LocalRunner(study.context, workers or available_processors())
     if workers is not None:

@@ -14,13 +14,16 @@ import os
 import sys
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
+from functools import cache
 from hashlib import sha256
 from importlib.abc import MetaPathFinder
 from importlib.machinery import FileFinder, ModuleSpec, SourceFileLoader
+from importlib.util import find_spec, module_from_spec, spec_from_file_location
 from pathlib import Path
 from types import CodeType, ModuleType
 from typing import Any
 
+from ..core import resources
 from ..core.errors import (
     PASS_THROUGH_EXCEPTIONS,
     InputError,
@@ -106,17 +109,25 @@ def _imported_siblings(path: Path) -> list[Path]:
     return []
 
 
+def import_shipped(module: str) -> ModuleType:
+    """Import a module of a package that cosim ships.
+
+    Args:
+        module: Name with the package, as in an import statement.
+    """
+    return _import_file(resources.root().joinpath(*module.split(".")).with_suffix(".py"))
+
+
 def _import_file(path: Path) -> ModuleType:
-    """Import a file below a namespace package whose name is derived from the path of its root folder."""
+    """Import a file by its own name if cosim ships its package, else by a unique name.
+
+    So users import the same classes of the shipped plant that runs use, while their copy of it
+    elsewhere is another package.
+    """
     root = package_root(path)
-    unique = f"{_NAMESPACE_PREFIX}{sha256(str(root).encode()).hexdigest()[:12]}"
-    if unique not in sys.modules:
-        namespace = ModuleType(unique)
-        namespace.__path__ = [str(root)]
-        sys.modules[unique] = namespace
-    if not any(isinstance(finder, _FolderFinder) for finder in sys.meta_path):
-        sys.meta_path.insert(0, _FolderFinder())
-    name = ".".join((unique, *path.relative_to(root).with_suffix("").parts))
+    parts = path.relative_to(root).with_suffix("").parts
+    is_shipped = root == resources.root() and len(parts) > 1 and _is_importable(root / parts[0])
+    name = ".".join(parts) if is_shipped else _unique_name(root, parts)
     try:
         return importlib.import_module(name)
     except PASS_THROUGH_EXCEPTIONS:
@@ -125,6 +136,31 @@ def _import_file(path: Path) -> ModuleType:
         raise InputError(
             f'"{path.name}" cannot be imported: {describe_exception(error)}'
         ) from error
+
+
+@cache
+def _is_importable(package: Path) -> bool:
+    """Return whether the name of a package means this one; make it so if the name is free."""
+    name = package.name
+    if name not in sys.modules and find_spec(name) is None:
+        spec = spec_from_file_location(name, package / "__init__.py")
+        assert spec is not None
+        assert spec.loader is not None
+        sys.modules[name] = module = module_from_spec(spec)
+        spec.loader.exec_module(module)
+    return resolve_path(Path(importlib.import_module(name).__path__[0])) == package
+
+
+def _unique_name(root: Path, parts: Sequence[str]) -> str:
+    """Return the name of a module below a namespace package that is named by the path of its root folder."""
+    unique = f"{_NAMESPACE_PREFIX}{sha256(str(root).encode()).hexdigest()[:12]}"
+    if unique not in sys.modules:
+        namespace = ModuleType(unique)
+        namespace.__path__ = [str(root)]
+        sys.modules[unique] = namespace
+    if not any(isinstance(finder, _FolderFinder) for finder in sys.meta_path):
+        sys.meta_path.insert(0, _FolderFinder())
+    return ".".join((unique, *parts))
 
 
 class _FolderFinder(MetaPathFinder):

@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from importlib.metadata import PackageNotFoundError, version
 from itertools import pairwise
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ..components.python_import import with_imported_siblings
 from ..core import resources
@@ -19,6 +19,7 @@ from .fmu.model_description import DESCRIPTION_FILE
 from .fmu.package import write_fmu
 from .foreign.c_sources import write_c_fmu
 from .foreign.python_class import write_python_fmu
+from .plant import VEHICLE_PROGRAM, vehicle_block
 
 if TYPE_CHECKING:
     from .modelica import ModelicaOptions
@@ -90,37 +91,8 @@ def _load_equations(path: Path, _model: str | None, _options: ModelicaOptions | 
         ) from error
 
 
-#: program whose function `vehicle_block` makes the block of a vehicle file
-_VEHICLE_PROGRAM = "plant_src/vehicle_files/block.py"
-#: file and class of the shipped plant
-WORLD = "plant_src/world.py:World"
-_WORLD_SCHEMA = "plant_src/schemas/world.py:world_schema"
-_VEHICLE_SCHEMA = "plant_src/schemas/vehicle.py:vehicle_schema"
-
-
 def _load_vehicle(path: Path, _model: str | None, _options: ModelicaOptions | None) -> Block:
-    from ..components.python_import import load_object
-
-    create_block: Callable[[Path], Block] = load_object(
-        f"{_VEHICLE_PROGRAM}:vehicle_block", resources.root()
-    )
-    return create_block(path)
-
-
-def world_schema() -> dict[str, Any]:
-    """Return the JSON Schema of the arguments of the shipped plant."""
-    from ..components.python_import import load_object
-
-    create_schema: Callable[[], dict[str, Any]] = load_object(_WORLD_SCHEMA, resources.root())
-    return create_schema()
-
-
-def vehicle_file_schema() -> dict[str, Any]:
-    """Return the JSON Schema of vehicle files."""
-    from ..components.python_import import load_object
-
-    create_schema: Callable[[], dict[str, Any]] = load_object(_VEHICLE_SCHEMA, resources.root())
-    return create_schema()
+    return vehicle_block(path)
 
 
 SOURCE_KINDS = (
@@ -140,7 +112,7 @@ SOURCE_KINDS = (
         "plant_src/vehicles/data/*.json",
         "casadi",
         _load_vehicle,
-        program=_VEHICLE_PROGRAM,
+        program=VEHICLE_PROGRAM,
     ),
     SourceKind(
         "PythonFMU class",
@@ -166,12 +138,9 @@ def find_sources(root: Path) -> list[Source]:
     Raises:
         InputError: Two sources have the same FMU name.
     """
-    paths = [
-        path
-        for kind in SOURCE_KINDS
-        for path in root.glob(kind.pattern)
-        if not path.name.startswith("_")
-    ]
+    paths: list[Path] = []
+    for kind in SOURCE_KINDS:
+        paths += [path for path in root.glob(kind.pattern) if not path.name.startswith("_")]
     sources = sorted(map(classify_source, paths), key=lambda source: source.manifest_key)
     clashes = [(a, b) for a, b in pairwise(sources) if a.manifest_key == b.manifest_key]
     if clashes:

@@ -1,6 +1,6 @@
 /* The state of the process that foreign code may change, as bytes that are compared in a microsecond.
 
-   They hold the attributes of cosim/process/process_attributes.py, which restores those that differ. Linux only.                   */
+   They hold the attributes of cosim/process/process_state.py, which restores those that differ. Linux only.                   */
 
 #define _GNU_SOURCE
 #define PY_SSIZE_T_CLEAN

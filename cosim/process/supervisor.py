@@ -10,20 +10,28 @@ from __future__ import annotations
 import ctypes
 import mmap
 import os
+import resource
 import select
 import signal
 import sys
+import tempfile
 import threading
 import time
 from collections.abc import Callable, Iterator
 from contextlib import AbstractContextManager, contextmanager, nullcontext, suppress
 from dataclasses import dataclass, field
-from pathlib import Path
 from tempfile import TemporaryFile
+from typing import NoReturn
 
 from ..core.errors import ComponentError
-from .failure_attribution import attribute_failure, describe_exit_status, unattributed_failure
-from .foreign_output import ForeignOutput
+from .failure_attribution import (
+    attribute_failure,
+    describe_exit_status,
+    innermost_line,
+    request_stack,
+    unattributed_failure,
+    write_stack_on_signals,
+)
 from .journal import (
     CALL_NUMBER,
     CHANGE_COUNT,
@@ -34,12 +42,17 @@ from .journal import (
     STEP_COUNT,
     Journal,
     Phase,
+    set_current_journal,
+    watch_forks,
 )
-from .python_stack import innermost_line, request_stack
-from .run_files.live_csv_writer import LiveCsvWriter
-from .supervised_child import run_child
+from .limits import detach, lower_limit
+from .process_state import reserve_descriptors
+from .process_status import child_processes, waiting_time
+from .standard_streams import ForeignOutput, protected_stream
 from .temporary_folders import temporary_run_folder
-from .waiting_time import waiting_time
+
+#: limit of the private memory of a supervised run (bytes); mapped files of rows do not count
+MEMORY_LIMIT = 4 << 30
 
 #: interval at which the supervisor checks the child (s)
 POLL_INTERVAL = 0.05
@@ -123,6 +136,60 @@ def run_supervised(
             return _Supervisor(child, journal, reader, stack.fileno()).wait_for_child()
 
 
+def run_child(
+    entry: Callable[[], int],
+    journal: Journal,
+    output: int,
+    stack: int,
+    temporary_folder: str,
+    supervisor: int,
+) -> NoReturn:
+    """Run `entry` in this process, which was just forked, and end the process.
+
+    Args:
+        entry: Returns the exit code.
+        journal: Journal in memory that the supervisor reads.
+        output: Descriptor of the pipe for the output of foreign code.
+        stack: Descriptor of the file for the Python stack (see `failure_attribution`).
+        temporary_folder: Folder for temporary files.
+        supervisor: Process id of the supervisor.
+    """
+    code = 70
+    try:
+        _isolate(output, supervisor)
+        write_stack_on_signals(stack)
+        tempfile.tempdir = os.environ["TMPDIR"] = temporary_folder
+        journal.exclude_from_forks()
+        watch_forks()
+        set_current_journal(journal)
+        code = entry()
+        sys.stdout.flush()
+        sys.stderr.flush()
+        journal[EXIT_CODE] = code
+        journal.enter_phase(Phase.DONE)
+    finally:
+        os._exit(code)  # skips the exit handlers of foreign code
+
+
+def _isolate(output: int, supervisor: int) -> None:
+    """Enter a new session that ends with the supervisor, limit memory, and connect descriptors 1 and 2 to the pipe `output`.
+
+    Python's own output goes to duplicates of the former descriptors. The limit keeps a component that allocates without end from
+    affecting other processes. Core files are not written. Some descriptors are reserved for results.
+    """
+    detach(supervisor)
+    lower_limit(resource.RLIMIT_DATA, MEMORY_LIMIT)
+    lower_limit(resource.RLIMIT_CORE, 0)
+    reserve_descriptors()
+    sys.stdout, sys.stderr = (
+        protected_stream(sys.stdout, duplicate=True),
+        protected_stream(sys.stderr, duplicate=True),
+    )
+    os.dup2(output, 1)
+    os.dup2(output, 2)
+    os.close(output)
+
+
 @contextmanager
 def interrupt_on_termination() -> Iterator[None]:
     """Raise KeyboardInterrupt on SIGTERM and SIGHUP inside the block.
@@ -156,7 +223,7 @@ class _Supervisor:
         child: Process id.
         journal: Journal of the child.
         reader: Pipe with the output of foreign code.
-        stack: File for the Python stack of the child (see `python_stack`).
+        stack: File for the Python stack of the child (see `failure_attribution`).
     """
 
     child: int
@@ -184,9 +251,8 @@ class _Supervisor:
         for descriptor in (self.reader, process):
             if descriptor >= 0:
                 poll.register(descriptor, select.POLLIN)
-        csv = LiveCsvWriter(self.journal)
         try:
-            status = self._poll_child(poll, csv)
+            status = self._poll_child(poll)
         finally:
             self._kill_descendants()
             self._output.forward()
@@ -195,11 +261,8 @@ class _Supervisor:
                 os.close(process)
         return self._outcome(status)
 
-    def _poll_child(self, poll: select.poll, csv: LiveCsvWriter) -> int:
-        """Forward output, check the deadline and update the CSV file until the child ends.
-
-        Return its status.
-        """
+    def _poll_child(self, poll: select.poll) -> int:
+        """Forward output and check the deadline until the child ends; return its status."""
         while True:
             try:
                 poll.poll(POLL_INTERVAL * 1000)
@@ -212,7 +275,6 @@ class _Supervisor:
                 if pid:
                     self._stop_time = time.monotonic() if os.WIFSTOPPED(status) else 0.0
                 self._check_deadline()
-                csv.update()
             except KeyboardInterrupt:
                 self._forward_interrupt()
 
@@ -264,7 +326,7 @@ class _Supervisor:
         with suppress(ProcessLookupError, PermissionError):
             os.killpg(self.child, signal.SIGKILL)
         for _ in range(_MAX_ORPHAN_SCANS):
-            orphans = _child_processes()
+            orphans = child_processes()
             if not orphans:
                 return
             for orphan in orphans:
@@ -293,38 +355,3 @@ class _Supervisor:
                 code, rows, journal, warning=f"{failure}; all results were written before"
             )
         return SupervisedOutcome(1, rows, journal, failure)
-
-
-def is_stopped(process: int) -> bool:
-    """Return whether a process is stopped (SIGSTOP); False on systems that do not report it."""
-    return _process_state(process) == "T"
-
-
-def has_ended(process: int) -> bool:
-    """Return whether a process has ended, waited for or not.
-
-    False on systems that do not report it.
-    """
-    return _process_state(process) in ("Z", "X", "")
-
-
-def _process_state(process: int) -> str:
-    """Return the letter of a process's state in /proc.
-
-    "" if it does not exist, "?" on systems without /proc.
-    """
-    try:
-        return Path(f"/proc/{process}/stat").read_text().rpartition(") ")[2][:1]
-    except OSError:
-        return "" if Path("/proc/self/stat").exists() else "?"
-
-
-def _child_processes() -> list[int]:
-    """Return the ids of the children of this process; empty where the system does not list them."""
-    try:
-        return [
-            int(word)
-            for word in Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
-        ]
-    except OSError:
-        return []

@@ -31,11 +31,11 @@ from inspect import getattr_static
 from pathlib import Path
 from typing import Any
 
-from ..components.python_import import load_object
 from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, InputError, did_you_mean
 from ..results.files import to_json_types
-from ..scenario.extension import read_system_document
+from ..scenario.extension import nested_content
 from ..scenario.named_functions import load_function
+from ..scenario.sources import kind_of
 
 LIST_KEYS = ("bodies", "fixed", "markers", "views", "spans", "marks", "plots")
 
@@ -109,12 +109,7 @@ def static_method(
     Raises:
         InputError: The file or the class does not exist.
     """
-    reference = component.get("python")
-    if (
-        not isinstance(reference, str) or ".py:" not in reference
-    ):  # also a Python class or object of a scenario that is a dict
-        return None
-    method = getattr_static(load_object(reference, folder), name, None)
+    method = getattr_static(kind_of(component).python_class(component, folder), name, None)
     return method if isinstance(method, staticmethod) else None
 
 
@@ -126,13 +121,11 @@ def flatten_components(
     Parameters that an outer system sets ("usv.waypoint_x") are added to the inner component.
     """
     for name, component in system.get("components", {}).items():
-        if "system" not in component:
+        nested = nested_content(component, folder)
+        if nested is None:
             yield name, component, folder
             continue
-        file = folder / component["system"]
-        for inner, leaf, leaf_folder in flatten_components(
-            read_system_document(file).value, file.parent
-        ):
+        for inner, leaf, leaf_folder in flatten_components(*nested):
             parameters = component.get("parameters", {}).items()
             outer = {
                 key.removeprefix(f"{inner}."): value

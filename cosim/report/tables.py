@@ -13,10 +13,11 @@ from typing import TYPE_CHECKING, Literal, TextIO
 
 from ..core.text import escape_control_characters
 from ..process.standard_streams import unescaped
-from ..results.checks import CheckOutcome, Number
 
 if TYPE_CHECKING:
     from rich.text import Text
+
+    from ..results.checks import CheckOutcome, Number
 
 MAX_LINE_WIDTH = 1000  # characters, of output that is not a terminal
 

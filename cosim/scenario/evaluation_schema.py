@@ -6,7 +6,7 @@ from typing import Any
 
 from pydantic import ConfigDict, model_validator
 
-from .schema_types import INVALID, BoolOrNumber, Name, NameList, Spec, key
+from .schema_types import INVALID, BoolOrNumber, FilePath, FileReference, Name, NameList, Spec, key
 
 #: the rules of `CheckSpec._check_bounds` that JSON Schema can express
 _CHECK_RULES: dict[str, Any] = {
@@ -20,7 +20,7 @@ _CHECK_RULES: dict[str, Any] = {
 class CallSpec(Spec):
     """A Python function that is called with the scenario as its first argument."""
 
-    python: str = key('"file.py:function" or "package.module:function"', "cosim.kpis:rms")
+    python: FileReference = key('"file.py:function" or "package.module:function"', "cosim.kpis:rms")
     arguments: dict[str, Any] = key(
         'keyword arguments of the function; {"from": "usv.waypoint_x"} is the value of a '
         "parameter, and "
@@ -102,7 +102,7 @@ class ToleranceSpec(Spec):
 class ReferenceSpec(Spec):
     """A recorded reference trajectory that `cosim compare` and `cosim regress` compare the result with."""
 
-    file: str = key("path of a CSV file with recorded signals", "references/demo1_box.csv")
+    file: FilePath = key("path of a CSV file with recorded signals", "references/demo1_box.csv")
     tolerances: dict[str, ToleranceSpec] = key(
         "tolerances by pattern; only matching signals are compared",
         {"plant.*.position.*": {"absolute": 0.01, "time": 0.02}},

@@ -9,6 +9,7 @@
   misspelt entry of the base.
 - A component that gets a source of another kind inherits only `period`, and `isolation` where it is
   valid.
+- An inline nested system is merged with that of the base, unless it has an "extends" of its own.
 - With a component that `null` removes go its connections, its place in the stages and its recorded
   signals.
 - `name`, `description`, `reference` and `$schema` describe the base alone and are not inherited.
@@ -16,7 +17,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Collection, Mapping, Sequence, Set
+from collections.abc import Collection, Iterator, Mapping, Sequence, Set
 from dataclasses import replace
 from pathlib import Path
 from typing import Any
@@ -24,16 +25,16 @@ from typing import Any
 from ..core import paths
 from ..core.errors import InputError, Problem, did_you_mean, nearest_name
 from ..core.size_limits import MAX_LEVELS
-from .component_schema import SOURCES
-from .file_paths import change_paths, find_scenario, path_in, relocating, resolve_shipped_paths
+from .file_paths import find_scenario, path_in, relocating, resolve_shipped_paths
 from .included_files import include_files
-from .json_document import Document, JsonPath, Origin, read_document
+from .json_document import Document, JsonPath, Origin, path_in_system, read_document
 from .schema import KEYED_LISTS, NOT_INHERITED
+from .sources import NestedSystem, change_paths, component_kinds, kind_of
 
 #: entries with names -> their noun, and the keys of which an entry needs one to be new; without
 #: them it changes one of the base
 _NEW_ENTRIES: Mapping[str, tuple[str, tuple[str, ...]]] = {
-    "components": ("component", SOURCES),
+    "components": ("component", ()),
     "connections": ("connection to", ("from",)),
     "kpis": ("KPI", ("python",)),
     "figures": ("figure", ("python",)),
@@ -50,6 +51,18 @@ def read_system_document(file: Path) -> Document:
     return expand_document(read_document(file))
 
 
+def nested_content(entry: Mapping[str, Any], folder: Path) -> tuple[dict[str, Any], Path] | None:
+    """Return the content of the nested system of a component, and the folder of its paths.
+
+    None if the component, as in a scenario file in `folder`, has another source.
+    """
+    system = entry.get(NestedSystem.KEY)
+    if isinstance(system, str):
+        file = folder / system
+        return read_system_document(file).value, file.parent
+    return (system, folder) if isinstance(system, dict) else None
+
+
 def expand_document(document: Document, extending: tuple[Path, ...] = ()) -> Document:
     """Include the files that arguments name, resolve the paths of shipped files, and merge the document with its bases.
 
@@ -64,10 +77,11 @@ def expand_document(document: Document, extending: tuple[Path, ...] = ()) -> Doc
     if not isinstance(document.value, dict):
         return document
     document = replace(document, value=resolve_shipped_paths(document.value, document.file.parent))
+    extending = (*extending, paths.resolve_path(document.file))
+    document = _expand_inline_systems(document, extending)
     value = document.value
     if "extends" not in value:
         return document
-    extending = (*extending, paths.resolve_path(document.file))
     base = expand_document(_read_base(document, value["extends"], extending), extending)
     merger = _Merger(document, base)
     inherited = _inherited(base, document.file.parent)
@@ -92,6 +106,54 @@ def expand_document(document: Document, extending: tuple[Path, ...] = ()) -> Doc
         bases=bases,
         removed=removed,
     )
+
+
+def _inline_systems(system: Any) -> Iterator[tuple[str, dict[str, Any]]]:
+    """Yield (name, component) of the components that are inline nested systems."""
+    components = system.get("components") if isinstance(system, dict) else None
+    for name, component in components.items() if isinstance(components, dict) else ():
+        if isinstance(component, dict) and isinstance(component.get(NestedSystem.KEY), dict):
+            yield name, component
+
+
+def _expand_inline_systems(document: Document, extending: tuple[Path, ...]) -> Document:
+    """Expand each inline nested system like a file of its own in the same folder."""
+    for name, component in _inline_systems(document.value):
+        path = ("components", name, "system")
+        inner = expand_document(document.part(path), extending)
+        components = document.value["components"]
+        changed = {**components, name: {**component, "system": inner.value}}
+        origins = {(*path, *each): origin for each, origin in inner.origins.items() if each}
+        outside = [each for each in document.invalid_paths if each[:3] != path]
+        invalid = [*outside, *((*path, *each) for each in inner.invalid_paths)]
+        complete = {(*path, *each) for each in inner.complete_systems}
+        document = replace(
+            document,
+            value={**document.value, "components": changed},
+            problems=[*document.problems, *inner.problems],
+            invalid_paths=invalid,
+            origins={**document.origins, **origins},
+            bases=(*document.bases, *inner.bases),
+            removed=document.removed | {(*path, *each) for each in inner.removed},
+            complete_systems=document.complete_systems
+            | complete
+            | ({path} if "extends" in component["system"] else set()),
+        )
+    return document
+
+
+def expand_set_systems(document: Document, path: JsonPath = ()) -> None:
+    """Expand the inline nested systems that settings have put into a scenario, which is changed."""
+    system = document.part(path).value
+    for name, component in _inline_systems(system):
+        place = (*path, "components", name, "system")
+        if any(place[:n] in document.settings for n in range(1, len(place) + 1)):
+            inner = expand_document(document.part(place), (paths.resolve_path(document.file),))
+            component["system"] = inner.value
+            document.problems += inner.problems
+            document.bases += inner.bases
+        else:
+            expand_set_systems(document, place)
 
 
 def _read_base(document: Document, name: Any, extending: tuple[Path, ...]) -> Document:
@@ -196,9 +258,15 @@ def _component_of(name: Any) -> str:
     return name.partition(".")[0] if isinstance(name, str) else ""
 
 
+def _new_entry(kind: str) -> tuple[str, tuple[str, ...]]:
+    """Return the noun of an entry, and the keys of which it needs one to be new."""
+    noun, keys = _NEW_ENTRIES.get(kind, ("", ()))
+    return noun, tuple(component_kinds(None)) if kind == "components" else keys
+
+
 def _is_change_of_nothing(kind: str, new: Any) -> bool:
     """Return True if an entry that the base lacks adds nothing, because it has no key that makes it new, misspelt or not."""
-    _, keys = _NEW_ENTRIES.get(kind, ("", ()))
+    _, keys = _new_entry(kind)
     return (
         isinstance(new, dict)
         and bool(keys)
@@ -236,7 +304,7 @@ class _Merger:
             if key not in new:
                 result[key] = self._copy(self._base, places[0], old[key], places[1])
             elif (
-                path == ("components",)
+                path_in_system(path) == ("components",)
                 and key not in old
                 and _is_change_of_nothing("components", new[key])
             ):
@@ -262,47 +330,59 @@ class _Merger:
         """Merge two values; `old` is None if the base has no such value."""
         if isinstance(new, dict):
             self.origins[path] = Origin(self._document, new_path)
-            if path in KEYED_LISTS:
-                return self._merge_list(
-                    str(path[0]), KEYED_LISTS[path], old if isinstance(old, list) else [], new
-                )
-            if len(path) == 2 and path[0] == "components" and isinstance(old, dict):
-                source = next((each for each in SOURCES if new.get(each) is not None), None)
-                old = inherited_component(old, source) if source else old
+            match path_in_system(path):
+                case (kind,) if path_in_system(path) in KEYED_LISTS:
+                    key = KEYED_LISTS[(str(kind),)]
+                    return self._merge_list(
+                        path, old_path, new_path, key, old if isinstance(old, list) else [], new
+                    )
+                case ("components", _) if isinstance(old, dict):
+                    old = inherited_component(old, new)
+                case ("components", _, "system") if isinstance(old, dict):
+                    if new_path in self._document.complete_systems:
+                        return self._copy(self._document, path, new, new_path)
+                    new = {**new, **_removals_with_components(old, new)}
             return self.merge_objects(
                 path, old if isinstance(old, dict) else {}, new, old_path, new_path
             )
         return self._copy(self._document, path, new, new_path)
 
-    def _merge_list(self, kind: str, key: str, old: list[Any], new: Mapping[str, Any]) -> list[Any]:
+    def _merge_list(
+        self,
+        path: JsonPath,
+        old_path: JsonPath,
+        new_path: JsonPath,
+        key: str,
+        old: list[Any],
+        new: Mapping[str, Any],
+    ) -> list[Any]:
         """Merge a list of named elements with changes by name."""
+        kind = str(path[-1])
         names = [str(element.get(key)) if isinstance(element, dict) else "" for element in old]
         result: list[Any] = []
         for i, name in enumerate(names):
-            path = (kind, len(result))
+            place, old_place = (*path, len(result)), (*old_path, i)
             if name not in new or names.count(name) > 1:
-                result.append(self._copy(self._base, path, old[i], (kind, i)))
+                result.append(self._copy(self._base, place, old[i], old_place))
             elif new[name] is not None:
-                result.append(self._merge_element(path, (kind, i), (kind, name), old[i], new[name]))
+                new_place = (*new_path, name)
+                result.append(self._merge_element(place, old_place, new_place, old[i], new[name]))
         for name, change in new.items():
+            new_place = (*new_path, name)
             if names.count(name) > 1:
                 self._report(
-                    (kind, name),
-                    (
-                        f"the base has {names.count(name)} elements with this name; a list "
-                        "replaces all elements"
-                    ),
+                    new_place,
+                    f"the base has {names.count(name)} elements with this name; a list "
+                    "replaces all elements",
                 )
             elif name not in names and change is None:
-                self._report((kind, name), f"nothing to remove{did_you_mean(name, names)}")
+                self._report(new_place, f"nothing to remove{did_you_mean(name, names)}")
             elif name not in names and _is_change_of_nothing(kind, change):
-                self._report_unknown((kind, name), names)
+                self._report_unknown(new_place, names)
             elif name not in names:
-                path = (kind, len(result))
-                result.append(
-                    {key: name, **self._merge_element(path, (), (kind, name), {}, change)}
-                )
-                self.origins[(*path, key)] = Origin(self._document, (kind, name))
+                place = (*path, len(result))
+                result.append({key: name, **self._merge_element(place, (), new_place, {}, change)})
+                self.origins[(*place, key)] = Origin(self._document, new_place)
         return result
 
     def _merge_element(
@@ -331,8 +411,8 @@ class _Merger:
 
     def _report_unknown(self, path: JsonPath, names: Collection[str]) -> None:
         """Report a change of an entry that the base lacks; `names` are those of its entries."""
-        noun, keys = _NEW_ENTRIES[str(path[0])]
-        name = str(path[1])
+        noun, keys = _new_entry(str(path[-2]))
+        name = str(path[-1])
         near = nearest_name(name, names)
         hint = (
             f'; did you mean "{near}"?'
@@ -347,12 +427,12 @@ class _Merger:
         self.problems.append(Problem(text, self._document.where(path)))
 
 
-def inherited_component(component: Mapping[str, Any], source: str) -> dict[str, Any]:
-    """Return what a component with a source of the kind `source` inherits.
+def inherited_component(old: Mapping[str, Any], new: Mapping[str, Any]) -> dict[str, Any]:
+    """Return what a component inherits that `new` changes.
 
-    All of it, unless its source is of another kind.
+    All of it, unless `new` has a source of another kind.
     """
-    if source in component or not any(each in component for each in SOURCES):
-        return dict(component)
-    kept = ("period", "isolation") if source in ("fmu", "modelica") else ("period",)
-    return {key: component[key] for key in kept if key in component}
+    kind = kind_of(new)
+    if not hasattr(kind, "KEY") or kind.KEY in old or not hasattr(kind_of(old), "KEY"):
+        return dict(old)
+    return {key: old[key] for key in kind.KEPT_KEYS if key in old}

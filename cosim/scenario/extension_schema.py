@@ -24,7 +24,10 @@ _EXTENDS: Schema = {
 
 
 def editor_schema(nested: bool = False) -> Schema:
-    """Return the JSON Schema (2020-12) of scenario files or of nested-system files, with or without "extends"."""
+    """Return the JSON Schema (2020-12) of scenario files or of nested-system files.
+
+    It accepts files with and without "extends", also for inline nested systems.
+    """
     full = json_schema(nested)
     version, definitions = full.pop("$schema"), full.pop("$defs")
     changes = {
@@ -32,14 +35,26 @@ def editor_schema(nested: bool = False) -> Schema:
         for name, each in definitions.items()
         if _is_object(each)
     }
-    name = "Nested" if nested else "Scenario"
-    roots = {name: full, f"{name}{_SUFFIX}": _change_of_root(full, definitions)}
+    inline = definitions["NestedSpec"]
+    change = _change_of_root(inline, definitions)
+    changes[f"NestedSpec{_SUFFIX}"] = {**change, "required": []}
+    roots = {"Nested": inline, f"Nested{_SUFFIX}": change, "NestedSpec": _with_or_without("Nested")}
+    if not nested:
+        roots["Scenario"] = full
+        roots[f"Scenario{_SUFFIX}"] = _change_of_root(full, definitions)
     return {
         "$schema": version,
+        **_with_or_without("Nested" if nested else "Scenario"),
+        "$defs": {**definitions, **changes, **roots},
+    }
+
+
+def _with_or_without(name: str) -> Schema:
+    """Return the schema of files of a kind, with "extends" or without it."""
+    return {
         "if": {"type": "object", "required": ["extends"]},
         "then": {"$ref": f"#/$defs/{name}{_SUFFIX}"},
         "else": {"$ref": f"#/$defs/{name}"},
-        "$defs": {**definitions, **changes, **roots},
     }
 
 

@@ -3,28 +3,18 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, TypeGuard
+from typing import Any
 
 from ..core import paths, resources
 from ..core.errors import InputError, did_you_mean
 from .json_document import pointer_keys
-
-#: returns the new text of a path
-PathChange = Callable[[str], str]
+from .schema_types import PathChange
+from .sources import change_paths
 
 #: a path that begins so starts from the files that cosim ships
 SHIPPED = "cosim:"
-
-#: keys of a scenario with lists or objects of entries that name files, and keys with one such entry
-_ENTRIES, _ENTRY = ("components", "inputs", "kpis", "figures"), ("scene", "reference")
-#: keys of an entry that hold a path, and keys that hold a reference such as "file.py:Class"
-_PATH_KEYS, _PATH_LIST_KEYS, _REFERENCE_KEYS = (
-    ("fmu", "system", "file"),
-    ("libraries",),
-    ("python", "modelica"),
-)
 
 
 def find_scenario(scenario: str | Path) -> Path:
@@ -87,45 +77,6 @@ def resolve_shipped_paths(system: Mapping[str, Any], folder: Path) -> dict[str, 
     return change_paths(system, lambda text: change(text) if text.startswith(SHIPPED) else text)
 
 
-def change_paths(system: Mapping[str, Any], change: PathChange) -> dict[str, Any]:
-    """Return a copy of a scenario or nested system, or of a part of one, in which every path is changed.
-
-    Strings in `arguments` and `parameters` are not paths for cosim and stay as they are.
-    """
-    return {key: _change_value(key, value, change) for key, value in system.items()}
-
-
-def _change_value(key: str, value: Any, change: PathChange) -> Any:
-    if key in _ENTRY:
-        return _change_entry(value, change)
-    if key in _ENTRIES and isinstance(value, list):
-        return [_change_entry(each, change) for each in value]
-    if key in _ENTRIES and isinstance(value, Mapping):
-        return {name: _change_entry(each, change) for name, each in value.items()}
-    return value
-
-
-def _change_entry(entry: Any, change: PathChange) -> Any:
-    if not isinstance(entry, Mapping):
-        return entry
-    paths = {key: change(text) for key in _PATH_KEYS if isinstance(text := entry.get(key), str)}
-    references = {
-        key: change_reference(text, change)
-        for key in _REFERENCE_KEYS
-        if isinstance(text := entry.get(key), str)
-    }
-    lists = {
-        key: list(map(change, each))
-        for key in _PATH_LIST_KEYS
-        if _is_list_of_texts(each := entry.get(key))
-    }
-    return {**entry, **paths, **references, **lists}
-
-
-def _is_list_of_texts(value: Any) -> TypeGuard[list[str]]:
-    return isinstance(value, list) and all(isinstance(each, str) for each in value)
-
-
 def change_pointed(pointer: str, value: Any, change: PathChange) -> Any:
     """Return the value of a JSON pointer into a scenario with every path changed."""
     keys = pointer_keys(pointer)
@@ -135,12 +86,3 @@ def change_pointed(pointer: str, value: Any, change: PathChange) -> Any:
     for key in keys:
         value = value[key]
     return value
-
-
-def change_reference(reference: str, change: PathChange) -> str:
-    """Return a reference "file.py:name" or "file.mo:Model" with a changed path.
-
-    Modules stay as they are.
-    """
-    file, separator, name = reference.rpartition(":")
-    return f"{change(file)}{separator}{name}" if file.endswith((".py", ".mo")) else reference

@@ -15,7 +15,7 @@ from typing import Any
 import numpy as np
 
 from ..core.errors import InputError, Problem
-from .json_document import Document, JsonPath, Origin, read_document
+from .json_document import Document, JsonPath, Origin, path_in_system, read_document
 
 SUFFIX = ".json"
 
@@ -75,9 +75,11 @@ def include_in_setting(
         documents[path] = file
         return file.value
 
-    is_argument = tuple(keys[:2]) == ("scene", "arguments") or (
-        len(keys) > 2 and (keys[0], keys[2]) == ("components", "arguments")
-    )
+    match path_in_system(keys):
+        case ["scene", "arguments", *_] | ["components", _, "arguments", *_]:
+            is_argument = True
+        case _:
+            is_argument = False
     return (_replace_names(value, (), read) if is_argument else value), files, documents
 
 

@@ -10,11 +10,11 @@ import json
 import math
 import re
 from bisect import bisect_right
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence, Set
 from dataclasses import dataclass, field, replace
 from functools import cached_property, lru_cache
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 from ..core.errors import InputError, Problem, abbreviate_names, nearest_file, nearest_name
 from ..core.json_values import copy_json
@@ -23,6 +23,7 @@ from ..core.text import acceptable_text, count_noun, shorten, text_problem
 
 #: keys and indices from the root of a document to a value
 JsonPath = tuple["str | int", ...]
+T = TypeVar("T")
 _DECODER = json.JSONDecoder()
 _WHITESPACE = re.compile(r"[ \t\r\n]*")
 _LITERAL = re.compile(r"-?Infinity|NaN|true|false|null|-?(?:0|[1-9]\d*)(?:\.\d+)?(?:[eE][-+]?\d+)?")
@@ -46,11 +47,13 @@ class Document:
     origins: Mapping[JsonPath, Origin] = field(default_factory=dict)
     #: the other files from which the value is merged
     bases: tuple[Path, ...] = ()
-    #: Python classes and objects by the names of the components that they implement; from a dict or
+    #: Python classes and objects by the paths of the components that they implement; from a dict or
     #: from settings
-    objects: Mapping[str, Any] = field(default_factory=dict)
+    objects: Mapping[JsonPath, Any] = field(default_factory=dict)
     #: paths of the values of other files that are removed
     removed: set[JsonPath] = field(default_factory=set)
+    #: paths of the inline nested systems that extend a file
+    complete_systems: Set[JsonPath] = frozenset()
     #: JSON pointers of the caller's settings by the paths of the values that they set
     settings: dict[JsonPath, str] = field(default_factory=dict)
     #: files that these settings name, by the paths of the values that are read from them
@@ -101,18 +104,38 @@ class Document:
 
     def refuse_objects(self, reason: str, classes: bool) -> None:
         """Raise InputError with this reason if components are Python objects, or (if `classes`) Python classes."""
-        if names := [
-            name for name, target in self.objects.items() if classes or not callable(target)
-        ]:
-            kind = "class or object" if classes else "object"
-            raise InputError(
-                [
-                    Problem(
-                        f"{reason}: found a Python {kind}",
-                        self.where(("components", names[0], "python")),
-                    )
-                ]
-            )
+        for path, target in self.objects.items():
+            if classes or not callable(target):
+                kind = "class or object" if classes else "object"
+                where = self.where((*path, "python"))
+                raise InputError(Problem(f"{reason}: found a Python {kind}", where))
+
+    def part(self, path: JsonPath) -> Document:
+        """Return the object at a path, an inline nested system, as a document of its own.
+
+        Its problems are located in this document.
+        """
+        value = self.value
+        for key in path:
+            value = value[key]
+
+        def below(paths: Iterable[JsonPath]) -> list[JsonPath]:
+            return [each[len(path) :] for each in paths if each[: len(path)] == path]
+
+        return Document(
+            self.file,
+            "",
+            value,
+            origins={(): Origin(self, path)},
+            invalid_paths=below(self.invalid_paths),
+            removed=set(below(self.removed)),
+            objects={each: self.objects[*path, *each] for each in below(self.objects)},
+            settings={each: self.settings[*path, *each] for each in below(self.settings)},
+            set_documents={
+                each: self.set_documents[*path, *each] for each in below(self.set_documents)
+            },
+            is_dict=self.is_dict,
+        )
 
     @property
     def files(self) -> tuple[Path, ...]:
@@ -139,6 +162,17 @@ class Origin(NamedTuple):
 
     document: Document
     path: JsonPath
+
+
+def path_in_system(path: Sequence[T]) -> Sequence[T]:
+    """Return the part of a path that lies in the innermost inline nested system.
+
+    >>> path_in_system(("components", "uav", "system", "connections", 0))
+    ('connections', 0)
+    """
+    while len(path) > 3 and (path[0], path[2]) == ("components", "system"):
+        path = path[3:]
+    return path
 
 
 def json_path(path: Sequence[str | int]) -> str:

@@ -18,11 +18,12 @@ from ..core.text import shorten
 from .evaluation_schema import CallSpec
 from .expanded_size import SystemFile, check_expanded_size
 from .extension import expand_document, read_system_document
-from .file_paths import change_paths, find_scenario, relocating
+from .file_paths import find_scenario, relocating
 from .json_document import Document, pointer_keys, set_value
 from .schema import NestedSpec, PortsSpec, ScenarioSpec, SystemSpec, ports_of
 from .schema_types import accepted
 from .settings import apply_settings, document_of_dict
+from .sources import change_paths
 from .validation import validate_document
 
 _LEGAL_NAME = re.compile("[A-Za-z_][A-Za-z0-9_]*")
@@ -91,10 +92,10 @@ class Node:
 
     def leaves(self) -> Iterator[tuple[Node, str]]:
         """Yield (system, name) of every valid component that is not a nested system, in the order of the files."""
-        for name, component in self.spec.components.items():
+        for name in self.spec.components:
             if name in self.children:
                 yield from self.children[name].leaves()
-            elif name not in self.invalid_components and component.system is None:
+            elif name not in self.invalid_components:
                 yield self, name
 
 
@@ -124,29 +125,34 @@ class Scenario:
         return change_paths(value, relocating(self.root.folder, None))
 
     def files(self) -> list[Path]:
-        """Return all files that the scenario names, whether they exist or not.
+        """Return all files that the scenario names, whether they exist or not."""
+        return list(files_of_system(self.root, self.spec))
 
-        These are the scenario and its nested systems, sources with their packages, input profiles,
-        KPIs and figures.
-        """
-        files = [file for node in self.root.walk() for file in node.document.files]
-        files += [self.root.folder / spec.file for _, spec in accepted(self.spec.inputs)]
-        functions: list[CallSpec] = [
-            spec for _, spec in (*accepted(self.spec.kpis), *accepted(self.spec.figures))
-        ]
-        functions += [self.spec.scene] if self.spec.scene else []
-        python = [
-            self.root.folder / spec.python.rpartition(":")[0]
-            for spec in functions
-            if ".py:" in spec.python
-        ]
-        for node, name in self.root.leaves():
-            spec = node.spec.components[name]
-            if spec.python:
-                python.append(node.folder / spec.python.rpartition(":")[0])
-            else:
-                files.append(node.folder / (spec.fmu or (spec.modelica or "").rpartition(":")[0]))
-        return [*files, *package_files(python)]
+
+def files_of_system(root: Node, spec: ScenarioSpec, is_loaded: bool = False) -> set[Path]:
+    """Return all files that a scenario depends on.
+
+    These are the scenario and its nested systems, sources with their packages, input profiles,
+    KPIs and figures.
+
+    Args:
+        root: The scenario.
+        spec: Its specification.
+        is_loaded: The components exist, so that the files from which they were built are known.
+    """
+    files: list[Path] = []
+    for node in root.walk():
+        files += node.document.files
+    for _, profile in accepted(spec.inputs):
+        files += profile.files(root.folder)
+    calls: list[CallSpec] = [each for _, each in (*accepted(spec.kpis), *accepted(spec.figures))]
+    for call in (*calls, spec.scene) if spec.scene else calls:
+        files += [root.folder / path for path in call.paths]
+    for node, name in root.leaves():
+        source = node.spec.components[name]
+        files += source.used_files(node.folder) if is_loaded else source.files(node.folder)
+    python = [file for file in files if file.suffix == ".py"]
+    return {*files, *package_files(python)}
 
 
 def open_scenario(scenario: str | Path | Mapping[str, Any]) -> Document:
@@ -248,17 +254,36 @@ class _SystemReader:
         file = SystemFile(document, spec, invalid_keys, invalid_components, {})
         ancestors = (*ancestors, paths.resolve_path(document.file))
         for name, component in spec.components.items():
-            if component.system is not None:
-                if child := self._read_nested(file, name, component.system, ancestors):
+            if component.nested_system is not None:
+                if child := self._read_nested(file, name, component.nested_system, ancestors):
                     file.children[name] = child
                 else:
                     invalid_components.add(name)
         return file
 
     def _read_nested(
+        self,
+        parent: SystemFile,
+        name: str,
+        system: str | dict[str, Any],
+        ancestors: tuple[Path, ...],
+    ) -> SystemFile | None:
+        """Return the file of a nested system, or None if it cannot be used.
+
+        An inline system is a part of the file of its parent.
+        """
+        if isinstance(system, str):
+            return self._read_nested_file(parent, name, system, ancestors)
+        place = ("components", name, "system")
+        if len(ancestors) + 1 > MAX_LEVELS:
+            text = f'the nested system "{name}" is nested more than {MAX_LEVELS} levels deep'
+            self.problems.append(Problem(text, parent.document.where(place)))
+            return None
+        return self.read(parent.document.part(place), NestedSpec, ancestors)
+
+    def _read_nested_file(
         self, parent: SystemFile, name: str, path: str, ancestors: tuple[Path, ...]
     ) -> SystemFile | None:
-        """Return the file of a nested system, or None if it cannot be used."""
         file = parent.document.file.parent / path
         key = (
             paths.resolve_path(file.parent) / file.name

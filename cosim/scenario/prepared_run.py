@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import os
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
 from decimal import Decimal
 from fractions import Fraction
@@ -17,7 +17,6 @@ from typing import Any, Literal, get_args
 import numpy as np
 
 from ..components.fmi import FmuFile
-from ..components.python_import import package_files
 from ..core import resources
 from ..core.errors import InputError, Problem
 from ..core.paths import resolve_path
@@ -36,7 +35,7 @@ from .evaluation_schema import FunctionSpec
 from .file_paths import SHIPPED
 from .json_document import Document
 from .named_functions import load_function, signal_problems
-from .nested_systems import Node, load_scenario
+from .nested_systems import Node, files_of_system, load_scenario
 from .overview import describe_software, describe_system
 from .schema import ScenarioSpec
 from .system_builder import PROFILE_PREFIX, SystemBuilder
@@ -170,23 +169,9 @@ class PreparedRun:
 
         These are the scenario and its nested systems, FMUs, Python and Modelica sources, and input profiles.
         """
-        own = [file for node in self.root.walk() for file in node.document.files]
-        own += [self.root.folder / spec.file for spec in self.spec.inputs]
-        calls = (
-            *self.spec.kpis,
-            *self.spec.figures,
-            *([self.spec.scene] if self.spec.scene else []),
-        )
-        modules = (spec.python.rpartition(":")[0] for spec in calls)
-        functions = (self.root.folder / module for module in modules if module.endswith(".py"))
-        factory, folder = self.component_factory, self.root.folder.resolve()
-        fmus = (path for path, _ in factory.fmus if path not in factory.cached_fmus)
-        data = {file.resolve() for file in (*own, *fmus, *_modelica_files(factory))}
-        files = data | package_files((*functions, *factory.python_files))
-        return {
-            _name_of_file(str(file), str(folder), _shipped()): file
-            for file in sorted(files, key=str)
-        }
+        folder, shipped = str(self.root.folder.resolve()), _shipped()
+        files = {file.resolve() for file in files_of_system(self.root, self.spec, is_loaded=True)}
+        return {_name_of_file(str(file), folder, shipped): file for file in sorted(files, key=str)}
 
     @property
     def sources(self) -> dict[str, str]:
@@ -197,35 +182,21 @@ class PreparedRun:
         One that cosim ships has a name such as "cosim:fmus/mixer.fmu", except for those of shipped
         scenarios.
         """
-        profiles = {f"{PROFILE_PREFIX}.{i}": spec.file for i, spec in enumerate(self.spec.inputs)}
-        return {
-            node.full_name(name): self._source_of(node, name) for node, name in self.root.leaves()
-        } | profiles
+        sources = {}
+        root, shipped = str(self.root.folder.resolve()), _shipped()
+        for node, name in self.root.leaves():
 
-    def _source_of(self, node: Node, name: str) -> str:
-        spec = node.spec.components[name]
-        text = spec.fmu or spec.python or spec.modelica or ""
-        file, colon, member = ("", "", "") if spec.fmu else text.rpartition(":")
-        known = _name_of_file(
-            str(resolve_path(node.folder / (file or text))),
-            str(self.root.folder.resolve()),
-            _shipped(),
-        )
-        return f"{known}{colon}{member}" if text and known.startswith(SHIPPED) else text
+            def shown(path: str, folder: Path = node.folder) -> str:
+                known = _name_of_file(str(resolve_path(folder / path)), root, shipped)
+                return known if known.startswith(SHIPPED) else path
+
+            sources[node.full_name(name)] = node.spec.components[name].label(shown)
+        profiles = {f"{PROFILE_PREFIX}.{i}": spec.file for i, spec in enumerate(self.spec.inputs)}
+        return {**sources, **profiles}
 
     def free(self) -> None:
         """Free the components of a scenario that is not simulated."""
         free_components(self.system.components)
-
-
-def _modelica_files(factory: ComponentFactory) -> Iterator[Path]:
-    """Yield the Modelica sources of components, and the files of packages from which FMUs in the user's cache were built."""
-    yield from factory.modelica_files
-    if factory.cached_fmus:
-        from ..export.modelica.frontend.model_files import needed_files
-
-        for source in factory.cached_fmus.values():
-            yield from needed_files(source)
 
 
 def _shipped() -> str:

@@ -14,7 +14,6 @@ from pydantic import ConfigDict, StringConstraints, model_validator
 from ..core.system import Interpolation, IterationMethod
 from ..core.text import count_noun
 from ..engine.settings import NonFinitePolicy, StopOutcome
-from .component_schema import ComponentSpec
 from .evaluation_schema import CallSpec, CheckSpec, FunctionSpec, ReferenceSpec
 from .schema_types import (
     INVALID,
@@ -31,6 +30,7 @@ from .schema_types import (
     key,
     schema_of,
 )
+from .sources import ComponentSpec, InputTableSource, component_model
 
 #: pattern of the names of scenarios
 SCENARIO_NAME = r"^[A-Za-z0-9_][A-Za-z0-9_. -]*$"
@@ -243,18 +243,6 @@ class StopSpec(Spec):
     )
 
 
-class InputSpec(Spec):
-    """An input profile over time from a CSV file."""
-
-    file: str = key(
-        'path of the CSV file; its first column is "time" (s)', "profiles/accelerations.csv"
-    )
-    to: dict[str, NameList] = key("the inputs that each column is connected to", {"ax": "uav.ax"})
-    interpolation: Literal["linear", "hold"] = key(
-        "value between two rows; hold: that of the last row", "hold", default="linear"
-    )
-
-
 class PortsSpec(Spec):
     """The ports of a nested system.
 
@@ -360,7 +348,7 @@ class ScenarioSpec(SystemSpec):
         [{"time": 20.0, "set": {"plant.usv.external_force.y": 2.0}}],
         default=[],
     )
-    inputs: list[InputSpec] = key(
+    inputs: list[InputTableSource] = key(
         "input profiles from CSV files",
         [{"file": "profiles/accelerations.csv", "to": {"ax": "uav.ax"}}],
         default=[],
@@ -429,4 +417,4 @@ def ports_of(spec: SystemSpec) -> PortsSpec:
 
 def json_schema(nested: bool = False) -> dict[str, Any]:
     """Return the JSON Schema (2020-12) of scenario files, or of nested-system files."""
-    return schema_of(NestedSpec if nested else ScenarioSpec)
+    return schema_of(NestedSpec if nested else ScenarioSpec, component_model(), NestedSpec)

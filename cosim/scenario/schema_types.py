@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Callable, Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from dataclasses import dataclass
 from fractions import Fraction
+from functools import cache
 from typing import Annotated, Any, Literal, TypeVar
 
 from pydantic import (
@@ -18,10 +20,13 @@ from pydantic import (
     WithJsonSchema,
     model_validator,
 )
+from pydantic.fields import FieldInfo
 
 from ..core.time_grid import MAX_TIME, exact_fraction
 
 S = TypeVar("S")
+#: returns the new text of a path
+PathChange = Callable[[str], str]
 
 _UNSIGNED_TIME = r"[0-9]{1,400}/0{0,399}[1-9][0-9]{0,399}$"
 #: text of a time: a fraction; as regular expression of Python and of JSON Schema
@@ -191,6 +196,42 @@ NameList = Annotated[
 ]
 
 
+@dataclass(frozen=True)
+class HoldsPaths:
+    """Mark of a key whose value holds paths of files.
+
+    Attributes:
+        change: Returns the JSON value of the key with every path changed.
+    """
+
+    change: Callable[[Any, PathChange], Any]
+
+
+def _change_path(value: Any, change: PathChange) -> Any:
+    return change(value) if isinstance(value, str) else value
+
+
+def _change_list(value: Any, change: PathChange) -> Any:
+    is_list = isinstance(value, list) and all(isinstance(each, str) for each in value)
+    return list(map(change, value)) if is_list else value
+
+
+def change_reference(reference: Any, change: PathChange) -> Any:
+    """Return a reference "file.py:name" or "file.mo:Model" with a changed path.
+
+    Modules stay as they are.
+    """
+    if not isinstance(reference, str):
+        return reference
+    file, separator, name = reference.rpartition(":")
+    return f"{change(file)}{separator}{name}" if file.endswith((".py", ".mo")) else reference
+
+
+FilePath = Annotated[str, HoldsPaths(_change_path)]
+FolderPaths = Annotated[list[str], HoldsPaths(_change_list)]
+FileReference = Annotated[str, HoldsPaths(change_reference)]
+
+
 class InvalidElement:
     """Placeholder of an invalid list element, which keeps the indices of the elements after it."""
 
@@ -222,10 +263,39 @@ class Spec(BaseModel):
         extra="forbid", strict=True, frozen=True, arbitrary_types_allowed=True
     )
 
+    @property
+    def paths(self) -> list[str]:
+        """Paths of the files that this part names, as they are written in the scenario."""
+        found: list[str] = []
+
+        def note(path: str) -> str:
+            found.append(path)
+            return path
+
+        for name, mark in path_keys(type(self)).items():
+            mark.change(getattr(self, name), note)
+        return found
+
+    @classmethod
+    def known_fields(cls) -> Mapping[str, FieldInfo]:
+        """Return the fields of this part of a scenario."""
+        return cls.model_fields
+
     @model_validator(mode="wrap")
     @classmethod
     def _pass_invalid(cls, value: Any, handler: Any) -> Any:
         return value if value is INVALID else handler(value)
+
+
+@cache
+def path_keys(model: type[Spec]) -> Mapping[str, HoldsPaths]:
+    """Return the keys of a part of a scenario that hold paths."""
+    marks: dict[str, HoldsPaths] = {}
+    for name, field in model.model_fields.items():
+        for mark in field.metadata:
+            if isinstance(mark, HoldsPaths):
+                marks[name] = mark
+    return marks
 
 
 def accepted(specs: Iterable[S]) -> Iterator[tuple[int, S]]:
@@ -233,28 +303,47 @@ def accepted(specs: Iterable[S]) -> Iterator[tuple[int, S]]:
     return ((i, spec) for i, spec in enumerate(specs) if spec is not INVALID)
 
 
-def schema_of(model: type[BaseModel]) -> dict[str, Any]:
+def schema_of(model: type[BaseModel], *further: type[BaseModel]) -> dict[str, Any]:
     """Return the JSON Schema (2020-12) of a model.
 
     Entries in the order of the code, names only as their patterns allow.
+
+    Args:
+        model: The model.
+        *further: Models that {"ref": name of the model} in the schema refers to.
     """
-    from pydantic.json_schema import GenerateJsonSchema
+    from pydantic.json_schema import GenerateJsonSchema, models_json_schema
 
     class InOrder(GenerateJsonSchema):
         def sort(self, value: Any, parent_key: str | None = None) -> Any:  # noqa: ARG002
             return value
 
-    schema = model.model_json_schema(by_alias=True, schema_generator=InOrder)
-    _refuse_other_names(schema)
-    return {"$schema": "https://json-schema.org/draft/2020-12/schema", **schema}
+    models = dict.fromkeys((model, *further))
+    _, schema = models_json_schema(
+        [(each, "validation") for each in models], by_alias=True, schema_generator=InOrder
+    )
+    _complete(schema)
+    definitions = schema["$defs"]
+    root = definitions[model.__name__]
+    if model not in further:
+        del definitions[model.__name__]
+    return {
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "$defs": definitions,
+        **root,
+    }
 
 
-def _refuse_other_names(schema: Any) -> None:
+def _complete(schema: Any) -> None:
+    """Refuse other names than a pattern allows, and complete the references to further models."""
     if isinstance(schema, dict):
         if "patternProperties" in schema:
             schema["additionalProperties"] = False
+        if isinstance(name := schema.get("ref"), str):
+            schema["$ref"] = f"#/$defs/{name}"
+            del schema["ref"]
         for value in schema.values():
-            _refuse_other_names(value)
+            _complete(value)
     elif isinstance(schema, list):
         for value in schema:
-            _refuse_other_names(value)
+            _complete(value)

@@ -16,8 +16,7 @@ from typing import Any
 
 from ..core.errors import InputError, Problem
 from ..core.text import acceptable_text, shorten, text_problem
-from .component_schema import SOURCES
-from .extension import inherited_component
+from .extension import expand_set_systems, inherited_component
 from .file_paths import change_pointed, relocating
 from .included_files import include_in_setting
 from .json_document import (
@@ -26,10 +25,12 @@ from .json_document import (
     find_value,
     json_path,
     parse_document,
+    path_in_system,
     pointer_keys,
     set_value,
     value_path,
 )
+from .sources import component_kinds
 
 
 def apply_settings(
@@ -79,21 +80,24 @@ def apply_settings(
             document.set_documents |= {(*path, *inner): file for inner, file in documents.items()}
         else:
             variables[name] = value
+    expand_set_systems(document)
     return variables, problems
 
 
 def _is_source(name: str) -> bool:
-    keys = pointer_keys(name)
-    return len(keys) == 3 and keys[0] == "components" and keys[2] in SOURCES
+    match path_in_system(pointer_keys(name)):
+        case ["components", _, key]:
+            return key in component_kinds((key,))
+    return False
 
 
 def _set_value(document: Document, pointer: str, value: Any) -> str:
     """Set a value in a document and note that it is a setting. Return the problem, or ""."""
     if _is_source(pointer) and value is not None:
-        components, name, source = pointer_keys(pointer)
-        component, depth = find_value(document.value, (components, name))
-        if depth == 2 and isinstance(component, dict):
-            document.value[components][name] = inherited_component(component, source)
+        *place, name, source = pointer_keys(pointer)
+        components, depth = find_value(document.value, place)
+        if depth == len(place) and isinstance(components.get(name), dict):
+            components[name] = inherited_component(components[name], {source: value})
     problem = set_value(document.value, pointer, value)
     if not problem:
         document.settings[value_path(document.value, pointer)] = pointer
@@ -161,7 +165,7 @@ def document_of_dict(scenario: Mapping[str, Any]) -> Document:
     Raises:
         InputError: The dict contains values that JSON cannot express.
     """
-    objects = _objects_of(_mapping(scenario).get("components"))
+    objects = _objects_in(scenario, ())
     text = json.dumps(_to_json(scenario, (), objects), indent=1)
     return parse_document(Document(Path.cwd() / DICT_FILE, text, objects=objects, is_dict=True))
 
@@ -177,26 +181,28 @@ def move_objects(document: Document, path: Sequence[str], value: Any) -> Any:
     Returns:
         The value with a text in place of the class or object. Values at other paths are unchanged.
     """
-    if (
-        path[0] != "components"
-        or len(path) not in (2, 3)
-        or (len(path) == 3 and path[2] != "python")
-    ):
-        return value
-    found = _objects_of({path[1]: value if len(path) == 2 else {"python": value}})
-    document.objects = {
-        name: target for name, target in document.objects.items() if name != path[1]
-    } | found
+    system = value
+    for key in reversed(path):
+        system = {key: system}
+    found = _objects_in(system, ())
+    objects = {
+        place: target
+        for place, target in document.objects.items()
+        if (*place, "python")[: len(path)] != tuple(path)
+    }
+    document.objects = {**objects, **found}
     return _to_json(value, tuple(path), found) if found else value
 
 
-def _objects_of(components: Any) -> dict[str, Any]:
-    """Return the Python classes and objects by the names of their components."""
-    return {
-        name: spec["python"]
-        for name, spec in _mapping(components).items()
-        if isinstance(spec, Mapping) and not isinstance(spec.get("python", ""), str | None)
-    }
+def _objects_in(system: Any, path: JsonPath) -> dict[JsonPath, Any]:
+    """Return the Python classes and objects of a system by the paths of their components."""
+    found: dict[JsonPath, Any] = {}
+    for name, entry in _mapping(_mapping(system).get("components")).items():
+        component, place = _mapping(entry), (*path, "components", name)
+        if not isinstance(component.get("python", ""), str | None):
+            found[place] = component["python"]
+        found |= _objects_in(component.get("system"), (*place, "system"))
+    return found
 
 
 def describe_object(target: Any) -> str:
@@ -209,9 +215,9 @@ def _mapping(value: Any) -> Mapping[str, Any]:
     return value if isinstance(value, Mapping) else {}
 
 
-def _to_json(value: Any, path: JsonPath, objects: Mapping[str, Any]) -> Any:
+def _to_json(value: Any, path: JsonPath, objects: Mapping[JsonPath, Any]) -> Any:
     """Return a value with dicts, lists, texts, numbers and None only."""
-    if len(path) == 3 and path[0] == "components" and path[2] == "python" and path[1] in objects:
+    if path[-1:] == ("python",) and path[:-1] in objects:
         return describe_object(value)
     if value is None or isinstance(value, bool | str | int | float):
         return value

@@ -12,7 +12,6 @@ from pathlib import Path
 from typing import Any
 
 from ..components.fmi import FmuFile, Isolation
-from ..components.input_table import read_input_table
 from ..core import component_log
 from ..core.component import Component, Variable, count_scalars
 from ..core.errors import InputError, Problem, merge_problems
@@ -23,7 +22,6 @@ from ..engine.plan import Plan, compile_plan
 from ..engine.settings import Event, Settings
 from ..process.journal import Deadlines, current_journal
 from .component_factory import ComponentFactory
-from .component_schema import SOURCES
 from .function_arguments import FunctionResolver, without_placeholders
 from .name_resolution import (
     SlotIndex,
@@ -37,6 +35,7 @@ from .named_functions import find_function_problems
 from .nested_systems import Node, Scenario
 from .recorded_signals import SignalSelector, StopConditionReader
 from .schema_types import accepted
+from .sources import Creation
 from .stages import StagePlanner, parallel_mode
 from .wiring import Wiring
 
@@ -145,7 +144,14 @@ class SystemBuilder:
         for node, name in self.root.leaves():
             full_name = node.full_name(name)
             try:
-                component = self.component_factory.create(node, name, values.get(full_name, {}))
+                creation = Creation(
+                    full_name,
+                    node.folder,
+                    values.get(full_name, {}),
+                    node.document.objects.get(("components", name)),
+                    self.component_factory,
+                )
+                component = node.spec.components[name].create(creation)
                 self.components[full_name] = component
                 for warning in component.warnings:
                     place = node.where("components", name, *warning.subject)
@@ -161,9 +167,7 @@ class SystemBuilder:
         self.profiles = [f"{PROFILE_PREFIX}.{i}" for i, _ in accepted(self.spec.inputs)]
         for i, spec in accepted(self.spec.inputs):
             try:
-                table = read_input_table(
-                    self.root.folder / spec.file, self._targets(spec.to), spec.interpolation
-                )
+                table = spec.create(self.root.folder, self._targets(spec.to))
                 self.components[f"{PROFILE_PREFIX}.{i}"] = table
             except InputError as error:
                 self.profiles.remove(f"{PROFILE_PREFIX}.{i}")
@@ -360,10 +364,7 @@ class SystemBuilder:
 
         Those without a subject belong to its source if the caller has set the source.
         """
-        source = next(
-            each for each in SOURCES if getattr(node.spec.components[name], each) is not None
-        )
-        path = ("components", name, source)
+        path = ("components", name, node.spec.components[name].KEY)
         where = node.where(*path) if path in node.document.settings else ""
         problems = [
             each if each.subject else replace(each, where=each.where or where)

@@ -8,18 +8,19 @@ from __future__ import annotations
 import json
 import types
 import typing
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from itertools import count
 from typing import Any, Generic, NamedTuple, TypeVar
 
 from pydantic import BaseModel, ValidationError
+from pydantic.fields import FieldInfo
 
 from ..core.errors import Problem, did_you_mean, nearest_name
 from ..core.json_values import copy_json
 from ..core.text import REPLACEMENT, count_noun
 from .json_document import Document
 from .schema import SystemSpec
-from .schema_types import INVALID, PlacedError, hint_at_quotes
+from .schema_types import INVALID, PlacedError, Spec, hint_at_quotes
 
 S = TypeVar("S", bound=SystemSpec)
 
@@ -276,7 +277,12 @@ def _known_keys(kind: Any, path: Sequence[str | int]) -> list[str]:
     for key in path:
         kind = _child_type(kind, key)
     kind = _model_type(kind)
-    return [field.alias or name for name, field in kind.model_fields.items()] if kind else []
+    return [field.alias or name for name, field in _fields(kind).items()] if kind else []
+
+
+def _fields(model: type[BaseModel]) -> Mapping[str, FieldInfo]:
+    """Return the fields of a model; those of components depend on the kind of their source."""
+    return model.known_fields() if issubclass(model, Spec) else model.model_fields
 
 
 def _child_type(kind: Any, key: str | int) -> Any:
@@ -285,9 +291,7 @@ def _child_type(kind: Any, key: str | int) -> Any:
     None if it is unknown.
     """
     if model := _model_type(kind):
-        return next(
-            (f.annotation for n, f in model.model_fields.items() if key in (n, f.alias)), None
-        )
+        return next((f.annotation for n, f in _fields(model).items() if key in (n, f.alias)), None)
     for option in _union_members(kind):
         if typing.get_origin(option) in (dict, list):
             return typing.get_args(option)[-1]

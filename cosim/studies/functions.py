@@ -15,16 +15,13 @@ from ..api.arguments import expect, is_integer
 from ..core.processors import available_processors
 from ..core.size_limits import MAX_RUNS
 from ..results.files import check_writable
-from .execution.local import LocalRunner
 from .execution.run_store import RunStore
-from .regression import RegressionOutcome
-from .regression_runs import default_folder, run_regressions
+from .execution.worker_pool import LocalRunner
+from .regression import RegressionOutcome, default_folder, run_regressions
 from .summary.sweep_files import SweepSummary, write_sweep_files
-from .summary.tuning_files import write_tuning_files
-from .summary.worst_case_files import write_worst_case_files
 from .sweep import Sweep, SweepRow
-from .tune import Trial, Tuning
-from .worst_case import Attempt, WorstCase
+from .tune import Trial, Tuning, write_tuning_files
+from .worst_case import Attempt, WorstCase, write_worst_case_files
 
 #: a study file, the name of a shipped study, or the content of a study file
 StudySource = str | Path | Mapping[str, Any]

@@ -18,13 +18,14 @@ from .factor_schema import (
     TRIAL_COLUMNS,
     FactorSpec,
     Scale,
+    Setter,
     SettingPaths,
+    check_conflicts,
     check_level_counts,
     check_log_scale,
     check_order,
     reject_column_names,
 )
-from .setting_conflicts import Setter, check_conflicts
 
 
 class SeedsSpec(Spec):

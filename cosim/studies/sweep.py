@@ -14,11 +14,18 @@ from ..core.errors import InputError, Problem
 from ..core.size_limits import MAX_RUNS
 from ..results.checks import CheckOutcome, Number, evaluate_all_checks, evaluate_checks, kpi_hint
 from .design import Design, Point, build_design
-from .document import StudyFile, read_study
 from .execution.job import Job, Record, RunKey
 from .execution.run_store import RunStore
 from .schema import SweepSpec
-from .study import CheckingRunner, ObservedKpis, RecordObserver, Study, run_pending
+from .study import (
+    CheckingRunner,
+    ObservedKpis,
+    RecordObserver,
+    Study,
+    StudyFile,
+    read_study,
+    run_pending,
+)
 
 #: number of points that are checked before the first run
 _MAX_CHECKED_POINTS = 20

@@ -26,14 +26,31 @@ import numpy as np
 from ..core.errors import InputError, Problem
 from ..core.expressions import Expression, parse_expression
 from ..core.size_limits import MAX_RUNS
-from .document import StudyFile, read_study
+from ..results.files import write_json
+from .execution.bundle import cosim_fingerprint
 from .execution.job import Job
 from .execution.run_store import RunStore
-from .objective import Constraint, parse_constraint
-from .optimizers import INFEASIBLE_RANK, METHODS
+from .factor_schema import TRIAL_COLUMNS
+from .optimization import (
+    INFEASIBLE_RANK,
+    METHODS,
+    Constraint,
+    parameter_settings,
+    parameter_values,
+    parse_constraint,
+    start_coordinates,
+)
 from .schema import TuneSpec
-from .search_space import parameter_settings, parameter_values, start_coordinates
-from .study import CheckingRunner, ObservedKpis, RecordObserver, Study, run_pending
+from .study import (
+    CheckingRunner,
+    ObservedKpis,
+    RecordObserver,
+    Study,
+    StudyFile,
+    read_study,
+    run_pending,
+)
+from .summary.table import write_csv_rows
 
 #: ranks of points worse than any feasible value, beside INFEASIBLE_RANK; small enough for
 #: optimizers to square and add them
@@ -211,3 +228,34 @@ class Tuning:
         ]
         if problems and self.observed_kpis.runs:
             raise InputError(problems)
+
+
+def write_tuning_files(tuning: Tuning, folder: Path) -> Trial:
+    """Write trials.csv and best.json and return the best trial.
+
+    There must be at least one trial.
+    """
+    names = [spec.name for spec in tuning.spec.parameters]
+    lines = (
+        [*trial.parameters.values(), trial.value, trial.violation, trial.failure]
+        for trial in tuning.trials
+    )
+    write_csv_rows([*names, *TRIAL_COLUMNS], lines, folder / "trials.csv")
+    best = min(tuning.trials, key=lambda trial: trial.rank)
+    write_json(describe_best(tuning, best), folder / "best.json")
+    return best
+
+
+def describe_best(tuning: Tuning, best: Trial) -> dict[str, Any]:
+    """Return the best trial with everything that its evaluation depends on, as a JSON value."""
+    return {
+        "name": tuning.spec.name,
+        "tuning": tuning.study_file.document.value,
+        "parameters": best.parameters,
+        "settings": tuning.settings(best.parameters),
+        "value": best.value,
+        "violation": best.violation,
+        "trials": len(tuning.trials),
+        "cosim": cosim_fingerprint(),
+        "sha256": dict(tuning.study.bundle.files),
+    }

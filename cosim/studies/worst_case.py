@@ -15,13 +15,23 @@ from typing import Any
 from ..core.errors import InputError
 from ..core.size_limits import MAX_RUNS
 from ..results.checks import CheckOutcome, evaluate_all_checks, evaluate_checks
-from .document import StudyFile, read_study
+from ..results.files import write_json
+from ..scenario.nested_systems import extending_scenario
+from .execution.bundle import cosim_fingerprint
 from .execution.job import Job, Record
 from .execution.run_store import RunStore
-from .optimizers import METHODS
+from .optimization import METHODS, parameter_settings, parameter_values, start_coordinates
 from .schema import WorstCaseSpec
-from .search_space import parameter_settings, parameter_values, start_coordinates
-from .study import CheckingRunner, ObservedKpis, RecordObserver, Study, run_pending
+from .study import (
+    CheckingRunner,
+    ObservedKpis,
+    RecordObserver,
+    Study,
+    StudyFile,
+    read_study,
+    run_pending,
+)
+from .summary.table import write_csv_rows
 
 #: severity of a run that failed; that of a check without a value, or of a wrong truth value
 _FAILED, _WRONG = 10.0, 1.0
@@ -180,3 +190,43 @@ def severity(outcome: CheckOutcome) -> float:
         if key in check:
             excesses.append(sign * (value - check[key]) / (abs(check[key]) or 1))
     return min(max(excesses[1:] or excesses), _FAILED)
+
+
+def write_worst_case_files(search: WorstCase, folder: Path) -> list[Path]:
+    """Write trials.csv and worst.json, and each counterexample as a scenario that extends that of the search.
+
+    Returns:
+        The files of the counterexamples, the worst one first.
+    """
+    names = [spec.name for spec in search.spec.parameters]
+    rows = (
+        [*each.parameters.values(), each.severity, each.passed, each.reason]
+        for each in search.attempts
+    )
+    write_csv_rows([*names, "severity", "passed", "reason"], rows, folder / "trials.csv")
+    write_json(describe_worst_case(search), folder / "worst.json")
+    files, scenario = [], search.study_file.scenario
+    for number, each in enumerate(search.counterexamples, 1):
+        name = f"{search.spec.name}_{number}"
+        file = folder / "counterexamples" / f"{name}.json"
+        file.parent.mkdir(exist_ok=True)
+        settings = search.settings(each)
+        write_json(
+            extending_scenario(scenario, file.parent, name, each.reason, settings, scenario.parent),
+            file,
+        )
+        files.append(file)
+    return files
+
+
+def describe_worst_case(search: WorstCase) -> dict[str, Any]:
+    """Return the worst run and the counterexamples with everything that they depend on, as a JSON value."""
+    return {
+        "name": search.spec.name,
+        "search": search.study_file.document.value,
+        "worst": vars(search.worst),
+        "counterexamples": [vars(each) for each in search.counterexamples],
+        "runs": len(search.attempts),
+        "cosim": cosim_fingerprint(),
+        "sha256": dict(search.study.bundle.files),
+    }

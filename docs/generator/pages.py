@@ -9,8 +9,7 @@ from pathlib import Path
 from markdown_parts import code, page, plain, table
 
 import cosim
-from cosim.cli.scenario_groups import group_scenarios
-from cosim.cli.shipped import CATALOGUE, Entry
+from cosim.cli.shipped import CATALOGUE, Entry, group_scenarios
 from cosim.components.fmi import FmuFile
 from cosim.components.python_import import load_object
 from cosim.core import resources

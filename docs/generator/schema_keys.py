@@ -9,7 +9,7 @@ from typing import Any
 
 from markdown_parts import code, page, plain, table
 
-from cosim.export.sources import world_schema
+from cosim.export.plant import world_schema
 from cosim.scenario import json_schema
 from cosim.studies.schema import SweepSpec, TuneSpec, WorstCaseSpec, study_json_schema
 

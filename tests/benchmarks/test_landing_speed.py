@@ -8,7 +8,7 @@ from time import perf_counter
 
 import pytest
 
-from cosim.studies.execution.local import LocalRunner
+from cosim.studies.execution.worker_pool import LocalRunner
 from cosim.studies.sweep import Sweep
 
 pytestmark = pytest.mark.benchmark

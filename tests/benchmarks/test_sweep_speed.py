@@ -14,7 +14,7 @@ from cosim.results import Result
 from cosim.results.kpi import evaluate_kpis
 from cosim.scenario import find_scenario, load, load_scenario
 from cosim.studies.execution.job import Job, StudyContext
-from cosim.studies.execution.local import LocalRunner
+from cosim.studies.execution.worker_pool import LocalRunner
 
 pytestmark = pytest.mark.benchmark
 

@@ -15,8 +15,7 @@ from fault_fmu import FaultFmus, build_library
 from cosim.cli.bench_output import print_side_by_side
 from cosim.core import resources
 from cosim.studies.controller_bench.page import BenchedController
-from cosim.studies.controller_bench.ranking import ScenarioKpis, rank
-from cosim.studies.controller_bench.score import RunKpis
+from cosim.studies.controller_bench.ranking import RunKpis, ScenarioKpis, rank
 
 ROOT = resources.root()
 MISSION = {

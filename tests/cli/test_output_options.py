@@ -1,6 +1,7 @@
 """Options that choose what commands print: --json, --quiet, --verbose; and `cosim list`."""
 
 import json
+import logging
 import re
 from pathlib import Path
 
@@ -8,6 +9,7 @@ import pytest
 from cosim_command import run_cosim
 
 from cosim.cli import COMMANDS
+from cosim.cli.messages import collect_log, print_log
 
 ROOT = Path(__file__).parents[2]
 TALKING = """
@@ -206,3 +208,18 @@ def test_an_fmu_in_place_of_a_scenario_is_explained():
         "x.fmu is an FMU, expected a scenario; `cosim simulate x.fmu` simulates a single FMU\n"
     )
     assert (done.returncode, done.stderr) == (2, message)
+
+
+def test_a_command_keeps_the_log_handlers_of_the_program_that_calls_it():
+    logger, own = logging.getLogger("cosim"), logging.NullHandler()
+    level = logger.level
+    logger.addHandler(own)
+    try:
+        first, second = print_log(), print_log()
+        logger.warning("once")
+        assert own in logger.handlers
+        assert (first, second) == ([], ["WARNING once"])
+    finally:
+        collect_log()
+        logger.handlers.remove(own)
+        logger.setLevel(level)

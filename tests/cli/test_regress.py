@@ -10,6 +10,7 @@ from cosim_command import run_cosim
 from lxml import etree
 
 from cosim.cli.commands import regress as regress_command
+from cosim.studies import regression_runs
 from cosim.studies.regression import RegressionOutcome
 
 COOLING = """
@@ -196,13 +197,13 @@ def test_a_folder_without_scenarios_is_told_that_the_shipped_ones_are_run(folder
     monkeypatch.chdir(folder / "scenarios")
     outcome = RegressionOutcome("demo1_box", 0, "5 checks")
     monkeypatch.setattr(
-        regress_command,
+        regression_runs,
         "run_regressions",
         lambda folders, *_: [outcome] if folders[0].is_absolute() else [],
     )
     assert (
         "no folder scenarios/ here: the shipped scenarios are run\n"
-        in CliRunner().invoke(regress_command.command).stderr
+        in CliRunner().invoke(regress_command.regress).stderr
     )
 
 

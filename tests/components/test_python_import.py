@@ -6,7 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from cosim.components import python_import
 from cosim.components.python_import import load_object, package_files, read_with_relative_imports
+from cosim.core import resources
 from cosim.core.errors import InputError
 
 MAIN = """\
@@ -64,3 +66,38 @@ def test_a_file_of_a_package_is_not_changed(tmp_path):
     assert read_with_relative_imports(folder / "main.py", folder) == MAIN
     with pytest.raises(InputError, match=r"No module named 'helper' \(main\.py:2\)"):
         load_object("main.py:answer", folder)
+
+
+def test_the_shipped_plant_is_the_package_that_users_import():
+    from plant_src.obstacles import read_obstacles
+
+    file = "plant_src/obstacles.py:read_obstacles"
+    assert load_object(file, resources.root()) is read_obstacles
+    assert load_object(f"../{file}", resources.root() / "scenarios") is read_obstacles
+
+
+def test_a_copy_of_the_shipped_plant_is_another_package(tmp_path):
+    import plant_src.placement
+
+    (folder := tmp_path / "plant_src").mkdir()
+    for name in ("__init__", "placement"):
+        (folder / f"{name}.py").write_text("from pathlib import Path\nclass Platform: pass\n")
+    copy = load_object("plant_src/placement.py:Platform", tmp_path)
+    shipped = load_object("plant_src/placement.py:Platform", resources.root())
+    assert shipped is plant_src.placement.Platform is not copy
+    assert copy.__module__.startswith("_cosim_")
+
+
+@pytest.mark.parametrize("is_taken", [False, True])
+def test_a_shipped_package_gets_its_name_only_if_that_is_free(tmp_path, monkeypatch, is_taken):
+    name = f"shipped_package_{is_taken}".lower()
+    for folder in ("shipped", "other"):
+        (package := tmp_path / folder / name).mkdir(parents=True)
+        for module in ("__init__", "part"):
+            (package / f"{module}.py").write_text(f"origin = {folder!r}\n")
+    if is_taken:
+        monkeypatch.syspath_prepend(str(tmp_path / "other"))
+    monkeypatch.setattr(resources, "root", lambda: tmp_path / "shipped")
+    part = python_import.import_shipped(f"{name}.part")
+    assert part.origin == "shipped"
+    assert (part.__name__ == f"{name}.part") is not is_taken

@@ -12,7 +12,7 @@ import pytest
 from jsonschema import Draft202012Validator
 
 import cosim
-from cosim.export.sources import vehicle_file_schema
+from cosim.export.plant import vehicle_file_schema
 from cosim.scenario import json_schema
 from plant_src.world import World
 

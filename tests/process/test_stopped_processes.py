@@ -13,7 +13,8 @@ from tempfile import TemporaryFile
 import pytest
 
 from cosim.process.journal import JOURNAL_SIZE, Journal, Phase
-from cosim.process.supervisor import _Supervisor, is_stopped
+from cosim.process.process_status import is_stopped
+from cosim.process.supervisor import _Supervisor
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="reads /proc")
 
@@ -24,7 +25,7 @@ def settings(monkeypatch):
     such as servers of tests.
     """
     monkeypatch.setattr("cosim.process.supervisor.STOP_TIMEOUT", 0.2)
-    monkeypatch.setattr("cosim.process.supervisor._child_processes", list)
+    monkeypatch.setattr("cosim.process.supervisor.child_processes", list)
 
 
 def supervise(work, journal: Journal):

@@ -7,7 +7,7 @@ from pathlib import Path
 from click.testing import CliRunner
 from test_run_folders import write
 
-from cosim.cli.commands.plot import command
+from cosim.cli.commands.finished_runs import plot as command
 from cosim.core.errors import InputError
 
 

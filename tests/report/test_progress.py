@@ -5,7 +5,7 @@ import subprocess
 import sys
 
 CODE = """
-from cosim.cli.progress import progress_bar
+from cosim.cli.messages import progress_bar
 
 with progress_bar("chase.mp4") as progress:
     if progress:

@@ -10,15 +10,13 @@ import numpy as np
 import pytest
 from click.testing import CliRunner
 
-from cosim.cli.commands.replay import command as replay
-from cosim.cli.commands.report import command as report
+from cosim.cli.commands.finished_runs import replay, report
 from cosim.cli.commands.run import command as run
 from cosim.core import resources
 from cosim.core.errors import InputError
 from cosim.core.recording import Recording
 from cosim.report import pages
-from cosim.report.failure import find_failure
-from cosim.report.replay import replay_data
+from cosim.report.replay import find_failure, replay_data
 from cosim.report.run_page import write_report
 from cosim.results import Result, write_run
 from cosim.results.checks import CheckOutcome

@@ -67,7 +67,7 @@ def test_a_reason_contains_the_values_of_arguments(flight):
 
 
 def test_a_landing_without_the_mode_of_the_descent_has_another_reason(flight, monkeypatch):
-    monkeypatch.setattr("plant_src.landing_kpis.touchdown_row", lambda *_: 10)
+    monkeypatch.setattr("plant_src.kpis.touchdown_row", lambda *_: 10)
     (note,) = notes(flight, "descent", descent, vehicle="plant.uav", mode="uav.mode", descending=9)
     assert note == "descent.time_to_land: uav.mode is never 9, the mode of the descent"
 

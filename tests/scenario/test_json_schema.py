@@ -5,6 +5,7 @@ too large for a double.
 """
 
 import copy
+from itertools import chain
 
 import pytest
 from jsonschema import Draft202012Validator
@@ -69,6 +70,13 @@ SCENARIO = {
         },
         "f": {"fmu": "x.fmu", "isolation": "fmu"},
         "s": {"system": "n.json"},
+        "i": {
+            "system": {
+                "components": {"p": {"fmu": "y.fmu"}},
+                "connections": [{"from": "p.y", "to": "p.u"}],
+                "ports": {"inputs": {"u": "p.u"}},
+            }
+        },
     },
     "connections": [{"from": "a.y", "to": "f.u", "delay": 1}],
     "algorithm": {
@@ -149,7 +157,15 @@ def mutants(document, path):
 
 
 def problems(document, kind, tmp_path):
-    return validate_document(Document(tmp_path / "x.json", "", document), kind).problems
+    """Return the problems of a document and of its inline nested systems."""
+    found = validate_document(Document(tmp_path / "x.json", "", document), kind)
+    inner = [each.nested_system for each in found.spec.components.values()]
+    return [
+        *found.problems,
+        *chain.from_iterable(
+            problems(each, NestedSpec, tmp_path) for each in inner if isinstance(each, dict)
+        ),
+    ]
 
 
 @pytest.mark.parametrize(

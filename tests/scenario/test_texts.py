@@ -13,8 +13,8 @@ import pytest
 
 import cosim
 from cosim.core.text import MAX_TEXT_LENGTH
-from cosim.studies.document import read_study
 from cosim.studies.schema import SweepSpec
+from cosim.studies.study import read_study
 
 BAD = {
     "U+0000": "a\0b",

@@ -11,8 +11,8 @@ from cosim_command import run_cosim
 from cosim.cli import cli
 from cosim.core import resources
 from cosim.core.errors import InputError
-from cosim.studies.document import read_study
 from cosim.studies.schema import SweepSpec, TuneSpec
+from cosim.studies.study import read_study
 from cosim.studies.tune import Tuning
 
 FACTOR = {"name": "f", "set": "a.b", "values": [1]}

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from cosim.studies.objective import parse_constraint
+from cosim.studies.optimization import parse_constraint
 
 VALUES = {"landing.error": 0.5, "gain": 3.0, "lost": math.nan}
 

@@ -5,8 +5,8 @@ import tracemalloc
 import pytest
 
 from cosim.core.errors import InputError
-from cosim.studies.document import read_study
 from cosim.studies.schema import SweepSpec
+from cosim.studies.study import read_study
 from cosim.studies.sweep import Sweep
 from cosim.studies.tune import Tuning
 

@@ -6,7 +6,7 @@ import pytest
 
 from cosim.core import resources
 from cosim.scenario import load
-from cosim.studies.search_space import parameter_settings, parameter_values
+from cosim.studies.optimization import parameter_settings, parameter_values
 from cosim.studies.sweep import Sweep
 from cosim.studies.tune import Tuning
 from cosim.studies.worst_case import WorstCase

@@ -13,8 +13,12 @@ import click
 
 from ...core.errors import ComponentError, InputError
 from ...core.processors import available_processors
-from ...studies.regression import EXIT_CODE_SEVERITY
-from ...studies.regression_runs import check_unique_names, default_folder, find_scenario_files
+from ...studies.regression import (
+    EXIT_CODE_SEVERITY,
+    check_unique_names,
+    default_folder,
+    find_scenario_files,
+)
 from .. import supervision
 from ..bench_output import (
     BenchProgress,
@@ -23,10 +27,9 @@ from ..bench_output import (
     print_side_by_side,
     print_trial,
 )
-from ..completion import complete_role, complete_scenario
 from ..forked_commands import forked_commands
 from ..messages import print_json
-from ..output_options import json_option
+from ..options import complete_role, complete_scenario, json_option
 
 if TYPE_CHECKING:
     from ...studies.controller_bench.trials import ControllerTrials, TrialResult

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import click
 
 from ...core.errors import CheckError, InputError, Problem, nearest_file
-from ..vehicle_files import read_vehicle_file
+from .new_vehicle import read_vehicle_file
 
 if TYPE_CHECKING:
     from ...export.build import BuildResult
@@ -106,7 +106,7 @@ def command(
         return 0
     for source in files:
         if source.suffix == ".json" and source.is_file():
-            from ...export.vehicle_files import examine_vehicle
+            from ...export.plant import examine_vehicle
 
             read_vehicle_file(source, examine_vehicle)
     if output is not None:

@@ -11,9 +11,8 @@ from ...core.errors import InputError, Problem
 from ...core.system import Group, Stage
 from ...core.text import count_noun
 from .. import strict_sandbox, supervision
-from ..completion import complete_scenario
 from ..messages import collect_log, print_json
-from ..output_options import json_option
+from ..options import complete_scenario, json_option
 
 if TYPE_CHECKING:
     from ...core.component import Variable

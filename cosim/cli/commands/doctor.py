@@ -19,7 +19,7 @@ import click
 from ...core.errors import InputError
 from ...core.processors import available_processors
 from ..messages import print_json
-from ..output_options import json_option
+from ..options import json_option
 
 if TYPE_CHECKING:
     from packaging.requirements import Requirement

@@ -15,9 +15,9 @@ from ...core.text import shorten
 from ...scenario.file_paths import SHIPPED
 from .. import current_command_line
 from ..messages import print_json, print_line
-from ..output_options import json_option
+from ..options import json_option
 from ..shipped import shipped_fmus
-from ..vehicle_files import read_vehicle_file
+from .new_vehicle import read_vehicle_file
 
 if TYPE_CHECKING:
     from ...components.fmi import FmuFile
@@ -104,7 +104,7 @@ def _describe(source: str) -> tuple[Mapping[str, str], Sequence[Variable]]:
     if file.endswith(".py"):
         return _describe_class(source)
     if source.endswith(".json"):
-        from ...export.vehicle_files import describe_vehicle
+        from ...export.plant import describe_vehicle
 
         return read_vehicle_file(_find_fmu(source), describe_vehicle)
     if file.endswith(".mo"):

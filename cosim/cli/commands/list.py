@@ -1,23 +1,24 @@
-"""`cosim list`: what cosim ships."""
+"""`cosim list` and `cosim schema`: what cosim ships, and the JSON Schemas of its files."""
 
 from __future__ import annotations
 
+import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from typing import Any
 
 import click
 
 from .. import current_command_line
 from ..messages import print_json
-from ..output_options import json_option
-from ..scenario_groups import group_scenarios
-from ..shipped import CATALOGUE, Entry
+from ..options import json_option
+from ..shipped import CATALOGUE, Entry, group_scenarios
 
 
 @click.command()
 @click.argument("kinds", metavar="[KIND...]", nargs=-1, type=click.Choice(list(CATALOGUE)))
 @json_option("an object with a list of entries (name, description, file, arguments) for each KIND")
-def command(kinds: tuple[str, ...], as_json: bool) -> None:
+def list_shipped(kinds: tuple[str, ...], as_json: bool) -> None:
     """List what cosim ships, with one line each, scenarios in groups.
 
     KIND: scenarios, sweeps, models, controllers, roles, kpis.
@@ -48,3 +49,36 @@ def _print_groups(groups: Mapping[str, Sequence[Entry]], width: int) -> None:
             click.echo(f"  {entry.name:{width}}  {entry.description}")
             if entry.arguments and current_command_line().verbosity > 0:
                 click.echo(f"  {'':{width}}    arguments: {entry.arguments}")
+
+
+@click.command()
+@click.option("--nested", "kind", flag_value="nested", help="Print the schema of nested systems.")
+@click.option("--sweep", "kind", flag_value="sweep", help="Print the schema of sweeps.")
+@click.option("--tune", "kind", flag_value="tune", help="Print the schema of tunings.")
+@click.option(
+    "--worst", "kind", flag_value="worst", help="Print the schema of searches for the worst case."
+)
+@click.option("--vehicle", "kind", flag_value="vehicle", help="Print the schema of vehicle files.")
+def schema(kind: str | None) -> None:
+    """Print the JSON Schema of scenarios, sweeps, tunings or vehicle files.
+
+    An editor completes and checks a file that names its schema: "$schema": "scenario.schema.json".
+    """
+    click.echo(json.dumps(_schema(kind), indent=2))
+
+
+def _schema(kind: str | None) -> dict[str, Any]:
+    if kind in ("sweep", "tune", "worst"):
+        from ...studies.schema import SweepSpec, TuneSpec, WorstCaseSpec, study_json_schema
+
+        if kind == "worst":
+            return study_json_schema(WorstCaseSpec)
+        return study_json_schema(SweepSpec if kind == "sweep" else TuneSpec)
+    if kind == "vehicle":
+        from ...export.plant import vehicle_file_schema
+
+        return vehicle_file_schema()
+    from ...export.plant import WORLD, world_schema
+    from ...scenario.extension_schema import editor_schema, with_arguments
+
+    return with_arguments(editor_schema(kind == "nested"), WORLD, world_schema())

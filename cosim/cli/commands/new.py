@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import keyword
 import re
 import shlex
@@ -14,7 +15,8 @@ import click
 
 from ...core import resources
 from ...core.errors import InputError, Problem, did_you_mean
-from . import new_scenario, new_vehicle
+from ..options import new_file_options
+from .new_vehicle import vehicle
 
 TEMPLATES = Path(__file__).parents[1] / "templates"
 _MODELICA_TYPES = ("Real", "Integer", "Boolean", "String")
@@ -81,8 +83,7 @@ def command() -> None:
     """Create a controller with a scenario in which it runs, a scenario, or a vehicle."""
 
 
-command.add_command(new_scenario.command, "scenario")
-command.add_command(new_vehicle.command, "vehicle")
+command.add_command(vehicle)
 
 
 @command.command()
@@ -102,13 +103,7 @@ command.add_command(new_vehicle.command, "vehicle")
         "LimPID."
     ),
 )
-@click.option(
-    "--directory",
-    type=click.Path(path_type=Path),
-    default=Path(),
-    help="Parent of the folder NAME; default: the working directory.",
-)
-@click.option("--force", is_flag=True, help="Overwrite existing files.")
+@new_file_options("folder")
 def controller(
     name: str, language: str | None, role: str, library: bool, directory: Path, force: bool
 ) -> None:
@@ -214,4 +209,46 @@ def _print_next_steps(language: Language, folder: Path, names: Mapping[str, str]
         f"\nBuild and run it:\n  {build}\n  {run}"
         if language.key == "fmu"
         else f"\nRun it:\n  {run}\nAs an FMU:\n  {build}"
+    )
+
+
+@command.command()
+@click.argument("name")
+@click.option(
+    "--from",
+    "base",
+    required=True,
+    metavar="SCENARIO",
+    help="Scenario file, or name of a shipped scenario.",
+)
+@new_file_options()
+def scenario(name: str, base: str, directory: Path, force: bool) -> None:
+    """Create NAME.json, a scenario that extends SCENARIO.
+
+    It runs at once; add the keys that differ.
+
+    A shipped scenario is extended by its name, so that the new file runs wherever cosim is
+    installed.
+    """
+    from ...results.files import write_file
+    from ...scenario.file_paths import find_scenario
+    from ...scenario.nested_systems import extending_scenario, load_scenario
+    from ...scenario.schema import SCENARIO_NAME
+
+    if not re.match(SCENARIO_NAME, name):
+        raise InputError(
+            f'"{name}" is not a name of a scenario: expected letters, digits, "_", ".", "-" and '
+            "spaces"
+        )
+    file, found = directory / f"{name}.json", find_scenario(base)
+    if file.exists() and not force:
+        raise InputError([Problem("exists; --force overwrites it", str(file))])
+    if problems := load_scenario(found).problems:
+        raise InputError(problems)
+    content = extending_scenario(base, directory, name, f"{found.stem} with changes")
+    write_file(file, json.dumps(content, indent=1) + "\n")
+    path = shlex.quote(str(file))
+    click.echo(
+        f"{file}\n\nPrint all keys that it can change:\n  cosim check {path} --expanded\nRun it:\n "
+        f" cosim run {path}"
     )

@@ -5,15 +5,22 @@ from __future__ import annotations
 import json
 import re
 import shlex
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import replace
 from pathlib import Path
-from typing import Any, NamedTuple
+from typing import Any, NamedTuple, TypeVar
 
 import click
 
 from ...core import resources
 from ...core.errors import InputError, Problem, did_you_mean
 from ...scenario.json_document import Document, read_document
+from ..options import new_file_options
+
+_Result = TypeVar("_Result")
+
+#: keys that a scenario or a study has, and a vehicle file has not
+_SCENARIO_KEYS = frozenset({"components", "extends", "scenario"})
 
 
 @click.command()
@@ -25,12 +32,7 @@ from ...scenario.json_document import Document, read_document
     metavar="VEHICLE",
     help="Vehicle file, or name of a shipped vehicle.",
 )
-@click.option(
-    "--directory",
-    type=click.Path(path_type=Path),
-    default=Path(),
-    help="Folder of the file; default: the working directory.",
-)
+@new_file_options()
 @click.option(
     "--urdf",
     type=click.Path(path_type=Path),
@@ -49,8 +51,7 @@ from ...scenario.json_document import Document, read_document
     default=1.0,
     help="Factor on the coordinates of --mesh, for example 0.001 for mm.",
 )
-@click.option("--force", is_flag=True, help="Overwrite an existing file.")
-def command(
+def vehicle(
     name: str,
     base: str,
     directory: Path,
@@ -107,7 +108,7 @@ def _vehicle(
         InputError: A scenario would refuse the data; each problem names the file and the place in
             it.
     """
-    from ...export.vehicle_files import examine_vehicle, vehicle_from_mesh, vehicle_from_urdf
+    from ...export.plant import examine_vehicle, vehicle_from_mesh, vehicle_from_urdf
 
     if source.problems or not isinstance(source.value, dict):
         raise InputError(
@@ -200,3 +201,27 @@ def _find_vehicle(base: str) -> Path:
             f'no vehicle file and no shipped vehicle "{base}"{did_you_mean(base, files)}'
         )
     return files[base]
+
+
+def read_vehicle_file(file: Path, read: Callable[[Mapping[str, Any], str], _Result]) -> _Result:
+    """Return the result of `read` for the data in a vehicle file and the name of the file.
+
+    Raises:
+        InputError: The file is no vehicle file; each problem names file, line and column.
+    """
+    document = read_document(file)
+    if document.problems:
+        raise InputError(document.problems)
+    if not isinstance(document.value, dict):
+        raise InputError(Problem("expected an object, the data of a vehicle", document.where(())))
+    if "family" not in document.value and not _SCENARIO_KEYS.isdisjoint(document.value):
+        raise InputError(
+            f"{file} is a scenario or a study, expected a vehicle file; `cosim check {file}` "
+            "describes a scenario"
+        )
+    try:
+        return read(document.value, file.stem)
+    except InputError as error:
+        raise InputError(
+            [replace(each, where=document.where(each.subject[1:])) for each in error.problems]
+        ) from None

@@ -14,12 +14,9 @@ import click
 from ...core.errors import InputError, Problem
 from ...process.output_lock import LockKeeper
 from .. import live, strict_sandbox, supervision
-from ..completion import complete_scenario
-from ..csv_options import csv_options
-from ..failed_runs import save_after_crash
-from ..output_options import json_option
-from ..progress import progress_bar
-from ..run_outputs import RunOptions, RunOutcome, write_outputs
+from ..messages import log_problems, print_log, progress_bar, warn_overwriting
+from ..options import complete_scenario, csv_option, json_option
+from ..run_outputs import RunOptions, RunOutcome, save_after_crash, write_outputs
 from ..unfinished_runs import OutputFiles
 
 if TYPE_CHECKING:
@@ -82,7 +79,7 @@ RESULT_FILES = (
     "loop_seconds, kpis, checks, warnings, "
     "folder and files"
 )
-@csv_options
+@csv_option
 @live.view_options
 @supervision.supervision_options
 def command(
@@ -139,10 +136,9 @@ def _run_scenario(options: RunOptions, locks: LockKeeper, link: Connection | Non
         link: connection to a live view; None: no live view.
     """
     from ...process.float_mode import default_float_mode
-    from ...process.run_files.folder import keeping_run_files
-    from .. import messages
+    from ...process.run_files import keeping_run_files
 
-    warnings = messages.print_log()
+    warnings = print_log()
     _require_packages(options)
     began = time.perf_counter()
     with _load(options, None if link else options.real_time) as simulation:
@@ -152,7 +148,7 @@ def _run_scenario(options: RunOptions, locks: LockKeeper, link: Connection | Non
         control = live.create_control(prepared, link, options.real_time) if link else None
         with (
             keeping_run_files(
-                OutputFiles.of_folder(folder).unfinished, folder / "result.csv", prepared.metadata
+                OutputFiles.of_folder(folder).unfinished, prepared.metadata, writes_csv=True
             ),
             _progress_observers(prepared) as observers,
             default_float_mode(),
@@ -184,7 +180,6 @@ def _load(options: RunOptions, real_time: float | None) -> Simulation:
     from ...api import load
     from ...scenario.plausibility import find_run_warnings
     from ...scenario.settings import parse_settings
-    from .. import messages
 
     simulation = load(
         options.scenario,
@@ -196,7 +191,7 @@ def _load(options: RunOptions, real_time: float | None) -> Simulation:
         isolation=options.isolation,
         sandbox=options.sandbox,
     )
-    messages.log_problems(find_run_warnings(simulation.prepared))
+    log_problems(find_run_warnings(simulation.prepared))
     return simulation
 
 
@@ -204,7 +199,6 @@ def _prepare_folder(prepared: PreparedRun, options: RunOptions, locks: LockKeepe
     """Check the figures and that results can be written, lock the output directory, and remove results of an earlier run."""
     from ...engine.disk_space import find_space_problems
     from ...results.files import check_writable, remove_files
-    from ..messages import warn_overwriting
 
     if not options.no_report and (problems := prepared.figure_problems()):
         raise InputError(problems)

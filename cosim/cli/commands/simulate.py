@@ -12,9 +12,8 @@ from ...core.text import count_noun
 from ...process.output_lock import LOCK_FILE, LockKeeper, acquire_lock
 from ...process.temporary_folders import temporary_run_folder
 from .. import current_command_line, report_error, strict_sandbox, supervision
-from ..csv_options import csv_options
 from ..messages import print_json, print_line
-from ..output_options import json_option
+from ..options import csv_option, json_option
 from ..unfinished_runs import OutputFiles, writing_results
 
 if TYPE_CHECKING:
@@ -68,7 +67,7 @@ if TYPE_CHECKING:
     "an object with time (s) and the final values of the outputs by name; nothing with "
     "--output-file"
 )
-@csv_options
+@csv_option
 @supervision.supervision_options
 def command(isolation: str, sandbox: str | None, output_file: Path | None, **options: Any) -> int:
     """Simulate a single FMU (Co-Simulation or Model Exchange of FMI 1.0, 2.0 or 3.0) from its default start time."""
@@ -143,7 +142,7 @@ def _simulate(
     from ...core.errors import InputError, Problem
     from ...engine.disk_space import find_space_problems
     from ...engine.run_loop import simulating
-    from ...process.run_files.folder import keeping_run_files, remove_run_files, run_folder
+    from ...process.run_files import keeping_run_files, remove_run_files, run_folder
     from ...results.files import remove_files
     from ...results.non_finite import warn_non_finite
     from ...results.result import describe_termination
@@ -166,7 +165,7 @@ def _simulate(
         if problems := find_space_problems(plan, target.parent, csv=True, replaced=size):
             raise InputError(problems)
         remove_files(target.parent, target.name)
-    with keeping_run_files(folder, target), simulating(plan) as run:
+    with keeping_run_files(folder, writes_csv=target is not None), simulating(plan) as run:
         warn_non_finite(run.recording)
         if output:
             _write_recording(run.recording, output, run_folder())

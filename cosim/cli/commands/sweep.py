@@ -14,9 +14,8 @@ from ...core.processors import available_processors
 from ...core.text import count_noun
 from ...report.tables import print_table
 from .. import current_command_line, study_options
-from ..completion import complete_study
 from ..messages import print_json, warn_overwriting
-from ..output_options import json_option
+from ..options import complete_study, json_option
 
 if TYPE_CHECKING:
     from ...studies.execution.run_store import RunStore
@@ -134,8 +133,7 @@ def _write_maps_and_page(
     workers: int | None,
 ) -> None:
     """Write the maps, the replays of their cells if required, and the page."""
-    from ...studies.summary.page import write_sweep_page
-    from ...studies.summary.replays import remove_foreign_replays, write_replays
+    from ...studies.summary.page import remove_foreign_replays, write_replays, write_sweep_page
     from ...studies.summary.success_map import success_maps
 
     maps = success_maps(sweep, sweep.rows(run_store))

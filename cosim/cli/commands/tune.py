@@ -12,9 +12,8 @@ from ...core.errors import CosimError, InputError
 from ...core.text import count_noun
 from ...report.tables import print_table
 from .. import study_options
-from ..completion import complete_study
 from ..messages import print_json
-from ..output_options import json_option
+from ..options import complete_study, json_option
 
 if TYPE_CHECKING:
     from ...studies.execution.run_store import RunStore
@@ -70,7 +69,7 @@ def _run_tuning(
     scheduler: str | None,
 ) -> int:
     from ...process.supervisor import interrupt_on_termination
-    from ...studies.summary.tuning_files import describe_best, write_tuning_files
+    from ...studies.tune import describe_best, write_tuning_files
 
     try:
         with (
@@ -103,8 +102,7 @@ def _find_worst(
 ) -> int:
     """Search for the run that breaks a controller."""
     from ...process.supervisor import interrupt_on_termination
-    from ...studies.summary.worst_case_files import describe_worst_case, write_worst_case_files
-    from ...studies.worst_case import WorstCase
+    from ...studies.worst_case import WorstCase, describe_worst_case, write_worst_case_files
 
     search = WorstCase.from_file(file, max_runs)
     folder = output_dir or Path("runs") / search.spec.name
@@ -141,7 +139,7 @@ def _print_worst(search: WorstCase, files: list[Path]) -> None:
 
 
 def _print_best(tuning: Tuning, best: Trial, folder: Path, failure: str | None) -> None:
-    from ...studies.summary.run_commands import format_run_command
+    from ...studies.summary.unsuccessful_runs import format_run_command
 
     first = tuning.trials[0]
     rows = [

@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ..messages import print_json
-from ..output_options import json_option
+from ..options import json_option
 
 if TYPE_CHECKING:
     from ...components.fmi.preflight import Finding

@@ -21,10 +21,10 @@ from ...scenario import load
 from ...scenario.name_resolution import SlotIndex, Target, UnknownNameError, resolve_name
 from ...scenario.nested_systems import Node, load_scenario
 from ...scenario.schema import NestedSpec
+from ...scenario.sources import component_kinds
 from .role import Role
 
 _CANDIDATE = "candidate"
-_SOURCE_KINDS = {".fmu": "fmu", ".py": "python", ".mo": "modelica", ".json": "system"}
 _CAUSALITIES = {
     "inputs": ("input",),
     "outputs": ("output",),
@@ -55,15 +55,16 @@ def parse_source(text: str) -> CandidateSource:
     """
     file, separator, member = text.partition(":")
     path = Path(file)
-    kind = _SOURCE_KINDS.get(path.suffix)
-    if kind is None or bool(separator) != (kind in ("python", "modelica")):
+    kinds = component_kinds().values()
+    kind = next((each for each in kinds if path.suffix == each.SUFFIX), None)
+    if kind is None or bool(separator) != bool(kind.MEMBER):
         raise InputError(
             f'expected my.fmu, my.py:Class, my.mo:Model or a nested system my.json, found "{text}"'
         )
     if not path.is_file():
         raise InputError(f'there is no file "{file}"{nearest_file(path)}')
     return CandidateSource(
-        {kind: f"{path.resolve()}{separator}{member}"}, member or path.stem, text
+        {kind.KEY: f"{path.resolve()}{separator}{member}"}, member or path.stem, text
     )
 
 

@@ -17,11 +17,12 @@ from typing import Any, NamedTuple
 
 from ...core.errors import InputError
 from ...results.files import write_json
-from ...scenario.component_schema import SOURCES
 from ...scenario.evaluation_schema import FunctionSpec
-from ...scenario.extension import read_system_document
+from ...scenario.extension import nested_content
+from ...scenario.file_paths import relocating
 from ...scenario.named_functions import declared_arguments
 from ...scenario.nested_systems import load_scenario
+from ...scenario.sources import change_paths, kind_of
 from .candidate import CandidateInterface, CandidateSource
 from .role import Role
 
@@ -171,8 +172,11 @@ class ControllerSubstitution:
         name: str,
         maps: dict[str, NameMap],
     ) -> dict[str, Any]:
-        kind = next(source for source in SOURCES if source in spec)
-        path = (folder / _reference_file(spec[kind])).resolve()
+        system = change_paths({"components": {name: spec}}, relocating(folder, None))
+        absolute: dict[str, Any] = system["components"][name]
+        kind = kind_of(spec).KEY
+        source = absolute[kind]
+        path = Path(_reference_file(source)).resolve() if isinstance(source, str) else folder
         if path in self.role.controllers:
             self.replaced_components[full_name] = path.stem
             maps[name] = partial(self._candidate_name, full_name)
@@ -180,10 +184,11 @@ class ControllerSubstitution:
                 **self.candidate.entry,
                 **{key: spec[key] for key in ("period", "parameters") if key in spec},
             }
-        system = self.role.stand_ins.get(path, path if kind == "system" else None)
-        nested = self._substitute_nested(system, full_name) if system else None
+        stand_in = self.role.stand_ins.get(path)
+        content = nested_content({"system": str(stand_in)} if stand_in else spec, folder)
+        nested = self._substitute_nested(*content, full_name) if content else None
         if nested is None:
-            return {**spec, kind: absolute_reference(spec[kind], folder)}
+            return absolute
         changed, maps[name] = nested
         return {key: value for key, value in spec.items() if key not in (kind, "isolation")} | {
             "system": str(changed)
@@ -208,15 +213,15 @@ class ControllerSubstitution:
             else NewName(name, name)
         )
 
-    def _substitute_nested(self, file: Path, full_name: str) -> tuple[Path, NameMap] | None:
+    def _substitute_nested(
+        self, system: Mapping[str, Any], folder: Path, full_name: str
+    ) -> tuple[Path, NameMap] | None:
         """Change a nested system that contains a controller of the role.
 
         Return its path and name map, or None if no component has the role.
         """
         before = len(self.replaced_components)
-        value, renamed = self._substitute_system(
-            read_system_document(file).value, file.parent, f"{full_name}."
-        )
+        value, renamed = self._substitute_system(system, folder, f"{full_name}.")
         if len(self.replaced_components) == before:
             return None
         ports, lost = self._prune_ports(value.get("ports", {}), renamed)

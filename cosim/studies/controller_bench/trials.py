@@ -20,14 +20,12 @@ from ..regression import (
     CommandRunner,
     Regression,
     RegressionOutcome,
+    run_in_parallel,
 )
-from ..regression_runs import run_in_parallel
 from .candidate import interface_problems, parse_source, read_interface
-from .kpi_descriptions import describe_kpis
-from .page import BenchedController
-from .ranking import Ranking, ScenarioKpis, rank
+from .page import BenchedController, describe_kpis
+from .ranking import KpiComparison, Ranking, RunKpis, ScenarioKpis, compare_kpis, is_current, rank
 from .role import read_role
-from .score import KpiComparison, RunKpis, compare_kpis, is_current
 from .step_cost import MeasuredController, measure_step_costs
 from .substitution import ControllerSubstitution, Omission
 

@@ -16,8 +16,8 @@ from ...core import paths, resources
 from ...core.errors import InputError, Problem
 from ...core.version import __version__
 from ...scenario import load_scenario
-from ...scenario.component_schema import ComponentSpec
 from ...scenario.nested_systems import Node
+from ...scenario.sources import FmuSource, texts_in
 
 
 def cosim_fingerprint() -> str:
@@ -88,7 +88,7 @@ def collect_bundle(scenario: Path, variants: Iterable[Mapping[str, Any]] = ({},)
 
 def fmu_paths(files: Iterable[str]) -> tuple[str, ...]:
     """Return the paths that are FMUs, sorted."""
-    return tuple(sorted(path for path in files if path.endswith(".fmu")))
+    return tuple(sorted(path for path in files if path.endswith(FmuSource.SUFFIX)))
 
 
 def absolute_paths(scenario: Path, settings: Mapping[str, Any]) -> list[Problem]:
@@ -115,7 +115,7 @@ def _scenario_files(scenario: Path, settings: Mapping[str, Any]) -> Iterator[Pat
         yield from (file.resolve() for file in node.document.files)
         yield from _existing_files(node.folder, (name for name, _ in _named_files(node)))
     variables = [value for name, value in settings.items() if not name.startswith("/")]
-    yield from _existing_files(root.folder, _strings(variables))
+    yield from _existing_files(root.folder, texts_in(variables))
 
 
 def _existing_files(folder: Path, names: Iterable[str]) -> Iterator[Path]:
@@ -132,33 +132,14 @@ def _named_files(node: Node) -> Iterator[tuple[str, str]]:
     """Yield (path, location) of all files that a system names, and of strings in arguments and parameters that may be files."""
     for name, component in node.spec.components.items():
         where = node.where("components", name)
-        yield from ((path, where) for path in _component_paths(component))
+        yield from ((path, where) for path in component.texts())
     for i, profile in enumerate(getattr(node.spec, "inputs", ())):
-        yield profile.file, node.where("inputs", i)
+        yield from ((path, node.where("inputs", i)) for path in profile.paths)
     for i, kpi in enumerate(getattr(node.spec, "kpis", ())):
         where = node.where("kpis", i)
         yield from (
-            (path, where) for path in (kpi.python.rpartition(":")[0], *_strings(kpi.arguments))
+            (path, where) for path in (kpi.python.rpartition(":")[0], *texts_in(kpi.arguments))
         )
-
-
-def _component_paths(component: ComponentSpec) -> Iterator[str]:
-    for path in (component.fmu, component.system):
-        if path is not None:
-            yield path
-    for reference in (component.python, component.modelica):
-        if reference is not None:
-            yield reference.rpartition(":")[0]
-    yield from _strings(component.arguments)
-    yield from _strings(component.parameters)
-
-
-def _strings(value: Any) -> Iterator[str]:
-    if isinstance(value, dict | list):
-        for item in value.values() if isinstance(value, dict) else value:
-            yield from _strings(item)
-    elif isinstance(value, str) and value and "\0" not in value:
-        yield value
 
 
 def _package_files(path: Path) -> Iterator[Path]:

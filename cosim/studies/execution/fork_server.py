@@ -26,7 +26,6 @@ from typing import Any
 
 from ...api.execution import RUN_MODULES
 from ...components.fmi import FmuFile
-from ...components.python_import import load_object
 from ...core.errors import CosimError
 from ...process.limits import detach, thread_count
 from ...process.temporary_folders import temporary_run_folder
@@ -88,11 +87,8 @@ def _preload_components(scenario: Scenario) -> None:
     A file that takes longer than its deadline ends this process.
     """
     for node, name in scenario.root.leaves():
-        component = node.spec.components[name]
-        if component.python:
-            with _ending_after(scenario.spec.deadlines.load):
-                if warm := getattr(load_object(component.python, node.folder), "warm", None):
-                    warm(**component.arguments)
+        with _ending_after(scenario.spec.deadlines.load):
+            node.spec.components[name].preload(node.folder)
     with _ending_after(scenario.spec.deadlines.load):
         deque(find_function_problems(scenario.root, scenario.spec, scenario.spec, None), maxlen=0)
         for kpi in scenario.spec.kpis:

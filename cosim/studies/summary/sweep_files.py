@@ -16,10 +16,15 @@ from ..execution.bundle import cosim_fingerprint
 from ..execution.run_store import RunStore
 from ..factor_schema import AGGREGATE_COLUMNS, SUCCESS_COLUMNS
 from ..sweep import Sweep, SweepRow, kpi_names
-from .missed_criteria import MissedCriterion, UnsuccessfulRun, missed_criteria, unsuccessful_runs
-from .run_commands import format_run_command
 from .statistics import RunGroup, failure_causes, group_rows, groupings
 from .table import write_csv, write_csv_rows, write_parquet
+from .unsuccessful_runs import (
+    MissedCriterion,
+    UnsuccessfulRun,
+    format_run_command,
+    missed_criteria,
+    unsuccessful_runs,
+)
 
 #: largest number of runs without success in a summary
 _MAX_LISTED_RUNS = 50

@@ -10,7 +10,7 @@ import jsonschema
 import numpy as np
 import pytest
 
-from cosim.cli.commands.schema import _schema
+from cosim.cli.commands.list import _schema
 from cosim.core import resources
 from cosim.core.errors import InputError
 from plant_src.json_reader import JsonReader

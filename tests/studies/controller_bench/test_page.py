@@ -5,10 +5,13 @@ screens.
 import pytest
 
 from cosim.core import resources
-from cosim.studies.controller_bench.kpi_descriptions import describe_kpis, kpi_description
-from cosim.studies.controller_bench.page import BenchedController, write_bench_page
-from cosim.studies.controller_bench.ranking import ScenarioKpis, rank
-from cosim.studies.controller_bench.score import RunKpis
+from cosim.studies.controller_bench.page import (
+    BenchedController,
+    describe_kpis,
+    kpi_description,
+    write_bench_page,
+)
+from cosim.studies.controller_bench.ranking import RunKpis, ScenarioKpis, rank
 
 FOLDER = resources.root() / "scenarios"
 KPIS = [

@@ -1,6 +1,7 @@
 """Shipped roles, and scenarios in which a candidate replaces a controller."""
 
 import json
+from contextlib import nullcontext
 from hashlib import sha256
 
 import pytest
@@ -9,21 +10,22 @@ from cosim import __version__
 from cosim.core import resources
 from cosim.core.component import Variable
 from cosim.core.errors import InputError
-from cosim.scenario import load
+from cosim.scenario import PreparedRun, load
+from cosim.studies.controller_bench import candidate
 from cosim.studies.controller_bench.candidate import (
     CandidateInterface,
     interface_problems,
     parse_source,
     read_interface,
 )
-from cosim.studies.controller_bench.role import read_role, read_role_file, role_names
-from cosim.studies.controller_bench.score import (
+from cosim.studies.controller_bench.ranking import (
     RunKpis,
     compare_kpis,
     compare_values,
     is_current,
     merge_senses,
 )
+from cosim.studies.controller_bench.role import read_role, read_role_file, role_names
 from cosim.studies.controller_bench.substitution import ControllerSubstitution
 
 ROOT = resources.root()
@@ -371,3 +373,19 @@ def test_a_users_role_file_is_validated(tmp_path):
     ]
     assert len(found) >= 4
     assert {"1:2:", "1:50:", "1:59:"} <= set(found)
+
+
+@pytest.mark.parametrize("fails", [False, True])
+def test_the_components_of_a_candidate_are_freed(monkeypatch, fails):
+    freed = []
+    monkeypatch.setattr(PreparedRun, "free", lambda run: freed.extend(run.system.components))
+    if fails:
+        monkeypatch.setattr(candidate, "_component_interface", raise_input_error)
+    source = parse_source(str(ROOT / "fmus/heading_controller.fmu"))
+    with pytest.raises(InputError) if fails else nullcontext():
+        read_interface(source)
+    assert freed == ["candidate"]
+
+
+def raise_input_error(_component):
+    raise InputError("refused")

@@ -14,7 +14,7 @@ from page_probes import LOW_CONTRAST
 
 from cosim.core import resources
 from cosim.studies.summary.page import _design_rows
-from cosim.studies.summary.run_commands import format_run_command
+from cosim.studies.summary.unsuccessful_runs import format_run_command
 from cosim.studies.sweep import Sweep
 
 #: a run that ends above 0.2 is unsuccessful; the last one crashes

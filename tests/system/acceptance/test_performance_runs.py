@@ -8,7 +8,7 @@ import pytest
 from click.testing import CliRunner
 
 import cosim
-from cosim.cli.commands.plot import command as plot
+from cosim.cli.commands.finished_runs import plot
 from cosim.cli.commands.run import command as run
 
 NAMES = [f"performance_{n}" for n in range(1, 7)]

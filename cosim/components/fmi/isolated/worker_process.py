@@ -14,9 +14,14 @@ from typing import NoReturn
 
 from ....core import component_log
 from ....process.failure_attribution import describe_exit_status
-from ....process.foreign_output import ForeignOutput
-from ....process.forks import attributing_forks
-from ....process.journal import CALL_NUMBER, CHANGE_COUNT, Journal, suspending_deadline
+from ....process.journal import (
+    CALL_NUMBER,
+    CHANGE_COUNT,
+    Journal,
+    attributing_forks,
+    suspending_deadline,
+)
+from ....process.standard_streams import ForeignOutput
 from ....process.supervisor import POLL_INTERVAL
 from .messages import (
     INVALID_ANSWER_ERRORS,

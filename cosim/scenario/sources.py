@@ -1,0 +1,595 @@
+"""Sources of components: one class for each kind, all of them in one table.
+
+The class of a kind is the data model of a component with such a source. Everything that depends on
+the kind is one of its attributes or methods: the keys and their checks, the paths of files, the
+creation of the component. Another package adds a kind by an entry point of the group
+"cosim.sources": a subclass of `ComponentSource` under the name of its key.
+"""
+
+from __future__ import annotations
+
+import re
+from collections.abc import Iterable, Iterator, Mapping
+from dataclasses import dataclass
+from functools import cache
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
+
+from pydantic import BaseModel, GetPydanticSchema, WithJsonSchema, create_model, model_validator
+from pydantic.fields import FieldInfo
+from pydantic_core.core_schema import no_info_plain_validator_function
+
+from ..components.fmi.settings import Method
+from ..components.python_import import load_object
+from ..core.component import Component, Variable
+from ..core.errors import InputError, nearest_file
+from ..core.paths import is_file
+from .evaluation_schema import CallSpec, ReferenceSpec
+from .schema_types import (
+    FilePath,
+    FileReference,
+    FolderPaths,
+    HoldsPaths,
+    NameList,
+    PathChange,
+    Period,
+    Spec,
+    Value,
+    key,
+    path_keys,
+)
+
+if TYPE_CHECKING:
+    from ..components.input_table import InputTable
+    from .component_factory import ComponentFactory
+
+#: group of the entry points by which other packages add kinds of sources
+ENTRY_POINTS = "cosim.sources"
+
+
+@dataclass(frozen=True)
+class Creation:
+    """Input of a source for the creation of its component.
+
+    Attributes:
+        name: Full name of the component, such as "uav.vtol".
+        folder: Folder that relative paths start from.
+        values: Values of variables that the scenario sets, by name; structural parameters among
+            them size the arrays.
+        target: Python class or object of a scenario that is a dict, or None.
+        factory: Factory of the components of FMUs.
+    """
+
+    name: str
+    folder: Path
+    values: Mapping[str, Any]
+    target: Any
+    factory: ComponentFactory
+
+
+class Source(Spec):
+    """Base of everything in a scenario that provides the signals of a component."""
+
+    #: key of the source
+    KEY: ClassVar[str]
+
+    @property
+    def reference(self) -> Any:
+        """Value of the key of the source."""
+        return getattr(self, self.KEY)
+
+    def label(self, change: PathChange) -> str:
+        """Return the source as run.json shows it, with changed paths."""
+        mark = path_keys(type(self)).get(self.KEY)
+        return str(mark.change(self.reference, change) if mark else self.reference)
+
+    def files(self, folder: Path) -> Iterable[Path]:
+        """Return the files that the source names, whether they exist or not."""
+        return [folder / path for path in self.paths]
+
+    def used_files(self, folder: Path) -> Iterable[Path]:
+        """Return all files that the component, which has been created, depends on."""
+        return self.files(folder)
+
+
+class ComponentSource(Source):
+    """A component; subclasses are the kinds of its source."""
+
+    #: end of the names of source files, and noun for what is named after them ("file.py:Class")
+    SUFFIX: ClassVar[str] = ""
+    MEMBER: ClassVar[str] = ""
+    #: keys that a component keeps if an extending file gives it a source of this kind
+    KEPT_KEYS: ClassVar[tuple[str, ...]] = ("period",)
+    #: end of the message about a key of this kind in a component of another kind, by key
+    MISPLACED: ClassVar[Mapping[str, str]] = {}
+
+    parameters: dict[str, Value] = key(
+        "values of parameters and start values, by variable name; a list sets an array, nested "
+        "lists one of several dimensions; "
+        "a Binary is a text of hexadecimal digits",
+        {"speed_command": 1.0, "waypoint_x": [3.0, 3.0, -3.0]},
+        default={},
+    )
+    period: Period | None = key(
+        "time between two steps; default: every macro step", 0.02, unit="s", default=None
+    )
+
+    @property
+    def nested_system(self) -> str | dict[str, Any] | None:
+        """Path or content of a nested system; None for other sources."""
+        return None
+
+    def create(self, creation: Creation) -> Component:
+        """Create the component.
+
+        Raises:
+            InputError: The source does not exist or cannot be used.
+        """
+        raise NotImplementedError
+
+    def texts(self) -> Iterator[str]:
+        """Yield the texts of the component that may be paths of files, also those in its values."""
+        yield from self.paths
+        yield from texts_in(self.parameters)
+
+    def preload(self, folder: Path) -> None:
+        """Import the code of the component, for processes from which runs are forked."""
+
+    @classmethod
+    def python_class(cls, entry: Mapping[str, Any], folder: Path) -> Any:  # noqa: ARG003
+        """Return the Python class of a component as in a scenario file, or None."""
+        return None
+
+    @classmethod
+    def known_fields(cls) -> Mapping[str, FieldInfo]:
+        """Return the fields of a kind; of this base class those of all kinds."""
+        return component_model().model_fields if cls is ComponentSource else cls.model_fields
+
+
+class _FmuBased(ComponentSource):
+    """A component that is an FMU."""
+
+    KEPT_KEYS = ("period", "isolation")
+
+    isolation: Literal["fmu"] | None = key("run the FMU in a separate process", "fmu", default=None)
+
+
+class SolverSpec(Spec):
+    """Integration of a Model Exchange FMU."""
+
+    method: Method = key(
+        (
+            '"euler", "rk4": explicit methods with fixed step size; "cvode": BDF with variable '
+            "step size and root finding"
+        ),
+        "euler",
+    )
+    step_size: Period | None = key(
+        "largest step size of a method with fixed step size; default: that of the FMU's default "
+        "experiment, "
+        "or else the time between two steps of the component",
+        0.001,
+        unit="s",
+        default=None,
+    )
+
+    @model_validator(mode="after")
+    def _check_step_size(self) -> SolverSpec:
+        if self.step_size is not None and self.method == "cvode":
+            raise ValueError(
+                '"step_size" is for methods with fixed step size; "cvode" has a "tolerance"'
+            )
+        return self
+
+
+class FmuSource(_FmuBased):
+    """A component that is the FMU of a file."""
+
+    KEY = "fmu"
+    SUFFIX = ".fmu"
+
+    fmu: FilePath = key("path of an FMU", "../fmus/strider_autopilot.fmu")
+    solver: SolverSpec | None = key(
+        (
+            "simulate by Model Exchange with this solver; default: by Co-Simulation if the FMU has "
+            "it, else cvode"
+        ),
+        {"method": "euler", "step_size": 0.001},
+        default=None,
+    )
+    tolerance: float | None = key(
+        (
+            "relative tolerance of the FMU and of its solver; default: that of the FMU's default "
+            "experiment"
+        ),
+        1e-6,
+        default=None,
+        gt=0,
+        allow_inf_nan=False,
+    )
+
+    def create(self, creation: Creation) -> Component:
+        """Create an instance of the FMU."""
+        from ..components.fmi import InstanceSettings, SolverSettings
+
+        for kind in component_kinds().values():
+            if kind.MEMBER and re.search(rf"{re.escape(kind.SUFFIX)}(?::\w+)?$", self.fmu):
+                raise InputError(
+                    f'"{self.fmu}" is not an FMU; it is named by "{kind.KEY}" instead of "fmu"'
+                )
+        solver = SolverSettings(self.solver.method, self.solver.step_size) if self.solver else None
+        return creation.factory.instantiate(
+            creation,
+            creation.folder / self.fmu,
+            InstanceSettings(self.tolerance, solver),
+            self.isolation is not None,
+        )
+
+
+class PythonSource(ComponentSource):
+    """A component that is an object of a Python class."""
+
+    KEY = "python"
+    SUFFIX = ".py"
+    MEMBER = "Class"
+    MISPLACED = {"arguments": '; variables are set with "parameters"'}
+
+    python: FileReference = key(
+        '"file.py:Class": a PythonFMU class or a component class of cosim',
+        "my_autopilot.py:Autopilot",
+    )
+    arguments: dict[str, Any] = key(
+        "arguments of the constructor; only for Python components",
+        {"environment": {"seed": 1}},
+        default={},
+    )
+
+    def create(self, creation: Creation) -> Component:
+        """Import the class and construct the object."""
+        from ..components.python_class import create_python_component, load_component
+        from ..process.journal import calling_component
+
+        with calling_component(creation.name, "loading the class", "load"):
+            if creation.target is not None:
+                return create_python_component(
+                    creation.target, self.python, creation.name, self.arguments
+                )
+            return load_component(self.python, creation.folder, creation.name, self.arguments)
+
+    def texts(self) -> Iterator[str]:
+        """Yield the texts that may be paths, also those in the arguments."""
+        yield from super().texts()
+        yield from texts_in(self.arguments)
+
+    def preload(self, folder: Path) -> None:
+        """Import the class, and call its static method `warm` with the arguments if it has one."""
+        if warm := getattr(load_object(self.python, folder), "warm", None):
+            warm(**self.arguments)
+
+    @classmethod
+    def python_class(cls, entry: Mapping[str, Any], folder: Path) -> Any:
+        """Return the class; None for a Python class or object of a scenario that is a dict."""
+        reference = entry["python"]
+        is_file_name = isinstance(reference, str) and ".py:" in reference
+        return load_object(reference, folder) if is_file_name else None
+
+
+class ModelicaSource(_FmuBased):
+    """A component that is a Modelica model, of which an FMU is built."""
+
+    KEY = "modelica"
+    SUFFIX = ".mo"
+    MEMBER = "Model"
+
+    modelica: FileReference = key(
+        '"file.mo:Model"; built when needed (requires the extra "build")',
+        "MyAutopilot.mo:MyAutopilot",
+    )
+    libraries: FolderPaths = key(
+        (
+            "folders of Modelica libraries, searched before those of MODELICAPATH; only for "
+            "Modelica models"
+        ),
+        ["../modelica"],
+        default=[],
+    )
+
+    def create(self, creation: Creation) -> Component:
+        """Create an instance of the FMU in the user's cache, which is built if it is out of date."""
+        from ..components.fmi import InstanceSettings
+        from ..export.build import cached_fmu
+
+        file, _, model = self.modelica.rpartition(":")
+        if not file.endswith(self.SUFFIX):
+            raise InputError(f'expected "file.mo:Model", found "{self.modelica}"')
+        path = creation.folder / file
+        if not is_file(path):
+            raise InputError(f'file "{file}" does not exist{nearest_file(path)}')
+        fmu = cached_fmu(path, model, [creation.folder / library for library in self.libraries])
+        return creation.factory.instantiate(
+            creation, fmu, InstanceSettings(None, None), self.isolation is not None
+        )
+
+    @property
+    def paths(self) -> list[str]:
+        """Path of the Modelica file; libraries are folders."""
+        return [self.modelica.rpartition(":")[0]]
+
+    def used_files(self, folder: Path) -> Iterable[Path]:
+        """Return the Modelica file, and those from which its model was built."""
+        from ..export.modelica.frontend.model_files import needed_files
+
+        files = list(self.files(folder))
+        return [*files, *needed_files(files[0])]
+
+
+def _change_system(value: Any, change: PathChange) -> Any:
+    """Return the path of a nested system, or the content of an inline one, with changed paths."""
+    if isinstance(value, str):
+        return change(value)
+    if not isinstance(value, Mapping):
+        return value
+    changed, base = change_paths(value, change), value.get("extends")
+    if isinstance(base, str) and (base.endswith(".json") or "/" in base):
+        changed["extends"] = change(base)
+    return changed
+
+
+class NestedSystem(ComponentSource):
+    """A component that is a nested system."""
+
+    KEY = "system"
+    SUFFIX = ".json"
+
+    system: Annotated[
+        str | dict[str, Any],
+        HoldsPaths(_change_system),
+        WithJsonSchema({"anyOf": [{"type": "string"}, {"ref": "NestedSpec"}]}),
+    ] = key(
+        "path of the JSON file of a nested system, or its content",
+        "systems/strider_autopilot.json",
+    )
+
+    @property
+    def nested_system(self) -> str | dict[str, Any]:
+        """Path or content of the system."""
+        return self.system
+
+    @property
+    def paths(self) -> list[str]:
+        """Path of the file; the components of an inline system have their own."""
+        return [self.system] if isinstance(self.system, str) else []
+
+
+class InputTableSource(Source):
+    """An input profile over time from a CSV file."""
+
+    KEY = "file"
+
+    file: FilePath = key(
+        'path of the CSV file; its first column is "time" (s)', "profiles/accelerations.csv"
+    )
+    to: dict[str, NameList] = key("the inputs that each column is connected to", {"ax": "uav.ax"})
+    interpolation: Literal["linear", "hold"] = key(
+        "value between two rows; hold: that of the last row", "hold", default="linear"
+    )
+
+    def create(self, folder: Path, targets: Mapping[str, Variable | None]) -> InputTable:
+        """Read the table; `targets` are the first inputs that its columns feed."""
+        from ..components.input_table import read_input_table
+
+        return read_input_table(folder / self.file, targets, self.interpolation)
+
+
+#: all kinds of sources of cosim; those of components by their keys
+SOURCES: tuple[type[Source], ...] = (
+    FmuSource,
+    PythonSource,
+    ModelicaSource,
+    NestedSystem,
+    InputTableSource,
+)
+_COMPONENT_KINDS = {kind.KEY: kind for kind in SOURCES if issubclass(kind, ComponentSource)}
+
+
+def component_kinds(keys: Iterable[str] | None = ()) -> Mapping[str, type[ComponentSource]]:
+    """Return the kinds of sources of components by key.
+
+    Those of other packages are only looked up, which takes time, if one of `keys` is no key of a
+    kind of cosim, or if `keys` is None.
+    """
+    if keys is not None and all(each in _own_keys() for each in keys):
+        return _COMPONENT_KINDS
+    return _COMPONENT_KINDS | _kinds_of_packages()
+
+
+@cache
+def _own_keys() -> frozenset[str]:
+    return frozenset().union(*(kind.model_fields for kind in _COMPONENT_KINDS.values()))
+
+
+@cache
+def _kinds_of_packages() -> dict[str, type[ComponentSource]]:
+    """Return the kinds that the entry points of installed packages name."""
+    from importlib.metadata import entry_points
+
+    kinds: dict[str, type[ComponentSource]] = {}
+    for entry in entry_points(group=ENTRY_POINTS):
+        who = f'the kind of sources "{entry.name}" of the package {entry.dist and entry.dist.name}'
+        try:
+            kind = entry.load()
+        except Exception as error:
+            raise InputError(f"{who} cannot be imported: {error}") from error
+        if not (isinstance(kind, type) and issubclass(kind, ComponentSource)):
+            raise InputError(f"{who}: expected a subclass of ComponentSource, found {kind!r}")
+        if entry.name != getattr(kind, "KEY", "") or entry.name not in kind.model_fields:
+            raise InputError(f'{who}: expected KEY = "{entry.name}", and a field of this name')
+        if entry.name in _own_keys() or entry.name in kinds:
+            raise InputError(f"{who}: this key is taken")
+        kinds[entry.name] = kind
+    return kinds
+
+
+def kind_of(entry: Mapping[str, Any]) -> type[ComponentSource]:
+    """Return the kind of a component as in a scenario file; the base class if it has no source."""
+    for name, kind in component_kinds(entry).items():
+        if entry.get(name) is not None:
+            return kind
+    return ComponentSource
+
+
+# -- validation of components, and their JSON Schema
+
+
+def _parse_component(value: Any) -> ComponentSource:
+    """Validate a component by the model of its kind.
+
+    A component that does not have exactly one source, or a key of another kind, is refused by the
+    model that has the keys of all kinds.
+    """
+    entry = value if isinstance(value, Mapping) else {}
+    kinds = component_kinds(entry)
+    given = [kind for name, kind in kinds.items() if entry.get(name) is not None]
+    if len(given) != 1 or not entry.keys() <= given[0].model_fields.keys():
+        component_model().model_validate(value)
+        entry = {name: each for name, each in entry.items() if name in given[0].model_fields}
+    return given[0].model_validate(entry)
+
+
+#: a component of a scenario
+ComponentSpec = Annotated[
+    ComponentSource,
+    GetPydanticSchema(lambda *_: no_info_plain_validator_function(_parse_component)),
+    WithJsonSchema({"ref": "ComponentSpec"}),
+]
+
+
+class _AnyComponent(Spec):
+    """Base of the model of components with the keys of all kinds."""
+
+    @model_validator(mode="after")
+    def _one_source(self) -> _AnyComponent:
+        kinds = component_kinds(None)
+        given = [name for name in kinds if getattr(self, name) is not None]
+        if len(given) != 1:
+            raise ValueError(
+                f"expected exactly one of {', '.join(kinds)}; found {' and '.join(given) or 'none'}"
+            )
+        for name in type(self).model_fields:
+            if name not in kinds[given[0]].model_fields and getattr(self, name):
+                owners = [kind for kind in kinds.values() if name in kind.model_fields]
+                keys = " or ".join(f'"{kind.KEY}"' for kind in owners)
+                verb = "are" if name.endswith("s") else "is"
+                hint = owners[0].MISPLACED.get(name, "")
+                raise ValueError(f'"{name}" {verb} for components with {keys}{hint}')
+        return self
+
+
+@cache
+def component_model() -> type[BaseModel]:
+    """Return the model of components with the keys of all kinds, for problems and JSON Schema."""
+    kinds = component_kinds(None)
+    common = ComponentSource.model_fields
+    owners: dict[str, list[str]] = {}
+    fields: dict[str, Any] = {}
+    for kind in kinds.values():
+        for name in dict.fromkeys((kind.KEY, *kind.model_fields)):
+            if name not in common:
+                owners.setdefault(name, []).append(kind.KEY)
+                fields[name] = _optional(kind.model_fields[name])
+    rules: list[dict[str, Any]] = []
+    for name, keys in owners.items():
+        if name not in kinds:
+            rules.append({"if": _is_given(name), "then": {"anyOf": list(map(_is_given, keys))}})
+    for name, field in common.items():
+        fields[name] = (field.annotation, field)
+    names = list(kinds)
+    model: type[BaseModel] = create_model(
+        "ComponentSpec",
+        __base__=_AnyComponent,
+        __doc__=(
+            f"A component with exactly one source: {', '.join(names[:-1])} or {names[-1]}.\n\n"
+            "Paths start from the folder of this file."
+        ),
+        __cls_kwargs__={
+            "json_schema_extra": {"oneOf": list(map(_is_given, kinds)), "allOf": rules}
+        },
+        **fields,
+    )
+    return model
+
+
+def _is_given(name: str) -> dict[str, Any]:
+    """Return the JSON Schema of objects in which a key has a value."""
+    return {"required": [name], "properties": {name: {"not": {"enum": [None, [], {}]}}}}
+
+
+def _optional(field: FieldInfo) -> tuple[Any, FieldInfo]:
+    """Return annotation and field of a key that components of other kinds do not have."""
+    if not field.is_required():
+        return field.annotation, field
+    annotation: Any = Annotated[(field.annotation, *field.metadata)]
+    return annotation | None, key(
+        str(field.description), (field.examples or [None])[0], default=None
+    )
+
+
+# -- paths of files in the JSON of scenarios and nested systems
+
+#: entries other than components that name files: models of the elements of lists, and of objects
+_LISTS: Mapping[str, type[Spec]] = {
+    "inputs": InputTableSource,
+    "kpis": CallSpec,
+    "figures": CallSpec,
+}
+_OBJECTS: Mapping[str, type[Spec]] = {"scene": CallSpec, "reference": ReferenceSpec}
+
+
+def change_paths(system: Mapping[str, Any], change: PathChange) -> dict[str, Any]:
+    """Return a copy of a scenario or nested system, or of a part of one, in which every path is changed.
+
+    Texts in `arguments` and `parameters` are not paths for cosim and stay as they are.
+    """
+
+    def change_entry(entry: Any, keys: Mapping[str, HoldsPaths]) -> Any:
+        if not isinstance(entry, Mapping):
+            return entry
+        changed = {
+            name: mark.change(entry[name], change) for name, mark in keys.items() if name in entry
+        }
+        return {**entry, **changed}
+
+    result = dict(system)
+    for name, model in _OBJECTS.items():
+        if name in system:
+            result[name] = change_entry(system[name], path_keys(model))
+    for name, model in _LISTS.items():
+        match system.get(name):
+            case list(entries):
+                result[name] = [change_entry(each, path_keys(model)) for each in entries]
+            case dict(entries):  # changes of a file with "extends", by name
+                result[name] = {
+                    each: change_entry(entry, path_keys(model)) for each, entry in entries.items()
+                }
+    if isinstance(components := system.get("components"), Mapping):
+        result["components"] = {
+            name: change_entry(entry, _path_keys_of_component(entry))
+            for name, entry in components.items()
+        }
+    return result
+
+
+def _path_keys_of_component(entry: Any) -> Mapping[str, HoldsPaths]:
+    marks: dict[str, HoldsPaths] = {}
+    for kind in component_kinds(entry if isinstance(entry, Mapping) else ()).values():
+        marks |= path_keys(kind)
+    return marks
+
+
+def texts_in(value: Any) -> Iterator[str]:
+    """Yield the texts in a JSON value that can be paths."""
+    if isinstance(value, dict | list):
+        for item in value.values() if isinstance(value, dict) else value:
+            yield from texts_in(item)
+    elif isinstance(value, str) and value and "\0" not in value:
+        yield value
