@@ -134,7 +134,7 @@ class ControllerSubstitution:
             write_json(content, path)
 
     # -- systems
-    # -------------------------------------------------------------------------------------------------------
+    # ---------------------------------------------------------------------------------------
 
     def _substitute_system(
         self, value: Mapping[str, Any], folder: Path, prefix: str
