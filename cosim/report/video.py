@@ -84,7 +84,7 @@ def write_video(
 
 
 def find_frame_source(result: Result) -> str:
-    """Return the "file.py:Class" of the first component of the run's scenario that renders video frames.
+    """Return the "file.py:Class" of the first component that renders video frames.
 
     Raises:
         InputError: No component renders frames, or the source file of a component does not exist.
