@@ -24,13 +24,14 @@ from ..components.fmi import (
     Isolation,
     SolverSettings,
     create_component,
+    open_fmu,
 )
 from ..components.fmi.settings import Method
 from ..components.python_import import load_object
 from ..core.component import Component, Variable
 from ..core.errors import InputError, nearest_file
 from ..core.paths import is_file, resolve_path
-from ..export.foreign.source_fmus import usable_fmu
+from ..export.foreign import add_binary
 from .schema_types import (
     FilePath,
     FileReference,
@@ -111,10 +112,10 @@ class ComponentFactory:
         needs_own_process = used is not None and used.description.once_per_process
         if used is None:
             loaded = None if interface else self._loaded_fmus.get(key[0])
-            self.fmus[key] = loaded or usable_fmu(path, interface)
+            self.fmus[key] = loaded or open_fmu(path, interface, add_binary)
         elif needs_own_process:
             # its process must not inherit the library that is loaded in this one
-            self.fmus[key] = usable_fmu(path, interface)
+            self.fmus[key] = open_fmu(path, interface, add_binary)
         file = self.fmus[key]
         settings = settings.with_structural_parameters(file.description, creation.values)
         isolated = isolated or self._isolate_fmus or needs_own_process

@@ -59,8 +59,12 @@ class RowFeed:
         return {column.name: column.unit for column in self._layout.columns}
 
     def available(self, recorded: int) -> int:
-        """Return the number of rows after downsampling when `recorded` rows have been recorded."""
-        return (recorded - 1) // self.stride + 1 if recorded else 0
+        """Return the number of rows after downsampling when `recorded` rows have been recorded.
+
+        Rows between communication points are not in `capacity`; the page then shows fewer of the
+        last rows while the run goes on.
+        """
+        return min(self.capacity, (recorded - 1) // self.stride + 1) if recorded else 0
 
     def read(self, first: int, count: int) -> bytes:
         """Return the bytes of `count` rows from `first` on, column by column.
