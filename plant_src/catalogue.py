@@ -14,7 +14,7 @@ from typing import Any, TypeVar
 
 from cosim.core.errors import InputError, Problem, did_you_mean
 
-from .vehicles.common.visual_mesh import read_visual
+from .vehicles.common.vehicle_reader import read_visual
 from .vehicles.model import Model
 
 _Value = TypeVar("_Value")
@@ -38,19 +38,18 @@ def multirotor_model(name: str, data: Mapping[str, Any]) -> Model:
     """Return the model of a multirotor. Raises InputError with all problems of its data."""
     from .vehicles.common.inertia import inertia_of
     from .vehicles.multirotor import interface
-    from .vehicles.multirotor.airframe import MAX_ROTORS
-    from .vehicles.multirotor.vehicle_data import read_multirotor
+    from .vehicles.multirotor.airframe import MAX_ROTORS, MultirotorReader
 
-    vehicle = read_multirotor(name, data, COMMON_KEYS)
-    airframe = vehicle.airframe
+    vehicle = MultirotorReader().read(name, data, COMMON_KEYS)
+    airframe = vehicle.vehicle
     return Model(
         name,
         interface.variables(airframe),
         interface.states(MAX_ROTORS),
-        airframe.body(vehicle.boxes_in),
+        vehicle.body(),
         vehicle.crash_speed,
         airframe=airframe,
-        body_of=lambda given: vehicle.body_with(given["mass"], inertia_of(given)),
+        body_of=lambda given: vehicle.body(mass=given["mass"], inertia=inertia_of(given)),
         equations="multirotor",
         layout=interface.variables(airframe, MAX_ROTORS),
     )
@@ -60,19 +59,18 @@ def submerged_model(name: str, data: Mapping[str, Any]) -> Model:
     """Return the model of a submerged vehicle. Raises InputError with all problems of its data."""
     from .vehicles.common.inertia import inertia_of
     from .vehicles.submerged import interface
-    from .vehicles.submerged.craft import MAX_THRUSTERS
-    from .vehicles.submerged.vehicle_data import read_submerged
+    from .vehicles.submerged.craft import MAX_THRUSTERS, SubmergedReader
 
-    vehicle = read_submerged(name, data, COMMON_KEYS)
-    craft = vehicle.craft
+    vehicle = SubmergedReader().read(name, data, COMMON_KEYS)
+    craft = vehicle.vehicle
     return Model(
         name,
         interface.variables(craft),
         interface.states(MAX_THRUSTERS),
-        craft.body(vehicle.boxes_in),
+        vehicle.body(),
         vehicle.crash_speed,
         craft=craft,
-        body_of=lambda given: vehicle.body_with(given["mass"], inertia_of(given)),
+        body_of=lambda given: vehicle.body(mass=given["mass"], inertia=inertia_of(given)),
         equations="submerged",
         layout=interface.variables(craft, MAX_THRUSTERS),
     )
@@ -82,20 +80,20 @@ def surface_vessel_model(name: str, data: Mapping[str, Any]) -> Model:
     """Return the model of a floating vessel. Raises InputError with all problems of its data."""
     from .vehicles.common.inertia import inertia_of
     from .vehicles.surface_vessel import interface
-    from .vehicles.surface_vessel.vehicle_data import read_surface_vessel
+    from .vehicles.surface_vessel.surface_vessel import SurfaceVesselReader
     from .vehicles.vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS
 
-    vehicle = read_surface_vessel(name, data, COMMON_KEYS)
-    vessel = vehicle.vessel
+    vehicle = SurfaceVesselReader().read(name, data, COMMON_KEYS)
+    vessel = vehicle.vehicle
     return Model(
         name,
         interface.variables(vessel),
         interface.states(MAX_PROPELLERS),
-        vehicle.body_with(vessel.mass, vessel.inertia),
+        vehicle.body(),
         vehicle.crash_speed,
         is_vessel=True,
         boat=vessel,
-        body_of=lambda given: vehicle.body_with(given["mass"], inertia_of(given)),
+        body_of=lambda given: vehicle.body(mass=given["mass"], inertia=inertia_of(given)),
         equations="surface_vessel",
         layout=interface.variables(vessel, (MAX_PROPELLERS, MAX_RUDDERS)),
     )
@@ -104,21 +102,21 @@ def surface_vessel_model(name: str, data: Mapping[str, Any]) -> Model:
 def planar_vessel_model(name: str, data: Mapping[str, Any]) -> Model:
     """Return the model of a planar vessel. Raises InputError with all problems of its data."""
     from .vehicles.planar_vessel import interface
-    from .vehicles.planar_vessel.vehicle_data import read_planar_vessel
+    from .vehicles.planar_vessel.planar_vessel import PlanarVesselReader
     from .vehicles.vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS
 
-    vehicle = read_planar_vessel(name, data, COMMON_KEYS)
-    vessel = vehicle.vessel
+    vehicle = PlanarVesselReader().read(name, data, COMMON_KEYS)
+    vessel = vehicle.vehicle
     return Model(
         name,
         interface.variables(vessel),
         interface.states(MAX_PROPELLERS),
-        vehicle.body_with(vessel.mass, vessel.yaw_inertia),
+        vehicle.body(),
         vehicle.crash_speed,
         is_vessel=True,
         motion="planar",
         boat=vessel,
-        body_of=lambda given: vehicle.body_with(given["mass"], given["yaw_inertia"]),
+        body_of=lambda given: vehicle.body(mass=given["mass"], yaw_inertia=given["yaw_inertia"]),
         equations="planar_vessel",
         layout=interface.variables(vessel, (MAX_PROPELLERS, MAX_RUDDERS)),
     )
@@ -171,13 +169,13 @@ def _named_links(data: Mapping[str, Any]) -> Iterator[Problem]:
 
 
 def _strider() -> Model:
-    from .vehicles.strider import geometry, interface, parameters
+    from .vehicles.strider import interface, parameters
 
     return Model(
         "strider",
         interface.VARIABLES,
         interface.STATES,
-        geometry.BODY,
+        parameters.BODY,
         parameters.CRASH_SPEED,
         is_vessel=True,
         motion="planar",
@@ -189,13 +187,13 @@ def _strider_6dof() -> Model:
     from .vehicles.common.interface import VESSEL_STATES
     from .vehicles.strider.interface import HULLS
     from .vehicles.strider.parameters import CRASH_SPEED
-    from .vehicles.strider_6dof import geometry, interface
+    from .vehicles.strider_6dof import interface, parameters
 
     return Model(
         "strider_6dof",
         interface.VARIABLES,
         VESSEL_STATES,
-        geometry.BODY,
+        parameters.BODY,
         CRASH_SPEED,
         is_vessel=True,
         vehicle="strider",
@@ -205,13 +203,13 @@ def _strider_6dof() -> Model:
 
 def _otter(name: str) -> Model:
     from .vehicles.common.interface import VESSEL_STATES
-    from .vehicles.otter import geometry, interface, parameters
+    from .vehicles.otter import interface, parameters
 
     return Model(
         name,
         interface.VARIABLES,
         (*VESSEL_STATES, *interface.PROPELLER_STATES),
-        geometry.BODY,
+        parameters.BODY,
         parameters.CRASH_SPEED,
         is_vessel=True,
     )

@@ -119,7 +119,7 @@ def write_outputs(outcome: RunOutcome) -> int:
 
 
 def _end_failed_run(outcome: RunOutcome, failure: BaseException) -> int:
-    from ..process.run_files.folder import remove_run_files, run_folder
+    from ..process.run_files import remove_run_files, run_folder
 
     metadata = outcome.result.metadata
     metadata["failure"] = metadata["failure"] or str(failure)  # a KPI may have failed
@@ -162,7 +162,7 @@ def _report_failed_run(partial: Result, folder: Path, options: RunOptions, exit_
     Returns:
         The exit code.
     """
-    from ..report.finished_run import write_folder_report
+    from ..report.run_page import write_folder_report
 
     files = ["result.csv", "run.json"] if len(partial.time) else []
     if files and not options.no_report:
@@ -183,7 +183,7 @@ def save_after_crash(outcome: SupervisedOutcome, options: RunOptions) -> None:
 
     The report is written by another supervised process, because it calls functions of the user.
     """
-    from ..process.run_files.folder import read_metadata
+    from ..process.run_files import read_metadata
     from ..results import Result
     from ..results.non_finite import warn_non_finite
 
@@ -212,7 +212,7 @@ def save_after_crash(outcome: SupervisedOutcome, options: RunOptions) -> None:
 
 def _write_result_files(outcome: RunOutcome) -> None:
     """Write result.csv, kpis.json and run.json in place of the files of the unfinished run."""
-    from ..process.run_files.folder import remove_run_files, run_folder
+    from ..process.run_files import remove_run_files, run_folder
     from ..results.result import write_run
 
     with writing_results(outcome.result, run_folder(), outcome.shown_folder):

@@ -87,7 +87,7 @@ def _save_partial(
     outcome: SupervisedOutcome, save_partial: Callable[[SupervisedOutcome], None], folder: Path
 ) -> None:
     """Save the rows of an unfinished run and remove its folder, unless writing fails or the child kept the rows and said so."""
-    from ..process.run_files.folder import find_kept_rows
+    from ..process.run_files import find_kept_rows
 
     if find_kept_rows(folder) and not outcome.failure:
         return
@@ -111,8 +111,6 @@ def results_written(code: int) -> int:
 
 def recover_outcome_recording(outcome: SupervisedOutcome) -> Recording:
     """Return the rows that a crashed or interrupted child recorded."""
-    from ..process.run_files.folder import find_kept_rows, recover_recording
+    from ..process.run_files import recover_recording
 
-    folder = outcome.journal.folder
-    file, rows = (folder and find_kept_rows(folder)) or (None, outcome.row_count)
-    return recover_recording(folder, rows, file)
+    return recover_recording(outcome.journal.folder, outcome.row_count)

@@ -26,7 +26,7 @@ class OutputFiles:
     """Files that accompany an output while it is written.
 
     Attributes:
-        unfinished: Folder of the rows, see `process.run_files.folder`.
+        unfinished: Folder of the rows, see `process.run_files`.
         lock: Lock file.
     """
 
@@ -65,11 +65,9 @@ def writing_results(result: Result, folder: Path | None, shown: Path) -> Iterato
         InputError: The output cannot be written; the text says how to continue.
         OutputError: The same, on a full or defective disk.
     """
-    from ..process.run_files.folder import keep_rows, remove_live_copies
+    from ..process.run_files import keep_rows
     from ..results.files import to_json_types
 
-    if folder:
-        remove_live_copies(folder)
     try:
         yield
     except (InputError, OutputError) as error:

@@ -1,6 +1,9 @@
-"""Exact communication points.
+"""The time base of a run: exact communication points and their times in seconds.
 
-Integers on a grid that are converted to seconds with one rounding.
+A communication point is an integer on a grid of exact fractions. Its time is rounded once, here and
+nowhere else: the executors receive their times from `TimeGrid.times`. Every recorded row contains its
+time as float64, so that readers of rows need no grid. A row may also lie between two communication
+points, and several rows may have the same time (the limits before and after an event).
 """
 
 from __future__ import annotations
@@ -14,6 +17,8 @@ import numpy as np
 
 #: largest magnitude of a time (s); all integers up to this one are exact as float64
 MAX_TIME = 2**53
+#: number of times that NumPy computes faster than Python
+MIN_VECTOR_LENGTH = 16
 
 #: a decimal number or a fraction; the number of digits is limited because Fraction expands
 #: 1e999999999
@@ -123,7 +128,10 @@ class TimeGrid:
         )
 
     def ending_at(self, stop: Fraction) -> TimeGrid:
-        """Return the grid with a shorter last step, which ends at `stop` (s), if `stop` lies between two points."""
+        """Return the grid that ends exactly at `stop` (s).
+
+        The last step is shorter if `stop` lies between two communication points.
+        """
         count = (stop - self.start) / self.step
         if count.denominator == 1:
             return replace(self, count=int(count), _stop=None)
@@ -131,14 +139,31 @@ class TimeGrid:
 
     def time_at(self, n: int) -> float:
         """Return the time of communication point n (s), correctly rounded."""
-        return (
-            float(self._stop)
-            if self._stop is not None and n >= self.count
-            else self._regular_time(n)
-        )
-
-    def _regular_time(self, n: int) -> float:
+        if self._stop is not None and n >= self.count:
+            return float(self._stop)
         return (self._origin + n * self._stride) / self._denominator
+
+    def times(self, first: int, end: int) -> np.ndarray:
+        """Return the times of communication points `first` to `end` - 1 (s), like `time_at`.
+
+        The division is the only rounding, as long as float64 represents the numerators exactly.
+        Otherwise Python's integers are divided, which it does with one rounding.
+        """
+        if end - first < MIN_VECTOR_LENGTH or not self._is_exact(end):
+            return np.array([self.time_at(n) for n in range(first, end)], np.float64)
+        begin, stride = self._origin + first * self._stride, self._stride
+        times: np.ndarray = np.arange(
+            begin, begin + (end - first) * stride, stride, dtype=np.float64
+        )
+        times /= self._denominator
+        if self._stop is not None:
+            times[max(0, self.count - first) :] = float(self._stop)
+        return times
+
+    def _is_exact(self, end: int) -> bool:
+        """Return whether float64 represents all terms of the times before point `end` exactly."""
+        terms = self._origin, self._denominator, end * self._stride
+        return max(map(abs, (*terms, self._origin + end * self._stride))) <= MAX_TIME
 
     @property
     def end(self) -> Fraction:
@@ -149,41 +174,6 @@ class TimeGrid:
     def whole_steps(self) -> int:
         """Number of steps that are not shorter."""
         return self.count - (self._stop is not None)
-
-    @property
-    def integer_coefficients(self) -> dict[str, int]:
-        """Coefficients of the time of communication point n.
-
-        (origin + n * stride) / denominator, in s.
-        """
-        return {"origin": self._origin, "stride": self._stride, "denominator": self._denominator}
-
-    def times(self, points: range) -> np.ndarray:
-        """Return the times of communication points (s), shape (points,), bit-identical to `time_at`."""
-        if not self.float_coefficients(points.stop):
-            return np.array([self.time_at(n) for n in points], np.float64)
-        n = np.arange(points.start, points.stop, points.step, dtype=np.int64)
-        times: np.ndarray = (self._origin + n * self._stride) / self._denominator
-        if self._stop is not None:
-            times[n >= self.count] = float(self._stop)
-        return times
-
-    def float_coefficients(self, last: int) -> tuple[float, float, float] | None:
-        """Return origin, stride and denominator of the formula (origin + n * stride) / denominator in float64 arithmetic.
-
-        Args:
-            last: The last communication point for which the formula is needed.
-
-        Returns:
-            None if some operation other than the division would be inexact up to `last`.
-        """
-        largest = max(
-            abs(self._origin),
-            abs(self._origin + last * self._stride),
-            last * self._stride,
-            self._denominator,
-        )
-        return (self._origin, self._stride, self._denominator) if largest <= MAX_TIME else None
 
     def index(self, time: Fraction) -> int:
         """Return the communication point at exactly `time` (s); it exceeds `count` after the end.

@@ -29,7 +29,7 @@ static unsigned x87_control(void) {
     return word;
 }
 
-enum { INTERFACE = 7 };                              /* also in native_executor.py, where it is described */
+enum { INTERFACE = 8 };                              /* also in native_executor.py, where it is described */
 enum { WARNING = 1, DISCARD = 2 };                   /* FMI statuses; 0 is OK, everything but OK and WARNING is bad */
 /* Codes passed to `on_status` like an FMI status. They exceed 32 bits, so no FMU can return them. */
 #define FLOAT_MODE_CHANGED (INT64_C(1) << 33)
@@ -143,7 +143,7 @@ typedef struct {
     Py_ssize_t buffer_size, record_every, row_size;
     RowPart *row_parts;
     Py_ssize_t row_part_count;
-    char *row;                  /* address of the next row */
+    char *row, *rows_end;       /* address of the next row, and of the end of the chunk */
     Condition *conditions;
     Py_ssize_t condition_count;
     int64_t wake_point;         /* from here on CONDITIONS_CHANGED is reported even without a change */
@@ -470,19 +470,23 @@ static void copy_row_parts(const Program *p) {
     }
 }
 
-static int record_row(Program *p, int64_t n) {
+/* Record communication point n. A row begins with its time, which is written last: readers in other processes take a row whose
+   time is 0 for one that is not complete. */
+static int record_row(Program *p, int64_t n, double time) {
     if (p->record_every != 1 && n % p->record_every) return 0;
     if (p->record) {
         acquire_gil(p);
-        PyObject *result = PyObject_CallFunction(p->record, "L", (long long)n);
+        PyObject *result = PyObject_CallFunction(p->record, "d", time);
         Py_XDECREF(result);
         release_gil(p);
         return result ? 0 : -1;
     }
-    if (p->buffer) memcpy(p->row, p->buffer, (size_t)p->buffer_size);
+    if (p->buffer) memcpy(p->row + sizeof time, p->buffer, (size_t)p->buffer_size);
     copy_row_parts(p);
+    *(volatile double *)p->row = time;
     p->row += p->row_size;
     p->marker[MARKER_ROWS]++;
+    if (p->row == p->rows_end && !p->end_request) p->end_request = END_AFTER_STEP;
     return 0;
 }
 
@@ -689,19 +693,19 @@ static int check_signals(Program *p) {
 
 static bool traps_changed(const Program *p) { return sse_control() != p->sse_control; }
 
-static int run_macro_steps(Program *p, int64_t first, int64_t count, double origin, double stride, double denominator) {
+/* Run macro steps first, first + 1, ... until the chunk of rows is full. `times` are those of the communication points from
+   `first` on. */
+static int run_macro_steps(Program *p, int64_t first, int64_t count, const double *times) {
     const int64_t steps_per_check = macro_steps_per_signal_check(p);
     int64_t left = steps_per_check;
-    double next_time = (origin + (double)first * stride) / denominator;
     for (int64_t n = first; n < first + count && !p->end_request; n++) {
-        double time = next_time;
-        next_time = (origin + (double)(n + 1) * stride) / denominator; /* the division takes its time during the step */
+        double time = *times++;
         *p->current_time = time;
         if (run_macro_step(p, n, time) < 0) return -1;
         if (p->end_request == END_BEFORE_STEP) return 0;
         if ((n + 1) % TRAP_CHECK_INTERVAL == 0 && traps_changed(p) && report_status(p, -1, FLOAT_TRAPS_ENABLED) < 0) return -1;
         if (!all_finite(p) && report_status(p, -1, NOT_FINITE) < 0) return -1;
-        if (record_row(p, n + 1) < 0) return -1;
+        if (record_row(p, n + 1, *times) < 0) return -1;
         p->marker[MARKER_STEPS] = n + 1;
         if (report_changed_conditions(p, n + 1) < 0) return -1;
         if (--left < 0) {
@@ -712,20 +716,22 @@ static int run_macro_steps(Program *p, int64_t first, int64_t count, double orig
     return 0;
 }
 
-/* Run macro steps first, first + 1, ... Step n begins at (origin + n * stride) / denominator. These numbers and n * stride are
-   integers that a double represents exactly, so the division is the only rounding. */
 static PyObject *run(Program *p, PyObject *arguments) {
-    long long first, count;
-    double origin, stride, denominator;
-    if (!PyArg_ParseTuple(arguments, "LLddd", &first, &count, &origin, &stride, &denominator)) return NULL;
+    long long first;
+    Py_buffer times;
+    if (!PyArg_ParseTuple(arguments, "Ly*", &first, &times)) return NULL;
     p->end_request = CONTINUE;
     p->sse_control = sse_control();
     p->x87_control = x87_control();
-    if (!p->is_packed && all_steps_measured(p) && pack_steps(p) < 0) return NULL;
-    release_gil(p);
-    int failed = run_macro_steps(p, first, count, origin, stride, denominator);
-    if (!failed && (traps_changed(p) || x87_control() != p->x87_control)) failed = report_status(p, -1, FLOAT_TRAPS_ENABLED);
-    acquire_gil(p);
+    int failed = !p->is_packed && all_steps_measured(p) && pack_steps(p) < 0;
+    if (!failed) {
+        release_gil(p);
+        failed = run_macro_steps(p, first, times.len / (Py_ssize_t)sizeof(double) - 1, times.buf);
+        if (!failed && (traps_changed(p) || x87_control() != p->x87_control))
+            failed = report_status(p, -1, FLOAT_TRAPS_ENABLED);
+        acquire_gil(p);
+    }
+    PyBuffer_Release(&times);
     if (failed) return NULL;
     Py_RETURN_NONE;
 }
@@ -868,7 +874,7 @@ static PyObject *set_monitored_floats(Program *p, PyObject *arguments) {
     Py_RETURN_NONE;
 }
 
-/* A row is a copy of the whole buffer if buffer_size > 0, else the row parts. A callable `record` replaces both. */
+/* After its time, a row is a copy of the whole buffer if buffer_size > 0, else the row parts. A callable `record` replaces both. */
 static PyObject *set_recording(Program *p, PyObject *arguments) {
     unsigned long long buffer;
     PyObject *record;
@@ -927,10 +933,12 @@ static PyObject *set_wake_point(Program *p, PyObject *arguments) {
     Py_RETURN_NONE;
 }
 
-static PyObject *set_row_address(Program *p, PyObject *arguments) {
+static PyObject *set_rows(Program *p, PyObject *arguments) {
     unsigned long long row;
-    if (!PyArg_ParseTuple(arguments, "K", &row)) return NULL;
+    Py_ssize_t count;
+    if (!PyArg_ParseTuple(arguments, "Kn", &row, &count)) return NULL;
     p->row = pointer(row);
+    p->rows_end = p->row + count * p->row_size;
     Py_RETURN_NONE;
 }
 
@@ -1019,11 +1027,11 @@ static PyMethodDef methods[] = {
     {"add_instruction", (PyCFunction)add_instruction, METH_VARARGS, "Add an instruction of the stop condition."},
     {"set_wake_point", (PyCFunction)set_wake_point, METH_VARARGS,
      "Set the point from which on changed conditions are reported even without a change."},
-    {"set_row_address", (PyCFunction)set_row_address, METH_VARARGS, "Set the address at which the next row is written."},
+    {"set_rows", (PyCFunction)set_rows, METH_VARARGS, "Set the address of the next row, and the number of rows that fit there."},
     {"step_durations", (PyCFunction)step_durations, METH_NOARGS,
      "Return (call number, shortest duration in ns) of all doStep calls."},
     {"run", (PyCFunction)run, METH_VARARGS,
-     "Run `count` macro steps from number `first`; step n begins at (origin + n * stride) / denominator s."},
+     "Run macro steps from number `first`; `times` are the float64 times of their communication points."},
     {NULL, NULL, 0, NULL},
 };
 

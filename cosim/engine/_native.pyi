@@ -1,6 +1,8 @@
 from collections.abc import Callable
 from typing import Any, Final
 
+import numpy as np
+
 INTERFACE: Final[int]
 #: codes that `on_status` receives beside FMI statuses; they exceed 32 bits
 FLOAT_MODE_CHANGED: Final[int]
@@ -99,7 +101,7 @@ class Program:
         row_size: int,
         buffer: int,
         buffer_size: int,
-        record: Callable[[int], None] | None,
+        record: Callable[[float], None] | None,
         /,
     ) -> None: ...
     def add_row_part(
@@ -110,8 +112,6 @@ class Program:
         self, kind: int, value: float, source: int, source_kind: str, skip: int, /
     ) -> None: ...
     def set_wake_point(self, point: int, /) -> None: ...
-    def set_row_address(self, address: int, /) -> None: ...
+    def set_rows(self, address: int, count: int, /) -> None: ...
     def step_durations(self) -> list[tuple[int, int]]: ...
-    def run(
-        self, first: int, count: int, origin: float, stride: float, denominator: float, /
-    ) -> None: ...
+    def run(self, first: int, times: np.ndarray, /) -> None: ...

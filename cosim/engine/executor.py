@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from abc import ABC, abstractmethod
 from collections.abc import Mapping, Sequence
+from fractions import Fraction
 from typing import NamedTuple
 
 import numpy as np
@@ -103,8 +104,8 @@ class Executor(ABC):
         self._schedule.prepare()
         self._parallel_steps.find_candidates(self.plan.phases, self._schedule)
         self._prepare()
+        self.recorder.record(self.time)
         self.recorder.write_header(self._schedule.call_names)
-        self.recorder.record(0)
         self.marker[ROW_COUNT] = self.recorder.row_count
         self._check_stop_conditions(0)
 
@@ -113,6 +114,32 @@ class Executor(ABC):
         met = self.stop_conditions.check(n)
         if met and not self._runner.termination:
             self._runner.termination = Termination("", met.time, condition=met)
+
+    def record_between(self, time: Fraction | float) -> None:
+        """Record the present outputs as a row at a time that is not a communication point.
+
+        Several rows may have the same time, such as the limits of a signal before and after an
+        event. Components may call it in a macro step, and others between two macro steps. Stop
+        conditions are evaluated at communication points only.
+
+        Args:
+            time: exact time (s); float64 rounds it once.
+
+        Raises:
+            ValueError: the time lies before the last row, or after the next communication point.
+        """
+        recorder, runner = self.recorder, self._runner
+        recorder.row_count = runner.recorded_rows
+        earliest = recorder.last_time
+        latest = self.plan.grid.time_at(min(self.completed_steps + 1, self.plan.grid.count))
+        if not earliest <= float(time) <= latest:
+            raise ValueError(
+                f"cannot record a row at t = {float(time)!r} s: expected a time from the last row, "
+                f"{earliest!r} s, to the next communication point, {latest!r} s"
+            )
+        recorder.record(float(time))
+        recorder.provide_rows()
+        self.marker[ROW_COUNT] = recorder.row_count
 
     def run(self, end: int) -> None:
         """Run macro steps until communication point `end` is reached, or a component or a condition ends the simulation.
@@ -140,13 +167,12 @@ class Executor(ABC):
                 self._choose_step_sizes(n)
             try:
                 next_change = next((point for point in changes if point > n), end)
-                self._run_macro_steps(
-                    n, min(end, next_change, self.recorder.last_point_in_chunk(n))
-                )
+                self.recorder.provide_rows()
+                self._run_macro_steps(n, min(end, next_change))
                 if enabled_traps():
                     self._restore_float_traps(self.completed_steps)
             finally:
-                self.recorder.set_row_count(runner.recorded_rows)
+                self.recorder.row_count = runner.recorded_rows
 
     def _choose_step_sizes(self, n: int) -> None:
         """Prepare the steps with their sizes in macro step `n`, if these have changed.
@@ -238,7 +264,7 @@ class Executor(ABC):
     def _run_macro_steps(self, first: int, end: int) -> None:
         """Run macro steps from number `first` up to at most `end`.
 
-        The current chunk has room for their rows.
+        The current chunk has space for one row at least. A full chunk ends the call early.
         """
 
     @abstractmethod

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import ctypes
 from collections.abc import Callable
+from fractions import Fraction
 
 import numpy as np
 
@@ -12,8 +13,6 @@ from ..core.errors import InputError
 from ..process.journal import ROW_COUNT
 from .component_step import ScheduledStep
 from .executor import Executor
-from .plan import Plan
-from .recorder import Recorder
 from .transfer_calls import contiguous_views
 from .transfer_plan import Transfer
 
@@ -24,12 +23,12 @@ except ImportError:  # installed without a C compiler
 
 #: number of the interface of `_native.c`; raised with every change of a function, an argument, a
 #: code or the marker
-INTERFACE = 7
+INTERFACE = 8
 #: average number of values in contiguous runs from which a run is copied as a block of memory
 MIN_BLOCK_VALUES = 8
-#: most macro steps per call; the first call is shorter, because it measures the durations of the
-#: steps
-MAX_STEPS_PER_CALL = 1 << 16
+#: most macro steps per call, whose times stay in the cache of the processor; the first call is
+#: shorter, because it measures the durations of the steps
+MAX_STEPS_PER_CALL = 1 << 15
 
 
 def native_available() -> bool:
@@ -53,10 +52,6 @@ def native_available() -> bool:
 
 class NativeExecutor(Executor):
     """Executor that runs everything except Python components in C."""
-
-    def __init__(self, plan: Plan, recorder: Recorder, marker: np.ndarray | None = None):
-        super().__init__(plan, recorder, marker)
-        self._time_coefficients = plan.grid.float_coefficients(plan.grid.count)
 
     def _prepare(self) -> None:
         current_time = ctypes.addressof(self._runner.current_time)
@@ -167,13 +162,22 @@ class NativeExecutor(Executor):
     # -- running
     # -------------------------------------------------------------------------------------------------------
 
+    def record_between(self, time: Fraction | float) -> None:
+        """Record the present outputs as a row at a time that is not a communication point."""
+        super().record_between(time)
+        self._use_rows()
+
     def _run_macro_steps(self, first: int, end: int) -> None:
-        grid = self.plan.grid
-        coefficients = self._time_coefficients or grid.float_coefficients(end)
-        count = min(end - first, self._steps_per_call(first)) if coefficients else 1
-        self._program.set_row_address(self.recorder.next_row_address)
+        end = min(end, first + self._steps_per_call(first))
+        self._use_rows()
         self._program.set_wake_point(self.stop_conditions.wake_point)
-        self._program.run(first, count, *(coefficients or (grid.time_at(first), 0.0, 1.0)))
+        self._program.run(first, self.plan.grid.times(first, end + 1))
+
+    def _use_rows(self) -> None:
+        """Pass the memory of the next rows to the program, which writes them unless Python does."""
+        recorder = self.recorder
+        by_python = recorder.has_strings
+        self._program.set_rows(*((0, 1) if by_python else (recorder.next_row, recorder.free_rows)))
 
     def _steps_per_call(self, first: int) -> int:
         """Return the largest number of macro steps in one call.
@@ -190,8 +194,8 @@ class NativeExecutor(Executor):
             for number, nanoseconds in durations
         }
 
-    def _record(self, n: int) -> None:
-        self.recorder.record(n)
+    def _record(self, time: float) -> None:
+        self.recorder.record(time)
         self.marker[ROW_COUNT] = self.recorder.row_count
 
     def _on_status(self, number: int, status: int) -> int:

@@ -39,7 +39,7 @@ from .component_states import ComponentStates, SavedState
 from .disk_space import find_space_problems
 from .initialization import instantiate_components
 from .pacer import Pacer
-from .saving_recorder import SavingRecorder
+from .recorder import SavingRecorder
 
 #: called with (completed macro steps, all macro steps); must not change the system
 Observer = Callable[[int, int], None]
@@ -379,7 +379,7 @@ def _space_problems(plan: Plan, journal: Journal | None) -> list[Problem]:
     settings = plan.settings
     rows = (journal and journal.folder) or (settings.rows_file and settings.rows_file.parent)
     return find_space_problems(
-        plan, rows or Path(tempfile.gettempdir()), csv=bool(journal and journal.csv_path)
+        plan, rows or Path(tempfile.gettempdir()), csv=bool(journal and journal.writes_csv)
     )
 
 

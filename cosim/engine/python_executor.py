@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import sys
 from collections.abc import Callable, Iterable, Iterator, Sequence
-from itertools import compress
+from itertools import compress, pairwise
 from math import inf
 from time import perf_counter
 from typing import Any, NamedTuple
@@ -21,6 +21,8 @@ from .plan import Phase, Plan
 from .recorder import Recorder
 from .transfer_calls import TransferCall, contiguous_views
 
+#: most macro steps whose times are computed at once
+MAX_STEPS_PER_CALL = 1 << 12
 #: number of floats from which NumPy extracts the exponent bytes faster than Python
 MIN_NUMPY_FLOATS = 256
 
@@ -117,16 +119,13 @@ class PythonExecutor(Executor):
             self._exponents,
         )
         current_time, find_call = runner.current_time, self._schedule.find_call
-        row_writers, row, every = (
-            self.recorder.row_writers,
-            self.recorder.row_count,
-            self.recorder.every,
-        )
+        recorder, every = self.recorder, self.recorder.every
         one, little, least = float_mode.PROBE_VALUES
         stops = bool(self.stop_conditions)
-        origin, stride, denominator = self.plan.grid.integer_coefficients.values()
-        for n in range(first, end):
-            current_time.value = (origin + n * stride) / denominator
+        end = min(end, first + MAX_STEPS_PER_CALL)
+        times = self.plan.grid.times(first, end + 1).tolist()
+        for n, (time, next_time) in enumerate(pairwise(times), start=first):
+            current_time.value = time
             for copies, transfers, steps in phases:
                 for target, source in copies:
                     target[:] = source
@@ -144,10 +143,8 @@ class PythonExecutor(Executor):
                 if 0x7F in (found := get_bytes()[exponent_bytes]) or 0xFF in found:
                     self._finite_check.run()
             if every == 1 or (n + 1) % every == 0:
-                for write in row_writers:
-                    write(row)
-                row += 1
-                marker[ROW_COUNT] = row
+                recorder.record(next_time)
+                marker[ROW_COUNT] = recorder.row_count
                 if stops:
                     self._check_stop_conditions(n + 1)
                     termination = runner.termination

@@ -1,4 +1,8 @@
-"""Recording of outputs: one row of values per recorded communication point."""
+"""Recording of outputs: rows of a time and the present values.
+
+The executors record every `every`-th communication point. Further rows may lie between these, and
+several rows may have the same time.
+"""
 
 from __future__ import annotations
 
@@ -10,17 +14,20 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from ..core.recording import Recording
-from ..process.run_files.row_store import compute_in_chunks, open_row_store
+from ..process.row_store import MAX_MEMORY_BYTES, open_row_store
+from ..process.run_files import ROWS_FILE, SIGNALS, TIME, TIME_SIZE, Column, RowLayout, RowsFile
 from .layout import ArrayPosition
 from .plan import Plan
 from .transfer_calls import MAX_SINGLE_COPIES
 
+#: size of an output buffer from which copying all of it is faster than copying values one by one
+MIN_BUFFER_BYTES = 64
 #: writes the current values into the row with this number
 RowWriter = Callable[[int], object]
 
 
 class RowPart(NamedTuple):
-    """Values of one dtype in a row: `source[indices]`, written at byte offset `position`."""
+    """Values of one dtype in a row: `source[indices]`, written at `position` (bytes)."""
 
     source: np.ndarray
     indices: np.ndarray
@@ -28,11 +35,11 @@ class RowPart(NamedTuple):
 
 
 class Recorder:
-    """Stores the values of the recorded outputs at every `every`-th communication point.
+    """Stores the values of the recorded outputs.
 
-    A row is a copy of the whole output buffer if at least half of it is recorded; otherwise it
-    contains only the recorded values. Strings and binaries are stored in memory, apart from the
-    rows.
+    The signals of a row are a copy of the whole output buffer if it is not small and at least half
+    of it is recorded; otherwise a row contains only the recorded values. Strings and binaries are stored in memory,
+    apart from the rows.
 
     Args:
         plan: the compiled system.
@@ -53,19 +60,19 @@ class Recorder:
         numeric = sorted(
             {p for p in self._positions.values() if not p.dtype.hasobject}, key=_alignment_order
         )
-        #: a row is a copy of the whole output buffer
-        self.whole_buffer = (
-            2 * sum(position.dtype.itemsize for position in numeric)
-            >= plan.outputs.buffer.nbytes
-            > 0
-        )
+        #: a row contains a copy of the whole output buffer
+        recorded_bytes = sum(position.dtype.itemsize for position in numeric)
+        self.whole_buffer = 2 * recorded_bytes >= plan.outputs.buffer.nbytes >= MIN_BUFFER_BYTES
         #: the parts of a row otherwise
         self.row_parts: Sequence[RowPart] = (
             () if self.whole_buffer else list(self._pack_row(numeric))
         )
-        self.row_store = open_row_store(self._row_dtype(numeric), plan.row_count, file)
+        self.layout = self._row_layout(numeric)
+        self.row_store = open_row_store(self.layout.dtype, plan.row_count, file)
         #: number of rows recorded so far
         self.row_count = 0
+        #: first row of the current chunk, and the row after it
+        self._first = self._end = 0
         self._string_columns = {
             name: _StringColumn(plan.outputs.arrays[position.dtype], position.offset)
             for name, position in self._positions.items()
@@ -74,113 +81,90 @@ class Recorder:
         self._string_writers: list[RowWriter] = [
             column.append for column in self._string_columns.values()
         ]
-        #: functions that write a row of the current chunk
-        self.row_writers: Sequence[RowWriter] = ()
-        #: number of rows that still fit into the current chunk, the bytes of the chunk, and the
-        #: address of its end
-        self.free_rows, self.chunk, self._chunk_end = 0, np.zeros(0, np.uint8), 0
+        self._writers: Sequence[RowWriter] = ()
 
     def _pack_row(self, numeric: Sequence[ArrayPosition]) -> Iterator[RowPart]:
-        row_offset = 0
+        row_offset = TIME_SIZE
         for dtype, positions in groupby(numeric, lambda position: position.dtype):
             indices = np.array([position.offset for position in positions], np.intp)
             yield RowPart(self._plan.outputs.arrays[dtype], indices, row_offset)
             row_offset += len(indices) * dtype.itemsize
 
-    def _row_dtype(self, numeric: Sequence[ArrayPosition]) -> np.dtype[Any]:
-        """Return the structured dtype of a row: one field per recorded name.
-
-        Names of the same output share their bytes.
-        """
+    def _row_layout(self, numeric: Sequence[ArrayPosition]) -> RowLayout:
+        """Return the layout of a row; several names of one output share its bytes."""
         outputs = self._plan.outputs
         ends = np.cumsum([0, *(position.dtype.itemsize for position in numeric)]).tolist()
+        offsets = dict(zip(numeric, ends, strict=False))
         if self.whole_buffer:
-            offsets, size = (
-                {position: outputs.byte_offset(position) for position in numeric},
-                outputs.buffer.nbytes,
-            )
-        else:
-            offsets, size = dict(zip(numeric, ends, strict=False)), -(-ends[-1] // 8) * 8
-        fields = {
-            name: position
-            for name, position in self._positions.items()
-            if not position.dtype.hasobject
-        }
-        return np.dtype(
-            {
-                "names": list(fields),
-                "formats": [position.dtype for position in fields.values()],
-                "offsets": [offsets[position] for position in fields.values()],
-                "itemsize": size,
-            }
-        )
+            offsets = {position: outputs.byte_offset(position) for position in numeric}
+        columns, texts = [], []
+        for i, (name, position) in enumerate(self._positions.items()):
+            if position.dtype.hasobject:
+                texts.append((i, name))
+                continue
+            boolean, unit = self.variables[name].type == "Boolean", self.units[name]
+            columns.append(Column(name, position.dtype.str, offsets[position], boolean, unit))
+        size = outputs.buffer.nbytes if self.whole_buffer else ends[-1]
+        return RowLayout(-(-size // TIME_SIZE) * TIME_SIZE, columns, texts)
 
     def write_header(self, call_names: Sequence[tuple[str, str]]) -> None:
-        """Write a description of the rows for other processes.
+        """Write a description of the rows for other processes, after the first row.
 
         This recorder keeps its rows private and writes none.
         """
 
-    def start_chunk(self) -> None:
-        """Add a chunk to the row store; call it when the current chunk is full."""
-        chunk = self.row_store.add_chunk()
-        self.chunk = chunk.view(np.uint8) if chunk.dtype.itemsize else np.zeros(0, np.uint8)
-        self._use_chunk()
+    def provide_rows(self) -> None:
+        """Provide space for the next row if the current chunk is full."""
+        if self.row_count == self._end:
+            self._open_chunk(self.row_count)
 
-    def _use_chunk(self) -> None:
-        """Write the next rows to the current chunk, whose first row is the next one."""
-        self.free_rows = self.row_store.chunk_rows
-        self._chunk_end = self.chunk.ctypes.data + len(self.chunk)
-        size, first = self.row_store.dtype.itemsize, self.row_count
+    def _open_chunk(self, rows: int) -> None:
+        """Write further rows after the first `rows` ones."""
+        first, chunk = self.row_store.provide_chunk(rows)
+        memory, size = chunk.view(np.uint8), chunk.itemsize
         if self.whole_buffer:
-            writers = [_buffer_writer(self.chunk.data, self._plan.outputs.buffer.data, size, first)]
+            writers = [_buffer_writer(memory.data, self._plan.outputs.buffer.data, size, first)]
         else:
-            writers = [_part_writer(self.chunk, size, part, first) for part in self.row_parts]
-        self.row_writers = writers + self._string_writers
+            writers = [_part_writer(memory, size, part, first) for part in self.row_parts]
+        self._writers = writers + self._string_writers
+        self._times: Any = chunk[TIME].data
+        self._first, self._end, self.row_count = first, first + len(chunk), rows
+        self._chunk_end = memory.ctypes.data + len(memory)
 
-    def record(self, n: int) -> None:
-        """Record the current values as those of communication point `n`, if `n` is a multiple of the recording interval."""
-        if n % self.every:
-            return
-        if not self.free_rows:
-            self.start_chunk()
-        row = self.row_count
-        for write in self.row_writers:
-            write(row)
-        self.row_count = row + 1
-        self.free_rows -= 1
+    def record(self, time: float) -> None:
+        """Record the current values as those at `time` (s).
 
-    def last_point_in_chunk(self, n: int) -> int:
-        """Return the last communication point after `n` whose row fits into the current chunk.
-
-        A full chunk is replaced.
+        The time is written last: other processes take a row whose time is 0 for an incomplete one.
         """
-        if not self.free_rows:
-            self.start_chunk()
-        return n - n % self.every + (self.free_rows + 1) * self.every - 1
-
-    def set_row_count(self, rows: int) -> None:
-        """Set the number of recorded rows, after an executor has written rows into the chunk."""
-        self.free_rows -= rows - self.row_count
-        self.row_count = rows
+        row = self.row_count
+        if row == self._end:
+            self._open_chunk(row)
+        for write in self._writers:
+            write(row)
+        self._times[row - self._first] = time
+        self.row_count = row + 1
 
     def rewind(self, rows: int) -> None:
         """Forget all but the first `rows` rows.
 
         Results that share memory with the others keep them.
         """
-        self.chunk, first = (
-            self.row_store.rewind(rows).view(np.uint8),
-            rows - rows % self.row_store.chunk_rows,
-        )
-        self.row_count = first
-        self._use_chunk()
-        self.set_row_count(rows)
+        self._open_chunk(rows)
         for column in self._string_columns.values():
             column.rewind(rows)
 
     @property
-    def next_row_address(self) -> int:
+    def last_time(self) -> float:
+        """Time of the last row (s)."""
+        return float(self.row_store.read_first(self.row_count)[TIME][-1])
+
+    @property
+    def free_rows(self) -> int:
+        """Number of rows that still fit into the current chunk."""
+        return self._end - self.row_count
+
+    @property
+    def next_row(self) -> int:
         """Address of the next row in the current chunk."""
         return self._chunk_end - self.free_rows * self.row_store.dtype.itemsize
 
@@ -197,20 +181,15 @@ class Recorder:
             values = (
                 self._string_columns[name].column(self.row_count)
                 if name in self._string_columns
-                else rows[name]
+                else rows[SIGNALS][name]
             )
             columns[name] = (
                 values.astype(bool, copy=False) if variable.type == "Boolean" else values
             )
-        return Recording(self._times(), columns, self.units)
-
-    def _times(self) -> np.ndarray:
-        every = self.every
-        return compute_in_chunks(
-            self.row_count,
-            lambda rows: self._plan.grid.times(range(rows.start * every, rows.stop * every, every)),
-            np.dtype(np.float64),
-        )
+        time = rows[TIME]
+        if time.nbytes <= MAX_MEMORY_BYTES:  # many functions read it, faster if contiguous
+            time = np.ascontiguousarray(time)
+        return Recording(time, columns, self.units)
 
     @property
     def units(self) -> dict[str, str]:
@@ -230,17 +209,18 @@ def _alignment_order(position: ArrayPosition) -> tuple[int, str, int]:
 
 
 def _buffer_writer(chunk: memoryview, buffer: memoryview, size: int, first: int) -> RowWriter:
-    """Return a function that copies the whole buffer into a row of the chunk whose first row is `first`."""
+    """Return a function that copies the buffer into a row of the chunk that begins at row `first`."""
+    length = len(buffer)
 
     def write(row: int) -> None:
-        begin = (row - first) * size
-        chunk[begin : begin + size] = buffer
+        begin = (row - first) * size + TIME_SIZE
+        chunk[begin : begin + length] = buffer
 
     return write
 
 
 def _part_writer(chunk: np.ndarray, size: int, part: RowPart, first: int) -> RowWriter:
-    """Return a function that writes a part into a row of the chunk whose first row is `first`."""
+    """Return a function that writes a part into a row of the chunk that begins at row `first`."""
     source, indices, position = part
     shape, strides = (len(chunk) // size, len(indices)), (size, source.itemsize)
     cells = np.ndarray(shape, source.dtype, chunk.data, position, strides)
@@ -279,3 +259,37 @@ class _StringColumn:
         for row, value in self._changes:
             values[row:] = value
         return values
+
+
+class SavingRecorder(Recorder):
+    """Recorder whose rows and strings survive the process (see `process.run_files`).
+
+    Args:
+        plan: the compiled system.
+        folder: folder of the unfinished run.
+    """
+
+    def __init__(self, plan: Plan, folder: Path):
+        super().__init__(plan, folder / ROWS_FILE)
+        self._file = RowsFile(folder, self.layout)
+        self._strings: dict[str, tuple[np.ndarray, int]] = {}
+        for _, name in self.layout.texts:
+            position = self._positions[name]
+            self._strings[name] = plan.outputs.arrays[position.dtype], position.offset
+        self._saved_strings: dict[str, Any] = dict.fromkeys(self._strings, "")
+        if self._strings:
+            self._file.write_texts(0, {})
+            self._string_writers.append(self._save_changed_strings)
+
+    def write_header(self, call_names: Sequence[tuple[str, str]]) -> None:
+        """Write layout and calls (component, function) to the folder of the unfinished run."""
+        self._file.write_header(call_names)
+
+    def _save_changed_strings(self, row: int) -> None:
+        changed = {}
+        for name, (array, index) in self._strings.items():
+            if array[index] != self._saved_strings[name]:
+                changed[name] = array[index]
+        if changed:
+            self._saved_strings |= changed
+            self._file.write_texts(row, changed)

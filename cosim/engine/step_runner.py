@@ -17,7 +17,7 @@ from ..core.errors import (
     join_alternatives,
 )
 from ..process import float_mode
-from ..process.journal import CALL_NUMBER, ROW_COUNT, STEP_COUNT
+from ..process.journal import CALL_NUMBER, ROW_COUNT, STEP_COUNT, STEP_TIME
 from .component_step import ScheduledStep
 from .iteration import FixedPointIteration
 from .plan import Step
@@ -52,7 +52,7 @@ class StepRunner:
     """
 
     def __init__(self, marker: np.ndarray):
-        self.current_time = ctypes.c_double()
+        self.current_time = ctypes.c_double.from_buffer(marker.data, 8 * STEP_TIME)
         self.termination: Termination | None = None
         self._marker = marker.data
         self._float_mode = float_mode.FloatModeGuard()

@@ -7,6 +7,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from concurrent.futures import Future, ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -46,12 +47,15 @@ def check_fmus(root: Path) -> list[Problem]:
 
 
 def _orphans(root: Path, manifest: Mapping[str, Any], sources: Sequence[Source]) -> list[Problem]:
-    expected = {path for source in sources for path in fmu_files(source, root).values()}
+    expected: set[Path] = set()
+    for source in sources:
+        expected.update(fmu_files(source, root).values())
     present = set((root / "fmus").rglob("*.fmu"))
-    listed = {root / fmu for entry in manifest.values() for fmu in entry["fmus"]}
+    for entry in manifest.values():
+        present.update(root / fmu for fmu in entry["fmus"])
     return [
         Problem("has no source", path.relative_to(root).as_posix())
-        for path in sorted((present | listed) - expected)
+        for path in sorted(present - expected)
     ]
 
 
@@ -143,11 +147,11 @@ def compare_fmus(first: Sequence[Path], second: Sequence[Path], seed: int = 1) -
     with pools[0] as first_pool, pools[1] as second_pool:
         first_traces = [first_pool.submit(record_traces, path, seed) for path in first]
         second_traces = [second_pool.submit(record_traces, path, seed) for path in second]
-        differences = {
-            path: _difference_of_results(a, b)
-            for path, a, b in zip(second, first_traces, second_traces, strict=True)
-        }
-    return {path: difference for path, difference in differences.items() if difference}
+        differences = {}
+        for path, a, b in zip(second, first_traces, second_traces, strict=True):
+            if difference := _difference_of_results(a, b):
+                differences[path] = difference
+    return differences
 
 
 def _difference_of_results(first: Future[list[Trace]], second: Future[list[Trace]]) -> str:
@@ -157,14 +161,13 @@ def _difference_of_results(first: Future[list[Trace]], second: Future[list[Trace
         return "the process that simulates the FMUs crashed in this FMU or in one before it"
     except Exception as error:
         return f"cannot be simulated: {error}"
-    return next((text for a, b in pairs if (text := first_difference(a, b))), "")
+    return next(filter(None, (first_difference(a, b) for a, b in pairs)), "")
 
 
 def first_difference(first: Trace, second: Trace) -> str:
     """Return a description of the first difference between two traces, or "" if they agree within the tolerances."""
-    first_variables, second_variables = (
-        {variable.name: variable for variable in trace.variables} for trace in (first, second)
-    )
+    first_variables = {variable.name: variable for variable in first.variables}
+    second_variables = {variable.name: variable for variable in second.variables}
     for name in sorted(first_variables.keys() | second_variables.keys()):
         a, b = first_variables.get(name), second_variables.get(name)
         if a != b:
@@ -233,9 +236,8 @@ def _record_trace(path: Path, random: np.random.Generator, vary_parameters: bool
         failure = str(error)
     finally:
         component.free()
-    names = [
-        name for variable in _variables_in_memory_order(outputs) for name in variable.scalar_names
-    ]
+    ordered = _variables_in_memory_order(outputs)
+    names = list(chain.from_iterable(variable.scalar_names for variable in ordered))
     return Trace(component.variables, names, np.array(rows).reshape(len(rows), len(names)), failure)
 
 
@@ -264,12 +266,8 @@ def _allocate_ports(variables: Sequence[Variable]) -> Ports:
 
 def _variables_in_memory_order(ports: Ports) -> list[Variable]:
     """Return the variables in the order of their values in the concatenated arrays."""
-    return [
-        variable
-        for dtype in ports.arrays
-        for variable in ports.variables
-        if variable.dtype == dtype
-    ]
+    places = {dtype: place for place, dtype in enumerate(ports.arrays)}
+    return sorted(ports.variables, key=lambda variable: places[variable.dtype])
 
 
 def _concatenate(ports: Ports) -> np.ndarray:

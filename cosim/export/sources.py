@@ -138,12 +138,9 @@ def find_sources(root: Path) -> list[Source]:
     Raises:
         InputError: Two sources have the same FMU name.
     """
-    paths = [
-        path
-        for kind in SOURCE_KINDS
-        for path in root.glob(kind.pattern)
-        if not path.name.startswith("_")
-    ]
+    paths: list[Path] = []
+    for kind in SOURCE_KINDS:
+        paths += [path for path in root.glob(kind.pattern) if not path.name.startswith("_")]
     sources = sorted(map(classify_source, paths), key=lambda source: source.manifest_key)
     clashes = [(a, b) for a, b in pairwise(sources) if a.manifest_key == b.manifest_key]
     if clashes:

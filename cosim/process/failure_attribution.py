@@ -13,13 +13,14 @@ import os
 import re
 import signal
 import time
+from collections.abc import Sequence
 from contextlib import suppress
 from itertools import takewhile
 
 from ..core.errors import ComponentError, join_alternatives
 from ..core.user_code import innermost_user_line, is_cosim_file
-from .journal import CALL_NUMBER, STEP_COUNT, Journal, Phase
-from .run_files.folder import read_header
+from .journal import CALL_NUMBER, Journal, Phase
+from .run_files import RowsFile
 
 _REQUEST_SIGNAL = signal.SIGUSR2
 #: lowest descriptor of the file in the child, so that later files do not get its number if foreign
@@ -40,15 +41,12 @@ def attribute_failure(journal: Journal, reason: str) -> ComponentError:
         journal: Journal of the process that failed.
         reason: Description of the failure.
     """
-    header = read_header(journal.folder)
-    if journal.phase == Phase.STEPPING and header:
-        number, time = journal[CALL_NUMBER], header.time_at(journal[STEP_COUNT])
-        component, function = (
-            header.calls[number]
-            if 0 <= number < len(header.calls)
-            else ("the run", "moving values")
-        )
-        return ComponentError(component, function, reason, time)
+    calls = _calls_of_run(journal)
+    if journal.phase == Phase.STEPPING and calls is not None:
+        number = journal[CALL_NUMBER]
+        known = 0 <= number < len(calls)
+        component, function = calls[number] if known else ("the run", "moving values")
+        return ComponentError(component, function, reason, journal.step_time)
     if journal.phase in (Phase.CALLING, Phase.RESULTS_WRITTEN):
         activity = journal.activity()
         return ComponentError(
@@ -67,8 +65,7 @@ def unattributed_failure(journal: Journal, reason: str) -> ComponentError:
         journal: Journal of the process that failed.
         reason: Description of the failure.
     """
-    header = read_header(journal.folder)
-    names = dict.fromkeys(component for component, _ in header.calls) if header else {}
+    names = dict.fromkeys(component for component, _ in _calls_of_run(journal) or ())
     return ComponentError(join_alternatives(names) if names else "cosim", "the run", reason)
 
 
@@ -85,6 +82,12 @@ def describe_exit_status(status: int) -> str:
             f"{text}: out of memory, or killed from outside" if number == signal.SIGKILL else text
         )
     return f"it ended the process with exit code {os.WEXITSTATUS(status)}"
+
+
+def _calls_of_run(journal: Journal) -> Sequence[tuple[str, str]] | None:
+    """Return component and function of each call of the stepping loop; None before it begins."""
+    rows_file = RowsFile.open(journal.folder) if journal.folder else None
+    return rows_file.layout.calls if rows_file else None
 
 
 def write_stack_on_signals(file: int) -> None:

@@ -11,7 +11,6 @@ import math
 import mmap
 import os
 import struct
-import time as clock
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
@@ -24,20 +23,14 @@ from ..core import component_log
 from ..core.errors import PASS_THROUGH_EXCEPTIONS, ComponentError, CosimError, describe_exception
 
 #: size of a journal (bytes)
-JOURNAL_SIZE = 5 * 4096
+JOURNAL_SIZE = 4 * 4096
 #: indices of the int64 fields, which occupy the first 64 bytes
-CALL_NUMBER, STEP_COUNT, ROW_COUNT, PHASE, CHANGE_COUNT, DEADLINE, EXIT_CODE, CSV_UPDATE = range(8)
+CALL_NUMBER, STEP_COUNT, ROW_COUNT, STEP_TIME, PHASE, CHANGE_COUNT, DEADLINE, EXIT_CODE = range(8)
 #: number of leading fields that form the marker, which the executor updates: present call, finished
-#: macro steps, recorded rows
-MARKER_SIZE = 3
-#: offsets of a float64 and of four texts; a text is its length (uint32) followed by UTF-8
-_TIME_OFFSET, _COMPONENT_OFFSET, _FUNCTION_OFFSET, _FOLDER_OFFSET, _CSV_PATH_OFFSET = (
-    64,
-    4096,
-    8192,
-    12288,
-    16384,
-)
+#: macro steps, recorded rows, start of the present macro step (a float64, in s)
+MARKER_SIZE = 4
+#: offsets of a float64 and of three texts; a text is its length (uint32) followed by UTF-8
+_TIME_OFFSET, _COMPONENT_OFFSET, _FUNCTION_OFFSET, _FOLDER_OFFSET = 64, 4096, 8192, 12288
 _MAX_TEXT_SIZE = 4092
 #: reason of a failure after which the journal is not valid
 OVERWRITTEN = "it wrote over memory of the process that is not its own"
@@ -60,7 +53,7 @@ class Phase(IntEnum):
     WAITING = 5
 
 
-_PHASES, _LOOP_PHASES = frozenset(Phase), frozenset((Phase.STEPPING, Phase.WAITING))
+_PHASES = frozenset(Phase)
 #: longest deadline (ms)
 _MAX_DEADLINE = 10**15
 
@@ -102,6 +95,8 @@ class Journal:
         #: one
         self.is_shared = False
         self._is_claimed = False
+        #: the results of the run are written beside its folder
+        self.writes_csv = False
         self.enter_phase(Phase.IDLE)
 
     def __getitem__(self, field: int) -> int:
@@ -114,12 +109,7 @@ class Journal:
     def is_valid(self) -> bool:
         """True if the content is plausible; foreign code in the process can overwrite it."""
         deadline, counts = self[DEADLINE], (self[STEP_COUNT], self[ROW_COUNT], self[CHANGE_COUNT])
-        return (
-            self[PHASE] in _PHASES
-            and self[CSV_UPDATE] in (0, 1)
-            and -1 <= deadline <= _MAX_DEADLINE
-            and min(counts) >= 0
-        )
+        return self[PHASE] in _PHASES and -1 <= deadline <= _MAX_DEADLINE and min(counts) >= 0
 
     def claim(self) -> bool:
         """Return True at the first call.
@@ -150,35 +140,13 @@ class Journal:
         """Present phase. Raises ValueError if foreign code has overwritten it."""
         return Phase(self[PHASE])
 
-    @property
-    def in_loop(self) -> bool:
-        """True while rows are recorded; false if foreign code has overwritten the phase."""
-        return self[PHASE] in _LOOP_PHASES
-
     def enter_phase(self, phase: Phase, deadline: float = math.inf) -> None:
-        """Begin a phase with a maximum duration of each call (s).
-
-        Wait for the end of an update of the result file.
-        """
+        """Begin a phase with a maximum duration of each call (s)."""
         self[CHANGE_COUNT] += (
             1  # first, so that a reader of the new deadline also reads the new count
         )
         self[DEADLINE] = -1 if math.isinf(deadline) else int(min(deadline * 1000, _MAX_DEADLINE))
         self[PHASE] = phase
-        while self[CSV_UPDATE]:
-            clock.sleep(1e-4)
-
-    @contextmanager
-    def updating_csv(self) -> Iterator[bool]:
-        """Yield whether the supervisor may replace the result file.
-
-        The run does not write it during the block.
-        """
-        self[CSV_UPDATE] = 1
-        try:
-            yield self.in_loop
-        finally:
-            self[CSV_UPDATE] = 0
 
     def record_call(self, component: str, function: str, time: float = math.nan) -> None:
         """Record the present call and its simulation time (s; NaN outside the simulation)."""
@@ -202,20 +170,21 @@ class Journal:
         milliseconds = self[DEADLINE]
         return math.inf if milliseconds < 0 else milliseconds / 1000
 
-    def set_run_files(self, folder: Path, csv: Path | None) -> None:
-        """Record the folder of the files of the run, and the CSV file for its rows (None: no such file)."""
+    @property
+    def step_time(self) -> float:
+        """Start of the present macro step (s)."""
+        (time,) = struct.unpack_from("d", self.memory, 8 * STEP_TIME)
+        return float(time)
+
+    def set_folder(self, folder: Path, writes_csv: bool = False) -> None:
+        """Record the folder of the files of the run, and whether results are written beside it."""
         self._write_text(_FOLDER_OFFSET, str(folder.resolve()))
-        self._write_text(_CSV_PATH_OFFSET, str(csv.resolve()) if csv else "")
+        self.writes_csv = writes_csv
 
     @property
     def folder(self) -> Path | None:
         """Folder of the files of the run (see `process.run_files`); None if not set."""
         return Path(text) if (text := self._read_text(_FOLDER_OFFSET)) else None
-
-    @property
-    def csv_path(self) -> Path | None:
-        """CSV file for the rows of the run; None if not set."""
-        return Path(text) if (text := self._read_text(_CSV_PATH_OFFSET)) else None
 
     def _write_text(self, offset: int, text: str) -> None:
         data = text.encode("utf-8", "replace")[:_MAX_TEXT_SIZE]

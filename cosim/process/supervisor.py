@@ -48,7 +48,6 @@ from .journal import (
 from .limits import detach, lower_limit
 from .process_state import reserve_descriptors
 from .process_status import child_processes, waiting_time
-from .run_files.live_csv_writer import LiveCsvWriter
 from .standard_streams import ForeignOutput, protected_stream
 from .temporary_folders import temporary_run_folder
 
@@ -252,9 +251,8 @@ class _Supervisor:
         for descriptor in (self.reader, process):
             if descriptor >= 0:
                 poll.register(descriptor, select.POLLIN)
-        csv = LiveCsvWriter(self.journal)
         try:
-            status = self._poll_child(poll, csv)
+            status = self._poll_child(poll)
         finally:
             self._kill_descendants()
             self._output.forward()
@@ -263,11 +261,8 @@ class _Supervisor:
                 os.close(process)
         return self._outcome(status)
 
-    def _poll_child(self, poll: select.poll, csv: LiveCsvWriter) -> int:
-        """Forward output, check the deadline and update the CSV file until the child ends.
-
-        Return its status.
-        """
+    def _poll_child(self, poll: select.poll) -> int:
+        """Forward output and check the deadline until the child ends; return its status."""
         while True:
             try:
                 poll.poll(POLL_INTERVAL * 1000)
@@ -280,7 +275,6 @@ class _Supervisor:
                 if pid:
                     self._stop_time = time.monotonic() if os.WIFSTOPPED(status) else 0.0
                 self._check_deadline()
-                csv.update()
             except KeyboardInterrupt:
                 self._forward_interrupt()
 

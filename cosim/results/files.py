@@ -23,7 +23,7 @@ import numpy as np
 
 from ..core import paths
 from ..core.errors import write_error
-from ..process.run_files.row_store import FileMapping
+from ..process.row_store import FileMapping
 
 #: suffix of files that are being written
 _PART_SUFFIX = ".part"

@@ -309,7 +309,7 @@ class _FinishedRun:
 
     def draw_tubes(self, comparison: Comparison, path: Path) -> Path:
         """Draw the worst signals in their tubes to a file and return its path."""
-        from ..report.comparison_figure import draw_tubes
+        from ..report.comparison_figures import draw_tubes
         from ..report.figures import draw_figure, save_figure
 
         arguments = {

@@ -14,7 +14,7 @@ from cosim.core.errors import Problem
 from cosim.core.units import KNOWN_UNITS
 
 from ..json_reader import argument_problem as warning
-from ..vehicles.common.quantities import RADIANS_EXPECTED
+from ..vehicles.common.vehicle_reader import RADIANS_EXPECTED
 from ..vehicles.model import Model
 from ..vehicles.planar_vessel.planar_vessel import PlanarVessel
 from ..vehicles.submerged.craft import Craft

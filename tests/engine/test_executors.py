@@ -311,8 +311,8 @@ def test_unconnected_outputs_may_be_infinite(kind):
 
 @pytest.mark.parametrize("kind", EXECUTORS)
 def test_rows_are_complete_when_they_need_several_chunks(kind, monkeypatch):
-    monkeypatch.setattr("cosim.process.run_files.row_store.CHUNK_BYTES", 1000)
-    monkeypatch.setattr("cosim.process.run_files.row_store.MAX_MEMORY_BYTES", 0)
+    monkeypatch.setattr("cosim.process.row_store.CHUNK_BYTES", 1000)
+    monkeypatch.setattr("cosim.process.row_store.MAX_MEMORY_BYTES", 0)
     count = FakeComponent(
         [Variable("y", causality="output")],
         lambda v, _t, _h: v.update(y=v["y"] + 1),

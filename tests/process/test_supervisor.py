@@ -13,8 +13,8 @@ import os, sys, time
 from cosim.process import supervisor
 
 looks = []
-update = supervisor.LiveCsvWriter.update
-supervisor.LiveCsvWriter.update = lambda writer: looks.append(0) or update(writer)
+check = supervisor._Supervisor._check_deadline
+supervisor._Supervisor._check_deadline = lambda self: looks.append(0) or check(self)
 
 def entry():
     os.write(1, b"last words")

@@ -3,7 +3,7 @@
 import json
 
 import cosim
-from cosim.components.fmi import file, instance
+from cosim.components.fmi import api, file
 
 
 def ring(folder, probe, size):
@@ -28,10 +28,10 @@ def ring(folder, probe, size):
 def test_one_file_is_extracted_and_loaded_once(tmp_path, probe, monkeypatch):
     file.remove_idle_folders()
     extracted, loaded = [], []
-    extract, load_library = file.extract, instance.load_library
+    extract, load_library = file.extract, api.load_library
     monkeypatch.setattr(file, "extract", lambda *args: extracted.append(args) or extract(*args))
     monkeypatch.setattr(
-        instance, "load_library", lambda *args: loaded.append(args) or load_library(*args)
+        api, "load_library", lambda *args: loaded.append(args) or load_library(*args)
     )
     result = cosim.run(ring(tmp_path, probe, 20))
     assert (len(extracted), len(loaded)) == (1, 1)

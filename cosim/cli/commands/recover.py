@@ -1,4 +1,4 @@
-"""`cosim recover`: results of a run that could not be written when it ended."""
+"""`cosim recover`: results of a run that could not write them when it ended, or that was killed."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 @click.command()
 @click.argument("output", type=click.Path(path_type=Path))
 def command(output: Path) -> None:
-    """Write the results of a run that could not be written when it ended, as on a full disk.
+    """Write the results of a run that could not write them (as on a full disk) or that was killed.
 
     OUTPUT is the output directory of `cosim run`, or the output file of `cosim simulate`. Writes
     result.csv, kpis.json and run.json, or the output file, and removes the rows that were kept.
@@ -42,22 +42,15 @@ def command(output: Path) -> None:
 
 def _recover(unfinished: Path, target: Path, shown: Path) -> None:
     """Write the results from the rows in the folder `unfinished`, and remove it."""
-    from ...process.run_files.folder import find_kept_rows, read_metadata
+    from ...process.run_files import read_metadata
     from ...results import Result
     from ...results.result import write_run
 
-    kept = find_kept_rows(unfinished)
-    if kept is None:
-        file = shown / "result.csv" if target.is_dir() else shown
-        raise InputError(
-            f'no rows were kept for "{shown}": its run was killed; the rows until shortly before '
-            f'are in "{file}"'
-        )
-    rows_file, count = kept
+    recording, count = _read_recording(unfinished)
     metadata = read_metadata(unfinished)
     kpis, timing = metadata.pop("kpis", {}), metadata.pop("timing", {})
-    csv = target / "result.csv" if target.is_dir() else target
-    result = Result(_read_recording(unfinished, count, rows_file, csv), kpis, timing, metadata)
+    metadata.setdefault("failure", "killed")
+    result = Result(recording, kpis, timing, metadata)
     try:
         if target.is_dir():
             write_run(result, target)
@@ -71,31 +64,24 @@ def _recover(unfinished: Path, target: Path, shown: Path) -> None:
     click.echo(f"{text} until t = {result.time[-1]:g} s in {shown}")
 
 
-def _read_recording(unfinished: Path, count: int, rows_file: Path, csv: Path) -> Recording:
-    """Return the `count` rows of a file, or those that are left of them.
+def _read_recording(unfinished: Path) -> tuple[Recording, int]:
+    """Return the rows of an unfinished run that can be read, and the number of recorded rows."""
+    from ...core.recording import Recording
+    from ...process.run_files import HEADER_FILE, ROWS_FILE, RowsFile, find_kept_rows
 
-    Never replace a CSV file by fewer rows.
-    """
-    from ...process.run_files.folder import HEADER_FILE, recover_recording
-
+    rows_file = RowsFile.open(unfinished)
+    path, count = find_kept_rows(unfinished) or (unfinished / ROWS_FILE, 0)
     try:
-        recording = recover_recording(unfinished, count, rows_file)
+        if rows_file:
+            count = count or rows_file.count_rows()
+        recording = rows_file.recording(count) if rows_file else Recording.empty()
     except (ValueError, TypeError, LookupError, ArithmeticError) as error:  # a damaged header
         raise InputError(
-            f'cannot read "{unfinished / HEADER_FILE}": {error}; the rows stay in "{rows_file}"'
+            f'cannot read "{unfinished / HEADER_FILE}": {error}; the rows stay in "{path}"'
         ) from error
-    rows = len(recording.time)
-    if not rows or (rows < count and csv.exists()):
-        hint = (
-            (
-                f'; "{csv}" has the rows that were written during the run, remove it to write '
-                "those that can be read"
-            )
-            if rows
-            else ""
-        )
+    if not len(recording.time):
         raise InputError(
-            f'only {rows} of {count} rows in "{rows_file}" can be read: it or "{HEADER_FILE}" is '
-            f"damaged{hint}"
+            f'only 0 of {count_noun(count, "row")} in "{path}" can be read: it or "{HEADER_FILE}" '
+            "is damaged"
         )
-    return recording
+    return recording, count

@@ -136,7 +136,7 @@ def _run_scenario(options: RunOptions, locks: LockKeeper, link: Connection | Non
         link: connection to a live view; None: no live view.
     """
     from ...process.float_mode import default_float_mode
-    from ...process.run_files.folder import keeping_run_files
+    from ...process.run_files import keeping_run_files
 
     warnings = print_log()
     _require_packages(options)
@@ -148,7 +148,7 @@ def _run_scenario(options: RunOptions, locks: LockKeeper, link: Connection | Non
         control = live.create_control(prepared, link, options.real_time) if link else None
         with (
             keeping_run_files(
-                OutputFiles.of_folder(folder).unfinished, folder / "result.csv", prepared.metadata
+                OutputFiles.of_folder(folder).unfinished, prepared.metadata, writes_csv=True
             ),
             _progress_observers(prepared) as observers,
             default_float_mode(),

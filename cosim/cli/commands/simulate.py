@@ -142,7 +142,7 @@ def _simulate(
     from ...core.errors import InputError, Problem
     from ...engine.disk_space import find_space_problems
     from ...engine.run_loop import simulating
-    from ...process.run_files.folder import keeping_run_files, remove_run_files, run_folder
+    from ...process.run_files import keeping_run_files, remove_run_files, run_folder
     from ...results.files import remove_files
     from ...results.non_finite import warn_non_finite
     from ...results.result import describe_termination
@@ -165,7 +165,7 @@ def _simulate(
         if problems := find_space_problems(plan, target.parent, csv=True, replaced=size):
             raise InputError(problems)
         remove_files(target.parent, target.name)
-    with keeping_run_files(folder, target), simulating(plan) as run:
+    with keeping_run_files(folder, writes_csv=target is not None), simulating(plan) as run:
         warn_non_finite(run.recording)
         if output:
             _write_recording(run.recording, output, run_folder())

@@ -1,15 +1,9 @@
 """FMUs as components; the only package that uses FMPy at run time."""
 
-from collections.abc import Sequence
-from typing import Protocol
-
-from ...core.component import Component
+from .co_simulation import CoSimulationFmu
 from .description import DefaultExperiment, FmuDescription
-from .file import FmuFile
-from .fmi1 import Fmi1Instance
-from .fmi2 import Fmi2Instance
-from .fmi3_slave import Fmi3Slave
-from .instance import FmuInstance
+from .driver import FmuComponent, FmuDriver
+from .file import FmuFile, open_fmu
 from .preflight import Interface
 from .settings import InstanceSettings, Isolation, Method, SolverSettings
 
@@ -24,19 +18,10 @@ __all__ = [
     "Method",
     "SolverSettings",
     "create_component",
+    "open_fmu",
 ]
 
 DEFAULT_SETTINGS = InstanceSettings()
-
-
-class FmuComponent(Component, Protocol):
-    """Component of an FMU.
-
-    Attributes:
-        description: Model description of the FMU.
-    """
-
-    description: FmuDescription
 
 
 def create_component(
@@ -62,16 +47,13 @@ def create_component(
         InputError: The FMU has no usable binary for this platform, or a worker process is not
             possible on it.
     """
-    description = file.description
-    if description.interface == "model-exchange":
-        from .model_exchange import Fmi1Model, Fmi2Model, Fmi3Model
+    driver: type[FmuDriver] = CoSimulationFmu
+    if file.description.interface == "model-exchange":
+        from .model_exchange import ModelExchangeFmu
 
-        classes: Sequence[type[FmuInstance]] = (Fmi1Model, Fmi2Model, Fmi3Model)
-    else:
-        classes = (Fmi1Instance, Fmi2Instance, Fmi3Slave)
-    instance_class = classes[description.major - 1]
+        driver = ModelExchangeFmu
     if isolation:
         from .isolated import IsolatedFmu
 
-        return IsolatedFmu(instance_class, file, instance_name, settings, isolation)
-    return instance_class(file, instance_name, settings)
+        return IsolatedFmu(driver, file, instance_name, settings, isolation)
+    return driver(file, instance_name, settings)

@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import ctypes
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import groupby
 from typing import Any, Literal
 
 import numpy as np
 
-from ...core.component import NativeGetSet, Ports, PreparedCall, Variable
+from ...core.component import SUCCESS_STATUSES, NativeGetSet, Ports, PreparedCall, Variable
 from ...core.errors import InputError
 from .library import FunctionTable, as_pointer, as_size, function_address
 
@@ -154,3 +154,26 @@ class AccessorCallFactory:
             len(values),
         )
         return PreparedCall(function, arguments, name, native, (references, values))
+
+
+def prepare_negations(outputs: Ports, negated: Collection[str]) -> list[PreparedCall]:
+    """Prepare the calls that change the signs of negated aliases after they have been got.
+
+    Args:
+        outputs: Bound variables and their arrays.
+        negated: Names of the negated aliases, which only FMI 1.0 has and which are scalars.
+    """
+    calls = []
+    begins = dict.fromkeys(outputs.arrays, 0)
+    for variable in outputs.variables:
+        index = begins[variable.dtype]
+        begins[variable.dtype] += len(variable.scalar_names)
+        if variable.name in negated:
+            arguments = (outputs.arrays[variable.dtype], index)
+            calls.append(PreparedCall(_negate_element, arguments, "negated alias"))
+    return calls
+
+
+def _negate_element(array: np.ndarray, index: int) -> int:
+    array[index] = not array[index] if array.dtype == np.bool_ else -array[index]
+    return SUCCESS_STATUSES[0]

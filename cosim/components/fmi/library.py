@@ -9,7 +9,10 @@ from __future__ import annotations
 import ctypes
 import inspect
 from _ctypes import FUNCFLAG_CDECL, FUNCFLAG_PYTHONAPI, CFuncPtr
+from collections.abc import Callable
 from functools import cache
+from importlib import import_module
+from itertools import count
 from pathlib import Path
 from types import UnionType
 from typing import Any, get_args
@@ -19,6 +22,11 @@ from .description import FmuDescription
 from .file import FmuFile
 from .preflight.functions import function_prefix
 from .preflight.platforms import current_platform
+
+try:
+    from . import _logger
+except ImportError:  # installed without a C compiler: the text arrives unformatted
+    _logger = None  # type: ignore[assignment]  # a module cannot be declared optional
 
 #: argument objects that ctypes passes on unchanged; converting arguments in each call would double
 #: its time
@@ -64,13 +72,12 @@ class MissingFunctionError(Exception):
     """Name of a function that the library does not export."""
 
 
-def load_library(file: FmuFile, folder: Path, slave_class: type) -> Any:
+def load_library(file: FmuFile, folder: Path) -> Any:
     """Load the library of an extracted FMU.
 
     Args:
         file: The FMU.
         folder: Folder of the extracted FMU.
-        slave_class: FMPy's class of a slave.
 
     Returns:
         FMPy's slave object. Its attribute `functions` is the `FunctionTable` of the library.
@@ -79,7 +86,7 @@ def load_library(file: FmuFile, folder: Path, slave_class: type) -> Any:
         InputError: The library cannot be loaded.
     """
     try:
-        slave = _create_slave(slave_class, file.description, folder)
+        slave = _create_slave(file.description, folder)
     except Exception as error:
         reason = str(error).replace(f"{folder}/", "")
         raise InputError(f'the binary of "{file.path}" cannot be loaded: {reason}') from None
@@ -87,13 +94,15 @@ def load_library(file: FmuFile, folder: Path, slave_class: type) -> Any:
     return slave
 
 
-def _create_slave(slave_class: type, description: FmuDescription, folder: Path) -> Any:
+def _create_slave(description: FmuDescription, folder: Path) -> Any:
     """Create FMPy's slave object without its constructor, which changes the working directory of all threads during the load."""
-    machine = current_platform()
+    major, machine = description.major, current_platform()
+    interface = "Model" if description.interface == "model-exchange" else "Slave"
+    slave_class = getattr(import_module(f"fmpy.fmi{major}"), f"FMU{major}{interface}")
     library = (
         folder
         / "binaries"
-        / machine.binary_folder(description.major)
+        / machine.binary_folder(major)
         / f"{description.model_identifier}{machine.suffix}"
     )
     slave: Any = object.__new__(slave_class)
@@ -107,7 +116,7 @@ def _create_slave(slave_class: type, description: FmuDescription, folder: Path) 
         component=None,
     )
     slave._functions = _SlaveFunctions(
-        slave_class, slave.dll, function_prefix(description.major, description.model_identifier)
+        slave_class, slave.dll, function_prefix(major, description.model_identifier)
     )
     return slave
 
@@ -174,3 +183,65 @@ def _reject_negative_status(status: int, function: Any, _: Any) -> int:
     if status < 0:
         raise FMICallException(function.__name__, status)
     return status
+
+
+# The logger callback of FMI 1.0 and FMI 2.0 gets a printf format followed by its arguments. ctypes
+# cannot read the arguments of a variadic function. Therefore a C function formats the messages of
+# all instances and calls one function of this module, which dispatches them.
+
+#: receives the status and the text of a message
+_MessageHandler = Callable[[int, bytes | None], None]
+
+_environments = count(1)
+#: instance names and handlers by componentEnvironment, in the order of their registration
+_handlers: dict[int, tuple[bytes, _MessageHandler]] = {}
+
+
+def register_logger(callbacks: Any, instance_name: str, handler: _MessageHandler) -> int:
+    """Set the logger in the callback functions of an instance.
+
+    Args:
+        callbacks: FMPy's fmi1CallbackFunctions or fmi2CallbackFunctions.
+        instance_name: Name of the instance, by which FMI 1.0 identifies it.
+        handler: Function that receives the messages of the instance.
+
+    Returns:
+        The key of the registration, for `unregister_logger`. It is the componentEnvironment of
+        FMI 2.0.
+    """
+    key = next(_environments)
+    _handlers[key] = instance_name.encode(), handler
+    logger = ctypes.c_void_p(_logger.LOGGER) if _logger else _UNFORMATTED
+    callbacks.logger = ctypes.cast(logger, type(callbacks.logger))
+    if hasattr(callbacks, "componentEnvironment"):
+        callbacks.componentEnvironment = key
+    return key
+
+
+def unregister_logger(key: int) -> None:
+    """Forget a registration; later messages of the instance go to another one, or are dropped."""
+    _handlers.pop(key, None)
+
+
+def _dispatch(environment: int | None, name: bytes | None, status: int, text: bytes | None) -> None:
+    """Pass a message to the instance of the environment, else of the name, else to the newest."""
+    if environment in _handlers:
+        _handlers[environment][1](status, text)
+        return
+    newest_first = list(reversed(_handlers.values()))
+    named = [handler for known, handler in newest_first if known == name]
+    for handler in (*named, *(handler for _, handler in newest_first)):
+        handler(status, text)
+        return
+
+
+_receiver = ctypes.CFUNCTYPE(None, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p)(
+    _dispatch
+)
+_UNFORMATTED = ctypes.CFUNCTYPE(
+    None, ctypes.c_void_p, ctypes.c_char_p, ctypes.c_int, ctypes.c_char_p, ctypes.c_char_p
+)(lambda environment, name, status, _, text: _dispatch(environment, name, status, text))
+if _logger:
+    ctypes.c_void_p.from_address(_logger.RECEIVER).value = ctypes.cast(
+        _receiver, ctypes.c_void_p
+    ).value

@@ -7,6 +7,7 @@ import math
 from collections import Counter
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import chain
 from typing import Any, NamedTuple
 
 from ...core import units
@@ -40,7 +41,7 @@ def variable_table(block: Block, fmi_version: int) -> list[TableRow]:
     if fmi_version == 3:
         indicators = block.exchange.indicators if block.exchange else ()
         return [TableRow(variable) for variable in (*block.variables, *indicators)]
-    return [row for variable in block.variables for row in _scalar_rows(variable)]
+    return list(chain.from_iterable(map(_scalar_rows, block.variables)))
 
 
 def _scalar_rows(variable: BlockVariable) -> Iterator[TableRow]:

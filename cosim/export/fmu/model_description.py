@@ -314,12 +314,10 @@ def _states_of_derivatives(block: Block, table: Sequence[TableRow]) -> dict[int,
     for index, row in enumerate(table):
         rows.setdefault(row.variable.member, []).append(index)
     members = {variable.name: variable.member for variable in block.variables}
-    pairs = block.exchange.states.items() if block.exchange else ()
-    return {
-        derivative: state
-        for names in pairs
-        for state, derivative in zip(*(rows[members[name]] for name in names), strict=True)
-    }
+    result: dict[int, int] = {}
+    for state, derivative in block.exchange.states.items() if block.exchange else ():
+        result.update(zip(rows[members[derivative]], rows[members[state]], strict=True))
+    return result
 
 
 def _add_element(parent: Element, tag: str, **attributes: Any) -> Element:

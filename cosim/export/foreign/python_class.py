@@ -121,10 +121,10 @@ def _read_files(source: Path, include: Sequence[Path]) -> tuple[dict[Path, bytes
         name: file for name, file in _included_files(folder, include) if name not in contents
     }
     subfolders = {file.parent for file in modules} - {folder}
-    for file in (
-        *([data] if data.is_file() else []),
-        *(each for subfolder in subfolders for each in subfolder.glob("*.json")),
-    ):
+    data_files = [data] if data.is_file() else []
+    for subfolder in subfolders:
+        data_files += subfolder.glob("*.json")
+    for file in data_files:
         included[file.relative_to(folder)] = file
     return contents | {name: file.read_bytes() for name, file in included.items()}, [
         *modules,

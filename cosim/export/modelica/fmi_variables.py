@@ -32,10 +32,8 @@ def check_units(variables: Sequence[tuple[Variable, FmiRole]]) -> set[str]:
     """
     unknown: dict[str, list[Variable]] = {}
     problems = []
-    errors = {
-        unit: _unit_error(unit)
-        for unit in {variable.unit for variable, _ in variables if variable.unit}
-    }
+    units = {variable.unit for variable, _ in variables} - {""}
+    errors = {unit: _unit_error(unit) for unit in units}
     for variable, (causality, _) in variables:
         error = errors.get(variable.unit)
         if error and causality in ("input", "output"):
@@ -74,12 +72,16 @@ def block_variables(analysed: AnalysedModel) -> list[BlockVariable]:
         InputError: An input or output has an unknown unit, or enumerations have the same name.
     """
     names = struct_members(analysed.model)
-    roles = [
-        (v, role) for v in analysed.model.variables.values() if (role := _fmi_role(v, analysed))
-    ]
+    roles = []
+    for variable in analysed.model.variables.values():
+        if role := _fmi_role(variable, analysed):
+            roles.append((variable, role))
     dropped = check_units(roles)
-    known = ((replace(v, unit="") if v.unit in dropped else v, role) for v, role in roles)
-    return [_block_variable(v, names[v.name], role, analysed) for v, role in known]
+    result = []
+    for variable, role in roles:
+        known = replace(variable, unit="") if variable.unit in dropped else variable
+        result.append(_block_variable(known, names[variable.name], role, analysed))
+    return result
 
 
 def _fmi_role(variable: Variable, analysed: AnalysedModel) -> FmiRole | None:

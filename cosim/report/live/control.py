@@ -24,7 +24,7 @@ from ...core.time_grid import TimeGrid
 from ...engine.pacer import Pacer
 from ...engine.run_checks import settable_variables
 from ...process.journal import calling_component, current_journal, suspending_deadline
-from ...process.run_files.folder import read_metadata, write_metadata
+from ...process.run_files import read_metadata, write_metadata
 from ...scenario.name_resolution import check_assignment
 
 #: smallest and largest factor of the command "speed"

@@ -21,7 +21,7 @@ from ...core.json_values import parse_object
 from ...engine.run_loop import simulating
 from ...process.float_mode import default_float_mode
 from ...process.journal import EXIT_CODE, Phase, current_journal
-from ...process.run_files.folder import keeping_run_files
+from ...process.run_files import keeping_run_files
 from ...process.supervisor import SupervisedOutcome, run_supervised
 from ...results import Result
 from ...results.checks import evaluate_all_checks

@@ -18,8 +18,8 @@ from cosim.components.fmi import (
     InstanceSettings,
     Isolation,
     SolverSettings,
+    co_simulation,
     create_component,
-    fmi3_slave,
 )
 from cosim.core.component import Variable
 from cosim.core.errors import ComponentError
@@ -238,7 +238,7 @@ FAULTS = {
 
 @pytest.mark.parametrize("fault", FAULTS)
 def test_wrong_event_loops_end_in_one_line_and_keep_the_rows(bounces, fault, monkeypatch):
-    monkeypatch.setattr(fmi3_slave, "MAX_EVENTS_PER_STEP", 100)
+    monkeypatch.setattr(co_simulation, "MAX_EVENTS_PER_STEP", 100)
     outcome = run_with_fault(bounces["both"], fault)
     assert str(outcome.failure).startswith(f"bounce: {FAULTS[fault]}")
     assert len(str(outcome.failure).splitlines()) == 1

@@ -9,15 +9,15 @@ import pytest
 from fakes import FakeComponent, inputs, outputs
 from systems import endpoint, make_system
 
-import cosim.report.live.feed
+import cosim.report.live.session
 from cosim.core.component import Variable
 from cosim.core.errors import ComponentError
 from cosim.core.time_grid import TimeGrid
 from cosim.engine.run_loop import simulate
 from cosim.engine.settings import Event, Settings
-from cosim.process.run_files.folder import Column, RowsHeader
+from cosim.process.run_files import ROWS_FILE, SIGNALS, TIME, Column, RowLayout, RowsFile
 from cosim.report.live.control import LiveControl
-from cosim.report.live.feed import RowFeed
+from cosim.report.live.session import RowFeed
 
 STEP = Fraction(1, 60)
 GRID = TimeGrid.from_times(Fraction(0), Fraction(1), STEP)
@@ -149,19 +149,25 @@ def test_a_text_that_no_fmu_can_hold_is_refused_and_the_run_goes_on(name, value)
 @pytest.fixture
 def recorded(tmp_path):
     """A folder with 101 rows of an unfinished run: a number, an integer and a Boolean."""
-    dtype = np.dtype([("x", "<f8"), ("n", "<i4"), ("b", "|b1")], align=True)
-    rows = np.zeros(101, dtype)
-    rows["x"], rows["n"], rows["b"] = np.arange(101) ** 2, np.arange(101), np.arange(101) % 2
-    rows.tofile(tmp_path / "rows")
     columns = [
-        Column(name, dtype[name].str, dtype.fields[name][1], name == "b", "")
-        for name in dtype.names
+        Column("x", "<f8", 0, False, ""),
+        Column("n", "<i4", 8, False, ""),
+        Column("b", "|b1", 12, True, ""),
     ]
-    return tmp_path, RowsHeader(0, 1, 100, 2, dtype.itemsize, columns, [], [])
+    layout = RowLayout(16, columns, [])
+    rows = np.zeros(101, layout.dtype)
+    rows[TIME], signals = np.arange(101) / 50, rows[SIGNALS]
+    signals["x"], signals["n"], signals["b"] = (
+        np.arange(101) ** 2,
+        np.arange(101),
+        np.arange(101) % 2,
+    )
+    rows.tofile(tmp_path / ROWS_FILE)
+    return RowsFile(tmp_path, layout)
 
 
 def test_rows_are_columns_of_32_bit_floats(recorded):
-    feed = RowFeed(*recorded, expected_rows=101)
+    feed = RowFeed(recorded, expected_rows=101)
     assert (feed.available(0), feed.available(101), feed.capacity) == (0, 101, 101)
     time, x, n, b = np.frombuffer(feed.read(10, 3), "<f4").reshape(4, 3)
     assert time == pytest.approx([0.2, 0.22, 0.24])
@@ -169,8 +175,8 @@ def test_rows_are_columns_of_32_bit_floats(recorded):
 
 
 def test_rows_of_long_runs_are_downsampled(recorded, monkeypatch):
-    monkeypatch.setattr(cosim.report.live.feed, "MAX_VALUES", 4 * 26)
-    feed = RowFeed(*recorded, expected_rows=101)
+    monkeypatch.setattr(cosim.report.live.session, "MAX_VALUES", 4 * 26)
+    feed = RowFeed(recorded, expected_rows=101)
     assert (feed.stride, feed.available(1), feed.available(9), feed.capacity) == (4, 1, 3, 26)
     assert np.frombuffer(feed.read(1, 25), "<f4").reshape(4, 25)[2].tolist() == list(
         range(4, 101, 4)

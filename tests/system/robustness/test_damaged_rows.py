@@ -6,35 +6,26 @@ import json
 import os
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 import cosim
 from cosim.cli import main
-from cosim.process.run_files.folder import HEADER_FILE, ROWS_FILE
+from cosim.process.run_files import HEADER_FILE, ROWS_FILE
 
-ROWS, SIZE = 6, 8
-HEADER = {
-    "origin": 0,
-    "stride": 1,
-    "denominator": 100,
-    "steps_per_row": 1,
-    "row_size": SIZE,
-    "calls": [],
-    "texts": [],
-}
+ROWS, SIZE = 6, 16
+HEADER = {"signals_size": 8, "calls": [], "texts": []}
 COLUMN = {"name": "a.y", "dtype": "<f8", "offset": 0, "boolean": False, "unit": ""}
 
 
 @pytest.fixture
 def output(tmp_path: Path) -> Path:
-    """An output directory with six rows that were kept, and the three that the run had written
-    until then.
-    """
+    """An output directory with six rows that were kept."""
     folder = tmp_path / "out" / ".unfinished"
     folder.mkdir(parents=True)
     (folder / HEADER_FILE).write_text(json.dumps({**HEADER, "columns": [COLUMN]}))
-    (folder / f"{ROWS_FILE}.{ROWS}").write_bytes(bytes(ROWS * SIZE))
-    (tmp_path / "out/result.csv").write_text('"time","a.y"\n0.0,0.0\n0.01,0.0\n0.02,0.0\n')
+    rows = np.column_stack([np.arange(ROWS) / 100, np.zeros(ROWS)])
+    (folder / f"{ROWS_FILE}.{ROWS}").write_bytes(rows.tobytes())
     return tmp_path / "out"
 
 
@@ -54,33 +45,41 @@ def test_intact_rows_are_recovered(output):
     "change",
     [
         None,
-        {"denominator": 0},
         {"columns": []},
-        {"row_size": 0},
+        {"signals_size": 0},
+        {"signals_size": -8},
         {"columns": [{**COLUMN, "dtype": "x"}]},
-        {"origin": []},
+        {"signals_size": []},
     ],
 )
 def test_a_damaged_header(output, change, capsys):
     header = output / ".unfinished" / HEADER_FILE
     header.write_text(json.dumps({**HEADER, "columns": [COLUMN], **change}) if change else "")
-    before = (output / "result.csv").read_bytes()
     if recover(output) != 0:
         assert len(capsys.readouterr().err.splitlines()) == 1
         assert (output / ".unfinished" / f"{ROWS_FILE}.{ROWS}").stat().st_size == ROWS * SIZE
-        assert (output / "result.csv").read_bytes() == before
+        assert not (output / "result.csv").exists()
 
 
-@pytest.mark.parametrize("left", [0, 2])
-def test_too_few_rows_do_not_replace_the_csv_file(output, left, capsys):
-    os.truncate(output / ".unfinished" / f"{ROWS_FILE}.{ROWS}", left * SIZE)
+def test_rows_that_cannot_be_read_are_an_error(output, capsys):
+    os.truncate(output / ".unfinished" / f"{ROWS_FILE}.{ROWS}", SIZE - 1)
     assert recover(output) == 2
-    assert f"only {left} of {ROWS} rows" in capsys.readouterr().err
-    assert len(cosim.Result.from_csv(output / "result.csv").time) == 3
+    assert f"only 0 of {ROWS} rows" in capsys.readouterr().err
+    assert not (output / "result.csv").exists()
 
 
-def test_the_rows_that_are_left_are_written_if_there_is_no_csv_file(output, capsys):
+def test_the_rows_that_are_left_are_written(output, capsys):
     os.truncate(output / ".unfinished" / f"{ROWS_FILE}.{ROWS}", 2 * SIZE)
-    (output / "result.csv").unlink()
     assert recover(output) == 0
     assert capsys.readouterr().out.startswith(f"2 of {ROWS} rows until t = 0.01 s")
+
+
+def test_rows_of_a_killed_run_are_recovered(output, capsys):
+    """Nobody has counted the rows, and the rest of their chunk contains zeros."""
+    unfinished = output / ".unfinished"
+    with (unfinished / f"{ROWS_FILE}.{ROWS}").open("ab") as file:
+        file.write(bytes(5 * SIZE))
+    (unfinished / f"{ROWS_FILE}.{ROWS}").rename(unfinished / ROWS_FILE)
+    assert recover(output) == 0
+    assert capsys.readouterr().out.startswith(f"{ROWS} rows until t = 0.05 s")
+    assert json.loads((output / "run.json").read_text())["failure"] == "killed"

@@ -154,11 +154,11 @@ def test_a_real_disk_that_is_too_small_for_the_result(tmp_path, more):
     workplace = CommandFolder(tmp_path / "work")
     workplace.scenario(300, arguments={"pause": 0})
     done = on_small_disk(
-        workplace, "1200k", "$COSIM run robust.json --output-dir out --no-report; code=$?", more
+        workplace, "1500k", "$COSIM run robust.json --output-dir out --no-report; code=$?", more
     )
     assert done.returncode == 1, done.stderr
     assert done.stderr.count(FULL) == 1
-    assert "free about 1 MB, then call `cosim recover out`" in done.stderr
+    assert "free about 2 MB, then call `cosim recover out`" in done.stderr
     if more == RECOVER:
         assert sorted(path.name for path in workplace.out.iterdir()) == [
             "kpis.json",
@@ -241,7 +241,7 @@ def test_a_component_that_fails_on_a_full_disk_is_named(tmp_path):
         300, arguments={"pause": 0, "fail_at": 20_000}, record={"signals": ["ticker.count"]}
     )
     done = on_small_disk(
-        workplace, "480k", "$COSIM run robust.json --output-dir out --no-report; code=$?"
+        workplace, "600k", "$COSIM run robust.json --output-dir out --no-report; code=$?"
     )
     assert done.returncode == 1
     full, failure = done.stderr.splitlines()

@@ -44,7 +44,6 @@ def running(workplace: CommandFolder):
 @pytest.mark.parametrize("isolation", ["run", "none", "fmu"])
 def test_a_second_run_into_the_same_folder_is_refused(workplace, running, isolation):
     assert refused(workplace.run(*RUN, "--isolation", isolation), "out", running.pid)
-    assert wait_until((workplace.out / "result.csv").exists)
     running.send_signal(signal.SIGINT)
     running.communicate(timeout=30)
     assert running.returncode == 130
@@ -78,7 +77,7 @@ def test_one_file_of_two_simulations(workplace):
     """Other files in the same folder are not locked."""
     words = ("simulate", FMU, "--step-size", "0.01", "--output-file")
     process = workplace.start(*words, "x.csv", "--stop-time", "1e5")
-    assert wait_until((workplace.folder / "x.csv").exists)
+    assert wait_until((workplace.folder / ".x.csv.unfinished/header.json").exists)
     assert refused(workplace.run(*words, "x.csv"), "x.csv", process.pid)
     assert workplace.run(*words, "y.csv").returncode == 0
     process.send_signal(signal.SIGINT)

@@ -26,7 +26,7 @@ from ....process.journal import (
     report_forks,
     watch_forks,
 )
-from ..instance import FmuInstance
+from ..driver import FmuDriver
 from .messages import (
     STEP_COMMAND,
     STEP_DONE,
@@ -49,7 +49,7 @@ class Worker:
     answer.
     """
 
-    def __init__(self, instance: FmuInstance, block: SharedMemoryBlock, setup: Callable[[], None]):
+    def __init__(self, instance: FmuDriver, block: SharedMemoryBlock, setup: Callable[[], None]):
         """Create the server.
 
         Args:
@@ -131,7 +131,9 @@ class Worker:
             return STEP_DONE if result is None else encode_line({"value": result})
         except ComponentError as error:
             fields = error.component, error.function, error.reason, error.time
-            return encode_line({"component_error": fields, "fatal": self._instance.has_fatal_error})
+            return encode_line(
+                {"component_error": fields, "fatal": self._instance.api.has_fatal_error}
+            )
         except InputError as error:
             return encode_line({"input_error": [str(problem) for problem in error.problems]})
         except Exception as error:
@@ -148,7 +150,6 @@ class Worker:
         self._instance.instantiate()
 
     # -- commands that carry strings, which are not in shared memory
-    # ---------------------------------------------------
 
     def _set_inputs(self, strings: list[Any]) -> None:
         self._input_strings[:] = strings
@@ -163,7 +164,6 @@ class Worker:
         return self._step(), self._output_strings.tolist()
 
     # -- the stepping loop
-    # ---------------------------------------------------------------------------------------------
 
     def _prepare_step(self, step_size: float) -> list[str]:
         """Prepare the calls of a step and return their names.
@@ -188,11 +188,10 @@ class Worker:
             if status and status not in SUCCESS_STATUSES:
                 result = self._instance.interpret_status(call.name, status)
             if one + tiny != one - tiny or not subnormal + subnormal or (is_do_step and traps()):
-                self._instance.restore_float_mode(call.name)
+                self._instance.api.restore_float_mode(call.name)
         return result
 
     # -- FMU states, which stay in the worker process
-    # ------------------------------------------------------------------
 
     def _get_state(self) -> int:
         number = next(self._state_numbers)

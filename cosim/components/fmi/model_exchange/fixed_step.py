@@ -14,7 +14,7 @@ import numpy as np
 
 from ....core.component import NativeDoStep, PreparedCall
 from ....core.time_grid import exact_fraction
-from ..function_calls import DISCARD, OK
+from ..api import DISCARD, OK
 from ..library import GilReleasingFunction, as_pointer, function_address
 from ..settings import Method
 from .continuous_model import ContinuousModel, EventKind, IntegrationError, Integrator, StepEvent

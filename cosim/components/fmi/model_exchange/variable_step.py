@@ -20,7 +20,7 @@ import numpy as np
 
 from ....core.component import SUCCESS_STATUSES, PreparedCall
 from ....core.errors import InputError
-from ..function_calls import DISCARD, OK
+from ..api import DISCARD, OK
 from ..library import as_pointer, as_size
 from .continuous_model import ContinuousModel, EventKind, IntegrationError, Integrator, StepEvent
 
@@ -256,7 +256,6 @@ class VariableStepIntegrator(Integrator):
         return self._time
 
     # -- functions that CVODE calls
-    # ------------------------------------------------------------------------------------
 
     def _guarded(self, evaluate: Callable[[], None]) -> int:
         """Return the result of a callback.
@@ -295,7 +294,6 @@ class VariableStepIntegrator(Integrator):
         return self._guarded(evaluate)
 
     # -- steps
-    # ---------------------------------------------------------------------------------------------------------
 
     def prepare_step(self, current_time: ctypes.c_double, step_size: float) -> PreparedCall:
         """Prepare a call that integrates one communication step.

@@ -191,9 +191,10 @@ def linear_index(terms: list[tuple[int, int | str]]) -> int | str:
     ]
     if not parts:
         return constant
-    return " + ".join(parts) + (
-        f" + {constant}" if constant > 0 else f" - {-constant}" if constant < 0 else ""
-    )
+    text = " + ".join(parts)
+    if constant == 0:
+        return text
+    return f"{text} {'+' if constant > 0 else '-'} {abs(constant)}"
 
 
 def _parenthesize_index(index: str) -> str:

@@ -88,11 +88,8 @@ def exchange_functions(
     Returns:
         The function definitions.
     """
-    addresses = [
-        f"{array}[{k}] = {address};"
-        for array, all in (("states", states), ("rates", rates))
-        for k, address in enumerate(all)
-    ]
+    addresses = [f"states[{k}] = {address};" for k, address in enumerate(states)]
+    addresses += [f"rates[{k}] = {address};" for k, address in enumerate(rates)]
     return [
         function_definition(
             "void model_states(Model *m, double **states, double **rates)",

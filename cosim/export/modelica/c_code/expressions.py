@@ -218,21 +218,21 @@ class ExpressionLowering(BuiltinLowering):
 
     def known_branch(self, node: syntax_tree.If) -> syntax_tree.Expression | None:
         """Return the value of an if-expression without the branches before it, if the first condition is constant, else None."""
-        (condition, value), rest = node.branches[0], node.branches[1:]
+        condition, value = node.branches[0]
         known = self.static_value(condition)
         if known is None:
             return None
-        return value if known else syntax_tree.If(rest, node.otherwise) if rest else node.otherwise
+        return value if known else _without_first_branch(node)
 
     def _if(self, node: syntax_tree.If) -> CValue:
         if (known := self.known_branch(node)) is not None:
             return self.lower(known)
-        (condition, yes), rest = node.branches[0], node.branches[1:]
+        condition, yes = node.branches[0]
         test = self.scalar_of(condition)
         with self.collect_lines() as yes_lines:
             first = self.lower(yes)
         with self.collect_lines() as no_lines:
-            second = self.lower(syntax_tree.If(rest, node.otherwise) if rest else node.otherwise)
+            second = self.lower(_without_first_branch(node))
         type_name = common_type([first.type, second.type])
         if not (yes_lines or no_lines or first.shape):
             return scalar_value(type_name, conditional(test, first.text, second.text))
@@ -285,3 +285,8 @@ class ExpressionLowering(BuiltinLowering):
         c_arguments += [result.pointer or "&" + result.text.code for result in results]
         self.lines.append(c_call(function.name, *c_arguments).code + ";")
         return results
+
+
+def _without_first_branch(node: syntax_tree.If) -> syntax_tree.Expression:
+    rest = node.branches[1:]
+    return syntax_tree.If(rest, node.otherwise) if rest else node.otherwise

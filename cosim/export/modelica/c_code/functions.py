@@ -152,9 +152,11 @@ class FunctionTranslator:
     def _name(self, name: str) -> str:
         base = c_identifier(name) if "." in name else c_identifier(name) + "_"
         used = {instance.name for instance in self._instances.values()}
-        return next(
-            n for n in (base, *(f"{base}_{k}" for k in range(2, len(used) + 3))) if n not in used
-        )
+        result, number = base, 1
+        while result in used:
+            number += 1
+            result = f"{base}_{number}"
+        return result
 
 
 def _with_sizes(function: Function, numbers: tuple[int | None, ...]) -> tuple[Function, Sizes]:
@@ -246,13 +248,8 @@ def _opening_lines(
     lines += [_declaration(value) for value, _ in used]
     read = {referenced_variable(reference) for reference in read_references(function.body)}
     unread = [value for value in instance.inputs if not uses_variable(_c_name(value), body)]
-    return [
-        *lines,
-        *(
-            f"(void){_c_name(value)};"
-            for value in (*unread, *(value for value, name in used if name not in read))
-        ),
-    ]
+    unread += [value for value, name in used if name not in read]
+    return lines + [f"(void){_c_name(value)};" for value in unread]
 
 
 def _closing_lines(instance: FunctionInstance) -> list[str]:

@@ -331,10 +331,11 @@ class ModelCode:
 
     def _element_pointers(self, names: Iterable[str]) -> list[str]:
         """Return C pointers to all elements of variables."""
-        values = (
-            struct_member(self.model.variables[name], f"m->{self.members[name]}") for name in names
-        )
-        return [f"&{value.element(k).code}" for value in values for k in range(value.size)]
+        pointers = []
+        for name in names:
+            value = struct_member(self.model.variables[name], f"m->{self.members[name]}")
+            pointers += [f"&{value.element(k).code}" for k in range(value.size)]
+        return pointers
 
 
 def _owning_component(statement: Statement) -> str:

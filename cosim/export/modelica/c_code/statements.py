@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass, replace
+from itertools import chain
 
 from ..external.c_files import call_signature
 from ..model import syntax_tree
@@ -220,7 +221,7 @@ class StatementLowering(ExpressionLowering):
             self.lines.append(f"double residual[{n}], jacobian[{n * n}];")
             for k, residual in enumerate(node.residuals):
                 self.lines.append(f"residual[{k}] = {self.scalar_of(residual).code};")
-            for k, derivative in enumerate(item for row in node.jacobian for item in row):
+            for k, derivative in enumerate(chain.from_iterable(node.jacobian)):
                 self.lines.append(f"jacobian[{k}] = {self.scalar_of(derivative).code};")
             arguments = (
                 f"m, {n}, (double *[]){{{unknowns}}}, residual, jacobian, step, scale, &search, "

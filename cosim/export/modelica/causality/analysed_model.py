@@ -59,12 +59,10 @@ def classify_parameters(model: Model, schedule: Schedule) -> ParameterRoles:
             f"these parameters depend on each other: {', '.join(error.args[1])}",
             model.variables[error.args[1][0]].where,
         )
-    used_by_clocks = {
-        parameter
-        for clock in schedule.clocks
-        for name in variable_names((clock.start, clock.period))
-        for parameter in _transitive_dependencies(name, dependencies)
-    }
+    used_by_clocks: set[str] = set()
+    for clock in schedule.clocks:
+        for name in variable_names((clock.start, clock.period)):
+            used_by_clocks.update(_transitive_dependencies(name, dependencies))
     return ParameterRoles(
         settable,
         [v.name for v in parameters if v.name not in settable and v.name not in dependent],

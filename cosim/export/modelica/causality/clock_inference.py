@@ -95,10 +95,9 @@ def clock_parameters(model: Model) -> set[str]:
         for item in walk(_sections(model))
         if isinstance(item, Builtin) and item.name in (*CONVERSIONS, "Clock")
     ]
-    names = {name for call in calls for name in variable_names(call.arguments)}
     return {
         name
-        for name in names
+        for name in variable_names(tuple(calls))
         if name in model.variables and model.variables[name].variability == "parameter"
     }
 

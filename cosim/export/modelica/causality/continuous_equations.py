@@ -9,8 +9,15 @@ from __future__ import annotations
 from collections.abc import Collection, Sequence
 
 from ....core.errors import InputError
-from ..model.flat_model import Equation, Model, is_input, previous_name
-from ..model.scalars import ScalarKey, reference_of, scalar_keys
+from ..model.flat_model import Equation, Model, given_variables, previous_name
+from ..model.scalars import (
+    ScalarKey,
+    reference_of,
+    scalar_keys,
+    scalars_in,
+    scalars_of,
+    scalars_read,
+)
 from ..model.syntax_tree import (
     Assign,
     Builtin,
@@ -22,7 +29,7 @@ from ..model.syntax_tree import (
     Solve,
     raise_model_error,
 )
-from ..model.traversal import assigned_references, read_references
+from ..model.traversal import assigned_references
 from .equation_systems import EquationSystem
 from .matching import strongly_connected_components
 
@@ -52,31 +59,23 @@ def solve_equations(
         explicit = None
     if explicit is not None and not _has_loop(model, explicit):
         return explicit, set()
-    known = {
-        v.name
-        for v in model.variables.values()
-        if v.variability in ("constant", "parameter") or is_input(v)
-    }
-    known |= set(assigned) | _previous_values(model)
-    system = EquationSystem(model, model.equations, _keys(model, set(model.variables) - known))
+    known = given_variables(model) | set(assigned) | _previous_values(model)
+    system = EquationSystem(model, model.equations, scalars_of(model, set(model.variables) - known))
     return system.solve(), system.held
 
 
 def _has_loop(model: Model, statements: Sequence[Assign]) -> bool:
-    writers = {
-        key: k for k, s in enumerate(statements) for key in scalar_keys(model.variables, s.target)
-    }
-    reads = [
-        {
-            writers[key]
-            for item in read_references(s)
-            for key in scalar_keys(model.variables, item)
-            if key in writers
-        }
-        for s in statements
-    ]
-    return any(len(component) > 1 for component in strongly_connected_components(reads)) or any(
-        k in r for k, r in enumerate(reads)
+    writers = {}
+    for k, statement in enumerate(statements):
+        for key in scalar_keys(model.variables, statement.target):
+            writers[key] = k
+    reads = []
+    for statement in statements:
+        keys = scalars_read(model, statement)
+        reads.append({writers[key] for key in keys if key in writers})
+    components = strongly_connected_components(reads)
+    return any(len(component) > 1 for component in components) or any(
+        k in read for k, read in enumerate(reads)
     )
 
 
@@ -110,15 +109,11 @@ def solve_initial_equations(
             explicit = None
         if explicit is not None and all(isinstance(s, Assign) for s in continuous):
             return [*continuous, *explicit], set()
-    known = {
-        v.name
-        for v in model.variables.values()
-        if v.variability in ("constant", "parameter") or is_input(v)
-    }
+    known = given_variables(model)
     fixed = {name for name in model.states if model.variables[name].fixed}
     started = (set(assigned) | _previous_values(model)) - fixed
-    optional = _keys(model, started) - set(written)
-    unknowns = _keys(model, set(model.variables) - known - started - fixed) - set(written)
+    optional = scalars_of(model, started) - set(written)
+    unknowns = scalars_of(model, set(model.variables) - known - started - fixed) - set(written)
     fixed_unknowns = [
         Equation(Name(v.name), v.start or Literal(0.0, "Real"), v.where)
         for v in model.variables.values()
@@ -127,7 +122,7 @@ def solve_initial_equations(
     equations = (*model.equations, *model.initial_equations, *fixed_unknowns)
     system = EquationSystem(model, equations, unknowns, [optional], continues=True)
     solved = system.solve()
-    determined = {key for s in solved for key in _solved_keys(model, s)} | set(written)
+    determined = scalars_in(model, assigned_references(tuple(solved))) | set(written)
     kept = [
         Assign(reference_of(key, model), reference_of((previous_name(key[0]), key[1]), model))
         for key in sorted(optional - determined)
@@ -136,20 +131,8 @@ def solve_initial_equations(
     return [*solved, *kept], system.held
 
 
-def _solved_keys(model: Model, statement: Solution) -> set[ScalarKey]:
-    return {
-        key
-        for target in assigned_references(statement)
-        for key in scalar_keys(model.variables, target)
-    }
-
-
 def _previous_values(model: Model) -> set[str]:
     return {previous_name(name) for name in model.hybrid.remembered} if model.hybrid else set()
-
-
-def _keys(model: Model, names: Collection[str]) -> set[ScalarKey]:
-    return {key for name in names for key in scalar_keys(model.variables, Name(name))}
 
 
 def match_equations(model: Model, assigned: Collection[str]) -> list[Assign]:
@@ -168,12 +151,7 @@ def match_equations(model: Model, assigned: Collection[str]) -> list[Assign]:
     Raises:
         InputError: An equation defines no variable, or a variable has no equation.
     """
-    defined = {key for name in assigned for key in scalar_keys(model.variables, Name(name))}
-    for name in model.hybrid.remembered if model.hybrid else ():
-        defined |= scalar_keys(model.variables, Name(previous_name(name)))
-    for variable in model.variables.values():
-        if variable.variability in ("constant", "parameter") or is_input(variable):
-            defined |= scalar_keys(model.variables, Name(variable.name))
+    defined = scalars_of(model, set(assigned) | _previous_values(model) | given_variables(model))
     pending, matched = list(enumerate(model.equations)), dict[int, Assign]()
     while pending:
         unmatched = []
@@ -197,13 +175,13 @@ def _candidates(model: Model, equation: Equation, defined: Collection[ScalarKey]
     None, one or two.
     """
     sides = ((equation.left, equation.right), (equation.right, equation.left))
-    return [
-        Assign(side, other, equation.where)
-        for side, other in sides
-        if isinstance(side, Name | Index)
-        and (keys := scalar_keys(model.variables, side))
-        and not keys & set(defined)
-    ]
+    assignments = []
+    for side, other in sides:
+        if isinstance(side, Name | Index):
+            keys = scalar_keys(model.variables, side)
+            if keys and keys.isdisjoint(defined):
+                assignments.append(Assign(side, other, equation.where))
+    return assignments
 
 
 def _raise_unmatched(
@@ -211,16 +189,8 @@ def _raise_unmatched(
 ) -> None:
     equation = equations[0]
     if _candidates(model, equation, defined):
-        names = ", ".join(
-            sorted(
-                {
-                    side.name
-                    for e in equations
-                    for side in (e.left, e.right)
-                    if isinstance(side, Name)
-                }
-            )
-        )
+        sides = [side for each in equations for side in (each.left, each.right)]
+        names = ", ".join(sorted({side.name for side in sides if isinstance(side, Name)}))
         raise_model_error(
             (
                 "these variables are only connected to each other, no equation gives them a "

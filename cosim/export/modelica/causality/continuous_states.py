@@ -11,6 +11,7 @@ from ..model.flat_model import (
     Model,
     Variable,
     derivative_name,
+    given_variables,
     internal_variable,
     is_input,
 )
@@ -135,17 +136,11 @@ def reduce_states(model: Model) -> Model:
 
 
 def _system(model: Model, assigned: set[str]) -> EquationSystem:
-    known = {
-        v.name
-        for v in model.variables.values()
-        if v.variability in ("constant", "parameter") or is_input(v)
-    } | assigned
-    keys = [
-        key
-        for name in model.variables
-        if name not in known
-        for key in scalar_keys(model.variables, Name(name))
-    ]
+    known = given_variables(model) | assigned
+    keys: list[ScalarKey] = []
+    for name in model.variables:
+        if name not in known:
+            keys += scalar_keys(model.variables, Name(name))
     groups: list[list[ScalarKey]] = [[], [], []]
     for key in keys:
         if key[0] in model.states:

@@ -5,9 +5,10 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
 from functools import partial
+from itertools import chain
 
 from ..model.flat_model import Model, owning_component
-from ..model.scalars import ScalarKey, scalar_keys
+from ..model.scalars import ScalarKey, scalar_keys, scalars_in, scalars_of, scalars_read
 from ..model.syntax_tree import (
     Assert,
     Assign,
@@ -17,7 +18,6 @@ from ..model.syntax_tree import (
     Expression,
     IfStatement,
     Literal,
-    Name,
     Solve,
     SourceLocation,
     Statement,
@@ -25,7 +25,7 @@ from ..model.syntax_tree import (
     raise_model_error,
     referenced_variable,
 )
-from ..model.traversal import assigned_references, has_builtin, read_references, walk
+from ..model.traversal import assigned_references, has_builtin, walk
 from .when_conditions import WhenConditions
 
 
@@ -63,7 +63,9 @@ def sort_topologically(nodes: list[Node]) -> list[Node]:
                     f"{key[0]} is defined twice, first at {writers[key].where}", node.where
                 )
             writers[key] = node
-    dependencies = {node: {writers[key] for key in node.reads if key in writers} for node in nodes}
+    dependencies = {}
+    for node in nodes:
+        dependencies[node] = {writers[key] for key in node.reads if key in writers}
     remaining, done, order = list(nodes), set[Node](), list[Node]()
     while remaining:
         ready = [node for node in remaining if dependencies[node] <= done]
@@ -148,22 +150,15 @@ def make_node(model: Model, statements: Body, assigned: Iterable[str] = ()) -> N
 
     Reading the variables `assigned`, of an algorithm, creates no dependency.
     """
-    written = {
-        key
-        for target in assigned_references(statements)
-        for key in scalar_keys(model.variables, Name(referenced_variable(target)))
-    }
     if len(statements) == 1 and isinstance(statements[0], Assign):
         written = scalar_keys(model.variables, statements[0].target)
-    if unknowns := [
-        target for item in walk(statements) if isinstance(item, Solve) for target in item.unknowns
-    ]:
-        written = {key for target in unknowns for key in scalar_keys(model.variables, target)}
-    read = {
-        key
-        for reference in read_references(statements)
-        for key in scalar_keys(model.variables, reference)
-    }
+    else:
+        solved = [item.unknowns for item in walk(statements) if isinstance(item, Solve)]
+        targets = assigned_references(statements)
+        written = scalars_in(model, chain.from_iterable(solved)) or scalars_of(
+            model, map(referenced_variable, targets)
+        )
+    read = scalars_read(model, statements)
     flags_read = {
         _flag_key(item.arguments[0])
         for item in walk(statements)

@@ -7,10 +7,11 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
+from itertools import chain
 
 from ....core.errors import InputError, Problem
 from ..model.flat_model import Equation, Model
-from ..model.scalars import ScalarKey, reference_of, scalar_keys
+from ..model.scalars import ScalarKey, reference_of, scalar_keys, scalars_read
 from ..model.simplification import ZERO, divide, negate, subtract, without_zeros
 from ..model.syntax_tree import (
     Assign,
@@ -26,7 +27,7 @@ from ..model.syntax_tree import (
     SourceLocation,
     raise_model_error,
 )
-from ..model.traversal import has_builtin, read_references, rewrite, rewrite_outermost
+from ..model.traversal import has_builtin, rewrite, rewrite_outermost
 from .differentiation import Differentiation
 from .matching import match, strongly_connected_components
 from .scalar_equations import EquationSplitter
@@ -78,9 +79,7 @@ class EquationSystem:
 
     def __post_init__(self) -> None:
         splitter = EquationSplitter(self.model)
-        self._scalar = [
-            scalar for equation in self.equations for scalar in splitter.split(equation)
-        ]
+        self._scalar = list(chain.from_iterable(map(splitter.split, self.equations)))
         self._all = set(self.unknowns).union(*self.optional)
         self._incidence = [self._keys(equation) for equation in self._scalar]
         relations = self.model.hybrid.relations if self.model.hybrid else ()
@@ -114,35 +113,27 @@ class EquationSystem:
         self._check(matched)
         numbers = sorted(matched)
         owner = {matched[number]: k for k, number in enumerate(numbers)}
-        successors = [
-            {owner[key] for key in self._incidence[n] if key in owner and owner[key] != k}
-            for k, n in enumerate(numbers)
-        ]
+        successors = []
+        for k, number in enumerate(numbers):
+            others = {owner[key] for key in self._incidence[number] if key in owner}
+            successors.append(others - {k})
         components = strongly_connected_components(successors)
-        if loops := {
-            key
-            for c in components
-            if len(c) > 1
-            for key in (matched[numbers[k]] for k in c)
-            if key[0] in self._relations
-        }:
-            self.held |= loops
-            successors = [
-                {k for k in nodes if matched[numbers[k]] not in loops} for nodes in successors
-            ]
+        loops: set[int] = set()
+        for component in components:
+            if len(component) > 1:
+                loops.update(k for k in component if matched[numbers[k]][0] in self._relations)
+        if loops:
+            self.held |= {matched[numbers[k]] for k in loops}
+            successors = [nodes - loops for nodes in successors]
             components = strongly_connected_components(successors)
-        return [
-            self._solve_component([numbers[k] for k in component], matched)
-            for component in components
-        ]
+        solved = []
+        for component in components:
+            solved.append(self._solve_component([numbers[k] for k in component], matched))
+        return solved
 
     def _keys(self, equation: Equation) -> list[ScalarKey]:
         """Return the unknowns that an equation contains."""
-        references = read_references((equation.left, equation.right))
-        keys = {
-            key for reference in references for key in scalar_keys(self.model.variables, reference)
-        }
-        return sorted(keys & self._all)
+        return sorted(scalars_read(self.model, (equation.left, equation.right)) & self._all)
 
     def _preferences(self, number: int) -> list[ScalarKey]:
         """Return the unknowns for which an equation can be solved.
@@ -150,18 +141,11 @@ class EquationSystem:
         Those that stand alone on one side are first.
         """
         equation = self._scalar[number]
-        alone = [
-            key
-            for side in (equation.left, equation.right)
-            for key in self._key_of(side)
-            if self._is_free_of(key, side, equation)
-        ]
-        others = [
-            key
-            for key in self._incidence[number]
-            if key not in alone and not self._is_discrete(key)
-        ]
-        return [*dict.fromkeys(alone), *others]
+        preferred: list[ScalarKey] = []
+        for side in (equation.left, equation.right):
+            preferred += [k for k in self._key_of(side) if self._is_free_of(k, side, equation)]
+        others = [key for key in self._incidence[number] if not self._is_discrete(key)]
+        return list(dict.fromkeys([*preferred, *others]))
 
     def _key_of(self, side: Expression) -> set[ScalarKey]:
         keys = scalar_keys(self.model.variables, side) if isinstance(side, Name | Index) else set()
@@ -169,10 +153,7 @@ class EquationSystem:
 
     def _is_free_of(self, key: ScalarKey, side: Expression, equation: Equation) -> bool:
         other = equation.right if side is equation.left else equation.left
-        return not any(
-            key in scalar_keys(self.model.variables, reference)
-            for reference in read_references(other)
-        )
+        return key not in scalars_read(self.model, other)
 
     def _is_discrete(self, key: ScalarKey) -> bool:
         return self.model.variables[key[0]].type in _DISCRETE_TYPES
@@ -183,14 +164,14 @@ class EquationSystem:
             equation for number, equation in enumerate(self._scalar) if number not in matched
         ]
         if surplus or missing:
-            variables = [
-                (name, self.model.variables[name].where)
-                for name in sorted({name for name, _ in missing})
-            ]
-            equations = [
-                (each.where, sorted({name for name, _ in self._keys(each)})) for each in surplus
-            ]
+            names = sorted({name for name, _ in missing})
+            variables = [(name, self.model.variables[name].where) for name in names]
+            equations = [(each.where, self._names(each)) for each in surplus]
             raise SingularError(variables, equations)
+
+    def _names(self, equation: Equation) -> list[str]:
+        """Return the names of the unknowns that an equation contains."""
+        return sorted({name for name, _ in self._keys(equation)})
 
     def _solve_component(
         self, numbers: list[int], matched: dict[int, ScalarKey]
@@ -251,17 +232,13 @@ class EquationSystem:
 
     def _system(self, equations: Sequence[Equation], keys: Sequence[ScalarKey]) -> Solve:
         residuals = tuple(subtract(equation.left, equation.right) for equation in equations)
-        jacobian = tuple(
-            tuple(self._derivative(residual, key) for key in keys) for residual in residuals
-        )
-        contained = {
-            key
-            for item in read_references(jacobian)
-            for key in scalar_keys(self.model.variables, item)
-            if key in set(keys)
-        }
+        jacobian = tuple(self._gradient(residual, keys) for residual in residuals)
+        linear = scalars_read(self.model, jacobian).isdisjoint(keys)
         references = tuple(reference_of(key, self.model) for key in keys)
-        return Solve(references, residuals, jacobian, not contained, _first_location(equations))
+        return Solve(references, residuals, jacobian, linear, _first_location(equations))
+
+    def _gradient(self, node: Expression, keys: Sequence[ScalarKey]) -> tuple[Expression, ...]:
+        return tuple(self._derivative(node, key) for key in keys)
 
     def _derivative(self, node: Expression, key: ScalarKey) -> Expression:
         def leaf(reference: Name | Index) -> Expression | None:

@@ -18,6 +18,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from itertools import chain
 from typing import Any
 
 from ..model.builtin_functions import PRE_OPERATORS, ROUNDINGS
@@ -99,26 +100,20 @@ class _Preparation:
 
     def is_needed(self) -> bool:
         """Return whether the model has elements that require event iteration."""
-        outside = tuple(
-            s for body in self._model.algorithms for s in body if not isinstance(s, When)
-        )
-        conditions = tuple(
-            c
-            for item in walk((self._model.whens, self._model.algorithms))
-            if isinstance(item, When)
-            for c, _ in item.branches
-        )
+        statements = chain.from_iterable(self._model.algorithms)
+        outside = tuple(each for each in statements if not isinstance(each, When))
+        clauses = list(walk((self._model.whens, self._model.algorithms)))
+        conditions: tuple[Expression, ...] = ()
+        for item in clauses:
+            if isinstance(item, When):
+                conditions += tuple(condition for condition, _ in item.branches)
         if has_builtin(
             (self._model.equations, outside, self._model.asserts), *PRE_OPERATORS, "sample", "delay"
         ):
             return True
-        if has_builtin(conditions, *PRE_OPERATORS) or any(
-            _is_combined_sample(c) for c in conditions
-        ):
+        if has_builtin(conditions, *PRE_OPERATORS) or any(map(_is_combined_sample, conditions)):
             return True
-        if any(
-            isinstance(item, Reinit) for item in walk((self._model.whens, self._model.algorithms))
-        ):
+        if any(isinstance(item, Reinit) for item in clauses):
             return True
         if _remembered(self._model.initial_equations) - self._assigned:
             return True
@@ -143,7 +138,7 @@ class _Preparation:
             )
             sections["algorithms"] = tuple(map(self._in_algorithm, sections["algorithms"]))
         sections["equations"] = (*sections["equations"], *self._equations)
-        used = {name for section in sections.values() for name in _remembered(section)}
+        used = _remembered(tuple(sections.values()))
         used |= {relation.name for relation in self._relations} | {
             v.name for v in self._variables.values() if is_input(v)
         }
@@ -192,16 +187,11 @@ class _Preparation:
         whens: tuple[When, ...], replacement: Callable[[Any], Any]
     ) -> tuple[When, ...]:
         """Return when-clauses with conditions in which nodes are replaced."""
-        return tuple(
-            replace(
-                when,
-                branches=tuple(
-                    (rewrite_outermost(condition, replacement), body)
-                    for condition, body in when.branches
-                ),
-            )
-            for when in whens
-        )
+        changed = []
+        for when in whens:
+            branches = [(rewrite_outermost(c, replacement), body) for c, body in when.branches]
+            changed.append(replace(when, branches=tuple(branches)))
+        return tuple(changed)
 
     def _in_algorithm(self, body: Body) -> Body:
         """Return an algorithm whose when-clauses have located conditions, if it does not assign the compared variables itself."""

@@ -25,18 +25,24 @@ def match(
     Returns:
         Equation number -> unknown; equations that cannot be matched are missing.
     """
-    excluded = {key for group in optional for key in group}
-    options = [[key for key in keys if key not in excluded] for keys in candidates]
-    matched = _match_in_sequence(options)
+    excluded = set[Key]().union(*optional)
+    matched = _match_in_sequence(_without(candidates, excluded))
     owner = {key: number for number, key in matched.items()}
     groups: list[Collection[Key]] = [[], *optional]
     for group in groups:
         excluded -= set(group)
-        options = [[key for key in keys if key not in excluded] for keys in candidates]
+        options = _without(candidates, excluded)
         for number in range(len(options)):
             if number not in matched:
                 _augment(number, options, matched, owner)
     return matched
+
+
+def _without(candidates: Sequence[Sequence[Key]], excluded: set[Key]) -> list[list[Key]]:
+    result = []
+    for keys in candidates:
+        result.append([key for key in keys if key not in excluded])
+    return result
 
 
 def _match_in_sequence(candidates: Sequence[Sequence[Key]]) -> dict[int, Key]:

@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 
 from ..model.builtin_functions import PRE_OPERATORS
 from ..model.flat_model import Model, derivative_name, is_input
-from ..model.scalars import ScalarKey, scalar_keys
+from ..model.scalars import ScalarKey, scalars_of, scalars_read
 from ..model.syntax_tree import (
     Assign,
     Binary,
@@ -33,7 +33,6 @@ from ..model.syntax_tree import (
 from ..model.traversal import (
     assigned_references,
     has_builtin,
-    read_references,
     rewrite,
     rewrite_outermost,
     variable_names,
@@ -98,38 +97,30 @@ def statements_between_events(
     """
     statements = [s for s in continuous if not (model.hybrid and _is_discrete(model, s))]
     nodes = [make_node(model, (_without_ticks(statement),)) for statement in statements]
-    nodes += [
-        node for body in model.algorithms for node in algorithm_nodes(model, body, lambda _: ())
-    ]
+    for body in model.algorithms:
+        nodes += algorithm_nodes(model, body, lambda _: ())
     for node in nodes:
         node.reads -= held
-    required = {
-        key
-        for name in model.states
-        for key in scalar_keys(model.variables, Name(derivative_name(name)))
-    }
+    required = scalars_of(model, map(derivative_name, model.states))
     order = sort_topologically(nodes)
     if not model.hybrid:
         return BetweenEvents(
             merge_statements(required_nodes(order, required)), (), merge_statements(order)
         )
     required |= {(delay.name, 0) for delay in model.hybrid.delays}
-    operands = {
-        key
-        for reference in read_references(
-            tuple(relation.condition for relation in model.hybrid.relations)
-        )
-        for key in scalar_keys(model.variables, reference)
-    }
+    conditions = tuple(relation.condition for relation in model.hybrid.relations)
+    operands = scalars_read(model, conditions)
     varying = _varying(model, order, model.states)
     inputs = [v.name for v in model.variables.values() if is_input(v)]
-    remembered = {
-        key
-        for name in model.hybrid.remembered
-        if model.variables[name].type == "Real"
-        and name not in {*model.states, *inputs, *model.hybrid.iterated}
-        for key in scalar_keys(model.variables, Name(name))
-    }
+    others = {*model.states, *inputs, *model.hybrid.iterated}
+    remembered = scalars_of(
+        model,
+        [
+            name
+            for name in model.hybrid.remembered
+            if model.variables[name].type == "Real" and name not in others
+        ],
+    )
     return BetweenEvents(
         merge_statements(required_nodes(varying, required)),
         merge_statements(required_nodes(varying, operands)),
@@ -140,7 +131,7 @@ def statements_between_events(
 
 def _varying(model: Model, order: Iterable[Node], sources: Iterable[str]) -> list[Node]:
     """Return the sorted nodes whose values change between events, because they depend on the variables `sources` or on time."""
-    changing = {key for name in sources for key in scalar_keys(model.variables, Name(name))}
+    changing = scalars_of(model, sources)
     nodes = []
     for node in order:
         if (
@@ -292,12 +283,16 @@ def _at_initialization(model: Model, body: Body) -> Body:
 
 def _reinits(model: Model, conditions: WhenConditions) -> Body:
     """Return the assignments of reinit(), which follow all others."""
-    bodies = [
-        conditions.at_event(when)
-        for when in (*model.whens, *(s for b in model.algorithms for s in b if isinstance(s, When)))
-    ]
-    selected = (filter_statements(body, lambda s: isinstance(s, Reinit)) for body in bodies)
-    return tuple(rewrite_outermost(tuple(s for body in selected for s in body), _as_assignment))
+    whens = list(model.whens)
+    for body in model.algorithms:
+        whens += [statement for statement in body if isinstance(statement, When)]
+    selected: list[Statement] = []
+    for when in whens:
+        selected += filter_statements(
+            conditions.at_event(when), lambda statement: isinstance(statement, Reinit)
+        )
+    result: Body = rewrite_outermost(tuple(selected), _as_assignment)
+    return result
 
 
 def _as_assignment(node: Any) -> Any:
@@ -305,7 +300,7 @@ def _as_assignment(node: Any) -> Any:
 
 
 def _written(nodes: Iterable[Node]) -> set[ScalarKey]:
-    return {key for node in nodes for key in node.writes}
+    return set[ScalarKey]().union(*(node.writes for node in nodes))
 
 
 def _event_nodes(model: Model, conditions: WhenConditions) -> Iterator[Node]:
@@ -317,11 +312,9 @@ def _event_nodes(model: Model, conditions: WhenConditions) -> Iterator[Node]:
 
 
 def _initial_nodes(model: Model, conditions: WhenConditions) -> list[Node]:
-    nodes = [
-        node
-        for when in model.whens
-        for node in split_by_target(model, conditions.at_initialization(when))
-    ]
+    nodes: list[Node] = []
+    for when in model.whens:
+        nodes += split_by_target(model, conditions.at_initialization(when))
     for body in (*model.algorithms, *model.initial_algorithms):
         nodes += algorithm_nodes(model, body, conditions.at_initialization)
     return nodes + [make_node(model, (statement,)) for statement in model.asserts]
@@ -330,13 +323,13 @@ def _initial_nodes(model: Model, conditions: WhenConditions) -> list[Node]:
 def _remove_clock_condition(body: Body) -> Body:
     """Remove the flag of the only clock: without continuous states, it ticks in every event."""
     simplified = rewrite(body, lambda node: _TRUE if node == tick_flag(0) else node)
-    inner = (
-        s.branches[0][1]
-        if isinstance(s, IfStatement) and _is_always_true(s.branches[0][0])
-        else (s,)
-        for s in simplified
-    )
-    return tuple(statement for statements in inner for statement in statements)
+    result: list[Statement] = []
+    for statement in simplified:
+        if isinstance(statement, IfStatement) and _is_always_true(statement.branches[0][0]):
+            result += statement.branches[0][1]
+        else:
+            result.append(statement)
+    return tuple(result)
 
 
 def _remove_unused_detectors(body: Body) -> Body:

@@ -6,6 +6,7 @@ import re
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from importlib import resources
+from itertools import product
 from pathlib import Path
 from typing import NamedTuple
 
@@ -73,16 +74,16 @@ def external_archives(
     found: dict[str, Path] = {}
     for function in sorted(functions, key=lambda f: f.name):
         assert function.external
-        names = [f"lib{library}.a" for library in function.external.libraries]
-        folders = [
-            folder / sub for folder in _folders(function, packages) for sub in _LIBRARY_FOLDERS
-        ]
-        found |= {
-            n: path
-            for n in names
-            if (path := next((f / n for f in folders if (f / n).is_file()), None))
-        }
+        for library in function.external.libraries:
+            name = f"lib{library}.a"
+            places = product(_folders(function, packages), _LIBRARY_FOLDERS)
+            if path := _first_file(folder / sub / name for folder, sub in places):
+                found[name] = path
     return found
+
+
+def _first_file(candidates: Iterable[Path]) -> Path | None:
+    return next((path for path in candidates if path.is_file()), None)
 
 
 def _add_files(function: Function, packages: Mapping[str, Path], files: dict[str, str]) -> None:
@@ -90,14 +91,12 @@ def _add_files(function: Function, packages: Mapping[str, Path], files: dict[str
     folders = _folders(function, packages)
     pending = _INCLUDE.findall(function.external.include)
     required = set(pending)
-    pending += [
-        f"{library}{suffix}" for library in function.external.libraries for suffix in (".h", ".c")
-    ]
+    pending += map("".join, product(function.external.libraries, (".h", ".c")))
     while pending:
         name = pending.pop()
         if Path(name).name in files:
             continue
-        path = next((folder / name for folder in folders if (folder / name).is_file()), None)
+        path = _first_file(folder / name for folder in folders)
         if path is None:
             if name in required:
                 places = ", ".join(map(str, folders)) or "no folder"
@@ -122,11 +121,8 @@ def _check_libraries(
     """Raise InputError if a function without Include annotation has libraries, but neither C code nor a static library."""
     assert function.external
     libraries = function.external.libraries
-    if (
-        function.external.include
-        or not libraries
-        or any(f"{n}{s}" in files for n in libraries for s in (".c", ".h"))
-    ):
+    c_files = map("".join, product(libraries, (".c", ".h")))
+    if function.external.include or not libraries or not files.keys().isdisjoint(c_files):
         return
     if not external_archives([function], packages):
         names = ", ".join(f"{name}.c, lib{name}.a" for name in libraries)
@@ -143,7 +139,7 @@ def _implementations(header: Path) -> list[Path]:
         f"{header.stem}.c",
         *([_COMPANIONS[header.stem]] if header.stem in _COMPANIONS else []),
     ]
-    candidates = (header.parent / folder / name for name in names for folder in _SOURCE_FOLDERS)
+    candidates = (header.parent / folder / name for name, folder in product(names, _SOURCE_FOLDERS))
     return [path for path in candidates if header.suffix == ".h" and path.is_file()]
 
 
@@ -159,14 +155,16 @@ def _folders(function: Function, packages: Mapping[str, Path]) -> Sequence[Path]
         for text in (function.external.include_directory, function.external.library_directory)
         if text
     ]
+    annotated = []
     for text in given:
-        if (uri := _URI.match(text)) and uri[1] not in packages:
+        uri = _URI.match(text)
+        if uri and uri[1] not in packages:
             raise_model_error(f'{function.name}: unknown package in "{text}"', function.where)
-    annotated = [
-        packages[uri[1]] / uri[2] if (uri := _URI.match(text)) else own / text for text in given
-    ]
-    defaults = (parent / name for parent in (own, *own.parents) for name in _DEFAULT_FOLDERS)
-    return annotated or [own, *(folder for folder in defaults if folder.is_dir())]
+        annotated.append(packages[uri[1]] / uri[2] if uri else own / text)
+    if annotated:
+        return annotated
+    defaults = (parent / name for parent, name in product((own, *own.parents), _DEFAULT_FOLDERS))
+    return [own, *(folder for folder in defaults if folder.is_dir())]
 
 
 _C_TYPES = {

@@ -82,11 +82,9 @@ def _same_class(name: str, models: Iterable[str]) -> str:
 
 
 def _models_of(files: Iterable[Path]) -> Iterator[tuple[str, Path]]:
-    return (
-        (model, file)
-        for file in files
-        for model in declared_models(file.read_text(encoding="utf-8", errors="replace"))
-    )
+    for file in files:
+        text = file.read_text(encoding="utf-8", errors="replace")
+        yield from ((model, file) for model in declared_models(text))
 
 
 def _shown(file: Path) -> str:

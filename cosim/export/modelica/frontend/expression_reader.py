@@ -9,6 +9,7 @@ import operator
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 from typing import Any
 
 from ..model import syntax_tree
@@ -79,18 +80,12 @@ class ExpressionReader:
     @cached_property
     def _object_types(self) -> set[int]:
         """Numbers of the types of external objects."""
-        functions = self.json["functions"].values()
-        locals_ = (
-            local
-            for f in functions
-            for kind in ("inputs", "outputs", "locals")
-            for local in f[kind]
-        )
-        return {
-            local["effective_type"]["canonical_type"]
-            for local in locals_
-            if local["type_class"] == "Class"
-        }
+        types: set[int] = set()
+        for function in self.json["functions"].values():
+            for local in (*function["inputs"], *function["outputs"], *function["locals"]):
+                if local["type_class"] == "Class":
+                    types.add(local["effective_type"]["canonical_type"])
+        return types
 
     def _optional(self, node: Json | None) -> Expression | None:
         return None if node is None else self.read_expression(node)
@@ -201,9 +196,8 @@ class ExpressionReader:
             for row in rows
             if isinstance(row, syntax_tree.Builtin) and row.name == "columns"
         ]
-        if len(columns) != len(rows) or not all(
-            self._is_scalar(element) for row in columns for element in row
-        ):
+        elements = chain.from_iterable(columns)
+        if len(columns) != len(rows) or not all(map(self._is_scalar, elements)):
             return ()
         return tuple(map(syntax_tree.Array, columns))
 
@@ -266,7 +260,7 @@ class ExpressionReader:
             if field in names and len(call["args"]) == len(names):
                 return self.read_expression(call["args"][names.index(field)])
         else:
-            names = [name for local in function["outputs"] for name in self.scalar_names(local)]
+            names = list(chain.from_iterable(map(self.scalar_names, function["outputs"])))
             if (name := f"{function['outputs'][0]['name']}.{field}") in names:
                 return replace(self._call(call), result=names.index(name))
         reason = (

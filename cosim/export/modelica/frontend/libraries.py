@@ -137,7 +137,9 @@ def find_libraries(
     """
     available = list(libraries_in(folders))
     names = {library.name: library.path.is_file() for library in available}
-    queue = [(*each, file) for file in files for each in _used_names(file, names).items()]
+    queue = []
+    for file in files:
+        queue += [(*each, file) for each in _used_names(file, names).items()]
     found: dict[str, Library] = {}
     while queue:
         name, version, user = queue.pop(0)

@@ -88,14 +88,10 @@ class ModelicaSources:
             library.name: library.path for library in self.libraries if library.path.is_dir()
         }
         code = self.files[0].read_text(encoding="utf-8")
-        return next(
-            (
-                place
-                for word in operators
-                if packages and (place := find_operator(word, code, packages))
-            ),
-            None,
-        )
+        for word in operators if packages else ():
+            if place := find_operator(word, code, packages):
+                return place
+        return None
 
     def locate(self, span: Mapping[str, int] | None) -> SourceLocation | None:
         """Return the line at which a span starts, or None for a span that is not in these files."""
@@ -184,10 +180,10 @@ def needed_files(path: Path) -> list[Path]:
 
 
 def _with_package_files(path: Path, packages: Sequence[Path]) -> list[Path]:
-    return [
-        path,
-        *(file for package in packages for file in sorted(package.rglob("*.mo")) if file != path),
-    ]
+    files = [path]
+    for package in packages:
+        files += [file for file in sorted(package.rglob("*.mo")) if file != path]
+    return files
 
 
 def find_packages(path: Path, text: str) -> list[Path]:
@@ -212,9 +208,7 @@ def select_used_files(path: Path, packages: Sequence[Path], declaration: str = "
         packages: Folders of the top-level packages that it may use.
         declaration: Text of a further class that uses the model.
     """
-    candidates = [
-        file for package in packages for file in sorted(package.rglob("*.mo")) if file != path
-    ]
+    candidates = _with_package_files(path, packages)[1:]
     enclosing = {
         parent / _PACKAGE_FILE for parent in path.parents if (parent / _PACKAGE_FILE) in candidates
     }

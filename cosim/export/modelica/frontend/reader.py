@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
-from itertools import product
+from itertools import chain, product
 from typing import Any
 
 from ..model import flat_model, syntax_tree
@@ -51,12 +51,13 @@ class ModelReader(StatementReader):
                 if not node["is_constructor"]
             },
             enumerations=self._enumerations(),
-            structural=frozenset(
-                self._resolve_name(candidates)
-                for node in self.json.get("parameter_branch_selections", ())
-                for candidates in node["references"]
-            ),
+            structural=frozenset(self._parameters_of_branches()),
         )
+
+    def _parameters_of_branches(self) -> Iterator[str]:
+        """Yield the parameters with which rumoca has selected branches."""
+        for node in self.json.get("parameter_branch_selections", ()):
+            yield from map(self._resolve_name, node["references"])
 
     def _check_document(self, where: SourceLocation) -> None:
         if self.json["is_partial"]:
@@ -146,16 +147,16 @@ class ModelReader(StatementReader):
             type_name, _, literal = key.rpartition(".")
             if not literal.startswith("'"):
                 types.setdefault(type_name, {})[ordinal] = literal
-        return {
-            type_name: tuple(literals[k] for k in sorted(literals))
-            for type_name, literals in types.items()
-        }
+        enumerations = {}
+        for type_name, literals in types.items():
+            enumerations[type_name] = tuple(literals[k] for k in sorted(literals))
+        return enumerations
 
     # equations
 
     def read_equations(self, section: str) -> tuple[flat_model.Equation, ...]:
         """Convert the equations of a section of the document."""
-        return tuple(pair for node in self.json[section] for pair in self._equation(node))
+        return tuple(chain.from_iterable(map(self._equation, self.json[section])))
 
     def _unrolled_equations(self) -> Iterator[flat_model.Equation]:
         """Yield all equations, with the placeholders of for-equations replaced (see `unrolling`)."""

@@ -88,12 +88,11 @@ def flatten_model(
     libraries = find_libraries(
         used, library_folders(options.library_path), [package.name for package in available]
     )
-    of_libraries = {name for library in libraries for name in library.uses}
-    packages = [
-        folder
-        for folder in available
-        if folder.name in of_libraries or any(f.is_relative_to(folder) for f in used)
-    ]
+    of_libraries = set[str]().union(*(library.uses for library in libraries))
+    packages = []
+    for folder in available:
+        if folder.name in of_libraries or any(f.is_relative_to(folder) for f in used):
+            packages.append(folder)
     files = _with_package_files(path, packages)
     links = link_libraries(libraries) if libraries else None
     sources = ModelicaSources(
@@ -129,11 +128,11 @@ def _check_names(flat: Mapping[str, Any], values: Mapping[str, Any], model: str)
         for name, variable in flat["variables"].items()
         if "Parameter" in variable["variability"]
     ]
-    problems = [
-        Problem(f'the model {model} has no parameter "{name}"{did_you_mean(name, known)}')
-        for name in values
-        if name not in known and not any(each.startswith(f"{name}.") for each in known)
-    ]
+    problems = []
+    for name in values:
+        if name not in known and not any(each.startswith(f"{name}.") for each in known):
+            text = f'the model {model} has no parameter "{name}"{did_you_mean(name, known)}'
+            problems.append(Problem(text))
     if problems:
         raise InputError(problems)
 

@@ -63,11 +63,9 @@ def main(request: dict[str, Any]) -> None:
         return
     answer = _flatten(rumoca, request)
     # a file with a syntax error, and a package with such a file, cannot be loaded
-    errors = (
-        [each for file in request["files"] for each in _syntax_errors(rumoca, file)]
-        if "error" in answer
-        else []
-    )
+    errors: list[tuple[str, int, str]] = []
+    for file in request["files"] if "error" in answer else ():
+        errors += _syntax_errors(rumoca, file)
     _write({"syntax_errors": errors} if errors else answer)
 
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Callable, Mapping
 from dataclasses import replace
+from itertools import chain
 from typing import cast
 
 from ..model import flat_model, syntax_tree
@@ -30,9 +31,10 @@ class StatementReader(ExpressionReader):
 
     def read_body(self, nodes: list[Json]) -> Body:
         """Convert a list of statements."""
-        return tuple(
-            statement for node in nodes for statement in self._statements(*split_tagged(node))
-        )
+        statements: list[Statement] = []
+        for node in nodes:
+            statements += self._statements(*split_tagged(node))
+        return tuple(statements)
 
     def _statements(self, kind: str, node: Json) -> list[Statement]:
         """Convert a statement.
@@ -168,7 +170,7 @@ class StatementReader(ExpressionReader):
             InputError: The function contains an unsupported element.
         """
         inputs, outputs, local = (
-            tuple(variable for local in node[kind] for variable in self._locals(local))
+            tuple(chain.from_iterable(map(self._locals, node[kind])))
             for kind in ("inputs", "outputs", "locals")
         )
         body, external = self.read_body(node["body"]), None

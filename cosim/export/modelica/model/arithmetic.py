@@ -10,6 +10,7 @@ import math
 import operator
 from collections.abc import Callable, Mapping
 from functools import reduce
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -34,10 +35,8 @@ def elementwise(function: Callable[..., Any], *arguments: Any) -> Any:
     if not any(isinstance(a, np.ndarray) for a in arguments):
         return function(*arguments)
     arrays = np.broadcast_arrays(*arguments)
-    results = [
-        function(*(to_python_scalar(x) for x in elements))
-        for elements in zip(*(a.flat for a in arrays), strict=True)
-    ]
+    rows = zip(*(array.flat for array in arrays), strict=True)
+    results = [function(*map(to_python_scalar, row)) for row in rows]
     return np.array(results).reshape(arrays[0].shape)
 
 
@@ -63,18 +62,10 @@ def matrix_product(left: np.ndarray, right: np.ndarray) -> Any:
     NumPy may add in another order.
     """
     rows, columns = left.reshape(-1, left.shape[-1]), right.reshape(right.shape[0], -1)
-    sums = [
-        [
-            sum_of(
-                [
-                    check_int32(to_python_scalar(a) * to_python_scalar(b))
-                    for a, b in zip(r, c, strict=True)
-                ]
-            )
-            for c in columns.T
-        ]
-        for r in rows
-    ]
+    sums = []
+    for row, column in product(rows, columns.T):
+        pairs = zip(map(to_python_scalar, row), map(to_python_scalar, column), strict=True)
+        sums.append(sum_of([check_int32(a * b) for a, b in pairs]))
     return to_python_scalar(np.array(sums).reshape((*left.shape[:-1], *right.shape[1:]))[()])
 
 

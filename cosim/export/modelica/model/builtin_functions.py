@@ -11,6 +11,7 @@ import operator
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import partial, reduce
+from itertools import chain
 from typing import Any, TypeAlias
 from typing import Literal as OneOf
 
@@ -89,7 +90,8 @@ def _maximum(*arguments: Any) -> Any:
 
 def _flat_elements(arguments: tuple[Any, ...]) -> list[Any]:
     """Return all elements of the arguments, converted to Real if one of them is Real."""
-    elements = [to_python_scalar(x) for argument in arguments for x in np.asarray(argument).flat]
+    flat = chain.from_iterable(np.asarray(argument).flat for argument in arguments)
+    elements = list(map(to_python_scalar, flat))
     return [float(x) for x in elements] if any(isinstance(x, float) for x in elements) else elements
 
 

@@ -35,13 +35,7 @@ def convert_to_type(value: Any, type_name: str, shape: tuple[int, ...]) -> Any:
         return np.array(np.broadcast_to(np.asarray(value, DTYPES[type_name]), shape))
     if type_name == "String":
         return str(value or "")
-    return (
-        float(value)
-        if type_name == "Real"
-        else bool(value)
-        if type_name == "Boolean"
-        else int(value)
-    )
+    return {"Real": float, "Boolean": bool}.get(type_name, int)(value)
 
 
 @dataclass
@@ -110,13 +104,9 @@ class Evaluator:
         Reals with 6 significant digits.
         """
         value = self(node)
-        return (
-            f"{value:g}"
-            if isinstance(value, float)
-            else str(value).lower()
-            if isinstance(value, bool)
-            else str(value)
-        )
+        if isinstance(value, float):
+            return f"{value:g}"
+        return str(value).lower() if isinstance(value, bool) else str(value)
 
     # expressions
 

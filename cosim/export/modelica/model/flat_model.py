@@ -187,6 +187,15 @@ def is_integrated(model: Model) -> bool:
     return model.hybrid is not None and bool(model.states or model.hybrid.relations)
 
 
+def given_variables(model: Model) -> set[str]:
+    """Return the constants, parameters and inputs, which no equation determines."""
+    return {
+        v.name
+        for v in model.variables.values()
+        if v.variability in ("constant", "parameter") or is_input(v)
+    }
+
+
 def internal_variable(variable: Variable, name: str) -> Variable:
     """Return the declaration of a variable that the compiler inserts, with type and shape of another variable."""
     return replace(

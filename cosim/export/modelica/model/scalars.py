@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterable, Mapping
 from itertools import product
 from math import prod
+from typing import Any
 
 from .flat_model import Model, Variable
 from .syntax_tree import (
@@ -13,6 +14,7 @@ from .syntax_tree import (
     Literal,
     Name,
 )
+from .traversal import read_references
 
 #: a scalar: variable name and row-major index of the element
 ScalarKey = tuple[str, int]
@@ -58,3 +60,18 @@ def reference_of(key: ScalarKey, model: Model) -> Name | Index:
         if shape
         else Name(name)
     )
+
+
+def scalars_of(model: Model, names: Iterable[str]) -> set[ScalarKey]:
+    """Return all scalars of some variables."""
+    return scalars_in(model, map(Name, names))
+
+
+def scalars_in(model: Model, references: Iterable[Name | Index]) -> set[ScalarKey]:
+    """Return the scalars that some references denote."""
+    return set[ScalarKey]().union(*(scalar_keys(model.variables, each) for each in references))
+
+
+def scalars_read(model: Model, tree: Any) -> set[ScalarKey]:
+    """Return the scalars whose current value a tree reads."""
+    return scalars_in(model, read_references(tree))

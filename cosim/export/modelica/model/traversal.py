@@ -142,14 +142,13 @@ def assigned_references(node: Any) -> Iterator[Name | Index]:
 
 def composed_asserts(node: Any) -> list[Assert]:
     """Return the assertions whose message is composed at run time, a warning or that of a `terminate`."""
-    asserts = [item for item in walk(node) if isinstance(item, Assert)]
-    return [
-        item
-        for item in asserts
-        if item.warning
-        or item.terminates
-        or not all(isinstance(part, Literal) for part in item.message)
-    ]
+    composed = []
+    for item in walk(node):
+        if isinstance(item, Assert):
+            is_constant = all(isinstance(part, Literal) for part in item.message)
+            if item.warning or item.terminates or not is_constant:
+                composed.append(item)
+    return composed
 
 
 def has_terminate(node: Any) -> bool:

@@ -19,8 +19,8 @@ from cosim.components.fmi import (
     Isolation,
     SolverSettings,
     create_component,
+    model_exchange,
 )
-from cosim.components.fmi.model_exchange import instance
 from cosim.core.errors import InputError
 from cosim.engine.run_loop import simulate
 from cosim.engine.settings import Settings
@@ -149,7 +149,7 @@ FAULTS_OF_THE_INITIALIZATION = (13, 17, 18)
 
 @pytest.mark.parametrize(("fault", "method"), SEMANTICS)
 def test_values_without_meaning(balls, fault, method, monkeypatch):
-    monkeypatch.setattr(instance, "MAX_EVENTS_PER_STEP", 100)
+    monkeypatch.setattr(model_exchange, "MAX_EVENTS_PER_STEP", 100)
     outcome = run(balls[3], method, fault)
     message = SEMANTICS[fault, method]
     if message is None:

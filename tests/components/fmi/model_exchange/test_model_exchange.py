@@ -15,8 +15,9 @@ from cosim.components.fmi import (
     Isolation,
     SolverSettings,
     create_component,
+    model_exchange,
 )
-from cosim.components.fmi.model_exchange import fixed_step, instance
+from cosim.components.fmi.model_exchange import fixed_step
 from cosim.core.component import Variable
 from cosim.core.errors import ComponentError, InputError
 from cosim.core.system import Group, Iteration
@@ -239,7 +240,7 @@ FAULTS = {
 def test_a_failure_names_function_time_and_cause_and_keeps_the_rows(
     ball, fault, method, monkeypatch
 ):
-    monkeypatch.setattr(instance, "MAX_EVENTS_PER_STEP", 100)
+    monkeypatch.setattr(model_exchange, "MAX_EVENTS_PER_STEP", 100)
     system = make_system(
         {"ball": component(ball, method)},
         start_values={"ball": {"fault": fault, "last_count": 10**6}},

@@ -7,7 +7,7 @@ import mmap
 import os
 import sys
 import tempfile
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from functools import cache
 from pathlib import Path
@@ -17,43 +17,42 @@ from weakref import finalize
 
 import numpy as np
 
-from ...core.errors import write_error
+from ..core.errors import write_error
 
-#: maximum size of a chunk of a file (bytes); number of values computed at a time
-CHUNK_BYTES, BATCH_VALUES = 1 << 24, 1 << 18
-
+#: maximum size of a chunk of a file (bytes)
+CHUNK_BYTES = 1 << 24
 #: maximum size of rows in memory (bytes)
 MAX_MEMORY_BYTES = 1 << 26
 
 
 class RowStore:
-    """Rows of one structured dtype in memory.
+    """Rows of one structured dtype in memory, in an array that is replaced by a larger one if full.
 
     Attributes:
         dtype: Structured dtype of a row.
-        chunk_rows: Number of rows of a chunk.
     """
 
     def __init__(self, dtype: np.dtype[Any], expected: int):
         self.dtype = dtype
-        self.chunk_rows = max(1, expected)
-        self._chunk = np.zeros(0, dtype)
+        self._expected = max(1, expected)
+        self._rows = np.zeros(0, dtype)
 
-    def add_chunk(self) -> np.ndarray:
-        """Append a chunk of zeros and return it, shape (chunk_rows,)."""
-        self._chunk = np.zeros(self.chunk_rows, self.dtype)
-        return self._chunk
+    def provide_chunk(self, count: int) -> tuple[int, np.ndarray]:
+        """Forget all but the first `count` rows, and provide space for at least one more.
 
-    def rewind(self, count: int) -> np.ndarray:
-        """Forget all but the first `count` rows, and return the chunk of the next row, shape (chunk_rows,)."""
-        kept = self._chunk[:count]
-        chunk = self.add_chunk()
-        chunk[:count] = kept
-        return chunk
+        Arrays that `read_first` has returned keep their rows.
+
+        Returns:
+            Number of the first row of the chunk in which the next row lies, and the chunk.
+        """
+        rows = np.zeros(max(self._expected, 2 * count), self.dtype)
+        rows[:count] = self._rows[:count]
+        self._rows = rows
+        return 0, rows
 
     def read_first(self, count: int) -> np.ndarray:
         """Return the first `count` rows, shape (count,)."""
-        return self._chunk[:count]
+        return self._rows[:count]
 
 
 class FileRowStore(RowStore):
@@ -65,8 +64,9 @@ class FileRowStore(RowStore):
     """
 
     def __init__(self, dtype: np.dtype[Any], expected: int, file: Path | IO[bytes]):
-        super().__init__(dtype, min(expected, CHUNK_BYTES // max(1, dtype.itemsize)))
-        self._file, self._rows = file, 0
+        super().__init__(dtype, expected)
+        self._file = file
+        self._chunk_rows = max(1, min(expected, CHUNK_BYTES // dtype.itemsize))
         if isinstance(file, Path):
             file.write_bytes(b"")
 
@@ -78,37 +78,29 @@ class FileRowStore(RowStore):
         else:
             yield self._file
 
-    def add_chunk(self) -> np.ndarray:
-        """Append a chunk of zeros and return it, shape (chunk_rows,), mapped to the file.
+    def provide_chunk(self, count: int) -> tuple[int, np.ndarray]:
+        """Map the chunk of the next row after the first `count` rows; a new one contains zeros.
 
         Raises:
             OutputError: The disk has no space for the chunk.
         """
-        if not self.dtype.itemsize:
-            return np.zeros(self.chunk_rows, self.dtype)
-        begin, size = self._rows * self.dtype.itemsize, self.chunk_rows * self.dtype.itemsize
+        first = count - count % self._chunk_rows
+        begin, size = first * self.dtype.itemsize, self._chunk_rows * self.dtype.itemsize
         try:
             with self._open() as file:
                 _allocate_disk_space(file.fileno(), begin, begin + size)
-                chunk = _map_rows(file, self.dtype, begin, self.chunk_rows, writable=True)
+                return first, map_rows(file, self.dtype, first, self._chunk_rows, writable=True)
         except OSError as error:
             where = self._file if isinstance(self._file, Path) else tempfile.gettempdir()
             raise write_error(
                 f"cannot write {size / 1e6:.3g} MB of recorded rows to {where}: {error.strerror}",
                 error,
             ) from None
-        self._rows += self.chunk_rows
-        return chunk
-
-    def rewind(self, count: int) -> np.ndarray:
-        """Forget all but the first `count` rows, and return the chunk of the next row, mapped to the file."""
-        self._rows = count - count % self.chunk_rows
-        return self.add_chunk()
 
     def read_first(self, count: int) -> np.ndarray:
         """Return the first `count` rows, shape (count,), mapped to the file."""
         with self._open() as file:
-            return read_rows(file, self.dtype, count)
+            return map_rows(file, self.dtype, 0, count)
 
 
 class FileMapping:
@@ -148,15 +140,16 @@ def _c_library() -> Any:
     return library
 
 
-def _map_rows(
-    file: IO[bytes], dtype: np.dtype[Any], begin: int, count: int, writable: bool
+def map_rows(
+    file: IO[bytes], dtype: np.dtype[Any], first: int, count: int, writable: bool = False
 ) -> np.ndarray:
-    """Map `count` rows from byte `begin` on."""
+    """Map `count` rows of a file from row `first` on, shape (count,)."""
+    if not count:
+        return np.zeros(0, dtype)
+    begin, size = first * dtype.itemsize, count * dtype.itemsize
     if sys.platform == "win32":
         return np.memmap(file, dtype, "r+" if writable else "r", begin, (count,))
-    return np.asarray(FileMapping(file.fileno(), begin, count * dtype.itemsize, writable)).view(
-        dtype
-    )
+    return np.asarray(FileMapping(file.fileno(), begin, size, writable)).view(dtype)
 
 
 def open_row_store(dtype: np.dtype[Any], expected: int, path: Path | None) -> RowStore:
@@ -170,38 +163,6 @@ def open_row_store(dtype: np.dtype[Any], expected: int, path: Path | None) -> Ro
     if path is None and expected * dtype.itemsize <= MAX_MEMORY_BYTES:
         return RowStore(dtype, expected)
     return FileRowStore(dtype, expected, path or TemporaryFile())
-
-
-def compute_in_chunks(
-    count: int, fill: Callable[[range], np.ndarray], dtype: np.dtype[Any]
-) -> np.ndarray:
-    """Compute an array piece by piece; a large one is stored in a temporary file.
-
-    Args:
-        count: Number of values.
-        fill: Returns the values at a range of indices.
-        dtype: Type of the values.
-
-    Returns:
-        All values, shape (count,).
-    """
-    store = open_row_store(dtype, count, None)
-    for begin in range(0, count, store.chunk_rows):
-        chunk = store.add_chunk()[: count - begin]
-        for first in range(0, len(chunk), BATCH_VALUES):
-            piece = fill(range(begin + first, begin + min(len(chunk), first + BATCH_VALUES)))
-            chunk[first : first + len(piece)] = piece
-    return store.read_first(count)
-
-
-def read_rows(file: Path | IO[bytes], dtype: np.dtype[Any], count: int) -> np.ndarray:
-    """Return the first `count` rows of a file, shape (count,), mapped to memory."""
-    if not count or not dtype.itemsize:
-        return np.zeros(count, dtype)
-    if isinstance(file, Path):
-        with file.open("rb") as opened:
-            return _map_rows(opened, dtype, 0, count, writable=False)
-    return _map_rows(file, dtype, 0, count, writable=False)
 
 
 def _allocate_disk_space(file: int, begin: int, end: int) -> None:

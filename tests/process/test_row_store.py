@@ -9,7 +9,7 @@ from systems import endpoint, make_system
 
 from cosim.engine.run_loop import simulate
 from cosim.engine.settings import Settings
-from cosim.process.run_files.row_store import FileMapping, read_rows
+from cosim.process.row_store import FileMapping
 from cosim.results.csv_files import read_csv, write_csv
 from cosim.results.files import _memory_map
 
@@ -28,8 +28,9 @@ def recorded(every=1, **more):
 
 @pytest.fixture
 def small_chunks(monkeypatch):
-    for name, value in (("CHUNK_BYTES", 1000), ("BATCH_VALUES", 7), ("MAX_MEMORY_BYTES", 0)):
-        monkeypatch.setattr(f"cosim.process.run_files.row_store.{name}", value)
+    for name, value in (("CHUNK_BYTES", 1000), ("MAX_MEMORY_BYTES", 0)):
+        monkeypatch.setattr(f"cosim.process.row_store.{name}", value)
+    monkeypatch.setattr("cosim.engine.recorder.MAX_MEMORY_BYTES", 0)
 
 
 @pytest.mark.usefixtures("small_chunks")
@@ -51,11 +52,11 @@ def test_rows_of_every_nth_step_have_the_right_times():
 
 def test_rows_are_stored_in_the_given_file(tmp_path):
     recording = recorded(rows_file=tmp_path / "rows")
-    dtype = np.dtype([("y", np.float64), ("n", np.int32), ("gap", np.int32)])
-    assert (
-        read_rows(tmp_path / "rows", dtype, STEPS + 1)["n"].tolist()
-        == recording.columns["a.n"].tolist()
-    )
+    dtype = np.dtype([("t", np.float64), ("y", np.float64), ("n", np.int32), ("gap", np.int32)])
+    rows = np.fromfile(tmp_path / "rows", dtype)
+    assert len(rows) == STEPS + 1
+    assert rows["t"].tolist() == recording.time.tolist()
+    assert rows["n"].tolist() == recording.columns["a.n"].tolist()
 
 
 @pytest.mark.usefixtures("small_chunks")
@@ -67,7 +68,7 @@ def test_csv_is_written_from_a_file_of_rows(tmp_path):
     assert again.columns["a.y"].tolist() == recording.columns["a.y"].tolist()
 
 
-def test_rows_without_signals_have_no_bytes(tmp_path):
+def test_rows_without_signals_contain_times(tmp_path):
     settings = Settings(Fraction(0), Fraction(1), Fraction(1, 100), rows_file=tmp_path / "rows")
     recording = simulate(make_system({"a": counter()}), settings).recording
     assert len(recording.time) == 101

@@ -1,1 +1,0 @@
-"""Files on disk of a run in progress."""
