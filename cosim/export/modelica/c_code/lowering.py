@@ -15,7 +15,7 @@ from ..model.arithmetic import EvaluationError
 from ..model.evaluate import Evaluator
 from ..model.flat_model import Function
 from ..model.syntax_tree import Expression, SourceLocation, raise_model_error
-from ..model.traversal import walk
+from ..model.traversal import is_call, walk
 from .c_values import (
     C_TYPES,
     CExpression,
@@ -183,11 +183,7 @@ class Lowering:
             if left is None or right is None:
                 return None
             return {"+": left + right, "-": left - right, "*": left * right}[node.operator]
-        if (
-            isinstance(node, syntax_tree.Builtin)
-            and node.name == "size"
-            and len(node.arguments) == 2
-        ):
+        if is_call(node, "size") and len(node.arguments) == 2:
             dimension = self.static_integer(node.arguments[1])
             return None if dimension is None else self.shape_of(node.arguments[0])[dimension - 1]
         value = self.static_value(node) if isinstance(node, syntax_tree.Builtin) else None

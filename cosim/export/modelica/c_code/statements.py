@@ -9,7 +9,12 @@ from itertools import chain
 from ..external.c_files import call_signature
 from ..model import syntax_tree
 from ..model.syntax_tree import Body, Expression, Statement, raise_model_error
-from ..model.traversal import assigned_references, composed_asserts, read_references, variable_names
+from ..model.traversal import (
+    assigned_names,
+    composed_asserts,
+    read_references,
+    variable_names,
+)
 from .c_values import CExpression, CValue, c_identifier, scalar_value
 from .expressions import ExpressionLowering
 
@@ -145,9 +150,9 @@ class StatementLowering(ExpressionLowering):
         step = self.static_integer(node.range.step) if node.range.step else 1
         if not step:
             raise_model_error("the step of a for-loop must be a constant other than 0", node.where)
-        if not stop.code.lstrip("-").isdigit() and _variables_read(node.range.stop) & {
-            syntax_tree.referenced_variable(t) for t in assigned_references(node.body)
-        }:
+        if not stop.code.lstrip("-").isdigit() and _variables_read(
+            node.range.stop
+        ) & assigned_names(node.body):
             stop = self.evaluated_once(scalar_value("Integer", stop)).text
         index = c_identifier(node.index)
         first, last = self.static_integer(node.range.start), self.static_integer(node.range.stop)

@@ -15,6 +15,7 @@ from typing import Any
 from ..model import syntax_tree
 from ..model.builtin_functions import SPELLINGS
 from ..model.syntax_tree import Expression, SourceLocation, raise_model_error
+from ..model.traversal import is_call
 from .model_files import ModelicaSources
 
 Json = Mapping[str, Any]
@@ -191,11 +192,7 @@ class ExpressionReader:
 
     def _scalar_rows(self, rows: tuple[Expression, ...]) -> tuple[syntax_tree.Array, ...]:
         """Return the rows of a matrix as arrays if all their elements are certainly scalars, else no rows."""
-        columns = [
-            row.arguments
-            for row in rows
-            if isinstance(row, syntax_tree.Builtin) and row.name == "columns"
-        ]
+        columns = [row.arguments for row in rows if is_call(row, "columns")]
         elements = chain.from_iterable(columns)
         if len(columns) != len(rows) or not all(map(self._is_scalar, elements)):
             return ()

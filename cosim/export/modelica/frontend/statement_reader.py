@@ -17,7 +17,7 @@ from ..model.syntax_tree import (
     raise_model_error,
     referenced_variable,
 )
-from ..model.traversal import variable_names
+from ..model.traversal import is_call, variable_names
 from .expression_reader import ExpressionReader, Json, is_object_constructor, split_tagged
 from .model_files import MARK
 
@@ -240,7 +240,7 @@ class StatementReader(ExpressionReader):
 
 def message_parts(message: Expression) -> list[Expression]:
     """Return the terms of a concatenation of Strings; adjacent literals become one literal."""
-    if isinstance(message, syntax_tree.Builtin) and message.name == "String":
+    if is_call(message, "String"):
         return [message.arguments[0]]
     if not (isinstance(message, syntax_tree.Binary) and message.operator == "+"):
         return [message]
