@@ -6,13 +6,14 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, is_dataclass, replace
 from typing import Any, TypeGuard
 
-from . import syntax_tree
 from .flat_model import SECTIONS, Model
 from .syntax_tree import (
     Array,
     Assert,
     Assign,
+    Binary,
     Builtin,
+    Call,
     Colon,
     Comprehension,
     Expression,
@@ -22,6 +23,7 @@ from .syntax_tree import (
     Name,
     Solve,
     SourceLocation,
+    Unary,
     referenced_variable,
 )
 
@@ -184,24 +186,24 @@ def to_text(node: Expression | Colon) -> str:
 
     Operands that are operations themselves are in parentheses.
     """
-    if isinstance(node, syntax_tree.Literal):
+    if isinstance(node, Literal):
         return str(node.value).lower() if isinstance(node.value, bool) else str(node.value)
-    if isinstance(node, syntax_tree.Name):
+    if isinstance(node, Name):
         return node.name
-    if isinstance(node, syntax_tree.Index):
+    if isinstance(node, Index):
         return f"{to_text(node.base)}[{', '.join(map(to_text, node.subscripts))}]"
-    if isinstance(node, syntax_tree.Binary):
+    if isinstance(node, Binary):
         return f"{_operand(node.left)} {node.operator} {_operand(node.right)}"
-    if isinstance(node, syntax_tree.Unary):
+    if isinstance(node, Unary):
         return f"{node.operator}{' ' * (node.operator == 'not')}{_operand(node.operand)}"
-    if isinstance(node, syntax_tree.Builtin):
+    if isinstance(node, Builtin):
         return f"{node.name}({', '.join(map(to_text, node.arguments))})"
-    if isinstance(node, syntax_tree.Call):
+    if isinstance(node, Call):
         return f"{node.function}({', '.join(map(to_text, node.arguments))})"
-    if isinstance(node, syntax_tree.Array):
+    if isinstance(node, Array):
         return f"{{{', '.join(map(to_text, node.elements))}}}"
     return ":" if isinstance(node, Colon) else "..."
 
 
 def _operand(node: Expression) -> str:
-    return f"({to_text(node)})" if isinstance(node, syntax_tree.Binary) else to_text(node)
+    return f"({to_text(node)})" if isinstance(node, Binary) else to_text(node)
