@@ -13,27 +13,25 @@ from cosim.core.errors import InputError, Problem, did_you_mean
 
 from .vehicles.common.inertia import inertia_of
 from .vehicles.common.interface import VESSEL_STATES
-from .vehicles.common.visual_mesh import read_visual
+from .vehicles.common.vehicle_reader import read_visual
 from .vehicles.data import read_vehicle_files
 from .vehicles.model import Model
 from .vehicles.multirotor import interface as multirotor_interface
-from .vehicles.multirotor.airframe import MAX_ROTORS
-from .vehicles.multirotor.vehicle_data import read_multirotor
-from .vehicles.otter import geometry as otter
+from .vehicles.multirotor.airframe import MAX_ROTORS, MultirotorReader
 from .vehicles.otter import interface as otter_interface
+from .vehicles.otter import parameters as otter
 from .vehicles.otter import parameters as otter_parameters
 from .vehicles.planar_vessel import interface as planar_vessel_interface
-from .vehicles.planar_vessel.vehicle_data import read_planar_vessel
-from .vehicles.strider import geometry as strider
+from .vehicles.planar_vessel.planar_vessel import PlanarVesselReader
 from .vehicles.strider import interface as strider_interface
+from .vehicles.strider import parameters as strider
 from .vehicles.strider import parameters as strider_parameters
-from .vehicles.strider_6dof import geometry as strider_6dof
 from .vehicles.strider_6dof import interface as strider_6dof_interface
+from .vehicles.strider_6dof import parameters as strider_6dof
 from .vehicles.submerged import interface as submerged_interface
-from .vehicles.submerged.craft import MAX_THRUSTERS
-from .vehicles.submerged.vehicle_data import read_submerged
+from .vehicles.submerged.craft import MAX_THRUSTERS, SubmergedReader
 from .vehicles.surface_vessel import interface as surface_vessel_interface
-from .vehicles.surface_vessel.vehicle_data import read_surface_vessel
+from .vehicles.surface_vessel.surface_vessel import SurfaceVesselReader
 from .vehicles.vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS
 
 #: lists of a vehicle file whose elements may name a link of a URDF file in place of position and
@@ -49,16 +47,16 @@ SLOTS = (MAX_PROPELLERS, MAX_RUDDERS)
 
 def multirotor_model(name: str, data: Mapping[str, Any]) -> Model:
     """Return the model of a multirotor. Raises InputError with all problems of its data."""
-    vehicle = read_multirotor(name, data, COMMON_KEYS)
-    airframe = vehicle.airframe
+    vehicle = MultirotorReader().read(name, data, COMMON_KEYS)
+    airframe = vehicle.vehicle
     return Model(
         name,
         multirotor_interface.variables(airframe),
         multirotor_interface.states(MAX_ROTORS),
-        airframe.body(vehicle.boxes_in),
+        vehicle.body(),
         vehicle.crash_speed,
         airframe=airframe,
-        body_of=lambda given: vehicle.body_with(given["mass"], inertia_of(given)),
+        body_of=lambda given: vehicle.body(mass=given["mass"], inertia=inertia_of(given)),
         equations="multirotor",
         layout=multirotor_interface.variables(airframe, MAX_ROTORS),
     )
@@ -66,16 +64,16 @@ def multirotor_model(name: str, data: Mapping[str, Any]) -> Model:
 
 def submerged_model(name: str, data: Mapping[str, Any]) -> Model:
     """Return the model of a submerged vehicle. Raises InputError with all problems of its data."""
-    vehicle = read_submerged(name, data, COMMON_KEYS)
-    craft = vehicle.craft
+    vehicle = SubmergedReader().read(name, data, COMMON_KEYS)
+    craft = vehicle.vehicle
     return Model(
         name,
         submerged_interface.variables(craft),
         submerged_interface.states(MAX_THRUSTERS),
-        craft.body(vehicle.boxes_in),
+        vehicle.body(),
         vehicle.crash_speed,
         craft=craft,
-        body_of=lambda given: vehicle.body_with(given["mass"], inertia_of(given)),
+        body_of=lambda given: vehicle.body(mass=given["mass"], inertia=inertia_of(given)),
         equations="submerged",
         layout=submerged_interface.variables(craft, MAX_THRUSTERS),
     )
@@ -83,17 +81,17 @@ def submerged_model(name: str, data: Mapping[str, Any]) -> Model:
 
 def surface_vessel_model(name: str, data: Mapping[str, Any]) -> Model:
     """Return the model of a floating vessel. Raises InputError with all problems of its data."""
-    vehicle = read_surface_vessel(name, data, COMMON_KEYS)
-    vessel = vehicle.vessel
+    vehicle = SurfaceVesselReader().read(name, data, COMMON_KEYS)
+    vessel = vehicle.vehicle
     return Model(
         name,
         surface_vessel_interface.variables(vessel),
         surface_vessel_interface.states(MAX_PROPELLERS),
-        vehicle.body_with(vessel.mass, vessel.inertia),
+        vehicle.body(),
         vehicle.crash_speed,
         is_vessel=True,
         boat=vessel,
-        body_of=lambda given: vehicle.body_with(given["mass"], inertia_of(given)),
+        body_of=lambda given: vehicle.body(mass=given["mass"], inertia=inertia_of(given)),
         equations="surface_vessel",
         layout=surface_vessel_interface.variables(vessel, SLOTS),
     )
@@ -101,18 +99,18 @@ def surface_vessel_model(name: str, data: Mapping[str, Any]) -> Model:
 
 def planar_vessel_model(name: str, data: Mapping[str, Any]) -> Model:
     """Return the model of a planar vessel. Raises InputError with all problems of its data."""
-    vehicle = read_planar_vessel(name, data, COMMON_KEYS)
-    vessel = vehicle.vessel
+    vehicle = PlanarVesselReader().read(name, data, COMMON_KEYS)
+    vessel = vehicle.vehicle
     return Model(
         name,
         planar_vessel_interface.variables(vessel),
         planar_vessel_interface.states(MAX_PROPELLERS),
-        vehicle.body_with(vessel.mass, vessel.yaw_inertia),
+        vehicle.body(),
         vehicle.crash_speed,
         is_vessel=True,
         motion="planar",
         boat=vessel,
-        body_of=lambda given: vehicle.body_with(given["mass"], given["yaw_inertia"]),
+        body_of=lambda given: vehicle.body(mass=given["mass"], yaw_inertia=given["yaw_inertia"]),
         equations="planar_vessel",
         layout=planar_vessel_interface.variables(vessel, SLOTS),
     )

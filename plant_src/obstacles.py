@@ -15,7 +15,7 @@ from cosim.core.errors import InputError
 from .json_reader import JsonPath, JsonReader
 from .placement import DRY, ContactSurface, read_surface
 from .vehicles.common.shapes import Vector
-from .vehicles.common.visual_mesh import read_triangles
+from .vehicles.common.vehicle_reader import read_triangles
 
 #: colour of obstacles without "colour": concrete
 CONCRETE: Vector = (0.62, 0.61, 0.58)

@@ -30,7 +30,7 @@ def _html(result: Result) -> str:
 
 
 def _write_report(folder: Path) -> None:
-    from ..report.finished_run import write_folder_report
+    from ..report.run_page import write_folder_report
 
     write_folder_report(folder, folder / "report.html")
 

@@ -82,7 +82,7 @@ class ComparisonTask(NamedTuple):
 
     def figure(self, comparison: Comparison) -> NamedCall:
         """Return name, function and arguments of the figure with the largest deviations."""
-        from ..report.comparison_figure import draw_tubes
+        from ..report.comparison_figures import draw_tubes
 
         arguments = {
             "reference": self.reference,

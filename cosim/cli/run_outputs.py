@@ -162,7 +162,7 @@ def _report_failed_run(partial: Result, folder: Path, options: RunOptions, exit_
     Returns:
         The exit code.
     """
-    from ..report.finished_run import write_folder_report
+    from ..report.run_page import write_folder_report
 
     files = ["result.csv", "run.json"] if len(partial.time) else []
     if files and not options.no_report:

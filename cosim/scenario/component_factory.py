@@ -6,10 +6,17 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from ..components.fmi import FmuFile, InstanceSettings, Interface, Isolation, create_component
+from ..components.fmi import (
+    FmuFile,
+    InstanceSettings,
+    Interface,
+    Isolation,
+    create_component,
+    open_fmu,
+)
 from ..core.component import Component
 from ..core.paths import resolve_path
-from ..export.foreign.source_fmus import usable_fmu
+from ..export.foreign import add_binary
 from .sources import Creation
 
 
@@ -51,10 +58,10 @@ class ComponentFactory:
         needs_own_process = used is not None and used.description.once_per_process
         if used is None:
             loaded = None if interface else self._loaded_fmus.get(key[0])
-            self.fmus[key] = loaded or usable_fmu(path, interface)
+            self.fmus[key] = loaded or open_fmu(path, interface, add_binary)
         elif needs_own_process:
             # its process must not inherit the library that is loaded in this one
-            self.fmus[key] = usable_fmu(path, interface)
+            self.fmus[key] = open_fmu(path, interface, add_binary)
         file = self.fmus[key]
         settings = settings.with_structural_parameters(file.description, creation.values)
         isolated = isolated or self._isolate_fmus or needs_own_process

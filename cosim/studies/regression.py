@@ -50,9 +50,7 @@ def has_keys(file: Path, *groups: Sequence[str]) -> bool:
             content = read_system_document(file).value
     except (OSError, ValueError, RecursionError, InputError):
         return True
-    return isinstance(content, dict) and all(
-        any(content.get(key) for key in group) for group in groups
-    )
+    return isinstance(content, dict) and all(any(map(content.get, group)) for group in groups)
 
 
 @dataclass(frozen=True)
@@ -309,7 +307,7 @@ class _FinishedRun:
 
     def draw_tubes(self, comparison: Comparison, path: Path) -> Path:
         """Draw the worst signals in their tubes to a file and return its path."""
-        from ..report.comparison_figure import draw_tubes
+        from ..report.comparison_figures import draw_tubes
         from ..report.figures import draw_figure, save_figure
 
         arguments = {

@@ -21,8 +21,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..placement import DRY, ContactSurface
+from ..vehicles.common.interface import MAX_STATE_NORM
 from ..vehicles.common.shapes import Body, Box, ConvexPiece, Shape
-from ..vehicles.common.step_status import MAX_STATE_NORM
 from .clearance import BoundingBox
 from .client import pybullet
 from .convex_pieces import mesh_file

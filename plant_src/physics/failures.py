@@ -18,7 +18,7 @@ from typing import Any
 import numpy as np
 
 from ..placement import VehiclePlacement
-from ..vehicles.common.step_status import MAY_FAIL
+from ..vehicles.common.interface import MAY_FAIL
 from .body import ContactBody
 
 #: indices of the flags of a vehicle, in the order of its Boolean variables

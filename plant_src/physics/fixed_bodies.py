@@ -9,8 +9,7 @@ import numpy as np
 
 from ..obstacles import Obstacle
 from ..placement import Platform
-from ..vehicles.common.convex_points import outermost_points
-from ..vehicles.common.shapes import ConvexPiece
+from ..vehicles.common.shapes import ConvexPiece, outermost_points
 from .body import create_compound_shape, create_platform, set_dynamics
 from .clearance import BoundingBox
 from .client import pybullet

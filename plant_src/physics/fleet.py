@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..placement import VehiclePlacement
-from ..vehicles.common.step_status import INVALID_STATE, LEAVES_SAFE_BOX, MAY_FAIL
+from ..vehicles.common.interface import INVALID_STATE, LEAVES_SAFE_BOX, MAY_FAIL
 from .body import ContactBody, InvalidStateError, state_sizes
 from .clearance import BoundingBox, Clearance
 from .client import pybullet

@@ -16,7 +16,7 @@ from ..physics.body import create_compound_shape, set_dynamics
 from ..physics.client import pybullet
 from ..vehicles.common.inertia import principal_axes
 from ..vehicles.common.shapes import quaternion_from_matrix
-from ..vehicles.strider import geometry as strider
+from ..vehicles.strider import parameters as strider
 from ..vehicles.strider.parameters import RUDDER_ARM
 
 #: mass of each of the two links of the published joint rig (kg); 4.31 kg move in x, 4.21 kg in y

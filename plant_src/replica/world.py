@@ -23,8 +23,8 @@ from ..physics.client import connect, pybullet
 from ..placement import Platform, VehiclePlacement
 from ..scene import replay
 from ..variable_views import recorded_others
+from ..vehicles.common.interface import MAX_STATE_NORM
 from ..vehicles.common.shapes import Box
-from ..vehicles.common.step_status import MAX_STATE_NORM
 from .bodies import Quadcopter, Vessel
 from .interface import INPUTS, OUTPUTS
 

@@ -18,7 +18,7 @@ from ..obstacles import Obstacle
 from ..vehicles.common.shapes import Body, Quaternion, Shape, Vector
 from ..vehicles.model import Model
 from ..vehicles.multirotor.airframe import Airframe, Rotor
-from ..vehicles.strider import geometry as strider_geometry
+from ..vehicles.strider import parameters as strider_geometry
 from ..vehicles.strider.parameters import (
     DECK_TOP,
     DECK_X,

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from typing import Any
 
 from ..catalogue import COMMON_KEYS
-from ..vehicles.common.quantities import TEXT_KEYS
+from ..vehicles.common.vehicle_reader import TEXT_KEYS
 
 Schema = dict[str, Any]
 

@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ..catalogue import FAMILIES
-from ..vehicles.multirotor import vehicle_data as multirotor
-from ..vehicles.submerged import vehicle_data as submerged
+from ..vehicles.multirotor import airframe as multirotor
+from ..vehicles.submerged import craft as submerged
 from .parts import (
     Schema,
     family_schema,

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-from ..vehicles.planar_vessel import vehicle_data as planar
-from ..vehicles.surface_vessel import vehicle_data as surface
+from ..vehicles.planar_vessel import planar_vessel as planar
+from ..vehicles.surface_vessel import surface_vessel as surface
 from ..vehicles.vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS
 from .parts import (
     TEXT,

@@ -10,11 +10,11 @@ from cosim.core.errors import InputError, Problem
 from cosim.export.fmu.block import Block
 
 from ..catalogue import FAMILIES, model_from_data
-from ..vehicles.multirotor.multirotor_equations import multirotor_block
-from ..vehicles.planar_vessel.planar_equations import planar_vessel_block
+from ..vehicles.multirotor.equations import multirotor_block
+from ..vehicles.planar_vessel.equations import planar_vessel_block
 from ..vehicles.planar_vessel.planar_vessel import PlanarVessel
-from ..vehicles.submerged.submerged_equations import submerged_block
-from ..vehicles.surface_vessel.floating_equations import surface_vessel_block
+from ..vehicles.submerged.equations import submerged_block
+from ..vehicles.surface_vessel.equations import surface_vessel_block
 from ..vehicles.surface_vessel.surface_vessel import SurfaceVessel
 
 

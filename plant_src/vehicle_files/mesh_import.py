@@ -16,8 +16,8 @@ import numpy as np
 
 from cosim.core.errors import InputError, Problem, nearest_file
 
-from ..vehicles.common.convex_points import outermost_points
-from ..vehicles.common.visual_mesh import MAX_TRIANGLES
+from ..vehicles.common.shapes import outermost_points
+from ..vehicles.common.vehicle_reader import MAX_TRIANGLES
 
 _DIGITS = 6  # of coordinates in vehicle files (m)
 

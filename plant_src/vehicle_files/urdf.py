@@ -19,7 +19,7 @@ from cosim.core.errors import InputError, Problem, did_you_mean
 
 from ..catalogue import NAMED_LISTS
 from ..vehicles.common.inertia import inertia_problems
-from ..vehicles.common.quantities import QuantityReader
+from ..vehicles.common.vehicle_reader import QuantityReader
 from . import mesh_import
 from .mesh_import import ImportedVehicle
 from .primitive_shapes import box_triangles, cylinder_triangles, sphere_triangles

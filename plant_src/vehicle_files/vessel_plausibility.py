@@ -12,7 +12,7 @@ import numpy as np
 
 from cosim.core.errors import Problem
 
-from ..vehicles.common.quantities import RADIANS_EXPECTED
+from ..vehicles.common.vehicle_reader import RADIANS_EXPECTED
 from ..vehicles.planar_vessel.planar_vessel import PlanarVessel
 from ..vehicles.submerged.craft import Craft
 from ..vehicles.surface_vessel.surface_vessel import SurfaceVessel

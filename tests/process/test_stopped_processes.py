@@ -25,7 +25,7 @@ def settings(monkeypatch):
     such as servers of tests.
     """
     monkeypatch.setattr("cosim.process.supervisor.STOP_TIMEOUT", 0.2)
-    monkeypatch.setattr("cosim.process.supervisor._child_processes", list)
+    monkeypatch.setattr("cosim.process.supervisor.child_processes", list)
 
 
 def supervise(work, journal: Journal):

@@ -4,7 +4,7 @@ import csv
 
 from matplotlib.figure import Figure
 
-from cosim.report.figure_data import write_figure_data
+from cosim.report.figures import write_figure_data
 
 
 def table(figure, folder):

@@ -16,8 +16,7 @@ from cosim.core import resources
 from cosim.core.errors import InputError
 from cosim.core.recording import Recording
 from cosim.report import pages
-from cosim.report.failure import find_failure
-from cosim.report.replay import replay_data
+from cosim.report.replay import find_failure, replay_data
 from cosim.report.run_page import write_report
 from cosim.results import Result, write_run
 from cosim.results.checks import CheckOutcome

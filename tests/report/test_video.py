@@ -11,8 +11,7 @@ import pytest
 from cosim.core import resources
 from cosim.core.errors import CosimError, InputError
 from cosim.core.recording import Recording
-from cosim.report.frames import RenderJob, render_frames
-from cosim.report.video import find_frame_source, write_video
+from cosim.report.video import RenderJob, find_frame_source, render_frames, write_video
 from cosim.results import Result
 
 FRAMES = """

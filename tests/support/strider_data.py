@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from plant_src.vehicles.strider import geometry
+from plant_src.vehicles.strider import parameters as geometry
 from plant_src.vehicles.strider import parameters as p
 from plant_src.vehicles.strider_6dof import parameters as p6
 

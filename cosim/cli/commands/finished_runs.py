@@ -58,9 +58,9 @@ def plot(
     Several RESULTs have separate folders in the output directory; the figure of --timings is
     written next to these.
     """
+    from ...report.comparison_figures import draw_timings
     from ...report.figures import draw_figures
     from ...report.runs import load_figures, read_run
-    from ...report.timings import draw_timings
     from ...report.video import write_video
 
     suffixes = [f".{name}" for name in formats]
@@ -111,7 +111,7 @@ def report(result: Path, output_file: Path | None, reference: Path | None, open_
     RESULT is a folder written by `cosim run`. The page is a single file and needs no network.
     """
     from ...api.comparison import ComparisonTask, is_scenario
-    from ...report.finished_run import Deviation, write_folder_report
+    from ...report.run_page import Deviation, write_folder_report
     from ...results.comparison import Tolerance
     from ...studies.regression import accept_command
 

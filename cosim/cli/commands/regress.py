@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import re
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,8 +16,11 @@ from ..messages import print_json, print_outcome
 from ..options import complete_scenario, json_option
 
 if TYPE_CHECKING:
-    from ...report.junit import JUnitCase
     from ...studies.regression import RegressionOutcome
+
+#: name of the test suite in JUnit XML
+_SUITE = "cosim regress"
+_INVALID_XML_CHARACTERS = re.compile(r"[^\t\n\r\x20-\ud7ff\ue000-\ufffd\U00010000-\U0010ffff]")
 
 
 @click.command()
@@ -160,24 +165,48 @@ def regress(
         if not as_json:
             print_outcome(outcome)
     if junit:
-        from ...report.junit import write_junit
-
-        write_junit("cosim regress", [_junit_case(outcome) for outcome in outcomes], junit)
+        _write_junit(outcomes, junit)
     failed = sum(outcome.code != 0 for outcome in outcomes)
     if as_json:
         print_json({"failed": failed, "scenarios": [asdict(outcome) for outcome in outcomes]})
     else:
-        click.echo(
-            f"{count_noun(len(outcomes), 'scenario')}, "
-            f"{f'{failed} failed' if failed else 'all passed'}"
-        )
+        verdict = f"{failed} failed" if failed else "all passed"
+        click.echo(f"{count_noun(len(outcomes), 'scenario')}, {verdict}")
         if accepted := [outcome.accept for outcome in outcomes if outcome.accept]:
             click.echo(accept_command(accepted))
     return min((outcome.code for outcome in outcomes), key=EXIT_CODE_SEVERITY.index)
 
 
-def _junit_case(outcome: RegressionOutcome) -> JUnitCase:
-    from ...report.junit import JUnitCase
+def _write_junit(outcomes: Sequence[RegressionOutcome], file: Path) -> None:
+    """Write the outcomes as a JUnit XML file, which CI services read.
 
-    kind = {0: "passed", 3: "failure"}.get(outcome.code, "error")
-    return JUnitCase(outcome.name, kind, outcome.seconds, outcome.details)
+    A scenario without a result is an error, one whose result is not as expected is a failure.
+
+    Raises:
+        InputError: The file cannot be written.
+        OutputError: The disk is full or failed.
+    """
+    from xml.etree import ElementTree
+
+    from ...results.files import writing_atomically
+
+    kinds = [{0: "", 3: "failure"}.get(outcome.code, "error") for outcome in outcomes]
+    attributes = {
+        "name": _SUITE,
+        "tests": str(len(outcomes)),
+        "failures": str(kinds.count("failure")),
+        "errors": str(kinds.count("error")),
+        "time": f"{sum(outcome.seconds for outcome in outcomes):.3f}",
+    }
+    root = ElementTree.Element("testsuites")
+    suite = ElementTree.SubElement(root, "testsuite", attributes)
+    for outcome, kind in zip(outcomes, kinds, strict=True):
+        attributes = {"name": outcome.name, "time": f"{outcome.seconds:.3f}"}
+        case = ElementTree.SubElement(suite, "testcase", {"classname": _SUITE, **attributes})
+        if kind:
+            details = [_INVALID_XML_CHARACTERS.sub("?", line) for line in outcome.details]
+            problem = ElementTree.SubElement(case, kind, message=details[0] if details else "")
+            problem.text = "\n".join(details)
+    ElementTree.indent(root)
+    with writing_atomically(file) as temporary:
+        ElementTree.ElementTree(root).write(temporary, encoding="utf-8", xml_declaration=True)

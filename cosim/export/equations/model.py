@@ -16,13 +16,14 @@ Arguments and results must not overlap in memory.
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
+from typing import Self
 
 import casadi as ca
 
 from ...core.component import Variable
-from .c_code import Callee
+from .c_code import Callee, call_in_c
 
 
 @dataclass(frozen=True)
@@ -59,6 +60,19 @@ class ContinuousModel:
     derived_parameters: Callable[[ca.SX], ca.SX] | None = None
     #: functions with a hand-written C body that the expressions call
     callees: Sequence[Callee] = ()
+
+    def with_called_derivatives(self) -> Self:
+        """Return the model with its derivatives as one function in C.
+
+        All stages of the integration call it, so that the code is small.
+        """
+        symbols = [
+            ca.SX.sym("state", len(self.states)),
+            ca.SX.sym("inputs", len(self.elements("input"))),
+            self.derived_parameter_symbols(),
+        ]
+        rate = ca.Function("rate_of_change", symbols, [self.derivatives(*symbols)])
+        return replace(self, derivatives=lambda *arguments: call_in_c(rate, *arguments)[0])
 
     def derived_parameter_symbols(self) -> ca.SX:
         """Return symbols for the derived parameters, or for the parameters themselves if there are no derived ones."""

@@ -8,6 +8,6 @@ Two processes take part:
   between macro steps.
 - The supervising process serves the page. `live_view.LiveView` owns the HTTP server
   (`server.LiveServer`, one thread per request). `session.LiveSession` exchanges messages with the
-  simulation process through a pipe, with a thread that receives them. `feed.RowFeed` reads the
+  simulation process through a pipe, with a thread that receives them. `session.RowFeed` reads the
   recorded rows from the files of the run.
 """

@@ -224,7 +224,7 @@ class _Handler(BaseHTTPRequestHandler):
         self._send(HTTPStatus.OK, "text/html; charset=utf-8", text.encode())
 
     def _send_rows(self) -> None:
-        """Send one line of JSON with the state, then the rows as float32 (see `feed`)."""
+        """Send one line of JSON with the state, then the rows as float32 (see `session.RowFeed`)."""
         try:
             query = parse_qs(urlsplit(self.path).query)
             first, version = (int(query[name][0]) for name in ("first", "version"))

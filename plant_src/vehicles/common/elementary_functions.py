@@ -29,6 +29,11 @@ _ROUNDING_MAGIC = 1.5 * 2.0**52
 _SQUARINGS = 8
 
 
+def clamp(value: ca.SX) -> ca.SX:
+    """Return the value limited to 0 ... 1."""
+    return ca.fmin(ca.fmax(value, 0), 1)
+
+
 def sine_and_cosine(angle: ca.SX) -> tuple[ca.SX, ca.SX]:
     """Return sin and cos of |angle| < 1e6 rad.
 
@@ -89,7 +94,11 @@ def logarithm(x: ca.SX) -> ca.SX:
 
 
 def _polynomial(coefficients: Sequence[float], x: ca.SX) -> ca.SX:
-    """Evaluate a polynomial, lowest power first, by Estrin's scheme, whose operations can run in parallel."""
+    """Evaluate a polynomial, lowest power first, by Estrin's scheme.
+
+    It adds pairs of terms and squares x, so that its operations can run in parallel; Horner's
+    scheme is one chain (Muller, "Elementary Functions", 3rd edition, section 5.3).
+    """
     terms = [ca.SX(coefficient) for coefficient in coefficients]
     while len(terms) > 1:
         terms = [

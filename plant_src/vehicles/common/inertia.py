@@ -16,20 +16,26 @@ from .shapes import Body, Shape, quaternion_from_matrix
 #: principal axes
 Boxes = Callable[[np.ndarray], tuple[Shape, ...]]
 
+#: relative rounding error of the elements of a matrix
+_TOLERANCE = 1e-9
+
 #: parameter -> row and column in the symmetric inertia tensor
 INERTIA_INDICES = {
-    f"inertia.{'xyz'[i]}{'xyz'[j]}": (i, j)
-    for i, j in ((0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2))
+    "inertia.xx": (0, 0),
+    "inertia.yy": (1, 1),
+    "inertia.zz": (2, 2),
+    "inertia.xy": (0, 1),
+    "inertia.xz": (0, 2),
+    "inertia.yz": (1, 2),
 }
 
 
 def inertia_variables(mass: float, inertia: np.ndarray, mass_text: str) -> tuple[Variable, ...]:
-    """Return the parameters `mass` (kg) and `inertia.*` (kg m2, about the centre of mass, body frame)."""
+    """Return the parameters `mass` (kg) and `inertia.*` (kg m2, centre of mass, body frame)."""
     text = "inertia tensor about the centre of mass, body frame, rotors locked"
-    elements = {name: float(inertia[place]) for name, place in INERTIA_INDICES.items()}
     tensor = (
-        scalar_variable(name, "kg.m2", f"{text}: {name[-2:]}", "parameter", value)
-        for name, value in elements.items()
+        scalar_variable(name, "kg.m2", f"{text}: {name[-2:]}", "parameter", float(inertia[place]))
+        for name, place in INERTIA_INDICES.items()
     )
     return (scalar_variable("mass", "kg", mass_text, "parameter", mass), *tensor)
 
@@ -65,18 +71,32 @@ def inertia_problems(inertia: np.ndarray) -> Iterator[str]:
             )
 
 
+def symmetry_problems(matrix: np.ndarray) -> Iterator[str]:
+    """Yield a message if a matrix is not symmetric."""
+    if not np.allclose(matrix, matrix.T, rtol=_TOLERANCE, atol=0):
+        yield "expected a symmetric matrix"
+
+
+def eigenvalue_problems(matrix: np.ndarray) -> Iterator[str]:
+    """Yield a message if the symmetric part of a matrix is not positive semi-definite.
+
+    The kinetic energy of added mass and the power that damping takes away would be negative for
+    some motion.
+    """
+    lowest = float(np.linalg.eigvalsh((matrix + matrix.T) / 2)[0])
+    if lowest < -_TOLERANCE * np.abs(matrix).max():
+        yield f"found the eigenvalue {lowest:g}, expected none below 0"
+
+
 def _moments_text(moments: np.ndarray, axes: np.ndarray) -> str:
     """Return principal moments with their axes in words, in the order of the nearest body axes."""
+    nearest = np.argmax(np.abs(axes), axis=0)
     texts = []
-    for moment, axis in sorted(
-        zip(moments, axes.T, strict=True), key=lambda pair: int(np.argmax(np.abs(pair[1])))
-    ):
-        largest = int(np.argmax(np.abs(axis)))
-        components = ", ".join(
-            f"{round(component / np.sign(axis[largest]), 2) + 0.0:g}" for component in axis
-        )
-        name = "xyz"[largest] if abs(axis[largest]) > 1 - 1e-9 else f"[{components}]"
-        texts.append(f"{moment:.4g} about {name}")
+    for k in np.argsort(nearest, kind="stable"):
+        axis, largest = axes[:, k], axes[nearest[k], k]
+        components = ", ".join(f"{round(x / np.sign(largest), 2) + 0.0:g}" for x in axis)
+        name = "xyz"[nearest[k]] if abs(largest) > 1 - 1e-9 else f"[{components}]"
+        texts.append(f"{moments[k]:.4g} about {name}")
     return ", ".join(texts)
 
 

@@ -1,6 +1,4 @@
-"""Variables that vehicles have in common.
-
-Names, units and order, for the plant FMUs and for the world.
+"""Variables that vehicles have in common: names, units and order, for the plant FMUs and the world.
 
 World frame: x east, y north, z up. Body frame: x forward, y left, z up, origin at the centre of
 mass. Rotations follow the right-hand rule: positive roll lifts the left side, positive pitch lowers
@@ -13,6 +11,17 @@ from collections.abc import Sequence
 
 from cosim.core.component import Causality, Variability, Variable
 from cosim.core.units import parse_unit
+
+#: status codes of a predicted step, which the compiled equations report before anything has moved:
+#: valid; the vehicle leaves the box in which it cannot meet anything; an input or the state is not
+#: finite, or too large. LEAVES_SAFE_BOX and MAY_FAIL are added if both apply.
+VALID, LEAVES_SAFE_BOX, INVALID_STATE = 0.0, 1.0, 2.0
+
+#: the vehicle ends upside down, or a multirotor where the water surface may be
+MAY_FAIL = 4.0
+
+#: norm of the state (m, m/s, rad, rad/s) from which the motion counts as diverged
+MAX_STATE_NORM = 1e5
 
 
 def vector_variables(
@@ -268,3 +277,21 @@ def initial_variables(
             "initial.rates", rate_axes, "rad/s", "initial angular velocity, body frame", "parameter"
         ),
     )
+
+
+def element_labels(labels: Sequence[str], slots: int, count: str) -> str:
+    """Return the labels of all elements of an array.
+
+    If it has more elements than labels, return which elements are in use.
+
+    Args:
+        labels: Place of each part in words.
+        slots: Number of elements of the array.
+        count: Name of the parameter that is the number of parts, or the largest number.
+
+    >>> element_labels(["port", "starboard"], 2, "rudder_count")
+    'port, starboard'
+    >>> element_labels(["port", "starboard"], 16, "rudder_count")
+    '1 to rudder_count'
+    """
+    return ", ".join(labels) if len(labels) == slots else f"1 to {count}"

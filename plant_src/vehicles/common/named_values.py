@@ -57,6 +57,17 @@ def values_by_name(vector: ca.SX, variables: Sequence[Variable]) -> NamedValues:
     )
 
 
+def vector_rows(values: NamedValues, group: str) -> ca.SX:
+    """Return the vectors `group.x|y|z` of several parts, shape (parts, 3)."""
+    return ca.horzcat(*(values[f"{group}.{axis}"] for axis in "xyz"))
+
+
+def square_matrix(elements: ca.SX) -> ca.SX:
+    """Return the matrix whose rows follow each other in `elements`."""
+    size = round(elements.numel() ** 0.5)
+    return ca.reshape(elements, size, size).T
+
+
 def initial_parameters(parameters: NamedValues) -> dict[str, ca.SX]:
     """Return the parameters `initial.*`."""
     return {name: value for name, value in parameters.items() if name.startswith("initial.")}

@@ -20,7 +20,7 @@ RIGID_BODY_STATE_COUNT = len(FREE_STATES)
 
 
 class RigidBody(NamedTuple):
-    """Mass (kg), inertia about the centre of mass (kg m2, body frame, shape (3, 3)) and the inverse of the inertia."""
+    """Mass (kg), inertia about the centre of mass (kg m2, body frame, (3, 3)) and its inverse."""
 
     mass: ca.SX
     inertia: ca.SX
@@ -77,6 +77,27 @@ def rigid_body_rate(
         acceleration,
         body.inverse_inertia @ moment,
     )
+
+
+def lagging_speeds(
+    speed: ca.SX, target: ca.SX, lag: ca.SX, step: ca.SX
+) -> tuple[ca.SX, ca.SX, ca.SX]:
+    """Return speeds with a first-order lag at the start, the middle and the end of a step.
+
+    They are the exact solution for held commands: the difference to the command decays by
+    exp(-t / lag). Without a lag (0) the speeds equal their commands.
+
+    Args:
+        speed: Speeds of the state (rad/s).
+        target: Commanded speeds (rad/s).
+        lag: Time constant (s).
+        step: Length of the step (s).
+    """
+    start = ca.if_else(lag > 0, speed, target)
+    # fraction of the difference left after half a step; 0 without a lag
+    remaining = ca.exp(-step / 2 / lag)
+    middle, end = (target + fraction * (start - target) for fraction in (remaining, remaining**2))
+    return start, middle, end
 
 
 def normalised_state(state: ca.SX) -> ca.SX:

@@ -49,10 +49,16 @@ class ConvexPiece(NamedTuple):
     points: tuple[Vector, ...]
 
     @property
+    def size(self) -> Vector:
+        """Edges of the box around the piece (m)."""
+        x, y, z = np.ptp(self.points, axis=0).tolist()
+        return x, y, z
+
+    @property
     def half_extents(self) -> Vector:
         """Half of the edges of the box around the piece (m)."""
-        x, y, z = (np.ptp(self.points, axis=0) / 2).tolist()
-        return x, y, z
+        x, y, z = self.size
+        return x / 2, y / 2, z / 2
 
     @property
     def position(self) -> Vector:
@@ -72,6 +78,10 @@ class ConvexPiece(NamedTuple):
     def moved(self, offset: Vector) -> ConvexPiece:
         """Return the piece moved by `offset` (m)."""
         return ConvexPiece(tuple(_sum(point, offset) for point in self.points))
+
+    def shape_in(self, to_body: np.ndarray) -> ConvexPiece:
+        """Return the piece in the frame from which `to_body` (3, 3) rotates into that of the body."""
+        return ConvexPiece(tuple((x, y, z) for x, y, z in (self.corners() @ to_body).tolist()))
 
 
 def _sum(a: Vector, b: Vector) -> Vector:
@@ -127,3 +137,21 @@ def quaternion_from_matrix(rotation: np.ndarray) -> Quaternion:
     w = math.sqrt(1 + np.trace(rotation)) / 2
     x, y, z = (rotation[k - 1, k - 2] - rotation[k - 2, k - 1] for k in range(3))
     return float(x / (4 * w)), float(y / (4 * w)), float(z / (4 * w)), w
+
+
+#: largest number of points of a convex piece
+MAX_POINTS = 64
+
+
+def outermost_points(points: np.ndarray) -> np.ndarray:
+    """Return at most MAX_POINTS of the points (n, 3).
+
+    Those farthest in directions that lie evenly on a sphere.
+    """
+    if len(points) <= MAX_POINTS:
+        return points
+    height = 1 - 2 * (np.arange(MAX_POINTS) + 0.5) / MAX_POINTS
+    angle, radius = np.pi * (1 + 5**0.5) * np.arange(MAX_POINTS), np.sqrt(1 - height**2)
+    directions = np.column_stack([radius * np.cos(angle), radius * np.sin(angle), height])
+    chosen: np.ndarray = points[np.unique(np.argmax(points @ directions.T, axis=0))]
+    return chosen

@@ -1,22 +1,287 @@
-"""Reader of what the files of all families of vehicles have in common."""
+"""Readers of vehicle data: quantities, triangles, and what the files of all families share.
+
+A quantity is a number, or a list of numbers, in SI units, or an object that also states unit and
+source:
+
+    "mass": 0.5
+    "mass": {"value": 500, "unit": "g", "source": "weighed"}
+"""
 
 from __future__ import annotations
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
-from typing import Any, TypeVar
+from typing import Any, ClassVar, Generic, Protocol, TypeVar
 
 import numpy as np
 
-from cosim.core.errors import InputError
+from cosim.core.errors import InputError, abbreviate_names
+from cosim.core.unit_table import PREFIXED
+from cosim.core.units import KNOWN_UNITS, Unit, parse_unit
 
-from ...json_reader import JsonPath
-from .quantities import QuantityReader
-from .shapes import BODY_UP, ConvexPiece, Shape, Vector, level_box
+from ...json_reader import JsonPath, JsonReader, Numbers
+from .inertia import Boxes
+from .shapes import BODY_UP, Body, ConvexPiece, Shape, Vector, level_box
 
-_Vehicle = TypeVar("_Vehicle")
+#: keys that every object of vehicle data may have; they are texts for the reader of the file
+TEXT_KEYS = ("source", "note")
+
+#: hint for an angle of more than a turn
+RADIANS_EXPECTED = 'radians expected; in degrees? Write {"value": 90, "unit": "deg"}'
+
+
+class QuantityReader(JsonReader):
+    """Reader of vehicle data, which collects all problems."""
+
+    def read_data(
+        self, value: Any, path: JsonPath, required: Sequence[str], optional: Sequence[str]
+    ) -> Mapping[str, Any]:
+        """Read an object with these keys, those of TEXT_KEYS and no others."""
+        found = self.read_object(value, path, required, (*optional, *TEXT_KEYS))
+        for key in TEXT_KEYS:
+            if key in found:
+                self.text(found[key], (*path, key))
+        return found
+
+    def text(self, value: Any, path: JsonPath) -> str:
+        """Read a text."""
+        if not isinstance(value, str):
+            self.add_problem(path, f"found {value!r}, expected a text")
+            return ""
+        return value
+
+    def si_value(self, value: Any, path: JsonPath, unit: str) -> Any:
+        """Return a quantity without its unit and source, in SI units.
+
+        The numbers themselves are not checked.
+
+        Args:
+            value: The quantity.
+            path: Its path.
+            unit: SI unit of the result.
+        """
+        if not isinstance(value, Mapping):
+            return value
+        self.read_data(value, path, ("value",), ("unit",))
+        factor = (
+            self._factor(value["unit"], (*path, "unit"), parse_unit(unit))
+            if "unit" in value
+            else 1.0
+        )
+        return _scaled(value.get("value", math.nan), factor)
+
+    def _factor(self, name: Any, path: JsonPath, expected: Unit) -> float:
+        try:
+            found = parse_unit(name)
+        except (TypeError, ValueError, AttributeError):
+            self.add_problem(path, f"found {name!r}, expected a unit such as {_offered(expected)}")
+            return 1.0
+        if found.exponents != expected.exponents or found.offset != expected.offset:
+            self.add_problem(
+                path, f"found {name!r}, expected a unit that converts to {_offered(expected)}"
+            )
+            return 1.0
+        return found.factor / expected.factor
+
+    def quantity(
+        self,
+        value: Any,
+        path: JsonPath,
+        unit: str,
+        low: float = -math.inf,
+        high: float = math.inf,
+        above: float | None = None,
+    ) -> float:
+        """Read a quantity from `low` to `high` (in SI units), and greater than `above`."""
+        number = self.si_value(value, path, unit)
+        found = self.number(number, path, low, high, _angle_hint(value, unit))
+        if above is not None and not found > above:
+            self.add_problem(path, f"found {number!r}, expected a number greater than {above:g}")
+        return found
+
+    def entry(
+        self,
+        data: Mapping[str, Any],
+        key: str,
+        unit: str,
+        default: float = 1.0,
+        path: JsonPath = (),
+        **limits: float,
+    ) -> float:
+        """Read the quantity of a key.
+
+        Args:
+            data: Object that has the key.
+            key: The key.
+            unit: SI unit of the result.
+            default: Value if the key is missing.
+            path: Path of the object.
+            **limits: See `quantity`.
+        """
+        return self.quantity(data.get(key, default), (*path, key), unit, **limits)
+
+    def vector_quantity(
+        self, value: Any, path: JsonPath, unit: str, axes: Sequence[str]
+    ) -> Numbers:
+        """Read a list of one quantity for each of `axes` (in SI units)."""
+        return self.vector(self.si_value(value, path, unit), path, axes)
+
+    def read_vector(
+        self,
+        data: Mapping[str, Any],
+        key: str,
+        unit: str = "m",
+        default: Sequence[float] = (0.0, 0.0, 0.0),
+        path: JsonPath = (),
+        minimum: float = -math.inf,
+    ) -> Vector:
+        """Read the quantities of a key along x, y and z; see `entry`."""
+        x, y, z = self.vector_quantity(data.get(key, list(default)), (*path, key), unit, "xyz")
+        if min(x, y, z) < minimum:
+            text = f"found {[x, y, z]}, expected numbers of at least {minimum:g}"
+            self.add_problem((*path, key), text)
+        return x, y, z
+
+    def read_size(
+        self, data: Mapping[str, Any], path: JsonPath, default: Sequence[float]
+    ) -> Vector:
+        """Read the edges "size" of a box (m)."""
+        size = self.read_vector(data, "size", "m", default, path)
+        if not min(size) > 0:
+            text = f"found {list(size)}, expected edges greater than 0"
+            self.add_problem((*path, "size"), text)
+        return size
+
+    def read_matrix(
+        self,
+        value: Any,
+        path: JsonPath,
+        axes: Sequence[str],
+        unit: str = "1",
+        diagonal: Sequence[str] = (),
+    ) -> np.ndarray:
+        """Read the diagonal of a square matrix, or its rows.
+
+        Args:
+            value: Numbers of the diagonal, or rows, as a quantity.
+            path: Path of the value.
+            axes: Names of the elements of a row.
+            unit: SI unit of the result.
+            diagonal: Names of the elements of the diagonal if they differ.
+        """
+        numbers = self.si_value(value, path, unit)
+        is_list = isinstance(numbers, list) and len(numbers) == len(axes)
+        if is_list and all(isinstance(row, list) for row in numbers):
+            rows = [self.vector(row, (*path, str(i)), axes) for i, row in enumerate(numbers)]
+            return np.array(rows)
+        return np.diag(self.vector(numbers, path, diagonal or axes))
+
+
+def _angle_hint(value: Any, unit: str) -> str:
+    """Return a hint for an angle without a unit that is more than a turn; "" for anything else."""
+    number = value.get("value") if isinstance(value, Mapping) and "unit" not in value else value
+    is_large = unit == "rad" and isinstance(number, int | float) and abs(number) > 2 * math.pi
+    return f": {RADIANS_EXPECTED}" if is_large else ""
+
+
+def _offered(unit: Unit) -> str:
+    """Return the name of a unit, and those of the other known units of the same quantity."""
+    prefixed = [f"{prefix}{unit.name}" for prefix in "mk" if unit.name in PREFIXED]
+    others = [
+        name
+        for name, known in KNOWN_UNITS.items()
+        if known.exponents == unit.exponents and name != unit.name
+    ]
+    return abbreviate_names(map(repr, (unit.name, *prefixed, *others)))
+
+
+def _scaled(value: Any, factor: float) -> Any:
+    """Return a number, or nested lists of numbers, times a factor.
+
+    Anything else is returned as it is.
+    """
+    if factor == 1.0:
+        return value
+    if isinstance(value, list | tuple):
+        return [_scaled(each, factor) for each in value]
+    return (
+        value * factor if isinstance(value, int | float) and not isinstance(value, bool) else value
+    )
+
+
+#: sense of rotation seen from the tip of the thrust's axis -> sign of the reaction torque about
+#: this axis
+TORQUE_SIGNS = {"clockwise": 1.0, "counter-clockwise": -1.0}
+
+#: largest number of triangles
+MAX_TRIANGLES = 20_000
+
+
+def read_visual(data: Mapping[str, Any]) -> np.ndarray | None:
+    """Return the triangles of the key "visual" (m, body frame), or None without this key.
+
+    Args:
+        data: Vehicle data; "visual" is {"vertices": [[x, y, z], ...], "faces": [[a, b, c], ...]},
+            vertices counted from 0.
+
+    Returns:
+        Corners of the triangles, shape (n, 3, 3).
+
+    Raises:
+        InputError: If the mesh is invalid; the subject is the path of the value.
+    """
+    if "visual" not in data:
+        return None
+    reader = JsonReader()
+    triangles = read_triangles(reader, data["visual"], ("visual",))
+    if reader.problems:
+        raise InputError(reader.problems)
+    return triangles
+
+
+def read_triangles(reader: JsonReader, value: Any, path: JsonPath) -> np.ndarray | None:
+    """Read {"vertices": [[x, y, z], ...], "faces": [[a, b, c], ...]}.
+
+    Return triangles (n, 3, 3), None if they are invalid.
+    """
+    mesh = reader.read_object(value, path, ("vertices", "faces"), ("source", "note"))
+    try:
+        vertices = np.array(mesh.get("vertices"), np.float64)
+        faces = np.array(mesh.get("faces"), np.int64)
+    except (TypeError, ValueError):
+        vertices, faces = np.zeros(0), np.zeros(0, np.int64)
+    lists = (
+        vertices.ndim == faces.ndim == 2
+        and vertices.shape[1] == faces.shape[1] == 3
+        and np.isfinite(vertices).all()
+    )
+    text = (
+        f"expected vertices [[x, y, z], ...] and 1 to {MAX_TRIANGLES} faces [[a, b, c], ...] of "
+        "them"
+    )
+    if (
+        not lists
+        or not 0 < len(faces) <= MAX_TRIANGLES
+        or not (0 <= faces.min() <= faces.max() < len(vertices))
+    ):
+        reader.add_problem(path, text)
+        return None
+    triangles: np.ndarray = vertices[faces]
+    return triangles
+
+
+class Vehicle(Protocol):
+    """A vehicle that is given by data: a dataclass."""
+
+    __dataclass_fields__: ClassVar[dict[str, Any]]
+
+    def body(self, boxes: Boxes) -> Body:
+        """Return the rigid body for Bullet with this collision shape."""
+
+
+_Vehicle = TypeVar("_Vehicle", bound=Vehicle)
 
 
 @dataclass(frozen=True)
@@ -41,61 +306,106 @@ class CollisionBox:
         return level_box(to_body, self.size, self.position, self.yaw)
 
 
-@dataclass(frozen=True)
-class CollisionPiece:
-    """A convex piece of the collision shape: the convex hull of points (m, body frame)."""
-
-    points: tuple[Vector, ...]
-
-    @property
-    def size(self) -> Vector:
-        """Edges of the box around the piece (m)."""
-        x, y, z = np.ptp(self.points, axis=0).tolist()
-        return x, y, z
-
-    @property
-    def position(self) -> Vector:
-        """Centre of the box around the piece (m)."""
-        return ConvexPiece(self.points).position
-
-    def corners(self) -> np.ndarray:
-        """Return the points (m, body frame)."""
-        return np.array(self.points)
-
-    def shape_in(self, to_body: np.ndarray) -> Shape:
-        """Return the piece in the frame from which `to_body` (3, 3) rotates into the body frame."""
-        return ConvexPiece(tuple((x, y, z) for x, y, z in (self.corners() @ to_body).tolist()))
-
-
 #: element of "boxes"
-Collision = CollisionBox | CollisionPiece
+Collision = CollisionBox | ConvexPiece
 
 
 def boxes_in(boxes: Sequence[Collision], to_body: np.ndarray) -> tuple[Shape, ...]:
-    """Return the collision shape in the frame from which `to_body` (3, 3) rotates into the body frame."""
+    """Return the collision shape in another frame.
+
+    `to_body` (3, 3) rotates from this frame into the body frame.
+    """
     return tuple(box.shape_in(to_body) for box in boxes)
 
 
 def edges_around(boxes: Sequence[Collision]) -> Vector:
     """Return the edges (m) of the box around all boxes; 1 m if there are none."""
-    corners = np.concatenate(
-        [box.corners() for box in boxes or (CollisionBox((1.0,) * 3, (0.0,) * 3, 0.0),)]
-    )
+    unit_box = CollisionBox((1.0,) * 3, (0.0,) * 3, 0.0)
+    corners = np.concatenate([box.corners() for box in boxes or (unit_box,)])
     length, width, height = np.ptp(corners, axis=0).tolist()
     return length, width, height
 
 
-class VehicleReader(QuantityReader):
-    """Reader of vehicle data."""
+@dataclass(frozen=True)
+class VehicleData(Generic[_Vehicle]):
+    """A vehicle, its collision shape and its crash speed (m/s)."""
 
-    def construct(self, create: Callable[[], _Vehicle]) -> _Vehicle | None:
-        """Return a new vehicle; if it is impossible, record its problems and return None."""
+    vehicle: _Vehicle
+    boxes: tuple[Collision, ...]
+    crash_speed: float
+
+    def body(self, **changes: Any) -> Body:
+        """Return the rigid body for Bullet with other values of some attributes of the vehicle.
+
+        Raises InputError if these are impossible.
+        """
+        vehicle = replace(self.vehicle, **changes)
+        return vehicle.body(lambda to_body: boxes_in(self.boxes, to_body))
+
+
+class VehicleReader(QuantityReader, Generic[_Vehicle]):
+    """Reader of the data of one family of vehicles.
+
+    Attributes:
+        keys: Required keys of the file.
+        optional_keys: Optional keys, besides those that vehicles of all families have.
+        vehicle_class: Class of the vehicles.
+    """
+
+    keys: Sequence[str]
+    optional_keys: Sequence[str]
+    vehicle_class: Callable[..., _Vehicle]
+
+    def read_values(self, data: Mapping[str, Any]) -> dict[str, Any]:
+        """Read the attributes of the vehicle without its name, and its collision shape "boxes"."""
+        raise NotImplementedError
+
+    def check(self, vehicle: _Vehicle) -> None:
+        """Record what is wrong with a possible vehicle."""
+
+    def read(
+        self, name: str, data: Mapping[str, Any], common_keys: Sequence[str]
+    ) -> VehicleData[_Vehicle]:
+        """Read the data of a vehicle.
+
+        Args:
+            name: Name of the vehicle.
+            data: JSON object (`plant_src/vehicles/data/README.md`).
+            common_keys: Keys that vehicles of all families have.
+
+        Raises:
+            InputError: With all problems; the subject of each is the path of the value.
+        """
+        data = self.read_data(data, (), self.keys, (*self.optional_keys, *common_keys))
+        values = self.read_values(data)
+        boxes = values.pop("boxes")
+        crash_speed = self.entry(data, "crash_speed", "m/s", above=0.0)
+        if self.problems:
+            raise InputError(self.problems)
         try:
-            return create()
+            vehicle = self.vehicle_class(name=name, **values)
         except InputError as error:
             for problem in error.problems:
                 self.add_problem(problem.subject, problem.message)
-            return None
+            raise InputError(self.problems) from None
+        self.check(vehicle)
+        if self.problems:
+            raise InputError(self.problems)
+        return VehicleData(vehicle, boxes, crash_speed)
+
+    def source_of(
+        self, key: str, data: Mapping[str, Any], path: JsonPath, common: Mapping[str, Any], of: str
+    ) -> tuple[Mapping[str, Any], JsonPath]:
+        """Return the object that states a key of an element, and its path.
+
+        Values of an element at `path` replace those of the object `common` of all elements, whose
+        key is `of`.
+        """
+        return (data, path) if key in data else (common, (of,))
+
+    def read_label(self, data: Mapping[str, Any], path: JsonPath, kind: str) -> str:
+        """Read the label of an element; by default its kind and number."""
+        return self.text(data.get("label", f"{kind} {int(path[-1]) + 1}"), (*path, "label"))
 
     def elements(self, data: Mapping[str, Any], key: str) -> list[tuple[int, Any]]:
         """Read a list with at least one element; return its elements with their indices."""
@@ -107,17 +417,7 @@ class VehicleReader(QuantityReader):
 
     def read_inertia(self, value: Any) -> np.ndarray:
         """Read three moments of inertia, or three rows of a tensor."""
-        numbers = self.si_value(value, ("inertia",), "kg.m2")
-        rows = (
-            isinstance(numbers, list)
-            and len(numbers) == 3
-            and all(isinstance(row, list) for row in numbers)
-        )
-        if rows:
-            return np.array(
-                [self.vector(row, ("inertia", str(i)), "xyz") for i, row in enumerate(numbers)]
-            )
-        return np.diag(self.vector(numbers, ("inertia",), ("xx", "yy", "zz")))
+        return self.read_matrix(value, ("inertia",), "xyz", "kg.m2", ("xx", "yy", "zz"))
 
     def read_axis(self, value: Any, path: JsonPath) -> Vector:
         """Read the direction of a thrust and return it as a unit vector."""
@@ -141,30 +441,20 @@ class VehicleReader(QuantityReader):
                 self.read_data(value, path, ("points",), ()).get("points"), (*path, "points")
             )
         data = self.read_data(value, path, ("size",), ("position", "yaw"))
-        length, width, height = self.vector_quantity(
-            data.get("size", [1.0] * 3), (*path, "size"), "m", "xyz"
-        )
-        if not min(length, width, height) > 0:
-            self.add_problem(
-                (*path, "size"), f"found {[length, width, height]}, expected edges greater than 0"
-            )
-        x, y, z = self.vector_quantity(
-            data.get("position", [0.0] * 3), (*path, "position"), "m", "xyz"
-        )
-        yaw = self.quantity(data.get("yaw", 0.0), (*path, "yaw"), "rad", -2 * math.pi, 2 * math.pi)
-        return CollisionBox((length, width, height), (x, y, z), yaw)
+        size = self.read_size(data, path, (1.0, 1.0, 1.0))
+        position = self.read_vector(data, "position", path=path)
+        turn = 2 * math.pi
+        yaw = self.entry(data, "yaw", "rad", 0.0, path, low=-turn, high=turn)
+        return CollisionBox(size, position, yaw)
 
-    def read_piece(self, value: Any, path: JsonPath) -> CollisionPiece:
+    def read_piece(self, value: Any, path: JsonPath) -> ConvexPiece:
         """Read the points of a convex piece."""
         numbers = self.si_value(value, path, "m")
-        rows = (
-            [self.vector(row, (*path, str(i)), "xyz") for i, row in enumerate(numbers)]
-            if isinstance(numbers, list)
-            else []
-        )
+        given = numbers if isinstance(numbers, list) else []
+        rows = [self.vector(row, (*path, str(i)), "xyz") for i, row in enumerate(given)]
         if len(rows) < 4 or np.linalg.matrix_rank(np.array(rows) - rows[0], tol=1e-9) < 3:
             self.add_problem(
                 path, f"found {len(rows)} points, expected at least 4 that do not lie in a plane"
             )
             rows = [(0.0, 0.0, 0.0), (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)]
-        return CollisionPiece(tuple((x, y, z) for x, y, z in rows))
+        return ConvexPiece(tuple((x, y, z) for x, y, z in rows))

@@ -12,7 +12,6 @@ from dataclasses import replace
 from cosim.core.component import Variable
 from cosim.core.units import parse_unit
 
-from ..common.element_labels import element_labels
 from ..common.inertia import inertia_variables
 from ..common.interface import (
     CURRENT_INPUTS,
@@ -24,6 +23,7 @@ from ..common.interface import (
     WATER_LEVEL_INPUT,
     WIND_INPUTS,
     WORLD_OUTPUTS,
+    element_labels,
     initial_variables,
     scalar_variable,
 )

@@ -1,6 +1,37 @@
-"""Forces and torques of rotors and air on a multirotor, as CasADi expressions.
+"""Loads of rotors, air, ground and water on a multirotor, as CasADi expressions.
 
-`multirotor_equations.py` has the formulas.
+`equations.py` has the formulas of rotors and air.
+
+Ground effect by the method of images: a hovering rotor is modelled as a source at its hub; its
+image below the surface reduces its inflow (Cheeseman and Bennett, "The Effect of the Ground on a
+Helicopter Rotor in Forward Flight", ARC R&M 3021, 1955). At the height z a rotor of the radius R
+has 1 / (1 - (R / 4z)^2) times the thrust far from the surface. The images of the other rotors act
+in the same way (Sanchez-Cuevas, Heredia and Ollero, "Characterization of the Aerodynamic Ground
+Effect and Its Influence in Multirotor Control", International Journal of Aerospace Engineering
+2017, 1823056). An image at the lateral distance d reduces the inflow by (R^2 / 2) z / (d^2 + 4
+z^2)^(3/2). For d = 0 this is Cheeseman and Bennett's (R / 4z)^2; the sum over the corners of a
+square is eq. 4 of Sanchez-Cuevas et al. Their empirical term for the flow between the rotors is
+neglected. The reduction is limited to one half, because the images of many close rotors would
+otherwise reverse the inflow.
+
+Air that moves with the speed V in the plane of the rotor carries the wake away: the reduction is
+divided by 1 + (V / v)^2, with the induced velocity v = sqrt(T / (2 rho A)) of the hovering rotor
+(Cheeseman and Bennett, section on forward flight).
+
+Water acts with buoyancy, drag and added mass of the body; rotors have no thrust below the surface.
+With the height d of the surface above the centre of mass and the edges l, b, h of the box around
+the body, the immersed fraction is s = clamp(d / h + 1/2, 0, 1) at every attitude. u is the velocity
+relative to the current, body frame:
+
+    F = rho g V s e_z - s R(q) (|u| D u)       D = rho C_D / 2 diag(b h, l h, l b)
+    T = -s |w| K w                             K = rho C_D / 64 diag(l b^4, b l^4, h (l^4 + b^4))
+    m_a = 0.68 s rho l b h                     added mass, that of a cube in all directions
+                                               (DNV-RP-H103, table A-2)
+
+The buoyancy acts at the centre of mass. K is the integral of the drag of flat plates that turn
+about their centre lines. Added inertia and the pressure peak of the impact on the surface are
+neglected. The aerodynamic loads of a rotor are those of the speed n_i e_i, with e_i = clamp((z_i -
+level) / R + 1/2, 0, 1) of the height z_i of its hub.
 """
 
 from __future__ import annotations
@@ -15,22 +46,48 @@ from cosim.export.equations.c_code import Callee
 from cosim.export.equations.simd_sum import sum_over_rows
 
 from ..common import kinematics
-from ..common.named_values import NamedValues
-from .ground_effect import AIR_DENSITY, create_reductions, thrust_factor
+from ..common.elementary_functions import clamp
+from ..common.named_values import NamedValues, vector_rows
 from .interface import ROTOR_TABLE_COLUMNS, table_rows
+
+#: largest ratio of the air speed in the plane of a rotor to the speed of its tips for which the
+#: translational lift grows
+MAX_ADVANCE_RATIO = 0.5
+
+#: smallest height in rotor radii; smaller heights are replaced by it, because the method of images
+#: is not valid there
+MIN_HEIGHT_RATIO = 0.5
+
+#: largest relative reduction of the inflow
+MAX_REDUCTION = 0.5
+
+#: added to the thrust (N) in a division, for rotors at rest
+SMALLEST_THRUST = 1e-12
+
+AIR_DENSITY = 1.225  # kg/m3, ICAO standard atmosphere at sea level
+
+WATER_DENSITY = 1025.0  # kg/m3, sea water
+
+_ADDED_MASS_COEFFICIENT = 0.68
+_SMALLEST_HEIGHT = 1e-3  # m, replaces the height of a hull without size
 
 
 def rotor_table(parameters: NamedValues, slots: int) -> ca.SX:
-    """Return position, axis, thrust and torque coefficient of each rotor, shape (table_rows(slots), ROTOR_TABLE_COLUMNS)."""
-    names = [f"{group}.{axis}" for group in ("rotor_position", "rotor_axis") for axis in "xyz"]
-    columns = [parameters[name] for name in (*names, "thrust_coefficient", "torque_coefficient")]
-    return ca.vertcat(
-        ca.horzcat(*columns), ca.SX.zeros(table_rows(slots) - slots, ROTOR_TABLE_COLUMNS)
+    """Return position, axis, thrust and torque coefficient of each rotor.
+
+    Its shape is (table_rows(slots), ROTOR_TABLE_COLUMNS).
+    """
+    rows = ca.horzcat(
+        vector_rows(parameters, "rotor_position"),
+        vector_rows(parameters, "rotor_axis"),
+        parameters["thrust_coefficient"],
+        parameters["torque_coefficient"],
     )
+    return ca.vertcat(rows, ca.SX.zeros(table_rows(slots) - slots, ROTOR_TABLE_COLUMNS))
 
 
 def still_air_loads(table: ca.SX, slots: int) -> ca.SX:
-    """Return the matrix (6, slots) from squared rotor speeds to force (N) and torque about the centre of mass (N m)."""
+    """Return the matrix (6, slots) from squared rotor speeds to force (N) and torque (N m)."""
     loads = []
     for k in range(slots):
         position, axis, thrust, torque = table[k, 0:3].T, table[k, 3:6].T, table[k, 6], table[k, 7]
@@ -48,11 +105,8 @@ def create_still_air_load(slots: int) -> Callee:
         Function of the matrix of `still_air_loads`, the number of rotors and the speeds (rad/s).
         Its result has the shape (6,).
     """
-    arguments = matrix, _, speed = (
-        ca.SX.sym("matrix", 6, slots),
-        ca.SX.sym("count"),
-        ca.SX.sym("speed", slots),
-    )
+    matrix, speed = ca.SX.sym("matrix", 6, slots), ca.SX.sym("speed", slots)
+    arguments = matrix, ca.SX.sym("count"), speed
     return Callee(ca.Function("still_air_load", arguments, [matrix @ speed**2]), _STILL_AIR_LOAD_C)
 
 
@@ -66,11 +120,6 @@ _STILL_AIR_LOAD_C = """{
 """
 
 
-#: largest ratio of the air speed in the plane of a rotor to the speed of its tips for which the
-#: translational lift grows
-MAX_ADVANCE_RATIO = 0.5
-
-
 def _rotor_term() -> ca.Function:
     """Return the function of one rotor to its load.
 
@@ -78,15 +127,10 @@ def _rotor_term() -> ca.Function:
     translational lift, rotor radius), (speed, reduction of the inflow by the ground effect) and the
     row of the rotor.
     """
-    common, moving, row = (
-        ca.SX.sym("common", 13),
-        ca.SX.sym("moving", 2),
-        ca.SX.sym("row", ROTOR_TABLE_COLUMNS),
-    )
-    (air, rates, drag), (gain, wake, lift, radius) = (
-        ca.vertsplit(common[0:9], 3),
-        ca.vertsplit(common[9:13]),
-    )
+    common, moving = ca.SX.sym("common", 13), ca.SX.sym("moving", 2)
+    row = ca.SX.sym("row", ROTOR_TABLE_COLUMNS)
+    air, rates, drag = ca.vertsplit(common[0:9], 3)
+    gain, wake, lift, radius = ca.vertsplit(common[9:13])
     (speed, reduction), (position, axis) = ca.vertsplit(moving), ca.vertsplit(row[0:6], 3)
     squared = speed**2
     local_air = air + ca.cross(rates, position)
@@ -130,7 +174,7 @@ class RotorFunctions:
         return sum_over_rows("rotor_loads", _rotor_term(), table_rows(self.slots))
 
     def ground_reductions(self, inputs: NamedValues, constants: NamedValues) -> ca.SX:
-        """Return the relative reduction of each hovering rotor's inflow by the surface below, shape (slots,)."""
+        """Return the relative reduction of each hovering rotor's inflow, shape (slots,)."""
         common = ca.vertcat(
             inputs["ground_distance"], constants["rotor_radius"], constants["rotor_count"]
         )
@@ -158,22 +202,18 @@ class RotorFunctions:
         air = kinematics.rotation_matrix(state[3:7]).T @ (state[7:10] - inputs["wind"])
         padding = ca.SX.zeros(table_rows(self.slots) - self.slots)
         moving = ca.vertcat(speed, padding, reductions, padding)
-        gain, radius = (
-            constants["ground_effect"] * inputs["ground_share"],
-            constants["rotor_radius"],
-        )
+        gain = constants["ground_effect"] * inputs["ground_share"]
+        radius, lift = constants["rotor_radius"], constants["translational_lift"]
         wake = 2 * math.pi * AIR_DENSITY * radius**2
-        rotors = (gain, wake, constants["translational_lift"], radius)
-        common = ca.vertcat(air, state[10:13], constants["rotor_drag"], *rotors)
-        rows = table_rows(self.slots)
-        load = self.load_sum(
-            common, constants["rotor_count"], ca.reshape(moving, rows, 2), constants["rotor_table"]
-        )
+        common = ca.vertcat(air, state[10:13], constants["rotor_drag"], gain, wake, lift, radius)
+        table = constants["rotor_table"]
+        moving = ca.reshape(moving, table.rows(), 2)
+        load = self.load_sum(common, constants["rotor_count"], moving, table)
         return load[0:3] - ca.norm_2(air) * constants["body_drag"] * air, load[3:6]
 
 
 def gyroscopic_torque(rates: ca.SX, momentum: ca.SX, momentum_rate: ca.SX) -> ca.SX:
-    """Return the torque (N m, body frame) of spinning rotors on a rotating body, and of their acceleration.
+    """Return the torque (N m, body frame) of spinning and accelerating rotors on a rotating body.
 
     Args:
         rates: Angular velocity of the body (rad/s).
@@ -181,3 +221,95 @@ def gyroscopic_torque(rates: ca.SX, momentum: ca.SX, momentum_rate: ca.SX) -> ca
         momentum_rate: Its time derivative in the body frame (N m).
     """
     return -(ca.cross(rates, momentum) + momentum_rate)
+
+
+def create_reductions(slots: int) -> Callee:
+    """Create the function of the relative reduction of each hovering rotor's inflow.
+
+    It is not limited yet.
+
+    Args:
+        slots: Number of elements of the arrays of rotors.
+
+    Returns:
+        Function of (height of the rotor centre above the surface, rotor radius, number of rotors)
+        and x and y of the hubs (m), each of the shape (slots,). Its result has the shape (slots,);
+        only the elements with a rotor are of use.
+    """
+    common, x, y = ca.SX.sym("common", 3), ca.SX.sym("x", slots), ca.SX.sym("y", slots)
+    height, radius, count = ca.vertsplit(common)
+    z = ca.fmax(height, MIN_HEIGHT_RATIO * radius)
+    reductions = []
+    for i in range(slots):
+        reduction = ca.SX(0)
+        for j in range(slots):
+            d2 = (x[i] - x[j]) ** 2 + (y[i] - y[j]) ** 2 + 4 * z**2
+            reduction += ca.if_else(count > j, radius**2 / 2 * z / (d2 * ca.sqrt(d2)), 0)
+        reductions.append(reduction)
+    function = ca.Function("inflow_reductions", [common, x, y], [ca.vertcat(*reductions)])
+    return Callee(function, _REDUCTIONS_C % {"slots": slots, "min_ratio": MIN_HEIGHT_RATIO})
+
+
+_REDUCTIONS_C = """{
+    const double radius = in[0][1], count = in[0][2];
+    const double z = in[0][0] > %(min_ratio)r * radius ? in[0][0] : %(min_ratio)r * radius;
+    for (int i = 0; i < %(slots)d; ++i) out[0][i] = 0;
+    for (int i = 0; i < count; ++i)
+        for (int j = 0; j < count; ++j) {
+            const double x = in[1][i] - in[1][j], y = in[2][i] - in[2][j], d2 = x * x + y * y + 4 * z * z;
+            out[0][i] += radius * radius / 2 * z / (d2 * sqrt(d2));
+        }
+}
+"""
+
+
+def thrust_factor(
+    reduction: ca.SX, gain: ca.SX, thrust: ca.SX, air_speed_squared: ca.SX, wake: ca.SX
+) -> ca.SX:
+    """Return the ratio of a rotor's thrust to that in free air.
+
+    Args:
+        reduction: Relative reduction of the inflow in hover (1).
+        gain: Fraction of the additional thrust (1).
+        thrust: Thrust in free air (N).
+        air_speed_squared: Squared speed of the air in the plane of the rotor (m2/s2).
+        wake: Thrust over the square of the induced velocity, 2 rho A (kg/m).
+    """
+    remaining = thrust / (thrust + wake * air_speed_squared + SMALLEST_THRUST)
+    return 1 + gain * (1 / (1 - ca.fmin(reduction * remaining, MAX_REDUCTION)) - 1)
+
+
+def emerged_fractions(state: ca.SX, inputs: NamedValues, constants: NamedValues) -> ca.SX:
+    """Return the fraction of each rotor's speed that acts on air, shape (slots,)."""
+    up = kinematics.rotation_matrix(state[3:7])[2, :]
+    heights = state[2] + vector_rows(constants, "rotor_position") @ up.T
+    return clamp((heights - inputs["water_level"]) / constants["rotor_radius"] + 0.5)
+
+
+def add_water_loads(
+    rate: ca.SX, state: ca.SX, inputs: NamedValues, constants: NamedValues
+) -> ca.SX:
+    """Return the rate of the rigid-body states with the loads of the water.
+
+    Args:
+        rate: Time derivative without water.
+        state: States of the rigid body.
+        inputs: Inputs of the model.
+        constants: Constants of the equations.
+    """
+    to_world, rates = kinematics.rotation_matrix(state[3:7]), state[10:13]
+    length, width, height = ca.vertsplit(constants["hull_size"])
+    immersed = clamp((inputs["water_level"] - state[2]) / ca.fmax(height, _SMALLEST_HEIGHT) + 0.5)
+    flow = to_world.T @ (state[7:10] - ca.vertcat(inputs["current"], 0))
+    pressure = WATER_DENSITY * constants["water_drag_coefficient"] / 2
+    areas = ca.vertcat(width * height, length * height, length * width)
+    moments = ca.vertcat(length * width**4, width * length**4, height * (length**4 + width**4)) / 32
+    buoyancy = WATER_DENSITY * constants["displaced_volume"] * constants["gravity"]
+    force = ca.vertcat(0, 0, buoyancy) - to_world @ (ca.norm_2(flow) * pressure * areas * flow)
+    torque = -ca.norm_2(rates) * pressure * moments * rates
+    mass = constants["mass"]
+    added = immersed * _ADDED_MASS_COEFFICIENT * WATER_DENSITY * length * width * height
+    acceleration = (mass * rate[7:10] + immersed * force) / (mass + added)
+    return ca.vertcat(
+        rate[0:7], acceleration, rate[10:13] + constants["inverse_inertia"] @ (immersed * torque)
+    )

@@ -1,7 +1,4 @@
-"""Equations of motion of the Otter in six degrees of freedom.
-
-README.md has the loads, `vehicles/README.md` the rest.
-"""
+"""Equations of motion of the Otter in six degrees of freedom."""
 
 from __future__ import annotations
 
@@ -10,23 +7,24 @@ from functools import partial
 import casadi as ca
 
 from cosim.export.equations.c_code import call_in_c
-from cosim.export.equations.fmu_code import as_block
 from cosim.export.fmu.block import Block
 
 from ..common import kinematics
 from ..common.named_values import NamedValues, initial_parameters
-from ..vessel import floating_maps, vessel_equations
-from ..vessel.hull import Frame, Hull, LoadArguments, rigid_body_mass_matrix
-from ..vessel.hydrostatics import (
+from ..vessel.hull import (
     Ballast,
+    Frame,
+    Hull,
+    LoadArguments,
     attitude_at,
     improved_equilibrium,
+    rigid_body_mass_matrix,
     upward_axis,
     weight_and_buoyancy,
 )
-from ..vessel.strips import STRIP_COUNT, immersion
+from ..vessel.strips import STATION_COUNT, STRIP_COUNT, Box, TwinHull, equivalent_strips, immersion
+from ..vessel.vessel_equations import VesselModel, constant_body, floating_block, wave_table_of
 from . import parameters as p
-from .geometry import BODY
 from .interface import PROPELLER_STATES, VARIABLES
 from .loads import (
     added_mass,
@@ -38,7 +36,57 @@ from .loads import (
     propulsion,
     wind,
 )
-from .pontoons import STRIPS, resting_pontoons, station_draughts
+from .parameters import BODY
+
+STRIPS = equivalent_strips(
+    ca.SX(p.CENTRE_OF_FLOTATION),
+    (ca.SX(p.TRANSVERSE_MOMENT), ca.SX(p.LONGITUDINAL_MOMENT)),
+    ca.SX(p.WATERPLANE_AREA),
+)
+
+#: smallest draught at rest of a station (m), for payloads that lift it out of the water
+_MIN_DRAUGHT = 1e-3
+
+_DEPTHS = [draught + p.PONTOON_TOP for draught in p.STATION_DRAUGHTS]
+_MEAN_DEPTH = sum(_DEPTHS) / STATION_COUNT
+
+
+def resting_pontoons(draughts: ca.SX, mean_draught: ca.SX) -> TwinHull:
+    """Return the pontoons.
+
+    Args:
+        draughts: Draughts of the stations at rest from bow to stern (m), shape (STATION_COUNT,).
+        mean_draught: Displaced volume over the area of the waterplane (m).
+    """
+    positive = ca.fmax(draughts, _MIN_DRAUGHT)
+    weights = STATION_COUNT / ca.sum1(positive) * positive
+    boxes = [
+        Box(ca.SX(depth), ca.SX(p.PONTOON_TOP - depth / 2), draught, depth / _MEAN_DEPTH, weight)
+        for depth, draught, weight in zip(
+            _DEPTHS, ca.vertsplit(positive), ca.vertsplit(weights), strict=True
+        )
+    ]
+    return TwinHull(
+        STRIPS,
+        ca.SX(p.PONTOON_BEAM),
+        mean_draught,
+        ca.SX(_MEAN_DEPTH),
+        ca.SX(p.WATERPLANE_AREA),
+        boxes,
+    )
+
+
+def station_draughts(equilibrium: ca.SX) -> ca.SX:
+    """Return the draughts of the stations (m) for height of O (m), roll and pitch (rad) at rest."""
+    up = upward_axis(equilibrium)
+    bottoms = zip(STRIPS.stations, p.STATION_DRAUGHTS, strict=True)
+    return ca.vertcat(
+        *(
+            up[2] * draught - equilibrium[0] - up[0] * (STRIPS.centre[0] + x)
+            for x, draught in bottoms
+        )
+    )
+
 
 #: steps of the iteration for the equilibrium
 _EQUILIBRIUM_STEPS = 40
@@ -82,7 +130,7 @@ def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
         "drag": cross_flow_drag(volume / (2 * p.BLOCK_COEFFICIENT * p.PONTOON_BEAM * p.LENGTH)),
         "propeller_time_constant": parameters["propeller_time_constant"],
         "wave.count": parameters["wave.count"],
-        "wave_table": vessel_equations.wave_table_of(parameters, pontoons),
+        "wave_table": wave_table_of(parameters, pontoons),
         "equilibrium": equilibrium,
     }
 
@@ -164,7 +212,7 @@ def water_loads(constants: NamedValues, now: LoadArguments) -> ca.SX:
     return ca.vertcat(to_level @ static[0:3], to_level @ static[3:6]) + under_water.wetness * moving
 
 
-VESSEL = vessel_equations.VesselModel(
+VESSEL = VesselModel(
     "otter",
     "Maritime Robotics Otter with a landing deck, afloat",
     VARIABLES,
@@ -176,10 +224,4 @@ VESSEL = vessel_equations.VesselModel(
 
 def block() -> Block:
     """Return the Otter for export."""
-    model = otter_model(VESSEL)
-    return as_block(
-        model,
-        floating_maps.FloatingContactMaps(
-            model, VESSEL, floating_maps.constant_body(BODY)
-        ).functions(),
-    )
+    return floating_block(otter_model(VESSEL), VESSEL, constant_body(BODY))

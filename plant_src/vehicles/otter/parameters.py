@@ -1,16 +1,10 @@
-"""Parameters of the Otter with their sources, in SI units.
-
-Body frame: x forward, y left, z up, origin O midships on the centre line at the waterline.
-
-Source: the model `otter` of the Marine Systems Simulator (github.com/cybergalactic/MSS, MIT
-licence, revision of 2026-06-27) by T. I. Fossen; Fossen 2021, Handbook of Marine Craft
-Hydrodynamics and Motion Control, 2nd edition. The values are converted from the frame x forward, y
-right, z down: y and z of vectors change their sign. Values from elsewhere are marked [assumed].
-"""
+"""Parameters of the Otter with their sources, and its rigid body, in SI units."""
 
 from __future__ import annotations
 
 import math
+
+from ..common.shapes import Body, Box
 
 GRAVITY = 9.81  # m/s2
 WATER_DENSITY = 1025.0  # kg/m3
@@ -132,3 +126,17 @@ DECK_SIZE = (1.2, 1.0, 0.02)
 #: top and bottom of the pontoons above O [assumed] (m); the bottom is at the draught with 25 kg of
 #: payload
 PONTOON_TOP, PONTOON_BOTTOM = 0.15, -0.195
+
+
+def _pontoon_box(side: float) -> Box:
+    half_extents = (LENGTH / 2, PONTOON_BEAM / 2, (PONTOON_TOP - PONTOON_BOTTOM) / 2)
+    return Box(half_extents, (0.0, side * PONTOON_OFFSET, (PONTOON_TOP + PONTOON_BOTTOM) / 2))
+
+
+def _deck_box() -> Box:
+    x, y, z = DECK_SIZE
+    return Box((x / 2, y / 2, z / 2), (DECK_CENTRE[0], DECK_CENTRE[1], DECK_CENTRE[2] - z / 2))
+
+
+_ROLL, _PITCH, _YAW = (HULL_MASS * radius**2 for radius in RADII_OF_GYRATION)
+BODY = Body(HULL_MASS, (_ROLL, _PITCH, _YAW), (_deck_box(), _pontoon_box(+1.0), _pontoon_box(-1.0)))

@@ -1,21 +1,17 @@
-"""Equations of motion of the Otter exactly as in MSS.
-
-README.md has the loads, `vehicles/README.md` the rest.
-"""
+"""Equations of motion of the Otter exactly as in MSS."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 import casadi as ca
 
-from cosim.export.equations.fmu_code import as_block
 from cosim.export.fmu.block import Block
 
 from ..common import kinematics
 from ..common.named_values import NamedValues, initial_parameters
 from ..otter import parameters as p
-from ..otter.geometry import BODY
 from ..otter.interface import PROPELLER_STATES, VARIABLES
 from ..otter.loads import (
     added_mass,
@@ -27,11 +23,45 @@ from ..otter.loads import (
     propulsion,
     wind,
 )
-from ..vessel import floating_maps, vessel_equations
+from ..otter.parameters import BODY
 from ..vessel import hull as vessel
 from ..vessel.hull import Frame, Hull, LoadArguments, load_of_force_at, transformation_matrix
 from ..vessel.strips import TwinHull, equivalent_strips
-from . import hydrostatics
+from ..vessel.vessel_equations import VesselModel, constant_body, floating_block, wave_table_of
+
+
+@dataclass(frozen=True)
+class Hydrostatics:
+    """Hydrostatics for one mass and centre of mass.
+
+    Attributes:
+        draught: Draught (m).
+        stiffness: Restoring stiffness of heave (N/m), roll and pitch (N m/rad) at the centre of
+            flotation, shape (3,).
+        compliance: Heave (m), roll and pitch (rad) over heave force (N), roll and pitch moment (N
+            m) at O, shape (3, 3).
+        mean_draught: Volume over waterplane (m).
+    """
+
+    draught: ca.SX
+    stiffness: ca.SX
+    compliance: ca.SX
+    mean_draught: ca.SX
+
+
+def hydrostatics(mass: ca.SX, centre: ca.SX) -> Hydrostatics:
+    """Return the hydrostatics for a mass (kg) and a centre of mass (m, body frame)."""
+    volume = mass / p.WATER_DENSITY
+    draught = volume / (2 * p.BLOCK_COEFFICIENT * p.PONTOON_BEAM * p.LENGTH)
+    moments = ca.SX([p.TRANSVERSE_MOMENT, p.MSS_LONGITUDINAL_MOMENT])
+    buoyancy_height = (5 * draught / 2 - volume / (2 * p.LENGTH * p.PONTOON_BEAM)) / 3
+    metacentric_heights = buoyancy_height + moments / volume - (draught + centre[2])
+    weight = p.WATER_DENSITY * p.GRAVITY
+    stiffness = ca.vertcat(weight * p.WATERPLANE_AREA, weight * volume * metacentric_heights)
+    to_flotation = transformation_matrix(ca.SX(p.CENTRE_OF_FLOTATION))[2:5, 2:5]
+    compliance = ca.inv(to_flotation.T @ ca.diag(stiffness) @ to_flotation)
+    return Hydrostatics(draught, stiffness, compliance, volume / p.WATERPLANE_AREA)
+
 
 _CENTRE_OF_FLOTATION = ca.SX(p.CENTRE_OF_FLOTATION)
 _STRIPS = equivalent_strips(
@@ -46,7 +76,7 @@ def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
     payload, own = parameters["payload_mass"], mass_properties(parameters)
     added = added_mass(own.inertia)
     mass_matrix = vessel.rigid_body_mass_matrix(own.mass, own.centre, own.inertia) + ca.diag(added)
-    floating = hydrostatics.hydrostatics(own.mass, own.centre)
+    floating = hydrostatics(own.mass, own.centre)
     constants = {
         **initial_parameters(parameters),
         "mass": own.mass,
@@ -63,7 +93,7 @@ def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
         "payload_position": parameters["payload_position"],
         "propeller_time_constant": parameters["propeller_time_constant"],
         "wave.count": parameters["wave.count"],
-        "wave_table": vessel_equations.wave_table_of(parameters, _twin_hull(floating.mean_draught)),
+        "wave_table": wave_table_of(parameters, _twin_hull(floating.mean_draught)),
     }
     return constants | {"equilibrium": _equilibrium(constants)}
 
@@ -150,7 +180,7 @@ def restoring(constants: NamedValues, now: LoadArguments) -> ca.SX:
     return ca.vertcat(0, 0, load, 0)
 
 
-VESSEL = vessel_equations.VesselModel(
+VESSEL = VesselModel(
     "otter_mss",
     "Maritime Robotics Otter of MSS with linear restoring",
     VARIABLES,
@@ -162,10 +192,4 @@ VESSEL = vessel_equations.VesselModel(
 
 def block() -> Block:
     """Return the Otter of MSS for export."""
-    model = otter_model(VESSEL)
-    return as_block(
-        model,
-        floating_maps.FloatingContactMaps(
-            model, VESSEL, floating_maps.constant_body(BODY)
-        ).functions(),
-    )
+    return floating_block(otter_model(VESSEL), VESSEL, constant_body(BODY))

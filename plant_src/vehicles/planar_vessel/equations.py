@@ -1,17 +1,224 @@
-"""Equations of all planar vessels that are given by data.
+"""Equations of motion of a vessel in the horizontal plane that is given by data.
 
-One binary, whose values are all parameters.
+State: position of the centre of mass (m, world frame), yaw angle, surge and sway velocity of the
+centre of mass, yaw rate, and propeller speeds. With nu = (u, v, r) of the origin O, the current
+nu_c in body axes and nu_r = nu - nu_c (Fossen 2021, Handbook of Marine Craft Hydrodynamics and
+Motion Control, 2nd edition, chapters 3 and 6, in the axes forward-left-up):
+
+    (M_RB + M_A) (nu' - nu_c') = tau - C_RB nu_r - C_A(nu_r) nu_r - D nu_r
+                                 - (|u_r| D_u + |v_r| D_v + |r| D_r) nu_r - d nu_r^3
+    nu_c' = (r v_c, -r u_c, 0)
+
+tau are the loads of propellers, rudders and air, and the external load at the centre of mass. One
+binary holds the equations of all planar vessels; all values are parameters.
 """
 
 from __future__ import annotations
 
+from functools import cached_property
+
+import casadi as ca
 import numpy as np
 
+from cosim.core.component import Variable
+from cosim.export.equations.fmu_code import as_block
+from cosim.export.equations.model import ContinuousModel
 from cosim.export.fmu.block import Block
 
+from ..common import kinematics
+from ..common.elementary_functions import sine_and_cosine
+from ..common.interface import WORLD_OUTPUTS
+from ..common.named_values import (
+    ConstantsMap,
+    NamedValues,
+    square_matrix,
+    values_by_name,
+    variables_of,
+)
+from ..vessel import planar_maps, propulsion
 from ..vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS, Propeller
-from .planar_equations import planar_vessel_block
+from .interface import states, variables
 from .planar_vessel import PlanarVessel
+
+_BODY_STATES = 6
+_FAR_BELOW = 1e3  # m; propellers of planar vessels are always immersed
+
+
+class PlanarEquations:
+    """Equations of a planar vessel.
+
+    Args:
+        vessel: Vessel with the start values.
+        slots: Numbers of elements of the arrays of propellers and rudders.
+        identifier: Name of the FMU.
+        description: Description of the FMU.
+    """
+
+    def __init__(
+        self, vessel: PlanarVessel, slots: tuple[int, int], identifier: str, description: str
+    ):
+        self.variables: tuple[Variable, ...] = variables(vessel, slots)
+        self.slots, self.identifier, self.description = slots, identifier, description
+
+    @cached_property
+    def constants(self) -> ConstantsMap:
+        """Map from the parameters to the constants of the equations."""
+        return ConstantsMap(self.variables, derive_constants)
+
+    @cached_property
+    def model(self) -> ContinuousModel:
+        """Model to export; its contact outputs are 0."""
+        return ContinuousModel(
+            self.identifier,
+            self.description,
+            self.variables,
+            states(self.slots[0]),
+            lambda constants: initial_state(self.constants.by_name(constants), self.slots[0]),
+            lambda state, inputs, constants: rate(
+                state,
+                values_by_name(inputs, variables_of(self.variables, "input")),
+                self.constants.by_name(constants),
+            ),
+            lambda state, _inputs, constants: ca.vertcat(
+                self.observe(state, constants), ca.SX.zeros(len(WORLD_OUTPUTS))
+            ),
+            derived_parameters=self.constants.vector,
+            callees=(propulsion.PROPELLER_SUM, *([propulsion.RUDDER_SUM] if self.slots[1] else [])),
+        )
+
+    def observe(self, state: ca.SX, constants: ca.SX) -> ca.SX:
+        """Return the motion outputs of the vessel and of its landing deck."""
+        return observe(state, self.constants.by_name(constants))
+
+    def block(self) -> Block:
+        """Return the vessel for export: its FMU and the contact functions of the world."""
+
+        def body(constants: ca.SX) -> planar_maps.PlanarBody:
+            known = self.constants.by_name(constants)
+            return planar_maps.PlanarBody(
+                known["mass"], known["yaw_inertia"], known["height"] + known["centre_of_mass"][2]
+            )
+
+        model = self.model.with_called_derivatives()
+        return as_block(model, planar_maps.PlanarContactMaps(model, body, self.observe).functions())
+
+
+def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
+    """Return the constants of the equations."""
+    x, y, _ = ca.vertsplit(parameters["centre_of_mass"])
+    mass = parameters["mass"]
+    # nu of the centre of mass from nu of O
+    to_centre = ca.blockcat([[1, 0, -y], [0, 1, x], [0, 0, 1]])
+    rigid = to_centre.T @ ca.diag(ca.vertcat(mass, mass, parameters["yaw_inertia"])) @ to_centre
+    return {
+        **{name: value for name, value in parameters.items() if name != "rudder_propeller"},
+        **propulsion.derive_races(parameters),
+        "rigid_body_mass": rigid,
+        "inverse_mass_matrix": ca.inv(rigid + square_matrix(parameters["added_mass"])),
+    }
+
+
+def rate(state: ca.SX, inputs: NamedValues, constants: NamedValues) -> ca.SX:
+    """Return the time derivative of the state."""
+    yaw, u, v, r = ca.vertsplit(state[2:_BODY_STATES])
+    sin, cos = sine_and_cosine(yaw)
+    x, y, _ = ca.vertsplit(constants["centre_of_mass"])
+    to_body = ca.vertcat(ca.horzcat(cos, sin), ca.horzcat(-sin, cos))
+    current = to_body @ inputs["current"]
+    absolute = ca.vertcat(u + r * y, v - r * x, r)  # nu of O
+    relative = absolute - ca.vertcat(current, 0)
+    air = absolute[0:2] - to_body @ inputs["wind"][0:2]
+    actuators = state[_BODY_STATES:]
+    load = water_loads(actuators, relative, inputs, constants) + air_load(air, constants)
+    load += _load_at(constants["centre_of_mass"], to_body @ inputs["external_force"][0:2])
+    load += ca.vertcat(0, 0, inputs["external_torque.z"])
+    added = square_matrix(constants["coriolis_added_mass"])
+    load -= coriolis(constants["rigid_body_mass"], relative) + coriolis(added, relative)
+    acceleration = constants["inverse_mass_matrix"] @ load + current_rate(current, r)
+    yaw_acceleration = acceleration[2]
+    centre = acceleration[0:2] + yaw_acceleration * ca.vertcat(-y, x)
+    kinematic = ca.vertcat(to_body.T @ ca.vertcat(u, v), r)
+    return ca.vertcat(
+        kinematic, centre, yaw_acceleration, propulsion.speed_rates(actuators, inputs, constants)
+    )
+
+
+def current_rate(current: ca.SX, r: ca.SX) -> ca.SX:
+    """Return the time derivative of a steady current in the axes of a turning vessel (m/s2).
+
+    The vessel turns with the rate r (rad/s).
+    """
+    return ca.vertcat(r * current[1], -r * current[0], 0)
+
+
+def coriolis(mass: ca.SX, nu: ca.SX) -> ca.SX:
+    """Return C(nu) nu of a mass matrix (3, 3) (Fossen 2021, section 3.3, in three velocities)."""
+    momentum = mass @ nu
+    return ca.vertcat(
+        -nu[2] * momentum[1], nu[2] * momentum[0], nu[0] * momentum[1] - nu[1] * momentum[0]
+    )
+
+
+def water_loads(
+    actuators: ca.SX, relative: ca.SX, inputs: NamedValues, constants: NamedValues
+) -> ca.SX:
+    """Return the load (X, Y, N) about O of water, propellers and rudders."""
+    load = square_matrix(constants["linear_damping"]) @ relative
+    for k, letter in enumerate("uvr"):
+        matrix = square_matrix(constants[f"quadratic_damping.{letter}"])
+        load += ca.fabs(relative[k]) * (matrix @ relative)
+    load += ca.vertcat(*(constants[f"cubic_damping.{letter}"] for letter in "uvr")) * relative**3
+    speed = propulsion.speeds(actuators, inputs, constants)
+    flow = ca.vertcat(relative[0:2], 0, 0, 0, relative[2])
+    driving = propulsion.propeller_loads(
+        speed, flow, ca.SX(_FAR_BELOW), ca.SX.zeros(3), inputs, constants
+    )
+    driving += propulsion.rudder_loads(speed, flow, inputs, constants)
+    return ca.vertcat(driving[0:2], driving[5]) - load
+
+
+def air_load(air: ca.SX, constants: NamedValues) -> ca.SX:
+    """Return the load (X, Y, N) about O of the air for a velocity relative to it (m/s, (2,))."""
+    return _load_at(constants["air_centre"], -constants["air_drag"] * ca.fabs(air) * air)
+
+
+def _load_at(point: ca.SX, force: ca.SX) -> ca.SX:
+    return ca.vertcat(force, point[0] * force[1] - point[1] * force[0])
+
+
+def initial_state(constants: NamedValues, slots: int) -> ca.SX:
+    """Return the state at the start; the propellers rest."""
+    initial = ca.vertcat(
+        constants["initial.position"], constants["initial.yaw"], constants["initial.velocity_body"]
+    )
+    return ca.vertcat(initial, constants["initial.rates"], ca.SX.zeros(slots))
+
+
+def observe(state: ca.SX, constants: NamedValues) -> ca.SX:
+    """Return the motion outputs of the vessel and of its landing deck."""
+    centre = constants["centre_of_mass"]
+    position = ca.vertcat(state[0:2], constants["height"] + centre[2])
+    orientation = kinematics.quaternion_about_z(state[2])
+    to_world = kinematics.rotation_matrix(orientation)
+    rates = ca.vertcat(0, 0, state[5])
+    velocity = to_world @ ca.vertcat(state[3:5], 0)
+    to_deck = to_world @ (constants["deck_centre"] - centre)
+    deck = ca.vertcat(position + to_deck, velocity + ca.cross(rates, to_deck))
+    return ca.vertcat(kinematics.motion_outputs(position, orientation, velocity, rates), deck)
+
+
+def planar_vessel_block(
+    vessel: PlanarVessel, description: str, slots: tuple[int, int] | None = None
+) -> Block:
+    """Return a planar vessel for export.
+
+    Args:
+        vessel: Vessel with the start values.
+        description: Description of the FMU.
+        slots: Numbers of slots of propellers and rudders. None means the numbers of the vessel.
+    """
+    return PlanarEquations(vessel, slots or vessel.slots, vessel.name, description).block()
+
 
 _ZERO = np.zeros((3, 3))
 

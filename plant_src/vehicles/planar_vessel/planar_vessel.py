@@ -1,17 +1,20 @@
-"""Data of a vessel that moves in the horizontal plane: surge, sway and yaw."""
+"""Data of a vessel that moves in the horizontal plane (surge, sway and yaw), and their reader."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from cosim.core.errors import Problem
 
-from ..common.shapes import Body, Shape
-from ..vessel.boat import Boat
+from ..common.inertia import Boxes
+from ..common.shapes import Body
+from ..vessel import boat as boat_data
+from ..vessel.boat import Boat, BoatReader
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,29 +38,64 @@ class PlanarVessel(Boat):
         """Yield what is physically impossible."""
         yield from super().problems()
         if not 0 < self.yaw_inertia < math.inf:
-            yield self.problem(
-                f"found {self.yaw_inertia!r}, expected a finite number greater than 0",
-                "yaw_inertia",
-            )
+            text = f"found {self.yaw_inertia!r}, expected a finite number greater than 0"
+            yield self.problem(text, "yaw_inertia")
         diagonal = [float(matrix[k, k]) for k, matrix in enumerate(self.quadratic_damping)]
         if min(diagonal) < 0:
-            yield self.problem(
-                f"found the coefficients {diagonal} of |u| u, |v| v and |r| r, expected at least 0",
-                "quadratic_damping",
-            )
+            found = f"found the coefficients {diagonal} of |u| u, |v| v and |r| r"
+            yield self.problem(f"{found}, expected at least 0", "quadratic_damping")
         if min(self.cubic_damping) < 0:
-            yield self.problem(
-                f"found {list(self.cubic_damping)}, expected numbers of at least 0", "cubic_damping"
-            )
+            text = f"found {list(self.cubic_damping)}, expected numbers of at least 0"
+            yield self.problem(text, "cubic_damping")
 
-    def body(self, boxes: tuple[Shape, ...]) -> Body:
+    def body(self, boxes: Boxes) -> Body:
         """Return the rigid body for Bullet, whose frame has its origin in the centre of mass.
 
-        `boxes` are relative to O.
+        The collision shape in the body frame is relative to O.
         """
         x, y, z = self.centre_of_mass
-        shifted = tuple(box.moved((-x, -y, -z)) for box in boxes)
-        inertia = (
-            self.yaw_inertia,
-        ) * 3  # that about the other axes has no effect, because the vessel cannot roll or pitch
+        shifted = tuple(box.moved((-x, -y, -z)) for box in boxes(np.eye(3)))
+        # the inertia about the other axes has no effect, because the vessel cannot roll or pitch
+        inertia = (self.yaw_inertia,) * 3
         return Body(self.mass, inertia, shifted, self.height + z)
+
+
+#: required keys of the file
+KEYS = (*boat_data.KEYS, "yaw_inertia")
+_OPTIONAL_KEYS = (*boat_data.OPTIONAL_KEYS, "height", "quadratic_damping", "cubic_damping")
+
+
+class PlanarVesselReader(BoatReader[PlanarVessel]):
+    """Reader of the data of a planar vessel (`plant_src/vehicles/data/README.md`)."""
+
+    keys, optional_keys, vehicle_class = KEYS, _OPTIONAL_KEYS, PlanarVessel
+    velocities = ("u", "v", "r")
+
+    def read_values(self, data: Mapping[str, Any]) -> dict[str, Any]:
+        """Read the attributes of the vessel, and the collision shape."""
+        boxes = self.read_boxes(data)
+        a, b, c = self.vector_quantity(
+            data.get("cubic_damping", [0.0] * 3), ("cubic_damping",), "1", self.velocities
+        )
+        return {
+            **self.read_boat(data, boxes),
+            "yaw_inertia": self.entry(data, "yaw_inertia", "kg.m2", above=0.0),
+            "height": self.entry(data, "height", "m", 0.0),
+            "quadratic_damping": self.read_quadratic_damping(data),
+            "cubic_damping": (a, b, c),
+        }
+
+    def read_quadratic_damping(self, data: Mapping[str, Any]) -> tuple[np.ndarray, ...]:
+        """Read the matrices of |u|, |v| and |r|.
+
+        They may be one matrix, whose columns belong to |u| u, |v| v and |r| r.
+        """
+        key, zero = "quadratic_damping", [0.0] * 3
+        value = data.get(key, zero)
+        if isinstance(value, Mapping) and "value" not in value:
+            given = self.read_data(value, (key,), (), self.velocities)
+            return tuple(
+                self.read_nu_matrix(given, letter, zero, (key,)) for letter in self.velocities
+            )
+        matrix = self.read_nu_matrix(data, key, zero)
+        return tuple(np.where(np.arange(3) == k, matrix, 0.0) for k in range(3))

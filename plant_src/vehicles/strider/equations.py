@@ -1,9 +1,4 @@
-"""Equations of motion of the catamaran in the horizontal plane: surge, sway and yaw.
-
-They are eqs. 9, 12 and 13 of the paper (`parameters.py`); README.md has them in the project's
-notation. Loads (X, Y, N) are surge and sway force (N) and yaw moment (N m), body frame
-forward-left-up.
-"""
+"""Equations of motion of the catamaran in the horizontal plane: surge, sway and yaw."""
 
 from __future__ import annotations
 
@@ -16,15 +11,37 @@ from cosim.export.equations.model import ContinuousModel
 from cosim.export.fmu.block import Block
 
 from ..common import kinematics
-from ..common.elementary_functions import sine_and_cosine
+from ..common.elementary_functions import logarithm, sine_and_cosine
 from ..common.interface import WORLD_OUTPUTS
 from ..common.named_values import ConstantsMap, NamedValues, initial_parameters, values_by_name
 from ..vessel import planar_maps
-from ..vessel.rudder import rudder_force
+from ..vessel.propulsion import rudder_force
 from . import parameters as p
-from .geometry import DECK_CENTRE
 from .interface import INPUTS, STATES, VARIABLES
-from .resistance import resistance
+from .parameters import DECK_CENTRE
+
+
+def resistance(u: ca.SX) -> ca.SX:
+    """Return the surge force (N) of both hulls for a surge velocity relative to the water (m/s)."""
+    square = u * u
+    coefficient = friction_coefficient(u) + residuary_coefficient(square)
+    return -p.WATER_DENSITY / 2 * p.WETTED_SURFACE * coefficient * ca.fabs(u) * u
+
+
+def friction_coefficient(u: ca.SX) -> ca.SX:
+    """Return 0.075 / (log10 Re - 2)^2 for a speed (m/s), with the value at `MIN_REYNOLDS_NUMBER` for slower flow."""
+    ratio = ca.fmax(1, ca.fabs(u) * (p.HULL_LENGTH / p.VISCOSITY / p.MIN_REYNOLDS_NUMBER))
+    exponent = logarithm(ratio) * (1 / math.log(10)) + (math.log10(p.MIN_REYNOLDS_NUMBER) - 2)
+    return 0.075 / (exponent * exponent)
+
+
+def residuary_coefficient(square: ca.SX) -> ca.SX:
+    """Return the residuary coefficient for a squared speed (m2/s2).
+
+    It rises with Fn^2 to its maximum and falls with Fn^-2.
+    """
+    share = square * (1 / (p.GRAVITY * p.HULL_LENGTH * p.RESIDUARY_PEAK_FROUDE_NUMBER**2))
+    return p.RESIDUARY_PEAK * 2 * share / (1 + share * share)
 
 
 def rate(state: ca.SX, inputs: NamedValues, constants: NamedValues) -> ca.SX:

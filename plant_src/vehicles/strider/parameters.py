@@ -1,15 +1,10 @@
-"""Parameters of the catamaran with their sources, in SI units.
-
-Body frame: x forward, y left, z up, origin at the centre of mass.
-
-Sources: [model] the simulation model published with the paper "An Open Simulation Strategy for
-Rapid Control Design in Aerial and Maritime Drone Teams"
-(github.com/OmarVelascoAnrar/UAV_USV_Simulator, commit 1eee757); [paper] its Table 2.
-"""
+"""Parameters of the catamaran with their sources, and its rigid body, in SI units."""
 
 from __future__ import annotations
 
 import math
+
+from ..common.shapes import Body, Box
 
 #: mass of the hull without the links of the original's joint rig [model] (kg)
 MASS = 4.11
@@ -79,3 +74,36 @@ RUDDER_ARM = 0.34727
 DECK_X = (-0.364, 0.337)
 DECK_Y = (-0.299, 0.303)
 DECK_TOP = 0.1444
+
+
+#: centre of the top of the landing deck (m)
+DECK_CENTRE = (sum(DECK_X) / 2, sum(DECK_Y) / 2, DECK_TOP)
+
+#: dimensions from the published simulation model (m)
+PLATE_THICKNESS = 0.023
+HOUSING_SIZE = (0.30, 0.30, 0.05)  # edges of the box under the deck plate
+
+
+def _hull_box(side: float) -> Box:
+    half_extents = (HULL_LENGTH / 2, HULL_BEAM / 2, (HULL_TOP - HULL_BOTTOM) / 2)
+    return Box(half_extents, (0.0, side * HULL_OFFSET, (HULL_TOP + HULL_BOTTOM) / 2))
+
+
+def _plate_box() -> Box:
+    half_extents = ((DECK_X[1] - DECK_X[0]) / 2, (DECK_Y[1] - DECK_Y[0]) / 2, PLATE_THICKNESS / 2)
+    return Box(half_extents, (DECK_CENTRE[0], DECK_CENTRE[1], DECK_TOP - PLATE_THICKNESS / 2))
+
+
+def _housing_box() -> Box:
+    x, y, z = HOUSING_SIZE
+    return Box(
+        (x / 2, y / 2, z / 2), (DECK_CENTRE[0], DECK_CENTRE[1], DECK_TOP - PLATE_THICKNESS - z / 2)
+    )
+
+
+BODY = Body(
+    MASS,
+    INERTIA,
+    (_plate_box(), _hull_box(+1.0), _hull_box(-1.0), _housing_box()),
+    CENTRE_OF_MASS_HEIGHT,
+)

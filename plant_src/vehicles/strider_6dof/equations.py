@@ -8,7 +8,6 @@ from __future__ import annotations
 import casadi as ca
 import numpy as np
 
-from cosim.export.equations.fmu_code import as_block
 from cosim.export.fmu.block import Block
 
 from ..common.named_values import NamedValues, initial_parameters
@@ -17,24 +16,24 @@ from ..strider.equations import (
     hull_constants,
     hull_loads,
     race_velocity_squared,
+    resistance,
     rudder_loads,
 )
-from ..strider.geometry import DECK_CENTRE
 from ..strider.parameters import (
     CENTRE_OF_MASS_HEIGHT,
+    DECK_CENTRE,
     GRAVITY,
     HULL_BEAM,
     INERTIA,
     MASS,
     WATER_DENSITY,
 )
-from ..strider.resistance import resistance
-from ..vessel import floating_maps, vessel_equations
 from ..vessel.hull import Hull, LoadArguments, load_of_force_at
 from ..vessel.strips import Immersion, TwinHull, equivalent_strips, immersion
+from ..vessel.vessel_equations import VesselModel, constant_body, floating_block, wave_table_of
 from . import parameters as p
-from .geometry import BODY
 from .interface import VARIABLES
+from .parameters import BODY
 
 _ORIGIN = ca.SX.zeros(3)  # of the body frame; the centre of mass
 _STRIPS = equivalent_strips(
@@ -63,7 +62,7 @@ def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
         "hydrodynamics": enabled,
         "inverse_mass_matrix": ca.inv(_RIGID_BODY_MASS_MATRIX + enabled * ca.SX(p.ADDED_MASS)),
         "wave.count": parameters["wave.count"],
-        "wave_table": vessel_equations.wave_table_of(parameters, _TWIN_HULL),
+        "wave_table": wave_table_of(parameters, _TWIN_HULL),
     }
 
 
@@ -141,7 +140,7 @@ def load_from_planar(load: ca.SX, height: float) -> ca.SX:
     return ca.vertcat(load[0:2], 0, -height * load[1], height * load[0], load[2])
 
 
-VESSEL = vessel_equations.VesselModel(
+VESSEL = VesselModel(
     "strider_6dof",
     "Strider V1.0 catamaran afloat, in six degrees of freedom",
     VARIABLES,
@@ -152,10 +151,4 @@ VESSEL = vessel_equations.VesselModel(
 
 def block() -> Block:
     """Return the catamaran for export."""
-    model = VESSEL.create_continuous_model()
-    return as_block(
-        model,
-        floating_maps.FloatingContactMaps(
-            model, VESSEL, floating_maps.constant_body(BODY)
-        ).functions(),
-    )
+    return floating_block(VESSEL.create_continuous_model(), VESSEL, constant_body(BODY))

@@ -1,9 +1,4 @@
-"""Parameters of the catamaran beyond those of the planar model (`strider/parameters.py`), in SI units.
-
-The original moves in the plane, so nothing is published about heave, roll and pitch. All values here are computed from the mass
-and the main dimensions of the model, or marked [assumed]. The draught follows from the geometry: the bottom of the hulls is
-0.144 m below the centre of mass, which floats 0.1245 m above the water.
-"""
+"""Parameters of the catamaran beyond those of the planar model, in SI units."""
 
 from __future__ import annotations
 
@@ -11,6 +6,7 @@ import math
 
 import numpy as np
 
+from ..strider import parameters as geometry
 from ..strider.parameters import (
     CENTRE_OF_MASS_HEIGHT,
     DRAUGHT,
@@ -114,3 +110,6 @@ POINT_DRAG = WATER_DENSITY / 2 * PLATE_DRAG_COEFFICIENT * WATERPLANE_AREA / len(
 #: [assumed]
 HULL_FORCE_HEIGHT = HULL_BOTTOM + DRAUGHT / 2
 RUDDER_HEIGHT = -CENTRE_OF_MASS_HEIGHT - RUDDER_AREA**0.5 / 2
+
+
+BODY = geometry.BODY._replace(height=0.0)

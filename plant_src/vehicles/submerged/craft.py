@@ -1,4 +1,4 @@
-"""Data of a submerged vehicle: a rigid body in water with thrusters.
+"""Data of a submerged vehicle, a rigid body in water with thrusters, and their reader.
 
 Body frame: x forward, y left, z up, origin at the centre of mass. SI units. Matrices (6, 6) belong
 to (u, v, w, p, q, r).
@@ -7,20 +7,34 @@ to (u, v, w, p, q, r).
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from cosim.core.errors import InputError, Problem
 
-from ..common.inertia import Boxes, inertia_problems, principal_body
+from ...json_reader import JsonPath
+from ..common.inertia import (
+    Boxes,
+    eigenvalue_problems,
+    inertia_problems,
+    principal_body,
+    symmetry_problems,
+)
 from ..common.shapes import Body, Vector
+from ..common.vehicle_reader import TORQUE_SIGNS, Collision, VehicleReader, edges_around
 
 #: largest number of thrusters
 MAX_THRUSTERS = 16
 
-_SYMMETRY_TOLERANCE = 1e-9
+#: parameter -> description of its matrix (6, 6)
+MATRICES = {
+    "added_mass": "added mass about the centre of mass",
+    "linear_damping": "load over velocity relative to the water",
+    "quadratic_damping": "load over squared velocity relative to the water",
+}
 
 
 @dataclass(frozen=True)
@@ -104,40 +118,124 @@ class Craft:
 
     def _inertia_problems(self) -> Iterator[Problem]:
         if not 0 < self.mass < math.inf:
-            yield self._problem(
-                f"found {self.mass!r}, expected a finite number greater than 0", "mass"
-            )
+            text = f"found {self.mass!r}, expected a finite number greater than 0"
+            yield self._problem(text, "mass")
         yield from (self._problem(text, "inertia") for text in inertia_problems(self.inertia))
 
     def _matrix_problems(self) -> Iterator[Problem]:
-        added = self.added_mass
-        if not np.allclose(added, added.T, rtol=_SYMMETRY_TOLERANCE, atol=0):
-            yield self._problem("expected a symmetric matrix", "added_mass")
+        yield from (
+            self._problem(text, "added_mass") for text in symmetry_problems(self.added_mass)
+        )
         for name in ("added_mass", "linear_damping"):
-            matrix = getattr(self, name)
-            if (
-                lowest := float(np.linalg.eigvalsh((matrix + matrix.T) / 2)[0])
-            ) < -_SYMMETRY_TOLERANCE * np.abs(matrix).max():
-                yield self._problem(
-                    (
-                        f"found the eigenvalue {lowest:g}, expected none below 0: energy is not "
-                        "generated"
-                    ),
-                    name,
-                )
+            for text in eigenvalue_problems(getattr(self, name)):
+                yield self._problem(f"{text}: energy is not generated", name)
         if (np.diag(self.quadratic_damping) < 0).any():
             diagonal = np.diag(self.quadratic_damping).tolist()
-            yield self._problem(
-                f"found the diagonal {diagonal}, expected numbers of at least 0",
-                "quadratic_damping",
-            )
+            text = f"found the diagonal {diagonal}, expected numbers of at least 0"
+            yield self._problem(text, "quadratic_damping")
 
     def _thruster_problems(self) -> Iterator[Problem]:
-        if not 1 <= len(self.thrusters) <= MAX_THRUSTERS:
+        if not 1 <= (count := len(self.thrusters)) <= MAX_THRUSTERS:
             yield self._problem(
-                f"found {len(self.thrusters) or 'none'}, expected 1 to {MAX_THRUSTERS}", "thrusters"
+                f"found {count or 'none'}, expected 1 to {MAX_THRUSTERS}", "thrusters"
             )
 
     def body(self, boxes: Boxes) -> Body:
         """Return the rigid body for Bullet, in the principal axes."""
         return principal_body(self.mass, self.inertia, boxes)
+
+
+#: required keys of the file
+KEYS = (
+    *("mass", "inertia", "displaced_volume", "centre_of_buoyancy"),
+    *(*MATRICES, "thruster", "thrusters", "boxes", "crash_speed"),
+)
+_OPTIONAL_KEYS = ("size", "gravity", "water_density")
+_COEFFICIENTS = {
+    "thrust_coefficient": "N.s2/rad2",
+    "reverse_thrust_coefficient": "N.s2/rad2",
+    "torque_coefficient": "N.m.s2/rad2",
+}
+#: required keys of all thrusters
+THRUSTER_KEYS = ("radius", "max_speed")
+_THRUSTER_OPTIONAL_KEYS = (*_COEFFICIENTS, "time_constant", "advance_coefficient")
+
+
+class SubmergedReader(VehicleReader[Craft]):
+    """Reader of the data of a submerged vehicle (`plant_src/vehicles/data/README.md`)."""
+
+    keys, optional_keys, vehicle_class = KEYS, _OPTIONAL_KEYS, Craft
+
+    def read_values(self, data: Mapping[str, Any]) -> dict[str, Any]:
+        """Read the attributes of the craft, and the collision shape."""
+        common = self.read_data(
+            data.get("thruster"), ("thruster",), THRUSTER_KEYS, _THRUSTER_OPTIONAL_KEYS
+        )
+        boxes = self.read_boxes(data)
+        return {
+            "boxes": boxes,
+            **self.read_volume(data, boxes),
+            **self.read_propulsion(common),
+            **{
+                matrix: self.read_matrix(data.get(matrix, [1.0] * 6), (matrix,), "uvwpqr")
+                for matrix in MATRICES
+            },
+            "mass": self.entry(data, "mass", "kg", above=0.0),
+            "inertia": self.read_inertia(data.get("inertia", [1.0] * 3)),
+            "thrusters": [
+                self.read_thruster(common, each, ("thrusters", str(i)))
+                for i, each in self.elements(data, "thrusters")
+            ],
+        }
+
+    def read_volume(self, data: Mapping[str, Any], boxes: tuple[Collision, ...]) -> dict[str, Any]:
+        """Read what determines weight and buoyancy."""
+        size = self.read_size(data, (), edges_around(boxes))
+        volume = self.entry(data, "displaced_volume", "m3", above=0.0)
+        if not self.problems and volume > (box := math.prod(size)):
+            text = (
+                f"found {volume:g}, expected at most {box:.4g}, the volume of the box with the "
+                f"edges {list(size)} m"
+            )
+            self.add_problem(("displaced_volume",), text)
+        return {
+            "displaced_volume": volume,
+            "centre_of_buoyancy": self.read_vector(data, "centre_of_buoyancy"),
+            "size": size,
+            "gravity": self.entry(data, "gravity", "m/s2", 9.81, above=0.0),
+            "water_density": self.entry(data, "water_density", "kg/m3", 1025.0, above=0.0),
+        }
+
+    def read_propulsion(self, common: Mapping[str, Any]) -> dict[str, float]:
+        """Read what all thrusters have in common."""
+        path = ("thruster",)
+        lag = self.entry(common, "time_constant", "s", 0.0, path, low=0.0)
+        advance = self.entry(common, "advance_coefficient", "kg/rad", 0.0, path, low=0.0)
+        return {
+            "max_thruster_speed": self.entry(common, "max_speed", "rad/s", path=path, above=0.0),
+            "thruster_radius": self.entry(common, "radius", "m", path=path, above=0.0),
+            "thruster_time_constant": lag,
+            "advance_coefficient": advance,
+        }
+
+    def read_thruster(self, common: Mapping[str, Any], value: Any, path: JsonPath) -> Thruster:
+        """Read one thruster; its coefficients replace those of all thrusters."""
+        data = self.read_data(value, path, ("position", "axis"), ("label", "turns", *_COEFFICIENTS))
+        if "thrust_coefficient" not in {*data, *common}:
+            self.add_missing(path, "thrust_coefficient", "thruster")
+        coefficients: dict[str, float] = {}
+        for key, unit in _COEFFICIENTS.items():
+            source, place = self.source_of(key, data, path, common, "thruster")
+            default = coefficients.get("thrust_coefficient", 1.0) if "thrust" in key else 0.0
+            coefficients[key] = self.entry(source, key, unit, default, place, low=0.0)
+        turns = self.choice(data.get("turns", "clockwise"), (*path, "turns"), tuple(TORQUE_SIGNS))
+        if coefficients["torque_coefficient"] and "turns" not in data:
+            text = (
+                '"turns" is missing; a thruster with a torque_coefficient has a sense of rotation'
+            )
+            self.add_problem(path, text)
+        coefficients["torque_coefficient"] *= TORQUE_SIGNS[turns]
+        position = self.read_vector(data, "position", path=path)
+        label = self.read_label(data, path, "thruster")
+        axis = self.read_axis(data.get("axis", [1.0, 0.0, 0.0]), (*path, "axis"))
+        return Thruster(label, position, axis, **coefficients)

@@ -15,7 +15,6 @@ import numpy as np
 from cosim.core.component import Variable
 from cosim.core.units import parse_unit
 
-from ..common.element_labels import element_labels
 from ..common.inertia import inertia_variables
 from ..common.interface import (
     CURRENT_INPUTS,
@@ -24,17 +23,11 @@ from ..common.interface import (
     MOTION_OUTPUTS,
     WATER_LEVEL_INPUT,
     WORLD_OUTPUTS,
+    element_labels,
     initial_variables,
     scalar_variable,
 )
-from .craft import Craft
-
-#: parameter -> description of its matrix (6, 6)
-MATRICES = {
-    "added_mass": "added mass about the centre of mass",
-    "linear_damping": "load over velocity relative to the water",
-    "quadratic_damping": "load over squared velocity relative to the water",
-}
+from .craft import MATRICES, Craft
 
 #: number of parts of the displaced volume
 OCTANTS = 8

@@ -1,17 +1,312 @@
-"""Equations of all floating vessels that are given by data.
+"""Loads of a floating vessel that is given by data.
 
-One binary, whose values are all parameters.
+`vessel/hull.py` has the equations of motion, README.md the loads. One binary holds the equations of
+all floating vessels; all values are parameters.
 """
 
 from __future__ import annotations
 
+from functools import cached_property
+from itertools import product
+
+import casadi as ca
 import numpy as np
 
+from cosim.core.component import Variable
+from cosim.export.equations.c_code import call_in_c
 from cosim.export.fmu.block import Block
 
+from ..common.named_values import NamedValues, square_matrix
+from ..common.rigid_body import symmetric_matrix
+from ..vessel import propulsion
 from ..vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS, Propeller
-from .floating_equations import surface_vessel_block
+from ..vessel.hull import (
+    Ballast,
+    Hull,
+    LoadArguments,
+    improved_equilibrium,
+    load_of_force_at,
+    rigid_body_mass_matrix,
+    weight_and_buoyancy,
+)
+from ..vessel.strips import GRAVITY, Strips, TwinHull, equivalent_strips, immersion
+from ..vessel.vessel_equations import BulletBody, VesselModel, floating_block, wave_table_of
+from .interface import states, variables
 from .surface_vessel import HullForm, SurfaceVessel
+
+#: number of stations along the hull for the cross-flow drag
+DRAG_STATIONS = 21
+
+#: steps of the iteration for the equilibrium
+_EQUILIBRIUM_STEPS = 40
+
+#: parameters that are no constants of the equations, because others are derived from them
+_REPLACED = (
+    "rudder_propeller",
+    "wave.amplitude",
+    "wave.frequency",
+    "wave.direction",
+    "wave.phase",
+)
+
+
+#: constants that determine the equilibrium
+_HYDROSTATICS = (
+    "mass",
+    "water_density",
+    "centre_of_mass.x",
+    "centre_of_mass.y",
+    "centre_of_mass.z",
+    "transverse_moment",
+    "longitudinal_moment",
+    "waterplane_area",
+    "waterplane_centre",
+    "strip_beam",
+    "hull_depth",
+    "hull_bottom",
+    "strip_spacing",
+    "strip_offset",
+    "draught",
+)
+
+
+class FloatingEquations:
+    """Equations of a floating vessel.
+
+    Args:
+        vessel: Vessel with the start values.
+        slots: Numbers of elements of the arrays of propellers and rudders.
+        identifier: Name of the FMU.
+        description: Description of the FMU.
+    """
+
+    def __init__(
+        self, vessel: SurfaceVessel, slots: tuple[int, int], identifier: str, description: str
+    ):
+        self.variables: tuple[Variable, ...] = variables(vessel, slots)
+        self.slots, self.identifier, self.description = slots, identifier, description
+
+    @cached_property
+    def model(self) -> VesselModel:
+        """Model of the vessel."""
+        return VesselModel(
+            self.identifier,
+            self.description,
+            self.variables,
+            derive_constants,
+            hull,
+            states(self.slots[0])[len(states(0)) :],
+            propulsion.speed_rates,
+            (propulsion.PROPELLER_SUM, *([propulsion.RUDDER_SUM] if self.slots[1] else [])),
+        )
+
+    def block(self) -> Block:
+        """Return the vessel for export: its FMU and the contact functions of the world."""
+        model = self.model.create_continuous_model().with_called_derivatives()
+
+        def body(constants: ca.SX) -> BulletBody:
+            known = self.model.constants.by_name(constants)
+            return BulletBody(known["mass"], ca.diag(known["inertia_tensor"]))
+
+        return floating_block(model, self.model, body)
+
+
+def derive_constants(parameters: NamedValues) -> dict[str, ca.SX]:
+    """Return the constants of the equations."""
+    inertia = symmetric_matrix(parameters["inertia"])
+    mass_matrix = rigid_body_mass_matrix(parameters["mass"], parameters["centre_of_mass"], inertia)
+    mass_matrix += square_matrix(parameters["added_mass"])
+    strips = equivalent_strips(
+        _waterplane_centre(parameters),
+        (parameters["transverse_moment"], parameters["longitudinal_moment"]),
+        parameters["waterplane_area"],
+    )
+    depth = draught(parameters)
+    constants = {
+        **{name: value for name, value in parameters.items() if name not in _REPLACED},
+        **propulsion.derive_races(parameters),
+        "inertia_tensor": inertia,
+        "inverse_mass_matrix": ca.inv(mass_matrix),
+        "strip_spacing": strips.spacing,
+        "strip_offset": strips.offset,
+        "draught": depth,
+        "centre_of_buoyancy": _waterplane_centre(parameters) - ca.vertcat(0, 0, depth / 2),
+    }
+    named = NamedValues(constants)
+    table = wave_table_of(parameters, twin_hull(named))
+    return constants | {"equilibrium": _equilibrium(named), "wave_table": table}
+
+
+def draught(parameters: NamedValues) -> ca.SX:
+    """Return the mean draught (m)."""
+    return parameters["mass"] / parameters["water_density"] / parameters["waterplane_area"]
+
+
+def _waterplane_centre(parameters: NamedValues) -> ca.SX:
+    return ca.vertcat(
+        parameters["waterplane_centre"], 0, parameters["hull_bottom"] + draught(parameters)
+    )
+
+
+def twin_hull(constants: NamedValues) -> TwinHull:
+    """Return the strips with their dimensions."""
+    centre = ca.vertcat(
+        constants["waterplane_centre"], 0, constants["hull_bottom"] + constants["draught"]
+    )
+    strips = Strips(centre, constants["strip_spacing"], constants["strip_offset"])
+    return TwinHull(
+        strips,
+        constants["strip_beam"],
+        constants["draught"],
+        constants["hull_depth"],
+        constants["waterplane_area"],
+    )
+
+
+def _equilibrium(constants: NamedValues) -> ca.SX:
+    """Return height of O (m), roll and pitch (rad) at rest.
+
+    By Newton's method with the constant stiffness of the upright hull.
+    """
+    symbols = NamedValues({name: ca.SX.sym(name) for name in _HYDROSTATICS})
+    state = ca.SX.sym("state", 3)
+    improve = ca.Function(
+        "equilibrium", [state, symbols.vector()], [_improved_equilibrium(state, symbols)]
+    )
+    known = ca.vertcat(*(constants[name] for name in _HYDROSTATICS))
+    result = ca.vertcat(-constants["hull_bottom"] - constants["draught"], 0, 0)
+    for _ in range(_EQUILIBRIUM_STEPS):
+        result = call_in_c(improve, result, known)[0]
+    return result
+
+
+def _improved_equilibrium(state: ca.SX, constants: NamedValues) -> ca.SX:
+    """Return height of O (m), roll and pitch (rad) after one step towards the equilibrium."""
+    form, weight_density = twin_hull(constants), GRAVITY * constants["water_density"]
+    area, volume = constants["waterplane_area"], constants["mass"] / constants["water_density"]
+    lever = form.strips.centre[2] - constants["draught"] / 2 - constants["centre_of_mass"][2]
+    moments = ca.vertcat(constants["transverse_moment"], constants["longitudinal_moment"])
+    return improved_equilibrium(
+        state, form, ballast(constants), weight_density * ca.vertcat(area, moments + volume * lever)
+    )
+
+
+def ballast(constants: NamedValues) -> Ballast:
+    """Return the weight of the vessel."""
+    return Ballast(constants["mass"], constants["centre_of_mass"], constants["water_density"])
+
+
+def hull(constants: NamedValues) -> Hull:
+    """Return the vessel with these constants."""
+    return Hull(
+        mass=constants["mass"],
+        centre_of_mass=constants["centre_of_mass"],
+        inertia=constants["inertia_tensor"],
+        added_mass=square_matrix(constants["added_mass"]),
+        coriolis_added_mass=square_matrix(constants["coriolis_added_mass"]),
+        inverse_mass_matrix=constants["inverse_mass_matrix"],
+        deck_centre=constants["deck_centre"],
+        equilibrium=constants["equilibrium"],
+        strips=twin_hull(constants).strips,
+        wave_count=constants["wave.count"],
+        wave_table=constants["wave_table"],
+        loads=lambda now: water_loads(constants, now) + wind_loads(constants, now),
+    )
+
+
+def water_loads(constants: NamedValues, now: LoadArguments) -> ca.SX:
+    """Return the load tau (6) of weight, water and propellers.
+
+    That of the moving water shrinks as the hulls leave it.
+    """
+    form, up = twin_hull(constants), now.frame.attitude[2, :].T
+    under_water = immersion(form, up, now.height, now.water.elevations)
+    speed = propulsion.speeds(now.actuators, now.inputs, constants)
+    flow = ca.vertcat(now.relative_velocity[0:3], now.rates_in_water, now.relative_velocity[5])
+    moving = (
+        damping(constants, flow)
+        + vertical_drag(constants, flow)
+        + cross_flow_drag(constants, flow)
+        + propulsion.rudder_loads(speed, now.relative_velocity, now.inputs, constants)
+        + now.froude_krylov_load(constants["mass"], constants["centre_of_buoyancy"], form.strips)
+    )
+    surface = ca.vertcat(-now.water.slopes[1], now.water.slopes[0], 0)
+    depth = now.water.heave - ca.dot(surface, form.strips.centre) - now.height
+    thrust = propulsion.propeller_loads(
+        speed, now.relative_velocity, depth, up - surface, now.inputs, constants
+    )
+    static = weight_and_buoyancy(under_water, up, ballast(constants))
+    return static + under_water.wetness * moving + thrust
+
+
+def damping(constants: NamedValues, flow: ca.SX) -> ca.SX:
+    """Return tau of the damping for the velocity relative to the water, shape (6,).
+
+    -D nu_r - D_q (|nu_r| nu_r), products by elements (Fossen 2021, section 6.4).
+    """
+    linear = square_matrix(constants["linear_damping"])
+    quadratic = square_matrix(constants["quadratic_damping"])
+    return -(linear @ flow + quadratic @ (ca.fabs(flow) * flow))
+
+
+def vertical_drag(constants: NamedValues, flow: ca.SX) -> ca.SX:
+    """Return tau of the drag of the bottoms.
+
+    It acts at four points around the centre of the waterplane, whose mean squared distances are
+    those of the bottoms.
+    """
+    pressure = constants["water_density"] / 8 * constants["vertical_drag_coefficient"]
+    coefficient = pressure * constants["waterplane_area"]
+    load = ca.SX.zeros(6)
+    for ahead, side in product((-1, 1), repeat=2):
+        x = constants["waterplane_centre"] + ahead * constants["drag_point.x"]
+        y = side * constants["drag_point.y"]
+        speed = flow[2] + y * flow[3] - x * flow[4]
+        drag = -coefficient * ca.fabs(speed) * speed
+        load += load_of_force_at(ca.vertcat(x, y, 0), ca.vertcat(0, 0, drag))
+    return load
+
+
+def cross_flow_drag(constants: NamedValues, flow: ca.SX) -> ca.SX:
+    """Return tau of the cross-flow drag along the hull, at half of the draught.
+
+    Each station is a section in transverse flow, whose velocity grows with the yaw rate (Fossen
+    2021, section 6.4).
+    """
+    length, depth = constants["hull_length"], constants["draught"]
+    spacing = length / (DRAG_STATIONS - 1)
+    coefficient = (
+        constants["water_density"] / 2 * depth * constants["cross_flow_drag_coefficient"] * spacing
+    )
+    force, moment = ca.SX(0), ca.SX(0)
+    for share in np.linspace(-0.5, 0.5, DRAG_STATIONS).tolist():
+        x = constants["waterplane_centre"] + share * length
+        across = flow[1] + x * flow[5]
+        drag = -coefficient * ca.fabs(across) * across
+        force, moment = force + drag, moment + x * drag
+    height = constants["hull_bottom"] + depth / 2
+    return ca.vertcat(0, force, 0, -height * force, 0, moment)
+
+
+def wind_loads(constants: NamedValues, now: LoadArguments) -> ca.SX:
+    """Return tau of the air."""
+    air = now.air_relative_velocity[0:2]
+    force = ca.vertcat(-constants["air_drag"] * ca.fabs(air) * air, 0)
+    return load_of_force_at(constants["air_centre"], force)
+
+
+def surface_vessel_block(
+    vessel: SurfaceVessel, description: str, slots: tuple[int, int] | None = None
+) -> Block:
+    """Return a floating vessel for export.
+
+    Args:
+        vessel: Vessel with the start values.
+        description: Description of the FMU.
+        slots: Numbers of slots of propellers and rudders. None means the numbers of the vessel.
+    """
+    return FloatingEquations(vessel, slots or vessel.slots, vessel.name, description).block()
+
 
 #: catamaran of 30 kg with two propellers; the start values of the FMU
 VESSEL = SurfaceVessel(

@@ -1,4 +1,4 @@
-"""Data of a floating vessel in six degrees of freedom.
+"""Data of a floating vessel in six degrees of freedom, their checks and their reader.
 
 One hull or two, whose strips the surface of the water cuts.
 """
@@ -6,17 +6,26 @@ One hull or two, whose strips the surface of the water cuts.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
+from itertools import product
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from cosim.core.errors import Problem
 
-from ..common.inertia import inertia_problems
-from ..common.shapes import Body, Shape
-from ..vessel.boat import Boat
-from .equilibrium import rest
+from ..common.inertia import Boxes, inertia_problems
+from ..common.shapes import Body
+from ..vessel import boat as boat_data
+from ..vessel.boat import Boat, BoatReader
+
+#: stations of both hulls from bow to stern (spacings), and their sides
+_STATIONS = np.tile([2.0, 1.0, 0.0, -1.0, -2.0], 2)
+_SIDES = np.repeat([1.0, -1.0], 5)
+
+#: steps of the iteration for the equilibrium
+_ITERATIONS = 200
 
 
 @dataclass(frozen=True)
@@ -103,10 +112,8 @@ class SurfaceVessel(Boat):
         yield from (self.problem(text, "inertia") for text in inertia_problems(self.inertia))
         if (np.diag(self.quadratic_damping) < 0).any():
             diagonal = np.diag(self.quadratic_damping).tolist()
-            yield self.problem(
-                f"found the diagonal {diagonal}, expected numbers of at least 0",
-                "quadratic_damping",
-            )
+            text = f"found the diagonal {diagonal}, expected numbers of at least 0"
+            yield self.problem(text, "quadratic_damping")
         if not self.draught < self.hull.depth:
             text = (
                 f"found {self.hull.depth:g}: the vessel sinks, because its draught at rest is "
@@ -119,18 +126,19 @@ class SurfaceVessel(Boat):
             yield self.problem(text, "centre_of_mass")
 
     def _instability(self) -> str:
-        """Return the height of the centre of mass, or else the moment of the waterplane, that would make the vessel stable."""
-        heights, z = self.metacentric_heights, self.centre_of_mass[2]
-        key = (
-            "transverse_moment (beam, offset)"
-            if heights[0] == min(heights)
-            else "longitudinal_moment (length)"
-        )
+        """Return what would make the vessel stable.
+
+        The height of the centre of mass, or else the moment of the waterplane.
+        """
+        (transverse, longitudinal), z = self.metacentric_heights, self.centre_of_mass[2]
+        lower = min(transverse, longitudinal)
+        key = "longitudinal_moment (length)"
+        if transverse == lower:
+            key = "transverse_moment (beam, offset)"
         return (
             f"found z = {z:g} m: the vessel is not stable: its metacentric heights (transverse, "
-            "longitudinal) are "
-            f"{heights[0]:.4g}, {heights[1]:.4g} m, expected > 0: z must be below "
-            f"{z + min(heights):.4g} m, or hull.{key} larger"
+            f"longitudinal) are {transverse:.4g}, {longitudinal:.4g} m, expected > 0: z must be "
+            f"below {z + lower:.4g} m, or hull.{key} larger"
         )
 
     def _imbalance(self) -> str:
@@ -152,10 +160,142 @@ class SurfaceVessel(Boat):
             "is under water"
         )
 
-    def body(self, boxes: tuple[Shape, ...]) -> Body:
+    def body(self, boxes: Boxes) -> Body:
         """Return the rigid body for Bullet, whose frame has its origin in O.
 
         Products of inertia have no influence on contact.
         """
         x, y, z = np.diag(self.inertia).tolist()
-        return Body(self.mass, (x, y, z), boxes)
+        return Body(self.mass, (x, y, z), boxes(np.eye(3)))
+
+
+class Rest(NamedTuple):
+    """Attitude of a vessel at rest.
+
+    Attributes:
+        heel: Heel (rad), positive to starboard.
+        trim: Trim (rad), positive by the bow.
+        freeboard: Height of the lowest deck edge above the water (m).
+    """
+
+    heel: float
+    trim: float
+    freeboard: float
+
+
+def rest(vessel: SurfaceVessel) -> Rest | None:
+    """Return the attitude at rest on calm water.
+
+    None if the vessel has none, so that it capsizes. Boxes at the stations give the buoyancy, as in
+    the equations (`vessel/strips.py`). Newton's method with the stiffness of the upright hull and
+    half of each step finds the height, roll and pitch at which it balances the weight.
+    """
+    hull = vessel.hull
+    middle, centre = hull.bottom + hull.depth / 2, np.array(vessel.centre_of_mass)
+    spacing = math.sqrt(hull.longitudinal_moment / hull.area / 2)
+    offset = math.sqrt(hull.transverse_moment / hull.area)
+    points = np.column_stack(
+        [hull.waterplane_centre + spacing * _STATIONS, offset * _SIDES, np.full(10, middle)]
+    )
+    strip_mass = vessel.water_density * hull.area * hull.depth / 10
+    height, roll, pitch = -hull.bottom - vessel.draught, 0.0, 0.0
+    for _ in range(_ITERATIONS):
+        up = np.array(
+            [-math.sin(pitch), math.sin(roll) * math.cos(pitch), math.cos(roll) * math.cos(pitch)]
+        )
+        extent = max(hull.depth * abs(up[2]), hull.strip_beam * abs(up[1]), spacing * abs(up[0]))
+        share = np.clip(0.5 - (height + points @ up) / extent, 0, 1)
+        lifted = points.copy()
+        lifted[:, 2] += hull.depth**2 * up[2] / extent / 2 * (share - 1)
+        force = strip_mass * share.sum() - vessel.mass
+        middle_of_plane = np.array([hull.waterplane_centre, 0, 0])
+        lever = strip_mass * share @ lifted - vessel.mass * centre - force * middle_of_plane
+        turn = np.cross(lever, up)[:2] / (vessel.mass * np.array(vessel.metacentric_heights))
+        height += (
+            force / (vessel.water_density * hull.area) + hull.waterplane_centre * turn[1]
+        ) / 2
+        roll, pitch = roll + turn[0] / 2, pitch + turn[1] / 2
+        if not max(abs(roll), abs(pitch)) < math.pi / 3:
+            return None
+    deck = hull.bottom + hull.depth
+    half_width = hull.offset + hull.beam / 2
+    freeboard = math.inf
+    for ahead, side in product((-1, 1), repeat=2):
+        x = hull.waterplane_centre + ahead * hull.length / 2
+        corner = (x, side * half_width, deck)
+        freeboard = min(freeboard, height + float(np.dot(corner, up)))
+    return Rest(roll, pitch, freeboard)
+
+
+#: required keys of the file
+KEYS = (*boat_data.KEYS, "inertia", "hull")
+_OPTIONAL_KEYS = (*boat_data.OPTIONAL_KEYS, "quadratic_damping")
+#: required and optional keys of "hull"
+HULL_KEYS = ("count", "length", "beam", "depth", "bottom")
+_DRAG_KEYS = ("vertical_drag_coefficient", "cross_flow_drag_coefficient")
+_HULL_OPTIONAL_KEYS = (
+    "offset",
+    "waterplane_centre",
+    "waterplane_coefficient",
+    "transverse_moment",
+    "longitudinal_moment",
+    *_DRAG_KEYS,
+)
+
+
+class SurfaceVesselReader(BoatReader[SurfaceVessel]):
+    """Reader of the data of a floating vessel (`plant_src/vehicles/data/README.md`)."""
+
+    keys, optional_keys, vehicle_class = KEYS, _OPTIONAL_KEYS, SurfaceVessel
+    velocities = ("u", "v", "w", "p", "q", "r")
+
+    def read_values(self, data: Mapping[str, Any]) -> dict[str, Any]:
+        """Read the attributes of the vessel, and the collision shape."""
+        return {
+            **self.read_boat(data, self.read_boxes(data)),
+            "inertia": self.read_inertia(data.get("inertia", [1.0] * 3)),
+            "quadratic_damping": self.read_nu_matrix(data, "quadratic_damping", [0.0] * 6),
+            "hull": self.read_hull(data.get("hull")),
+        }
+
+    def read_hull(self, value: Any) -> HullForm:
+        """Read the form of the hulls."""
+        data = self.read_data(value, path := ("hull",), HULL_KEYS, _HULL_OPTIONAL_KEYS)
+        length, beam, depth = (
+            self.entry(data, key, "m", path=path, above=0.0) for key in ("length", "beam", "depth")
+        )
+        count = self.integer(data.get("count", 1), (*path, "count"), 1, 2)
+        if count == 2 and "offset" not in data:
+            self.add_problem(path, '"offset" is missing: two hulls have a distance from the middle')
+        offset = self.entry(data, "offset", "m", 0.0, path, low=0.0) if count == 2 else 0.0
+        fullness = self.entry(data, "waterplane_coefficient", "1", 1.0, path, low=0.01, high=1.0)
+        if count == 2 and "offset" in data and 2 * offset < beam:
+            overlap = f"found {offset:g}: the hulls overlap"
+            expected = f"expected at least half of the beam, {beam / 2:g}"
+            self.add_problem((*path, "offset"), f"{overlap}, {expected}")
+        area = count * fullness * length * beam
+        defaults = {
+            "transverse_moment": (area * (offset**2 + beam**2 / 12), offset + beam / 2),
+            "longitudinal_moment": (fullness * area * length**2 / 12, length / 2),
+        }
+        moments = {}
+        for key, (default, reach) in defaults.items():
+            moments[key] = self.entry(data, key, "m4", default, path, above=0.0)
+            if not self.problems and moments[key] > (limit := area * reach**2):
+                text = (
+                    f"found {moments[key]:g}, expected at most {limit:.4g}: area of the waterplane "
+                    "times squared half extent"
+                )
+                self.add_problem((*path, key), text)
+        return HullForm(
+            count=count,
+            length=length,
+            beam=beam,
+            offset=offset,
+            depth=depth,
+            bottom=self.entry(data, "bottom", "m", 0.0, path),
+            waterplane_centre=self.entry(data, "waterplane_centre", "m", 0.0, path),
+            waterplane_coefficient=fullness,
+            **moments,
+            **{key: self.entry(data, key, "1", 0.0, path, low=0.0) for key in _DRAG_KEYS},
+        )

@@ -14,8 +14,7 @@ from dataclasses import dataclass
 from cosim.core.component import Variable
 from cosim.core.units import parse_unit
 
-from ..common.element_labels import element_labels
-from ..common.interface import parameter
+from ..common.interface import element_labels, parameter
 from ..common.shapes import Vector
 
 #: largest numbers of propellers and rudders

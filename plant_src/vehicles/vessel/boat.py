@@ -1,4 +1,4 @@
-"""Data of vessels that are given by JSON files.
+"""Data of vessels that are given by JSON files, and their reader.
 
 What the planar and the floating family have in common.
 
@@ -10,8 +10,9 @@ floating one, about O.
 from __future__ import annotations
 
 import math
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -19,11 +20,12 @@ from cosim.core.component import Variable
 from cosim.core.errors import InputError, Problem
 from cosim.core.units import parse_unit
 
+from ...json_reader import JsonPath
+from ..common.inertia import Boxes, eigenvalue_problems, symmetry_problems
 from ..common.interface import parameter
-from ..common.shapes import Vector
-from .actuators import MAX_PROPELLERS, MAX_RUDDERS, Propeller, Rudder
-
-_SYMMETRY_TOLERANCE = 1e-9
+from ..common.shapes import Body, Vector
+from ..common.vehicle_reader import Collision, CollisionBox, VehicleReader
+from .actuators import MAX_PROPELLERS, MAX_RUDDERS, MIN_TIME_CONSTANT, Propeller, Rudder
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,28 +72,18 @@ class Boat:
     def problems(self) -> Iterator[Problem]:
         """Yield what is physically impossible."""
         if not 0 < self.mass < math.inf:
-            yield self.problem(
-                f"found {self.mass!r}, expected a finite number greater than 0", "mass"
-            )
+            text = f"found {self.mass!r}, expected a finite number greater than 0"
+            yield self.problem(text, "mass")
         for name in ("added_mass", "coriolis_added_mass"):
-            if not np.allclose(
-                getattr(self, name), getattr(self, name).T, rtol=_SYMMETRY_TOLERANCE, atol=0
-            ):
-                yield self.problem("expected a symmetric matrix", name)
-        added = self.added_mass
-        if (
-            lowest := float(np.linalg.eigvalsh((added + added.T) / 2)[0])
-        ) < -_SYMMETRY_TOLERANCE * np.abs(added).max():
-            yield self.problem(
-                f"found the eigenvalue {lowest:g}, expected none below 0", "added_mass"
-            )
-        if (
-            diagonal := np.diag(self.linear_damping)
-        ).min() < 0:  # published matrices also contain lift, off the diagonal
-            yield self.problem(
-                f"found the diagonal {diagonal.tolist()}, expected numbers of at least 0",
-                "linear_damping",
-            )
+            for text in symmetry_problems(getattr(self, name)):
+                yield self.problem(text, name)
+        for text in eigenvalue_problems(self.added_mass):
+            yield self.problem(text, "added_mass")
+        # published matrices also contain lift, off the diagonal
+        diagonal = np.diag(self.linear_damping)
+        if diagonal.min() < 0:
+            text = f"found the diagonal {diagonal.tolist()}, expected numbers of at least 0"
+            yield self.problem(text, "linear_damping")
         for name, most, least in (("propellers", MAX_PROPELLERS, 1), ("rudders", MAX_RUDDERS, 0)):
             if not least <= (count := len(getattr(self, name))) <= most:
                 yield self.problem(f"found {count or 'none'}, expected {least} to {most}", name)
@@ -106,6 +98,10 @@ class Boat:
     def problem(self, text: str, *subject: str) -> Problem:
         """Return a problem of an attribute."""
         return Problem(text, f"vessel {self.name}: {'.'.join(subject)}", subject)
+
+    def body(self, boxes: Boxes) -> Body:
+        """Return the rigid body for Bullet with this collision shape."""
+        raise NotImplementedError
 
     @property
     def slots(self) -> tuple[int, int]:
@@ -159,3 +155,143 @@ def boat_parameters(boat: Boat, velocities: str) -> Iterator[Variable]:
     yield from vector_parameters(
         "deck_centre", "xyz", "m", "centre of the top of the landing deck, from O", boat.deck_centre
     )
+
+
+_Boat = TypeVar("_Boat", bound=Boat)
+
+#: required keys of both families
+KEYS = ("mass", "added_mass", "linear_damping", "propellers", "boxes", "crash_speed")
+OPTIONAL_KEYS = (
+    "centre_of_mass",
+    "coriolis_added_mass",
+    "air_drag",
+    "air_centre",
+    "deck_centre",
+    "propeller",
+    "rudders",
+    "water_density",
+)
+_PROPELLER_QUANTITIES = {
+    "thrust_coefficient": "N.s2/rad2",
+    "reverse_thrust_coefficient": "N.s2/rad2",
+    "max_speed": "rad/s",
+    "max_reverse_speed": "rad/s",
+    "time_constant": "s",
+    "radius": "m",
+    "advance_coefficient": "kg/rad",
+    "max_azimuth": "rad",
+}
+#: quantities of a propeller whose default is another one
+_PROPELLER_DEFAULTS = {
+    "reverse_thrust_coefficient": "thrust_coefficient",
+    "max_reverse_speed": "max_speed",
+}
+_REQUIRED_OF_PROPELLERS = ("thrust_coefficient", "max_speed")
+_RUDDER_KEYS = ("position", "area")
+_RUDDER_OPTIONAL_KEYS = ("label", "max_lift_coefficient", "stall_angle", "max_angle", "propeller")
+
+
+class BoatReader(VehicleReader[_Boat]):
+    """Reader of vessel data.
+
+    Attributes:
+        velocities: Names of the elements of nu.
+    """
+
+    velocities: Sequence[str]
+
+    def read_boat(self, data: Mapping[str, Any], boxes: Sequence[Collision]) -> dict[str, Any]:
+        """Read the attributes of `Boat` without its name, and the collision shape."""
+        ones = [1.0] * len(self.velocities)
+        added = self.read_nu_matrix(data, "added_mass", ones)
+        centre = self.read_vector(data, "centre_of_mass")
+        x, y = self.vector_quantity(data.get("air_drag", [0.0, 0.0]), ("air_drag",), "kg/m", "xy")
+        if min(x, y) < 0:
+            self.add_problem(("air_drag",), f"found {[x, y]}, expected numbers of at least 0")
+        coriolis = added
+        if "coriolis_added_mass" in data:
+            coriolis = self.read_nu_matrix(data, "coriolis_added_mass", ones)
+        return {
+            "boxes": boxes,
+            "mass": self.entry(data, "mass", "kg", above=0.0),
+            "centre_of_mass": centre,
+            "added_mass": added,
+            "coriolis_added_mass": coriolis,
+            "linear_damping": self.read_nu_matrix(data, "linear_damping", ones),
+            "air_drag": (x, y),
+            "air_centre": self.read_vector(data, "air_centre", default=centre),
+            "deck_centre": self.read_vector(data, "deck_centre", default=_highest_top(boxes)),
+            "propellers": self.read_propellers(data),
+            "rudders": self.read_rudders(data),
+            "water_density": self.entry(data, "water_density", "kg/m3", 1025.0, above=0.0),
+        }
+
+    def read_nu_matrix(
+        self, data: Mapping[str, Any], key: str, default: Any, path: JsonPath = ()
+    ) -> np.ndarray:
+        """Read a matrix that belongs to nu: its diagonal or its rows."""
+        return self.read_matrix(data.get(key, default), (*path, key), self.velocities)
+
+    def read_propellers(self, data: Mapping[str, Any]) -> list[Propeller]:
+        """Read all propellers; what they have in common is in "propeller"."""
+        common = self.read_data(
+            data.get("propeller", {}), ("propeller",), (), tuple(_PROPELLER_QUANTITIES)
+        )
+        return [
+            self.read_propeller(common, each, ("propellers", str(i)))
+            for i, each in self.elements(data, "propellers")
+        ]
+
+    def read_propeller(self, common: Mapping[str, Any], value: Any, path: JsonPath) -> Propeller:
+        """Read one propeller; its quantities replace those of all propellers."""
+        data = self.read_data(value, path, ("position",), ("label", "axis", *_PROPELLER_QUANTITIES))
+        numbers: dict[str, float] = {}
+        for key, unit in _PROPELLER_QUANTITIES.items():
+            source, place = self.source_of(key, data, path, common, "propeller")
+            default, limit = 0.0, {"low": 0.0}
+            if key in _REQUIRED_OF_PROPELLERS and key in source:
+                limit = {"above": 0.0}
+            elif key in _REQUIRED_OF_PROPELLERS:
+                self.add_missing(path, key, "propeller")
+            elif key in _PROPELLER_DEFAULTS:
+                default = numbers[_PROPELLER_DEFAULTS[key]]
+            numbers[key] = self.entry(source, key, unit, default, place, **limit)
+            if key == "time_constant" and 0 < numbers[key] < MIN_TIME_CONSTANT:
+                expected = f"expected 0 (no lag) or at least {MIN_TIME_CONSTANT}"
+                self.add_problem((*place, key), f"found {numbers[key]}, {expected}")
+        position = self.read_vector(data, "position", path=path)
+        label = self.read_label(data, path, "propeller")
+        axis = self.read_axis(data.get("axis", [1.0, 0.0, 0.0]), (*path, "axis"))
+        return Propeller(label, position, axis, **numbers)
+
+    def read_rudders(self, data: Mapping[str, Any]) -> list[Rudder]:
+        """Read all rudders; a vessel may have none."""
+        given = self.elements(data, "rudders") if data.get("rudders") != [] else []
+        return [self.read_rudder(each, ("rudders", str(i))) for i, each in given]
+
+    def read_rudder(self, value: Any, path: JsonPath) -> Rudder:
+        """Read one rudder."""
+        data = self.read_data(value, path, _RUDDER_KEYS, _RUDDER_OPTIONAL_KEYS)
+        right = math.pi / 2
+        position = self.read_vector(data, "position", path=path)
+        stall, largest = math.radians(30), math.radians(35)
+        return Rudder(
+            self.read_label(data, path, "rudder"),
+            position,
+            self.entry(data, "area", "m2", path=path, above=0.0),
+            self.entry(data, "max_lift_coefficient", "1", 1.2, path, above=0.0),
+            self.entry(data, "stall_angle", "rad", stall, path, low=0.01, high=right),
+            self.entry(data, "max_angle", "rad", largest, path, low=0.0, high=right),
+            self.integer(data.get("propeller", 0), (*path, "propeller"), 0),
+        )
+
+
+def _highest_top(boxes: Sequence[Collision]) -> Vector:
+    """Return the centre of the top of the highest box."""
+    box = max(
+        boxes,
+        key=lambda box: box.position[2] + box.size[2] / 2,
+        default=CollisionBox((0.0,) * 3, (0.0,) * 3, 0.0),
+    )
+    x, y, z = box.position
+    return x, y, z + box.size[2] / 2

@@ -1,6 +1,6 @@
-"""Equations of motion of a floating vessel in six degrees of freedom.
+"""Equations of motion, weight and buoyancy of a floating vessel in six degrees of freedom.
 
-`vehicles/README.md` has them with their sources.
+`vehicles/README.md` has the equations with their sources.
 
 Fossen (2021), Handbook of Marine Craft Hydrodynamics and Motion Control, 2nd edition, chapters 3, 6
 and 10, converted to world frame ENU and body frame forward-left-up. The origin O of the body frame
@@ -22,8 +22,16 @@ import casadi as ca
 from ..common import kinematics
 from ..common.interface import VESSEL_STATES
 from ..common.named_values import NamedValues
-from .strips import Strips
-from .wave_loads import WaterMotion, water_motion
+from .strips import (
+    GRAVITY,
+    STRIP_COUNT,
+    Immersion,
+    Strips,
+    TwinHull,
+    WaterMotion,
+    immersion,
+    water_motion,
+)
 
 
 @dataclass(frozen=True)
@@ -48,7 +56,7 @@ class Frame:
     world_to_current_axes: ca.SX
 
     def generalised_force(self, force: ca.SX, torque: ca.SX) -> ca.SX:
-        """Return the load tau, shape (6,), of a force at O (N) and a torque about O (N m), both in the world frame."""
+        """Return the load tau (6) of a force at O (N) and a torque about O (N m), world frame."""
         return ca.vertcat(
             self.to_world.T @ force, self.rates_to_angular_velocity.T @ (self.attitude.T @ torque)
         )
@@ -86,7 +94,10 @@ class LoadArguments:
         return self.relative_velocity[3:5] - self.water.rates
 
     def froude_krylov_load(self, mass: ca.SX, centre: ca.SX, strips: Strips) -> ca.SX:
-        """Return tau that accelerates the displaced water with the waves, beyond the hydrostatic pressure.
+        """Return tau that accelerates the displaced water with the waves.
+
+        It is the Froude-Krylov load beyond the hydrostatic pressure (Faltinsen 1990, Sea Loads on
+        Ships and Offshore Structures, chapter 3).
 
         Args:
             mass: Displaced mass (kg).
@@ -123,7 +134,7 @@ class Hull:
         equilibrium: Height of O (m), roll and pitch (rad) of the vessel afloat at rest, shape (3,).
         strips: Strips at which the waves act.
         wave_count: Number of wave components.
-        wave_table: Wave components, see `wave_loads.wave_table`.
+        wave_table: Wave components, see `strips.wave_table`.
         loads: Function for the load tau (6) of water, air and propulsion, without added mass.
         frame: Function from the orientation to the rotations.
         centre_in_velocity_axes: Centre of mass in the velocity frame (m), shape (3,); None:
@@ -148,11 +159,8 @@ class Hull:
     @property
     def velocity_centre(self) -> ca.SX:
         """Centre of mass in the velocity frame (m), shape (3,)."""
-        return (
-            self.centre_of_mass
-            if self.centre_in_velocity_axes is None
-            else self.centre_in_velocity_axes
-        )
+        other = self.centre_in_velocity_axes
+        return self.centre_of_mass if other is None else other
 
     def initial_state(self, initial: NamedValues, actuators: int = 0) -> ca.SX:
         """Return the state from the parameters `initial.*`, with `actuators` further states of 0.
@@ -211,10 +219,8 @@ class Hull:
             self.wave_table,
         )
         current = frame.world_to_current_axes @ ca.vertcat(inputs["current"], 0)
-        wave_velocity, wave_acceleration = (
-            frame.to_world.T @ water.velocity,
-            frame.to_world.T @ water.acceleration,
-        )
+        wave_velocity = frame.to_world.T @ water.velocity
+        wave_acceleration = frame.to_world.T @ water.acceleration
         nu_without_current = ca.vertcat(nu[0:3] - current, rates)
         nu_r = ca.vertcat(nu_without_current[0:3] - wave_velocity, rates)
         air = nu[0:3] - frame.to_world.T @ inputs["wind"]
@@ -229,7 +235,8 @@ class Hull:
             inputs,
             state[len(VESSEL_STATES) :],
         )
-        tau = self.loads(now) + self._external_load(frame, inputs)
+        external = ca.vertcat(inputs["external_force"], inputs["external_torque"])
+        tau = self.loads(now) + self.load_at_centre(frame, external)
         linear = wave_acceleration - ca.cross(rates, wave_velocity)
         tau += self.added_mass @ ca.vertcat(linear, water.angular_acceleration, 0)
         tau -= self._rigid_body_coriolis(nu_without_current) + coriolis_load(
@@ -251,14 +258,16 @@ class Hull:
             force, ca.cross(rates, self.inertia @ rates) + ca.cross(self.velocity_centre, force)
         )
 
-    def _external_load(self, frame: Frame, inputs: NamedValues) -> ca.SX:
-        force, torque = inputs["external_force"], inputs["external_torque"]
-        return frame.generalised_force(
-            force, torque + ca.cross(frame.attitude @ self.centre_of_mass, force)
-        )
+    def load_at_centre(self, frame: Frame, load: ca.SX) -> ca.SX:
+        """Return the load tau of a force at the centre of mass and a torque (6, world frame)."""
+        lever = frame.attitude @ self.centre_of_mass
+        return frame.generalised_force(load[0:3], load[3:6] + ca.cross(lever, load[0:3]))
 
     def observe(self, state: ca.SX) -> ca.SX:
-        """Return the motion of the centre of mass (`interface.MOTION_OUTPUTS`) and the deck (`interface.DECK_OUTPUTS`)."""
+        """Return the motion of the centre of mass and of the deck.
+
+        They are `interface.MOTION_OUTPUTS` and `interface.DECK_OUTPUTS`.
+        """
         orientation, nu = state[3:7], state[7:13]
         frame = self.frame(orientation)
         to_centre, to_deck = frame.attitude @ self.centre_of_mass, frame.attitude @ self.deck_centre
@@ -289,7 +298,7 @@ def load_of_force_at(point: ca.SX, force: ca.SX) -> ca.SX:
 
 
 def transformation_matrix(point: ca.SX) -> ca.SX:
-    """Return the matrix (6, 6) from nu of O to nu of a point (m) of the hull (Fossen 2021, appendix C)."""
+    """Return the matrix (6, 6) from nu of O to nu of a point (m) (Fossen 2021, appendix C)."""
     return ca.blockcat([[ca.SX.eye(3), -ca.skew(point)], [ca.SX.zeros(3, 3), ca.SX.eye(3)]])
 
 
@@ -303,3 +312,57 @@ def rigid_body_mass_matrix(mass: ca.SX, centre: ca.SX, inertia: ca.SX) -> ca.SX:
     """
     to_centre = transformation_matrix(centre)
     return to_centre.T @ ca.diagcat(mass * ca.SX.eye(3), inertia) @ to_centre
+
+
+@dataclass(frozen=True)
+class Ballast:
+    """Weight of a vessel and density of the water.
+
+    Attributes:
+        mass: Mass (kg).
+        centre_of_mass: Centre of mass from O (m, body frame), shape (3,).
+        water_density: Density of the water (kg/m3).
+    """
+
+    mass: ca.SX
+    centre_of_mass: ca.SX
+    water_density: ca.SX
+
+
+def weight_and_buoyancy(under_water: Immersion, up: ca.SX, ballast: Ballast) -> ca.SX:
+    """Return the load tau (6) of weight and buoyancy for the vertical axis in the body frame."""
+    weight = load_of_force_at(ballast.centre_of_mass, -GRAVITY * ballast.mass * up)
+    density = GRAVITY * ballast.water_density
+    return weight + density * ca.vertcat(under_water.volume * up, ca.cross(under_water.moment, up))
+
+
+def improved_equilibrium(state: ca.SX, hull: TwinHull, ballast: Ballast, stiffness: ca.SX) -> ca.SX:
+    """Return the state after one step of Newton's method towards the equilibrium in still water.
+
+    The state is height of O (m), roll and pitch (rad). The stiffness is that of the upright hull in
+    all steps, so that the method converges linearly but needs no derivatives.
+
+    Args:
+        state: Height, roll and pitch before the step, shape (3,).
+        hull: Hulls.
+        ballast: Weight of the vessel.
+        stiffness: Stiffness of heave (N/m), roll and pitch (N m/rad) at the centre of the
+            waterplane, shape (3,).
+    """
+    middle = hull.strips.centre
+    up = upward_axis(state)
+    load = weight_and_buoyancy(immersion(hull, up, state[0], ca.SX.zeros(STRIP_COUNT)), up, ballast)
+    force, moment = ca.dot(load[0:3], up), load[3:6] - ca.cross(middle, load[0:3])
+    angles = moment[0:2] / stiffness[1:3]
+    return state + ca.vertcat(force / stiffness[0] + middle[0] * angles[1], angles)
+
+
+def attitude_at(state: ca.SX) -> ca.SX:
+    """Return the rotation matrix body to world frame for height, roll and pitch without yaw."""
+    orientation = kinematics.quaternion_from_euler(state[1], state[2], ca.SX(0))
+    return kinematics.rotation_matrix(orientation)
+
+
+def upward_axis(state: ca.SX) -> ca.SX:
+    """Return the vertical axis of the world in the body frame for a state, shape (3,)."""
+    return attitude_at(state)[2, :].T

@@ -12,23 +12,22 @@ from cosim.export.equations.model import ContinuousModel
 
 from ..common import kinematics
 from ..common.contact_maps import (
-    CORRECT_ARGUMENTS,
-    INITIALIZE_RESULTS,
-    PREDICT_ARGUMENTS,
-    PREDICT_RESULTS,
     contact_impulse,
     correct_function,
     correct_symbols,
     create_symbols,
-    parameters_and_constants,
+    initialize_function,
+    predict_function,
     predict_symbols,
     predicted_state,
-    step_status,
 )
 
 
 class PlanarBody(NamedTuple):
-    """Mass (kg), moment of inertia about the yaw axis through the centre of mass (kg m2) and height of this centre (m)."""
+    """Mass (kg), moment of inertia about the vertical axis (kg m2) and height (m).
+
+    Both belong to the centre of mass.
+    """
 
     mass: ca.SX
     yaw_inertia: ca.SX
@@ -62,92 +61,56 @@ class PlanarContactMaps:
 
     def functions(self) -> list[ca.Function]:
         """Return the functions to export."""
-        return [self._initialize_function(), self._predict_function(), self._correct_function()]
-
-    def _initialize_function(self) -> ca.Function:
-        parameters, constants = parameters_and_constants(self.model)
-        state = self.model.initial_state(constants)
-        twist = _planar_twist(_planar_rotation(state[2]) @ state[3:5], ca.SX(0), state[5])
-        return ca.Function(
-            "contact_initialize",
-            [parameters],
-            [constants, state, twist, twist, _bullet_pose(state, self.body(constants))],
-            ["parameters"],
-            INITIALIZE_RESULTS,
-        )
+        return [
+            initialize_function(
+                self.model,
+                lambda state, _: _planar_twist(
+                    _planar_rotation(state[2]) @ state[3:5], ca.SX(0), state[5]
+                ),
+                lambda state, constants: _bullet_pose(state, self.body(constants)),
+            ),
+            self._predict_function(),
+            self._correct_function(),
+        ]
 
     def _predict_function(self) -> ca.Function:
-        arguments = predict_symbols(self.model)
-        state, end, constants, step = (
-            arguments[0],
-            predicted_state(self.model, *arguments[:5]),
-            *arguments[3:5],
-        )
+        arguments = predict_symbols(self.model) | create_symbols(vertical_load=3)
+        state, end = arguments["state"], predicted_state(self.model, arguments)
+        constants, load = arguments["constants"], arguments["vertical_load"]
         body = self.body(constants)
-        (vertical_load,) = create_symbols(vertical_load=3)
-        rates = (end[0:3] - state[0:3]) / step
-        twist = _planar_twist(
-            rates[0:2], _minmod(vertical_load[0], vertical_load[1]) / body.mass, rates[2]
-        )
-        endpoints = ca.vertcat(
-            self.observe(state, constants)[0:3], self.observe(end, constants)[0:3]
-        )
-        previous_load = ca.vertcat(vertical_load[0], vertical_load[2])
-        status = step_status(end, endpoints, arguments, ca.SX(0))
-        results = [
-            state,
+        rates = (end[0:3] - state[0:3]) / arguments["step_size"]
+        lift = _minmod(load[0], load[1]) / body.mass
+        positions = [self.observe(x, constants)[0:3] for x in (state, end)]
+        return predict_function(
+            arguments,
             end,
-            twist,
-            twist,
-            _bullet_pose(state, body),
-            previous_load,
-            endpoints,
-            status,
-        ]
-        names = (
-            *PREDICT_RESULTS,
-            "bullet_pose",
-            "previous_vertical_load",
-            "endpoints",
-            "step_status",
-        )
-        return ca.Function(
-            "contact_predict",
-            [*arguments, vertical_load],
-            results,
-            [*PREDICT_ARGUMENTS, "vertical_load"],
-            names,
+            _planar_twist(rates[0:2], lift, rates[2]),
+            ca.vertcat(*positions),
+            ca.SX(0),
+            bullet_pose=_bullet_pose(state, body),
+            previous_vertical_load=ca.vertcat(load[0], load[2]),
         )
 
     def _correct_function(self) -> ca.Function:
-        start, predicted, twist, bullet_twist, constants, step = arguments = correct_symbols(
-            self.model
-        )
-        (previous_load,) = create_symbols(previous_vertical_load=2)
+        arguments = correct_symbols(self.model)
+        start, predicted, twist, bullet_twist, constants, step = arguments.values()
+        arguments |= create_symbols(previous_vertical_load=2)
+        load, heave = ca.vertsplit(arguments["previous_vertical_load"])
         change, body = bullet_twist - twist, self.body(constants)
-        velocity = predicted[3:6] + ca.vertcat(
-            _planar_rotation(predicted[2]).T @ change[0:2], change[5]
-        )
+        turned_change = _planar_rotation(predicted[2]).T @ change[0:2]
+        velocity = predicted[3:6] + ca.vertcat(turned_change, change[5])
         impulse = contact_impulse(
             ca.norm_2(ca.vertcat(body.mass * change[0:3], body.yaw_inertia * change[5]))
         )
         pose = start[0:3] + step * ca.vertcat(bullet_twist[0:2], bullet_twist[5])
-        published = ca.vertcat(
-            pose, _planar_rotation(pose[2]).T @ bullet_twist[0:2], bullet_twist[5], predicted[6:]
-        )
-        vertical_load = ca.vertcat(
-            -body.mass * change[2], previous_load[0], previous_load[1] + bullet_twist[2] * step
-        )
-        corrected = ca.vertcat(pose, velocity, predicted[6:])
+        mean = _planar_rotation(pose[2]).T @ bullet_twist[0:2]
         return correct_function(
-            [*arguments, previous_load],
-            [*CORRECT_ARGUMENTS, "previous_vertical_load"],
+            arguments,
             impulse,
-            predicted,
-            corrected,
+            ca.vertcat(pose, velocity, predicted[6:]),
+            ca.vertcat(pose, mean, bullet_twist[5], predicted[6:]),
             lambda state: self.observe(state, constants),
-            published,
-            vertical_load=vertical_load,
+            vertical_load=ca.vertcat(-body.mass * change[2], load, heave + bullet_twist[2] * step),
         )
 
 

@@ -1,11 +1,12 @@
-"""Loads of propellers and rudders of vessels that are given by data, as CasADi expressions.
+"""Loads of propellers and rudders of vessels, as CasADi expressions.
 
     T_i = e_i (c_i n_i |n_i| - k_i |n_i| u_i)          u_i = a_i . (v_r + w x r_i)
 
-n_i is the speed, c_i the thrust coefficient of its sense of rotation, k_i the loss by axial inflow,
+n_i is the speed, c_i the thrust coefficient of its sense of rotation, k_i the loss by axial inflow
+(Fossen 2021, Handbook of Marine Craft Hydrodynamics and Motion Control, 2nd edition, chapter 9),
 a_i the axis turned by the azimuth angle, e_i the immersed fraction of the height of the propeller.
-Rudders are those of `rudder.py`; the race of a propeller adds 2 max(c_i n_i |n_i|, 0) / (rho A_i)
-to the squared velocity, as in the momentum theory of the actuator disc.
+The race of a propeller adds 2 max(c_i n_i |n_i|, 0) / (rho A_i) to the squared velocity at a
+rudder, as in the momentum theory of the actuator disc.
 """
 
 from __future__ import annotations
@@ -17,13 +18,44 @@ import casadi as ca
 
 from cosim.export.equations.simd_sum import sum_over_rows
 
-from ..common.elementary_functions import sine_and_cosine
-from ..common.named_values import NamedValues
+from ..common.elementary_functions import arctangent, sine_and_cosine, sine_of_right_angle_share
+from ..common.named_values import NamedValues, vector_rows
 from .actuators import MAX_PROPELLERS, MAX_RUDDERS, MIN_TIME_CONSTANT
-from .rudder import rudder_force
 
 _PROPELLER_ROW = 13
 _RUDDER_ROW = 7
+
+
+def rudder_force(
+    u: ca.SX,
+    v: ca.SX,
+    race: ca.SX,
+    angle: ca.SX,
+    turn: tuple[ca.SX, ca.SX],
+    pressure_area: ca.SX,
+    stall_angle: ca.SX,
+) -> tuple[ca.SX, ca.SX]:
+    """Return surge and sway force (N) of a rudder.
+
+    The lift is a sine of the angle of attack up to the stall angle, as in the published simulator
+    of the Strider (`strider/parameters.py`), and constant beyond.
+
+    Args:
+        u: Surge velocity relative to the water at the rudder (m/s); the lift changes its sign when
+            going astern.
+        v: Sway velocity relative to the water at the rudder (m/s).
+        race: What a propeller adds to the squared velocity at the rudder (m2/s2).
+        angle: Rudder angle (rad).
+        turn: Sine and cosine of the rudder angle.
+        pressure_area: rho / 2 times maximum lift coefficient times area (kg/m).
+        stall_angle: Angle of attack beyond which the lift is constant (rad).
+    """
+    pressure = ca.fabs(u) * u + race
+    ahead = ca.sign(pressure)
+    inflow_angle = arctangent(ahead * v, ca.sqrt(ca.fabs(pressure)))
+    attack = ca.fmin(1, ca.fmax(-1, (angle - inflow_angle) / stall_angle))
+    lift = pressure_area * pressure * sine_of_right_angle_share(attack)
+    return -lift * turn[0], lift * turn[1]
 
 
 def _propeller_term() -> ca.Function:
@@ -35,16 +67,13 @@ def _propeller_term() -> ca.Function:
     common, row = ca.SX.sym("common", 10), ca.SX.sym("row", _PROPELLER_ROW)
     velocity, rates, depth, slope = common[0:3], common[3:6], common[6], common[7:10]
     position, axis = row[0:3], row[3:6]
-    azimuth, speed, forward, reverse, advance, half_per_radius, immersed_at_rest = ca.vertsplit(
-        row[6:]
-    )
+    azimuth, speed, forward, reverse, advance, half_per_radius, at_rest = ca.vertsplit(row[6:])
     sine, cosine = sine_and_cosine(azimuth)
     direction = ca.vertcat(
         cosine * axis[0] - sine * axis[1], sine * axis[0] + cosine * axis[1], axis[2]
     )
-    immersed = ca.fmin(
-        1, ca.fmax(0, (depth - ca.dot(slope, position)) * half_per_radius + immersed_at_rest)
-    )
+    height = (depth - ca.dot(slope, position)) * half_per_radius + at_rest
+    immersed = ca.fmin(1, ca.fmax(0, height))
     inflow = ca.dot(direction, velocity + ca.cross(rates, position))
     size = ca.fabs(speed)
     thrust = immersed * size * (ca.if_else(speed > 0, forward, reverse) * speed - advance * inflow)
@@ -78,23 +107,19 @@ RUDDER_SUM = sum_over_rows("rudders", _rudder_term(), MAX_RUDDERS)
 def derive_races(parameters: NamedValues) -> dict[str, ca.SX]:
     """Return the constant "race" of vessels with rudders.
 
-    2 / (rho A) of the propeller ahead of each rudder (m2/s2/N).
-
-    A row belongs to a rudder, a column to a propeller.
+    It is 2 / (rho A) of the propeller ahead of each rudder (m2/s2/N), and 0 of the others. A row
+    belongs to a rudder, a column to a propeller.
     """
     if "rudder_count" not in parameters:
         return {}
     radius = parameters["propeller_radius"]
     area = math.pi * radius * radius
     factors = ca.if_else(area > 0, 2 / parameters["water_density"] / ca.fmax(area, 1e-9), 0)
-    rows = [
-        [
-            ca.if_else(rudder == number, factors[number - 1], 0)
-            for number in range(1, radius.numel() + 1)
-        ]
-        for rudder in ca.vertsplit(parameters["rudder_propeller"])
-    ]
-    return {"race": ca.vertcat(*(ca.horzcat(*row) for row in rows))}
+    rows = []
+    for rudder in ca.vertsplit(parameters["rudder_propeller"]):
+        row = [ca.if_else(rudder == k + 1, factors[k], 0) for k in range(radius.numel())]
+        rows.append(ca.horzcat(*row))
+    return {"race": ca.vertcat(*rows)}
 
 
 def speeds(actuators: ca.SX, inputs: NamedValues, constants: NamedValues) -> ca.SX:
@@ -146,12 +171,12 @@ def propeller_loads(
     limit, radius = constants["max_azimuth"], constants["propeller_radius"]
     azimuth = _limited(inputs["azimuth"], -limit, limit) if "azimuth" in inputs else 0 * limit
     columns = [
-        *(
-            constants[f"propeller_{name}.{letter}"]
-            for name in ("position", "axis")
-            for letter in "xyz"
-        ),
-        *(azimuth, speed, constants["thrust_coefficient"], constants["reverse_thrust_coefficient"]),
+        vector_rows(constants, "propeller_position"),
+        vector_rows(constants, "propeller_axis"),
+        azimuth,
+        speed,
+        constants["thrust_coefficient"],
+        constants["reverse_thrust_coefficient"],
         constants["advance_coefficient"],
         ca.if_else(radius > 0, 0.5 / ca.fmax(radius, 1e-9), 0),
         ca.if_else(radius > 0, 0.5, 1),
@@ -161,34 +186,31 @@ def propeller_loads(
 
 
 def rudder_loads(speed: ca.SX, flow: ca.SX, inputs: NamedValues, constants: NamedValues) -> ca.SX:
-    """Return the load (6) about O of all rudders for propeller speeds (rad/s) and a velocity (6) relative to the water."""
+    """Return the load (6) about O of all rudders.
+
+    Args:
+        speed: Propeller speeds (rad/s).
+        flow: Velocity relative to the water, shape (6,).
+        inputs: Inputs of the model.
+        constants: Constants of the equations.
+    """
     if "rudder_count" not in constants:
         return ca.SX.zeros(6)
     limit = constants["max_rudder_angle"]
     thrust = constants["thrust_coefficient"] * ca.fmax(speed, 0) ** 2
-    pressure_area = (
-        constants["water_density"]
-        / 2
-        * constants["rudder_lift_coefficient"]
-        * constants["rudder_area"]
-    )
+    pressure = constants["water_density"] / 2 * constants["rudder_lift_coefficient"]
     columns = [
-        *(constants[f"rudder_position.{letter}"] for letter in "xyz"),
-        *(
-            _limited(inputs["rudder_angle"], -limit, limit),
-            constants["race"] @ thrust,
-            pressure_area,
-            constants["stall_angle"],
-        ),
+        vector_rows(constants, "rudder_position"),
+        _limited(inputs["rudder_angle"], -limit, limit),
+        constants["race"] @ thrust,
+        pressure * constants["rudder_area"],
+        constants["stall_angle"],
     ]
-    return RUDDER_SUM(
-        ca.vertcat(flow[0], flow[1], flow[5]),
-        constants["rudder_count"],
-        _table(columns, MAX_RUDDERS),
-    )
+    common = ca.vertcat(flow[0], flow[1], flow[5])
+    return RUDDER_SUM(common, constants["rudder_count"], _table(columns, MAX_RUDDERS))
 
 
 def _table(columns: Sequence[ca.SX], rows: int) -> ca.SX:
     """Return a table with `rows` rows, of which those beyond the columns are 0."""
-    filled = [ca.vertcat(column, ca.SX.zeros(rows - column.numel())) for column in columns]
-    return ca.horzcat(*filled)
+    table = ca.horzcat(*columns)
+    return ca.vertcat(table, ca.SX.zeros(rows - table.rows(), table.columns()))

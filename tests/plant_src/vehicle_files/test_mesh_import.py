@@ -20,7 +20,7 @@ from plant_src.scene.parts import vehicle_parts
 from plant_src.vehicle_files import mesh_import
 from plant_src.vehicle_files.mesh_import import vehicle_from_mesh
 from plant_src.vehicle_files.urdf import vehicle_from_urdf
-from plant_src.vehicles.common.convex_points import MAX_POINTS
+from plant_src.vehicles.common.shapes import MAX_POINTS
 
 trimesh = pytest.importorskip("trimesh")
 

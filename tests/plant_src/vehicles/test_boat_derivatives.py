@@ -118,7 +118,7 @@ def rate_function(model: Any, given: dict[str, Any]) -> Any:
 
 
 def test_planar_vessel_at_random_states() -> None:
-    from plant_src.vehicles.planar_vessel.planar_equations import PlanarEquations
+    from plant_src.vehicles.planar_vessel.equations import PlanarEquations
 
     quadratic = tuple(10 * RANDOM.uniform(0, 1, (3, 3)) for _ in range(3))
     vessel = PlanarVessel(
@@ -151,7 +151,7 @@ def test_floating_vessel_at_random_states(count: int) -> None:
     """Half of the states lie in all attitudes and up to 0.4 m above or below the water, the others
     near the rest.
     """
-    from plant_src.vehicles.surface_vessel.floating_equations import FloatingEquations
+    from plant_src.vehicles.surface_vessel.equations import FloatingEquations
 
     hull = HullForm(
         count, 1.6, 0.4 / count, 0.3, 0.4, -0.25, -0.04, 0.8, 0.05 * count, 0.1 * count, 1.2, 0.9

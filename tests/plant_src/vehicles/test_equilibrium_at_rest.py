@@ -12,8 +12,7 @@ from world_harness import WorldHarness
 from cosim.core import resources
 from cosim.core.errors import InputError
 from plant_src.catalogue import model_from_data
-from plant_src.vehicles.surface_vessel.equilibrium import rest
-from plant_src.vehicles.surface_vessel.surface_vessel import SurfaceVessel
+from plant_src.vehicles.surface_vessel.surface_vessel import SurfaceVessel, rest
 
 BOAT = json.loads((resources.root() / "plant_src/vehicles/data/blueboat.json").read_text())
 

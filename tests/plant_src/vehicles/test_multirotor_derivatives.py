@@ -10,8 +10,8 @@ from plant_validation import MeasurementCheck
 from scipy.spatial.transform import Rotation
 
 from plant_src.vehicles.multirotor.airframe import MAX_ROTORS, Airframe, Hull, Rotor, RotorEffects
+from plant_src.vehicles.multirotor.equations import MultirotorEquations
 from plant_src.vehicles.multirotor.interface import variables
-from plant_src.vehicles.multirotor.multirotor_equations import MultirotorEquations
 
 RANDOM = np.random.default_rng(20)
 MASS, GRAVITY, RADIUS, LAG, SPIN_INERTIA = 3.0, 9.7, 0.08, 0.05, 2e-5

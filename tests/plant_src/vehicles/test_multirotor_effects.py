@@ -10,7 +10,7 @@ from plant_fmu import PlantFmu
 from plant_validation import MeasurementCheck
 
 from plant_src.catalogue import MODELS
-from plant_src.vehicles.multirotor.multirotor_equations import MultirotorEquations
+from plant_src.vehicles.multirotor.equations import MultirotorEquations
 
 CRAZYFLIE, HEXACOPTER = VEHICLES["crazyflie"], VEHICLES["survey_hexacopter"]
 IMAGES = "Sanchez-Cuevas et al. 2017"

@@ -257,7 +257,7 @@ def test_it_starts_on_the_waves_without_a_jump() -> None:
 
 def test_friction_is_that_of_ittc_57(measured: MeasurementCheck) -> None:
     casadi = pytest.importorskip("casadi")
-    from plant_src.vehicles.strider import resistance
+    from plant_src.vehicles.strider import equations as resistance
 
     u = casadi.SX.sym("u")
     function = casadi.Function("friction", [u], [resistance.friction_coefficient(u)])

@@ -11,8 +11,8 @@ from scipy.spatial.transform import Rotation
 from submerged_reference import derivative
 
 from plant_src.vehicles.submerged.craft import MAX_THRUSTERS, Craft, Thruster
+from plant_src.vehicles.submerged.equations import SubmergedEquations
 from plant_src.vehicles.submerged.interface import variables
-from plant_src.vehicles.submerged.submerged_equations import SubmergedEquations
 
 RANDOM = np.random.default_rng(21)
 

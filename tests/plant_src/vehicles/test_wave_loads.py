@@ -16,7 +16,8 @@ from plant_src.environment import sea
 from plant_src.environment.sea import Sea
 from plant_src.vehicles.common import elementary_functions
 from plant_src.vehicles.strider_6dof import parameters as p
-from plant_src.vehicles.vessel import strips, wave_loads
+from plant_src.vehicles.vessel import strips
+from plant_src.vehicles.vessel import strips as wave_loads
 
 VESSELS = [
     {"model": "strider", "motion": "6dof"},

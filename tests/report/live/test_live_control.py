@@ -9,7 +9,7 @@ import pytest
 from fakes import FakeComponent, inputs, outputs
 from systems import endpoint, make_system
 
-import cosim.report.live.feed
+import cosim.report.live.session
 from cosim.core.component import Variable
 from cosim.core.errors import ComponentError
 from cosim.core.time_grid import TimeGrid
@@ -17,7 +17,7 @@ from cosim.engine.run_loop import simulate
 from cosim.engine.settings import Event, Settings
 from cosim.process.run_files import ROWS_FILE, SIGNALS, TIME, Column, RowLayout, RowsFile
 from cosim.report.live.control import LiveControl
-from cosim.report.live.feed import RowFeed
+from cosim.report.live.session import RowFeed
 
 STEP = Fraction(1, 60)
 GRID = TimeGrid.from_times(Fraction(0), Fraction(1), STEP)
@@ -175,7 +175,7 @@ def test_rows_are_columns_of_32_bit_floats(recorded):
 
 
 def test_rows_of_long_runs_are_downsampled(recorded, monkeypatch):
-    monkeypatch.setattr(cosim.report.live.feed, "MAX_VALUES", 4 * 26)
+    monkeypatch.setattr(cosim.report.live.session, "MAX_VALUES", 4 * 26)
     feed = RowFeed(recorded, expected_rows=101)
     assert (feed.stride, feed.available(1), feed.available(9), feed.capacity) == (4, 1, 3, 26)
     assert np.frombuffer(feed.read(1, 25), "<f4").reshape(4, 25)[2].tolist() == list(

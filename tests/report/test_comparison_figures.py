@@ -8,8 +8,8 @@ from matplotlib.backends.backend_agg import FigureCanvasAgg
 
 from cosim.core.errors import InputError
 from cosim.core.recording import Recording
+from cosim.report.comparison_figures import draw_timings
 from cosim.report.figures import draw_figure
-from cosim.report.timings import draw_timings
 from cosim.results import Result
 
 

@@ -1,0 +1,156 @@
+"""A package adds a kind of component source, as in docs/python.md."""
+
+import json
+import os
+import re
+import subprocess
+import sys
+import tomllib
+from pathlib import Path
+
+import pytest
+
+import cosim
+from cosim.scenario import load_scenario, sources
+from cosim.studies.execution.bundle import collect_bundle
+
+PAGE = (Path(cosim.__file__).parents[1] / "docs/python.md").read_text("utf-8")
+
+
+def block(title):
+    """Return a block of the page by its title."""
+    (text,) = re.findall(rf'^```\w+ title="{title}"\n(.*?)^```$', PAGE, re.MULTILINE | re.DOTALL)
+    return text
+
+
+@pytest.fixture
+def installed(tmp_path):
+    """Folder with the package of the page as pip installs it."""
+    site = tmp_path / "site"
+    (site / "recordings-1.0.dist-info").mkdir(parents=True)
+    (site / "recordings.py").write_text(block("recordings/recordings.py"))
+    project = tomllib.loads(block("recordings/pyproject.toml"))["project"]
+    lines = ["Metadata-Version: 2.1", f"Name: {project['name']}", f"Version: {project['version']}"]
+    (site / "recordings-1.0.dist-info/METADATA").write_text("\n".join(lines))
+    entries = ["[cosim.sources]"]
+    entries += [
+        f"{name} = {value}" for name, value in project["entry-points"]["cosim.sources"].items()
+    ]
+    (site / "recordings-1.0.dist-info/entry_points.txt").write_text("\n".join(entries))
+    return site
+
+
+def forget_kinds():
+    sources._kinds_of_packages.cache_clear()
+    sources.component_model.cache_clear()
+
+
+@pytest.fixture
+def recordings(installed, monkeypatch):
+    """The package is installed in this process."""
+    monkeypatch.syspath_prepend(installed)
+    forget_kinds()
+    yield
+    forget_kinds()
+    sys.modules.pop("recordings", None)
+
+
+@pytest.fixture
+def replay(folder):
+    """The scenario of the page, in a folder of its own."""
+    (folder.path / "runs").mkdir()
+    (folder.path / "runs/wind.csv").write_text("time,speed\n0,3\n1,5\n")
+    return folder.write(block("replay.json"), "runs/replay.json")
+
+
+def change(file, **keys):
+    content = json.loads(file.read_text())
+    content["components"]["wind"] |= keys
+    file.write_text(json.dumps(content))
+    return file
+
+
+@pytest.mark.usefixtures("recordings")
+def test_a_scenario_uses_the_kind(replay):
+    result = cosim.run(replay)
+    assert result["wind.speed"].tolist() == [4.0, 4.0, 6.0, 6.0, 6.0]
+    about = result.metadata
+    assert about["system"]["components"][0]["origin"] == "wind.csv"
+    assert {"wind.csv", "replay.json"} == about["sha256"].keys()
+
+
+@pytest.mark.usefixtures("recordings", "replay")
+def test_extending_files_settings_and_bundles_find_its_files(folder):
+    outer = folder.write({"extends": "runs/replay", "name": "outer"}, "outer.json")
+    assert cosim.run(outer, {"/components/wind/offset": 2.0})["wind.speed"][0] == 5.0
+    assert set(collect_bundle(outer).files) == {"outer.json", "runs/replay.json", "runs/wind.csv"}
+    assert folder.path / "runs/wind.csv" in load_scenario(outer).files()
+    system = {"components": {"wind": {"recording": "runs/wind.csv"}}}
+    assert "a.wind.speed" in cosim.run(folder.scenario({"a": {"system": system}}))
+    other = folder.write(
+        {"extends": "outer", "name": "n", "components": {"wind": folder.block("Gain")}},
+        "other.json",
+    )
+    assert "wind.y" in cosim.run(other)
+
+
+@pytest.mark.usefixtures("recordings")
+@pytest.mark.parametrize(
+    ("keys", "text"),
+    [
+        ({"offset": "1"}, "$.components.wind.offset: expected a valid number"),
+        ({"ofset": 1}, '$.components.wind.ofset: unknown key; did you mean "offset"?'),
+        ({"recording": "w.csv"}, '$.components.wind: cannot read "w.csv"'),
+        ({"fmu": "a.fmu"}, "expected exactly one of fmu, python, modelica, system, recording"),
+        ({"solver": {"method": "euler"}}, '"solver" is for components with "fmu"'),
+    ],
+)
+def test_problems_name_its_keys(replay, folder, keys, text):
+    (line,) = folder.problems_of(change(replay, **keys))
+    assert text in line
+
+
+@pytest.mark.usefixtures("recordings")
+def test_a_key_of_the_kind_belongs_to_it(folder):
+    (line,) = folder.problems({"a": folder.block("Gain", offset=1.0)})
+    assert '"offset" is for components with "recording"' in line
+
+
+def test_without_the_package_the_key_is_unknown(replay, folder):
+    (line, *_) = folder.problems_of(replay)
+    assert "$.components.wind.recording: unknown key" in line
+
+
+@pytest.mark.usefixtures("recordings")
+@pytest.mark.parametrize(
+    ("kind", "text"),
+    [
+        ("Missing", "cannot be imported"),
+        ("Recording", "expected a subclass of ComponentSource"),
+        ("FmuSource", 'expected KEY = "recording"'),
+    ],
+)
+def test_a_wrong_entry_point_names_its_package(replay, installed, kind, text):
+    module = installed / "recordings.py"
+    module.write_text(f"from cosim.scenario.sources import FmuSource\n{module.read_text()}")
+    file = installed / "recordings-1.0.dist-info/entry_points.txt"
+    file.write_text(f"[cosim.sources]\nrecording = recordings:{kind}\n")
+    with pytest.raises(cosim.InputError) as refusal:
+        cosim.run(replay)
+    assert 'the kind of sources "recording" of the package recordings' in str(refusal.value)
+    assert text in str(refusal.value)
+
+
+def test_commands_know_the_kind(replay, installed):
+    def command(*words):
+        return subprocess.run(
+            [sys.executable, "-m", "cosim", *words],
+            env={**os.environ, "PYTHONPATH": str(installed)},
+            capture_output=True,
+            text=True,
+            check=True,
+        ).stdout
+
+    assert "wind  wind.csv, 0 inputs, 1 output" in command("check", str(replay))
+    component = json.loads(command("schema"))["$defs"]["ComponentSpec"]
+    assert component["properties"]["recording"]["description"].startswith("path of a CSV file")
