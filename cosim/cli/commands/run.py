@@ -157,12 +157,12 @@ def _run_scenario(options: RunOptions, locks: LockKeeper, link: Connection | Non
             default_float_mode(),
             simulation,
         ):
-            execution = simulation.execute(observers, control)
-            execution.result.metadata["warnings"] = warnings
+            result = simulation.execute(observers, control)
+            result.metadata["warnings"] = warnings
             if control:
-                execution.result.metadata["live_events"] = control.finish()
+                result.metadata["live_events"] = control.finish()
             return supervision.results_written(
-                write_outputs(RunOutcome(options, prepared, execution, began))
+                write_outputs(RunOutcome(options, prepared, result, began))
             )
 
 
