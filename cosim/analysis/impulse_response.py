@@ -68,12 +68,9 @@ def realize(
         int(np.sum(singular > tolerance * singular[0])) if singular[0] > 0 else 0
         for tolerance in _TOLERANCES
     }
-    found = [
-        realization(order)
-        for order in sorted(
-            {order if max_order is None else min(order, max_order) for order in orders}
-        )
-    ]
+    if max_order is not None:
+        orders = {min(order, max_order) for order in orders}
+    found = [realization(order) for order in sorted(orders)]
     misfits = [misfit(each, response) for each in found]
     enough = _MISFIT_FACTOR * max(min(misfits), min(tolerance, _MAX_TOLERANCE))
     return next(each for each, value in zip(found, misfits, strict=True) if value <= enough)

@@ -8,6 +8,7 @@ to their states. The model then holds the states that the inputs reach and the o
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -121,7 +122,7 @@ def by_directional_derivatives(
     names = set(experiment.prepared.system.components) if active is None else active
     component = next(iter(names))
     states = dict(experiment.prepared.system.components[component].continuous_states)
-    targets = [target for group in channels.values() for target in group]
+    targets = list(chain.from_iterable(channels.values()))
     own_outputs = [
         each.removeprefix(f"{component}.") for each in outputs if each.startswith(f"{component}.")
     ]

@@ -176,19 +176,15 @@ class _Search:
             simulation.step()
             span = simulation.time - begin
             after = {name: _elements(name, simulation.get(name)) for name in self.steady}
-        rates = {
-            f"{name}{key}": (after[name][key] - value) / span
-            for name in self.steady
-            for key, value in before[name].items()
-        }
-        deviations = {
-            f"{name}{key}": value - target
-            for name, target in self.required.items()
-            for key, value in before[name].items()
-        }
-        residuals = [*rates.items(), *deviations.items()]
-        self.names = [name for name, _ in residuals]
-        return np.array([value for _, value in residuals])
+        rates, deviations = dict[str, float](), dict[str, float]()
+        for name in self.steady:
+            for key, value in before[name].items():
+                rates[f"{name}{key}"] = (after[name][key] - value) / span
+        for name, target in self.required.items():
+            for key, value in before[name].items():
+                deviations[f"{name}{key}"] = value - target
+        self.names = [*rates, *deviations]
+        return np.array([*rates.values(), *deviations.values()])
 
 
 def _refuse_connected(prepared: PreparedRun, name: str) -> None:

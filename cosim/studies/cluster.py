@@ -316,14 +316,12 @@ class ClusterRunner:
 
 def _refuse_absolute_paths(study: Study) -> None:
     study_file = study.study_file
-    if problems := [
-        problem
-        for settings in study.all_setting_variants
-        for problem in study_file.locate_problems(
-            absolute_paths(study_file.scenario, settings), settings
-        )
-    ]:
-        raise InputError(dict.fromkeys(problems))
+    problems: dict[Problem, None] = {}
+    for settings in study.all_setting_variants:
+        found = absolute_paths(study_file.scenario, settings)
+        problems |= dict.fromkeys(study_file.locate_problems(found, settings))
+    if problems:
+        raise InputError(problems)
 
 
 def _killed_answer(job: Job, check: bool) -> dict[str, Any]:

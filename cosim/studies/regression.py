@@ -50,9 +50,7 @@ def has_keys(file: Path, *groups: Sequence[str]) -> bool:
             content = read_system_document(file).value
     except (OSError, ValueError, RecursionError, InputError):
         return True
-    return isinstance(content, dict) and all(
-        any(content.get(key) for key in group) for group in groups
-    )
+    return isinstance(content, dict) and all(any(map(content.get, group)) for group in groups)
 
 
 @dataclass(frozen=True)

@@ -100,21 +100,20 @@ class Study:
             [kpi for _, kpi in accepted(self._scenario.spec.kpis)],
             self._scenario.root.folder,
         )
-        return [
-            Problem(text, self.study_file.document.where(("success", i, "kpi")))
-            for i, name in enumerate(names)
-            if (text := kpi_name_problem(name, kpis, folder))
-        ]
+        problems = []
+        for i, name in enumerate(names):
+            if text := kpi_name_problem(name, kpis, folder):
+                where = self.study_file.document.where(("success", i, "kpi"))
+                problems.append(Problem(text, where))
+        return problems
 
     def check_jobs(
         self, runner: CheckingRunner, jobs: Iterable[Job], problems: Iterable[Problem] = ()
     ) -> None:
         """Raise InputError with `problems` and, with positions in the study's file, those for which these jobs cannot be run."""
-        found = [
-            problem
-            for job in jobs
-            for problem in self.study_file.locate_problems(runner.check(job), job.settings)
-        ]
+        found: list[Problem] = []
+        for job in jobs:
+            found += self.study_file.locate_problems(runner.check(job), job.settings)
         if found := [*found, *problems]:
             raise InputError(dict.fromkeys(found))
 
@@ -202,11 +201,12 @@ class StudyFile(Generic[S]):
         if Path(position.rsplit(":", 2)[0]).name != self.scenario.name:
             return where
         pointers = {each: _json_path(each) for each in settings if each.startswith("/")}
-        below = [
-            location
+        locations = (
+            self._setting_location(each, settings)
             for each, start in pointers.items()
-            if _is_within(start, path) and (location := self._setting_location(each, settings))
-        ]
+            if _is_within(start, path)
+        )
+        below = list(filter(None, locations))
         return f"{below[0]}, in {where}" if len(below) == 1 else where
 
     def _setting_location(self, name: str, settings: Mapping[str, Any], part: str = "") -> str:

@@ -219,8 +219,10 @@ class Ranking:
             self.candidate.passed - self.shipped.passed,
         ]
         differences += [counts["better"] - counts["worse"] for counts in self.goals.values()]
-        first = next((difference for difference in differences if difference), 0)
-        return "above" if first > 0 else "below" if first < 0 else "equal"
+        first = next(filter(None, differences), 0)
+        if first == 0:
+            return "equal"
+        return "above" if first > 0 else "below"
 
 
 def rank(scenarios: Sequence[ScenarioKpis], goals: Sequence[str]) -> Ranking:
