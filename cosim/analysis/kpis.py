@@ -16,8 +16,8 @@ from typing import Any
 from ..core.errors import InputError
 from ..results import Result
 from ..results.kpi import better, no_value, units
+from ..scenario.component_schema import change_paths
 from ..scenario.file_paths import relocating
-from ..scenario.sources import change_paths
 from .loop_margins import margins as loop_margins
 
 

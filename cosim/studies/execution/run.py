@@ -150,14 +150,13 @@ def _run_with_replay(
     _set_deadline(context)
     simulation = Simulation(lambda _: _prepare_job(context, job, fmu_files))
     with keeping_run_files(Path(tempfile.gettempdir()) / "run"), default_float_mode(), simulation:
-        execution = simulation.execute()
-        result = execution.result
+        result = simulation.execute()
         named = replace(result, metadata={**result.metadata, "name": replay.title})
         write_judged_replay(
             named, evaluate_all_checks(result.kpis, replay.checks), Path(replay.page)
         )
-        if execution.failure:
-            raise execution.failure
+        if result.failure:
+            raise result.failure
         _write_reply(
             reply, {"kpis": result.kpis, "units": _known_units(result.metadata["kpi_units"])}
         )
