@@ -220,7 +220,7 @@ def _alignment_order(position: ArrayPosition) -> tuple[int, str, int]:
 
 
 def _buffer_writer(chunk: memoryview, buffer: memoryview, size: int, first: int) -> RowWriter:
-    """Return a function that copies the buffer into a row of the chunk that begins at row `first`."""
+    """Return a function that copies the buffer to a row of the chunk that begins at row `first`."""
     length = len(buffer)
 
     def write(row: int) -> None:
