@@ -191,6 +191,7 @@ BAD_SOURCES = {
 def test_bad_sources_are_one_problem(case, tmp_path):
     sources, message = BAD_SOURCES[case]
     with pytest.raises(InputError, match=message) as refused:
-        open_fmu(write_source_fmu(tmp_path / "ball.fmu", 3, sources), None, add_binary)
+        path = write_source_fmu(tmp_path / "ball.fmu", 3, sources)
+        open_fmu(path, None, add_binary).check_binary()
     assert len(str(refused.value).splitlines()) == 1
     assert [path.name for path in tmp_path.rglob("pwned")] == []
