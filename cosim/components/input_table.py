@@ -14,10 +14,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..core.binary_text import parse_binary
 from ..core.component import DTYPES, Component, Ports, Variable
-from ..core.csv_text import read_rows
 from ..core.errors import InputError, Problem, did_you_mean
+from ..core.json_values import parse_binary
+from ..results.csv_files import read_rows
 
 Interpolation = Literal["linear", "hold"]
 

@@ -19,8 +19,7 @@ from ...core.component import DTYPES, Causality, Variability, Variable
 from ...core.errors import InputError, join_alternatives
 from ...core.size_limits import require_at_most
 from ...core.time_grid import exact_fraction
-from ...core.unit_table import BASE_UNITS
-from ...core.units import Unit, named_unit
+from ...core.units import BASE_UNITS, Unit, named_unit
 from .preflight import DEFAULT_LIMITS, Examination, PreflightLimits, raise_errors
 from .preflight.binary import list_platforms
 from .preflight.model_description import (

@@ -10,8 +10,8 @@ from typing import Any
 
 import numpy as np
 
-from ...core.compatibility import FLOAT_TYPES
 from ...core.component import Component, Ports, PreparedCall, StepResult, Variable
+from ...core.system import FLOAT_TYPES
 from .accessor_calls import AccessorCallFactory, prepare_negations
 from .api import OK, FmiApi
 from .file import FmuFile
