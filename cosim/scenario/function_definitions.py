@@ -24,11 +24,11 @@ class _Source(NamedTuple):
 
     Attributes:
         functions: Definitions by name.
-        imported: Module beside the file, and name in it, of each imported name.
+        imported: Modules beside the file: the names in them by the imported names.
     """
 
     functions: Mapping[str, ast.FunctionDef]
-    imported: Mapping[str, tuple[str, str]]
+    imported: Mapping[str, Mapping[str, str]]
 
 
 def source_path(file: str, folder: Path) -> Path | None:
@@ -59,30 +59,26 @@ def function_definitions(path: Path) -> dict[str, ast.FunctionDef]:
     Raises:
         SyntaxError: The file is not valid Python.
     """
-    source, found = _parse(path.read_bytes()), {}
-    for name, (module, original) in source.imported.items():
+    source = _parse(path.read_bytes())
+    found: dict[str, ast.FunctionDef] = {}
+    for module, names in source.imported.items():
         file = path.with_name(f"{module}.py")
-        if is_file(file) and (definition := _parse(file.read_bytes()).functions.get(original)):
-            found[name] = definition
+        functions = _parse(file.read_bytes()).functions if is_file(file) else {}
+        found |= {own: functions[name] for own, name in names.items() if name in functions}
     return {**found, **source.functions}
 
 
 @lru_cache(16)  # a file often has several functions, and sweeps load the same scenario many times
 def _parse(source: bytes) -> _Source:
-    body = ast.parse(source).body
-    imports = [
-        node
-        for node in body
-        if isinstance(node, ast.ImportFrom) and node.level <= 1 and node.module
-    ]
-    imported = {
-        alias.asname or alias.name: (str(node.module), alias.name)
-        for node in imports
-        for alias in node.names
-    }
-    return _Source(
-        {node.name: node for node in body if isinstance(node, ast.FunctionDef)}, imported
-    )
+    functions: dict[str, ast.FunctionDef] = {}
+    imported: dict[str, dict[str, str]] = {}
+    for node in ast.parse(source).body:
+        if isinstance(node, ast.FunctionDef):
+            functions[node.name] = node
+        elif isinstance(node, ast.ImportFrom) and node.level <= 1 and node.module:
+            names = imported.setdefault(node.module, {})
+            names |= {alias.asname or alias.name: alias.name for alias in node.names}
+    return _Source(functions, imported)
 
 
 @lru_cache(64)  # definitions are cached, so that equal ones are identical

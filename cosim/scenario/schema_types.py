@@ -260,7 +260,11 @@ class Spec(BaseModel):
     """Base of all parts of a scenario; unknown keys and implicit type conversions are errors."""
 
     model_config = ConfigDict(
-        extra="forbid", strict=True, frozen=True, arbitrary_types_allowed=True
+        extra="forbid",
+        strict=True,
+        frozen=True,
+        arbitrary_types_allowed=True,
+        defer_build=True,  # a run builds only the models that it validates
     )
 
     @property
