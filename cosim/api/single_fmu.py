@@ -58,19 +58,27 @@ def simulate(
     solver_step_size: float | str | None = None,
     tolerance: float | None = None,
 ) -> Result:
-    """Simulate one FMU (Co-Simulation or Model Exchange of FMI 1.0, 2.0 or 3.0), from the start time of its default experiment.
+    """Simulate one FMU from the start time of its default experiment.
+
+    Co-Simulation or Model Exchange of FMI 1.0, 2.0 or 3.0.
 
     Args:
         fmu: Path of the FMU.
-        stop_time: Stop time (s), a number or a fraction such as "1/3"; None: that of the default experiment, else 1 s later.
-        step_size: Communication step size (s); None: that of the default experiment, else a hundredth of the duration.
-        input: Values of inputs over time: a CSV file, or columns by name as a dict, a pandas DataFrame or a structured array. The
-            column "time" is in s. Floating-point numbers are interpolated linearly, other values are held.
+        stop_time: Stop time (s), a number or a fraction such as "1/3"; None: that of the default
+            experiment, else 1 s later.
+        step_size: Communication step size (s); None: that of the default experiment, else a
+            hundredth of the duration.
+        input: Values of inputs over time: a CSV file, or columns by name as a dict, a pandas
+            DataFrame or a structured array. The
+            column "time" is in s. Floating-point numbers are interpolated linearly, other values
+            are held.
         start_values: Parameters and start values by the names of the variables.
         output: Names of the recorded variables; None: all outputs.
         isolation: "fmu" runs the FMU in a separate process.
-        solver: "euler", "rk4" or "cvode" simulates by Model Exchange; None: by Co-Simulation if the FMU has it, else with cvode.
-        solver_step_size: Largest step size (s) of euler and rk4; None: that of the default experiment, else `step_size`.
+        solver: "euler", "rk4" or "cvode" simulates by Model Exchange; None: by Co-Simulation if
+            the FMU has it, else with cvode.
+        solver_step_size: Largest step size (s) of euler and rk4; None: that of the default
+            experiment, else `step_size`.
         tolerance: Relative tolerance of the FMU and of cvode; None: that of the default experiment.
 
     Returns:
@@ -78,7 +86,8 @@ def simulate(
 
     Raises:
         InputError: The FMU cannot be simulated, or an argument is of a wrong type.
-        ComponentError: The FMU failed; the attribute `result` of the error holds what was recorded until then.
+        ComponentError: The FMU failed; the attribute `result` of the error holds what was
+            recorded until then.
     """
     expect("fmu", fmu, isinstance(fmu, str | os.PathLike), "the path of an FMU")
     check_names("start_values", start_values)
@@ -232,7 +241,10 @@ def _read_inputs(values: InputValues, component: Component) -> InputTable:
 
 
 def _column_names(values: Any) -> list[str]:
-    """Return the names of the columns after "time" of a dict, a pandas DataFrame or a structured array."""
+    """Return the names of the columns after "time".
+
+    `values` is a dict, a pandas DataFrame or a structured array.
+    """
     found = (
         values.dtype.names
         if isinstance(values, np.ndarray)

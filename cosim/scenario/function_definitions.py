@@ -32,7 +32,9 @@ class _Source(NamedTuple):
 
 
 def source_path(file: str, folder: Path) -> Path | None:
-    """Return the source file of a Python file, whose path starts from `folder`, or of an importable module; None without one.
+    """Return the source file of a Python file or of an importable module; None without one.
+
+    The path of a file starts from `folder`.
 
     The parent packages of a module are imported.
     """
@@ -46,7 +48,10 @@ def source_path(file: str, folder: Path) -> Path | None:
 
 
 def function_definition(spec: CallSpec, folder: Path) -> ast.FunctionDef:
-    """Return the definition of a function that exists (see `named_functions.definition_problem`)."""
+    """Return the definition of a function that exists.
+
+    See `named_functions.definition_problem`.
+    """
     file, _, name = spec.python.rpartition(":")
     path = source_path(file, folder)
     assert path is not None
@@ -54,7 +59,7 @@ def function_definition(spec: CallSpec, folder: Path) -> ast.FunctionDef:
 
 
 def function_definitions(path: Path) -> dict[str, ast.FunctionDef]:
-    """Return the functions that a file defines at its top level, and those that it imports from files beside it, by name.
+    """Return the functions at the top level of a file, and those from files beside it, by name.
 
     Raises:
         SyntaxError: The file is not valid Python.
@@ -83,7 +88,9 @@ def _parse(source: bytes) -> _Source:
 
 @lru_cache(64)  # definitions are cached, so that equal ones are identical
 def kpi_value_names(function: ast.FunctionDef) -> list[str]:
-    """Return the names of a KPI's values without indices, or nothing if its last `return` does not write them as literals.
+    """Return the names of a KPI's values without indices.
+
+    The list is empty if the last `return` does not write them as literals.
 
     Names in earlier `return` statements, such as those for runs without a landing, are included.
     """
@@ -93,7 +100,7 @@ def kpi_value_names(function: ast.FunctionDef) -> list[str]:
 
 
 def _returned_expressions(node: ast.AST) -> Iterator[ast.expr | None]:
-    """Yield the expressions of all `return` statements of a function, except those of functions inside it."""
+    """Yield the expressions of all `return` statements, without those of inner functions."""
     for child in ast.iter_child_nodes(node):
         if isinstance(child, ast.Return):
             yield child.value

@@ -52,7 +52,7 @@ def describe_system(
 
 
 def describe_software() -> dict[str, Any]:
-    """Return the versions of cosim, Python and the installed packages of `_PACKAGES`, and the kind of machine."""
+    """Return the versions of cosim, Python and `_PACKAGES`, and the kind of machine."""
     return {
         "versions": dict(_versions()),
         "machine": {"system": platform.system(), "machine": platform.machine()},
