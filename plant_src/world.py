@@ -22,11 +22,11 @@ from . import world_settings
 from .catalogue import BINARIES
 from .environment.environment_model import EnvironmentModel
 from .physics.body import InvalidStateError
+from .physics.bullet_bodies import create_fixed_bodies
 from .physics.client import connect, preconnect, pybullet
 from .physics.compiled_equations import library_path
 from .physics.contacts import overlap_depths
 from .physics.failures import FLAG_COUNT
-from .physics.fixed_bodies import create_fixed_bodies
 from .physics.fleet import Fleet, FleetState
 from .variable_views import recorded_others, variable_views, views_in_parts
 from .vehicle_constants import input_limits, vehicle_constants

@@ -17,7 +17,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .random_generator import generator
+
+def generator(seed: int, *names: str) -> np.random.Generator:
+    """Return the random number generator of `seed` and `names`.
+
+    Other seeds and names give statistically independent numbers. PCG64 and its seeding are fixed,
+    so equal arguments give equal numbers on all machines.
+    """
+    key = int.from_bytes("/".join(names).encode(), "big")
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, key])))
+
 
 #: time step of the grid, over which a value is constant (s)
 GRID_STEP = 0.01

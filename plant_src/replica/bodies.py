@@ -12,7 +12,7 @@ import numpy as np
 
 from ..catalogue import MODELS
 from ..json_reader import Numbers
-from ..physics.body import create_compound_shape, set_dynamics
+from ..physics.bullet_bodies import create_compound_shape, set_dynamics
 from ..physics.client import pybullet
 from ..vehicles.common.inertia import principal_axes
 from ..vehicles.common.shapes import quaternion_from_matrix

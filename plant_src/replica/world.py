@@ -18,7 +18,7 @@ from cosim.core.component import Component, Ports, Variable
 from cosim.core.errors import ComponentError, InputError, Problem, did_you_mean
 
 from .. import world_settings
-from ..physics.body import create_compound_shape, set_dynamics
+from ..physics.bullet_bodies import create_compound_shape, set_dynamics
 from ..physics.client import connect, pybullet
 from ..placement import Platform, VehiclePlacement
 from ..scene import replay
