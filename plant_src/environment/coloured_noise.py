@@ -1,4 +1,6 @@
-"""Coloured noise on a fixed time grid, as a pure function of seed, name and grid index.
+"""Random generators by seed and name, and coloured noise on a fixed time grid.
+
+The noise is a pure function of seed, name and grid index.
 
 A channel is white noise filtered by (1 + b T s) / (1 + T s)^2, or 1 / (1 + T s), discretised
 exactly: on the grid it has the variance, autocorrelation and joint distribution of the continuous

@@ -1,4 +1,4 @@
-"""Realisation of an irregular sea by long-crested components in deep water, w^2 = g k.
+"""Wave spectra, and irregular seas of long-crested components in deep water, w^2 = g k.
 
     elevation(x, y, t) = sum a cos(k (x cos d + y sin d) - w t + phase)
 

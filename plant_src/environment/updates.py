@@ -1,6 +1,6 @@
-"""Updates of the environment inputs of vehicles.
+"""Updates of the environment inputs of vehicles, and the table of surfaces below multirotors.
 
-Functions of the time that write wind, current, water level and surfaces.
+The updates are functions of the time that write wind, current, water level and surfaces.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""Wind: mean velocity, profile over the height, and Dryden turbulence.
+"""Wind and current: mean velocities, wind profile, Dryden turbulence, changes of the current.
 
 The turbulence is the low-altitude model of MIL-F-8785C, 3.7.3, with the height h (ft), the wind
 speed W20 at 20 ft and the speed V at which the frozen turbulence field passes:

@@ -1,15 +1,19 @@
-"""Contact bodies: vehicles that move by their own compiled equations, with contact resolved by Bullet.
+"""Contact bodies: vehicles that move by their own equations, with contact resolved by Bullet.
 
 A step of the world has three parts:
 
-1. `predict`: the equations integrate each vehicle over the step without contact. Bullet receives the constant velocity and
-   angular velocity that lead a rigid body to the predicted pose.
+1. `predict`: the equations integrate each vehicle over the step without contact. Bullet receives
+   the constant velocity and angular velocity that lead a rigid body to the predicted pose.
 2. Bullet makes one step. Contact changes the velocities.
-3. `correct`: the change of velocity times Bullet's mass and inertia is the contact impulse. The equations apply it to the
-   predicted velocity and take over the pose to which Bullet's motion leads.
+3. `correct`: the change of velocity times Bullet's mass and inertia is the contact impulse. The
+   equations apply it to the predicted velocity and take over the pose to which Bullet's motion
+   leads.
 
-Gravity is part of the equations and zero in Bullet. A vehicle far from everything else needs no contact solution, and its motion
-is known without Bullet: Bullet steps only bodies that are near something (`clearance.py`). Inactive bodies wait in a remote row.
+Gravity is part of the equations and zero in Bullet. A vehicle far from everything else needs no
+contact solution, and its motion is known without Bullet: Bullet steps only bodies that are near
+something (`clearance.py`). Inactive bodies wait in a remote row.
+
+Vessels float in six degrees of freedom, or move in the horizontal plane.
 """
 
 from __future__ import annotations
@@ -24,9 +28,8 @@ import numpy as np
 
 from ..vehicles.common.interface import MAX_STATE_NORM
 from ..vehicles.common.shapes import Body
-from .bullet_bodies import create_compound_shape, set_dynamics
+from .bullet import create_compound_shape, pybullet, set_dynamics
 from .clearance import BoundingBox
-from .client import pybullet
 
 if TYPE_CHECKING:
     from ..placement import VehiclePlacement

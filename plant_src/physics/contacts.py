@@ -1,4 +1,14 @@
-"""Contact outputs of the vehicles: normal force and flags."""
+"""Contact outputs of the vehicles, and contact points that Bullet must forget.
+
+Bullet keeps contact points from one step to the next, and starts its solution with their last
+impulses. Its saved states hold the points of one pair of shapes for each pair of bodies. While
+several shapes of a vehicle can touch one other body, for example both hulls a wall, Bullet
+therefore computes all points afresh in each step, from poses and velocities alone. So saved states
+are restored bit for bit.
+
+A vehicle of one shape on a vehicle of several shapes, for example a multirotor on a deck, does not
+cause this.
+"""
 
 from __future__ import annotations
 
@@ -12,8 +22,8 @@ import numpy as np
 
 from ..placement import VehiclePlacement
 from .body import ContactBody, PlanarBody
+from .bullet import pybullet
 from .clearance import NEAR_DISTANCE, BoundingBox
-from .client import pybullet
 from .failures import FLAG_COUNT, ON_VESSEL, TOUCHING, Failures
 
 _NO_MOTION: Any = np.zeros(3).data  # of a platform

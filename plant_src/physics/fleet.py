@@ -1,4 +1,7 @@
-"""Fleet: all vehicles of a world, advanced together by one step."""
+"""Fleet: all vehicles of a world, advanced together by one step.
+
+Their arrays lie in one buffer, so that one copy saves their state.
+"""
 
 from __future__ import annotations
 
@@ -13,8 +16,8 @@ import numpy as np
 from ..placement import VehiclePlacement
 from ..vehicles.common.interface import INVALID_STATE, LEAVES_SAFE_BOX, MAY_FAIL
 from .body import ContactBody, InvalidStateError, PlanarBody, body_class, state_sizes
+from .bullet import pybullet
 from .clearance import BoundingBox, Clearance
-from .client import pybullet
 from .compiled_equations import CompiledEquations
 from .contacts import ContactMemory, Contacts, touching_pairs
 from .failures import Failures
