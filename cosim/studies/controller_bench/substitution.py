@@ -17,12 +17,13 @@ from typing import Any, NamedTuple
 
 from ...core.errors import InputError
 from ...results.files import write_json
+from ...scenario.component_schema import change_paths
 from ...scenario.evaluation_schema import FunctionSpec
 from ...scenario.extension import nested_content
 from ...scenario.file_paths import relocating
 from ...scenario.named_functions import declared_arguments
 from ...scenario.nested_systems import load_scenario
-from ...scenario.sources import change_paths, kind_of, texts_in
+from ...scenario.sources import kind_of, texts_in
 from .candidate import CandidateInterface, CandidateSource
 from .role import Role
 
@@ -134,7 +135,7 @@ class ControllerSubstitution:
             write_json(content, path)
 
     # -- systems
-    # -------------------------------------------------------------------------------------------------------
+    # ---------------------------------------------------------------------------------------
 
     def _substitute_system(
         self, value: Mapping[str, Any], folder: Path, prefix: str
