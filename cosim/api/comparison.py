@@ -10,9 +10,10 @@ from typing import TYPE_CHECKING, NamedTuple
 from ..core.errors import InputError, abbreviate_names
 from ..core.json_values import parse_object
 from ..results import Result
-from ..results.comparison import Comparison, Tolerance, needed_share
+from ..results.comparison import Comparison, needed_share
 from ..results.comparison import compare as compare_results
-from ..results.comparison.reference import describe_provenance_changes
+from ..results.reference import describe_provenance_changes
+from ..results.tolerance_tube import Tolerance
 from ..scenario import find_scenario, load_scenario
 from ..scenario.file_paths import SHIPPED
 from .arguments import expect, is_number

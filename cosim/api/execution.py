@@ -13,9 +13,14 @@ from ..engine import Termination
 from ..engine.plan_run import SimulationOutcome
 from ..process.float_mode import default_float_mode
 from ..results import Kpis, Result
-from ..results.checks import CheckOutcome, Number, evaluate_all_checks, evaluate_checks
+from ..results.checks import (
+    CheckOutcome,
+    Number,
+    evaluate_all_checks,
+    evaluate_checks,
+    warn_non_finite,
+)
 from ..results.kpi import NoValue, evaluate_kpis, kpi_notes, kpi_senses, kpi_units
-from ..results.non_finite import warn_non_finite
 from ..scenario import PreparedRun
 from ..scenario.input_limits import warn_exceeded_limits
 

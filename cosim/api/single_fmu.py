@@ -21,7 +21,6 @@ from ..components.fmi import (
 from ..components.input_table import InputTable, make_input_table, parse_cell, read_input_table
 from ..core import component_log
 from ..core.component import Component, Variable
-from ..core.csv_text import read_rows
 from ..core.errors import ComponentError, InputError, Problem, did_you_mean
 from ..core.system import Connection, Endpoint, System
 from ..core.time_grid import exact_divisor, exact_fraction
@@ -33,7 +32,8 @@ from ..export.foreign import add_binary
 from ..process.float_mode import default_float_mode
 from ..process.process_state import exclusive_process_state
 from ..results import Result
-from ..results.non_finite import warn_non_finite
+from ..results.checks import warn_non_finite
+from ..results.csv_files import read_rows
 from ..scenario.name_resolution import UnknownNameError, check_assignment
 from .arguments import check_names, expect
 

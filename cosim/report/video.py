@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING
 
 from ..components.python_import import load_object
 from ..core.errors import CosimError, InputError
-from ..core.processors import available_processors
+from ..core.resources import available_processors
 from ..results import Result
 from ..results.files import writing_atomically
 from ..scenario.component_schema import change_paths
@@ -85,7 +85,7 @@ def write_video(
 
 
 def find_frame_source(result: Result) -> str:
-    """Return the "file.py:Class" of the first component of the run's scenario that renders video frames.
+    """Return the "file.py:Class" of the first component that renders video frames.
 
     Raises:
         InputError: No component renders frames, or the source file of a component does not exist.

@@ -13,10 +13,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from functools import cached_property
 from typing import NamedTuple
 
-from ..core.compatibility import incompatibility
 from ..core.component import Component, Variable
 from ..core.errors import abbreviate_names
-from ..core.system import Endpoint, System
+from ..core.system import Endpoint, System, incompatibility
 from .nested_systems import Node
 from .system_builder import PROFILE_PREFIX
 

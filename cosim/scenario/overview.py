@@ -12,8 +12,8 @@ from importlib.metadata import PackageNotFoundError, version
 from types import MappingProxyType
 from typing import Any
 
+from ..core import __version__
 from ..core.system import Connection, Group, Stage, System
-from ..core.version import __version__
 from ..engine.transfer_plan import unit_conversion
 
 #: packages whose versions can change a result

@@ -20,11 +20,10 @@ from ..components.fmi import FmuFile, Isolation
 from ..core import resources
 from ..core.errors import InputError, Problem
 from ..core.paths import resolve_path
-from ..core.stopwatch import Stopwatch
 from ..core.system import System
 from ..core.text import count_noun
 from ..core.time_grid import exact_fraction, fraction_text
-from ..engine.pacer import LatePolicy
+from ..engine.pacer import LatePolicy, Stopwatch
 from ..engine.plan import Plan
 from ..engine.plan_run import free_components
 from ..engine.settings import Settings

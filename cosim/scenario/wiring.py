@@ -8,11 +8,10 @@ from contextlib import suppress
 from functools import cached_property
 from typing import NamedTuple
 
-from ..core.compatibility import incompatibility
 from ..core.component import Component, Variable
 from ..core.errors import Problem, abbreviate_names, did_you_mean
 from ..core.size_limits import MAX_CONNECTIONS, require_at_most
-from ..core.system import Connection, Endpoint
+from ..core.system import Connection, Endpoint, incompatibility
 from .name_resolution import SlotIndex, Target, UnknownNameError, resolve_name
 from .nested_systems import Node
 from .schema import ConnectionSpec

@@ -117,7 +117,10 @@ def command(
 
 
 def _sandbox_paths(options: RunOptions) -> tuple[list[Path], Path | None]:
-    """Return the files that the command reads, and its output directory (None if the scenario is invalid)."""
+    """Return the files that the command reads, and its output directory.
+
+    The directory is None if the scenario is invalid.
+    """
     from ...scenario import load_scenario
     from ...scenario.settings import parse_settings
 
@@ -196,8 +199,11 @@ def _load(options: RunOptions, real_time: float | None) -> Simulation:
 
 
 def _prepare_folder(prepared: PreparedRun, options: RunOptions, locks: LockKeeper) -> None:
-    """Check the figures and that results can be written, lock the output directory, and remove results of an earlier run."""
-    from ...engine.disk_space import find_space_problems
+    """Prepare the output directory: check and lock it, and remove results of an earlier run.
+
+    Also check the figures.
+    """
+    from ...engine.recorder import find_space_problems
     from ...results.files import check_writable, remove_files
 
     if not options.no_report and (problems := prepared.figure_problems()):
