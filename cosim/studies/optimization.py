@@ -151,11 +151,6 @@ class Constraint:
     left: Expression
     right: Expression
 
-    @property
-    def names(self) -> list[str]:
-        """Names of the KPIs and parameters on both sides."""
-        return [*self.left.names, *self.right.names]
-
     def violation(self, values: Mapping[str, float]) -> float:
         """Return by how much the constraint is violated.
 
