@@ -35,15 +35,14 @@ PART = re.compile(r'[\s,]*(?:("[^"]*")\s*:\s*)?(?=\S)')
 def fragments():
     """Return the pages and texts of the blocks that are part of a JSON file."""
     pages = [*sorted(ROOT.glob("plant_src/**/*.md")), ROOT / "docs/scenarios.md"]
-    found = [
-        (page, text)
-        for page in pages
-        for language, text in blocks(page)
-        if language == FRAGMENTS[page.parent.name == "docs"]
-    ]
-    return [
-        (page, text) for page, text in found if not text.startswith('{"family"')
-    ]  # tests/plant_src/test_urdf.py
+    found = []
+    for page in pages:
+        fragments = FRAGMENTS[page.parent.name == "docs"]
+        for language, text in blocks(page):
+            # tests/plant_src/test_urdf.py reads the vehicle files
+            if language == fragments and not text.startswith('{"family"'):
+                found.append((page, text))
+    return found
 
 
 def blocks(page):
