@@ -12,7 +12,7 @@ from typing import Any
 from cosim.core.errors import InputError, Problem, did_you_mean
 
 from .vehicles.common.inertia import inertia_of
-from .vehicles.common.interface import VESSEL_STATES
+from .vehicles.common.interface import PLANAR_STATES, VESSEL_STATES
 from .vehicles.common.vehicle_reader import read_visual
 from .vehicles.data import read_vehicle_files
 from .vehicles.model import Model
@@ -170,7 +170,7 @@ MODELS = {
         Model(
             "strider",
             strider_interface.VARIABLES,
-            strider_interface.STATES,
+            PLANAR_STATES,
             strider.BODY,
             strider_parameters.CRASH_SPEED,
             is_vessel=True,

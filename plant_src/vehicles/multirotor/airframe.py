@@ -43,6 +43,11 @@ class Rotor:
     torque_coefficient: float
     axis: Vector = BODY_UP
 
+    @property
+    def signed_torque_coefficient(self) -> float:
+        """Reaction torque about the axis over squared speed, with its sign (N m s2/rad2)."""
+        return self.torque_sign * self.torque_coefficient
+
 
 @dataclass(frozen=True)
 class RotorEffects:

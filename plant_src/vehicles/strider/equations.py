@@ -12,12 +12,12 @@ from cosim.export.fmu.block import Block
 
 from ..common import kinematics
 from ..common.elementary_functions import logarithm, sine_and_cosine
-from ..common.interface import WORLD_OUTPUTS
+from ..common.interface import PLANAR_STATES, WORLD_OUTPUTS
 from ..common.named_values import ConstantsMap, NamedValues, initial_parameters, values_by_name
 from ..vessel import planar_maps
 from ..vessel.propulsion import rudder_force
 from . import parameters as p
-from .interface import INPUTS, STATES, VARIABLES
+from .interface import INPUTS, VARIABLES
 from .parameters import DECK_CENTRE
 
 
@@ -133,7 +133,7 @@ def initial_state(constants: ca.SX) -> ca.SX:
 
     The first constants are position, yaw angle, velocity and yaw rate in the order of the state.
     """
-    return constants[: len(STATES)]
+    return constants[: len(PLANAR_STATES)]
 
 
 def observe(state: ca.SX) -> ca.SX:
@@ -160,7 +160,7 @@ def model() -> ContinuousModel:
         "strider",
         "Strider V1.0 catamaran on calm water",
         VARIABLES,
-        STATES,
+        PLANAR_STATES,
         initial_state,
         lambda state, inputs, constants: rate(
             state, values_by_name(inputs, INPUTS), CONSTANTS.by_name(constants)
