@@ -11,8 +11,8 @@ from typing import Any
 
 from cosim.core.errors import InputError, Problem, did_you_mean
 
-from .vehicles.common.inertia import inertia_of
 from .vehicles.common.interface import PLANAR_STATES, VESSEL_STATES
+from .vehicles.common.shapes import inertia_of
 from .vehicles.common.vehicle_reader import read_visual
 from .vehicles.data import read_vehicle_files
 from .vehicles.model import Model

@@ -14,8 +14,7 @@ from ..catalogue import MODELS
 from ..json_reader import Numbers
 from ..physics.body import create_compound_shape, set_dynamics
 from ..physics.client import pybullet
-from ..vehicles.common.inertia import principal_axes
-from ..vehicles.common.shapes import quaternion_from_matrix
+from ..vehicles.common.shapes import principal_axes, quaternion_from_matrix
 from ..vehicles.strider import parameters as strider
 from ..vehicles.strider.parameters import RUDDER_ARM
 

@@ -15,6 +15,8 @@ import numpy as np
 from cosim.core.component import Causality, Variability, Variable
 from cosim.core.units import parse_unit
 
+from .shapes import INERTIA_INDICES
+
 #: status codes of a predicted step, which the compiled equations report before anything has moved:
 #: valid; the vehicle leaves the box in which it cannot meet anything; an input or the state is not
 #: finite, or too large. LEAVES_SAFE_BOX and MAY_FAIL are added if both apply.
@@ -187,6 +189,17 @@ WORLD_OUTPUTS = (
     _flag("crashed", "collision above the crash speed or capsize; stays true"),
     _flag("ditched", "centre of mass below the water; stays true"),
 )
+
+
+def inertia_variables(mass: float, inertia: np.ndarray, mass_text: str) -> tuple[Variable, ...]:
+    """Return the parameters `mass` (kg) and `inertia.*` (kg m2, centre of mass, body frame)."""
+    text = "inertia tensor about the centre of mass, body frame, rotors locked"
+    tensor = (
+        scalar_variable(name, "kg.m2", f"{text}: {name[-2:]}", "parameter", float(inertia[place]))
+        for name, place in INERTIA_INDICES.items()
+    )
+    return (scalar_variable("mass", "kg", mass_text, "parameter", mass), *tensor)
+
 
 #: external loads at the centre of mass
 EXTERNAL_LOADS = (

@@ -15,8 +15,7 @@ import numpy as np
 from cosim.core.errors import InputError, Problem
 
 from ...json_reader import JsonPath
-from ..common.inertia import Boxes, inertia_problems, principal_body
-from ..common.shapes import BODY_UP, Body, Vector
+from ..common.shapes import BODY_UP, Body, Boxes, Vector, inertia_problems, principal_body
 from ..common.vehicle_reader import TORQUE_SIGNS, Collision, VehicleReader, edges_around
 
 #: largest number of rotors

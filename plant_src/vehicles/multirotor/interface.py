@@ -10,7 +10,6 @@ from collections.abc import Iterator
 
 from cosim.core.component import Variable
 
-from ..common.inertia import inertia_variables
 from ..common.interface import (
     CURRENT_INPUTS,
     EXTERNAL_LOADS,
@@ -25,6 +24,7 @@ from ..common.interface import (
     element_labels,
     element_parameters,
     element_states,
+    inertia_variables,
     initial_variables,
     parameter,
     scalar_variable,

@@ -12,7 +12,6 @@ from dataclasses import replace
 
 from cosim.core.component import Variable
 
-from ..common.inertia import inertia_variables
 from ..common.interface import (
     CURRENT_INPUTS,
     EXTERNAL_LOADS,
@@ -24,6 +23,7 @@ from ..common.interface import (
     element_labels,
     element_parameters,
     element_states,
+    inertia_variables,
     initial_variables,
     matrix_parameter,
     parameter,

@@ -6,7 +6,6 @@ from collections.abc import Iterator
 
 from cosim.core.component import Variable
 
-from ..common.inertia import inertia_variables
 from ..common.interface import (
     CURRENT_INPUTS,
     DECK_OUTPUTS,
@@ -19,6 +18,7 @@ from ..common.interface import (
     WIND_INPUTS,
     WORLD_OUTPUTS,
     element_states,
+    inertia_variables,
     initial_variables,
     matrix_parameter,
     parameter,

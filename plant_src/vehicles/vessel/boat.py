@@ -20,9 +20,8 @@ from cosim.core.component import Variable
 from cosim.core.errors import InputError, Problem
 
 from ...json_reader import JsonPath
-from ..common.inertia import Boxes, eigenvalue_problems, symmetry_problems
 from ..common.interface import matrix_parameter, parameter, vector_parameters
-from ..common.shapes import Body, Vector
+from ..common.shapes import Body, Boxes, Vector, eigenvalue_problems, symmetry_problems
 from ..common.vehicle_reader import Collision, CollisionBox, VehicleReader
 from .actuators import MAX_PROPELLERS, MAX_RUDDERS, MIN_TIME_CONSTANT, Propeller, Rudder
 
