@@ -1,8 +1,8 @@
-"""pytest plugin: `pytest scenarios/` runs every scenario file that has checks or a reference as a test.
+"""pytest plugin that runs scenario files with checks or a reference as tests.
 
-A scenario passes under the same conditions as in `cosim regress`. A scenario file with invalid JSON fails with the location of
-the error. Results are written below `runs/` in pytest's root folder, each in the folder of the same relative path. Tests may run
-in parallel under pytest-xdist.
+A scenario passes under the same conditions as in `cosim regress`. A scenario file with invalid JSON
+fails with the location of the error. Results are written below `runs/` in pytest's root folder,
+each in the folder of the same relative path. Tests may run in parallel under pytest-xdist.
 """
 
 from __future__ import annotations

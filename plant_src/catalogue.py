@@ -5,34 +5,24 @@ Those of the files in `vehicles/data/`, and the vessels with equations of their 
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping
+import json
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import replace
-from typing import Any
+from functools import partial
+from pathlib import Path
+from typing import Any, TypeVar
 
 from cosim.core.errors import InputError, Problem, did_you_mean
 
+<<<<<<< HEAD
 from .vehicles.common.interface import PLANAR_STATES, VESSEL_STATES
 from .vehicles.common.shapes import inertia_of
+=======
+>>>>>>> origin/main
 from .vehicles.common.vehicle_reader import read_visual
-from .vehicles.data import read_vehicle_files
 from .vehicles.model import Model
-from .vehicles.multirotor import interface as multirotor_interface
-from .vehicles.multirotor.airframe import MAX_ROTORS, MultirotorReader
-from .vehicles.otter import interface as otter_interface
-from .vehicles.otter import parameters as otter
-from .vehicles.otter import parameters as otter_parameters
-from .vehicles.planar_vessel import interface as planar_vessel_interface
-from .vehicles.planar_vessel.planar_vessel import PlanarVesselReader
-from .vehicles.strider import interface as strider_interface
-from .vehicles.strider import parameters as strider
-from .vehicles.strider import parameters as strider_parameters
-from .vehicles.strider_6dof import interface as strider_6dof_interface
-from .vehicles.strider_6dof import parameters as strider_6dof
-from .vehicles.submerged import interface as submerged_interface
-from .vehicles.submerged.craft import MAX_THRUSTERS, SubmergedReader
-from .vehicles.surface_vessel import interface as surface_vessel_interface
-from .vehicles.surface_vessel.surface_vessel import SurfaceVesselReader
-from .vehicles.vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS
+
+_Value = TypeVar("_Value")
 
 #: lists of a vehicle file whose elements may name a link of a URDF file in place of position and
 #: axis
@@ -41,70 +31,91 @@ NAMED_LISTS = ("rotors", "thrusters", "propellers")
 #: keys of a vehicle file of any family besides those of its family
 COMMON_KEYS = ("family", "name", "description", "sources", "validity", "visual", "$schema")
 
-#: numbers of elements of the arrays of propellers and rudders in the compiled equations of vessels
-SLOTS = (MAX_PROPELLERS, MAX_RUDDERS)
+#: vehicles that are given by a file, whose name is that of the vehicle
+_FILES = {
+    file.stem: file for file in sorted((Path(__file__).parent / "vehicles/data").glob("*.json"))
+}
+
+# Builders import the modules of their vehicles themselves: a run needs few of them.
 
 
 def multirotor_model(name: str, data: Mapping[str, Any]) -> Model:
     """Return the model of a multirotor. Raises InputError with all problems of its data."""
+    from .vehicles.common.inertia import inertia_of
+    from .vehicles.multirotor import interface
+    from .vehicles.multirotor.airframe import MAX_ROTORS, MultirotorReader
+
     vehicle = MultirotorReader().read(name, data, COMMON_KEYS)
     airframe = vehicle.vehicle
     return Model(
         name,
-        multirotor_interface.variables(airframe),
-        multirotor_interface.states(MAX_ROTORS),
+        interface.variables(airframe),
+        interface.states(MAX_ROTORS),
         vehicle.body(),
         vehicle.crash_speed,
         airframe=airframe,
         body_of=lambda given: vehicle.body(mass=given["mass"], inertia=inertia_of(given)),
         equations="multirotor",
-        layout=multirotor_interface.variables(airframe, MAX_ROTORS),
+        layout=interface.variables(airframe, MAX_ROTORS),
     )
 
 
 def submerged_model(name: str, data: Mapping[str, Any]) -> Model:
     """Return the model of a submerged vehicle. Raises InputError with all problems of its data."""
+    from .vehicles.common.inertia import inertia_of
+    from .vehicles.submerged import interface
+    from .vehicles.submerged.craft import MAX_THRUSTERS, SubmergedReader
+
     vehicle = SubmergedReader().read(name, data, COMMON_KEYS)
     craft = vehicle.vehicle
     return Model(
         name,
-        submerged_interface.variables(craft),
-        submerged_interface.states(MAX_THRUSTERS),
+        interface.variables(craft),
+        interface.states(MAX_THRUSTERS),
         vehicle.body(),
         vehicle.crash_speed,
         craft=craft,
         body_of=lambda given: vehicle.body(mass=given["mass"], inertia=inertia_of(given)),
         equations="submerged",
-        layout=submerged_interface.variables(craft, MAX_THRUSTERS),
+        layout=interface.variables(craft, MAX_THRUSTERS),
     )
 
 
 def surface_vessel_model(name: str, data: Mapping[str, Any]) -> Model:
     """Return the model of a floating vessel. Raises InputError with all problems of its data."""
+    from .vehicles.common.inertia import inertia_of
+    from .vehicles.surface_vessel import interface
+    from .vehicles.surface_vessel.surface_vessel import SurfaceVesselReader
+    from .vehicles.vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS
+
     vehicle = SurfaceVesselReader().read(name, data, COMMON_KEYS)
     vessel = vehicle.vehicle
     return Model(
         name,
-        surface_vessel_interface.variables(vessel),
-        surface_vessel_interface.states(MAX_PROPELLERS),
+        interface.variables(vessel),
+        interface.states(MAX_PROPELLERS),
         vehicle.body(),
         vehicle.crash_speed,
         is_vessel=True,
         boat=vessel,
         body_of=lambda given: vehicle.body(mass=given["mass"], inertia=inertia_of(given)),
         equations="surface_vessel",
-        layout=surface_vessel_interface.variables(vessel, SLOTS),
+        layout=interface.variables(vessel, (MAX_PROPELLERS, MAX_RUDDERS)),
     )
 
 
 def planar_vessel_model(name: str, data: Mapping[str, Any]) -> Model:
     """Return the model of a planar vessel. Raises InputError with all problems of its data."""
+    from .vehicles.planar_vessel import interface
+    from .vehicles.planar_vessel.planar_vessel import PlanarVesselReader
+    from .vehicles.vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS
+
     vehicle = PlanarVesselReader().read(name, data, COMMON_KEYS)
     vessel = vehicle.vehicle
     return Model(
         name,
-        planar_vessel_interface.variables(vessel),
-        planar_vessel_interface.states(MAX_PROPELLERS),
+        interface.variables(vessel),
+        interface.states(MAX_PROPELLERS),
         vehicle.body(),
         vehicle.crash_speed,
         is_vessel=True,
@@ -112,7 +123,7 @@ def planar_vessel_model(name: str, data: Mapping[str, Any]) -> Model:
         boat=vessel,
         body_of=lambda given: vehicle.body(mass=given["mass"], yaw_inertia=given["yaw_inertia"]),
         equations="planar_vessel",
-        layout=planar_vessel_interface.variables(vessel, SLOTS),
+        layout=interface.variables(vessel, (MAX_PROPELLERS, MAX_RUDDERS)),
     )
 
 
@@ -162,6 +173,7 @@ def _named_links(data: Mapping[str, Any]) -> Iterator[Problem]:
                 yield Problem(text, f"{key}.{i}.link", ("arguments", key, str(i), "link"))
 
 
+<<<<<<< HEAD
 #: name -> model
 MODELS = {
     model.name: model
@@ -203,13 +215,112 @@ MODELS = {
             otter_parameters.CRASH_SPEED,
             is_vessel=True,
         ),
+=======
+def _strider() -> Model:
+    from .vehicles.strider import interface, parameters
+
+    return Model(
+        "strider",
+        interface.VARIABLES,
+        interface.STATES,
+        parameters.BODY,
+        parameters.CRASH_SPEED,
+        is_vessel=True,
+        motion="planar",
+        hulls=interface.HULLS,
+>>>>>>> origin/main
     )
+
+
+def _strider_6dof() -> Model:
+    from .vehicles.common.interface import VESSEL_STATES
+    from .vehicles.strider.interface import HULLS
+    from .vehicles.strider.parameters import CRASH_SPEED
+    from .vehicles.strider_6dof import interface, parameters
+
+    return Model(
+        "strider_6dof",
+        interface.VARIABLES,
+        VESSEL_STATES,
+        parameters.BODY,
+        CRASH_SPEED,
+        is_vessel=True,
+        vehicle="strider",
+        hulls=HULLS,
+    )
+
+
+def _otter(name: str) -> Model:
+    from .vehicles.common.interface import VESSEL_STATES
+    from .vehicles.otter import interface, parameters
+
+    return Model(
+        name,
+        interface.VARIABLES,
+        (*VESSEL_STATES, *interface.PROPELLER_STATES),
+        parameters.BODY,
+        parameters.CRASH_SPEED,
+        is_vessel=True,
+    )
+
+
+def _model_of_file(name: str) -> Model:
+    return model_from_data(json.loads(_FILES[name].read_text(encoding="utf-8")), name)
+
+
+class _LazyMapping(Mapping[str, _Value]):
+    """Values by name, each of which is made when it is first used, and kept.
+
+    Args:
+        makers: Function that makes each value.
+    """
+
+    def __init__(self, makers: Mapping[str, Callable[[], _Value]]):
+        self._makers, self._made = makers, dict[str, _Value]()
+
+    def __getitem__(self, name: str) -> _Value:
+        if name not in self._made:
+            self._made[name] = self._makers[name]()
+        return self._made[name]
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._makers
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._makers)
+
+    def __len__(self) -> int:
+        return len(self._makers)
+
+
+#: vessels with equations of their own
+_OWN_EQUATIONS: Mapping[str, Callable[[], Model]] = {
+    "strider": _strider,
+    "strider_6dof": _strider_6dof,
+    "otter": partial(_otter, "otter"),
+    "otter_mss": partial(_otter, "otter_mss"),
 }
 
+#: names of the FMUs with the equations of all models
+BINARIES = (*FAMILIES, *_OWN_EQUATIONS)
+
+#: name -> model
+MODELS: Mapping[str, Model] = _LazyMapping(
+    {**{name: partial(_model_of_file, name) for name in _FILES}, **_OWN_EQUATIONS}
+)
+
+
+def _models_by_motion(*names: str) -> dict[str, Model]:
+    return {MODELS[name].motion: MODELS[name] for name in names}
+
+
 #: vehicle -> motion -> model; the first motion is the default
-VEHICLE_MODELS: dict[str, dict[str, Model]] = {}
-for _model in MODELS.values():
-    VEHICLE_MODELS.setdefault(_model.vehicle or _model.name, {})[_model.motion] = _model
+VEHICLE_MODELS: Mapping[str, dict[str, Model]] = _LazyMapping(
+    {
+        **{name: partial(_models_by_motion, name) for name in MODELS if name != "strider_6dof"},
+        "strider": partial(_models_by_motion, "strider", "strider_6dof"),
+    }
+)
 
 
 def models_of(vehicle: Any) -> Mapping[str, Model]:

@@ -155,7 +155,9 @@ def landing(
     start: float = 0.0,
     stop: float | None = None,
 ) -> Figure:
-    """Draw the altitudes of a multirotor and the deck, and their horizontal distance on a logarithmic axis, over time.
+    """Draw the altitudes of a multirotor and the deck, and their horizontal distance, over time.
+
+    The axis of the distance is logarithmic.
 
     Args:
         result: Recorded mission.
@@ -166,7 +168,8 @@ def landing(
         phases: Names of the modes 1, 2, ...
         limit: Horizontal error that is marked by a line (m).
         start: First time shown (s).
-        stop: Last time shown (s); by default 4 s after touchdown, or the end of a run without touchdown.
+        stop: Last time shown (s); by default 4 s after touchdown, or the end of a run without
+            touchdown.
 
     Returns:
         Figure of column width with two panels.

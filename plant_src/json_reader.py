@@ -13,6 +13,11 @@ JsonPath = tuple[str, ...]
 Numbers = tuple[float, ...]
 
 
+def argument_problem(text: str, *path: str) -> Problem:
+    """Return a problem of the argument with this path."""
+    return Problem(text, subject=("arguments", *path))
+
+
 class JsonReader:
     """Reader of the JSON arguments of a component.
 

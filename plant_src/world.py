@@ -19,7 +19,7 @@ from cosim.core.component import DTYPES, Component, Ports, PreparedCall, Variabl
 from cosim.core.errors import ComponentError, InputError, Problem, did_you_mean
 
 from . import world_settings
-from .catalogue import MODELS
+from .catalogue import BINARIES
 from .environment.environment_model import EnvironmentModel
 from .physics.body import InvalidStateError
 from .physics.client import connect, preconnect, pybullet
@@ -28,7 +28,6 @@ from .physics.contacts import overlap_depths
 from .physics.failures import FLAG_COUNT
 from .physics.fixed_bodies import create_fixed_bodies
 from .physics.fleet import Fleet, FleetState
-from .scene import replay
 from .variable_views import recorded_others, variable_views, views_in_parts
 from .vehicle_constants import input_limits, vehicle_constants
 from .vehicle_files.plausibility import placement_warnings
@@ -120,7 +119,7 @@ class World(Component):
 
         The equations of all vehicle models are unpacked too, because a run may have other vehicles.
         """
-        for binary in {model.binary for model in MODELS.values()}:
+        for binary in BINARIES:
             library_path(binary)
         with component_log.discarding_messages():
             cls("warm", **arguments).free()
@@ -129,7 +128,9 @@ class World(Component):
     @staticmethod
     def scene(name: str, scenario: Mapping[str, Any]) -> dict[str, Any]:
         """Return the scene of the 3-D replay, see `scene.replay`."""
-        return replay.world_scene(name, scenario)
+        from .scene.replay import world_scene  # only pages need it
+
+        return world_scene(name, scenario)
 
     @staticmethod
     def video_frames(

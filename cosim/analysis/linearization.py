@@ -8,6 +8,7 @@ to their states. The model then holds the states that the inputs reach and the o
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence, Set
+from itertools import chain
 from typing import Any
 
 import numpy as np
@@ -121,7 +122,7 @@ def by_directional_derivatives(
     names = set(experiment.prepared.system.components) if active is None else active
     component = next(iter(names))
     states = dict(experiment.prepared.system.components[component].continuous_states)
-    targets = [target for group in channels.values() for target in group]
+    targets = list(chain.from_iterable(channels.values()))
     own_outputs = [
         each.removeprefix(f"{component}.") for each in outputs if each.startswith(f"{component}.")
     ]
@@ -164,7 +165,9 @@ def _notes(
 
 
 def to_continuous(realization: Realization, step: float) -> Realization:
-    """Return the continuous model whose sampling with inputs held for a step has outputs at the end of each step.
+    """Return the continuous model of a sampled one.
+
+    Sampled with inputs held for a step, it has outputs at the end of each step.
 
     Args:
         realization: Its outputs belong to the end of the step in which its inputs act.
@@ -196,7 +199,7 @@ def to_continuous(realization: Realization, step: float) -> Realization:
 def _with_outputs_as_states(
     realization: Realization, names: Sequence[str]
 ) -> tuple[Realization, list[str]]:
-    """Return the realization with outputs as states if there are enough, and the names of the states."""
+    """Return the realization with outputs as states if there are enough, and their names."""
     order = len(realization.a)
     chosen: list[int] = []
     basis = np.zeros((0, order))

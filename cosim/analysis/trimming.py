@@ -1,4 +1,4 @@
-"""Trim: values of inputs, parameters and initial states with which a scenario starts in equilibrium."""
+"""Trim: inputs, parameters and initial states with which a scenario starts in equilibrium."""
 
 from __future__ import annotations
 
@@ -159,7 +159,10 @@ class _Search:
         return settings
 
     def without_effect(self, jacobian: np.ndarray) -> list[str]:
-        """Return the free values of whose elements none changes a residual, from the derivatives of the residuals."""
+        """Return the free values of whose elements none changes a residual.
+
+        The derivatives of the residuals show it.
+        """
         ends = np.cumsum([size or 1 for size in self.sizes])
         parts = np.split(jacobian, ends[:-1], axis=1)
         return [name for name, part in zip(self.free, parts, strict=True) if not part.any()]
@@ -176,19 +179,15 @@ class _Search:
             simulation.step()
             span = simulation.time - begin
             after = {name: _elements(name, simulation.get(name)) for name in self.steady}
-        rates = {
-            f"{name}{key}": (after[name][key] - value) / span
-            for name in self.steady
-            for key, value in before[name].items()
-        }
-        deviations = {
-            f"{name}{key}": value - target
-            for name, target in self.required.items()
-            for key, value in before[name].items()
-        }
-        residuals = [*rates.items(), *deviations.items()]
-        self.names = [name for name, _ in residuals]
-        return np.array([value for _, value in residuals])
+        rates, deviations = dict[str, float](), dict[str, float]()
+        for name in self.steady:
+            for key, value in before[name].items():
+                rates[f"{name}{key}"] = (after[name][key] - value) / span
+        for name, target in self.required.items():
+            for key, value in before[name].items():
+                deviations[f"{name}{key}"] = value - target
+        self.names = [*rates, *deviations]
+        return np.array([*rates.values(), *deviations.values()])
 
 
 def _refuse_connected(prepared: PreparedRun, name: str) -> None:

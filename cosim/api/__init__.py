@@ -8,13 +8,13 @@ from typing import TYPE_CHECKING
 
 from ..results import Result
 from ..results.result import Presentation
-from .execution import Execution, evaluate_scenario_checks
+from .execution import evaluate_scenario_checks
 from .simulation import Simulation, load, run
 
 if TYPE_CHECKING:
     from matplotlib.figure import Figure
 
-__all__ = ["Execution", "Result", "Simulation", "evaluate_scenario_checks", "load", "run"]
+__all__ = ["Result", "Simulation", "evaluate_scenario_checks", "load", "run"]
 
 
 def _plot(result: Result, signals: Sequence[str]) -> Figure:

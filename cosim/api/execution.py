@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import Any
 
 from ..core.errors import CosimError, InputError, Problem
@@ -35,23 +35,8 @@ RUN_MODULES = (
 )
 
 
-@dataclass(frozen=True)
-class Execution:
-    """A finished run.
-
-    Attributes:
-        result: Recorded signals, KPIs and checks, as far as they were computed.
-        failure: The error that ended the run early; None if there was none.
-    """
-
-    result: Result
-    failure: BaseException | None = None
-
-
 @default_float_mode()
-def evaluate_outcome(
-    prepared: PreparedRun, outcome: SimulationOutcome, complete: bool
-) -> Execution:
+def evaluate_outcome(prepared: PreparedRun, outcome: SimulationOutcome, complete: bool) -> Result:
     """Return the result of a run.
 
     Args:
@@ -59,25 +44,16 @@ def evaluate_outcome(
         outcome: What was recorded.
         complete: Also evaluate all KPIs and checks, unless the run failed.
     """
-    timing = _add_timings(prepared.timing, outcome.timing)
+    timing = {**prepared.timing, **outcome.timing}
     timing["simulate_seconds"] = sum(outcome.timing.values())
     metadata = {**prepared.metadata, **_outcome_metadata(prepared, outcome)}
     if complete or outcome.failure:
         warn_exceeded_limits(prepared, outcome.recording)
-    result = Result(outcome.recording, timing=timing, metadata=metadata)
-    return (
-        _evaluate_run(result, prepared)
-        if complete and not outcome.failure
-        else Execution(result, outcome.failure)
-    )
+    result = Result(outcome.recording, timing=timing, metadata=metadata, failure=outcome.failure)
+    return _evaluate_run(result, prepared) if complete and not outcome.failure else result
 
 
-def _add_timings(first: Mapping[str, float], second: Mapping[str, float]) -> dict[str, float]:
-    """Return the sum of the durations of each name."""
-    return {part: first.get(part, 0.0) + second.get(part, 0.0) for part in {**first, **second}}
-
-
-def _evaluate_run(result: Result, prepared: PreparedRun) -> Execution:
+def _evaluate_run(result: Result, prepared: PreparedRun) -> Result:
     """Evaluate all KPIs and checks; the others are also evaluated if a KPI fails."""
     values: dict[str, Number] = {}
     failures: list[BaseException] = []
@@ -99,8 +75,13 @@ def _evaluate_run(result: Result, prepared: PreparedRun) -> Execution:
         "kpi_notes": kpi_notes(values, _signals_of_optional_kpis(prepared, functions, result)),
         "check_notes": kpi_notes({name: values[name] for name in failed if name in values}),
     }
-    evaluated = replace(result, kpis=kpis, metadata={**result.metadata, **about}, checks=checks)
-    return Execution(evaluated, failures[0] if failures else None)
+    return replace(
+        result,
+        kpis=kpis,
+        metadata={**result.metadata, **about},
+        checks=checks,
+        failure=failures[0] if failures else None,
+    )
 
 
 def _signals_of_optional_kpis(
@@ -157,29 +138,20 @@ def _outcome_metadata(prepared: PreparedRun, outcome: SimulationOutcome) -> dict
 
     Steps, timing, signals that are not finite, termination, failure.
     """
-    termination = outcome.termination
+    failure = outcome.failure
+    text = str(failure) or type(failure).__name__
+    allows_all = prepared.spec.non_finite == "allow"
     return {
         "macro_steps": outcome.macro_steps,
         "real_time": outcome.real_time,
-        "non_finite": {}
-        if prepared.spec.non_finite == "allow"
-        else warn_non_finite(outcome.recording),
-        "terminated_by": _describe_termination(termination),
-        "failure": "interrupted"
-        if isinstance(outcome.failure, KeyboardInterrupt)
-        else _failure_text(outcome.failure),
+        "non_finite": {} if allows_all else warn_non_finite(outcome.recording),
+        "terminated_by": outcome.termination and _describe_termination(outcome.termination),
+        "failure": failure and ("interrupted" if isinstance(failure, KeyboardInterrupt) else text),
     }
 
 
-def _describe_termination(termination: Termination | None) -> dict[str, Any] | None:
+def _describe_termination(termination: Termination) -> dict[str, Any]:
     """Return the component or the condition that ended the run before the stop time."""
-    if termination is None:
-        return None
     if termination.condition:
         return termination.condition._asdict()
     return {"component": termination.component, "time": termination.time}
-
-
-def _failure_text(failure: BaseException | None) -> str | None:
-    """Return the text of a failure, its class name if the text is empty."""
-    return None if failure is None else str(failure) or type(failure).__name__

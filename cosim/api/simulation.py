@@ -19,7 +19,7 @@ from ..results import Result
 from ..scenario import IsolationMode, PreparedRun
 from ..scenario import load as prepare
 from .arguments import check_load_arguments, check_names, check_options, expect, is_integer
-from .execution import Execution, evaluate_outcome
+from .execution import evaluate_outcome
 from .variable_access import VariableAccess
 
 #: prepares the scenario with changed values of variables and entries
@@ -61,7 +61,7 @@ class Simulation:
         self.prepared = self._prepare(settings)
         self._run: PlanRun | None = None
         self._variables = VariableAccess(self.prepared)
-        self._execution: Execution | None = None
+        self._result: Result | None = None
         self._is_stepping = False
         #: ends the components; a list, so that the finalizer does not refer to this object
         self._ends: list[Callable[[], None]] = [self.prepared.free]
@@ -153,12 +153,12 @@ class Simulation:
                 was recorded until then.
             LateError: The simulation fell behind real time and `late` is "fail".
         """
-        return _result_or_failure(self.execute(observers))
+        return _raise_failure(self.execute(observers))
 
     def execute(
         self, observers: Sequence[Observer] = (), step_hook: StepHook | None = None
-    ) -> Execution:
-        """Like `run`, but return a failure with the result instead of raising it.
+    ) -> Result:
+        """Like `run`, but return a failure in the result instead of raising it.
 
         Args:
             observers: See `run`.
@@ -189,12 +189,8 @@ class Simulation:
         with self._lock:
             if self._run is None and self._ends:
                 self._running()
-            execution = self._evaluate()
-            return (
-                execution.result
-                if self._run and self._run.failure
-                else _result_or_failure(execution)
-            )
+            result = self._evaluate()
+            return result if self._run and self._run.failure else _raise_failure(result)
 
     def reset(self, seed: int | None = None, parameters: Mapping[str, Any] | None = None) -> None:
         """Return to the start time with new components.
@@ -287,7 +283,7 @@ class Simulation:
         """
         expect("state", state, isinstance(state, SavedState), "a state that save() returned")
         with self._lock:
-            self._execution = None
+            self._result = None
             self._running().restore(state)
 
     # -- internal
@@ -319,35 +315,34 @@ class Simulation:
             )
 
     def _advance(self, run: PlanRun, end: int, observers: Sequence[Observer] = ()) -> None:
-        self._is_stepping, self._execution = True, None
+        self._is_stepping, self._result = True, None
         try:
             run.advance(min(end, self.prepared.plan.grid.count), observers)
         except CosimError as error:
-            error.result = self._evaluate().result
+            error.result = self._evaluate()
             raise
         finally:
             self._is_stepping = False
 
-    def _evaluate(self) -> Execution:
-        if self._execution is None:
+    def _evaluate(self) -> Result:
+        if self._result is None:
             if self._run is None:
                 raise InputError(
                     "the simulation was closed before it began; reset() opens it again"
                 )
-            self._execution = evaluate_outcome(
+            self._result = evaluate_outcome(
                 self.prepared, self._run.outcome(), self._run.is_finished
             )
-        return self._execution
+        return self._result
 
 
-def _result_or_failure(execution: Execution) -> Result:
+def _raise_failure(result: Result) -> Result:
     """Return the result of a run, or raise its failure with the result."""
-    if execution.failure:
-        vars(execution.failure)["result"] = (
-            execution.result
-        )  # any exception has it, a KeyboardInterrupt too
-        raise execution.failure
-    return execution.result
+    if result.failure:
+        # any exception has it, a KeyboardInterrupt too
+        vars(result.failure)["result"] = result
+        raise result.failure
+    return result
 
 
 def _end_quietly(ends: list[Callable[[], None]], process: int) -> None:

@@ -10,7 +10,14 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from ..components.fmi import InstanceSettings, Isolation, Method, SolverSettings, create_component
+from ..components.fmi import (
+    InstanceSettings,
+    Isolation,
+    Method,
+    SolverSettings,
+    create_component,
+    open_fmu,
+)
 from ..components.input_table import InputTable, make_input_table, parse_cell, read_input_table
 from ..core import component_log
 from ..core.component import Component, Variable
@@ -22,7 +29,7 @@ from ..engine.plan import Plan, compile_plan
 from ..engine.plan_run import free_components
 from ..engine.run_loop import simulating
 from ..engine.settings import Settings
-from ..export.foreign.source_fmus import usable_fmu
+from ..export.foreign import add_binary
 from ..process.float_mode import default_float_mode
 from ..process.process_state import exclusive_process_state
 from ..results import Result
@@ -142,7 +149,7 @@ def compile_fmu(
     Raises:
         InputError: The FMU cannot be simulated in this way.
     """
-    file = usable_fmu(fmu, settings.interface)
+    file = open_fmu(fmu, settings.interface, add_binary)
     settings = settings.with_structural_parameters(file.description, start_values)
     experiment = file.description.default_experiment
     start = experiment.start_time or Fraction(0)

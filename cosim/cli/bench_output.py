@@ -103,7 +103,10 @@ def print_omissions(omissions: Sequence[tuple[str, Omission]], controller: str =
 
 
 def print_ranking(ranking: Ranking, candidate: str) -> None:
-    """Print the achievements of a candidate and of the scenarios' own controllers, the better one first."""
+    """Print the achievements of a candidate and of the scenarios' own controllers.
+
+    The better one comes first.
+    """
     if not ranking.candidate.scenarios:
         click.echo(f"\nno scenario feeds all inputs of {candidate}")
         return

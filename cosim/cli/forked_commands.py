@@ -1,7 +1,7 @@
-"""Commands of `cosim` in processes forked from this one, so that their modules are imported only once.
+"""Commands of `cosim` in forked processes, so that modules are imported only once.
 
-Each command runs in a process of its own, as if it had been started by `python -m cosim`. It is forked by a process that was
-forked from this one before this one started threads.
+Each command runs in a process of its own, as if it had been started by `python -m cosim`. It is
+forked by a process that was forked from this one before this one started threads.
 """
 
 from __future__ import annotations
@@ -89,7 +89,7 @@ class _ForkingProcess:
         self._stream = self._connection.makefile("rw", encoding="utf-8")
 
     def run(self, words: Sequence[str]) -> CompletedProcess[str]:
-        """Run a command; in a new process if the forking process has ended, for instance because it was killed."""
+        """Run a command; in a new process if the forking process has ended."""
         with suppress(ConnectionError):
             print(json.dumps(words), file=self._stream, flush=True)
             if answer := self._stream.readline():
@@ -127,7 +127,7 @@ def _serve(connection: socket.socket, mask: SignalMask) -> NoReturn:
 
 
 def _run_command(words: list[str], connection: socket.socket, mask: SignalMask) -> tuple[int, str]:
-    """Run a command in a forked process and return its exit code, as `subprocess` defines it, and its standard error."""
+    """Run a command in a forked process; return its exit code and its standard error."""
     reader, writer = os.pipe()
     child = os.fork()
     if child == 0:
@@ -143,7 +143,10 @@ def _run_command(words: list[str], connection: socket.socket, mask: SignalMask) 
 
 
 def _become_command(words: list[str], mask: SignalMask) -> NoReturn:
-    """Run a command in this process, which was just forked, with the state of a new interpreter, and end the process."""
+    """Run a command in this process, which was just forked, and end the process.
+
+    The command finds the state of a new interpreter.
+    """
     code: object = 130
     try:
         sys.stdout, sys.stderr = sys.__stdout__, sys.__stderr__

@@ -24,8 +24,10 @@ _DEFAULT_SPEED = 1.0
 _view = click.option(
     "--view",
     is_flag=True,
-    help="Show the run live in a browser on this machine: pause, step, set the speed, tunable parameters and unconnected "
-    "inputs. Starts in real time, or with the FACTOR of --real-time.",
+    help=(
+        "Show the run live in a browser on this machine: pause, step, set the speed, tunable "
+        "parameters and unconnected inputs. Starts in real time, or with the FACTOR of --real-time."
+    ),
 )
 _port = click.option(
     "--view-port",
@@ -94,7 +96,7 @@ def run_with_view(
 
 
 def create_control(prepared: PreparedRun, link: Connection, speed: float | None) -> LiveControl:
-    """Return the control that paces the run and executes the page's commands, which arrive through `link`.
+    """Return the control that paces the run and executes the commands of the page.
 
     Args:
         prepared: the run; it must not be paced itself.

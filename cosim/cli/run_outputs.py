@@ -19,7 +19,6 @@ from .messages import print_json, print_log
 from .unfinished_runs import writing_results
 
 if TYPE_CHECKING:
-    from ..api import Execution
     from ..engine.pacer import LatePolicy
     from ..process.supervisor import SupervisedOutcome
     from ..results import Result
@@ -59,21 +58,16 @@ class RunOutcome:
     Attributes:
         options: options of the command.
         prepared: the run as it was prepared.
-        execution: its result or failure.
+        result: its result; after a failure, what was recorded until then.
         began: `time.perf_counter()` before the scenario was loaded (s).
         files: names of the files that the summary lists.
     """
 
     options: RunOptions
     prepared: PreparedRun
-    execution: Execution
+    result: Result
     began: float
     files: list[str] = field(default_factory=list)
-
-    @property
-    def result(self) -> Result:
-        """The result; after a failure, what was recorded until then."""
-        return self.execution.result
 
     @property
     def shown_folder(self) -> Path:
@@ -100,8 +94,8 @@ class RunOutcome:
 
 def write_outputs(outcome: RunOutcome) -> int:
     """Write, print and draw all outputs of a run, and return the exit code of the command."""
-    if outcome.execution.failure:
-        code = _end_failed_run(outcome, outcome.execution.failure)
+    if failure := outcome.result.failure:
+        code = _end_failed_run(outcome, failure)
     else:
         for write in _COMPLETE_RUN_WRITERS:
             write(outcome)
@@ -109,7 +103,7 @@ def write_outputs(outcome: RunOutcome) -> int:
         code = 0 if passed else 3
     for write in _EVERY_RUN_WRITERS:
         write(outcome)
-    if outcome.options.as_json and not outcome.execution.failure:
+    if outcome.options.as_json and not failure:
         print_json(
             _summarize_run(
                 outcome.result, outcome.checks, outcome.shown_folder, outcome.files, code

@@ -36,8 +36,10 @@ _workers = click.option(
 _scheduler = click.option(
     "--scheduler",
     metavar="tcp://HOST:PORT",
-    help="Run on the Dask cluster with this scheduler (extra `cluster`). Only for a cluster that you trust: Dask unpickles its "
-    "answers, so that it can run code here as you run code there.",
+    help=(
+        "Run on the Dask cluster with this scheduler (extra `cluster`). Only for a cluster that "
+        "you trust: Dask unpickles its answers, so that it can run code here as you run code there."
+    ),
 )
 _max_runs = click.option(
     "--max-runs",
@@ -52,7 +54,7 @@ _retry = click.option(
 
 
 def study_options(command: Callable[..., int]) -> Callable[..., int]:
-    """Add the options `--workers`, `--scheduler`, `--max-runs`, `--retry-failed` and `--excel-safe` to a command."""
+    """Add the options that sweeps and tunings share to a command."""
     return _workers(_scheduler(_max_runs(_retry(csv_option(command)))))
 
 

@@ -1,4 +1,4 @@
-"""Execution of a command in a supervised child process, which protects it from crashes of foreign code."""
+"""Execution of a command in a supervised child process."""
 
 from __future__ import annotations
 
@@ -33,10 +33,12 @@ _sandbox = click.option(
     "--sandbox",
     type=click.Choice(SANDBOX_KINDS),
     metavar="[strict]",
-    help="Run each FMU in its own process that reads only its own files, writes only to a temporary folder, has no network and "
-    "starts no programs. "
-    "strict: also confine the whole command to the files it needs and to its output directory "
-    "(requires bubblewrap).",
+    help=(
+        "Run each FMU in its own process that reads only its own files, writes only to a temporary "
+        "folder, has no network and starts no programs. "
+        "strict: also confine the whole command to the files it needs and to its output directory "
+        "(requires bubblewrap)."
+    ),
 )
 
 
@@ -86,7 +88,10 @@ def run_supervised_command(
 def _save_partial(
     outcome: SupervisedOutcome, save_partial: Callable[[SupervisedOutcome], None], folder: Path
 ) -> None:
-    """Save the rows of an unfinished run and remove its folder, unless writing fails or the child kept the rows and said so."""
+    """Save the rows of an unfinished run and remove its folder.
+
+    The folder stays if writing fails, or if the child has kept the rows and said so.
+    """
     from ..process.run_files import find_kept_rows
 
     if find_kept_rows(folder) and not outcome.failure:
@@ -100,7 +105,10 @@ def _save_partial(
 
 
 def results_written(code: int) -> int:
-    """Record the final exit code in the journal, so that later failures do not change it, and return the code."""
+    """Record the final exit code in the journal and return it.
+
+    Later failures do not change it.
+    """
     from ..process.journal import EXIT_CODE, Phase, current_journal
 
     if journal := current_journal():

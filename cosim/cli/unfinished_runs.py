@@ -1,4 +1,4 @@
-"""Rows of runs whose results cannot be written (for example on a full disk), kept for `cosim recover`."""
+"""Rows of runs whose results could not be written, kept for `cosim recover`."""
 
 from __future__ import annotations
 

@@ -25,7 +25,7 @@ _MXCSR_OFFSET, _MXCSR_DEFAULT = (
 
 
 def is_changed() -> bool:
-    """Return whether the rounding mode is not to nearest, or subnormal numbers are flushed to zero."""
+    """Return whether numbers are not rounded to nearest, or subnormal ones are flushed to zero."""
     one, tiny, smallest = PROBE_VALUES
     return one + tiny != one - tiny or not smallest + smallest
 
@@ -123,7 +123,10 @@ class FloatModeGuard:
 
 @cache
 def _default_environment() -> Any:
-    """Return FE_DFL_ENV of <fenv.h>, on x86-64 without flush to zero, which FE_DFL_ENV does not reset there."""
+    """Return FE_DFL_ENV of <fenv.h>.
+
+    On x86-64 flush to zero is off in it, which FE_DFL_ENV does not reset there.
+    """
     if sys.platform == "darwin":
         return ctypes.c_void_p(
             ctypes.addressof(ctypes.c_char.in_dll(ctypes.PyDLL(None), "_FE_DFL_ENV"))

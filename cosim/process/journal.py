@@ -1,7 +1,8 @@
-"""Record of the present activity of this process, in memory that a supervising process can read after a crash.
+"""Record of the present activity of this process, which a supervisor reads after a crash.
 
-A journal is a small block of memory. It holds the marker of the executor (see `MARKER_SIZE`) and the present activity outside the
-stepping loop with its deadline. A process without a supervisor has no journal.
+A journal is a small block of memory. It holds the marker of the executor (see `MARKER_SIZE`) and
+the present activity outside the stepping loop with its deadline. A process without a supervisor has
+no journal.
 """
 
 from __future__ import annotations
@@ -76,7 +77,11 @@ class Deadlines:
 
 
 class Activity(NamedTuple):
-    """Recorded call into a component at simulation time `time` (s; NaN outside the simulation), with its deadline (s)."""
+    """Recorded call into a component.
+
+    `time` is the simulation time (s; NaN outside the simulation), `deadline` its maximum duration
+    (s).
+    """
 
     component: str
     function: str
@@ -85,7 +90,7 @@ class Activity(NamedTuple):
 
 
 class Journal:
-    """Journal in `memory`, a buffer of `JOURNAL_SIZE` bytes that may be shared with another process."""
+    """Journal in a buffer of `JOURNAL_SIZE` bytes, which may be shared with another process."""
 
     def __init__(self, memory: Any):
         self.memory = memory
@@ -204,7 +209,10 @@ _noted_calls: dict[tuple[str, str], bool] = {}
 
 
 class attributing_forks:  # noqa: N801  # a generator as context manager would take twice as long
-    """Attribute forks in the block to the present call, and end a copy of this process that reaches the end of the block."""
+    """Attribute forks in the block to the present call.
+
+    A copy of this process that reaches the end of the block is ended.
+    """
 
     def __init__(self, describe_call: CallDescription | None):
         """Prepare the block.
@@ -274,7 +282,7 @@ def current_journal() -> Journal | None:
 
 @contextmanager
 def calling_several_components() -> Iterator[None]:
-    """Keep the recorded call, which names several components, while threads call them in the block."""
+    """Keep the recorded call while threads call the several components that it names."""
     journal = _current
     if journal is None:
         yield
@@ -332,7 +340,10 @@ def _recording_call(
 
 @contextmanager
 def as_component_error(component: str, function: str, time: float = math.nan) -> Iterator[None]:
-    """Raise a ComponentError for an exception in the block that is no CosimError and not in `PASS_THROUGH_EXCEPTIONS`."""
+    """Raise a ComponentError for an exception in the block that is no CosimError.
+
+    Exceptions in `PASS_THROUGH_EXCEPTIONS` pass unchanged.
+    """
     try:
         yield
     except (CosimError, *PASS_THROUGH_EXCEPTIONS):

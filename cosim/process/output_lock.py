@@ -190,10 +190,10 @@ def _read_holder(path: Path) -> str:
 
 
 class LockKeeper:
-    """Context that holds the lock of a command's output until results are saved, even if a child process acquired it.
+    """Context that holds the lock of a command's output until results are saved.
 
-    The child sends the descriptor of its lock through a socket. So the lock survives a crash of the child, and foreign code
-    in the child cannot release it.
+    The child sends the descriptor of its lock through a socket. So the lock survives a crash of the
+    child, and foreign code in the child cannot release it.
     """
 
     def __enter__(self) -> LockKeeper:

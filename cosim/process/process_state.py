@@ -104,7 +104,10 @@ def _set_locale(name: bytes) -> None:
 
 
 def _c_environment() -> dict[bytes, bytes]:
-    """Return the environment of the C library, which foreign code changes without changing `os.environ`."""
+    """Return the environment of the C library.
+
+    Foreign code changes it without changing `os.environ`.
+    """
     if sys.platform != "linux":
         return {}
     entries = ctypes.POINTER(ctypes.c_char_p).in_dll(_c_library(), "environ")
@@ -194,7 +197,10 @@ def _restore_resource_limits(saved: dict[int, tuple[int, int]]) -> str | None:
 
 
 def reserve_descriptors() -> None:
-    """Lower the soft limit of open files, so that there are descriptors for results when foreign code has used up all others."""
+    """Lower the soft limit of open files, to have descriptors for results.
+
+    Foreign code may use up all others.
+    """
     soft, hard = resource.getrlimit(resource.RLIMIT_NOFILE)
     if soft > 2 * _RESERVED_DESCRIPTORS:
         resource.setrlimit(resource.RLIMIT_NOFILE, (soft - _RESERVED_DESCRIPTORS, hard))
@@ -264,13 +270,19 @@ _saved_states: list[ProcessState] = []
 
 
 class _StateCache:
-    """The last state that was read with its encoding, because reading one takes much longer than encoding it."""
+    """The last state that was read, with its encoding.
+
+    Reading a state takes much longer than encoding it.
+    """
 
     def __init__(self) -> None:
         self._encoding, self._state = b"", ProcessState()
 
     def read(self) -> tuple[bytes, ProcessState]:
-        """Return the encoding of the present state, b"" without the extension module, and the state."""
+        """Return the encoding of the present state and the state.
+
+        The encoding is b"" without the extension module.
+        """
         encoding = _encode()
         if not encoding or encoding != self._encoding:
             self._encoding, self._state = encoding, ProcessState()
@@ -346,7 +358,7 @@ def _restore_state(
 
 @contextmanager
 def exclusive_process_state() -> Iterator[None]:
-    """Exclude other threads from this block and from `restoring_process_state` while the block runs."""
+    """Exclude other threads from such blocks and from `restoring_process_state`."""
     with _lock:
         yield
 
@@ -357,7 +369,10 @@ def _state_cache() -> _StateCache:
 
 
 def _release_after_fork() -> None:
-    """In a child forked while another thread held the lock, replace the lock and restore what that thread would restore."""
+    """Replace a lock that another thread held when this process was forked.
+
+    Restore what that thread would restore.
+    """
     global _lock
     if _lock.acquire(blocking=False):
         _lock.release()
@@ -375,7 +390,7 @@ if hasattr(os, "register_at_fork"):
 
 
 def _output_files() -> list[tuple[int, int]]:
-    """Return device and inode of the files behind `sys.stdout` and `sys.stderr`, if they have any."""
+    """Return device and inode of the files behind `sys.stdout` and `sys.stderr`."""
     files = []
     for stream in (sys.stdout, sys.stderr):
         with suppress(OSError, ValueError, AttributeError):
@@ -385,7 +400,7 @@ def _output_files() -> list[tuple[int, int]]:
 
 
 def _file_access() -> tuple[int, bool]:
-    """Return the inode of the root folder, and whether files can be created in the folder of the run."""
+    """Return the inode of the root folder, and whether the folder of the run is writable."""
     journal, root = current_journal(), Path("/").stat().st_ino
     try:
         if journal and journal.folder and hasattr(os, "O_TMPFILE"):

@@ -8,13 +8,14 @@ from pathlib import Path
 
 
 def waiting_time(process: int) -> float:
-    """Return how long (s) the main thread of a process has been ready to run without having a processor.
+    """Return how long (s) the main thread of a process has waited for a processor.
 
     Args:
         process: Process id.
 
     Returns:
-        The time since the start of the thread; 0 where the system does not tell it (not Linux, or /proc is not readable).
+        The time since the start of the thread; 0 where the system does not tell it (not Linux, or
+        /proc is not readable).
     """
     with suppress(OSError, ValueError, IndexError):
         return int(Path(f"/proc/{process}/schedstat").read_text("ascii").split()[1]) * 1e-9

@@ -5,8 +5,8 @@
 - `texts`: string signals, one line of JSON for each change: the number of a row and its new strings
 - `metadata.json`: description of the run
 
-`RowsFile` writes and reads the first three. If the results cannot be written, as on a full disk, the
-files are kept: `rows` becomes `rows.COUNT` (see `keep_rows`).
+`RowsFile` writes and reads the first three. If the results cannot be written, as on a full disk,
+the files are kept: `rows` becomes `rows.COUNT` (see `keep_rows`).
 """
 
 from __future__ import annotations
@@ -39,7 +39,10 @@ TIME_SIZE = 8
 
 @dataclass(frozen=True)
 class Column:
-    """Numeric signal in a row: offset after the time (bytes), NumPy dtype such as "<f8", and unit."""
+    """Numeric signal in a row.
+
+    Offset after the time (bytes), NumPy dtype such as "<f8", and unit.
+    """
 
     name: str
     dtype: str
@@ -56,7 +59,8 @@ class RowLayout:
         signals_size: Size of the numeric signals of a row (bytes), without the time before them.
         columns: Numeric signals.
         texts: String signals, each with its index among all signals.
-        calls: Component and function of each call of the stepping loop, by the number in the marker.
+        calls: Component and function of each call of the stepping loop, by the number in the
+            marker.
     """
 
     signals_size: int

@@ -22,7 +22,7 @@ _MAX_READS = 64
 
 
 class _StandardFile(io.FileIO):
-    """File that drops output after the reader closed the pipe, and after a disk error that was raised once.
+    """File that drops output after its pipe was closed, or after a disk error was raised once.
 
     Disk errors of standard error are never raised, because they cannot be reported.
     """
@@ -61,7 +61,10 @@ class _EscapingStream(io.TextIOWrapper):
 
 
 def open_closed_streams() -> None:
-    """Connect closed standard streams to the null device, so that no file that is opened later takes their descriptors."""
+    """Connect closed standard streams to the null device.
+
+    No file that is opened later takes their descriptors.
+    """
     for descriptor in range(3):
         try:
             os.fstat(descriptor)
@@ -75,12 +78,12 @@ def open_closed_streams() -> None:
 
 
 def protected_stream(stream: TextIO, duplicate: bool = False) -> TextIO:
-    """Return a text stream to the same file that ignores a closed pipe and escapes control characters.
+    """Return a stream to the same file that ignores a closed pipe and escapes control characters.
 
     Args:
         stream: The stream to replace.
-        duplicate: Write through a duplicated descriptor, so that foreign code that closes or redirects the original one does
-            not affect the stream.
+        duplicate: Write through a duplicated descriptor, so that foreign code that closes or
+            redirects the original one does not affect the stream.
 
     Returns:
         The stream itself if it has no file descriptor, as in a notebook.
@@ -98,12 +101,18 @@ def protected_stream(stream: TextIO, duplicate: bool = False) -> TextIO:
 
 
 def unescaped(stream: TextIO) -> TextIO:
-    """Return a stream to the same file that writes control characters, for text without foreign parts."""
+    """Return a stream to the same file that writes control characters.
+
+    It is for text without foreign parts.
+    """
     return getattr(stream, "unescaped", stream)
 
 
 class ForeignOutput:
-    """Reader of a pipe that forwards output to standard error, escaped and up to `MAX_OUTPUT_SIZE`."""
+    """Reader of a pipe that forwards output to standard error, escaped and limited.
+
+    It forwards up to `MAX_OUTPUT_SIZE` bytes.
+    """
 
     def __init__(self, reader: int):
         """Make the pipe non-blocking; `reader` is its descriptor."""

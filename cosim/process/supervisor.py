@@ -96,7 +96,10 @@ class SupervisedOutcome:
 
 
 def can_supervise() -> bool:
-    """Return whether this process can fork and its standard streams have descriptors (not so in a test or a notebook)."""
+    """Return whether this process can fork and its standard streams have descriptors.
+
+    They have none in a notebook and in some tests.
+    """
     try:
         return hasattr(os, "fork") and sys.stdout.fileno() >= 0 and sys.stderr.fileno() >= 0
     except (OSError, AttributeError):
@@ -172,10 +175,13 @@ def run_child(
 
 
 def _isolate(output: int, supervisor: int) -> None:
-    """Enter a new session that ends with the supervisor, limit memory, and connect descriptors 1 and 2 to the pipe `output`.
+    """Enter a session that ends with the supervisor, and limit memory.
 
-    Python's own output goes to duplicates of the former descriptors. The limit keeps a component that allocates without end from
-    affecting other processes. Core files are not written. Some descriptors are reserved for results.
+    Descriptors 1 and 2 become the pipe `output`.
+
+    Python's own output goes to duplicates of the former descriptors. The limit keeps a component
+    that allocates without end from affecting other processes. Core files are not written. Some
+    descriptors are reserved for results.
     """
     detach(supervisor)
     lower_limit(resource.RLIMIT_DATA, MEMORY_LIMIT)
@@ -210,7 +216,7 @@ def interrupt_on_termination() -> Iterator[None]:
 
 
 def _adopt_orphans() -> None:
-    """Make orphaned descendants children of this process, so that they can be found and killed (Linux)."""
+    """Make orphaned descendants children of this process, which can kill them (Linux)."""
     if sys.platform == "linux":
         ctypes.CDLL(None).prctl(_PR_SET_CHILD_SUBREAPER, 1)
 
@@ -279,7 +285,10 @@ class _Supervisor:
                 self._forward_interrupt()
 
     def _check_deadline(self) -> None:
-        """Kill a child that exceeds a deadline, has overwritten its journal, ignores an interrupt or was stopped from outside."""
+        """Kill a child that exceeds a deadline.
+
+        Also one that has overwritten its journal, ignores an interrupt or was stopped from outside.
+        """
         journal, now = self.journal, time.monotonic()
         if not journal.is_valid:
             os.kill(self.child, signal.SIGKILL)
@@ -308,7 +317,10 @@ class _Supervisor:
             os.kill(self.child, signal.SIGKILL)
 
     def _exceeds(self, deadline: float, now: float) -> bool:
-        """Return whether a call exceeds a deadline (s) without the time in which a busy machine gave it no processor."""
+        """Return whether a call exceeds a deadline (s).
+
+        The time in which a busy machine gave it no processor does not count.
+        """
         waiting = waiting_time(self.child) - self._waiting_time
         return (
             now - self._progress_time - waiting > deadline

@@ -1,4 +1,7 @@
-"""Temporary folders that are removed with their process, or by a later process if theirs was killed."""
+"""Temporary folders that are removed with their process.
+
+If it was killed, a later process removes them.
+"""
 
 from __future__ import annotations
 

@@ -28,9 +28,10 @@ def draw_tubes(
     comparison: Comparison,
     max_signals: int = 4,
 ) -> Figure:
-    """Draw the signals with the largest deviations over time with their tolerance tubes, and beside them the deviations.
+    """Draw the signals with the largest deviations in their tubes, and the deviations beside them.
 
-    A tube that is narrow compared with the range of a signal is visible only in the panel of the deviation.
+    A tube that is narrow compared with the range of a signal is visible only in the panel of the
+    deviation.
 
     Args:
         result: The result that was compared.
@@ -68,7 +69,7 @@ def draw_tubes(
 def _draw_row(
     row: Sequence[Axes], comparer: Comparer, verdict: Verdict, tolerance: Tolerance
 ) -> None:
-    """Draw a signal and its tube in the first of two panels, and both minus the reference in the second."""
+    """Draw a signal and its tube; in the second of both panels minus the reference."""
     tube, points = comparer.tube(verdict.signal, tolerance), comparer.points
     values, reference = comparer.series(verdict.signal)
     base = points.interpolate_reference(reference)
@@ -101,7 +102,9 @@ def _draw_row(
 
 
 def draw_timings(result: Result, others: Sequence[Result] = ()) -> Figure:
-    """Draw the real-time factors of `result` and `others` as bars on a logarithmic axis, with those of the paper as a band.
+    """Draw the real-time factors of runs as bars on a logarithmic axis.
+
+    Those of the paper are a band.
 
     The figure is as wide as a column or, for many runs, up to a page of a two-column paper.
 

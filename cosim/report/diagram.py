@@ -69,7 +69,7 @@ class Diagram:
 
 
 def build_diagram(system: Mapping[str, Any]) -> Diagram:
-    """Return the diagram of a system that `cosim.scenario.overview.describe_system` has described."""
+    """Return the diagram of a system that `scenario.overview.describe_system` has described."""
     known = {component["name"]: component for component in system["components"]}
     layout = _place_side_by_side(system["stages"])
     boxes = {
@@ -146,7 +146,7 @@ def _build_box(component: Mapping[str, Any], column: float, row: float) -> Box:
 
 
 def _fit(text: str, size: float) -> str:
-    """Return a text that is not wider than a box in letters of `size` (px), shortened at its end if necessary."""
+    """Return a text that fits into a box in letters of `size` (px), shortened if necessary."""
     widths = list(accumulate(map(_letter_width, text), initial=1.0))  # with an ellipsis
     if (widths[-1] - 1.0) * size <= TEXT_WIDTH:
         return text
@@ -206,7 +206,10 @@ def _wires(
 
 
 def _forward_path(start: Box, end: Box) -> tuple[str, float, float]:
-    """Return a curve from a box to one further right, bent around the boxes between them, and its middle (px)."""
+    """Return a curve from a box to one further right, and its middle (px).
+
+    It bends around the boxes between them.
+    """
     x1, y1, x2, y2 = start.x + WIDTH, start.y + HEIGHT / 2, end.x, end.y + HEIGHT / 2
     bend = (x2 - x1) / 2
     passes_boxes = x2 - x1 > GAP_X + 1 and abs(y1 - y2) < HEIGHT
@@ -216,7 +219,10 @@ def _forward_path(start: Box, end: Box) -> tuple[str, float, float]:
 
 
 def _feedback_path(start: Box, end: Box, number: int, bottom: float) -> tuple[str, float, float]:
-    """Return a path from a box to one further left, along a separate lane below all boxes, and its middle (px)."""
+    """Return a path from a box to one further left, and its middle (px).
+
+    It runs along a separate lane below all boxes.
+    """
     aside, lane = 12 + 4 * (number % 6), bottom - GAP_Y / 2 + LANE * (number + 1)
     x1, y1, x2, y2 = start.x + WIDTH, start.y + 0.75 * HEIGHT, end.x, end.y + 0.75 * HEIGHT
     right, left = x1 + aside, x2 - aside
@@ -228,7 +234,7 @@ def _feedback_path(start: Box, end: Box, number: int, bottom: float) -> tuple[st
 
 
 def _rounded_path(points: Sequence[tuple[float, float]], radius: float = 6.0) -> str:
-    """Return a path along horizontal and vertical lines through `points`, with round corners of `radius` (px)."""
+    """Return a path along lines through `points`, with round corners of `radius` (px)."""
     path = "M{:g} {:g}".format(*points[0])
     for before, corner, after in zip(points, points[1:], points[2:], strict=False):
         (x1, y1), (x2, y2) = (_point_towards(corner, other, radius) for other in (before, after))

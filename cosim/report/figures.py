@@ -194,7 +194,10 @@ def write_figure_data(figure: Figure, path: Path) -> bool:
 
 
 def _curve_points(axes: Axes) -> Iterator[DataPoint]:
-    """Yield the points of all curves and bars of a panel, except markers without a label and lines across the axes."""
+    """Yield the points of all curves and bars of a panel.
+
+    Markers without a label and lines across the axes are left out.
+    """
     panel = axes.get_ylabel().replace("\n", " ")
     for line in axes.lines:
         name, in_data_units = str(line.get_label()), line.get_transform() == axes.transData

@@ -90,7 +90,9 @@ def write_replay(runs: Sequence[Result], path: Path) -> None:
 
 
 def write_judged_replay(result: Result, outcomes: Sequence[CheckOutcome], path: Path) -> None:
-    """Write the replay of a run that names the failed checks, marks the failure and opens before it; see `find_failure`.
+    """Write the replay of a run that marks the failure and opens before it.
+
+    It names the failed checks; see `find_failure`.
 
     Args:
         result: The run.

@@ -223,7 +223,10 @@ def write_folder_report(
 
 
 def _deviation_lines(run: Result, deviation: Deviation, is_accepted: bool) -> Iterator[str]:
-    """Yield the verdict of a failed comparison, the deviations, the reason of the tolerances, and how to accept the run."""
+    """Yield the lines about a failed comparison.
+
+    Verdict, deviations, reason of the tolerances, and how to accept the run.
+    """
     yield from deviation.summary.splitlines()
     reason = (run.metadata.get("scenario", {}).get("reference") or {}).get("reason")
     notes = (

@@ -187,7 +187,7 @@ def _read_json(path: Path, schema: type[BaseModel]) -> dict[str, Any]:
 
 
 def load_figures(result: Result) -> list[NamedCall]:
-    """Import the figure functions of a result's scenario and return (name, function, arguments) of each.
+    """Import the figures of a result's scenario: name, function and arguments of each.
 
     Raises:
         InputError: The scenario file is unknown, or a function does not exist.

@@ -55,7 +55,10 @@ def _to_float32(value: Any) -> float:
 
 
 def _stride_blocks(values: np.ndarray, max_count: int) -> tuple[np.ndarray, int]:
-    """Return the values in blocks, shape (blocks, 2 * stride), the last one padded with the last value, and the stride."""
+    """Return the values in blocks, shape (blocks, 2 * stride), and the stride.
+
+    The last block is padded with the last value.
+    """
     stride = -(-len(values) // max_count)
     count = -(-len(values) // (2 * stride))
     return np.pad(values, (0, 2 * stride * count - len(values)), mode="edge").reshape(

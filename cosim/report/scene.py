@@ -116,7 +116,9 @@ def static_method(
 def flatten_components(
     system: Mapping[str, Any], folder: Path
 ) -> Iterator[tuple[str, dict[str, Any], Path]]:
-    """Yield (full name, component, folder that its paths start from) of all components, including those of nested systems.
+    """Yield full name, component and folder of its paths of all components.
+
+    Those of nested systems are included.
 
     Parameters that an outer system sets ("usv.waypoint_x") are added to the inner component.
     """

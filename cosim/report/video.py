@@ -29,8 +29,9 @@ from ..core.errors import CosimError, InputError
 from ..core.processors import available_processors
 from ..results import Result
 from ..results.files import writing_atomically
+from ..scenario.component_schema import change_paths
 from ..scenario.file_paths import relocating
-from ..scenario.sources import change_paths, kind_of
+from ..scenario.sources import kind_of
 from .scene import flatten_components, static_method
 
 if TYPE_CHECKING:
@@ -84,7 +85,7 @@ def write_video(
 
 
 def find_frame_source(result: Result) -> str:
-    """Return the "file.py:Class" of the first component of the run's scenario that renders video frames.
+    """Return the "file.py:Class" of the first component that renders video frames.
 
     Raises:
         InputError: No component renders frames, or the source file of a component does not exist.

@@ -74,6 +74,8 @@ class Result:
         metadata: Description of the run: scenario, versions, hashes, failure.
         checks: Outcomes of the scenario's checks, each with `check`, `value` and `passed`; empty if
             the result was read from a file.
+        failure: The error that ended the run early; None if there was none, or if the result was
+            read from a file.
     """
 
     recording: Recording
@@ -81,6 +83,7 @@ class Result:
     timing: dict[str, float] = field(default_factory=dict)
     metadata: dict[str, Any] = field(default_factory=dict)
     checks: Sequence[CheckOutcome] = ()
+    failure: BaseException | None = None
 
     @property
     def time(self) -> np.ndarray:

@@ -9,9 +9,9 @@ from typing import Any
 
 from ..core import paths, resources
 from ..core.errors import InputError, did_you_mean
+from .component_schema import change_paths
 from .json_document import pointer_keys
 from .schema_types import PathChange
-from .sources import change_paths
 
 #: a path that begins so starts from the files that cosim ships
 SHIPPED = "cosim:"

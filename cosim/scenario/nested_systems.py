@@ -15,6 +15,7 @@ from ..core.errors import InputError, Problem
 from ..core.json_values import copy_json
 from ..core.size_limits import MAX_LEVELS
 from ..core.text import shorten
+from .component_schema import change_paths
 from .evaluation_schema import CallSpec
 from .expanded_size import SystemFile, check_expanded_size
 from .extension import expand_document, read_system_document
@@ -23,7 +24,6 @@ from .json_document import Document, pointer_keys, set_value
 from .schema import NestedSpec, PortsSpec, ScenarioSpec, SystemSpec, ports_of
 from .schema_types import accepted
 from .settings import apply_settings, document_of_dict
-from .sources import change_paths
 from .validation import validate_document
 
 _LEGAL_NAME = re.compile("[A-Za-z_][A-Za-z0-9_]*")

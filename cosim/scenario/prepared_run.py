@@ -16,7 +16,7 @@ from typing import Any, Literal, get_args
 
 import numpy as np
 
-from ..components.fmi import FmuFile
+from ..components.fmi import FmuFile, Isolation
 from ..core import resources
 from ..core.errors import InputError, Problem
 from ..core.paths import resolve_path
@@ -29,8 +29,8 @@ from ..engine.plan import Plan
 from ..engine.plan_run import free_components
 from ..engine.settings import Settings
 from ..process.float_mode import default_float_mode
+from ..process.journal import Deadlines, current_journal
 from ..process.process_state import exclusive_process_state
-from .component_factory import ComponentFactory
 from .evaluation_schema import FunctionSpec
 from .file_paths import SHIPPED
 from .json_document import Document
@@ -38,6 +38,7 @@ from .named_functions import load_function, signal_problems
 from .nested_systems import Node, files_of_system, load_scenario
 from .overview import describe_software, describe_system
 from .schema import ScenarioSpec
+from .sources import ComponentFactory
 from .system_builder import PROFILE_PREFIX, SystemBuilder
 
 IsolationMode = Literal["fmu", "none"]
@@ -64,7 +65,7 @@ class PreparedRun:
     #: values of variables that the caller sets, by name
     assignments: Mapping[str, Any]
     #: wall time (s) of the preparation "load_seconds" and its parts "parse_seconds",
-    #: "instantiate_seconds", "wiring_seconds"
+    #: "create_seconds" (of the components), "wiring_seconds"
     timing: Mapping[str, float]
 
     def __repr__(self) -> str:
@@ -277,9 +278,15 @@ def load(
                 '"isolation" of single FMUs instead'
             )
             loaded.root.document.refuse_objects(reason, classes=True)
-        builder = SystemBuilder(loaded, isolation == "fmu", sandbox, loaded_fmus)
+        deadlines = Deadlines(**loaded.spec.deadlines.model_dump())
+        if journal := current_journal():
+            journal.deadlines = deadlines
+        factory = ComponentFactory(
+            Isolation(deadlines, sandbox), isolation == "fmu" or sandbox, loaded_fmus
+        )
+        builder = SystemBuilder(loaded, factory)
         try:
-            with watch.measure("instantiate_seconds"):
+            with watch.measure("create_seconds"):
                 builder.make_components()
             with watch.measure("wiring_seconds"):
                 plan = builder.build_plan(real_time, late)

@@ -14,6 +14,7 @@ from pydantic import ConfigDict, StringConstraints, model_validator
 from ..core.system import Interpolation, IterationMethod
 from ..core.text import count_noun
 from ..engine.settings import NonFinitePolicy, StopOutcome
+from .component_schema import ComponentSpec, component_model
 from .evaluation_schema import CallSpec, CheckSpec, FunctionSpec, ReferenceSpec
 from .schema_types import (
     INVALID,
@@ -30,7 +31,7 @@ from .schema_types import (
     key,
     schema_of,
 )
-from .sources import ComponentSpec, InputTableSource, component_model
+from .sources import InputTableSource
 
 #: pattern of the names of scenarios
 SCENARIO_NAME = r"^[A-Za-z0-9_][A-Za-z0-9_. -]*$"

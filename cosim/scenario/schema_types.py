@@ -20,7 +20,6 @@ from pydantic import (
     WithJsonSchema,
     model_validator,
 )
-from pydantic.fields import FieldInfo
 
 from ..core.time_grid import MAX_TIME, exact_fraction
 
@@ -207,7 +206,8 @@ class HoldsPaths:
     change: Callable[[Any, PathChange], Any]
 
 
-def _change_path(value: Any, change: PathChange) -> Any:
+def change_path(value: Any, change: PathChange) -> Any:
+    """Return a changed path; other values stay as they are."""
     return change(value) if isinstance(value, str) else value
 
 
@@ -227,7 +227,7 @@ def change_reference(reference: Any, change: PathChange) -> Any:
     return f"{change(file)}{separator}{name}" if file.endswith((".py", ".mo")) else reference
 
 
-FilePath = Annotated[str, HoldsPaths(_change_path)]
+FilePath = Annotated[str, HoldsPaths(change_path)]
 FolderPaths = Annotated[list[str], HoldsPaths(_change_list)]
 FileReference = Annotated[str, HoldsPaths(change_reference)]
 
@@ -275,11 +275,6 @@ class Spec(BaseModel):
         for name, mark in path_keys(type(self)).items():
             mark.change(getattr(self, name), note)
         return found
-
-    @classmethod
-    def known_fields(cls) -> Mapping[str, FieldInfo]:
-        """Return the fields of this part of a scenario."""
-        return cls.model_fields
 
     @model_validator(mode="wrap")
     @classmethod

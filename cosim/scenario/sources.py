@@ -15,16 +15,23 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar, Literal
 
-from pydantic import BaseModel, GetPydanticSchema, WithJsonSchema, create_model, model_validator
-from pydantic.fields import FieldInfo
-from pydantic_core.core_schema import no_info_plain_validator_function
+from pydantic import WithJsonSchema, model_validator
 
+from ..components.fmi import (
+    FmuFile,
+    InstanceSettings,
+    Interface,
+    Isolation,
+    SolverSettings,
+    create_component,
+    open_fmu,
+)
 from ..components.fmi.settings import Method
 from ..components.python_import import load_object
 from ..core.component import Component, Variable
 from ..core.errors import InputError, nearest_file
-from ..core.paths import is_file
-from .evaluation_schema import CallSpec, ReferenceSpec
+from ..core.paths import is_file, resolve_path
+from ..export.foreign import add_binary
 from .schema_types import (
     FilePath,
     FileReference,
@@ -35,13 +42,13 @@ from .schema_types import (
     Period,
     Spec,
     Value,
+    change_path,
     key,
     path_keys,
 )
 
 if TYPE_CHECKING:
     from ..components.input_table import InputTable
-    from .component_factory import ComponentFactory
 
 #: group of the entry points by which other packages add kinds of sources
 ENTRY_POINTS = "cosim.sources"
@@ -65,6 +72,60 @@ class Creation:
     values: Mapping[str, Any]
     target: Any
     factory: ComponentFactory
+
+
+class ComponentFactory:
+    """Factory of the components of FMUs, however many components use the same file.
+
+    Args:
+        isolation: How isolated FMUs run. An FMU is isolated if its component has `isolation`, if
+            `isolate_fmus` is set, and from the second instance on if it allows only one instance
+            per process.
+        isolate_fmus: Isolate every FMU.
+        loaded_fmus: FMU files that have already been read, by resolved path.
+    """
+
+    def __init__(
+        self, isolation: Isolation, isolate_fmus: bool, loaded_fmus: Mapping[Path, FmuFile]
+    ) -> None:
+        self._isolation, self._isolate_fmus = isolation, isolate_fmus
+        self._loaded_fmus = loaded_fmus
+        #: FMU files in use, by resolved path and the interface that the scenario demands
+        self.fmus: dict[tuple[Path, Interface | None], FmuFile] = {}
+        #: solver of each Model Exchange FMU, by full name of its component
+        self.solvers: dict[str, dict[str, Any]] = {}
+
+    def instantiate(
+        self, creation: Creation, path: Path, settings: InstanceSettings, isolated: bool
+    ) -> Component:
+        """Create the component of an FMU.
+
+        Args:
+            creation: The component.
+            path: Path of the FMU.
+            settings: Tolerance and solver.
+            isolated: Run it in a separate process in any case.
+        """
+        interface = settings.interface
+        key = resolve_path(path), interface
+        used = self.fmus.get(key)
+        needs_own_process = used is not None and used.description.once_per_process
+        if used is None:
+            loaded = None if interface else self._loaded_fmus.get(key[0])
+            self.fmus[key] = loaded or open_fmu(path, interface, add_binary)
+        elif needs_own_process:
+            # its process must not inherit the library that is loaded in this one
+            self.fmus[key] = open_fmu(path, interface, add_binary)
+        file = self.fmus[key]
+        settings = settings.with_structural_parameters(file.description, creation.values)
+        isolated = isolated or self._isolate_fmus or needs_own_process
+        component = create_component(
+            file, creation.name, settings, self._isolation if isolated else None
+        )
+        if file.description.interface == "model-exchange":
+            experiment = file.description.default_experiment
+            self.solvers[creation.name] = settings.describe_solver(experiment)
+        return component
 
 
 class Source(Spec):
@@ -140,11 +201,6 @@ class ComponentSource(Source):
         """Return the Python class of a component as in a scenario file, or None."""
         return None
 
-    @classmethod
-    def known_fields(cls) -> Mapping[str, FieldInfo]:
-        """Return the fields of a kind; of this base class those of all kinds."""
-        return component_model().model_fields if cls is ComponentSource else cls.model_fields
-
 
 class _FmuBased(ComponentSource):
     """A component that is an FMU."""
@@ -210,8 +266,6 @@ class FmuSource(_FmuBased):
 
     def create(self, creation: Creation) -> Component:
         """Create an instance of the FMU."""
-        from ..components.fmi import InstanceSettings, SolverSettings
-
         for kind in component_kinds().values():
             if kind.MEMBER and re.search(rf"{re.escape(kind.SUFFIX)}(?::\w+)?$", self.fmu):
                 raise InputError(
@@ -296,7 +350,6 @@ class ModelicaSource(_FmuBased):
 
     def create(self, creation: Creation) -> Component:
         """Create an instance of the FMU in the user's cache, which is built if it is out of date."""
-        from ..components.fmi import InstanceSettings
         from ..export.build import cached_fmu
 
         file, _, model = self.modelica.rpartition(":")
@@ -323,18 +376,6 @@ class ModelicaSource(_FmuBased):
         return [*files, *needed_files(files[0])]
 
 
-def _change_system(value: Any, change: PathChange) -> Any:
-    """Return the path of a nested system, or the content of an inline one, with changed paths."""
-    if isinstance(value, str):
-        return change(value)
-    if not isinstance(value, Mapping):
-        return value
-    changed, base = change_paths(value, change), value.get("extends")
-    if isinstance(base, str) and (base.endswith(".json") or "/" in base):
-        changed["extends"] = change(base)
-    return changed
-
-
 class NestedSystem(ComponentSource):
     """A component that is a nested system."""
 
@@ -343,7 +384,7 @@ class NestedSystem(ComponentSource):
 
     system: Annotated[
         str | dict[str, Any],
-        HoldsPaths(_change_system),
+        HoldsPaths(change_path),
         WithJsonSchema({"anyOf": [{"type": "string"}, {"ref": "NestedSpec"}]}),
     ] = key(
         "path of the JSON file of a nested system, or its content",
@@ -436,154 +477,6 @@ def kind_of(entry: Mapping[str, Any]) -> type[ComponentSource]:
         if entry.get(name) is not None:
             return kind
     return ComponentSource
-
-
-# -- validation of components, and their JSON Schema
-
-
-def _parse_component(value: Any) -> ComponentSource:
-    """Validate a component by the model of its kind.
-
-    A component that does not have exactly one source, or a key of another kind, is refused by the
-    model that has the keys of all kinds.
-    """
-    entry = value if isinstance(value, Mapping) else {}
-    kinds = component_kinds(entry)
-    given = [kind for name, kind in kinds.items() if entry.get(name) is not None]
-    if len(given) != 1 or not entry.keys() <= given[0].model_fields.keys():
-        component_model().model_validate(value)
-        entry = {name: each for name, each in entry.items() if name in given[0].model_fields}
-    return given[0].model_validate(entry)
-
-
-#: a component of a scenario
-ComponentSpec = Annotated[
-    ComponentSource,
-    GetPydanticSchema(lambda *_: no_info_plain_validator_function(_parse_component)),
-    WithJsonSchema({"ref": "ComponentSpec"}),
-]
-
-
-class _AnyComponent(Spec):
-    """Base of the model of components with the keys of all kinds."""
-
-    @model_validator(mode="after")
-    def _one_source(self) -> _AnyComponent:
-        kinds = component_kinds(None)
-        given = [name for name in kinds if getattr(self, name) is not None]
-        if len(given) != 1:
-            raise ValueError(
-                f"expected exactly one of {', '.join(kinds)}; found {' and '.join(given) or 'none'}"
-            )
-        for name in type(self).model_fields:
-            if name not in kinds[given[0]].model_fields and getattr(self, name):
-                owners = [kind for kind in kinds.values() if name in kind.model_fields]
-                keys = " or ".join(f'"{kind.KEY}"' for kind in owners)
-                verb = "are" if name.endswith("s") else "is"
-                hint = owners[0].MISPLACED.get(name, "")
-                raise ValueError(f'"{name}" {verb} for components with {keys}{hint}')
-        return self
-
-
-@cache
-def component_model() -> type[BaseModel]:
-    """Return the model of components with the keys of all kinds, for problems and JSON Schema."""
-    kinds = component_kinds(None)
-    common = ComponentSource.model_fields
-    owners: dict[str, list[str]] = {}
-    fields: dict[str, Any] = {}
-    for kind in kinds.values():
-        for name in dict.fromkeys((kind.KEY, *kind.model_fields)):
-            if name not in common:
-                owners.setdefault(name, []).append(kind.KEY)
-                fields[name] = _optional(kind.model_fields[name])
-    rules: list[dict[str, Any]] = []
-    for name, keys in owners.items():
-        if name not in kinds:
-            rules.append({"if": _is_given(name), "then": {"anyOf": list(map(_is_given, keys))}})
-    for name, field in common.items():
-        fields[name] = (field.annotation, field)
-    names = list(kinds)
-    model: type[BaseModel] = create_model(
-        "ComponentSpec",
-        __base__=_AnyComponent,
-        __doc__=(
-            f"A component with exactly one source: {', '.join(names[:-1])} or {names[-1]}.\n\n"
-            "Paths start from the folder of this file."
-        ),
-        __cls_kwargs__={
-            "json_schema_extra": {"oneOf": list(map(_is_given, kinds)), "allOf": rules}
-        },
-        **fields,
-    )
-    return model
-
-
-def _is_given(name: str) -> dict[str, Any]:
-    """Return the JSON Schema of objects in which a key has a value."""
-    return {"required": [name], "properties": {name: {"not": {"enum": [None, [], {}]}}}}
-
-
-def _optional(field: FieldInfo) -> tuple[Any, FieldInfo]:
-    """Return annotation and field of a key that components of other kinds do not have."""
-    if not field.is_required():
-        return field.annotation, field
-    annotation: Any = Annotated[(field.annotation, *field.metadata)]
-    return annotation | None, key(
-        str(field.description), (field.examples or [None])[0], default=None
-    )
-
-
-# -- paths of files in the JSON of scenarios and nested systems
-
-#: entries other than components that name files: models of the elements of lists, and of objects
-_LISTS: Mapping[str, type[Spec]] = {
-    "inputs": InputTableSource,
-    "kpis": CallSpec,
-    "figures": CallSpec,
-}
-_OBJECTS: Mapping[str, type[Spec]] = {"scene": CallSpec, "reference": ReferenceSpec}
-
-
-def change_paths(system: Mapping[str, Any], change: PathChange) -> dict[str, Any]:
-    """Return a copy of a scenario or nested system, or of a part of one, in which every path is changed.
-
-    Texts in `arguments` and `parameters` are not paths for cosim and stay as they are.
-    """
-
-    def change_entry(entry: Any, keys: Mapping[str, HoldsPaths]) -> Any:
-        if not isinstance(entry, Mapping):
-            return entry
-        changed = {
-            name: mark.change(entry[name], change) for name, mark in keys.items() if name in entry
-        }
-        return {**entry, **changed}
-
-    result = dict(system)
-    for name, model in _OBJECTS.items():
-        if name in system:
-            result[name] = change_entry(system[name], path_keys(model))
-    for name, model in _LISTS.items():
-        match system.get(name):
-            case list(entries):
-                result[name] = [change_entry(each, path_keys(model)) for each in entries]
-            case dict(entries):  # changes of a file with "extends", by name
-                result[name] = {
-                    each: change_entry(entry, path_keys(model)) for each, entry in entries.items()
-                }
-    if isinstance(components := system.get("components"), Mapping):
-        result["components"] = {
-            name: change_entry(entry, _path_keys_of_component(entry))
-            for name, entry in components.items()
-        }
-    return result
-
-
-def _path_keys_of_component(entry: Any) -> Mapping[str, HoldsPaths]:
-    marks: dict[str, HoldsPaths] = {}
-    for kind in component_kinds(entry if isinstance(entry, Mapping) else ()).values():
-        marks |= path_keys(kind)
-    return marks
 
 
 def texts_in(value: Any) -> Iterator[str]:

@@ -8,10 +8,8 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from fractions import Fraction
-from pathlib import Path
 from typing import Any
 
-from ..components.fmi import FmuFile, Isolation
 from ..core import component_log
 from ..core.component import Component, Variable, count_scalars
 from ..core.errors import InputError, Problem, merge_problems
@@ -20,8 +18,6 @@ from ..core.system import Connection, Endpoint, System
 from ..engine.pacer import LatePolicy
 from ..engine.plan import Plan, compile_plan
 from ..engine.settings import Event, Settings
-from ..process.journal import Deadlines, current_journal
-from .component_factory import ComponentFactory
 from .function_arguments import FunctionResolver, without_placeholders
 from .name_resolution import (
     SlotIndex,
@@ -35,7 +31,7 @@ from .named_functions import find_function_problems
 from .nested_systems import Node, Scenario
 from .recorded_signals import SignalSelector, StopConditionReader
 from .schema_types import accepted
-from .sources import Creation
+from .sources import ComponentFactory, Creation
 from .stages import StagePlanner, parallel_mode
 from .wiring import Wiring
 
@@ -46,21 +42,10 @@ PROFILE_PREFIX = "inputs"
 class SystemBuilder:
     """Builder of a system: call `make_components`, then `build_plan`; each adds to `problems`."""
 
-    def __init__(
-        self,
-        scenario: Scenario,
-        isolate_fmus: bool,
-        sandbox: bool,
-        loaded_fmus: Mapping[Path, FmuFile],
-    ) -> None:
+    def __init__(self, scenario: Scenario, factory: ComponentFactory) -> None:
         self.root, self.spec, self.assignments = scenario.root, scenario.spec, scenario.assignments
         self.problems: list[Problem] = list(scenario.problems)
-        deadlines = Deadlines(**self.spec.deadlines.model_dump())
-        if journal := current_journal():
-            journal.deadlines = deadlines
-        self.component_factory = ComponentFactory(
-            Isolation(deadlines, sandbox), isolate_fmus or sandbox, loaded_fmus
-        )
+        self.component_factory = factory
         self.components: dict[str, Component] = {}
         self._variables_by_component: dict[str, Mapping[str, Variable]] = {}
         #: names with values that were refused, and the systems in which they are used

@@ -18,9 +18,11 @@ from pydantic.fields import FieldInfo
 from ..core.errors import Problem, did_you_mean, nearest_name
 from ..core.json_values import copy_json
 from ..core.text import REPLACEMENT, count_noun
+from .component_schema import component_model
 from .json_document import Document
 from .schema import SystemSpec
-from .schema_types import INVALID, PlacedError, Spec, hint_at_quotes
+from .schema_types import INVALID, PlacedError, hint_at_quotes
+from .sources import ComponentSource
 
 S = TypeVar("S", bound=SystemSpec)
 
@@ -282,7 +284,7 @@ def _known_keys(kind: Any, path: Sequence[str | int]) -> list[str]:
 
 def _fields(model: type[BaseModel]) -> Mapping[str, FieldInfo]:
     """Return the fields of a model; those of components depend on the kind of their source."""
-    return model.known_fields() if issubclass(model, Spec) else model.model_fields
+    return (component_model() if model is ComponentSource else model).model_fields
 
 
 def _child_type(kind: Any, key: str | int) -> Any:

@@ -133,7 +133,10 @@ def _worker_folder(worker: Any, name: str) -> Path:
 
 
 def _link_study_files(package: StudyPackage, worker: Any) -> Path:
-    """Link the stored files of a study into a folder, as its scenario expects them, and return the folder."""
+    """Link the stored files of a study into a folder, and return the folder.
+
+    They have the paths that the scenario expects.
+    """
     root = _worker_folder(worker, "trees") / package.digest
     for path, sha in package.files.items():
         file = root / path
@@ -316,14 +319,12 @@ class ClusterRunner:
 
 def _refuse_absolute_paths(study: Study) -> None:
     study_file = study.study_file
-    if problems := [
-        problem
-        for settings in study.all_setting_variants
-        for problem in study_file.locate_problems(
-            absolute_paths(study_file.scenario, settings), settings
-        )
-    ]:
-        raise InputError(dict.fromkeys(problems))
+    problems: dict[Problem, None] = {}
+    for settings in study.all_setting_variants:
+        found = absolute_paths(study_file.scenario, settings)
+        problems |= dict.fromkeys(study_file.locate_problems(found, settings))
+    if problems:
+        raise InputError(problems)
 
 
 def _killed_answer(job: Job, check: bool) -> dict[str, Any]:

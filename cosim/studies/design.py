@@ -51,7 +51,10 @@ def level_of_value(paths: Sequence[str], value: Any) -> Level:
 
 
 def build_factor(spec: FactorSpec, gridded: bool) -> Factor:
-    """Return the factor that a sweep file describes, with the levels of a full factorial design if it is `gridded`."""
+    """Return the factor that a sweep file describes.
+
+    It has the levels of a full factorial design if it is `gridded`.
+    """
     if spec.levels is not None:
         return _listed_factor(
             spec.name, [Level(label, settings) for label, settings in spec.levels.items()]
@@ -99,12 +102,14 @@ def _range_quantile(spec: RangeSpec) -> Callable[[float], float]:
 
 def interpolate(position: float, low: float, high: float, logarithmic: bool) -> float:
     """Interpolate between two bounds at a position in [0, 1]; 0 and 1 give the bounds exactly."""
+    if position in (0, 1):
+        return high if position else low
     value = (
         low * math.exp(position * math.log(high / low))
         if logarithmic
         else low + position * (high - low)
     )
-    return low if position == 0 else high if position == 1 else min(max(value, low), high)
+    return min(max(value, low), high)
 
 
 def _distribution_quantile(spec: DistributionSpec) -> Callable[[float], float]:
@@ -174,9 +179,10 @@ class Design:
         index, seed = divmod(run, max(1, len(self.seeds)))
         levels = [*self._levels(index), *(self.seeds[seed : seed + 1])]
         labels = {name: level.label for name, level in zip(self.columns, levels, strict=True)}
-        return Point(
-            labels, {path: value for level in levels for path, value in level.settings.items()}
-        )
+        settings: dict[str, Any] = {}
+        for level in levels:
+            settings |= level.settings
+        return Point(labels, settings)
 
     def _levels(self, index: int) -> list[Level]:
         if self.unit_samples is not None:
@@ -201,7 +207,8 @@ class Design:
 
     def level_settings(self) -> Iterator[Mapping[str, Any]]:
         """Yield the settings of each listed level; strings among them may name files."""
-        return (level.settings for factor in self.factors for level in factor.listed_levels)
+        for factor in self.factors:
+            yield from (level.settings for level in factor.listed_levels)
 
 
 def build_design(spec: SweepSpec) -> Design:

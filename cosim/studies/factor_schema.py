@@ -6,6 +6,7 @@ Factors and the parameters of a tuning share their names and bounds.
 from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
+from itertools import product
 from typing import Annotated, Any, Literal, NamedTuple
 
 from pydantic import AfterValidator, Field, StringConstraints, model_validator
@@ -216,10 +217,10 @@ class FactorSpec(Spec):
         return part.count or 0
 
     def settings(self) -> Iterator[tuple[str, Any]]:
-        """Yield each path that the factor sets with its listed values, or with None if it has none."""
+        """Yield each path that the factor sets with its listed values, or with None."""
         for level in (self.levels or {}).values():
             yield from level.items()
-        yield from ((path, value) for path in self.set or () for value in self.values or (None,))
+        yield from product(self.set or (), self.values or (None,))
 
     def has_labels(self, sampled: bool) -> bool:
         """Return whether the factor has levels that can be shown along an axis.
@@ -276,13 +277,11 @@ class _Setting(NamedTuple):
 
 def _expand_settings(owner: str, pairs: Iterable[tuple[str, Any]]) -> list[_Setting]:
     """Return the settings, including one for each part of an object."""
-    return list(
-        dict.fromkeys(
-            _Setting(owner, text, path)
-            for text, value in pairs
-            for path in _nested_paths(_setting_path(text), value)
-        )
-    )
+    settings: dict[_Setting, None] = {}
+    for text, value in pairs:
+        for path in _nested_paths(_setting_path(text), value):
+            settings[_Setting(owner, text, path)] = None
+    return list(settings)
 
 
 def _setting_path(text: str) -> tuple[str, ...]:
@@ -337,5 +336,8 @@ def check_conflicts(common: Mapping[str, Any], setters: Iterable[Setter]) -> Non
 
 def _pointers_by_ancestor(settings: Iterable[_Setting]) -> dict[tuple[str, ...], _Setting]:
     """Return, for every path within which a JSON pointer sets a value, one such setting."""
-    pointers = [each for each in settings if each.is_pointer and not each.is_nested]
-    return {each.path[:depth]: each for each in pointers for depth in range(1, len(each.path))}
+    pointers: dict[tuple[str, ...], _Setting] = {}
+    for each in settings:
+        if each.is_pointer and not each.is_nested:
+            pointers |= {each.path[:depth]: each for depth in range(1, len(each.path))}
+    return pointers

@@ -98,7 +98,10 @@ def parameter_settings(
     parameters: Sequence[ParameterSpec], values: Mapping[str, float]
 ) -> dict[str, float]:
     """Return the settings of the scenario for values of parameters."""
-    return {path: values[each.name] for each in parameters for path in each.set}
+    settings: dict[str, float] = {}
+    for each in parameters:
+        settings |= dict.fromkeys(each.set, values[each.name])
+    return settings
 
 
 def start_coordinates(parameters: Sequence[ParameterSpec]) -> list[float]:

@@ -50,9 +50,7 @@ def has_keys(file: Path, *groups: Sequence[str]) -> bool:
             content = read_system_document(file).value
     except (OSError, ValueError, RecursionError, InputError):
         return True
-    return isinstance(content, dict) and all(
-        any(content.get(key) for key in group) for group in groups
-    )
+    return isinstance(content, dict) and all(any(map(content.get, group)) for group in groups)
 
 
 @dataclass(frozen=True)
@@ -106,7 +104,7 @@ class Regression:
     run_command: CommandRunner = run_in_new_process
 
     def run(self) -> RegressionOutcome:
-        """Run the scenario by `cosim run` in a separate process and check its results, or update the reference."""
+        """Run the scenario in a separate process, and check its results or update the reference."""
         began = time.perf_counter()
         return replace(self._run(), seconds=time.perf_counter() - began)
 
@@ -184,7 +182,7 @@ class Regression:
         )
 
     def _write_report(self, *options: str) -> list[str]:
-        """Write the report of the run by `cosim report` in a separate process, and return a line that names it."""
+        """Write the report of the run in a separate process, and return a line that names it."""
         done = self.run_command(["report", str(self.directory), *options])
         return (
             [f"see {self.directory / 'report.html'}"]
@@ -208,7 +206,10 @@ class Regression:
 
 
 def _summarize(counts: Collection[tuple[int, int, str]], notes: Sequence[str]) -> str:
-    """Return the numbers of checks and signals from (number of failures, number of all, noun), and notes on the comparison."""
+    """Return the numbers of checks and signals, and notes on the comparison.
+
+    Each count is (number of failures, number of all, noun).
+    """
     ending = f" ({'; '.join(notes)})" if notes else ""
     if not any(failed for failed, _, _ in counts):
         return ", ".join(count_noun(number, noun) for _, number, noun in counts) + ending
@@ -249,7 +250,10 @@ class _FinishedRun:
         return checks
 
     def failed_checks(self, checks_only: bool = False) -> list[str]:
-        """Return the failed checks, after the crash that ended the run early (unless `checks_only`)."""
+        """Return the failed checks, after the crash that ended the run early.
+
+        `checks_only` leaves out the crash.
+        """
         from ..results.checks import evaluate_all_checks
 
         kpis = {
@@ -364,7 +368,7 @@ def run_regressions(
 
 
 def default_folder() -> Path:
-    """Return the folder scenarios/ of the working directory if it exists, else that of the shipped scenarios."""
+    """Return the folder scenarios/ here if it exists, else that of the shipped scenarios."""
     folder = Path("scenarios")
     return folder if folder.is_dir() else resources.root() / folder
 

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Sequence
+from itertools import chain, product
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, StringConstraints, model_validator
@@ -126,7 +127,7 @@ class StudySpec(Spec):
     )
 
     def run_counts(self) -> dict[CountPath, int]:
-        """Return the factors of the largest number of runs, by the paths of the entries that determine them."""
+        """Return the factors of the largest number of runs, by the paths of their entries."""
         raise NotImplementedError
 
     @property
@@ -176,11 +177,7 @@ class SweepSpec(StudySpec):
     @model_validator(mode="after")
     def _consistent(self) -> SweepSpec:
         names = _unique_names("factors", self.factors)
-        seeds = (
-            [Setter("seed", ("seeds",), [(path, None) for path in self.seeds.set])]
-            if self.seeds
-            else []
-        )
+        seeds = [Setter("seed", ("seeds",), product(self.seeds.set, (None,)))] if self.seeds else []
         factors = (
             Setter(factor.name, ("factors", i), factor.settings())
             for i, factor in enumerate(self.factors)
@@ -188,11 +185,11 @@ class SweepSpec(StudySpec):
         check_conflicts(self.settings, [*factors, *seeds])
         if not names and self.seeds is None:
             raise ValueError('expected "factors", "seeds" or both')
-        for i, name in ((i, name) for i, group in enumerate(self.by) for name in group):
-            if name not in (*names, "seed"):
-                raise PlacedError(
-                    f'"by" names no factor "{name}"{did_you_mean(name, [*names, "seed"])}', "by", i
-                )
+        columns = [*names, "seed"]
+        for i, group in enumerate(self.by):
+            if unknown := [name for name in group if name not in columns]:
+                hint = did_you_mean(unknown[0], columns)
+                raise PlacedError(f'"by" names no factor "{unknown[0]}"{hint}', "by", i)
         for i, each in enumerate(self.maps):
             _check_map(i, each, self)
         if self.design.kind == "full_factorial":
@@ -213,7 +210,7 @@ class SweepSpec(StudySpec):
         levels = {factor.name: factor.level_count for factor in self.factors}
         levels["seed"] = self.seeds.count if self.seeds else 0
         return {
-            ("maps", i): math.prod(levels[name] for name in each.factors)
+            ("maps", i): math.prod(map(levels.__getitem__, each.factors))
             for i, each in enumerate(self.maps)
         }
 
@@ -310,9 +307,8 @@ class TuneSpec(StudySpec):
 
     @model_validator(mode="after")
     def _consistent(self) -> TuneSpec:
-        cases = Setter(
-            "cases", ("cases",), [setting for case in self.cases for setting in case.items()]
-        )
+        settings = chain.from_iterable(case.items() for case in self.cases)
+        cases = Setter("cases", ("cases",), settings)
         check_conflicts(self.settings, [cases, *_parameter_setters(self.parameters)])
         return self
 
@@ -367,7 +363,7 @@ def _parameter_setters(parameters: Sequence[ParameterSpec]) -> list[Setter]:
     """Return the settings of parameters, whose names must differ."""
     _unique_names("parameters", parameters)
     return [
-        Setter(each.name, ("parameters", i), [(path, None) for path in each.set])
+        Setter(each.name, ("parameters", i), product(each.set, (None,)))
         for i, each in enumerate(parameters)
     ]
 

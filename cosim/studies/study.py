@@ -91,7 +91,9 @@ class Study:
         )
 
     def unknown_criteria(self, names: Iterable[str]) -> list[Problem]:
-        """Return the problems of criteria of success whose KPIs cannot result from the functions of the scenario.
+        """Return the problems of criteria of success with unknown KPIs.
+
+        These cannot result from the functions of the scenario.
 
         Args:
             names: names of the KPIs, in the order of "success".
@@ -100,21 +102,23 @@ class Study:
             [kpi for _, kpi in accepted(self._scenario.spec.kpis)],
             self._scenario.root.folder,
         )
-        return [
-            Problem(text, self.study_file.document.where(("success", i, "kpi")))
-            for i, name in enumerate(names)
-            if (text := kpi_name_problem(name, kpis, folder))
-        ]
+        problems = []
+        for i, name in enumerate(names):
+            if text := kpi_name_problem(name, kpis, folder):
+                where = self.study_file.document.where(("success", i, "kpi"))
+                problems.append(Problem(text, where))
+        return problems
 
     def check_jobs(
         self, runner: CheckingRunner, jobs: Iterable[Job], problems: Iterable[Problem] = ()
     ) -> None:
-        """Raise InputError with `problems` and, with positions in the study's file, those for which these jobs cannot be run."""
-        found = [
-            problem
-            for job in jobs
-            for problem in self.study_file.locate_problems(runner.check(job), job.settings)
-        ]
+        """Raise InputError with the problems for which these jobs cannot be run.
+
+        They have positions in the study's file. `problems` are added to them.
+        """
+        found: list[Problem] = []
+        for job in jobs:
+            found += self.study_file.locate_problems(runner.check(job), job.settings)
         if found := [*found, *problems]:
             raise InputError(dict.fromkeys(found))
 
@@ -137,7 +141,7 @@ class ObservedKpis:
 
     @property
     def has_enough_runs(self) -> bool:
-        """True if a name that is not among the KPIs may be reported as unknown before all runs have finished."""
+        """True if unknown names may be reported before all runs have finished."""
         return self.runs >= _ENOUGH_RUNS
 
 
@@ -202,11 +206,12 @@ class StudyFile(Generic[S]):
         if Path(position.rsplit(":", 2)[0]).name != self.scenario.name:
             return where
         pointers = {each: _json_path(each) for each in settings if each.startswith("/")}
-        below = [
-            location
+        locations = (
+            self._setting_location(each, settings)
             for each, start in pointers.items()
-            if _is_within(start, path) and (location := self._setting_location(each, settings))
-        ]
+            if _is_within(start, path)
+        )
+        below = list(filter(None, locations))
         return f"{below[0]}, in {where}" if len(below) == 1 else where
 
     def _setting_location(self, name: str, settings: Mapping[str, Any], part: str = "") -> str:
@@ -224,7 +229,10 @@ class StudyFile(Generic[S]):
     def _is_setting(
         self, path: tuple[str | int, ...], name: str, settings: Mapping[str, Any]
     ) -> bool:
-        """Return whether a path in this file defines a setting, as a key with its value or as a string of "set"."""
+        """Return whether a path in this file defines a setting.
+
+        It may be a key with its value, or a text of "set".
+        """
         value = _value_at(self.document.value, path)
         return value == name or (path[-1] == name and value == settings.get(name))
 

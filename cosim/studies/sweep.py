@@ -6,7 +6,7 @@ from collections import Counter
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
-from itertools import islice
+from itertools import chain, islice
 from pathlib import Path
 from typing import Any
 
@@ -113,7 +113,7 @@ class Sweep:
         ]
 
     def check(self, runner: CheckingRunner) -> None:
-        """Raise InputError with all problems of the levels of the factors and of the names of the criteria."""
+        """Raise InputError with all problems of the factors' levels and of the criteria's names."""
         points = islice(self._representatives(), _MAX_CHECKED_POINTS)
         jobs = (self.study.job(point.settings) for point in points)
         self.study.check_jobs(
@@ -129,9 +129,12 @@ class Sweep:
 
     @property
     def _varies_kpis(self) -> bool:
-        """True if levels change the KPI functions of the scenario, so that their names are unknown before the runs."""
-        settings = (self.design[0].settings, *self.design.level_settings())
-        return any(name.startswith("/kpis") for each in settings for name in each)
+        """True if levels change the KPI functions of the scenario.
+
+        Their names are then unknown before the runs.
+        """
+        names = chain(self.design[0].settings, *self.design.level_settings())
+        return any(name.startswith("/kpis") for name in names)
 
     def _representatives(self) -> Iterator[Point]:
         """Yield the first point, and the first point with each further listed level of a factor."""
@@ -174,7 +177,7 @@ class Sweep:
         run_pending(self.jobs(), run_store, runner, check_and_observe)
 
     def check_names(self, run_store: RunStore) -> None:
-        """Raise InputError for criteria with KPIs that no run has, and for factors named like a KPI."""
+        """Raise InputError for criteria whose KPI no run has, and for factors named like a KPI."""
         observed_kpis = ObservedKpis()
         for row in self.rows(run_store):
             observed_kpis.add(row.record)
@@ -217,4 +220,4 @@ class Sweep:
 
 def kpi_names(rows: Iterable[SweepRow]) -> list[str]:
     """Return the names of all KPIs in order of appearance."""
-    return list(dict.fromkeys(name for row in rows for name in row.record.kpis))
+    return list(dict.fromkeys(chain.from_iterable(row.record.kpis for row in rows)))

@@ -1,22 +1,24 @@
-"""Tuning: search for parameters within bounds that minimise an expression of KPIs under constraints.
+"""Tuning: search for parameters that minimise an expression of KPIs under constraints.
 
-Optimizers work in the unit cube. Points are ranked by the rules of K. Deb (Comput. Methods Appl. Mech. Engrg. 186 (2000),
-311-338), from best to worst:
+Optimizers work in the unit cube. Points are ranked by the rules of K. Deb (Comput. Methods Appl.
+Mech. Engrg. 186 (2000), 311-338), from best to worst:
 
 1. points that meet all constraints, by their value;
 2. points that violate a constraint, by the sum of violations;
 3. points without a value;
 4. points with a failed run.
 
-Finished runs are stored, so a tuning that was interrupted repeats its search without making a run twice.
+Finished runs are stored, so a tuning that was interrupted repeats its search without making a run
+twice.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
+from itertools import chain, product
 from pathlib import Path
 from statistics import fmean
 from typing import Any
@@ -156,12 +158,12 @@ class Tuning:
                 first runs for unknown names in the objective or a constraint.
         """
         start = start_coordinates(self.spec.parameters)
-        self.study.check_jobs(runner, self._jobs([parameter_values(self.spec.parameters, start)]))
+        self.study.check_jobs(runner, self._jobs(parameter_values(self.spec.parameters, start)))
 
         def evaluate(points: Sequence[Sequence[float]]) -> list[float]:
             parameters = [parameter_values(self.spec.parameters, point) for point in points]
             run_pending(
-                (job for each in parameters for job in self._jobs([each])),
+                chain.from_iterable(map(self._jobs, parameters)),
                 run_store,
                 runner,
                 observe,
@@ -180,15 +182,12 @@ class Tuning:
         """Return the settings of the scenario for these parameters."""
         return parameter_settings(self.spec.parameters, parameters)
 
-    def _jobs(self, points: Iterable[Mapping[str, float]]) -> list[Job]:
-        return [
-            self.study.job({**case, **self.settings(point)})
-            for point in points
-            for case in self.spec.cases
-        ]
+    def _jobs(self, point: Mapping[str, float]) -> list[Job]:
+        settings = self.settings(point)
+        return [self.study.job({**case, **settings}) for case in self.spec.cases]
 
     def _trial(self, parameters: Mapping[str, float], run_store: RunStore) -> Trial:
-        records = [run_store[job.key] for job in self._jobs([parameters])]
+        records = [run_store[job.key] for job in self._jobs(parameters)]
         for record in records:
             self.observed_kpis.add(record)
         if failures := [record.failure for record in records if record.failure]:
@@ -196,7 +195,7 @@ class Tuning:
         operands = [{**record.kpis, **parameters} for record in records]
         values = [self.objective(each) for each in operands]
         violation = sum(
-            constraint.violation(each) for constraint in self.constraints for each in operands
+            constraint.violation(each) for constraint, each in product(self.constraints, operands)
         )
         return Trial(
             parameters,
@@ -213,19 +212,16 @@ class Tuning:
             **self.observed_kpis.kpis,
             **dict.fromkeys(each.name for each in self.spec.parameters),
         }
-        expressions: list[tuple[Expression, tuple[str | int, ...]]] = [
-            (self.objective, ("minimize",))
-        ]
+        problems = []
+
+        def check(expression: Expression, *path: str | int) -> None:
+            if text := expression.unknown_name_problem(known):
+                problems.append(Problem(text, self.study_file.document.where(path)))
+
+        check(self.objective, "minimize")
         for i, constraint in enumerate(self.constraints):
-            expressions += [
-                (constraint.left, ("constraints", i)),
-                (constraint.right, ("constraints", i)),
-            ]
-        problems = [
-            Problem(text, self.study_file.document.where(path))
-            for expression, path in expressions
-            if (text := expression.unknown_name_problem(known))
-        ]
+            check(constraint.left, "constraints", i)
+            check(constraint.right, "constraints", i)
         if problems and self.observed_kpis.runs:
             raise InputError(problems)
 

@@ -11,8 +11,11 @@ from collections.abc import Iterator, Sequence
 import numpy as np
 
 from cosim.core.errors import Problem
+from cosim.core.units import KNOWN_UNITS
 
+from ..json_reader import argument_problem as warning
 from ..vehicles.common.vehicle_reader import RADIANS_EXPECTED
+from ..vehicles.model import Model
 from ..vehicles.planar_vessel.planar_vessel import PlanarVessel
 from ..vehicles.submerged.craft import Craft
 from ..vehicles.surface_vessel.surface_vessel import SurfaceVessel
@@ -29,16 +32,37 @@ MAX_TIP_SPEED = 100.0
 POSITION_MARGIN = 0.25
 #: largest distance of a thruster from the centre of mass over that of the farthest corner
 MAX_THRUSTER_DISTANCE = 2.0
+#: largest ratio of mass and displaced mass, in either direction; 1 kg is 2.2 lb
+MAX_MASS_RATIO = 1.5
+#: largest ratio of the lengths of the hull that floats and of a shape that collides or is drawn, in
+#: either direction
+MAX_LENGTH_RATIO = 3.0
 _GRAVITY = 9.81
 
 
-def warning(text: str, *path: str) -> Problem:
-    """Return a warning about the value with this path in the vehicle file."""
-    return Problem(text, subject=("arguments", *path))
+def vessel_warnings(model: Model, corners: np.ndarray, max_length: float) -> Iterator[Problem]:
+    """Yield warnings about a vessel or a submerged vehicle.
+
+    Args:
+        model: Model of the vehicle.
+        corners: Corners of its boxes (m), from O of a vessel, shape (n, 3).
+        max_length: Largest plausible length of a hull (m).
+    """
+    if model.boat:
+        yield from _boat_warnings(model.boat, corners)
+    if isinstance(model.boat, SurfaceVessel):
+        yield from _hull_warnings(model.boat, max_length)
+        yield from _draught_warnings(model.boat)
+        yield from _shape_warnings(model, corners, model.boat.hull.length)
+    if model.craft:
+        yield from _craft_warnings(model.craft, float(np.linalg.norm(corners, axis=1).max()))
+        displaced = model.craft.water_density * model.craft.displaced_volume
+        source = f"displaced_volume of {model.craft.displaced_volume:.4g} m3"
+        yield from _mass_warnings(model.craft.mass, displaced, source)
 
 
-def boat_warnings(boat: Boat, corners: np.ndarray) -> Iterator[Problem]:
-    """Yield warnings about a vessel, the corners of whose boxes from O are given (m), shape (n, 3)."""
+def _boat_warnings(boat: Boat, corners: np.ndarray) -> Iterator[Problem]:
+    """Yield warnings about a vessel of either kind."""
     thrusts = [each.thrust_coefficient * each.max_speed**2 for each in boat.propellers]
     largest = int(np.argmax(thrusts))
     propeller, path = boat.propellers[largest], ("propellers", str(largest))
@@ -55,7 +79,7 @@ def boat_warnings(boat: Boat, corners: np.ndarray) -> Iterator[Problem]:
     yield from _height_warnings(boat, high[2])
 
 
-def craft_warnings(craft: Craft, reach: float) -> Iterator[Problem]:
+def _craft_warnings(craft: Craft, reach: float) -> Iterator[Problem]:
     """Yield warnings about a submerged vehicle whose farthest corner is `reach` (m) from the centre of mass."""
     thrusts = [each.thrust_coefficient * craft.max_thruster_speed**2 for each in craft.thrusters]
     path = ("thrusters", str(int(np.argmax(thrusts))), "thrust_coefficient")
@@ -174,3 +198,62 @@ def _height_warnings(boat: Boat, top: float) -> Iterator[Problem]:
             f"{boat.hull.depth:.3g} m"
         )
         yield warning(text, "centre_of_mass")
+
+
+def _hull_warnings(vessel: SurfaceVessel, max_length: float) -> Iterator[Problem]:
+    hull, draught = vessel.hull, vessel.draught
+    if hull.length > max_length:
+        yield warning(
+            f"found {hull.length:g} m, expected less than {max_length:g} m", "hull", "length"
+        )
+    if hull.bottom > 0:
+        text = (
+            f"found {hull.bottom:g}: the origin is below the hull, minus the draught "
+            f"({-draught:.3g}) is usual"
+        )
+        yield warning(text, "hull", "bottom")
+    surface = hull.bottom + draught
+    for i, propeller in enumerate(vessel.propellers):
+        if propeller.radius and propeller.position[2] - propeller.radius > surface:
+            height = propeller.position[2] - surface
+            text = f"{height:.3g} m above the water at rest, the propeller gives no thrust"
+            yield warning(text, "propellers", str(i), "position")
+
+
+def _shape_warnings(model: Model, corners: np.ndarray, length: float) -> Iterator[Problem]:
+    """Yield a warning for each shape that is not that of the hull, whose length (m) is given."""
+    shapes = {"boxes": corners}
+    if model.visual is not None:
+        shapes["visual"] = model.visual.reshape(-1, 3)
+    for key, points in shapes.items():
+        extent = float(np.ptp(points[:, 0]))
+        if max(extent, length) > MAX_LENGTH_RATIO * min(extent, length):
+            yield warning(
+                (
+                    f"{extent:.4g} m long, but the vessel floats by hull.length = {length:.4g} m, "
+                    "whatever is drawn"
+                ),
+                key,
+            )
+
+
+def _draught_warnings(vessel: SurfaceVessel) -> Iterator[Problem]:
+    if vessel.hull.bottom < 0:
+        displaced = vessel.water_density * vessel.hull.area * -vessel.hull.bottom
+        yield from _mass_warnings(
+            vessel.mass,
+            displaced,
+            f"draught of {-vessel.hull.bottom:.4g} m (hull.bottom with a minus sign)",
+        )
+
+
+def _mass_warnings(mass: float, displaced: float, source: str) -> Iterator[Problem]:
+    """Yield a warning if the mass (kg) and the displaced mass that a quantity of the file gives (kg) differ too much."""
+    ratio = max(mass, displaced) / min(mass, displaced)
+    if ratio > MAX_MASS_RATIO:
+        is_pound = math.isclose(mass / displaced, 1 / KNOWN_UNITS["lb"].factor, rel_tol=0.05)
+        hint = ": is the mass in lb?" if is_pound else ""
+        yield warning(
+            f"found {mass:.4g} kg, but the {source} displaces {displaced:.4g} kg of water{hint}",
+            "mass",
+        )

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from itertools import chain, islice
+from typing import TYPE_CHECKING
 
 import numpy as np
 
@@ -14,9 +15,11 @@ from cosim.export.equations.exported_interface import describe_variables
 
 from .common.interface import ENVIRONMENT_INPUTS
 from .common.shapes import Body, Vector
-from .multirotor.airframe import Airframe
-from .submerged.craft import Craft
-from .vessel.boat import Boat
+
+if TYPE_CHECKING:
+    from .multirotor.airframe import Airframe
+    from .submerged.craft import Craft
+    from .vessel.boat import Boat
 
 
 @dataclass(frozen=True)

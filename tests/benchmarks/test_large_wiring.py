@@ -18,7 +18,7 @@ import cosim
 FMUS, CONNECTIONS = 1000, 10_000
 PARTS = (
     "parse_seconds",
-    "instantiate_seconds",
+    "create_seconds",
     "wiring_seconds",
     "initialize_seconds",
     "loop_seconds",

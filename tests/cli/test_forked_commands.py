@@ -16,7 +16,8 @@ from cosim.cli.forked_commands import forked_commands
 from cosim.studies.regression import run_in_new_process
 
 def children():
-    return [int(word) for word in Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()]
+    words = Path(f"/proc/self/task/{os.getpid()}/children").read_text().split()
+    return [int(word) for word in words]
 
 commands = json.loads(sys.argv[1])
 with forked_commands(2) as run:
@@ -25,7 +26,10 @@ with forked_commands(2) as run:
         os.kill(child, signal.SIGKILL)
     replaced = run(commands[0])
 new = [run_in_new_process(words) for words in commands]
-print(json.dumps([[(done.returncode, done.stderr) for done in each] for each in (forked, new, [replaced])] + [children()]))
+def outcomes(runs):
+    return [(done.returncode, done.stderr) for done in runs]
+
+print(json.dumps([outcomes(forked), outcomes(new), outcomes([replaced]), children()]))
 """
 
 BLOCK = """
@@ -59,6 +63,7 @@ def test_codes_and_messages_are_those_of_new_processes(tmp_path):
     done = subprocess.run(
         [sys.executable, "-c", PROGRAM, json.dumps(commands)],
         cwd=tmp_path,
+        stdin=subprocess.DEVNULL,
         capture_output=True,
         text=True,
         check=True,

@@ -24,7 +24,8 @@ class Body(Fmi2Slave):
     def __init__(self, **arguments):
         super().__init__(**arguments)
         self.rate, self.temperature = 0.5, 80.0
-        self.register_variable(Real("rate", causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable))
+        tunable = {"causality": Fmi2Causality.parameter, "variability": Fmi2Variability.tunable}
+        self.register_variable(Real("rate", **tunable))
         self.register_variable(Real("temperature", causality=Fmi2Causality.output))
 
     def do_step(self, current_time, step_size):

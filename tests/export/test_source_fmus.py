@@ -9,8 +9,9 @@ import pytest
 from ball_fmus import SOURCE, description_1, model_description
 from cosim_command import run_cosim
 
+from cosim.components.fmi import open_fmu
 from cosim.core.errors import InputError
-from cosim.export.foreign.source_fmus import usable_fmu
+from cosim.export.foreign import add_binary
 
 #: macro of the source that sets the FMI version; the prefix is that of tools whose sources add one
 #: by themselves
@@ -190,6 +191,6 @@ BAD_SOURCES = {
 def test_bad_sources_are_one_problem(case, tmp_path):
     sources, message = BAD_SOURCES[case]
     with pytest.raises(InputError, match=message) as refused:
-        usable_fmu(write_source_fmu(tmp_path / "ball.fmu", 3, sources), None).check_binary()
+        open_fmu(write_source_fmu(tmp_path / "ball.fmu", 3, sources), None, add_binary)
     assert len(str(refused.value).splitlines()) == 1
     assert [path.name for path in tmp_path.rglob("pwned")] == []

@@ -68,7 +68,7 @@ class PageVisit:
 
 @pytest.fixture(scope="module")
 def open_page(chromium):
-    """Opens files in the browser; at the end none may have asked for anything else or complained."""
+    """Open files in the browser; none may request anything else or report an error."""
     visits = []
 
     def opened(file):

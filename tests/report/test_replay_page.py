@@ -265,8 +265,10 @@ def test_something_is_drawn(opened):
     """The deck is grey, the water beside the vessel blue, and the shore behind it green."""
     opened.page.click("text=usv")
     colours = opened(
-        """() => { const {view} = cosimReplay, gl = view.renderer.getContext(), pixel = new Uint8Array(4);
-        const {x, y} = view.actors[1].object.position.clone().setZ(0.27).project(view.cameras.camera);
+        """() => { const {view} = cosimReplay, gl = view.renderer.getContext();
+        const pixel = new Uint8Array(4);
+        const centre = view.actors[1].object.position.clone().setZ(0.27);
+        const {x, y} = centre.project(view.cameras.camera);
         view.show("trails", false);
         view.renderer.render(view.scene, view.cameras.camera);
         view.show("trails", true);

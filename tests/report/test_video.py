@@ -24,7 +24,7 @@ class Scene:
     def video_frames(result, camera, times, size):
         for second in times:
             frame = np.zeros((size[1], size[0], 3), np.uint8)
-            frame[:, : size[0] // 2] = 40 + 90 * int(second)  # the left half becomes brighter from second to second
+            frame[:, : size[0] // 2] = 40 + 90 * int(second)  # brighter each second
             yield frame
 
 class Failing:

@@ -11,9 +11,9 @@ import cosim
 from cosim.components.python_import import load_object
 from cosim.core import resources
 from cosim.scenario import find_scenario, load_scenario
+from cosim.scenario.component_schema import change_paths
 from cosim.scenario.extension_schema import editor_schema
 from cosim.scenario.file_paths import relocating
-from cosim.scenario.sources import change_paths
 from cosim.studies.execution.bundle import collect_bundle
 
 SHIPPED = resources.root() / "scenarios"

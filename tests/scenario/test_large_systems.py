@@ -53,12 +53,14 @@ def test_the_timing_of_a_run_has_all_its_parts(tmp_path, probe):
     timing = cosim.run(ring(tmp_path, probe, 2)).timing
     parts = {
         "parse_seconds",
-        "instantiate_seconds",
+        "create_seconds",
         "wiring_seconds",
         "initialize_seconds",
         "loop_seconds",
     }
     assert set(timing) >= parts
+    simulated = ("instantiate_seconds", "initialize_seconds", "loop_seconds")
+    assert timing["simulate_seconds"] == sum(timing[part] for part in simulated)
     assert (
         0
         < sum(timing[part] for part in parts)

@@ -11,7 +11,7 @@ from pathlib import Path
 import pytest
 
 import cosim
-from cosim.scenario import load_scenario, sources
+from cosim.scenario import component_schema, load_scenario, sources
 from cosim.studies.execution.bundle import collect_bundle
 
 PAGE = (Path(cosim.__file__).parents[1] / "docs/python.md").read_text("utf-8")
@@ -42,7 +42,7 @@ def installed(tmp_path):
 
 def forget_kinds():
     sources._kinds_of_packages.cache_clear()
-    sources.component_model.cache_clear()
+    component_schema.component_model.cache_clear()
 
 
 @pytest.fixture

@@ -185,7 +185,10 @@ class _Bench:
         return trials.exit_code
 
     def run_all(self, sources: Sequence[str], number_of_own: int) -> int:
-        """Benchmark several controllers, show them side by side, and return the exit code of the first `number_of_own`."""
+        """Benchmark several controllers and show them side by side.
+
+        Return the exit code of the first `number_of_own`.
+        """
         from ...studies.controller_bench.candidate import parse_source
         from ...studies.controller_bench.page import order, write_bench_page
 

@@ -36,8 +36,10 @@ if TYPE_CHECKING:
     "--include",
     type=click.Path(path_type=Path, exists=True),
     multiple=True,
-    help="File or folder that the Python class reads at run time, for --output; repeatable. The class finds it below "
-    "`self.resources` or beside its own file.",
+    help=(
+        "File or folder that the Python class reads at run time, for --output; repeatable. The "
+        "class finds it below `self.resources` or beside its own file."
+    ),
 )
 @click.option(
     "--library",

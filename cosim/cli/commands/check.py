@@ -83,7 +83,7 @@ def command(
 
 
 def _warnings(prepared: PreparedRun, logged: Sequence[str]) -> list[Problem]:
-    """Return the warnings about a scenario, and those that its components have logged while they were made."""
+    """Return the warnings about a scenario and those that its components have logged."""
     from ...scenario.plausibility import find_warnings
 
     return [*find_warnings(prepared), *(Problem(text.removeprefix("WARNING ")) for text in logged)]

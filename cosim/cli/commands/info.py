@@ -93,7 +93,7 @@ def command(fmu: str, with_locals: bool, as_json: bool) -> None:
 
 
 def _describe(source: str) -> tuple[Mapping[str, str], Sequence[Variable]]:
-    """Return properties and variables of an FMU, of file.py:Class, of file.mo:Model, or of a vehicle file."""
+    """Return properties and variables of an FMU, a class, a Modelica model or a vehicle file."""
     from ...components.fmi import FmuFile
     from ...export.sources import MEMBERS
 
@@ -132,7 +132,7 @@ def _describe_class(reference: str) -> tuple[dict[str, str], Sequence[Variable]]
 
 
 def _find_fmu(fmu: str) -> Path:
-    """Return the path of an FMU that is given by its path, or by the name or path of a shipped FMU."""
+    """Return the path of an FMU that is given by its path, or by the name of a shipped FMU."""
     if fmu.startswith(SHIPPED):
         return resources.root() / fmu.removeprefix(SHIPPED)
     path, files = Path(fmu), shipped_fmus()

@@ -72,7 +72,7 @@ def command(directory: Path, force: bool) -> int:
 
 
 def _other_entries(directory: Path) -> list[str]:
-    """Return the files and folders that do not belong to the project, in the folders into which it is written."""
+    """Return the files and folders beside those of the project, in the same folders."""
     own = {Path(name) for name in (*_PROJECT_FILES, _PLANT)}
     folders = {parent for path in own for parent in path.parents}
     found = [

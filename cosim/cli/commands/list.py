@@ -41,7 +41,7 @@ def list_shipped(kinds: tuple[str, ...], as_json: bool) -> None:
 
 
 def _print_groups(groups: Mapping[str, Sequence[Entry]], width: int) -> None:
-    """Print the entries of each group below its heading ("": none), with names in a column of `width`."""
+    """Print the entries of each group below its heading, with names in a column of `width`."""
     for heading, entries in groups.items():
         if heading:
             click.echo(f"{heading}:")

@@ -135,7 +135,7 @@ def controller(
 
 
 def _controller_files(name: str, role: str, language: str) -> tuple[dict[str, str], dict[str, str]]:
-    """Return the names of a controller (SNAKE and CAMEL), and the texts of its files by file name."""
+    """Return the names of a controller (SNAKE and CAMEL) and the texts of its files."""
     template, chosen = _ALL_ROLES[role], LANGUAGES[language]
     texts = _read_texts(TEMPLATES / role / language) | _read_texts(TEMPLATES / chosen.shared)
     test = texts.pop("test_controller.py")

@@ -43,8 +43,10 @@ _SCENARIO_KEYS = frozenset({"components", "extends", "scenario"})
 @click.option(
     "--mesh",
     type=click.Path(path_type=Path),
-    help="STL, OBJ or GLB file with the shape: inertia for an even density, convex collision pieces, appearance. "
-    "Requires the extra mesh.",
+    help=(
+        "STL, OBJ or GLB file with the shape: inertia for an even density, convex collision "
+        "pieces, appearance. Requires the extra mesh."
+    ),
 )
 @click.option(
     "--mesh-scale",
@@ -145,12 +147,12 @@ def _vehicle(
 def _imported(
     data: Mapping[str, Any], source: Document, file: Path | None
 ) -> Mapping[str, Path | None]:
-    """Return the keys of the data that the vehicle file does not have, each with the file from which it was imported."""
+    """Return the keys that were imported, each with the file from which it was imported."""
     return dict.fromkeys(data.keys() - source.value.keys(), file)
 
 
 def _located(problem: Problem, source: Document, imported: Mapping[str, Path | None]) -> Problem:
-    """Return a problem of the data with its place in the vehicle file, or with the file from which its key was imported."""
+    """Return a problem of the data with its place in the vehicle file or in the imported file."""
     path = problem.subject[1:]
     if problem.subject[:1] != ("arguments",):
         return problem
@@ -184,7 +186,7 @@ def _use(file: Path, base: str, vehicle: _Vehicle, has_imported_shape: bool) -> 
 
 
 def _find_vehicle(base: str) -> Path:
-    """Return the path of a vehicle file that is given by its path or by the name of a shipped vehicle."""
+    """Return the path of a vehicle file, given by its path or the name of a shipped vehicle."""
     from ...export.sources import vehicle_files
 
     if base.endswith(".json"):

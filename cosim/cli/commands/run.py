@@ -117,7 +117,10 @@ def command(
 
 
 def _sandbox_paths(options: RunOptions) -> tuple[list[Path], Path | None]:
-    """Return the files that the command reads, and its output directory (None if the scenario is invalid)."""
+    """Return the files that the command reads, and its output directory.
+
+    The directory is None if the scenario is invalid.
+    """
     from ...scenario import load_scenario
     from ...scenario.settings import parse_settings
 
@@ -154,12 +157,12 @@ def _run_scenario(options: RunOptions, locks: LockKeeper, link: Connection | Non
             default_float_mode(),
             simulation,
         ):
-            execution = simulation.execute(observers, control)
-            execution.result.metadata["warnings"] = warnings
+            result = simulation.execute(observers, control)
+            result.metadata["warnings"] = warnings
             if control:
-                execution.result.metadata["live_events"] = control.finish()
+                result.metadata["live_events"] = control.finish()
             return supervision.results_written(
-                write_outputs(RunOutcome(options, prepared, execution, began))
+                write_outputs(RunOutcome(options, prepared, result, began))
             )
 
 
@@ -196,7 +199,10 @@ def _load(options: RunOptions, real_time: float | None) -> Simulation:
 
 
 def _prepare_folder(prepared: PreparedRun, options: RunOptions, locks: LockKeeper) -> None:
-    """Check the figures and that results can be written, lock the output directory, and remove results of an earlier run."""
+    """Prepare the output directory: check and lock it, and remove results of an earlier run.
+
+    Also check the figures.
+    """
     from ...engine.disk_space import find_space_problems
     from ...results.files import check_writable, remove_files
 

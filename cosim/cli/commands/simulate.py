@@ -70,7 +70,10 @@ if TYPE_CHECKING:
 @csv_option
 @supervision.supervision_options
 def command(isolation: str, sandbox: str | None, output_file: Path | None, **options: Any) -> int:
-    """Simulate a single FMU (Co-Simulation or Model Exchange of FMI 1.0, 2.0 or 3.0) from its default start time."""
+    """Simulate a single FMU from its default start time.
+
+    The FMU has Co-Simulation or Model Exchange of FMI 1.0, 2.0 or 3.0.
+    """
     output = _Output.check(output_file) if output_file else None
     if strict_sandbox.must_rerun(sandbox):
         return strict_sandbox.rerun_in_bubblewrap(

@@ -185,7 +185,7 @@ def _print_summary(sweep: Sweep, summary: SweepSummary) -> None:
 
 
 def _first(entries: Sequence[T], file: str) -> Iterator[T]:
-    """Yield the first entries, all of them with --verbose, and print how many are left out and where they are."""
+    """Yield the first entries (with --verbose all), and print how many are left out."""
     count = len(entries) if current_command_line().verbosity > 0 else _MAX_PRINTED
     yield from entries[:count]
     if len(entries) > count:

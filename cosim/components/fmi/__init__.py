@@ -3,7 +3,7 @@
 from .co_simulation import CoSimulationFmu
 from .description import DefaultExperiment, FmuDescription
 from .driver import FmuComponent, FmuDriver
-from .file import FmuFile
+from .file import FmuFile, open_fmu
 from .preflight import Interface
 from .settings import InstanceSettings, Isolation, Method, SolverSettings
 
@@ -18,6 +18,7 @@ __all__ = [
     "Method",
     "SolverSettings",
     "create_component",
+    "open_fmu",
 ]
 
 DEFAULT_SETTINGS = InstanceSettings()

@@ -29,7 +29,8 @@ from .preflight import (
     open_regular_file,
     raise_errors,
 )
-from .preflight.binary import can_be_compiled
+from .preflight.archive import Archive
+from .preflight.binary import WINDOWS, can_be_compiled
 from .preflight.platforms import current_platform
 
 K = TypeVar("K")
@@ -242,6 +243,11 @@ class FmuFile:
         )
 
     @property
+    def has_windows_binary(self) -> bool:
+        """True for an FMU with a DLL for 64-bit Windows."""
+        return WINDOWS.binary_folder(self.description.major) in self.description.platforms
+
+    @property
     def must_be_compiled(self) -> bool:
         """True for an FMU that has sources but no binary for this platform."""
         return not self.has_binary and can_be_compiled(self.description.platforms)
@@ -265,6 +271,13 @@ class FmuFile:
             return self._key.sha256
         with open_regular_file(self.path) as file:
             return file_digest(file, "sha256").hexdigest()
+
+    def read_members(self) -> dict[str, bytes]:
+        """Return the contents of all files in the archive by name."""
+        with open_regular_file(self.path) as content:
+            archive = Archive(content, self.limits)
+            names = [name for name in archive.members if not name.endswith("/")]
+            return {name: archive.read(name) for name in names}
 
     def check_binary(self) -> None:
         """Check that the FMU can be loaded on this platform.
@@ -338,3 +351,22 @@ class FmuFile:
             else:
                 self._folder.cleanup()
             self._folder = self._extracted = None
+
+
+def open_fmu(
+    path: Path, interface: Interface | None, add_binary: Callable[[FmuFile], Path | None]
+) -> FmuFile:
+    """Open an FMU; without a binary for this machine, open a copy that has one.
+
+    Args:
+        path: The FMU.
+        interface: Interface of its instances; None: the preferred one of the FMU.
+        add_binary: Writes a copy of an FMU with a binary for this machine, and returns its path;
+            None if it has neither sources nor a library for Windows.
+
+    Raises:
+        InputError: The FMU cannot be read, or the copy cannot be made.
+    """
+    file = FmuFile(path, interface=interface)
+    copied = None if file.has_binary else add_binary(file)
+    return FmuFile(copied, interface=interface) if copied else file

@@ -1,6 +1,6 @@
 """FMUs that contain sources but no binary for this machine.
 
-They are compiled when they are used, into the user's cache.
+They are compiled when they are used, into the user's cache (see `add_binary`).
 """
 
 from __future__ import annotations
@@ -17,9 +17,7 @@ from pathlib import Path, PurePosixPath
 from tempfile import TemporaryDirectory
 from typing import Any
 
-from ...components.fmi import FmuFile, Interface
-from ...components.fmi.preflight import open_regular_file
-from ...components.fmi.preflight.archive import Archive
+from ...components.fmi import FmuFile
 from ...components.fmi.preflight.findings import DESCRIPTION_FILE, FatalFindingError
 from ...components.fmi.preflight.platforms import current_platform
 from ...components.fmi.preflight.xml import parse_xml
@@ -27,7 +25,6 @@ from ...core.errors import InputError, did_you_mean
 from ..cache import cached_file
 from ..fmu.compiler import compiler_version, find_compiler
 from ..fmu.package import write_archive
-from .windows_fmus import find_wine, has_windows_binary, windows_fmu
 
 _SOURCES, _BUILD_DESCRIPTION = "sources/", "sources/buildDescription.xml"
 _C_SUFFIX, _CPP_SUFFIXES = ".c", (".cpp", ".cc", ".cxx")
@@ -63,29 +60,7 @@ class _Configuration:
     definitions: Sequence[str] = ()
 
 
-def usable_fmu(path: Path, interface: Interface | None) -> FmuFile:
-    """Open an FMU; if it has no binary for this machine, compile its sources or run its Windows library under Wine.
-
-    Args:
-        path: The FMU.
-        interface: Interface of its instances; None: the preferred one of the FMU.
-
-    Raises:
-        InputError: The FMU cannot be read, its sources cannot be compiled, or its Windows library cannot be used.
-    """
-    file = FmuFile(path, interface=interface)
-    if file.has_binary:
-        return file
-    if file.must_be_compiled:
-        try:
-            return FmuFile(_compiled_fmu(file), interface=interface)
-        except InputError:
-            if not has_windows_binary(file) or not find_wine():
-                raise
-    return FmuFile(windows_fmu(file), interface=interface) if has_windows_binary(file) else file
-
-
-def _compiled_fmu(file: FmuFile) -> Path:
+def compiled_fmu(file: FmuFile) -> Path:
     """Return a copy of an FMU that also contains the binaries for this machine, compiled from its sources.
 
     Args:
@@ -106,15 +81,14 @@ def _compiled_fmu(file: FmuFile) -> Path:
 
 
 def _compile(file: FmuFile, compiler: Sequence[str], target: Path) -> None:
-    with open_regular_file(file.path) as content:
-        archive = Archive(content, file.limits)
-        members = {name: archive.read(name) for name in archive.members if not name.endswith("/")}
+    members = file.read_members()
     machine = current_platform()
     with TemporaryDirectory() as folder:
-        for name in (name for name in members if name.startswith(_SOURCES)):
-            path = Path(folder, name)
-            path.parent.mkdir(parents=True, exist_ok=True)
-            path.write_bytes(members[name])
+        for name, content in members.items():
+            if name.startswith(_SOURCES):
+                path = Path(folder, name)
+                path.parent.mkdir(parents=True, exist_ok=True)
+                path.write_bytes(content)
         fmi1_header = Path(__file__).with_name("fmi1.h").read_text()
         for name, text in {**_WINDOWS_HEADERS, **dict.fromkeys(_FMI1_HEADERS, fmi1_header)}.items():
             Path(folder, name).write_text(text)

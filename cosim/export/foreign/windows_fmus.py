@@ -60,11 +60,6 @@ def find_windows_compiler() -> list[str]:
     )
 
 
-def has_windows_binary(file: FmuFile) -> bool:
-    """Return whether an FMU has a DLL for 64-bit Windows."""
-    return WINDOWS.binary_folder(file.description.major) in file.description.platforms
-
-
 def windows_fmu(file: FmuFile) -> Path:
     """Return a copy of an FMU that also has a library for this machine, which runs the FMU's DLL under Wine.
 
@@ -165,9 +160,7 @@ def _built_worker() -> Path:
 def _write_copy(
     file: FmuFile, wine: Sequence[str], worker: Path, compiler: Sequence[str], target: Path
 ) -> None:
-    with open_regular_file(file.path) as content:
-        archive = Archive(content, file.limits)
-        members = {name: archive.read(name) for name in archive.members if not name.endswith("/")}
+    members = file.read_members()
     major, identifier = file.description.major, file.description.model_identifier
     windows, own = (
         f"binaries/{WINDOWS.binary_folder(major)}/",

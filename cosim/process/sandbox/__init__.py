@@ -188,7 +188,7 @@ def probe_restrictions() -> ActiveRestrictions:
 
 
 def _is_root_unreadable() -> bool:
-    """Return whether Landlock forbids to open the root folder, which every user may read otherwise."""
+    """Return whether Landlock forbids to open the root folder, which everyone else may read."""
     try:
         os.close(os.open("/", os.O_RDONLY | os.O_DIRECTORY))
     except PermissionError:

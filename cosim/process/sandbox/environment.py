@@ -54,12 +54,13 @@ _BYTES_HEADER_SIZE = bytes.__basicsize__ - 1
 
 
 def clear_environment() -> None:
-    """Remove all variables but `KEPT_VARIABLES`, and overwrite their values in the memory of this process (Linux).
+    """Remove all variables but `KEPT_VARIABLES` and overwrite their values in memory (Linux).
 
     HOME names the folder for temporary files afterwards.
 
-    Removed but not overwritten values would remain readable in memory: in the block that the kernel created at the start of the
-    program, in copies of the C library, and in bytes objects of `os.environ`.
+    Removed but not overwritten values would remain readable in memory: in the block that the kernel
+    created at the start of the program, in copies of the C library, and in bytes objects of
+    `os.environ`.
     """
     kept = {name: os.environ[name] for name in KEPT_VARIABLES if name in os.environ} | {
         "HOME": tempfile.gettempdir()

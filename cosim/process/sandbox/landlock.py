@@ -1,6 +1,7 @@
-"""Restriction of the file access of a Linux process and its children by Landlock, without root privileges.
+"""Restriction of the file access of a process by Landlock, without root privileges (Linux).
 
-The three system calls are made by number, which is the same on every architecture. The constants are from linux/landlock.h.
+The three system calls are made by number, which is the same on every architecture. The constants
+are from linux/landlock.h.
 """
 
 from __future__ import annotations

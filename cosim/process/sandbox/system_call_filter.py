@@ -1,7 +1,8 @@
-"""System call filter (Linux seccomp) that denies a process the calls that reach beyond its own files and memory.
+"""System call filter (Linux seccomp) against calls that reach beyond own files and memory.
 
-The filter is a program of the Berkeley Packet Filter (BPF), which the kernel executes at each system call. Constants are from
-linux/filter.h, linux/seccomp.h and linux/audit.h, numbers of calls from the tables of both architectures.
+The filter is a program of the Berkeley Packet Filter (BPF), which the kernel executes at each
+system call. Constants are from linux/filter.h, linux/seccomp.h and linux/audit.h, numbers of calls
+from the tables of both architectures.
 """
 
 from __future__ import annotations
@@ -18,49 +19,48 @@ from typing import NamedTuple
 DENIED_CALLS = {
     "network and local sockets": "socket 41 198, socketpair 53 199",
     "new processes and programs": "fork 57 -, vfork 58 -, execve 59 221, execveat 322 281",
-    (
-        "owners, modes, times and attributes of files"
-    ): """chmod 90 -, fchmod 91 52, fchmodat 268 53, fchmodat2 452 452, chown 92 -,
-        fchown 93 55, lchown 94 -, fchownat 260 54, utime 132 -, utimes 235 -, futimesat 261 -, utimensat 280 88, setxattr 188 5,
-        lsetxattr 189 6, fsetxattr 190 7, getxattr 191 8, lgetxattr 192 9, fgetxattr 193 10, listxattr 194 11,
-        llistxattr 195 12, flistxattr 196 13, removexattr 197 14, lremovexattr 198 15, fremovexattr 199 16""",
-    (
-        "files past the confinement"
-    ): """truncate 76 45, mknod 133 -, mknodat 259 33, name_to_handle_at 303 264,
+    "owners, modes, times and attributes of files": """
+        chmod 90 -, fchmod 91 52, fchmodat 268 53, fchmodat2 452 452, chown 92 -,
+        fchown 93 55, lchown 94 -, fchownat 260 54, utime 132 -, utimes 235 -,
+        futimesat 261 -, utimensat 280 88, setxattr 188 5, lsetxattr 189 6, fsetxattr 190 7,
+        getxattr 191 8, lgetxattr 192 9, fgetxattr 193 10, listxattr 194 11,
+        llistxattr 195 12, flistxattr 196 13, removexattr 197 14, lremovexattr 198 15,
+        fremovexattr 199 16""",
+    "files past the confinement": """
+        truncate 76 45, mknod 133 -, mknodat 259 33, name_to_handle_at 303 264,
         open_by_handle_at 304 265""",
-    (
-        "observation of files"
-    ): """inotify_init 253 -, inotify_init1 294 26, inotify_add_watch 254 27, fanotify_init 300 262,
-        fanotify_mark 301 263""",
-    (
-        "mounts and namespaces"
-    ): """mount 165 40, umount2 166 39, pivot_root 155 41, chroot 161 51, move_mount 429 429,
-        open_tree 428 428, fsopen 430 430, fsconfig 431 431, fsmount 432 432, fspick 433 433, mount_setattr 442 442,
-        setns 308 268, unshare 272 97""",
-    (
-        "System V and POSIX objects"
-    ): """shmget 29 194, shmat 30 196, shmctl 31 195, msgget 68 186, msgsnd 69 189, msgrcv 70 188,
-        msgctl 71 187, semget 64 190, semop 65 193, semctl 66 191, semtimedop 220 192, mq_open 240 180, mq_unlink 241 181""",
+    "observation of files": """
+        inotify_init 253 -, inotify_init1 294 26, inotify_add_watch 254 27,
+        fanotify_init 300 262, fanotify_mark 301 263""",
+    "mounts and namespaces": """
+        mount 165 40, umount2 166 39, pivot_root 155 41, chroot 161 51, move_mount 429 429,
+        open_tree 428 428, fsopen 430 430, fsconfig 431 431, fsmount 432 432,
+        fspick 433 433, mount_setattr 442 442, setns 308 268, unshare 272 97""",
+    "System V and POSIX objects": """
+        shmget 29 194, shmat 30 196, shmctl 31 195, msgget 68 186, msgsnd 69 189,
+        msgrcv 70 188, msgctl 71 187, semget 64 190, semop 65 193, semctl 66 191,
+        semtimedop 220 192, mq_open 240 180, mq_unlink 241 181""",
     "files in memory, which no limit counts": "memfd_create 319 279, memfd_secret 447 447",
     "keys": "add_key 248 217, request_key 249 218, keyctl 250 219",
-    (
-        "other processes"
-    ): """tkill 200 130, rt_sigqueueinfo 129 138, rt_tgsigqueueinfo 297 240, pidfd_open 434 434,
-        pidfd_getfd 438 438, pidfd_send_signal 424 424, ptrace 101 117, process_vm_readv 310 270, process_vm_writev 311 271,
-        process_madvise 440 440, process_mrelease 448 448, kcmp 312 272, perf_event_open 298 241, move_pages 279 239,
+    "other processes": """
+        tkill 200 130, rt_sigqueueinfo 129 138, rt_tgsigqueueinfo 297 240,
+        pidfd_open 434 434, pidfd_getfd 438 438, pidfd_send_signal 424 424, ptrace 101 117,
+        process_vm_readv 310 270, process_vm_writev 311 271, process_madvise 440 440,
+        process_mrelease 448 448, kcmp 312 272, perf_event_open 298 241, move_pages 279 239,
         migrate_pages 256 238""",
-    "priorities and limits": """setpriority 141 140, ioprio_set 251 30, sched_setscheduler 144 119, sched_setparam 142 118,
-        sched_setattr 314 274, setrlimit 160 164""",
-    "calls past a filter": (
-        "io_uring_setup 425 425, io_uring_enter 426 426, io_uring_register 427 427, bpf 321 280"
-    ),
-    (
-        "the kernel and the machine"
-    ): """userfaultfd 323 282, init_module 175 105, finit_module 313 273, delete_module 176 106,
-        kexec_load 246 104, kexec_file_load 320 294, reboot 169 142, swapon 167 224, swapoff 168 225, acct 163 89,
-        quotactl 179 60, quotactl_fd 443 443, syslog 103 116, sethostname 170 161, setdomainname 171 162, settimeofday 164 170,
-        clock_settime 227 112, adjtimex 159 171, clock_adjtime 305 266, iopl 172 -, ioperm 173 -, vhangup 153 58,
-        modify_ldt 154 -, uselib 134 -, personality 135 92""",
+    "priorities and limits": """
+        setpriority 141 140, ioprio_set 251 30, sched_setscheduler 144 119,
+        sched_setparam 142 118, sched_setattr 314 274, setrlimit 160 164""",
+    "calls past a filter": """
+        io_uring_setup 425 425, io_uring_enter 426 426, io_uring_register 427 427,
+        bpf 321 280""",
+    "the kernel and the machine": """
+        userfaultfd 323 282, init_module 175 105, finit_module 313 273,
+        delete_module 176 106, kexec_load 246 104, kexec_file_load 320 294, reboot 169 142,
+        swapon 167 224, swapoff 168 225, acct 163 89, quotactl 179 60, quotactl_fd 443 443,
+        syslog 103 116, sethostname 170 161, setdomainname 171 162, settimeofday 164 170,
+        clock_settime 227 112, adjtimex 159 171, clock_adjtime 305 266, iopl 172 -,
+        ioperm 173 -, vhangup 153 58, modify_ldt 154 -, uselib 134 -, personality 135 92""",
 }
 #: calls that pass their arguments in memory, where a filter cannot read them; programs use older
 #: ones when they do not exist
@@ -112,7 +112,7 @@ class Condition(NamedTuple):
 
 
 def is_available() -> bool:
-    """Return whether this system supports the filter, and whether the filter supports this processor."""
+    """Return whether system and processor support the filter."""
     if sys.platform != "linux" or os.uname().machine not in _ARCHITECTURES:
         return False
     # a filter at no address is refused with EFAULT where filters are supported

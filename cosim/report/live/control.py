@@ -76,7 +76,7 @@ class LiveControl:
         self._events: list[dict[str, Any]] = []
 
     def __call__(self, n: int) -> None:
-        """Wait for real time and carry out commands before the step that starts at communication point n."""
+        """Wait for real time and carry out commands before the step from communication point n."""
         if n == 0:
             self._handshake()
         if self._pacer and not self._paused:
@@ -91,12 +91,15 @@ class LiveControl:
         self._steps = max(0, self._steps - 1)
 
     def finish(self) -> list[dict[str, Any]]:
-        """Report the end of the run and return the values that were set, in the form of a scenario's events."""
+        """Report the end of the run and return the values that were set as events of a scenario."""
         self._send({"ended": True})
         return self._events
 
     def _handshake(self) -> None:
-        """Describe the run and wait until the supervising process has opened its rows, which a short run soon removes."""
+        """Describe the run and wait until the supervising process has opened its rows.
+
+        A short run soon removes them.
+        """
         adjustable = [
             self._describe_variable(full_name, *owner)
             for full_name, owner in self._adjustable.items()
@@ -199,6 +202,6 @@ class LiveControl:
             )
 
     def _event_time(self, n: int) -> float | str:
-        """Return the time of communication point n in the form that a scenario file reads without rounding."""
+        """Return the time of communication point n in a form that is read without rounding."""
         seconds, exact = self._grid.time_at(n), self._grid.start + n * self._grid.step
         return seconds if Fraction(repr(seconds)) == exact else str(exact)

@@ -25,9 +25,12 @@ FINAL_FETCH_TIMEOUT = 2.0
 
 
 class LiveView:
-    """Live view, created before the simulation process is forked, so that both processes have their end of the pipe.
+    """Live view, created before the simulation process is forked.
 
-    The main thread of the supervising process calls `serve`; the simulation process calls `open_in_child`.
+    Both processes have their end of the pipe.
+
+    The main thread of the supervising process calls `serve`; the simulation process calls
+    `open_in_child`.
 
     Args:
         port: The port of the server on this machine; 0 for any free one.
@@ -51,7 +54,10 @@ class LiveView:
         return self._server.url
 
     def open_in_child(self) -> Connection:
-        """Return the end of the pipe for the simulation process, and close the sockets of the supervising process."""
+        """Return the end of the pipe for the simulation process.
+
+        The sockets of the supervising process are closed.
+        """
         self._server.socket.close()
         self._parent_end.close()
         return self._child_end

@@ -143,7 +143,7 @@ class LiveServer(ThreadingHTTPServer):
 
 
 class _HeadReader:
-    """Reader of a connection that limits the lines of each request's head to `MAX_HEAD_LENGTH` bytes together."""
+    """Reader of a connection that limits each request's head to `MAX_HEAD_LENGTH` bytes."""
 
     def __init__(self, file: BufferedIOBase) -> None:
         self._file, self._remaining = file, 0
@@ -224,7 +224,7 @@ class _Handler(BaseHTTPRequestHandler):
         self._send(HTTPStatus.OK, "text/html; charset=utf-8", text.encode())
 
     def _send_rows(self) -> None:
-        """Send one line of JSON with the state, then the rows as float32 (see `session.RowFeed`)."""
+        """Send one line of JSON with the state, then the rows as float32; see `RowFeed`."""
         try:
             query = parse_qs(urlsplit(self.path).query)
             first, version = (int(query[name][0]) for name in ("first", "version"))
@@ -271,7 +271,7 @@ class _Handler(BaseHTTPRequestHandler):
 
 
 def _is_flat(value: Any) -> bool:
-    """Return whether a JSON value is a scalar or a list of scalars, as all arguments of commands are."""
+    """Return whether a JSON value is a scalar or a list of scalars."""
     return not any(
         isinstance(part, dict | list) for part in (value if isinstance(value, list) else [value])
     )

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import json
 import math
-from collections.abc import Iterable, Iterator, Mapping
+from collections.abc import Collection, Iterable, Iterator, Mapping
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
@@ -91,7 +91,10 @@ class CandidateInterface:
         return {*self.inputs, *self.outputs, *self.parameters, *self.inner_variables}
 
     def has_variables(self, name: str) -> bool:
-        """Return whether `name` is a variable, an array, a prefix of variables, or a pattern with "*" that matches one."""
+        """Return whether `name` stands for variables.
+
+        It may be a variable, an array, a prefix, or a pattern with "*".
+        """
         head, star, tail = name.partition("*")
         if star:
             return any(each.startswith(head) and each.endswith(tail) for each in self.names)
@@ -141,10 +144,9 @@ def _with_user_location(problem: Problem, file: Path, candidate: CandidateSource
 
 def _common_step(file: Path) -> str:
     """Return the largest step size (s) that divides 1 s and the periods of all components."""
-    specs = (
-        spec for node in load_scenario(file).root.walk() for spec in node.spec.components.values()
-    )
-    periods = [Fraction(1), *(spec.period for spec in specs if spec.period)]
+    periods = [Fraction(1)]
+    for node in load_scenario(file).root.walk():
+        periods += [spec.period for spec in node.spec.components.values() if spec.period]
     denominator = math.lcm(*(period.denominator for period in periods))
     return fraction_text(
         Fraction(math.gcd(*(int(period * denominator) for period in periods)), denominator)
@@ -153,24 +155,25 @@ def _common_step(file: Path) -> str:
 
 def _component_interface(component: Component) -> CandidateInterface:
     inputs, outputs, parameters = (
-        {
-            slot: v
-            for v in component.variables
-            if v.causality in causalities
-            for slot in v.scalar_names
-        }
-        for causalities in _CAUSALITIES.values()
+        scalars(component, causalities) for causalities in _CAUSALITIES.values()
     )
     return CandidateInterface(inputs, outputs, parameters)
 
 
+def scalars(component: Component, causalities: Collection[str] = ()) -> dict[str, Variable]:
+    """Return the variables of a component by the names of their scalars; no causalities: all."""
+    found: dict[str, Variable] = {}
+    for variable in component.variables:
+        if not causalities or variable.causality in causalities:
+            found |= dict.fromkeys(variable.scalar_names, variable)
+    return found
+
+
 def _system_interface(root: Node, components: Mapping[str, Component]) -> CandidateInterface:
-    inner = {
-        f"{name.removeprefix(_CANDIDATE + '.')}.{slot}"
-        for name, c in components.items()
-        for v in c.variables
-        for slot in v.scalar_names
-    }
+    inner: set[str] = set()
+    for name, component in components.items():
+        inside = name.removeprefix(f"{_CANDIDATE}.")
+        inner |= {f"{inside}.{slot}" for slot in scalars(component)}
     inputs, outputs, parameters = (
         dict(_port_variables(root, components, kind)) for kind in _CAUSALITIES
     )
@@ -185,7 +188,7 @@ def _port_variables(
     for port in getattr(nested.ports, kind):
         for target in _port_targets(root, port, kind):
             component = components[target.component]
-            variables = {slot: v for v in component.variables for slot in v.scalar_names}
+            variables = scalars(component)
             for causality in _CAUSALITIES[kind]:
                 for rest, slot in SlotIndex(component, causality).below(target.prefix).items():
                     yield port + rest, variables[slot]
@@ -210,52 +213,36 @@ def interface_problems(
     """
     short = {short: role.parameters[name] for name, short in role.short_names.items()}
     expected = {**short, **role.inputs, **role.outputs, **role.parameters}
-    return [
-        *(
-            _missing_output(name, role, interface)
-            for name in role.outputs
-            if name not in interface.outputs
-        ),
-        *(
-            _unexpected_input(name, role, interface)
-            for name in interface.inputs
-            if name not in role.inputs
-        ),
-        *(
-            Problem(
-                f'"{name}" has the unit "{variable.unit.name}", expected "{unit.name}" or a unit '
-                "that converts to it"
-            )
-            for variables in (interface.inputs, interface.outputs, interface.parameters)
-            for name, variable in variables.items()
-            if (unit := expected.get(name) or role.parameters.get(name.partition("[")[0]))
-            and variable.unit
-            and not variable.unit.converts_to(unit)
-        ),
-        *(
-            Problem(f'the controller has no variable "{name}"{_name_hint(name, interface)}')
-            for name in settings
-            if not interface.has_variables(name)
-        ),
+    texts = [
+        _missing_output(name, role, interface)
+        for name in role.outputs
+        if name not in interface.outputs
     ]
+    unused = [name for name in role.inputs if name not in interface.inputs]
+    for name in interface.inputs:
+        if name not in role.inputs:
+            hint = did_you_mean(name, unused)
+            texts.append(f'the role has no signal for the input "{name}"{hint}')
+    for variables in (interface.inputs, interface.outputs, interface.parameters):
+        for name, variable in variables.items():
+            unit = expected.get(name) or role.parameters.get(name.partition("[")[0])
+            if unit and variable.unit and not variable.unit.converts_to(unit):
+                texts.append(
+                    f'"{name}" has the unit "{variable.unit.name}", expected "{unit.name}" or a '
+                    "unit that converts to it"
+                )
+    for name in settings:
+        if not interface.has_variables(name):
+            hint = did_you_mean(name, interface.names - interface.outputs.keys())
+            texts.append(f'the controller has no variable "{name}"{hint}')
+    return [Problem(text) for text in texts]
 
 
-def _name_hint(name: str, interface: CandidateInterface) -> str:
-    return did_you_mean(
-        name, {*interface.parameters, *interface.inner_variables, *interface.inputs}
-    )
-
-
-def _missing_output(name: str, role: Role, interface: CandidateInterface) -> Problem:
+def _missing_output(name: str, role: Role, interface: CandidateInterface) -> str:
     unit = role.outputs[name]
     expected = f'the output "{name}"' + (f" ({unit.name})" if unit else "")
     if name in {*interface.inputs, *interface.parameters}:
         causality = "an input" if name in interface.inputs else "a parameter"
-        return Problem(f'"{name}" is {causality}, expected an output')
+        return f'"{name}" is {causality}, expected an output'
     others = [output for output in interface.outputs if output not in role.outputs]
-    return Problem(f"{expected} is missing{did_you_mean(name, others)}")
-
-
-def _unexpected_input(name: str, role: Role, interface: CandidateInterface) -> Problem:
-    unused = [each for each in role.inputs if each not in interface.inputs]
-    return Problem(f'the role has no signal for the input "{name}"{did_you_mean(name, unused)}')
+    return f"{expected} is missing{did_you_mean(name, others)}"

@@ -12,6 +12,7 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from fnmatch import fnmatchcase
+from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
@@ -26,7 +27,7 @@ from ...scenario.function_definitions import function_definition
 from ...scenario.named_functions import definition_problem
 from .ranking import Ranking, RunKpis, ScenarioKpis
 
-_NOT_APPLICABLE = {"text": "n/a", "failed": False, "limits": ""}
+_NOT_APPLICABLE: dict[str, Any] = {"text": "n/a", "failed": False, "limits": ""}
 
 
 @dataclass(frozen=True)
@@ -70,15 +71,8 @@ def have_different_totals(controllers: Iterable[BenchedController]) -> bool:
 
     Some are not applicable, or their KPI is left out.
     """
-    return (
-        len(
-            {
-                (each.ranking.candidate.scenarios, each.ranking.candidate.checks)
-                for each in controllers
-            }
-        )
-        > 1
-    )
+    standings = [each.ranking.candidate for each in controllers]
+    return len({(standing.scenarios, standing.checks) for standing in standings}) > 1
 
 
 def write_bench_page(
@@ -97,10 +91,11 @@ def write_bench_page(
         reference: name of the controller whose cost is 1; "": the costs were not measured.
         reference_cost: its processor time per step (s).
     """
-    scenarios = [
-        (name, run.own_name, _settings(name, controllers), list(_kpi_rows(name, controllers)))
-        for name, run in controllers[0].scenarios.items()
-    ]
+    scenarios, rows = [], list[KpiRow]()
+    for name, run in controllers[0].scenarios.items():
+        own_rows = list(_kpi_rows(name, controllers))
+        scenarios.append((name, run.own_name, _settings(name, controllers), own_rows))
+        rows += own_rows
     text = render_page(
         "bench.html",
         role=Path(role).stem,
@@ -114,7 +109,7 @@ def write_bench_page(
         different_totals=have_different_totals(controllers),
         columns=[each.name for each in controllers],
         scenarios=scenarios,
-        meanings=_meanings(row for *_, rows in scenarios for row in rows),
+        meanings=_meanings(rows),
         version=__version__,
     )
     write_file(path, text)
@@ -151,22 +146,20 @@ class KpiRow(NamedTuple):
 def _kpi_rows(scenario: str, controllers: Sequence[BenchedController]) -> Iterator[KpiRow]:
     """Yield a row for each KPI that is checked or a goal."""
     runs = [each.scenarios[scenario] for each in controllers]
-    checks = [check for run in runs for check in run.checks]
-    found = [kpis for kpis in (runs[0].shipped, *(run.candidate for run in runs)) if kpis]
-    for name in dict.fromkeys(name for run in found for name in run.kpis):
+    checks = list(chain.from_iterable(run.checks for run in runs))
+    found = list(filter(None, [runs[0].shipped, *(run.candidate for run in runs)]))
+    for name in dict.fromkeys(chain.from_iterable(run.kpis for run in found)):
         limits = ", ".join(dict.fromkeys(outcome.limits for outcome in _outcomes(name, {}, checks)))
-        if limits or any(fnmatchcase(name, goal) for goal in controllers[0].goals):
-            unit = next((run.units[name] for run in found if name in run.units), "")
-            meaning = next(
-                filter(None, (kpi_description(name, run.descriptions) for run in runs)), ""
-            )
-            cells = [
-                _cell(name, run.candidate, run.checks) if run.is_applicable else _NOT_APPLICABLE
-                for run in runs
-            ]
-            yield KpiRow(
-                name, unit, meaning, limits, [_cell(name, runs[0].shipped, runs[0].checks), *cells]
-            )
+        is_goal = any(fnmatchcase(name, goal) for goal in controllers[0].goals)
+        if not limits and not is_goal:
+            continue
+        unit = next((run.units[name] for run in found if name in run.units), "")
+        meanings = (kpi_description(name, run.descriptions) for run in runs)
+        cells = [_cell(name, runs[0].shipped, runs[0].checks)]
+        for run in runs:
+            found_cell = _cell(name, run.candidate, run.checks)
+            cells.append(found_cell if run.is_applicable else _NOT_APPLICABLE)
+        yield KpiRow(name, unit, next(filter(None, meanings), ""), limits, cells)
 
 
 def _meanings(rows: Iterable[KpiRow]) -> dict[str, list[str]]:
@@ -179,7 +172,7 @@ def _meanings(rows: Iterable[KpiRow]) -> dict[str, list[str]]:
 
 
 def _cell(name: str, run: RunKpis | None, checks: Sequence[Mapping[str, Any]]) -> dict[str, Any]:
-    """Return the text of a KPI in a run (None: it failed), and the limits of the checks that failed."""
+    """Return the text of a KPI in a run (None: it failed), and the limits of failed checks."""
     if run is None or name not in run.kpis:
         return {"text": "", "failed": run is None, "limits": ""}
     failed = [outcome.limits for outcome in _outcomes(name, run.kpis, checks) if not outcome.passed]
@@ -222,9 +215,8 @@ def describe_kpis(kpis: Iterable[Mapping[str, Any]], folder: Path) -> dict[str, 
             if definition_problem(spec, folder)
             else ast.get_docstring(function_definition(spec, folder)) or ""
         )
-        found |= {
-            f"{spec.name}.{value}": meaning for value, meaning in _value_meanings(text).items()
-        }
+        for value, meaning in _value_meanings(text).items():
+            found[f"{spec.name}.{value}"] = meaning
         if text:
             found[spec.name] = _function_meaning(text.partition("\n")[0], spec.arguments)
     return found
@@ -237,14 +229,15 @@ def kpi_description(name: str, descriptions: Mapping[str, str]) -> str:
 
 
 def _value_meanings(docstring: str) -> dict[str, str]:
-    items = (
-        (names, " ".join(text.replace("`", "").split())) for names, text in _ITEM.findall(docstring)
-    )
-    return {name: text for names, text in items for name in _NAME.findall(names)}
+    meanings: dict[str, str] = {}
+    for names, text in _ITEM.findall(docstring):
+        meaning = " ".join(text.replace("`", "").split())
+        meanings |= dict.fromkeys(_NAME.findall(names), meaning)
+    return meanings
 
 
 def _function_meaning(first_line: str, arguments: Mapping[str, Any]) -> str:
-    """Return a line such as "the mean of the error over time (signal plant.uav.position.z, start 15.0)"."""
+    """Return a line such as "the mean of the error over time (signal uav.z, start 15.0)"."""
     line = re.sub(r"^(Return|Evaluate) ", "", first_line.replace("`", "")).rstrip(".")
     settings = ", ".join(f"{name} {value}" for name, value in arguments.items())
     return f"{line} ({settings})" if settings else line

@@ -102,7 +102,7 @@ class Role:
 
     @property
     def short_names(self) -> dict[str, str]:
-        """Names of the parameters without their prefixes, such as "landing_time", by those with prefixes."""
+        """Names without prefixes, such as "landing_time", of the parameters with prefixes."""
         return {name: name.rpartition(".")[2] for name in self.parameters if "." in name}
 
     @property
@@ -122,13 +122,13 @@ def read_role(role: str) -> Role:
     """
     file, spec = read_role_file(role)
     folder = file.parent.resolve()
-    inputs = [
-        item for name, source in spec.inputs.items() for item in _input_units(name, source, folder)
-    ]
+    inputs: dict[str, Unit | None] = {}
+    for name, source in spec.inputs.items():
+        inputs |= _input_units(name, source, folder)
     return Role(
         file.stem,
         spec.description,
-        dict(inputs),
+        inputs,
         {name: _parse_unit(source) for name, source in spec.outputs.items()},
         {name: _parse_unit(source) for name, source in spec.parameters.items()},
         tuple(spec.goals),
@@ -179,21 +179,18 @@ def _validate_role(document: Document) -> RoleSpec:
 
 def _input_units(
     name: str, source: str | VariableSpec | OutputsSpec, folder: Path
-) -> list[tuple[str, Unit | None]]:
+) -> dict[str, Unit | None]:
+    """Return the units of the inputs that an entry of a role stands for, by their names."""
     if not isinstance(source, OutputsSpec):
-        return [(name, _parse_unit(source))]
-    outputs = (
-        v
-        for v in FmuFile(folder / source.outputs_of).description.variables
-        if v.causality == "output"
-    )
+        return {name: _parse_unit(source)}
     prefix = f"{source.below}." if source.below else ""
-    return [
-        (f"{name}.{slot.removeprefix(prefix)}", variable.unit)
-        for variable in outputs
-        for slot in variable.scalar_names
-        if slot.startswith(prefix)
-    ]
+    units: dict[str, Unit | None] = {}
+    for variable in FmuFile(folder / source.outputs_of).description.variables:
+        if variable.causality == "output":
+            for slot in variable.scalar_names:
+                if slot.startswith(prefix):
+                    units[f"{name}.{slot.removeprefix(prefix)}"] = variable.unit
+    return units
 
 
 def _parse_unit(source: str | VariableSpec) -> Unit | None:

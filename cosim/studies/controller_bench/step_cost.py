@@ -1,4 +1,7 @@
-"""Processor time of controllers per step, measured in turns, so that other load of the machine affects all of them equally."""
+"""Processor time of controllers per step.
+
+It is measured in turns, so that other load of the machine affects all controllers equally.
+"""
 
 from __future__ import annotations
 
@@ -17,7 +20,7 @@ import numpy as np
 from ...api import Simulation, load
 from ...core.errors import ComponentError, CosimError, InputError
 from ...core.time_grid import fraction_text
-from .candidate import parse_source
+from .candidate import parse_source, scalars
 
 #: number of turns, and of steps in each of them
 ROUNDS, STEPS = 12, 500
@@ -40,11 +43,12 @@ class MeasuredController:
 
 
 def measure_step_costs(controllers: Sequence[MeasuredController], reference: str) -> list[float]:
-    """Return the smallest processor time per step (s) of the reference, an FMU, and of each controller.
+    """Return the smallest processor time per step (s) of the reference FMU and of each controller.
 
-    Each controller steps alone, with the inputs that it has in its scenario at a quarter of the time. A reference that is one of
-    the controllers is measured once, so that its ratio is 1; any other one keeps the start values of its inputs. The cost of a
-    controller that fails is NaN, with a warning.
+    Each controller steps alone, with the inputs that it has in its scenario at a quarter of the
+    time. A reference that is one of the controllers is measured once, so that its ratio is 1; any
+    other one keeps the start values of its inputs. The cost of a controller that fails is NaN, with
+    a warning.
     """
     entry = parse_source(reference).entry
     same = next(
@@ -57,13 +61,11 @@ def measure_step_costs(controllers: Sequence[MeasuredController], reference: str
         if same is None:
             alone.append(_enter(stack, reference, lambda: _load_alone(reference, Fraction(1, 100))))
         sources = [*(each.source for each in controllers), reference]
-        rounds = [
-            [_step_seconds(*each) for each in zip(sources, alone, strict=False)]
-            for _ in range(ROUNDS)
-        ]
-    costs = [
-        float(np.min(column)) for column in zip(*rounds, strict=True)
-    ]  # NaN if a round has failed
+        rounds = np.full((ROUNDS, len(alone)), math.nan)
+        for each in rounds:
+            for i, simulation in enumerate(alone):
+                each[i] = _step_seconds(sources[i], simulation)
+    costs = rounds.min(0).tolist()  # NaN if a round has failed
     return [costs[-1 if same is None else same], *costs[: len(controllers)]]
 
 
@@ -95,17 +97,10 @@ def _load_with_inputs(controller: MeasuredController) -> Simulation:
         flight.step(max(1, grid.count // 4))
         alone = _load_alone(controller.source, grid.step)
         for name, component in alone.prepared.system.components.items():
-            for slot in (
-                slot
-                for v in component.variables
-                if v.causality == "input"
-                for slot in v.scalar_names
-            ):
+            name_in_flight = f"{controller.component}{name.removeprefix(_NAME)}"
+            for slot in scalars(component, ("input",)):
                 with suppress(InputError):  # another part of a nested system feeds this input
-                    alone.set(
-                        f"{name}.{slot}",
-                        flight.get(f"{controller.component}{name.removeprefix(_NAME)}.{slot}"),
-                    )
+                    alone.set(f"{name}.{slot}", flight.get(f"{name_in_flight}.{slot}"))
     return alone
 
 

@@ -9,7 +9,7 @@ trajectories.
 from __future__ import annotations
 
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -17,12 +17,13 @@ from typing import Any, NamedTuple
 
 from ...core.errors import InputError
 from ...results.files import write_json
+from ...scenario.component_schema import change_paths
 from ...scenario.evaluation_schema import FunctionSpec
 from ...scenario.extension import nested_content
 from ...scenario.file_paths import relocating
 from ...scenario.named_functions import declared_arguments
 from ...scenario.nested_systems import load_scenario
-from ...scenario.sources import change_paths, kind_of
+from ...scenario.sources import kind_of, texts_in
 from .candidate import CandidateInterface, CandidateSource
 from .role import Role
 
@@ -100,10 +101,11 @@ class ControllerSubstitution:
     _folder: Path = field(init=False)
 
     def substitute(self, folder: Path) -> Path | None:
-        """Change the scenario and its nested systems, as files in `folder` that are not yet written.
+        """Change the scenario and its nested systems, as files in `folder`; they are not written.
 
         Returns:
-            Path of the changed scenario among `changed_files`; None if no component has the role, or if the file is not a scenario (has no components).
+            Path of the changed scenario among `changed_files`; None if no component has the role,
+            or if the file is not a scenario (has no components).
 
         Raises:
             InputError: if the scenario is invalid.
@@ -133,12 +135,13 @@ class ControllerSubstitution:
             write_json(content, path)
 
     # -- systems
-    # -------------------------------------------------------------------------------------------------------
+    # ---------------------------------------------------------------------------------------
 
     def _substitute_system(
         self, value: Mapping[str, Any], folder: Path, prefix: str
     ) -> tuple[dict[str, Any], NameMap]:
         """Return a system that contains the candidate, and a map of the names that exist in it."""
+        value = change_paths(value, relocating(folder, None))
         maps: dict[str, NameMap] = {}
         components = {
             name: self._substitute_component(spec, folder, f"{prefix}{name}", name, maps)
@@ -157,11 +160,10 @@ class ControllerSubstitution:
             components[name] = {**components[name], "parameters": {**parameters, **own}}
             self._note_applied({maps[name](each).own: given[each] for each in given})
             self._note_applied({(f"{prefix}{name}", each): own[each] for each in own})
-        connections = [
-            {**each, "to": new}
-            for each in value.get("connections", [])
-            if (new := self._kept_name(renamed, each["to"]))
-        ]
+        connections = []
+        for each in value.get("connections", []):
+            if new := self._kept_name(renamed, each["to"]):
+                connections.append({**each, "to": new})
         return {**value, "components": components, "connections": connections}, renamed
 
     def _substitute_component(
@@ -172,10 +174,8 @@ class ControllerSubstitution:
         name: str,
         maps: dict[str, NameMap],
     ) -> dict[str, Any]:
-        system = change_paths({"components": {name: spec}}, relocating(folder, None))
-        absolute: dict[str, Any] = system["components"][name]
         kind = kind_of(spec).KEY
-        source = absolute[kind]
+        source = spec[kind]
         path = Path(_reference_file(source)).resolve() if isinstance(source, str) else folder
         if path in self.role.controllers:
             self.replaced_components[full_name] = path.stem
@@ -188,7 +188,7 @@ class ControllerSubstitution:
         content = nested_content({"system": str(stand_in)} if stand_in else spec, folder)
         nested = self._substitute_nested(*content, full_name) if content else None
         if nested is None:
-            return absolute
+            return dict(spec)
         changed, maps[name] = nested
         return {key: value for key, value in spec.items() if key not in (kind, "isolation")} | {
             "system": str(changed)
@@ -227,12 +227,9 @@ class ControllerSubstitution:
         ports, lost = self._prune_ports(value.get("ports", {}), renamed)
         path = self._folder / "systems" / f"{self.file.stem}.{full_name}.json"
         self.changed_files[path] = {**value, "ports": ports}
-        shown = {
-            port: inner
-            for kind, named in value.get("ports", {}).items()
-            for port, inner in named.items()
-            if port in ports[kind]
-        }
+        shown: dict[str, Any] = {}
+        for kind, named in value.get("ports", {}).items():
+            shown |= {port: inner for port, inner in named.items() if port in ports[kind]}
 
         def renamed_outside(name: str) -> NewName:
             port = _SEPARATOR.split(name, 1)[0]
@@ -247,7 +244,10 @@ class ControllerSubstitution:
     def _prune_ports(
         self, ports: Mapping[str, Any], renamed: NameMap
     ) -> tuple[dict[str, Any], dict[str, str]]:
-        """Return the ports that lead to a variable of the changed system, and what is lacking for the removed ports."""
+        """Return the ports that lead to a variable of the changed system.
+
+        Also return what is lacking for the removed ports.
+        """
         remaining: dict[str, dict[str, Any]] = {kind: {} for kind in ports}
         lost = {}
         for kind, named in ports.items():
@@ -264,80 +264,60 @@ class ControllerSubstitution:
     # ---------------------------------------------------------------------------------------
 
     def _prune_scenario(
-        self, value: dict[str, Any], renamed: NameMap, folder: Path
+        self, value: Mapping[str, Any], renamed: NameMap, folder: Path
     ) -> dict[str, Any]:
+        """Return a scenario without the entries that refer to variables which the candidate lacks.
+
+        References are left out.
+        """
+        record = value.get("record", {})
         signals = [
             name
-            for name in value.get("record", {}).get("signals", ["*"])
+            for name in record.get("signals", ["*"])
             if "*" in name or not renamed(name).lacking
         ]
-        functions = {
-            key: [
-                {**each, "python": absolute_reference(each["python"], folder)}
-                for each in value.get(key, [])
-                if self._all_known(renamed, each, folder, f'{key[:-1]} "{each["name"]}"')
-            ]
-            for key in ("kpis", "figures")
-        }
-        kpis = {each["name"] for each in functions["kpis"]}
-        events = [
-            {**each, "set": self._known_settings(renamed, each["set"])}
-            for each in value.get("events", [])
-        ]
-        inputs = [
-            {**each, "file": absolute_reference(each["file"], folder)}
-            for each in value.get("inputs", [])
-        ]
-        scene = value.get("scene")
-        return {
-            **{key: item for key, item in value.items() if key != "reference"},
-            **functions,
-            "record": {**value.get("record", {}), "signals": signals},
-            "checks": [
-                each for each in value.get("checks", []) if each["kpi"].partition(".")[0] in kpis
-            ],
-            "events": [each for each in events if each["set"]],
-            "inputs": inputs,
-            **(
-                {"scene": {**scene, "python": absolute_reference(scene["python"], folder)}}
-                if scene
-                else {}
-            ),
-        }
+        kept: dict[str, list[Any]] = {"kpis": [], "figures": [], "events": []}
+        for key, noun in (("kpis", "kpi"), ("figures", "figure")):
+            for each in value.get(key, []):
+                if self._all_known(renamed, each, folder, f'{noun} "{each["name"]}"'):
+                    kept[key].append(each)
+        for event in value.get("events", []):
+            if settings := self._known_settings(renamed, event["set"]):
+                kept["events"].append({**event, "set": settings})
+        kpis = {each["name"] for each in kept["kpis"]}
+        checks = [each for each in value.get("checks", []) if each["kpi"].partition(".")[0] in kpis]
+        pruned = {**value, **kept, "record": {**record, "signals": signals}, "checks": checks}
+        pruned.pop("reference", None)
+        return {**pruned, "inputs": value.get("inputs", [])}
 
     def _known_settings(
         self, renamed: NameMap, settings: Mapping[str, Any], prefix: str = ""
     ) -> dict[str, Any]:
-        return {
-            new: value
-            for name, value in settings.items()
-            if (new := self._kept_name(renamed, name, prefix))
-        }
+        known = {}
+        for name, value in settings.items():
+            if new := self._kept_name(renamed, name, prefix):
+                known[new] = value
+        return known
 
     def _all_known(
         self, renamed: NameMap, function: Mapping[str, Any], folder: Path, what: str
     ) -> bool:
+        """Return whether all signals that a function needs exist; note the first that does not.
+
+        An argument that `arguments_from` gives needs a variable in one of the sources.
+        """
         spec = FunctionSpec.model_validate(function)
-        groups = [[text] for text in _strings(spec.arguments)]
+        groups = [[text] for text in texts_in(spec.arguments)]
         if sources := [source for source in spec.sources if not source.startswith("/")]:
-            needed = [
-                name
-                for name, is_required in declared_arguments(spec, folder).items()
-                if is_required
-            ]
-            groups += [
-                [f"{source}.{name}" for source in sources]
-                for name in needed
-                if name not in spec.arguments
-            ]
-        missing = [
-            (names[0], lacking[0])
-            for names in groups
-            if all(lacking := [renamed(name).lacking for name in names])
-        ]
-        if missing:
-            self.omissions.append(Omission(what, *missing[0]))
-        return not missing
+            for name, is_required in declared_arguments(spec, folder).items():
+                if is_required and name not in spec.arguments:
+                    groups.append([f"{source}.{name}" for source in sources])
+        for names in groups:
+            lacking = [renamed(name).lacking for name in names]
+            if all(lacking):
+                self.omissions.append(Omission(what, names[0], lacking[0]))
+                return False
+        return True
 
     def _kept_name(self, renamed: NameMap, name: str, prefix: str = "") -> str | None:
         """Return the new name of a variable that is set or fed.
@@ -351,25 +331,6 @@ class ControllerSubstitution:
         return None
 
 
-def absolute_reference(reference: str, folder: Path) -> str:
-    """Return a reference to a file, or to an object in a file, with an absolute path.
-
-    Python modules stay as they are.
-    """
-    file = _reference_file(reference)
-    is_module = file != reference and not file.endswith((".py", ".mo"))
-    return reference if is_module else f"{(folder / file).resolve()}{reference.removeprefix(file)}"
-
-
 def _reference_file(reference: str) -> str:
     """Return the file of a reference such as "my.fmu" or "my.py:Class"."""
     return reference.rpartition(":")[0] or reference
-
-
-def _strings(value: Any) -> Iterator[str]:
-    """Yield all strings in an argument of a KPI or figure."""
-    if isinstance(value, str):
-        yield value
-    elif isinstance(value, Mapping | list):
-        for item in value.values() if isinstance(value, Mapping) else value:
-            yield from _strings(item)

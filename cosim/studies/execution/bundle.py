@@ -75,9 +75,15 @@ class Bundle:
 
 
 def collect_bundle(scenario: Path, variants: Iterable[Mapping[str, Any]] = ({},)) -> Bundle:
-    """Collect the files of a scenario, also those that it uses only with one of the `variants` of its settings."""
-    named = {path for settings in variants for path in _scenario_files(scenario, settings)}
-    used = {path for file in named for path in _package_files(file)}
+    """Collect the files of a scenario.
+
+    They include those that it uses only with one of the `variants` of its settings.
+    """
+    named, used = set[Path](), set[Path]()
+    for settings in variants:
+        named.update(_scenario_files(scenario, settings))
+    for file in named:
+        used.update(_package_files(file))
     root = Path(os.path.commonpath([path.parent for path in used]))
     files = {
         path.relative_to(root).as_posix(): sha256(path.read_bytes()).hexdigest()
@@ -92,21 +98,18 @@ def fmu_paths(files: Iterable[str]) -> tuple[str, ...]:
 
 
 def absolute_paths(scenario: Path, settings: Mapping[str, Any]) -> list[Problem]:
-    """Return a problem for each absolute path in the scenario, which another machine would not have."""
-    return [
-        Problem(
-            (
-                f'absolute path "{path}" cannot be shipped to a cluster; expected a path relative '
-                "to this file"
-            ),
-            where,
-        )
-        for node in load_scenario(
-            scenario, _pointer_settings(settings), scenario.parent
-        ).root.walk()
-        for path, where in _named_files(node)
-        if Path(path).is_absolute() and paths.is_file(Path(path))
-    ]
+    """Return a problem for each absolute path in a scenario, which another machine would lack."""
+    problems = []
+    loaded = load_scenario(scenario, _pointer_settings(settings), scenario.parent)
+    for node in loaded.root.walk():
+        for path, where in _named_files(node):
+            if Path(path).is_absolute() and paths.is_file(Path(path)):
+                text = (
+                    f'absolute path "{path}" cannot be shipped to a cluster; expected a path '
+                    "relative to this file"
+                )
+                problems.append(Problem(text, where))
+    return problems
 
 
 def _scenario_files(scenario: Path, settings: Mapping[str, Any]) -> Iterator[Path]:
@@ -129,7 +132,10 @@ def _pointer_settings(settings: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def _named_files(node: Node) -> Iterator[tuple[str, str]]:
-    """Yield (path, location) of all files that a system names, and of strings in arguments and parameters that may be files."""
+    """Yield (path, location) of all files that a system names.
+
+    Texts in arguments and parameters may be files, too.
+    """
     for name, component in node.spec.components.items():
         where = node.where("components", name)
         yield from ((path, where) for path in component.texts())
@@ -137,13 +143,15 @@ def _named_files(node: Node) -> Iterator[tuple[str, str]]:
         yield from ((path, node.where("inputs", i)) for path in profile.paths)
     for i, kpi in enumerate(getattr(node.spec, "kpis", ())):
         where = node.where("kpis", i)
-        yield from (
-            (path, where) for path in (kpi.python.rpartition(":")[0], *texts_in(kpi.arguments))
-        )
+        yield kpi.python.rpartition(":")[0], where
+        yield from ((path, where) for path in texts_in(kpi.arguments))
 
 
 def _package_files(path: Path) -> Iterator[Path]:
-    """Yield a file and those beside it that it imports, or all files of its outermost Python package including data files."""
+    """Yield a file and those beside it that it imports.
+
+    Of a file in a Python package, yield all files of the outermost package, also data files.
+    """
     root = package_root(path)
     if path.suffix != ".py" or root == path.parent:
         yield from package_files([path]) if path.suffix == ".py" else [path]

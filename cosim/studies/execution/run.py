@@ -39,7 +39,13 @@ FmuFiles = Mapping[Path, FmuFile]
 
 
 class ReplayRequest(NamedTuple):
-    """Title and path of the page to which the replay of a run is written, and the checks that the run should pass."""
+    """Request for the replay of a run.
+
+    Attributes:
+        title: title of the page.
+        page: path of the page.
+        checks: checks that the run should pass.
+    """
 
     title: str
     page: str
@@ -90,7 +96,7 @@ def supervised_check(context: StudyContext, job: Job, fmu_files: FmuFiles) -> li
 
 
 # -- in the child
-# ------------------------------------------------------------------------------------------------------------
+# ----------------------------------------------------------------------------------------
 
 
 def _run_reporting_failure(reply: IO[str], work: Callable[[], None]) -> int:
@@ -144,14 +150,13 @@ def _run_with_replay(
     _set_deadline(context)
     simulation = Simulation(lambda _: _prepare_job(context, job, fmu_files))
     with keeping_run_files(Path(tempfile.gettempdir()) / "run"), default_float_mode(), simulation:
-        execution = simulation.execute()
-        result = execution.result
+        result = simulation.execute()
         named = replace(result, metadata={**result.metadata, "name": replay.title})
         write_judged_replay(
             named, evaluate_all_checks(result.kpis, replay.checks), Path(replay.page)
         )
-        if execution.failure:
-            raise execution.failure
+        if result.failure:
+            raise result.failure
         _write_reply(
             reply, {"kpis": result.kpis, "units": _known_units(result.metadata["kpi_units"])}
         )
@@ -198,7 +203,7 @@ def _check_job(context: StudyContext, job: Job, fmu_files: FmuFiles, reply: IO[s
 
 
 # -- in the supervisor
-# -------------------------------------------------------------------------------------------------------
+# ----------------------------------------------------------------------------------------
 
 
 def _make_record(
@@ -228,7 +233,7 @@ def _failure_cause(context: StudyContext, failure: ComponentError) -> str:
 
 
 def _without_root(context: StudyContext, text: str) -> str:
-    """Return a text with paths relative to the study's root, so that it is equal on all machines."""
+    """Return a text with paths relative to the study's root, so that all machines give the same."""
     return text.replace(f"{context.root}/", "")
 
 

@@ -43,9 +43,10 @@ def write_sweep_page(
     maps: Sequence[SuccessMap],
     folder: Path,
 ) -> None:
-    """Write every map as NAME.png and NAME.svg, and sweep.html with maps, success rates, KPIs, failures and the design.
+    """Write every map as NAME.png and NAME.svg, and sweep.html.
 
-    Each cell of a map is a link to the replay of one of its runs if there is one, else to the command that repeats that run.
+    The page shows maps, success rates, KPIs, failures and the design. Each cell of a map is a link
+    to the replay of one of its runs if there is one, else to the command that repeats that run.
     Maps of an earlier call are removed.
 
     Args:
@@ -56,15 +57,10 @@ def write_sweep_page(
         folder: the output directory.
     """
     overall = summary.groups[0] if summary.groups else None
-    drawn = {f"{each.name}{suffix}" for each in maps for suffix in (".png", ".svg")}
-    remove_files(
-        folder,
-        *(
-            path.name
-            for path in folder.glob(f"{MAP_NAME}*")
-            if _MAP_FILE.fullmatch(path.name) and path.name not in drawn
-        ),
-    )
+    found = {path.name for path in folder.glob(f"{MAP_NAME}*") if _MAP_FILE.fullmatch(path.name)}
+    for each in maps:
+        found -= {f"{each.name}.png", f"{each.name}.svg"}
+    remove_files(folder, *found)
     statistics = overall.shown_statistics() if overall else ()
     cells = list(_shown_cells(sweep, rows, summary.units, maps, folder))
     text = render_page(
@@ -141,13 +137,12 @@ def _shown_cells(
     maps: Iterable[SuccessMap],
     folder: Path,
 ) -> Iterator[dict[str, Any]]:
-    """Yield each run that represents a cell, once, with the reasons why it is no success and with its command."""
-    shown = {
-        cell.representative_run.number: cell
-        for map_ in maps
-        for cell in map_.cells.values()
-        if cell.representative_run is not None
-    }
+    """Yield each run that represents a cell, once, with its command and why it is no success."""
+    shown: dict[int, MapCell] = {}
+    for map_ in maps:
+        for cell in map_.cells.values():
+            if cell.representative_run is not None:
+                shown[cell.representative_run.number] = cell
     reasons = {row.run: _reasons(sweep, row, units) for row in rows if row.run in shown}
     for number, cell in sorted(shown.items()):
         texts = {"reasons": reasons[number], "command": run_command(sweep, number)}

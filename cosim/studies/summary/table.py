@@ -64,7 +64,7 @@ def write_csv_rows(names: Sequence[str], lines: Iterable[Sequence[Any]], path: P
     ):
         writer = csv.writer(file, lineterminator="\n")
         writer.writerow(map(text_cell, names))
-        writer.writerows([csv_value(value) for value in line] for line in lines)
+        writer.writerows(map(csv_value, line) for line in lines)
 
 
 def csv_value(value: Any) -> Any:
@@ -77,16 +77,17 @@ def csv_value(value: Any) -> Any:
 
 
 def write_parquet(rows: RowSource, factors: Sequence[str], kpis: Sequence[str], path: Path) -> None:
-    """Write the table as Parquet (extra `parquet`), with KPIs and purely numeric factors as doubles."""
+    """Write the table as Parquet (extra `parquet`).
+
+    KPIs and purely numeric factors are doubles.
+    """
     import pyarrow as pa
     from pyarrow.parquet import ParquetWriter
 
-    texts = {
-        name
-        for row in rows()
-        for name, label in row.point.labels.items()
-        if not isinstance(label, int | float)
-    }
+    texts: set[str] = set()
+    for row in rows():
+        labels = row.point.labels
+        texts.update(name for name in labels if not isinstance(labels[name], int | float))
     kinds = {"run": pa.int64(), "status": pa.string(), "passed": pa.bool_(), "failure": pa.string()}
     names = table_header(factors, kpis)
     schema = pa.schema(
@@ -105,9 +106,10 @@ def _arrow_columns(batch: list[list[Any]], schema: Any) -> Iterator[Any]:
     import pyarrow as pa
 
     for field, column in zip(schema, zip(*batch, strict=True), strict=True):
-        text, number = field.type == pa.string(), field.type == pa.float64()
-        plain = [
-            str(csv_value(v)) if text else float(v) if number and v is not None else v
-            for v in column
-        ]
-        yield pa.array(plain, field.type)
+        if field.type == pa.string():
+            yield pa.array([str(csv_value(value)) for value in column], field.type)
+        elif field.type == pa.float64():
+            numbers = [None if value is None else float(value) for value in column]
+            yield pa.array(numbers, field.type)
+        else:
+            yield pa.array(column, field.type)

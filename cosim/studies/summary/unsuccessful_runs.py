@@ -104,7 +104,10 @@ def run_command(sweep: Sweep, run: int) -> str:
 
 
 def run_settings(sweep: Sweep, run: int) -> dict[str, Any]:
-    """Return the settings that repeat a run with all signals that the scenario records, not only those that the sweep needs."""
+    """Return the settings that repeat a run with all signals that the scenario records.
+
+    A sweep may record only those that it needs.
+    """
     settings = sweep.study.job(sweep.design[run].settings).settings
     return {name: value for name, value in settings.items() if not name.startswith("/record")}
 
@@ -122,17 +125,18 @@ def format_run_command(scenario: Path, settings: Any) -> str:
         name: change_pointed(name, value, change) if name.startswith("/") else value
         for name, value in settings.items()
     }
-    words = [
-        word
-        for name, value in moved.items()
-        for word in ("--set", f"{name}={_setting_text(value)}")
-    ]
-    return shlex.join(["cosim", "run", _scenario_text(scenario), *words])
+    words = ["cosim", "run", _scenario_text(scenario)]
+    for name, value in moved.items():
+        words += ["--set", f"{name}={_setting_text(value)}"]
+    return shlex.join(words)
 
 
 @lru_cache(1)  # a sweep writes a command for each run without success
 def _path_changes(folder: Path, working: Path) -> PathChange:
-    """Return a function that makes paths relative to the folder shipped ones, or relative to the working directory."""
+    """Return a function that changes paths relative to the folder.
+
+    They become paths of shipped files, or relative to the working directory.
+    """
     to_shipped, to_working = relocating(folder, resources.root()), relocating(folder, working)
 
     def change(text: str) -> str:

@@ -12,7 +12,7 @@ import pytest
 from click.testing import CliRunner
 from world_harness import WorldHarness
 
-from cosim.cli.commands.new_vehicle import command
+from cosim.cli.commands.new_vehicle import vehicle as command
 from cosim.core import resources
 from cosim.core.errors import InputError
 from plant_src.catalogue import model_from_data

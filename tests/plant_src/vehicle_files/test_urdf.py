@@ -13,7 +13,7 @@ from click.testing import CliRunner, Result
 from scipy.spatial.transform import Rotation
 from world_harness import WorldHarness
 
-from cosim.cli.commands.new_vehicle import command
+from cosim.cli.commands.new_vehicle import vehicle as command
 from cosim.core.errors import InputError
 from plant_src.catalogue import model_from_data
 from plant_src.vehicle_files.urdf import vehicle_from_urdf

@@ -2,8 +2,8 @@
 
 from __future__ import annotations
 
-import importlib
-from typing import Any
+import subprocess
+import sys
 
 import pytest
 from fmpy import read_model_description
@@ -13,10 +13,6 @@ from plant_src.catalogue import MODELS, VEHICLE_MODELS
 from plant_src.vehicles.common.interface import ENVIRONMENT_INPUTS
 
 ALL = pytest.mark.parametrize("name", MODELS)
-
-
-def equations(name: str) -> Any:
-    return importlib.import_module(f"plant_src.vehicles.{name}.equations")
 
 
 @ALL
@@ -49,3 +45,15 @@ def test_strider_moves_in_the_plane_by_default() -> None:
     ]
     assert next(iter(VEHICLE_MODELS["strider"])) == "planar"
     assert list(VEHICLE_MODELS["otter"]) == ["6dof"]
+
+
+def test_a_run_reads_only_the_vehicles_that_it_uses() -> None:
+    program = (
+        "import cosim, sys; cosim.load('demo1_box').step(); "
+        "from plant_src.catalogue import MODELS, VEHICLE_MODELS; "
+        "print(sorted(MODELS._made), 'plant_src.vehicles.submerged.craft' in sys.modules)"
+    )
+    done = subprocess.run(
+        [sys.executable, "-c", program], cwd=resources.root(), capture_output=True, check=True
+    )
+    assert done.stdout.decode().split("\n")[0] == "['ar_drone', 'strider', 'strider_6dof'] False"

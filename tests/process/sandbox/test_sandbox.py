@@ -38,7 +38,12 @@ needs_bubblewrap = pytest.mark.skipif(not AVAILABLE.bubblewrap, reason="no bubbl
 WORKER = """
 import json, os, socket, subprocess, sys
 from pathlib import Path
-from cosim.process.sandbox import SandboxSettings, enter_sandbox, interpreter_folders, probe_restrictions
+from cosim.process.sandbox import (
+    SandboxSettings,
+    enter_sandbox,
+    interpreter_folders,
+    probe_restrictions,
+)
 settings = json.loads(sys.argv[1])
 for kind in ("readable", "writable"):
     settings[kind] = tuple(Path(p) for p in settings.get(kind, ()))
@@ -54,7 +59,10 @@ print(json.dumps(outcome, default=str))
 
 
 def worker(expression: str, **settings: object) -> object:
-    """Evaluate an expression in a sandboxed process; return its value or the name of its exception."""
+    """Evaluate an expression in a sandboxed process.
+
+    Return its value or the name of its exception.
+    """
     words = [sys.executable, "-c", WORKER, json.dumps(settings, default=str), expression]
     done = subprocess.run(words, capture_output=True, text=True, check=False, timeout=60)
     assert done.returncode == 0, done.stderr
@@ -180,7 +188,10 @@ from cosim.process.sandbox import clear_environment
 found, secret = 0, [ord(c) for c in "yromem-ni-hsifdrows"[::-1]]
 regions = [line.split() for line in open("/proc/self/maps")]
 with open("/proc/self/mem", "rb", 0) as memory:
-    for begin, end in (map(lambda word: int(word, 16), words[0].split("-")) for words in regions if words[1][:2] == "rw"):
+    for addresses, permissions, *_ in regions:
+        if permissions[:2] != "rw":
+            continue
+        begin, end = (int(word, 16) for word in addresses.split("-"))
         memory.seek(begin)
         content = memory.read(end - begin)
         first = content.find(bytes(secret[:8]))

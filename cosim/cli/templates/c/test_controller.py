@@ -1,4 +1,7 @@
-"""Test of the controller CONTROLLER in its scenario, by the command that ends an endless loop or a crash with a message."""
+"""Test of the controller CONTROLLER in its scenario.
+
+The command ends an endless loop or a crash with a message.
+"""
 
 import subprocess
 import sys

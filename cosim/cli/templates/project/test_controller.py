@@ -13,7 +13,10 @@ COURSE = Path(__file__).parents[1] / "scenarios/course.json"
 
 
 def run_course(folder: Path, setting: str) -> None:
-    """Run the scenario with a changed value by the command, which ends an endless loop or a crash with a message."""
+    """Run the scenario with a changed value.
+
+    The command ends an endless loop or a crash with a message.
+    """
     command = [
         sys.executable,
         "-m",

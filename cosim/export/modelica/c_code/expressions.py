@@ -10,8 +10,20 @@ from __future__ import annotations
 import json
 from collections.abc import Callable
 
-from ..model import syntax_tree
-from ..model.syntax_tree import SourceLocation, raise_model_error
+from ..model.syntax_tree import (
+    Array,
+    Binary,
+    Call,
+    Comprehension,
+    Expression,
+    If,
+    Literal,
+    Name,
+    Range,
+    SourceLocation,
+    Unary,
+    raise_model_error,
+)
 from ..model.traversal import unroll
 from .builtin_functions import BuiltinLowering
 from .c_values import (
@@ -37,7 +49,7 @@ _COMPARISONS = {"<": "<", "<=": "<=", ">": ">", ">=": ">=", "==": "==", "<>": "!
 class ExpressionLowering(BuiltinLowering):
     """Lowering of expressions."""
 
-    def _literal(self, node: syntax_tree.Literal) -> CValue:
+    def _literal(self, node: Literal) -> CValue:
         if node.type == "String":
             return scalar_value(
                 "String", CExpression(json.dumps(node.value, ensure_ascii=False)), reusable=True
@@ -48,19 +60,19 @@ class ExpressionLowering(BuiltinLowering):
             )
         return scalar_value(node.type, c_literal(node.number, node.type), reusable=True)
 
-    def _name(self, node: syntax_tree.Name) -> CValue:
+    def _name(self, node: Name) -> CValue:
         if node.name not in self.scope:
             raise_model_error(f"unknown name {node.name}", node.where)
         return self.scope[node.name]
 
-    def _comprehension(self, node: syntax_tree.Comprehension) -> CValue:
-        if not isinstance(node.range, syntax_tree.Range):
+    def _comprehension(self, node: Comprehension) -> CValue:
+        if not isinstance(node.range, Range):
             raise_model_error("an iterator needs a range such as 1:n", node.where)
         return self.lower(
-            unroll(node, [syntax_tree.Literal(k, "Integer") for k in self.static_range(node.range)])
+            unroll(node, [Literal(k, "Integer") for k in self.static_range(node.range)])
         )
 
-    def _array(self, node: syntax_tree.Array) -> CValue:
+    def _array(self, node: Array) -> CValue:
         parts = [self.lower(element) for element in node.elements]
         if len({part.shape for part in parts}) != 1:
             raise_model_error("the elements of an array constructor have different shapes", None)
@@ -74,7 +86,7 @@ class ExpressionLowering(BuiltinLowering):
             reusable=reusable,
         )
 
-    def _range(self, node: syntax_tree.Range) -> CValue:
+    def _range(self, node: Range) -> CValue:
         numbers = self.static_range(node)
         return CValue(
             "Integer",
@@ -86,11 +98,11 @@ class ExpressionLowering(BuiltinLowering):
 
     # operators
 
-    def _unary(self, node: syntax_tree.Unary) -> CValue:
+    def _unary(self, node: Unary) -> CValue:
         operand = self.lower(node.operand)
         if node.operator == "not":
             return map_elements(operand, "Boolean", lambda text: prefix("!", text))
-        if isinstance(node.operand, syntax_tree.Literal):
+        if isinstance(node.operand, Literal):
             return scalar_value(
                 operand.type, c_literal(-node.operand.number, operand.type), reusable=True
             )
@@ -98,7 +110,7 @@ class ExpressionLowering(BuiltinLowering):
             return map_elements(operand, "Integer", lambda text: c_call("subtract", "m", "0", text))
         return map_elements(operand, "Real", lambda text: prefix("-", text))
 
-    def _binary(self, node: syntax_tree.Binary) -> CValue:
+    def _binary(self, node: Binary) -> CValue:
         operator = node.operator
         if operator in ("and", "or"):
             return self._logical(node)
@@ -121,10 +133,10 @@ class ExpressionLowering(BuiltinLowering):
         )
 
     def _arithmetic(
-        self, operator: str, type_name: str, left: CValue, node: syntax_tree.Binary
+        self, operator: str, type_name: str, left: CValue, node: Binary
     ) -> Callable[[CExpression, CExpression], CExpression]:
         if operator == "^":
-            if node.right == syntax_tree.Literal(2, "Integer"):
+            if node.right == Literal(2, "Integer"):
                 return lambda a, _: c_call("square", a)
             return lambda a, b: c_call("pow", a, b)
         if type_name == "Integer":
@@ -135,7 +147,7 @@ class ExpressionLowering(BuiltinLowering):
             )
         return lambda a, b: infix(operator, a, b)
 
-    def _logical(self, node: syntax_tree.Binary) -> CValue:
+    def _logical(self, node: Binary) -> CValue:
         left = self.scalar_of(node.left)
         with self.collect_lines() as lines:
             right = self.scalar_of(node.right)
@@ -216,7 +228,7 @@ class ExpressionLowering(BuiltinLowering):
             indexable_in_loop=columns == 1 and left.indexable_in_loop,
         )
 
-    def known_branch(self, node: syntax_tree.If) -> syntax_tree.Expression | None:
+    def known_branch(self, node: If) -> Expression | None:
         """Return the value of an if-expression without the branches before it, if the first condition is constant, else None."""
         condition, value = node.branches[0]
         known = self.static_value(condition)
@@ -224,7 +236,7 @@ class ExpressionLowering(BuiltinLowering):
             return None
         return value if known else _without_first_branch(node)
 
-    def _if(self, node: syntax_tree.If) -> CValue:
+    def _if(self, node: If) -> CValue:
         if (known := self.known_branch(node)) is not None:
             return self.lower(known)
         condition, yes = node.branches[0]
@@ -249,10 +261,10 @@ class ExpressionLowering(BuiltinLowering):
 
     # functions
 
-    def _call(self, node: syntax_tree.Call) -> CValue:
+    def _call(self, node: Call) -> CValue:
         return self.lower_call(node)[node.result]
 
-    def lower_call(self, node: syntax_tree.Call, target: str | None = None) -> tuple[CValue, ...]:
+    def lower_call(self, node: Call, target: str | None = None) -> tuple[CValue, ...]:
         """Lower a call of a function of the model.
 
         Args:
@@ -287,6 +299,6 @@ class ExpressionLowering(BuiltinLowering):
         return results
 
 
-def _without_first_branch(node: syntax_tree.If) -> syntax_tree.Expression:
+def _without_first_branch(node: If) -> Expression:
     rest = node.branches[1:]
-    return syntax_tree.If(rest, node.otherwise) if rest else node.otherwise
+    return If(rest, node.otherwise) if rest else node.otherwise

@@ -9,9 +9,16 @@ from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from ..model import syntax_tree
 from ..model.flat_model import Function, FunctionVariable
-from ..model.syntax_tree import SourceLocation, raise_model_error, referenced_variable
+from ..model.syntax_tree import (
+    Assert,
+    Call,
+    Literal,
+    Name,
+    SourceLocation,
+    raise_model_error,
+    referenced_variable,
+)
 from ..model.traversal import read_references, rewrite, variable_names, walk
 from .c_values import C_TYPES, CValue, c_identifier, uses_variable, variable_value, wrap_lines
 from .lowering import FunctionInstance
@@ -34,16 +41,16 @@ class FunctionTranslator:
     _in_translation: list[str] = field(default_factory=list)
 
     #: assertions with the level warning, in the order of their numbers
-    warnings: list[syntax_tree.Assert] = field(default_factory=list)
+    warnings: list[Assert] = field(default_factory=list)
 
-    def warning_number(self, node: syntax_tree.Assert) -> int:
+    def warning_number(self, node: Assert) -> int:
         """Return the number of an assertion with the level warning."""
         if node not in self.warnings:
             self.warnings.append(node)
         return self.warnings.index(node)
 
     def function_instance(
-        self, call: syntax_tree.Call, shapes: Shapes, numbers: tuple[int | None, ...]
+        self, call: Call, shapes: Shapes, numbers: tuple[int | None, ...]
     ) -> FunctionInstance:
         """Return the C function for a call.
 
@@ -145,9 +152,7 @@ class FunctionTranslator:
     ) -> None:
         for local in variables:
             if local.default is not None:
-                lowering.store(
-                    lowering.scope[local.name], local.default, syntax_tree.Name(local.name)
-                )
+                lowering.store(lowering.scope[local.name], local.default, Name(local.name))
 
     def _name(self, name: str) -> str:
         base = c_identifier(name) if "." in name else c_identifier(name) + "_"
@@ -168,18 +173,16 @@ def _with_sizes(function: Function, numbers: tuple[int | None, ...]) -> tuple[Fu
     used = variable_names(
         tuple(local.dimensions for local in (*function.outputs, *function.locals))
     )
-    used |= variable_names(
-        tuple(n.arguments for n in walk(function.body) if isinstance(n, syntax_tree.Call))
-    )
+    used |= variable_names(tuple(n.arguments for n in walk(function.body) if isinstance(n, Call)))
     sizes = tuple(
         (i.name, n)
         for i, n in zip(function.inputs, numbers, strict=False)
         if n is not None and i.name in used
     )
-    literals = {name: syntax_tree.Literal(number, "Integer") for name, number in sizes}
+    literals = {name: Literal(number, "Integer") for name, number in sizes}
 
     def insert(node: Any) -> Any:
-        return literals.get(node.name, node) if isinstance(node, syntax_tree.Name) else node
+        return literals.get(node.name, node) if isinstance(node, Name) else node
 
     def resize(local: FunctionVariable) -> FunctionVariable:
         return replace(

@@ -10,12 +10,25 @@ from math import prod
 from typing import Any, Protocol
 
 from ....core.text import count_noun
-from ..model import syntax_tree
 from ..model.arithmetic import EvaluationError
 from ..model.evaluate import Evaluator
 from ..model.flat_model import Function
-from ..model.syntax_tree import Expression, SourceLocation, raise_model_error
-from ..model.traversal import walk
+from ..model.syntax_tree import (
+    Assert,
+    Binary,
+    Builtin,
+    Call,
+    Colon,
+    Expression,
+    Index,
+    Literal,
+    Name,
+    Range,
+    SourceLocation,
+    Unary,
+    raise_model_error,
+)
+from ..model.traversal import is_call, walk
 from .c_values import (
     C_TYPES,
     CExpression,
@@ -51,12 +64,12 @@ class TranslationUnit(Protocol):
     def failure_code(self, reason: str, where: SourceLocation | None) -> str:
         """Return the number of a failure reason."""
 
-    def warning_number(self, node: syntax_tree.Assert) -> int:
+    def warning_number(self, node: Assert) -> int:
         """Return the number of an assertion with the level warning."""
 
     def function_instance(
         self,
-        call: syntax_tree.Call,
+        call: Call,
         shapes: tuple[tuple[int, ...], ...],
         numbers: tuple[int | None, ...],
     ) -> FunctionInstance:
@@ -173,36 +186,32 @@ class Lowering:
 
         Return None for all other expressions.
         """
-        if isinstance(node, syntax_tree.Literal) and node.type in ("Integer", "Enumeration"):
+        if isinstance(node, Literal) and node.type in ("Integer", "Enumeration"):
             return int(node.number)
-        if isinstance(node, syntax_tree.Unary) and node.operator == "-":
+        if isinstance(node, Unary) and node.operator == "-":
             operand = self.static_integer(node.operand)
             return None if operand is None else -operand
-        if isinstance(node, syntax_tree.Binary) and node.operator in ("+", "-", "*"):
+        if isinstance(node, Binary) and node.operator in ("+", "-", "*"):
             left, right = self.static_integer(node.left), self.static_integer(node.right)
             if left is None or right is None:
                 return None
             return {"+": left + right, "-": left - right, "*": left * right}[node.operator]
-        if (
-            isinstance(node, syntax_tree.Builtin)
-            and node.name == "size"
-            and len(node.arguments) == 2
-        ):
+        if is_call(node, "size") and len(node.arguments) == 2:
             dimension = self.static_integer(node.arguments[1])
             return None if dimension is None else self.shape_of(node.arguments[0])[dimension - 1]
-        value = self.static_value(node) if isinstance(node, syntax_tree.Builtin) else None
+        value = self.static_value(node) if isinstance(node, Builtin) else None
         return value if isinstance(value, int) else None
 
     def static_value(self, node: Expression) -> Any:
         """Return the value of an expression without variables; None for all other expressions."""
-        if any(isinstance(n, syntax_tree.Name | syntax_tree.Call) for n in walk(node)):
+        if any(isinstance(n, Name | Call) for n in walk(node)):
             return None
         try:
             return Evaluator({}, {})(node)
         except (EvaluationError, KeyError):
             return None
 
-    def static_range(self, node: syntax_tree.Range) -> list[int]:
+    def static_range(self, node: Range) -> list[int]:
         """Return the values of a range.
 
         Raises:
@@ -210,7 +219,7 @@ class Lowering:
         """
         start, step, stop = (
             self.static_integer(e)
-            for e in (node.start, node.step or syntax_tree.Literal(1, "Integer"), node.stop)
+            for e in (node.start, node.step or Literal(1, "Integer"), node.stop)
         )
         if start is None or step is None or stop is None:
             raise_model_error(
@@ -220,11 +229,11 @@ class Lowering:
 
     # subscripts
 
-    def _index(self, node: syntax_tree.Index) -> CValue:
+    def _index(self, node: Index) -> CValue:
         base = self.lower(node.base)
         return self.select_elements(base, node)
 
-    def select_elements(self, base: CValue, node: syntax_tree.Index) -> CValue:
+    def select_elements(self, base: CValue, node: Index) -> CValue:
         """Return the element or slice of an array; it can be the target of an assignment.
 
         Args:
@@ -237,10 +246,10 @@ class Lowering:
         if len(node.subscripts) > len(base.shape):
             found = f"found {count_noun(len(node.subscripts), 'subscript')}"
             raise_model_error(f"{found}, expected at most {len(base.shape)}", node.where)
-        label = node.base.name if isinstance(node.base, syntax_tree.Name) else "array"
+        label = node.base.name if isinstance(node.base, Name) else "array"
         subscripts = [
             *node.subscripts,
-            *[syntax_tree.Colon()] * (len(base.shape) - len(node.subscripts)),
+            *[Colon()] * (len(base.shape) - len(node.subscripts)),
         ]
         offsets = [
             self._element_offsets(s, n, label, node.where)
@@ -268,15 +277,15 @@ class Lowering:
 
     def _element_offsets(
         self,
-        subscript: Expression | syntax_tree.Colon,
+        subscript: Expression | Colon,
         size: int,
         label: str,
         where: SourceLocation | None,
     ) -> list[int] | int | str:
         """Return the offset (from 0) of an element as a number or C code, or the offsets of a slice as a list."""
-        if isinstance(subscript, syntax_tree.Colon):
+        if isinstance(subscript, Colon):
             return list(range(size))
-        if isinstance(subscript, syntax_tree.Range):
+        if isinstance(subscript, Range):
             return [self._check_bounds(k, size, label, where) for k in self.static_range(subscript)]
         if (static := self.static_integer(subscript)) is not None:
             return self._check_bounds(static, size, label, where)

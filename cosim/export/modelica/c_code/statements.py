@@ -7,9 +7,32 @@ from dataclasses import dataclass, replace
 from itertools import chain
 
 from ..external.c_files import call_signature
-from ..model import syntax_tree
-from ..model.syntax_tree import Body, Expression, Statement, raise_model_error
-from ..model.traversal import assigned_references, composed_asserts, read_references, variable_names
+from ..model.syntax_tree import (
+    Assert,
+    Assign,
+    Body,
+    Call,
+    EdgeDetector,
+    Expression,
+    ExternalCall,
+    For,
+    If,
+    IfStatement,
+    Literal,
+    MultiAssign,
+    Name,
+    Solve,
+    Statement,
+    While,
+    raise_model_error,
+    referenced_variable,
+)
+from ..model.traversal import (
+    assigned_names,
+    composed_asserts,
+    read_references,
+    variable_names,
+)
 from .c_values import CExpression, CValue, c_identifier, scalar_value
 from .expressions import ExpressionLowering
 
@@ -38,7 +61,7 @@ class StatementLowering(ExpressionLowering):
         """
         getattr(self, f"_{type(node).__name__.lower()}")(node)
 
-    def _assign(self, node: syntax_tree.Assign) -> None:
+    def _assign(self, node: Assign) -> None:
         self.store(self.lower(node.target), node.value, node.target)
 
     def store(self, target: CValue, value: Expression, reference: Expression) -> None:
@@ -50,14 +73,12 @@ class StatementLowering(ExpressionLowering):
             reference: The assigned variable as an expression. It determines whether `value` depends
                 on the target.
         """
-        while isinstance(value, syntax_tree.If) and (known := self.known_branch(value)) is not None:
+        while isinstance(value, If) and (known := self.known_branch(value)) is not None:
             value = known
-        if isinstance(value, syntax_tree.If) and (
-            target.shape or self._needs_if_statement(target, value)
-        ):
+        if isinstance(value, If) and (target.shape or self._needs_if_statement(target, value)):
             self._lower_choice(target, value, reference)
         elif (
-            isinstance(value, syntax_tree.Call)
+            isinstance(value, Call)
             and target.pointer
             and not _variables_read(value) & variable_names(reference)
             and self._can_return_into(value, target)
@@ -77,7 +98,7 @@ class StatementLowering(ExpressionLowering):
             lowered = self.evaluated_once(replace(lowered, reusable=False))
         self.copy_elements(target, lowered)
 
-    def _can_return_into(self, value: syntax_tree.Call, target: CValue) -> bool:
+    def _can_return_into(self, value: Call, target: CValue) -> bool:
         """Return whether a function can write its result to the target without a copy."""
         shapes, numbers = (
             tuple(map(self.shape_of, value.arguments)),
@@ -86,14 +107,14 @@ class StatementLowering(ExpressionLowering):
         outputs = self.translation_unit.function_instance(value, shapes, numbers).outputs
         return [(output.type, output.shape) for output in outputs] == [(target.type, target.shape)]
 
-    def _needs_if_statement(self, target: CValue, value: syntax_tree.If) -> bool:
+    def _needs_if_statement(self, target: CValue, value: If) -> bool:
         if len(value.branches) > 1:
             return True
         with self.collect_lines() as lines:
             text = self.lower(value).text
         return bool(lines) or len(target.text.code) + len(text.code) > _MAX_CONDITIONAL_LENGTH
 
-    def _lower_choice(self, target: CValue, value: syntax_tree.If, reference: Expression) -> None:
+    def _lower_choice(self, target: CValue, value: If, reference: Expression) -> None:
         """Lower an if-expression to an if-statement.
 
         An `else if` is nested if its condition requires statements.
@@ -104,7 +125,7 @@ class StatementLowering(ExpressionLowering):
             self.store(target, first, reference)
         with self.collect_lines() as no:
             if rest:
-                self._lower_choice(target, syntax_tree.If(rest, value.otherwise), reference)
+                self._lower_choice(target, If(rest, value.otherwise), reference)
             else:
                 self.store(target, value.otherwise, reference)
         self._close_if(yes, no)
@@ -122,32 +143,32 @@ class StatementLowering(ExpressionLowering):
         else:
             self.lines.append("}")
 
-    def _ifstatement(self, node: syntax_tree.IfStatement) -> None:
+    def _ifstatement(self, node: IfStatement) -> None:
         (condition, body), rest = node.branches[0], node.branches[1:]
         if (known := self.static_value(condition)) is not None:
             if known or not rest:
                 self.body(body if known else node.otherwise)
             else:
-                self._ifstatement(syntax_tree.IfStatement(rest, node.otherwise, node.where))
+                self._ifstatement(IfStatement(rest, node.otherwise, node.where))
             return
         self.lines.append(f"if ({self.scalar_of(condition).code}) {{")
         with self.collect_lines() as yes:
             self.body(body)
         with self.collect_lines() as no:
             if rest:
-                self._ifstatement(syntax_tree.IfStatement(rest, node.otherwise, node.where))
+                self._ifstatement(IfStatement(rest, node.otherwise, node.where))
             else:
                 self.body(node.otherwise)
         self._close_if(yes, no)
 
-    def _for(self, node: syntax_tree.For) -> None:
+    def _for(self, node: For) -> None:
         start, stop = self.scalar_of(node.range.start), self.scalar_of(node.range.stop)
         step = self.static_integer(node.range.step) if node.range.step else 1
         if not step:
             raise_model_error("the step of a for-loop must be a constant other than 0", node.where)
-        if not stop.code.lstrip("-").isdigit() and _variables_read(node.range.stop) & {
-            syntax_tree.referenced_variable(t) for t in assigned_references(node.body)
-        }:
+        if not stop.code.lstrip("-").isdigit() and _variables_read(
+            node.range.stop
+        ) & assigned_names(node.body):
             stop = self.evaluated_once(scalar_value("Integer", stop)).text
         index = c_identifier(node.index)
         first, last = self.static_integer(node.range.start), self.static_integer(node.range.stop)
@@ -168,18 +189,16 @@ class StatementLowering(ExpressionLowering):
             self.scope[node.index] = shadowed
         self.lines += [*lines, "}"]
 
-    def _assert(self, node: syntax_tree.Assert) -> None:
+    def _assert(self, node: Assert) -> None:
         if composed_asserts(node):
             self._composed_assert(node)
             return
         condition = self.scalar_of(node.condition)
-        text = "".join(
-            str(part.value) for part in node.message if isinstance(part, syntax_tree.Literal)
-        )
+        text = "".join(str(part.value) for part in node.message if isinstance(part, Literal))
         failure = self.translation_unit.failure_code(text, node.where)
         self.lines.append(f"if (!{condition.parenthesized(13)}) fail(m, {failure});")
 
-    def _composed_assert(self, node: syntax_tree.Assert) -> None:
+    def _composed_assert(self, node: Assert) -> None:
         """Lower an assertion whose message contains values, whose level is warning, or which is a `terminate`."""
         condition = self.scalar_of(node.condition).parenthesized(13)
         with self.collect_lines() as lines:
@@ -203,14 +222,14 @@ class StatementLowering(ExpressionLowering):
 
     def _message_part(self, part: Expression) -> tuple[str, str]:
         """Return the format of a part of a message and the C expression of its value, "" for a literal."""
-        if isinstance(part, syntax_tree.Literal):
+        if isinstance(part, Literal):
             return str(part.value).replace("%", "%%"), ""
         value = self.lower(part)
         if value.type == "Boolean":
             return "%s", f"truth({value.text.code})"
         return ("%g" if value.type == "Real" else "%d"), value.text.code
 
-    def _solve(self, node: syntax_tree.Solve) -> None:
+    def _solve(self, node: Solve) -> None:
         """Lower a system of equations to a loop of Newton's method."""
         n, failure = (
             len(node.unknowns),
@@ -231,7 +250,7 @@ class StatementLowering(ExpressionLowering):
         state = [f"double step[{n}], scale[{n}];", "NewtonSearch search;"]
         self.lines += ["{", *state, "for (int iteration = 0;; iteration++) {", *lines, "}", "}"]
 
-    def _externalcall(self, node: syntax_tree.ExternalCall) -> None:
+    def _externalcall(self, node: ExternalCall) -> None:
         """Lower the body of an external function."""
         function = self.translation_unit.functions[self.function]
         signature, outputs = call_signature(function), {output.name for output in function.outputs}
@@ -243,7 +262,7 @@ class StatementLowering(ExpressionLowering):
                     self.as_c_array(value, argument.type),
                     *[str(value.size)] * signature.is_constructor,
                 ]
-            elif isinstance(expression, syntax_tree.Name) and expression.name in outputs:
+            elif isinstance(expression, Name) and expression.name in outputs:
                 arguments.append(f"&{value.text.code}")
             else:
                 arguments.append(
@@ -257,17 +276,17 @@ class StatementLowering(ExpressionLowering):
         )
         self.lines.append(f"if (!{signature.name}({', '.join(arguments)})) fail(m, {failure});")
 
-    def _while(self, node: syntax_tree.While) -> None:
+    def _while(self, node: While) -> None:
         with self.collect_lines() as lines:
             self.lines.append(f"if (!{self.scalar_of(node.condition).parenthesized(13)}) break;")
             self.body(node.body)
         self.lines += ["for (;;) {", *lines, "}"]
 
-    def _multiassign(self, node: syntax_tree.MultiAssign) -> None:
+    def _multiassign(self, node: MultiAssign) -> None:
         for target, result in zip(node.targets, self.lower_call(node.call), strict=False):
             self.copy_elements(self.lower(target), result)
 
-    def _edgedetector(self, node: syntax_tree.EdgeDetector) -> None:
+    def _edgedetector(self, node: EdgeDetector) -> None:
         """Set the flag risen(k) if the condition has become true since the previous event."""
         condition = self.scalar_of(node.condition).code
         if self.initial:
@@ -282,7 +301,7 @@ class StatementLowering(ExpressionLowering):
 
 def _variables_read(node: Expression) -> set[str]:
     """Return the variables whose current value an expression reads."""
-    return {syntax_tree.referenced_variable(reference) for reference in read_references(node)}
+    return {referenced_variable(reference) for reference in read_references(node)}
 
 
 def _is_one_if(lines: list[str]) -> bool:

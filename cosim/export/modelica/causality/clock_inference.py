@@ -14,7 +14,7 @@ from typing import Any
 
 from ..model.builtin_functions import CLOCKED_OPERATORS, CONVERSIONS
 from ..model.evaluate import Evaluator
-from ..model.flat_model import Model
+from ..model.flat_model import EVENT_SECTIONS, Model
 from ..model.syntax_tree import (
     Builtin,
     Expression,
@@ -25,9 +25,7 @@ from ..model.syntax_tree import (
     When,
     raise_model_error,
 )
-from ..model.traversal import variable_names, walk
-
-SECTIONS = ("equations", "whens", "algorithms", "asserts")
+from ..model.traversal import is_call, variable_names, walk
 
 
 @dataclass(frozen=True, slots=True)
@@ -90,11 +88,7 @@ def is_clocked_when(when: Any, model: Model) -> bool:
 
 def clock_parameters(model: Model) -> set[str]:
     """Return the parameters that determine clocks; they are constants of the FMU."""
-    calls = [
-        item
-        for item in walk(_sections(model))
-        if isinstance(item, Builtin) and item.name in (*CONVERSIONS, "Clock")
-    ]
+    calls = [item for item in walk(event_sections(model)) if is_call(item, *CONVERSIONS, "Clock")]
     return {
         name
         for name in variable_names(tuple(calls))
@@ -102,8 +96,9 @@ def clock_parameters(model: Model) -> set[str]:
     }
 
 
-def _sections(model: Model) -> tuple[Any, ...]:
-    return tuple(getattr(model, section) for section in SECTIONS)
+def event_sections(model: Model) -> tuple[Any, ...]:
+    """Return all equations and statements that are evaluated at events."""
+    return tuple(getattr(model, section) for section in EVENT_SECTIONS)
 
 
 class ClockInference:
@@ -133,7 +128,7 @@ class ClockInference:
 
     def items(self) -> Iterator[tuple[str, Any]]:
         """Yield all equations, when-clauses, algorithms and assertions with the names of their nodes."""
-        for section in SECTIONS:
+        for section in EVENT_SECTIONS:
             for number, item in enumerate(getattr(self._model, section)):
                 yield f"{section} {number}", item
 
@@ -182,7 +177,7 @@ class ClockInference:
         elif isinstance(tree, If) and is_clock(tree, self._model):
             self._collect(node, self.selected(tree), where)
         elif is_dataclass(tree):
-            if isinstance(tree, Builtin) and tree.name == "der":
+            if is_call(tree, "der"):
                 self._continuous.append((node, "der()", where))
             for field in fields(tree):
                 self._collect(node, getattr(tree, field.name), where)

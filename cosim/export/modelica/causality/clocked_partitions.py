@@ -12,7 +12,15 @@ from dataclasses import fields, is_dataclass, replace
 from typing import Any
 
 from ..model.builtin_functions import CLOCKED_OPERATORS, PRE_OPERATORS, ROUNDINGS
-from ..model.flat_model import SAMPLED, Equation, Model, Variable, internal_variable, is_input
+from ..model.flat_model import (
+    EVENT_SECTIONS,
+    SAMPLED,
+    Equation,
+    Model,
+    Variable,
+    internal_variable,
+    is_input,
+)
 from ..model.syntax_tree import (
     Array,
     Assign,
@@ -30,11 +38,17 @@ from ..model.syntax_tree import (
     raise_model_error,
     referenced_variable,
 )
-from ..model.traversal import assigned_references, has_builtin, variable_names, walk
+from ..model.traversal import (
+    assigned_names,
+    has_builtin,
+    is_call,
+    variable_names,
+    walk,
+)
 from .clock_inference import (
-    SECTIONS,
     ClockInference,
     Rate,
+    event_sections,
     is_clock,
     is_clocked_when,
     is_sampler,
@@ -51,7 +65,7 @@ def resolve_clocks(model: Model) -> Model:
     Raises:
         InputError: A clock is not determined, contradictory or not supported.
     """
-    sections = tuple(getattr(model, section) for section in SECTIONS)
+    sections = event_sections(model)
     if (
         not has_builtin(sections, *CLOCKED_OPERATORS)
         and next(samplers(sections, model), None) is None
@@ -77,7 +91,7 @@ class _Replacement:
         self._ticks: dict[Rate, Name] = {}
         self._jumps = JumpSearch(model)
         self._limits: list[Equation] = []
-        sections = tuple(getattr(model, section) for section in SECTIONS)
+        sections = event_sections(model)
         #: true if a sampled value can depend on a held one, so that held values have their start
         #: values at the initialization
         self._has_limits = any(
@@ -86,7 +100,7 @@ class _Replacement:
 
     def model(self) -> Model:
         """Return the translated model."""
-        changed: dict[str, list[Any]] = {section: [] for section in SECTIONS}
+        changed: dict[str, list[Any]] = {section: [] for section in EVENT_SECTIONS}
         for node, item in self._clocks.items():
             if isinstance(item, Equation) and (
                 is_clock(item.left, self._model) or is_clock(item.right, self._model)
@@ -287,11 +301,7 @@ class JumpSearch:
 
     def __init__(self, model: Model):
         self._model = model
-        calls = (
-            item
-            for item in walk(model.equations)
-            if isinstance(item, Builtin) and item.name == "der"
-        )
+        calls = (item for item in walk(model.equations) if is_call(item, "der"))
         ends = {
             referenced_variable(call.arguments[0])
             for call in calls
@@ -303,10 +313,7 @@ class JumpSearch:
             if is_input(v) or v.variability in ("parameter", "constant")
         }
         self._ends = ends
-        self._assigned = {
-            referenced_variable(target)
-            for target in assigned_references((model.whens, model.algorithms))
-        }
+        self._assigned = assigned_names((model.whens, model.algorithms))
         self._equations: dict[str, list[Any]] = {}
         for equation in model.equations:
             for name in variable_names(equation):

@@ -20,7 +20,6 @@ from ..model.scalars import (
 )
 from ..model.syntax_tree import (
     Assign,
-    Builtin,
     Expression,
     For,
     Index,
@@ -29,7 +28,7 @@ from ..model.syntax_tree import (
     Solve,
     raise_model_error,
 )
-from ..model.traversal import assigned_references
+from ..model.traversal import assigned_references, is_call
 from .equation_systems import EquationSystem
 from .matching import strongly_connected_components
 
@@ -232,9 +231,7 @@ def match_initial_equations(model: Model, assigned: Collection[str]) -> list[Ass
 def _initial_assignment(model: Model, equation: Equation, assigned: Collection[str]) -> Assign:
     assignments = []
     for side, other in ((equation.left, equation.right), (equation.right, equation.left)):
-        target: Expression = (
-            side.arguments[0] if isinstance(side, Builtin) and side.name == "pre" else side
-        )
+        target: Expression = side.arguments[0] if is_call(side, "pre") else side
         if isinstance(target, Name | Index) and {
             name for name, _ in scalar_keys(model.variables, target)
         } & set(assigned):

@@ -7,6 +7,7 @@ from dataclasses import replace
 from typing import Any
 
 from ..model.flat_model import (
+    SECTIONS,
     Equation,
     Model,
     Variable,
@@ -25,18 +26,15 @@ from ..model.syntax_tree import (
     raise_model_error,
     referenced_variable,
 )
-from ..model.traversal import assigned_references, rewrite, variable_names, walk
+from ..model.traversal import (
+    assigned_names,
+    is_call,
+    rewrite_sections,
+    variable_names,
+    walk,
+)
 from .differentiation import Differentiation
 from .equation_systems import EquationSystem
-
-_SECTIONS = (
-    "equations",
-    "whens",
-    "algorithms",
-    "asserts",
-    "initial_equations",
-    "initial_algorithms",
-)
 
 
 def introduce_derivatives(model: Model) -> Model:
@@ -49,23 +47,20 @@ def introduce_derivatives(model: Model) -> Model:
     for name, call in der_calls.items():
         _check_state(model, name, call)
     states = tuple(name for name in model.variables if name in der_calls)
+    derivatives = {
+        derivative_name(name): derivative_variable(model.variables[name]) for name in states
+    }
     return replace(
-        model,
-        variables={
-            **model.variables,
-            **{
-                derivative_name(name): derivative_variable(model.variables[name]) for name in states
-            },
-        },
+        rewrite_sections(model, _replace_der),
+        variables={**model.variables, **derivatives},
         states=states,
-        **{section: rewrite(getattr(model, section), _replace_der) for section in _SECTIONS},
     )
 
 
 def _der_calls(model: Model) -> Iterator[tuple[str, Builtin]]:
     """Yield the argument of each der() (the variable name), with the call."""
-    for item in walk(tuple(getattr(model, section) for section in _SECTIONS)):
-        if isinstance(item, Builtin) and item.name == "der":
+    for item in walk(tuple(getattr(model, section) for section in SECTIONS)):
+        if is_call(item, "der"):
             yield referenced_variable(_der_argument(item)), item
 
 
@@ -104,7 +99,7 @@ def derivative_variable(state: Variable) -> Variable:
 
 
 def _replace_der(node: Any) -> Expression | Any:
-    if not (isinstance(node, Builtin) and node.name == "der"):
+    if not (is_call(node, "der")):
         return node
     reference = _der_argument(node)
     name = Name(derivative_name(referenced_variable(reference)), node.where)
@@ -121,10 +116,7 @@ def reduce_states(model: Model) -> Model:
         InputError: The derivative of an input is needed, or an expression cannot be differentiated.
     """
     for _ in range(_MAX_ROUNDS if model.states else 0):
-        assigned = {
-            referenced_variable(target)
-            for target in assigned_references((model.whens, model.algorithms))
-        }
+        assigned = assigned_names((model.whens, model.algorithms))
         assigned |= model.initialized
         system = _system(model, assigned)
         matched = system.matching()

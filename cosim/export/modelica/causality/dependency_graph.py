@@ -13,7 +13,6 @@ from ..model.syntax_tree import (
     Assert,
     Assign,
     Body,
-    Builtin,
     EdgeDetector,
     Expression,
     IfStatement,
@@ -25,7 +24,7 @@ from ..model.syntax_tree import (
     raise_model_error,
     referenced_variable,
 )
-from ..model.traversal import assigned_references, has_builtin, walk
+from ..model.traversal import assigned_names, assigned_references, has_builtin, is_call, walk
 from .when_conditions import WhenConditions
 
 
@@ -160,9 +159,7 @@ def make_node(model: Model, statements: Body, assigned: Iterable[str] = ()) -> N
         )
     read = scalars_read(model, statements)
     flags_read = {
-        _flag_key(item.arguments[0])
-        for item in walk(statements)
-        if isinstance(item, Builtin) and item.name == "risen"
+        _flag_key(item.arguments[0]) for item in walk(statements) if is_call(item, "risen")
     }
     flags_written = {
         _flag_key(Literal(s.index, "Integer")) for s in statements if isinstance(s, EdgeDetector)
@@ -189,7 +186,7 @@ def algorithm_nodes(
 
     With `conditions`, edge detectors that depend on the algorithm itself become part of it.
     """
-    assigned = {referenced_variable(target) for target in assigned_references(body)}
+    assigned = assigned_names(body)
     statements: list[Statement] = []
     for statement in body:
         translated = translate_when(statement) if isinstance(statement, When) else (statement,)
@@ -200,7 +197,7 @@ def algorithm_nodes(
         yield make_node(
             model,
             tuple(statements),
-            {referenced_variable(t) for t in assigned_references(tuple(statements))},
+            assigned_names(tuple(statements)),
         )
 
 

@@ -16,7 +16,6 @@ from ..model.simplification import ZERO, divide, negate, subtract, without_zeros
 from ..model.syntax_tree import (
     Assign,
     Binary,
-    Builtin,
     Expression,
     For,
     Index,
@@ -27,7 +26,7 @@ from ..model.syntax_tree import (
     SourceLocation,
     raise_model_error,
 )
-from ..model.traversal import has_builtin, rewrite, rewrite_outermost
+from ..model.traversal import has_builtin, is_call, rewrite, rewrite_outermost
 from .differentiation import Differentiation
 from .matching import match, strongly_connected_components
 from .scalar_equations import EquationSplitter
@@ -197,7 +196,7 @@ class EquationSystem:
         part = Binary("/", Name("continuation"), Literal(float(_CONTINUATION_STEPS), "Real"))
 
         def mix(node: object) -> object:
-            if not (isinstance(node, Builtin) and node.name == "homotopy"):
+            if not (is_call(node, "homotopy")):
                 return node
             actual, simplified = node.arguments
             return Binary(

@@ -24,6 +24,7 @@ from typing import Any
 from ..model.builtin_functions import PRE_OPERATORS, ROUNDINGS
 from ..model.flat_model import (
     SAMPLED,
+    SECTIONS,
     Delay,
     Equation,
     Hybrid,
@@ -52,8 +53,9 @@ from ..model.syntax_tree import (
     referenced_variable,
 )
 from ..model.traversal import (
-    assigned_references,
+    assigned_names,
     has_builtin,
+    is_call,
     rewrite,
     rewrite_outermost,
     to_text,
@@ -61,14 +63,6 @@ from ..model.traversal import (
     walk,
 )
 
-_SECTIONS = (
-    "equations",
-    "whens",
-    "algorithms",
-    "asserts",
-    "initial_equations",
-    "initial_algorithms",
-)
 _COMPARISONS = ("<", "<=", ">", ">=")
 
 
@@ -81,10 +75,7 @@ def prepare_hybrid(model: Model) -> Model:
 class _Preparation:
     def __init__(self, model: Model):
         self._model = model
-        self._assigned = {
-            referenced_variable(target)
-            for target in assigned_references((model.whens, model.algorithms))
-        }
+        self._assigned = assigned_names((model.whens, model.algorithms))
         self._discrete = self._assigned | model.initialized
         self._discrete |= {
             v.name
@@ -128,7 +119,7 @@ class _Preparation:
 
     def prepare(self) -> Model:
         model = self._model
-        sections = {name: rewrite(getattr(model, name), self._replace_delay) for name in _SECTIONS}
+        sections = {name: rewrite(getattr(model, name), self._replace_delay) for name in SECTIONS}
         if model.states or "time" in variable_names((model.equations, model.whens)):
             sections["equations"] = rewrite_outermost(sections["equations"], self._replace_rounding)
             sections["whens"] = self._in_conditions(sections["whens"], self._replace_rounding)
@@ -195,7 +186,7 @@ class _Preparation:
 
     def _in_algorithm(self, body: Body) -> Body:
         """Return an algorithm whose when-clauses have located conditions, if it does not assign the compared variables itself."""
-        assigned = {referenced_variable(target) for target in assigned_references(body)}
+        assigned = assigned_names(body)
 
         def change(node: Any) -> Any:
             return node if variable_names(node) & assigned else self._replace_relation(node)
@@ -235,11 +226,7 @@ class _Preparation:
 
     def _is_rounding(self, node: Any) -> bool:
         """Return whether a node rounds a value that changes between events."""
-        return (
-            isinstance(node, Builtin)
-            and node.name in ROUNDINGS
-            and self._changes_between_events(node.arguments)
-        )
+        return is_call(node, *ROUNDINGS) and self._changes_between_events(node.arguments)
 
     def _replace_rounding(self, node: Any) -> Any:
         if _without_events(node) is not None:
@@ -283,7 +270,7 @@ class _Preparation:
     # delay() and pre()
 
     def _replace_delay(self, node: Any) -> Any:
-        if not (isinstance(node, Builtin) and node.name == "delay"):
+        if not (is_call(node, "delay")):
             return node
         name = f"$delayed {len(self._delays) + 1}"
         self._add_variable(name, "Real", node.arguments[0])
@@ -293,7 +280,7 @@ class _Preparation:
         )
 
     def _replace_pre(self, node: Any) -> Any:
-        if not (isinstance(node, Builtin) and node.name in PRE_OPERATORS):
+        if not (is_call(node, *PRE_OPERATORS)):
             return node
         (argument,) = node.arguments
         previous = self._previous(argument, node)
@@ -337,16 +324,11 @@ def _without_events(node: Any) -> Any:
 
 def _is_combined_sample(condition: Expression) -> bool:
     alternatives = getattr(condition, "elements", (condition,))
-    return any(
-        has_builtin(c, "sample") and not (isinstance(c, Builtin) and c.name == "sample")
-        for c in alternatives
-    )
+    return any(has_builtin(c, "sample") and not (is_call(c, "sample")) for c in alternatives)
 
 
 def _remembered(section: Any) -> set[str]:
-    calls = (
-        item for item in walk(section) if isinstance(item, Builtin) and item.name in PRE_OPERATORS
-    )
+    calls = (item for item in walk(section) if is_call(item, *PRE_OPERATORS))
     return {
         referenced_variable(call.arguments[0])
         for call in calls

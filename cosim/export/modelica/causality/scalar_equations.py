@@ -10,20 +10,22 @@ from typing import Any
 
 import numpy as np
 
-from ..model import syntax_tree
 from ..model.arithmetic import EvaluationError
 from ..model.builtin_functions import BUILTIN_FUNCTIONS
 from ..model.evaluate import Evaluator, convert_to_type
 from ..model.flat_model import Equation, Function, Model
 from ..model.syntax_tree import (
+    Array,
     Binary,
     Builtin,
     Call,
     Colon,
     Expression,
+    If,
     Index,
     Literal,
     Name,
+    Unary,
     raise_model_error,
 )
 from ..model.traversal import variable_names
@@ -94,26 +96,24 @@ class EquationSplitter:
             self, f"_{type(node).__name__.lower()}", None
         )
         result = (
-            method(node, position)
-            if method and (position or not isinstance(node, syntax_tree.Array))
-            else None
+            method(node, position) if method and (position or not isinstance(node, Array)) else None
         )
         if result is not None:
             return result
         return Index(node, _literals(position)) if position else node
 
-    def _array(self, node: syntax_tree.Array, position: Position) -> Expression:
+    def _array(self, node: Array, position: Position) -> Expression:
         return self.element(node.elements[position[0]], position[1:])
 
-    def _unary(self, node: syntax_tree.Unary, position: Position) -> Expression:
+    def _unary(self, node: Unary, position: Position) -> Expression:
         return replace(node, operand=self.element(node.operand, position))
 
-    def _if(self, node: syntax_tree.If, position: Position) -> Expression:
+    def _if(self, node: If, position: Position) -> Expression:
         branches = tuple(
             (self.element(condition, ()), self.element(value, position))
             for condition, value in node.branches
         )
-        return syntax_tree.If(branches, self.element(node.otherwise, position))
+        return If(branches, self.element(node.otherwise, position))
 
     def _index(self, node: Index, position: Position) -> Expression | None:
         """Select from the subscripts of a variable, or of another array."""

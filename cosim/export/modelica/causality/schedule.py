@@ -31,8 +31,9 @@ from ..model.syntax_tree import (
     referenced_variable,
 )
 from ..model.traversal import (
-    assigned_references,
+    assigned_names,
     has_builtin,
+    is_call,
     rewrite,
     rewrite_outermost,
     variable_names,
@@ -146,9 +147,7 @@ def _varying(model: Model, order: Iterable[Node], sources: Iterable[str]) -> lis
 
 def _without_ticks(statement: Statement) -> Statement:
     def change(node: Any) -> Any:
-        return (
-            Literal(False, "Boolean") if isinstance(node, Builtin) and node.name == "due" else node
-        )
+        return Literal(False, "Boolean") if is_call(node, "due") else node
 
     result: Statement = rewrite(statement, change)
     return result
@@ -186,7 +185,7 @@ def pre_variables(model: Model, body: Body) -> list[str]:
     used = {
         referenced_variable(item.arguments[0])
         for item in walk(body)
-        if isinstance(item, Builtin) and item.name in PRE_OPERATORS
+        if is_call(item, *PRE_OPERATORS)
     }
     return [name for name in model.variables if name in used]
 
@@ -214,10 +213,7 @@ def build_schedule(model: Model) -> Schedule:
     """
     conditions = WhenConditions(model)
     model = _with_tick_flags(model, conditions)
-    assigned = {
-        referenced_variable(target)
-        for target in assigned_references((model.whens, model.algorithms))
-    }
+    assigned = assigned_names((model.whens, model.algorithms))
     assigned |= {*model.states, *model.initialized}
     continuous, held = solve_equations(model, assigned)
     events = [
@@ -270,9 +266,9 @@ def _at_initialization(model: Model, body: Body) -> Body:
     """Replace initial() by true, tick flags by false, and delayed values by the present ones."""
 
     def change(node: Any) -> Any:
-        if isinstance(node, Builtin) and node.name == "due":
+        if is_call(node, "due"):
             return _FALSE
-        if isinstance(node, Builtin) and node.name == "past":
+        if is_call(node, "past"):
             assert model.hybrid
             return Name(model.hybrid.delays[delay_number(node)].name)
         return node
@@ -334,11 +330,7 @@ def _remove_clock_condition(body: Body) -> Body:
 
 def _remove_unused_detectors(body: Body) -> Body:
     """Remove the edge detectors whose flag is not read."""
-    read = {
-        item.arguments[0]
-        for item in walk(body)
-        if isinstance(item, Builtin) and item.name == "risen"
-    }
+    read = {item.arguments[0] for item in walk(body) if is_call(item, "risen")}
     return tuple(
         s
         for s in body

@@ -26,7 +26,7 @@ from ..model.syntax_tree import (
     When,
     raise_model_error,
 )
-from ..model.traversal import rewrite_outermost, variable_names, walk
+from ..model.traversal import is_call, rewrite_outermost, variable_names, walk
 
 
 @dataclass(frozen=True, slots=True)
@@ -115,7 +115,7 @@ class WhenConditions:
         return found
 
     def _flag(self, condition: Expression, where: SourceLocation | None) -> Builtin:
-        if isinstance(condition, Builtin) and condition.name == "sample":
+        if is_call(condition, "sample"):
             return tick_flag(self._clock_index(condition, where))
         return edge_flag(
             self._edge_detector_index(rewrite_outermost(condition, self.as_tick_flag), where)
@@ -123,7 +123,7 @@ class WhenConditions:
 
     def as_tick_flag(self, node: Any) -> Builtin | None:
         """Return the event flag of a sample(), or None for all other nodes."""
-        if not (isinstance(node, Builtin) and node.name == "sample"):
+        if not (is_call(node, "sample")):
             return None
         return tick_flag(self._clock_index(node, node.where))
 
@@ -158,8 +158,4 @@ def _to_real(expression: Expression) -> Expression:
 
 
 def _is_edge_flag(node: Any) -> bool:
-    return (
-        isinstance(node, Builtin)
-        and node.name == "risen"
-        and isinstance(node.arguments[0], Literal)
-    )
+    return is_call(node, "risen") and isinstance(node.arguments[0], Literal)

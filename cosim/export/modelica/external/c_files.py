@@ -11,7 +11,8 @@ from pathlib import Path
 from typing import NamedTuple
 
 from ..model.flat_model import Function, FunctionVariable
-from ..model.syntax_tree import Builtin, Expression, ExternalCall, Literal, Name, raise_model_error
+from ..model.syntax_tree import Expression, ExternalCall, Literal, Name, raise_model_error
+from ..model.traversal import is_call
 
 _INCLUDE = re.compile(r'^[ \t]*#[ \t]*include[ \t]*"([^"]+)"', re.MULTILINE)
 _URI = re.compile(r"modelica://(\w+)/?(.*)")
@@ -243,7 +244,7 @@ def _argument(
         return Argument(variable.type, bool(variable.dimensions), node.name in outputs)
     if isinstance(node, Literal):
         return Argument(node.type, False, False)
-    if isinstance(node, Builtin) and node.name == "size":
+    if is_call(node, "size"):
         return Argument("Integer", False, False)
     return raise_model_error(
         f"{function.name}: an argument of a C function must be a variable, a literal or a size()",

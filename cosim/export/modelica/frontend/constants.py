@@ -13,7 +13,6 @@ from ..model.evaluate import Evaluator
 from ..model.flat_model import Equation, Model, Variable
 from ..model.syntax_tree import (
     Array,
-    Builtin,
     Call,
     Comprehension,
     Expression,
@@ -21,7 +20,7 @@ from ..model.syntax_tree import (
     Name,
     Range,
 )
-from ..model.traversal import rewrite, unroll, variable_names, walk
+from ..model.traversal import is_call, rewrite, rewrite_sections, unroll, variable_names, walk
 
 _DISCRETE_TYPES = ("Integer", "Boolean", "Enumeration", "String")
 
@@ -130,24 +129,13 @@ def _rewrite_model(model: Model, change: Any, names: Iterable[str] | None = None
             variable, **{key: rewrite(getattr(variable, key), change) for key in expressions}
         )
 
-    sections = (
-        "equations",
-        "whens",
-        "algorithms",
-        "asserts",
-        "initial_equations",
-        "initial_algorithms",
-    )
-    names = model.variables if names is None else names
-    return replace(
-        model,
-        variables={
-            name: change_variable(model.variables[name])
-            for name in model.variables
-            if name in names
-        },
-        **{section: rewrite(getattr(model, section), change) for section in sections},
-    )
+    kept = model.variables if names is None else names
+    variables = {
+        name: change_variable(variable)
+        for name, variable in model.variables.items()
+        if name in kept
+    }
+    return replace(rewrite_sections(model, change), variables=variables)
 
 
 class _ShapeFolder:
@@ -157,11 +145,7 @@ class _ShapeFolder:
         self._shapes = {v.name: v.shape for v in model.variables.values()}
 
     def fold(self, node: Any) -> Any:
-        if not (
-            isinstance(node, Builtin)
-            and node.name == "size"
-            and isinstance(node.arguments[0], Name)
-        ):
+        if not (is_call(node, "size") and isinstance(node.arguments[0], Name)):
             return node
         shape = self._shapes.get(node.arguments[0].name)
         if shape is None or len(node.arguments) != 2 or not isinstance(node.arguments[1], Literal):

@@ -12,9 +12,25 @@ from functools import cached_property
 from itertools import chain
 from typing import Any
 
-from ..model import syntax_tree
 from ..model.builtin_functions import SPELLINGS
-from ..model.syntax_tree import Expression, SourceLocation, raise_model_error
+from ..model.syntax_tree import (
+    Array,
+    Binary,
+    Builtin,
+    Call,
+    Colon,
+    Comprehension,
+    Expression,
+    If,
+    Index,
+    Literal,
+    Name,
+    Range,
+    SourceLocation,
+    Unary,
+    raise_model_error,
+)
+from ..model.traversal import is_call
 from .model_files import ModelicaSources
 
 Json = Mapping[str, Any]
@@ -43,17 +59,15 @@ def split_tagged(node: Json) -> tuple[str, Any]:
 
 def _fold_constants(node: Expression) -> Expression:
     """Evaluate sums, differences and products of Integer literals, as they occur in the subscripts of an unrolled loop."""
-    if not (isinstance(node, syntax_tree.Binary) and node.operator in _INTEGER_OPERATORS):
+    if not (isinstance(node, Binary) and node.operator in _INTEGER_OPERATORS):
         return node
     left, right = _fold_constants(node.left), _fold_constants(node.right)
     if (
-        isinstance(left, syntax_tree.Literal)
-        and isinstance(right, syntax_tree.Literal)
+        isinstance(left, Literal)
+        and isinstance(right, Literal)
         and left.type == right.type == "Integer"
     ):
-        return syntax_tree.Literal(
-            _INTEGER_OPERATORS[node.operator](left.number, right.number), "Integer"
-        )
+        return Literal(_INTEGER_OPERATORS[node.operator](left.number, right.number), "Integer")
     return node
 
 
@@ -100,21 +114,21 @@ class ExpressionReader:
         readers: Mapping[str, Callable[[Json], Expression]] = {
             "Literal": self._literal,
             "VarRef": self._reference,
-            "Index": lambda n: syntax_tree.Index(
+            "Index": lambda n: Index(
                 self.read_expression(n["base"]), self._subscripts(n["subscripts"]), self.locate(n)
             ),
             "Unary": self._unary,
             "Binary": self._binary,
             "If": self._if,
             "Array": self._array,
-            "Range": lambda n: syntax_tree.Range(
+            "Range": lambda n: Range(
                 self.read_expression(n["start"]),
                 self._optional(n["step"]),
                 self.read_expression(n["end"]),
             ),
             "BuiltinCall": self._builtin,
             "FunctionCall": self._call,
-            "StringConversion": lambda n: syntax_tree.Builtin(
+            "StringConversion": lambda n: Builtin(
                 "String", (self.read_expression(n["value"]),), self.locate(n)
             ),
             "ArrayComprehension": self._comprehension,
@@ -124,29 +138,27 @@ class ExpressionReader:
             raise_model_error(f"the expression {kind} is not supported", self.locate(payload))
         return readers[kind](payload)
 
-    def _literal(self, node: Json) -> syntax_tree.Literal:
+    def _literal(self, node: Json) -> Literal:
         kind, value = split_tagged(node["value"])
-        return syntax_tree.Literal(value, kind)
+        return Literal(value, kind)
 
     def _reference(self, node: Json) -> Expression:
         name, where = node["name"]["name"], self.locate(node)
         if (ordinal := self.json["enum_literal_ordinals"].get(name)) is not None:
-            return syntax_tree.Literal(ordinal, "Enumeration")
-        base = syntax_tree.Name(name, where)
+            return Literal(ordinal, "Enumeration")
+        base = Name(name, where)
         return (
-            syntax_tree.Index(base, self._subscripts(node["subscripts"]), where)
-            if node["subscripts"]
-            else base
+            Index(base, self._subscripts(node["subscripts"]), where) if node["subscripts"] else base
         )
 
-    def _subscripts(self, nodes: list[Json]) -> tuple[Expression | syntax_tree.Colon, ...]:
+    def _subscripts(self, nodes: list[Json]) -> tuple[Expression | Colon, ...]:
         return tuple(self._subscript(*split_tagged(node)) for node in nodes)
 
-    def _subscript(self, kind: str, node: Json) -> Expression | syntax_tree.Colon:
+    def _subscript(self, kind: str, node: Json) -> Expression | Colon:
         if kind == "Colon":
-            return syntax_tree.Colon()
+            return Colon()
         return (
-            syntax_tree.Literal(node["value"], "Integer")
+            Literal(node["value"], "Integer")
             if kind == "Index"
             else _fold_constants(self.read_expression(node["expr"]))
         )
@@ -157,63 +169,57 @@ class ExpressionReader:
             return operand
         if node["op"] not in ("Minus", "Not"):
             raise_model_error(f"the operator {node['op']} is not supported", self.locate(node))
-        return syntax_tree.Unary("-" if node["op"] == "Minus" else "not", operand)
+        return Unary("-" if node["op"] == "Minus" else "not", operand)
 
-    def _binary(self, node: Json) -> syntax_tree.Binary:
+    def _binary(self, node: Json) -> Binary:
         operator = _OPERATORS.get(node["op"]) or raise_model_error(
             f"the operator {node['op']} is not supported", self.locate(node)
         )
-        return syntax_tree.Binary(
+        return Binary(
             operator,
             self.read_expression(node["lhs"]),
             self.read_expression(node["rhs"]),
             self.locate(node),
         )
 
-    def _if(self, node: Json) -> syntax_tree.If:
+    def _if(self, node: Json) -> If:
         branches = tuple(
             (self.read_expression(condition), self.read_expression(value))
             for condition, value in node["branches"]
         )
-        return syntax_tree.If(branches, self.read_expression(node["else_branch"]))
+        return If(branches, self.read_expression(node["else_branch"]))
 
     def _array(self, node: Json) -> Expression:
         """Convert an array constructor, or a concatenation `[a, b; c, d]`, whose elements may be arrays."""
         elements = tuple(map(self.read_expression, node["elements"]))
         kind = node.get("kind")
         if kind not in ("Horizontal", "Vertical"):
-            return syntax_tree.Array(elements)
+            return Array(elements)
         if kind == "Vertical" and (rows := self._scalar_rows(elements)):
-            return syntax_tree.Array(rows)
-        return syntax_tree.Builtin(
-            "rows" if kind == "Vertical" else "columns", elements, self.locate(node)
-        )
+            return Array(rows)
+        return Builtin("rows" if kind == "Vertical" else "columns", elements, self.locate(node))
 
-    def _scalar_rows(self, rows: tuple[Expression, ...]) -> tuple[syntax_tree.Array, ...]:
+    def _scalar_rows(self, rows: tuple[Expression, ...]) -> tuple[Array, ...]:
         """Return the rows of a matrix as arrays if all their elements are certainly scalars, else no rows."""
-        columns = [
-            row.arguments
-            for row in rows
-            if isinstance(row, syntax_tree.Builtin) and row.name == "columns"
-        ]
+        columns = [row.arguments for row in rows if is_call(row, "columns")]
         elements = chain.from_iterable(columns)
         if len(columns) != len(rows) or not all(map(self._is_scalar, elements)):
             return ()
-        return tuple(map(syntax_tree.Array, columns))
+        return tuple(map(Array, columns))
 
     def _is_scalar(self, node: Expression) -> bool:
         """Return whether an expression is certainly a scalar."""
-        if isinstance(node, syntax_tree.Name):
+        if isinstance(node, Name):
             variable = self.json["variables"].get(node.name)
             return variable is not None and not variable["dims"]
-        if isinstance(node, syntax_tree.Index):
-            return isinstance(node.base, syntax_tree.Name) and all(
-                isinstance(s, syntax_tree.Literal) for s in node.subscripts
+        if isinstance(node, Index):
+            return isinstance(node.base, Name) and all(
+                isinstance(s, Literal) for s in node.subscripts
             )
-        if isinstance(node, syntax_tree.Binary):
+        if isinstance(node, Binary):
             return self._is_scalar(node.left) and self._is_scalar(node.right)
-        return isinstance(node, syntax_tree.Literal) or (
-            isinstance(node, syntax_tree.Unary) and self._is_scalar(node.operand)
+        return isinstance(node, Literal) or (
+            isinstance(node, Unary) and self._is_scalar(node.operand)
         )
 
     def _comprehension(self, node: Json) -> Expression:
@@ -226,18 +232,16 @@ class ExpressionReader:
             raise_model_error("an array constructor with a condition is not supported", where)
         value = self.read_expression(node["expr"])
         for index in node["indices"]:
-            value = syntax_tree.Comprehension(
-                value, index["name"], self.read_expression(index["range"]), where
-            )
+            value = Comprehension(value, index["name"], self.read_expression(index["range"]), where)
         return value
 
     def _builtin(self, node: Json) -> Expression:
         name = node["function"].lower()
         if name == "terminal":  # an FMU computes nothing after the last step
-            return syntax_tree.Literal(False, "Boolean")
+            return Literal(False, "Boolean")
         if name == "terminate":
             raise_model_error("terminate() is supported in when-equations only", self.locate(node))
-        return syntax_tree.Builtin(
+        return Builtin(
             SPELLINGS.get(name, name),
             tuple(map(self.read_expression, node["args"])),
             self.locate(node),
@@ -285,7 +289,7 @@ class ExpressionReader:
         reason = f"the record {local['name']} inside a function is not supported; pass its fields"
         return raise_model_error(reason, self.locate(local))
 
-    def _call(self, node: Json) -> syntax_tree.Call:
+    def _call(self, node: Json) -> Call:
         if node["is_constructor"]:
             raise_model_error(
                 "a record constructor is not supported here; write one for a record variable",
@@ -295,7 +299,7 @@ class ExpressionReader:
 
     def _function_call(
         self, reference: Json, arguments: list[Json], where: SourceLocation | None
-    ) -> syntax_tree.Call:
+    ) -> Call:
         """Convert a function call.
 
         rumoca identifies functions by their short names and would silently use a function of
@@ -312,4 +316,4 @@ class ExpressionReader:
             raise_model_error(
                 f'the model uses several functions named "{name}"; give them different names', where
             )
-        return syntax_tree.Call(name, tuple(map(self.read_expression, arguments)), where)
+        return Call(name, tuple(map(self.read_expression, arguments)), where)

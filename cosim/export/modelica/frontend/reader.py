@@ -10,8 +10,23 @@ from dataclasses import replace
 from itertools import chain, product
 from typing import Any
 
-from ..model import flat_model, syntax_tree
-from ..model.syntax_tree import Body, Expression, SourceLocation, Statement, raise_model_error
+from ..model.flat_model import Equation, Model, Variable
+from ..model.syntax_tree import (
+    Assert,
+    Assign,
+    Body,
+    Call,
+    Expression,
+    IfStatement,
+    Index,
+    Literal,
+    Name,
+    Reinit,
+    SourceLocation,
+    Statement,
+    When,
+    raise_model_error,
+)
 from .expression_reader import Json, split_tagged
 from .statement_reader import StatementReader, message_parts
 
@@ -19,7 +34,7 @@ from .statement_reader import StatementReader, message_parts
 class ModelReader(StatementReader):
     """Reader of a flat model."""
 
-    def read_model(self, name: str) -> flat_model.Model:
+    def read_model(self, name: str) -> Model:
         """Convert the whole document.
 
         Args:
@@ -30,7 +45,7 @@ class ModelReader(StatementReader):
         """
         self._check_document(self.sources.locate_class(name))
         names = self.json["variables"]
-        return flat_model.Model(
+        return Model(
             name=name,
             description=self.json["model_description"] or "",
             variables={key: _with_default(self.read_variable(key)) for key in names},
@@ -84,12 +99,12 @@ class ModelReader(StatementReader):
 
     # variables
 
-    def read_variable(self, name: str) -> flat_model.Variable:
+    def read_variable(self, name: str) -> Variable:
         """Convert the declaration of a variable."""
         node = self.json["variables"][name]
         type_name = self.json["variable_type_names"][name]
         kind = self._type(self.json["effective_types"][str(node["type_id"])]["canonical_type"])
-        return flat_model.Variable(
+        return Variable(
             name=name,
             type=kind,
             shape=tuple(node["dims"]),
@@ -137,7 +152,7 @@ class ModelReader(StatementReader):
         literal = self.read_expression(node)
         return (
             str(literal.value)
-            if isinstance(literal, syntax_tree.Literal)
+            if isinstance(literal, Literal)
             else raise_model_error("a String literal is expected", self.locate(node))
         )
 
@@ -154,11 +169,11 @@ class ModelReader(StatementReader):
 
     # equations
 
-    def read_equations(self, section: str) -> tuple[flat_model.Equation, ...]:
+    def read_equations(self, section: str) -> tuple[Equation, ...]:
         """Convert the equations of a section of the document."""
         return tuple(chain.from_iterable(map(self._equation, self.json[section])))
 
-    def _unrolled_equations(self) -> Iterator[flat_model.Equation]:
+    def _unrolled_equations(self) -> Iterator[Equation]:
         """Yield all equations, with the placeholders of for-equations replaced (see `unrolling`)."""
         replacements = dict(unroll_equations(self.json, "structured_equations"))
         for index, node in enumerate(self.json["equations"]):
@@ -175,48 +190,38 @@ class ModelReader(StatementReader):
                 )
             yield from equations
 
-    def _equation(self, node: Json) -> list[flat_model.Equation]:
+    def _equation(self, node: Json) -> list[Equation]:
         kind, residual = split_tagged(node["residual"])
         where = self.locate(node)
         if kind != "Binary" or residual["op"] != "Sub":
-            return [
-                flat_model.Equation(
-                    self.read_expression(node["residual"]), syntax_tree.Literal(0.0, "Real"), where
-                )
-            ]
+            return [Equation(self.read_expression(node["residual"]), Literal(0.0, "Real"), where)]
         if "Tuple" in residual["lhs"]:
             return self._split_tuple(
                 residual["lhs"]["Tuple"]["elements"], self.read_expression(residual["rhs"]), where
             )
         left, call = self.read_expression(residual["lhs"]), residual["rhs"].get("FunctionCall")
-        if (
-            call
-            and isinstance(left, syntax_tree.Name)
-            and left.name in self.json["record_instances"]
-        ):
+        if call and isinstance(left, Name) and left.name in self.json["record_instances"]:
             fields = self._fields_of(left.name)
             return [
-                flat_model.Equation(
-                    syntax_tree.Name(left.name + f, where), self.read_field(call, f[1:]), where
-                )
+                Equation(Name(left.name + f, where), self.read_field(call, f[1:]), where)
                 for f in fields
             ]
         right = self.read_expression(residual["rhs"])
-        return [flat_model.Equation(a, b, where) for a, b in self._split_records(left, right)]
+        return [Equation(a, b, where) for a, b in self._split_records(left, right)]
 
     def _split_tuple(
         self, targets: list[Json], call: Expression, where: SourceLocation | None
-    ) -> list[flat_model.Equation]:
+    ) -> list[Equation]:
         """Return one equation for each result of a function with several results.
 
         Omitted results have no name.
         """
-        if not isinstance(call, syntax_tree.Call):
+        if not isinstance(call, Call):
             raise_model_error(
                 "the right side of an equation with a tuple must be a function call", where
             )
         return [
-            flat_model.Equation(self.read_expression(target), replace(call, result=k), where)
+            Equation(self.read_expression(target), replace(call, result=k), where)
             for k, target in enumerate(targets)
             if "Empty" not in target
         ]
@@ -226,9 +231,9 @@ class ModelReader(StatementReader):
     ) -> list[tuple[Expression, Expression]]:
         """Return the pairs of fields of an equation between two records, or the pair itself for all other equations."""
         records = self.json["record_instances"]
-        if not (isinstance(left, syntax_tree.Name) and left.name in records):
+        if not (isinstance(left, Name) and left.name in records):
             return [(left, right)]
-        if not (isinstance(right, syntax_tree.Name) and right.name in records):
+        if not (isinstance(right, Name) and right.name in records):
             raise_model_error(
                 (
                     "a record can only be equated with a record variable; write one equation for "
@@ -238,8 +243,8 @@ class ModelReader(StatementReader):
             )
         return [
             (
-                syntax_tree.Name(left.name + field, left.where),
-                syntax_tree.Name(right.name + field, right.where),
+                Name(left.name + field, left.where),
+                Name(right.name + field, right.where),
             )
             for field in self._fields_of(left.name)
         ]
@@ -252,25 +257,25 @@ class ModelReader(StatementReader):
             if name.startswith(f"{record}.")
         ]
 
-    def _declaration_equations(self) -> list[flat_model.Equation]:
+    def _declaration_equations(self) -> list[Equation]:
         """Return the declaration equations (`Real y = 2*u;`) of all variables that are neither parameters nor constants."""
         variables = [self.read_variable(name) for name in self.json["variables"]]
         return [
-            flat_model.Equation(syntax_tree.Name(v.name, v.where), v.binding, v.where)
+            Equation(Name(v.name, v.where), v.binding, v.where)
             for v in variables
             if v.binding is not None
             and v.variability not in ("constant", "parameter")
             and not _is_default(v)
         ]
 
-    def read_when_chain(self, chain: Json) -> syntax_tree.When:
+    def read_when_chain(self, chain: Json) -> When:
         """Convert a when-clause of an equation section, with its `elsewhen` branches."""
         blocks = [chain["first"], *chain["else_when"]]
         branches = tuple(
             (self.read_expression(block["condition"]), self._when_body(block["equations"]))
             for block in blocks
         )
-        return syntax_tree.When(branches, self.locate(chain))
+        return When(branches, self.locate(chain))
 
     def _when_body(self, nodes: list[Json]) -> Body:
         return tuple(self._when_equation(*split_tagged(node)) for node in nodes)
@@ -281,7 +286,7 @@ class ModelReader(StatementReader):
                 (self.read_expression(condition), self._when_body(body))
                 for condition, body in node["branches"]
             )
-            return syntax_tree.IfStatement(
+            return IfStatement(
                 branches, self._when_body(node["else_branch"] or []), self.locate(node)
             )
         if kind == "Assert":
@@ -289,24 +294,20 @@ class ModelReader(StatementReader):
         where = self.locate(node)
         if kind == "Terminate":
             message = tuple(message_parts(self.read_expression(node["message"])))
-            return syntax_tree.Assert(
-                syntax_tree.Literal(False, "Boolean"), message, where, terminates=True
-            )
+            return Assert(Literal(False, "Boolean"), message, where, terminates=True)
         if kind not in ("Assign", "Reinit"):
             raise_model_error(f"{kind} in a when-equation is not supported", where)
         target = self._parse_target(node["target" if kind == "Assign" else "state"], where)
-        statement = syntax_tree.Assign if kind == "Assign" else syntax_tree.Reinit
+        statement = Assign if kind == "Assign" else Reinit
         return statement(target, self.read_expression(node["value"]), where)
 
-    def _parse_target(
-        self, target: str, where: SourceLocation | None
-    ) -> syntax_tree.Name | syntax_tree.Index:
+    def _parse_target(self, target: str, where: SourceLocation | None) -> Name | Index:
         """Parse the target of a when-equation, given as text.
 
         A name, perhaps with constant subscripts.
         """
         if target in self.json["variables"]:
-            return syntax_tree.Name(target, where)
+            return Name(target, where)
         base, bracket, subscripts = target.rpartition("[")
         if not bracket or base not in self.json["variables"]:
             raise_model_error(
@@ -317,20 +318,20 @@ class ModelReader(StatementReader):
                 where,
             )
         numbers = subscripts.rstrip("]").split(",")
-        return syntax_tree.Index(
-            syntax_tree.Name(base, where),
-            tuple(syntax_tree.Literal(int(k), "Integer") for k in numbers),
+        return Index(
+            Name(base, where),
+            tuple(Literal(int(k), "Integer") for k in numbers),
             where,
         )
 
 
-def _is_default(variable: flat_model.Variable) -> bool:
+def _is_default(variable: Variable) -> bool:
     """Return whether the declaration equation of a variable is the value of an input of the model that nothing sets."""
     is_input = variable.causality == "input" and variable.top_level and not variable.protected
-    return is_input and isinstance(variable.binding, syntax_tree.Literal)
+    return is_input and isinstance(variable.binding, Literal)
 
 
-def _with_default(variable: flat_model.Variable) -> flat_model.Variable:
+def _with_default(variable: Variable) -> Variable:
     """Return an input of the model with its declared value as start value."""
     return (
         replace(variable, start=variable.binding, binding=None)

@@ -9,7 +9,6 @@ from typing import Any
 
 import numpy as np
 
-from . import syntax_tree
 from .arithmetic import (
     OPERATORS,
     EvaluationError,
@@ -20,7 +19,30 @@ from .arithmetic import (
 )
 from .builtin_functions import BUILTIN_FUNCTIONS
 from .flat_model import Function, FunctionVariable
-from .syntax_tree import Body, Expression
+from .syntax_tree import (
+    Array,
+    Assert,
+    Assign,
+    Binary,
+    Body,
+    Builtin,
+    Call,
+    Colon,
+    Comprehension,
+    Expression,
+    ExternalCall,
+    For,
+    If,
+    IfStatement,
+    Index,
+    Literal,
+    MultiAssign,
+    Name,
+    Range,
+    Unary,
+    While,
+    referenced_variable,
+)
 
 DTYPES = {"Real": np.float64, "Integer": np.int64, "Enumeration": np.int64, "Boolean": np.bool_}
 
@@ -59,29 +81,29 @@ class Evaluator:
         for statement in body:
             getattr(self, f"_{type(statement).__name__.lower()}")(statement)
 
-    def _assign(self, node: syntax_tree.Assign) -> None:
+    def _assign(self, node: Assign) -> None:
         self._store(node.target, self(node.value))
 
-    def _store(self, target: syntax_tree.Name | syntax_tree.Index, value: Any) -> None:
-        name = syntax_tree.referenced_variable(target)
+    def _store(self, target: Name | Index, value: Any) -> None:
+        name = referenced_variable(target)
         current = self.values[name]
-        if isinstance(target, syntax_tree.Index):
+        if isinstance(target, Index):
             current[self._indices(target, current.shape)] = value
         elif isinstance(current, np.ndarray):
             current[...] = value
         else:
             self.values[name] = type(current)(value)
 
-    def _multiassign(self, node: syntax_tree.MultiAssign) -> None:
+    def _multiassign(self, node: MultiAssign) -> None:
         for target, value in zip(node.targets, self._call_function(node.call), strict=False):
             self._store(target, value)
 
-    def _ifstatement(self, node: syntax_tree.IfStatement) -> None:
+    def _ifstatement(self, node: IfStatement) -> None:
         self.execute(
             next((body for condition, body in node.branches if self(condition)), node.otherwise)
         )
 
-    def _for(self, node: syntax_tree.For) -> None:
+    def _for(self, node: For) -> None:
         shadowed = self.values.get(node.index)
         for index in self._range(node.range):
             self.values[node.index] = int(index)
@@ -90,11 +112,11 @@ class Evaluator:
         if shadowed is not None:
             self.values[node.index] = shadowed
 
-    def _while(self, node: syntax_tree.While) -> None:
+    def _while(self, node: While) -> None:
         while self(node.condition):
             self.execute(node.body)
 
-    def _assert(self, node: syntax_tree.Assert) -> None:
+    def _assert(self, node: Assert) -> None:
         if not self(node.condition) and not (node.warning or node.terminates):
             raise EvaluationError("".join(map(self._as_text, node.message)), node.where)
 
@@ -118,16 +140,16 @@ class Evaluator:
         """
         return getattr(self, f"_{type(node).__name__.lower()}")(node)
 
-    def _literal(self, node: syntax_tree.Literal) -> Any:
+    def _literal(self, node: Literal) -> Any:
         return float(node.number) if node.type == "Real" else node.value
 
-    def _name(self, node: syntax_tree.Name) -> Any:
+    def _name(self, node: Name) -> Any:
         return self.values[node.name]
 
-    def _array(self, node: syntax_tree.Array) -> np.ndarray:
+    def _array(self, node: Array) -> np.ndarray:
         return np.array([self(element) for element in node.elements])
 
-    def _comprehension(self, node: syntax_tree.Comprehension) -> np.ndarray:
+    def _comprehension(self, node: Comprehension) -> np.ndarray:
         shadowed, elements = self.values.get(node.index), []
         for number in self(node.range):
             self.values[node.index] = to_python_scalar(number)
@@ -137,16 +159,16 @@ class Evaluator:
             self.values[node.index] = shadowed
         return np.array(elements)
 
-    def _range(self, node: syntax_tree.Range) -> np.ndarray:
+    def _range(self, node: Range) -> np.ndarray:
         step = self(node.step) if node.step else 1
         return np.arange(self(node.start), self(node.stop) + (1 if step > 0 else -1), step)
 
-    def _if(self, node: syntax_tree.If) -> Any:
+    def _if(self, node: If) -> Any:
         return self(
             next((value for condition, value in node.branches if self(condition)), node.otherwise)
         )
 
-    def _unary(self, node: syntax_tree.Unary) -> Any:
+    def _unary(self, node: Unary) -> Any:
         value = self(node.operand)
         return (
             elementwise(operator.not_, value)
@@ -154,7 +176,7 @@ class Evaluator:
             else elementwise(lambda x: check_int32(-x), value)
         )
 
-    def _binary(self, node: syntax_tree.Binary) -> Any:
+    def _binary(self, node: Binary) -> Any:
         if node.operator == "and":
             return bool(self(node.left)) and bool(self(node.right))
         if node.operator == "or":
@@ -162,34 +184,32 @@ class Evaluator:
         left, right = self(node.left), self(node.right)
         if node.operator == "*" and isinstance(left, np.ndarray) and isinstance(right, np.ndarray):
             return matrix_product(left, right)
-        if node.operator == "^" and node.right == syntax_tree.Literal(2, "Integer"):
+        if node.operator == "^" and node.right == Literal(2, "Integer"):
             return elementwise(lambda x: float(x) * float(x), left)
         return elementwise(OPERATORS[node.operator.removeprefix(".")], left, right)
 
-    def _index(self, node: syntax_tree.Index) -> Any:
+    def _index(self, node: Index) -> Any:
         base = self(node.base)
         return to_python_scalar(base[self._indices(node, base.shape)])
 
-    def _indices(self, node: syntax_tree.Index, shape: tuple[int, ...]) -> tuple[Any, ...]:
+    def _indices(self, node: Index, shape: tuple[int, ...]) -> tuple[Any, ...]:
         return tuple(
             self._index_of(s, n, node) for s, n in zip(node.subscripts, shape, strict=False)
         )
 
-    def _index_of(
-        self, subscript: Expression | syntax_tree.Colon, size: int, node: syntax_tree.Index
-    ) -> Any:
-        if isinstance(subscript, syntax_tree.Colon):
+    def _index_of(self, subscript: Expression | Colon, size: int, node: Index) -> Any:
+        if isinstance(subscript, Colon):
             return slice(None)
         index = self(subscript)
         if not all(1 <= k <= size for k in np.atleast_1d(index)):
-            label = node.base.name if isinstance(node.base, syntax_tree.Name) else "array"
+            label = node.base.name if isinstance(node.base, Name) else "array"
             raise EvaluationError(f"{label}: subscript outside 1..{size}", node.where)
         return index - 1
 
-    def _call(self, node: syntax_tree.Call) -> Any:
+    def _call(self, node: Call) -> Any:
         return self._call_function(node)[node.result]
 
-    def _call_function(self, node: syntax_tree.Call) -> list[Any]:
+    def _call_function(self, node: Call) -> list[Any]:
         function, arguments = (
             self.functions[node.function],
             [self(argument) for argument in node.arguments],
@@ -208,7 +228,7 @@ class Evaluator:
     def call_external(self, function: Function) -> None:
         """Call the C function of an external function, with this scope as the one of the function."""
         (node,) = function.body
-        assert isinstance(node, syntax_tree.ExternalCall)
+        assert isinstance(node, ExternalCall)
         assert function.external
         if function.external.library is None:
             return
@@ -217,7 +237,7 @@ class Evaluator:
         )
         for k, value in results.items():
             target = node.result if k < 0 else node.arguments[k]
-            assert isinstance(target, syntax_tree.Name)
+            assert isinstance(target, Name)
             self._store(target, value)
 
     def _declare(self, local: FunctionVariable) -> None:
@@ -226,7 +246,7 @@ class Evaluator:
             self(local.default) if local.default is not None else 0, local.type, shape
         )
 
-    def _builtin(self, node: syntax_tree.Builtin) -> Any:
+    def _builtin(self, node: Builtin) -> Any:
         evaluate = BUILTIN_FUNCTIONS[node.name].evaluate
         if evaluate is None:
             raise KeyError(node.name)

@@ -153,6 +153,11 @@ class Hybrid:
     sampled: tuple[str, ...] = ()
 
 
+#: sections of a model that are evaluated at events
+EVENT_SECTIONS = ("equations", "whens", "algorithms", "asserts")
+SECTIONS = (*EVENT_SECTIONS, "initial_equations", "initial_algorithms")
+
+
 @dataclass(frozen=True)
 class Model:
     """A flat model."""

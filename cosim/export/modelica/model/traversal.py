@@ -4,14 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import fields, is_dataclass, replace
-from typing import Any
+from typing import Any, TypeGuard
 
-from . import syntax_tree
+from .flat_model import SECTIONS, Model
 from .syntax_tree import (
     Array,
     Assert,
     Assign,
+    Binary,
     Builtin,
+    Call,
     Colon,
     Comprehension,
     Expression,
@@ -21,6 +23,8 @@ from .syntax_tree import (
     Name,
     Solve,
     SourceLocation,
+    Unary,
+    referenced_variable,
 )
 
 
@@ -87,6 +91,12 @@ def rewrite_outermost(node: Any, change: Callable[[Any], Any]) -> Any:
     )
 
 
+def rewrite_sections(model: Model, change: Callable[[Any], Any]) -> Model:
+    """Return a model with `change` applied to each node of its equations and statements."""
+    sections: dict[str, Any] = {name: rewrite(getattr(model, name), change) for name in SECTIONS}
+    return replace(model, **sections)
+
+
 def read_references(node: Any) -> Iterator[Name | Index]:
     """Yield the references whose current value is read.
 
@@ -110,7 +120,7 @@ def read_references(node: Any) -> Iterator[Name | Index]:
     elif isinstance(node, tuple) and not isinstance(node, SourceLocation | Colon):
         for item in node:
             yield from read_references(item)
-    elif is_dataclass(node) and not (isinstance(node, Builtin) and node.name == "pre"):
+    elif is_dataclass(node) and not (is_call(node, "pre")):
         for field in fields(node):
             yield from read_references(getattr(node, field.name))
 
@@ -156,9 +166,19 @@ def has_terminate(node: Any) -> bool:
     return any(isinstance(item, Assert) and item.terminates for item in walk(node))
 
 
+def assigned_names(node: Any) -> set[str]:
+    """Return the variables that the assignments in a tree change."""
+    return set(map(referenced_variable, assigned_references(node)))
+
+
+def is_call(node: Any, *names: str) -> TypeGuard[Builtin]:
+    """Return whether a node is a call of one of these built-in functions."""
+    return isinstance(node, Builtin) and node.name in names
+
+
 def has_builtin(node: Any, *builtins: str) -> bool:
     """Return whether a tree calls one of these built-in functions."""
-    return any(isinstance(item, Builtin) and item.name in builtins for item in walk(node))
+    return any(is_call(item, *builtins) for item in walk(node))
 
 
 def to_text(node: Expression | Colon) -> str:
@@ -166,24 +186,24 @@ def to_text(node: Expression | Colon) -> str:
 
     Operands that are operations themselves are in parentheses.
     """
-    if isinstance(node, syntax_tree.Literal):
+    if isinstance(node, Literal):
         return str(node.value).lower() if isinstance(node.value, bool) else str(node.value)
-    if isinstance(node, syntax_tree.Name):
+    if isinstance(node, Name):
         return node.name
-    if isinstance(node, syntax_tree.Index):
+    if isinstance(node, Index):
         return f"{to_text(node.base)}[{', '.join(map(to_text, node.subscripts))}]"
-    if isinstance(node, syntax_tree.Binary):
+    if isinstance(node, Binary):
         return f"{_operand(node.left)} {node.operator} {_operand(node.right)}"
-    if isinstance(node, syntax_tree.Unary):
+    if isinstance(node, Unary):
         return f"{node.operator}{' ' * (node.operator == 'not')}{_operand(node.operand)}"
-    if isinstance(node, syntax_tree.Builtin):
+    if isinstance(node, Builtin):
         return f"{node.name}({', '.join(map(to_text, node.arguments))})"
-    if isinstance(node, syntax_tree.Call):
+    if isinstance(node, Call):
         return f"{node.function}({', '.join(map(to_text, node.arguments))})"
-    if isinstance(node, syntax_tree.Array):
+    if isinstance(node, Array):
         return f"{{{', '.join(map(to_text, node.elements))}}}"
     return ":" if isinstance(node, Colon) else "..."
 
 
 def _operand(node: Expression) -> str:
-    return f"({to_text(node)})" if isinstance(node, syntax_tree.Binary) else to_text(node)
+    return f"({to_text(node)})" if isinstance(node, Binary) else to_text(node)

@@ -16,7 +16,10 @@ UNITS = {"position": "m", "velocity": "m/s"}
 
 
 class DeckFollower(Fmi2Slave):
-    """Position control by tilting the thrust, attitude control by differences of the rotors' thrusts; SI units, angles in rad."""
+    """Position control by tilting the thrust, attitude control by differences of thrusts.
+
+    SI units, angles in rad.
+    """
 
     description = "Flies above the deck at a commanded height"
     units = {
@@ -84,7 +87,10 @@ class DeckFollower(Fmi2Slave):
         return True
 
     def _acceleration_command(self) -> tuple[float, float, float]:
-        """Return the commanded acceleration in the world frame (m/s2) of a critically damped control of the position."""
+        """Return the commanded acceleration in the world frame (m/s2).
+
+        The control of the position is critically damped.
+        """
         position, velocity = self.vehicle.position, self.vehicle.velocity
         target, motion = self.target.position, self.target.velocity
         return (
@@ -111,7 +117,10 @@ class DeckFollower(Fmi2Slave):
         return roll, pitch, self.mass * (GRAVITY + z) / max(0.5, tilt)
 
     def _torques(self, roll: float, pitch: float) -> tuple[float, float, float]:
-        """Return the torques about the body axes (N.m) of a control of the attitude with a damping ratio of 0.8."""
+        """Return the torques about the body axes (N.m).
+
+        The control of the attitude has a damping ratio of 0.8.
+        """
         attitude, rates = self.vehicle.attitude, self.vehicle.rates
         turn = self.yaw_command - attitude.yaw
         w, w_yaw = self.attitude_bandwidth, self.yaw_bandwidth
