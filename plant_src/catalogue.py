@@ -14,11 +14,6 @@ from typing import Any, TypeVar
 
 from cosim.core.errors import InputError, Problem, did_you_mean
 
-<<<<<<< HEAD
-from .vehicles.common.interface import PLANAR_STATES, VESSEL_STATES
-from .vehicles.common.shapes import inertia_of
-=======
->>>>>>> origin/main
 from .vehicles.common.vehicle_reader import read_visual
 from .vehicles.model import Model
 
@@ -41,7 +36,7 @@ _FILES = {
 
 def multirotor_model(name: str, data: Mapping[str, Any]) -> Model:
     """Return the model of a multirotor. Raises InputError with all problems of its data."""
-    from .vehicles.common.inertia import inertia_of
+    from .vehicles.common.shapes import inertia_of
     from .vehicles.multirotor import interface
     from .vehicles.multirotor.airframe import MAX_ROTORS, MultirotorReader
 
@@ -62,7 +57,7 @@ def multirotor_model(name: str, data: Mapping[str, Any]) -> Model:
 
 def submerged_model(name: str, data: Mapping[str, Any]) -> Model:
     """Return the model of a submerged vehicle. Raises InputError with all problems of its data."""
-    from .vehicles.common.inertia import inertia_of
+    from .vehicles.common.shapes import inertia_of
     from .vehicles.submerged import interface
     from .vehicles.submerged.craft import MAX_THRUSTERS, SubmergedReader
 
@@ -83,7 +78,7 @@ def submerged_model(name: str, data: Mapping[str, Any]) -> Model:
 
 def surface_vessel_model(name: str, data: Mapping[str, Any]) -> Model:
     """Return the model of a floating vessel. Raises InputError with all problems of its data."""
-    from .vehicles.common.inertia import inertia_of
+    from .vehicles.common.shapes import inertia_of
     from .vehicles.surface_vessel import interface
     from .vehicles.surface_vessel.surface_vessel import SurfaceVesselReader
     from .vehicles.vessel.actuators import MAX_PROPELLERS, MAX_RUDDERS
@@ -173,62 +168,19 @@ def _named_links(data: Mapping[str, Any]) -> Iterator[Problem]:
                 yield Problem(text, f"{key}.{i}.link", ("arguments", key, str(i), "link"))
 
 
-<<<<<<< HEAD
-#: name -> model
-MODELS = {
-    model.name: model
-    for model in (
-        *(model_from_data(data, name) for name, data in read_vehicle_files()),
-        Model(
-            "strider",
-            strider_interface.VARIABLES,
-            PLANAR_STATES,
-            strider.BODY,
-            strider_parameters.CRASH_SPEED,
-            is_vessel=True,
-            motion="planar",
-            hulls=strider_interface.HULLS,
-        ),
-        Model(
-            "strider_6dof",
-            strider_6dof_interface.VARIABLES,
-            VESSEL_STATES,
-            strider_6dof.BODY,
-            strider_parameters.CRASH_SPEED,
-            is_vessel=True,
-            vehicle="strider",
-            hulls=strider_interface.HULLS,
-        ),
-        Model(
-            "otter",
-            otter_interface.VARIABLES,
-            (*VESSEL_STATES, *otter_interface.PROPELLER_STATES),
-            otter.BODY,
-            otter_parameters.CRASH_SPEED,
-            is_vessel=True,
-        ),
-        Model(
-            "otter_mss",
-            otter_interface.VARIABLES,
-            (*VESSEL_STATES, *otter_interface.PROPELLER_STATES),
-            otter.BODY,
-            otter_parameters.CRASH_SPEED,
-            is_vessel=True,
-        ),
-=======
 def _strider() -> Model:
+    from .vehicles.common.interface import PLANAR_STATES
     from .vehicles.strider import interface, parameters
 
     return Model(
         "strider",
         interface.VARIABLES,
-        interface.STATES,
+        PLANAR_STATES,
         parameters.BODY,
         parameters.CRASH_SPEED,
         is_vessel=True,
         motion="planar",
         hulls=interface.HULLS,
->>>>>>> origin/main
     )
 
 
