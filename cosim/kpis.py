@@ -129,7 +129,7 @@ def iae(
     start: float = -FOREVER,
     stop: float = FOREVER,
 ) -> dict[str, float]:
-    """Return the integral of the absolute error over time (IAE), in the unit of the signal times s."""
+    """Return the integral of the absolute error (IAE), in the unit of the signal times s."""
     time, error = control_error(result, signal, target, start, stop)
     return {"value": integrate(time, np.abs(error))}
 
@@ -144,7 +144,7 @@ def ise(
     start: float = -FOREVER,
     stop: float = FOREVER,
 ) -> dict[str, float]:
-    """Return the integral of the squared error over time (ISE), in the square of the unit of the signal times s."""
+    """Return the integral of the squared error (ISE), in the squared unit of the signal times s."""
     time, error = control_error(result, signal, target, start, stop)
     return {"value": integrate(time, error**2)}
 
@@ -159,7 +159,10 @@ def itae(
     start: float = -FOREVER,
     stop: float = FOREVER,
 ) -> dict[str, float]:
-    """Return the integral of the absolute error times the time since the first row (ITAE), in the unit of the signal times s2."""
+    """Return the integral of the absolute error times the time since the first row (ITAE).
+
+    Its unit is that of the signal times s2.
+    """
     time, error = control_error(result, signal, target, start, stop)
     return {"value": integrate(time, (time - time[:1]) * np.abs(error))}
 
@@ -228,7 +231,9 @@ def saturation_share(
 def time_to_reach(
     result: Result, signal: Signal, level: float, start: float = -FOREVER, stop: float = FOREVER
 ) -> dict[str, float]:
-    """Return the time (s) from the first row until a signal first reaches a level, from above or below.
+    """Return the time (s) until a signal first reaches a level, from above or below.
+
+    It counts from the first row.
 
     Args:
         result: The recorded run.
@@ -291,7 +296,10 @@ def overshoot(
     initial: float | None = None,
     target: float | None = None,
 ) -> dict[str, float]:
-    """Return the largest overshoot of a step response as a fraction of the step (1), 0 if there is none; see `rise_time`."""
+    """Return the largest overshoot as a fraction of the step (1), 0 if there is none.
+
+    Arguments as for `rise_time`.
+    """
     fraction = step_response(result, signal, start, stop, initial, target).fraction
     return {"value": max(float(fraction.max()) - 1, 0.0) if fraction.size else math.nan}
 

@@ -60,7 +60,7 @@ class Track:
         )
 
     def time_of_heading_change(self, angle: float) -> float:
-        """Return the first time (s) at which the heading differs by `angle` (rad) from the original course."""
+        """Return the first time (s) at which the heading has changed by `angle` (rad)."""
         return first_crossing_time(
             self.time, self.turn_direction(angle) * self.heading_change, angle
         )
@@ -108,7 +108,10 @@ def track(result: Result, vehicle: str, start: float, midships: Point = CENTRE_O
 
 
 def _point_offset(result: Result, vehicle: str, point: Point) -> np.ndarray:
-    """Return the horizontal offset x + i * y (m, world) of a body-fixed point from the centre of mass, shape (rows,)."""
+    """Return the horizontal offset x + i * y (m, world) of a body-fixed point.
+
+    It is that from the centre of mass, shape (rows,).
+    """
     if not any(point):
         return np.zeros(len(result.time), complex)
     w, x, y, z = (result[f"{vehicle}.orientation.{axis}"] for axis in "wxyz")
@@ -142,7 +145,9 @@ DEGREE = math.pi / 180  # rad
 def turning_circle(
     result: Result, vehicle: Prefix, start: float, length: float, midships: Point = CENTRE_OF_MASS
 ) -> dict[str, Number]:
-    """Evaluate a turning circle to port or starboard with the rudder hard over (IMO MSC.137(76), 5.2.1).
+    """Evaluate a turning circle with the rudder hard over (IMO MSC.137(76), 5.2.1).
+
+    It may turn to port or starboard.
 
     Args:
         result: Recorded run.
@@ -156,10 +161,12 @@ def turning_circle(
 
         - `advance`: distance along the original course until the heading has changed by 90 deg (m)
         - `transfer`: distance perpendicular to the original course until then (m)
-        - `tactical_diameter`: distance perpendicular to the original course until the heading has changed by 180 deg (m)
+        - `tactical_diameter`: distance perpendicular to the original course until the heading has
+          changed by 180 deg (m)
         - `steady_diameter`: diameter of the last full turn, its track length over pi (m)
         - `advance_lengths`, `tactical_diameter_lengths`: the same in lengths of the vessel
-        - `time_to_90`, `time_to_180`: time from the order until the heading has changed by 90 and 180 deg (s)
+        - `time_to_90`, `time_to_180`: time from the order until the heading has changed by 90 and
+          180 deg (s)
         - `period`: duration of the last full turn (s)
         - `steady_speed`: mean speed over the last full turn (m/s)
         - `speed_loss`: 1 - `steady_speed` / speed at the order
@@ -255,7 +262,10 @@ def zigzag(
 
 
 def _reversals(motion: Track, angle: float, count: int) -> tuple[list[float], list[float]]:
-    """Return the times (s) at which the heading passes `angle` (rad) on alternating sides, and the overshoots after them (rad).
+    """Return the reversals of a zig-zag and the overshoots after them.
+
+    A reversal is the time (s) at which the heading passes `angle` (rad) on alternating sides. An
+    overshoot is an angle (rad).
 
     An overshoot is NaN if the heading has not begun to return by the end of the track.
     """
@@ -281,7 +291,7 @@ def _reversals(motion: Track, angle: float, count: int) -> tuple[list[float], li
 
 
 def _time_back_on_course(motion: Track, reversal: float) -> float:
-    """Return the time (s) at which the heading is first back on the original course after `reversal` (s)."""
+    """Return the time (s) after `reversal` (s) at which the heading is first back on course."""
     rows = motion.time > reversal
     if not rows.any():
         return math.nan

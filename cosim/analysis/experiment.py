@@ -1,4 +1,4 @@
-"""A scenario at a point in time, whose inputs are perturbed again and again from the same saved state."""
+"""A scenario at a point in time, perturbed again and again from the same saved state."""
 
 from __future__ import annotations
 
@@ -201,7 +201,7 @@ class Experiment:
     def directional_derivatives(
         self, component: str, unknowns: Sequence[str], knowns: Sequence[str]
     ) -> np.ndarray | None:
-        """Return the partial derivatives of variables of a component at the operating point, shape (unknowns, knowns).
+        """Return the partial derivatives of variables of a component at the operating point.
 
         Args:
             component: Name of the component.
@@ -226,10 +226,10 @@ class Experiment:
         return np.array(columns).reshape(len(knowns), len(unknowns)).T
 
     # -- names
-    # -----------------------------------------------------------------------------------------------------------
+    # ---------------------------------------------------------------------------------------
 
     def find_outputs(self, names: Sequence[str]) -> list[str]:
-        """Return the recorded floating-point outputs that names or patterns such as "plant.uav.position" stand for.
+        """Return the recorded floating-point outputs that names or patterns stand for.
 
         Raises:
             InputError: A name stands for no output.
@@ -253,7 +253,7 @@ class Experiment:
         return list(found)
 
     def find_inputs(self, names: Sequence[str]) -> dict[str, list[PerturbationTarget]]:
-        """Return the channels that names of inputs, tunable parameters or connected outputs stand for.
+        """Return the channels that names of inputs, parameters or connected outputs stand for.
 
         Raises:
             InputError: A name stands for nothing that can be perturbed.
@@ -272,7 +272,10 @@ class Experiment:
         return channels
 
     def _targets(self, text: str) -> list[tuple[str, PerturbationTarget]]:
-        """Return the inputs that a name stands for, each with what follows the name in that of the input."""
+        """Return the inputs that a name stands for.
+
+        Each has what follows the name in that of the input.
+        """
         fed = {connection.target for connection in self.prepared.system.connections}
         targets = []
         for component, prefix in self._resolve(text):

@@ -1,6 +1,7 @@
-"""Bode and Nyquist diagrams, poles and step responses, of linear models and for the report of a scenario.
+"""Bode and Nyquist diagrams, poles and step responses, also for the report of a scenario.
 
-{"name": "bode", "python": "cosim.analysis.figures:bode", "arguments": {"components": "uav", "at": 15}}
+{"name": "bode", "python": "cosim.analysis.figures:bode",
+ "arguments": {"components": "uav", "at": 15}}
 """
 
 from __future__ import annotations
@@ -98,7 +99,7 @@ def steps(
 
 
 # -- drawing
-# -------------------------------------------------------------------------------------------------------------
+# ---------------------------------------------------------------------------------------
 
 
 def draw_loop_bode(loops: Sequence[LoopResponse]) -> Figure:
@@ -147,7 +148,10 @@ def draw_bode(model: LinearModel) -> Figure:
 
 
 def draw_nyquist(loops: Sequence[LoopResponse]) -> Figure:
-    """Draw open loops in the complex plane around the point -1, with the circle of the disk margin of the worst one."""
+    """Draw open loops in the complex plane around the point -1.
+
+    A circle shows the disk margin of the worst one.
+    """
     figure = Figure(figsize=(1.35 * _COLUMN, _COLUMN), layout="constrained")
     axes = figure.subplots()
     for loop in loops[:_MAX_CURVES]:

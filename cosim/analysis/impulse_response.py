@@ -1,6 +1,7 @@
 """Impulse responses at an operating point, and minimal state-space realizations of them.
 
-Responses are central differences of fourth order from a saved state. The method of realization is the eigensystem realization algorithm (J.-N. Juang and R. S. Pappa, J. Guidance 8
+Responses are central differences of fourth order from a saved state. The method of realization is
+the eigensystem realization algorithm (J.-N. Juang and R. S. Pappa, J. Guidance 8
 (1985), 620-627). The lags of the rows and columns of the Hankel matrix grow geometrically, so that
 a small matrix covers fast and slow modes.
 """
@@ -42,12 +43,13 @@ class Realization(NamedTuple):
 def realize(
     response: np.ndarray, max_order: int | None = None, tolerance: float = 0.0
 ) -> Realization:
-    """Return a balanced realization of the lowest order that reproduces a response about as well as any.
+    """Return a balanced realization of the lowest order that reproduces a response well enough.
 
     Args:
         response: Impulse response D, C B, C A B, ..., shape (steps, outputs, inputs).
         max_order: Largest order; None: no limit.
-        tolerance: Misfit of about this size is good enough, because the response itself varies as much; at most 0.001 counts.
+        tolerance: Misfit of about this size is good enough, because the response itself varies as
+            much; at most 0.001 counts.
     """
     rows, columns = _scales(response)
     scaled = response / rows[:, None] / columns
@@ -77,7 +79,10 @@ def realize(
 
 
 def misfit(realization: Realization, response: np.ndarray) -> float:
-    """Return the largest error of the impulse response of a realization, as a fraction of the peak of each response."""
+    """Return the largest error of the impulse response of a realization.
+
+    It is a fraction of the peak of each response.
+    """
     peaks = np.abs(response).max(0)
     peaks[peaks == 0] = 1
     with np.errstate(over="ignore", invalid="ignore"):
@@ -86,7 +91,7 @@ def misfit(realization: Realization, response: np.ndarray) -> float:
 
 
 def _scales(response: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Return factors of outputs and inputs that make the largest responses of all of them about 1."""
+    """Return factors of outputs and inputs that make the largest responses about 1."""
     peaks = np.abs(response).max(0)
     rows = peaks.max(1)
     rows[rows == 0] = 1
@@ -195,9 +200,12 @@ def _measure_channel(
 
 
 def _variation(response: Response, later: Response, shift: int, magnitudes: Response) -> float:
-    """Return the largest difference from the response to a perturbation `shift` samples later, as a fraction of the peaks.
+    """Return the largest difference from the response to a later perturbation.
 
-    Signals with a response far below that of the others are left out, because rounding may dominate them.
+    The perturbation is `shift` samples later. The difference is a fraction of the peaks.
+
+    Signals with a response far below that of the others are left out, because rounding may
+    dominate them.
     """
     peaks = [np.abs(part).max(0) for part in response]
     strengths = [peak / magnitude for peak, magnitude in zip(peaks, magnitudes, strict=True)]

@@ -37,9 +37,12 @@ def margins(
     loops: list[str] | None = None,
     duration: float | None = None,
 ) -> dict[str, float | bool]:
-    """Return the smallest gain (dB), phase (deg), delay (s) and disk margin (1) at the inputs and outputs of a controller.
+    """Return the smallest margins at the inputs and outputs of a controller.
 
-    If a loop is unstable or its linear model is not valid, `stable` is false and the margins are NaN.
+    They are gain (dB), phase (deg), delay (s) and disk margin (1).
+
+    If a loop is unstable or its linear model is not valid, `stable` is false and the margins are
+    NaN.
 
     Args:
         result: Recorded run.

@@ -51,12 +51,15 @@ class LinearModel:
     notes: Sequence[str] = ()
 
     def poles(self) -> np.ndarray:
-        """Return the eigenvalues of A in the order of their magnitude (1, of a continuous model 1/s)."""
+        """Return the eigenvalues of A by magnitude (1; of a continuous model 1/s)."""
         poles = np.linalg.eigvals(self.a)
         return poles[np.lexsort((poles.imag, poles.real, np.abs(poles)))]
 
     def frequency_response(self, frequencies: np.ndarray) -> np.ndarray:
-        """Return the transfer matrix at angular frequencies (rad/s), shape (frequencies, outputs, inputs)."""
+        """Return the transfer matrix at angular frequencies (rad/s).
+
+        Its shape is (frequencies, outputs, inputs).
+        """
         points = (
             1j * np.asarray(frequencies)
             if self.step is None
@@ -95,7 +98,10 @@ class LinearModel:
         return times, np.array(responses)
 
     def to_dict(self) -> dict[str, Any]:
-        """Return everything as numbers, texts and lists, with the poles as pairs of real and imaginary part."""
+        """Return everything as numbers, texts and lists.
+
+        Poles are pairs of real and imaginary part.
+        """
         matrices = {name.upper(): getattr(self, name).tolist() for name in "abcd"}
         names = {
             name: list(getattr(self, name)) for name in ("inputs", "outputs", "states", "notes")

@@ -165,7 +165,9 @@ def _notes(
 
 
 def to_continuous(realization: Realization, step: float) -> Realization:
-    """Return the continuous model whose sampling with inputs held for a step has outputs at the end of each step.
+    """Return the continuous model of a sampled one.
+
+    Sampled with inputs held for a step, it has outputs at the end of each step.
 
     Args:
         realization: Its outputs belong to the end of the step in which its inputs act.
@@ -197,7 +199,7 @@ def to_continuous(realization: Realization, step: float) -> Realization:
 def _with_outputs_as_states(
     realization: Realization, names: Sequence[str]
 ) -> tuple[Realization, list[str]]:
-    """Return the realization with outputs as states if there are enough, and the names of the states."""
+    """Return the realization with outputs as states if there are enough, and their names."""
     order = len(realization.a)
     chosen: list[int] = []
     basis = np.zeros((0, order))

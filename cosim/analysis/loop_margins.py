@@ -132,7 +132,10 @@ Response = Callable[[float], complex]
 def _crossings(
     frequencies: np.ndarray, values: np.ndarray, function: Callable[[float], float]
 ) -> Iterator[float]:
-    """Yield the frequencies at which a function, given also by its values at frequencies, changes its sign."""
+    """Yield the frequencies at which a function changes its sign.
+
+    The function is also given by its values at `frequencies`.
+    """
     for i in np.flatnonzero(values[:-1] * values[1:] < 0).tolist():
         low, high, rises = float(frequencies[i]), float(frequencies[i + 1]), values[i] < 0
         for _ in range(_HALVINGS):
@@ -164,7 +167,10 @@ def _gain_margins(
 def _phase_margins(
     frequencies: np.ndarray, values: np.ndarray, at: Response
 ) -> tuple[float, float, float]:
-    """Return phase (rad) and delay (s) that may be added, and the frequency (rad/s) of the phase margin."""
+    """Return phase (rad) and delay (s) that may be added.
+
+    Also return the frequency (rad/s) of the phase margin.
+    """
     phase, delay, found = inf, inf, nan
     for frequency in _crossings(
         frequencies, np.abs(values) - 1, lambda frequency: abs(at(frequency)) - 1

@@ -49,7 +49,7 @@ class LoopResponse:
     error: float
 
     def open_loop(self, frequencies: np.ndarray) -> np.ndarray:
-        """Return L at angular frequencies (rad/s), shape (frequencies,), with the sign of negative feedback."""
+        """Return L at angular frequencies (rad/s), with the sign of negative feedback."""
         closed = self.closed.frequency_response(frequencies)[:, 0, 0]
         return np.asarray(-closed / (1 + closed))
 
@@ -60,7 +60,10 @@ class LoopResponse:
 
     @property
     def is_valid(self) -> bool:
-        """False if the model is too far from the measured response for its margins, or for a pole outside the unit circle."""
+        """False if the model is too far from the measured response for its margins.
+
+        A model with a pole outside the unit circle must be closer than a stable one.
+        """
         return self.error < (_INVALID if self.is_stable else _UNCERTAIN)
 
     @property
@@ -68,7 +71,7 @@ class LoopResponse:
         return float(np.max(np.abs(self.closed.poles()), initial=0))
 
     def is_covered(self, sample_count: int) -> bool:
-        """Return whether the slowest mode decays to 1/e within half of a response of so many samples."""
+        """Return whether the slowest mode decays to 1/e within half of so many samples."""
         return bool(self._largest_pole ** (sample_count / 2) < np.exp(-1))
 
 
@@ -139,7 +142,9 @@ def measure_loops(
     parameters: Mapping[str, Any] | None = None,
     duration: float | None = None,
 ) -> list[LoopResponse]:
-    """Linearise each loop that is broken at one input or output of components, while all other loops remain closed.
+    """Linearise each loop that is broken at one input or output of components.
+
+    All other loops remain closed.
 
     Args:
         scenario: Path, name or content of a scenario.
@@ -147,7 +152,8 @@ def measure_loops(
         at: Point in time (s); None: the start time.
         loops: Names of signals; empty: all connected inputs and outputs.
         parameters: Values that replace those of the scenario.
-        duration: Duration of the impulse responses (s); None: 256 samples, and up to 64 times more for slow modes.
+        duration: Duration of the impulse responses (s); None: 256 samples, and up to 64 times more
+            for slow modes.
 
     Returns:
         The loops. A signal that does not act on itself belongs to no loop and is left out.
@@ -235,11 +241,14 @@ def estimate_loop(
     excitation: Excitation = "sines",
     parameters: Mapping[str, Any] | None = None,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Estimate the open-loop frequency response on the nonlinear system, from its response to a finite excitation.
+    """Estimate the open-loop frequency response from that to a finite excitation.
 
-    A run without excitation is subtracted. With sines, all frequencies act together; the response is measured over one period
-    of the lowest frequency after four periods. A chirp sweeps from the lowest to the highest frequency in eight periods of the
-    lowest one, followed by four periods in which the response decays.
+    The system remains nonlinear.
+
+    A run without excitation is subtracted. With sines, all frequencies act together; the response
+    is measured over one period of the lowest frequency after four periods. A chirp sweeps from the
+    lowest to the highest frequency in eight periods of the lowest one, followed by four periods in
+    which the response decays.
 
     Args:
         scenario: Path, name or content of a scenario.
@@ -252,7 +261,8 @@ def estimate_loop(
         parameters: Values that replace those of the scenario.
 
     Returns:
-        The used frequencies (rad/s), of sines rounded to multiples of the lowest one, and L, both of shape (frequencies,).
+        The used frequencies (rad/s), of sines rounded to multiples of the lowest one, and L, both
+        of shape (frequencies,).
 
     Raises:
         InputError: The scenario cannot be run, or a name is unknown.

@@ -1,4 +1,4 @@
-"""Trim: values of inputs, parameters and initial states with which a scenario starts in equilibrium."""
+"""Trim: inputs, parameters and initial states with which a scenario starts in equilibrium."""
 
 from __future__ import annotations
 
@@ -159,7 +159,10 @@ class _Search:
         return settings
 
     def without_effect(self, jacobian: np.ndarray) -> list[str]:
-        """Return the free values of whose elements none changes a residual, from the derivatives of the residuals."""
+        """Return the free values of whose elements none changes a residual.
+
+        The derivatives of the residuals show it.
+        """
         ends = np.cumsum([size or 1 for size in self.sizes])
         parts = np.split(jacobian, ends[:-1], axis=1)
         return [name for name, part in zip(self.free, parts, strict=True) if not part.any()]

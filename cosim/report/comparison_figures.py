@@ -11,8 +11,8 @@ from matplotlib.figure import Figure
 
 from ..core.errors import InputError
 from ..results import Result
-from ..results.comparison import Comparison, Tolerance, Verdict
-from ..results.comparison.comparison import Comparer, match_tolerances
+from ..results.comparison import Comparer, Comparison, Verdict, match_tolerances
+from ..results.tolerance_tube import Tolerance
 
 WIDTH, HEIGHT = 7.16, 1.7  # in, of the figure and of each panel
 TUBE_COLOUR, OUTSIDE_COLOUR = "#0072B2", "#D55E00"

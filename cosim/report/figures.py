@@ -15,8 +15,8 @@ from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
 
-from ..core.csv_text import text_cell
 from ..results import Result
+from ..results.csv_files import text_cell
 from ..results.files import writing_atomically
 from ..results.kpi import ResultFunction
 

@@ -133,7 +133,10 @@ def _worker_folder(worker: Any, name: str) -> Path:
 
 
 def _link_study_files(package: StudyPackage, worker: Any) -> Path:
-    """Link the stored files of a study into a folder, as its scenario expects them, and return the folder."""
+    """Link the stored files of a study into a folder, and return the folder.
+
+    They have the paths that the scenario expects.
+    """
     root = _worker_folder(worker, "trees") / package.digest
     for path, sha in package.files.items():
         file = root / path

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..api.arguments import expect, is_integer
-from ..core.processors import available_processors
+from ..core.resources import available_processors
 from ..core.size_limits import MAX_RUNS
 from ..results.files import check_writable
 from .execution.run_store import RunStore
@@ -55,7 +55,7 @@ class SweepResult:
         Raises:
             InputError: The package pandas is not installed.
         """
-        from ..results.data_frame import require_pandas
+        from ..results.parquet_files import require_pandas
 
         rows = [
             {
@@ -217,19 +217,22 @@ def regress(
     output_dir: str | Path = "runs",
     jobs: int | None = None,
 ) -> list[RegressionOutcome]:
-    """Run all scenarios that have checks or a reference, and compare their results with these, as `cosim regress`.
+    """Run all scenarios with checks or a reference, and compare their results, as `cosim regress`.
 
     Args:
-        scenarios: Scenario files, names of shipped scenarios, and folders; none: the folder scenarios/.
+        scenarios: Scenario files, names of shipped scenarios, and folders; none: the folder
+            scenarios/.
         update: Write the references instead of comparing with them.
         output_dir: Folder of the results.
         jobs: Number of scenarios that run at a time; None: one for each processor.
 
     Returns:
-        The outcome of each scenario, with `code` (0: passed, otherwise the exit code of the command), `summary` and `details`.
+        The outcome of each scenario, with `code` (0: passed, otherwise the exit code of the
+        command), `summary` and `details`.
 
     Raises:
-        InputError: There is no such scenario, two files have the same name, or an argument is of a wrong type.
+        InputError: There is no such scenario, two files have the same name, or an argument is of a
+            wrong type.
     """
     given = [scenarios] if isinstance(scenarios, str | os.PathLike) else scenarios
     accepted = isinstance(given, Sequence) and all(

@@ -26,7 +26,8 @@ from ..scenario import find_scenario
 
 if TYPE_CHECKING:
     from ..results import Result
-    from ..results.comparison import Comparison, Tolerance
+    from ..results.comparison import Comparison
+    from ..results.tolerance_tube import Tolerance
 
 
 #: keys of a scenario that state expectations of its results
@@ -104,7 +105,7 @@ class Regression:
     run_command: CommandRunner = run_in_new_process
 
     def run(self) -> RegressionOutcome:
-        """Run the scenario by `cosim run` in a separate process and check its results, or update the reference."""
+        """Run the scenario in a separate process, and check its results or update the reference."""
         began = time.perf_counter()
         return replace(self._run(), seconds=time.perf_counter() - began)
 
@@ -182,7 +183,7 @@ class Regression:
         )
 
     def _write_report(self, *options: str) -> list[str]:
-        """Write the report of the run by `cosim report` in a separate process, and return a line that names it."""
+        """Write the report of the run in a separate process, and return a line that names it."""
         done = self.run_command(["report", str(self.directory), *options])
         return (
             [f"see {self.directory / 'report.html'}"]
@@ -191,7 +192,7 @@ class Regression:
         )
 
     def _update_reference(self, run: _FinishedRun) -> RegressionOutcome:
-        from ..results.comparison.reference import write_reference
+        from ..results.reference import write_reference
 
         if failed := run.failed_checks():
             return RegressionOutcome(
@@ -206,7 +207,10 @@ class Regression:
 
 
 def _summarize(counts: Collection[tuple[int, int, str]], notes: Sequence[str]) -> str:
-    """Return the numbers of checks and signals from (number of failures, number of all, noun), and notes on the comparison."""
+    """Return the numbers of checks and signals, and notes on the comparison.
+
+    Each count is (number of failures, number of all, noun).
+    """
     ending = f" ({'; '.join(notes)})" if notes else ""
     if not any(failed for failed, _, _ in counts):
         return ", ".join(count_noun(number, noun) for _, number, noun in counts) + ending
@@ -247,7 +251,10 @@ class _FinishedRun:
         return checks
 
     def failed_checks(self, checks_only: bool = False) -> list[str]:
-        """Return the failed checks, after the crash that ended the run early (unless `checks_only`)."""
+        """Return the failed checks, after the crash that ended the run early.
+
+        `checks_only` leaves out the crash.
+        """
         from ..results.checks import evaluate_all_checks
 
         kpis = {
@@ -267,7 +274,7 @@ class _FinishedRun:
 
     @cached_property
     def tolerances(self) -> dict[str, Tolerance]:
-        from ..results.comparison import Tolerance
+        from ..results.tolerance_tube import Tolerance
 
         return {
             pattern: Tolerance(**tolerance)
@@ -299,7 +306,7 @@ class _FinishedRun:
 
     def later_rows(self) -> Iterator[str]:
         """Yield a note if the run continues after the end of the reference."""
-        from ..results.comparison.tube import time_tolerance
+        from ..results.tolerance_tube import time_tolerance
 
         own, expected = self.result.time, self.reference.time
         if own.size and expected.size and own[-1] > expected[-1] + time_tolerance(expected):
@@ -362,7 +369,7 @@ def run_regressions(
 
 
 def default_folder() -> Path:
-    """Return the folder scenarios/ of the working directory if it exists, else that of the shipped scenarios."""
+    """Return the folder scenarios/ here if it exists, else that of the shipped scenarios."""
     folder = Path("scenarios")
     return folder if folder.is_dir() else resources.root() / folder
 

@@ -91,7 +91,9 @@ class Study:
         )
 
     def unknown_criteria(self, names: Iterable[str]) -> list[Problem]:
-        """Return the problems of criteria of success whose KPIs cannot result from the functions of the scenario.
+        """Return the problems of criteria of success with unknown KPIs.
+
+        These cannot result from the functions of the scenario.
 
         Args:
             names: names of the KPIs, in the order of "success".
@@ -110,7 +112,10 @@ class Study:
     def check_jobs(
         self, runner: CheckingRunner, jobs: Iterable[Job], problems: Iterable[Problem] = ()
     ) -> None:
-        """Raise InputError with `problems` and, with positions in the study's file, those for which these jobs cannot be run."""
+        """Raise InputError with the problems for which these jobs cannot be run.
+
+        They have positions in the study's file. `problems` are added to them.
+        """
         found: list[Problem] = []
         for job in jobs:
             found += self.study_file.locate_problems(runner.check(job), job.settings)
@@ -136,7 +141,7 @@ class ObservedKpis:
 
     @property
     def has_enough_runs(self) -> bool:
-        """True if a name that is not among the KPIs may be reported as unknown before all runs have finished."""
+        """True if unknown names may be reported before all runs have finished."""
         return self.runs >= _ENOUGH_RUNS
 
 
@@ -224,7 +229,10 @@ class StudyFile(Generic[S]):
     def _is_setting(
         self, path: tuple[str | int, ...], name: str, settings: Mapping[str, Any]
     ) -> bool:
-        """Return whether a path in this file defines a setting, as a key with its value or as a string of "set"."""
+        """Return whether a path in this file defines a setting.
+
+        It may be a key with its value, or a text of "set".
+        """
         value = _value_at(self.document.value, path)
         return value == name or (path[-1] == name and value == settings.get(name))
 

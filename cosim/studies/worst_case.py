@@ -193,7 +193,9 @@ def severity(outcome: CheckOutcome) -> float:
 
 
 def write_worst_case_files(search: WorstCase, folder: Path) -> list[Path]:
-    """Write trials.csv and worst.json, and each counterexample as a scenario that extends that of the search.
+    """Write trials.csv and worst.json, and each counterexample as a scenario.
+
+    The scenarios extend that of the search.
 
     Returns:
         The files of the counterexamples, the worst one first.
@@ -220,7 +222,7 @@ def write_worst_case_files(search: WorstCase, folder: Path) -> list[Path]:
 
 
 def describe_worst_case(search: WorstCase) -> dict[str, Any]:
-    """Return the worst run and the counterexamples with everything that they depend on, as a JSON value."""
+    """Return the worst run and the counterexamples, with all that they depend on, as JSON."""
     return {
         "name": search.spec.name,
         "search": search.study_file.document.value,

@@ -12,9 +12,8 @@ from typing import Any
 
 import click
 
-from ...core import resources
+from ...core import __version__, resources
 from ...core.errors import InputError, Problem, abbreviate_names
-from ...core.version import __version__
 from ...studies.regression import Regression
 
 _TEMPLATES = Path(__file__).parents[1] / "templates"

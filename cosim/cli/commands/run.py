@@ -203,7 +203,7 @@ def _prepare_folder(prepared: PreparedRun, options: RunOptions, locks: LockKeepe
 
     Also check the figures.
     """
-    from ...engine.disk_space import find_space_problems
+    from ...engine.recorder import find_space_problems
     from ...results.files import check_writable, remove_files
 
     if not options.no_report and (problems := prepared.figure_problems()):

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 import click
 
 from ...core.errors import CosimError, InputError
-from ...core.processors import available_processors
+from ...core.resources import available_processors
 from ...core.text import count_noun
 from ...report.tables import print_table
 from .. import current_command_line, study_options

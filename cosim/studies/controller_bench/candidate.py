@@ -91,7 +91,10 @@ class CandidateInterface:
         return {*self.inputs, *self.outputs, *self.parameters, *self.inner_variables}
 
     def has_variables(self, name: str) -> bool:
-        """Return whether `name` is a variable, an array, a prefix of variables, or a pattern with "*" that matches one."""
+        """Return whether `name` stands for variables.
+
+        It may be a variable, an array, a prefix, or a pattern with "*".
+        """
         head, star, tail = name.partition("*")
         if star:
             return any(each.startswith(head) and each.endswith(tail) for each in self.names)

@@ -10,8 +10,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, Literal
 
+from ...core import __version__
 from ...core.json_values import is_number, parse_object
-from ...core.version import __version__
 from ...results.checks import CheckOutcome, Number, evaluate_all_checks, evaluate_checks
 from ...scenario.file_paths import path_in
 
@@ -124,7 +124,10 @@ def compare_kpis(
     last: RunKpis | None,
     checks: list[Mapping[str, Any]],
 ) -> list[KpiComparison]:
-    """Compare each KPI of the candidate with those of the shipped controller and of the candidate's last run."""
+    """Compare each KPI of the candidate with those of other runs.
+
+    These are the runs of the shipped controller and the last one of the candidate.
+    """
     better = merge_senses(candidate.senses, checks)
     outcomes = evaluate_checks(candidate.kpis, checks)
 
@@ -150,11 +153,16 @@ def compare_kpis(
 
 @dataclass(frozen=True)
 class ScenarioKpis:
-    """KPIs of both controllers in a scenario (None: the run did not reach its end), and the checks of the scenario.
+    """KPIs of both controllers in a scenario, and the checks of the scenario.
 
-    `is_applicable` is False if the scenario does not feed an input of the candidate. `own_name` is the name of the controller
-    that the scenario contains, such as "ar_drone_cascaded". `descriptions` are the meanings of KPI values (see `describe_kpis`),
-    `settings` the values that the scenario gives the candidate ("landing_time = 5.0").
+    Attributes:
+        candidate: KPIs of the candidate; None: its run did not reach its end.
+        shipped: KPIs of the scenario's own controller; None: its run did not reach its end.
+        checks: checks of the scenario.
+        is_applicable: False if the scenario does not feed an input of the candidate.
+        own_name: name of the scenario's own controller, such as "ar_drone_cascaded".
+        descriptions: meanings of KPI values (see `describe_kpis`).
+        settings: values that the scenario gives the candidate ("landing_time = 5.0").
     """
 
     candidate: RunKpis | None

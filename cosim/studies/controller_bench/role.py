@@ -102,7 +102,7 @@ class Role:
 
     @property
     def short_names(self) -> dict[str, str]:
-        """Names of the parameters without their prefixes, such as "landing_time", by those with prefixes."""
+        """Names without prefixes, such as "landing_time", of the parameters with prefixes."""
         return {name: name.rpartition(".")[2] for name in self.parameters if "." in name}
 
     @property

@@ -135,7 +135,7 @@ class ControllerSubstitution:
             write_json(content, path)
 
     # -- systems
-    # -------------------------------------------------------------------------------------------------------
+    # ---------------------------------------------------------------------------------------
 
     def _substitute_system(
         self, value: Mapping[str, Any], folder: Path, prefix: str

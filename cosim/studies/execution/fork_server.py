@@ -37,7 +37,10 @@ from .run import FmuFiles, ReplayRequest, supervised_check, supervised_run
 
 
 def serve_forks(control: socket.socket) -> None:
-    """Receive the study context, preload it, and fork workers until the connection `control` is closed."""
+    """Receive the study context, preload it, and fork workers.
+
+    End when the connection `control` is closed.
+    """
     if not (message := control.recv(1 << 16)):
         return
     request = json.loads(message)

@@ -39,7 +39,13 @@ FmuFiles = Mapping[Path, FmuFile]
 
 
 class ReplayRequest(NamedTuple):
-    """Title and path of the page to which the replay of a run is written, and the checks that the run should pass."""
+    """Request for the replay of a run.
+
+    Attributes:
+        title: title of the page.
+        page: path of the page.
+        checks: checks that the run should pass.
+    """
 
     title: str
     page: str
@@ -90,7 +96,7 @@ def supervised_check(context: StudyContext, job: Job, fmu_files: FmuFiles) -> li
 
 
 # -- in the child
-# ------------------------------------------------------------------------------------------------------------
+# ----------------------------------------------------------------------------------------
 
 
 def _run_reporting_failure(reply: IO[str], work: Callable[[], None]) -> int:
@@ -197,7 +203,7 @@ def _check_job(context: StudyContext, job: Job, fmu_files: FmuFiles, reply: IO[s
 
 
 # -- in the supervisor
-# -------------------------------------------------------------------------------------------------------
+# ----------------------------------------------------------------------------------------
 
 
 def _make_record(
@@ -227,7 +233,7 @@ def _failure_cause(context: StudyContext, failure: ComponentError) -> str:
 
 
 def _without_root(context: StudyContext, text: str) -> str:
-    """Return a text with paths relative to the study's root, so that it is equal on all machines."""
+    """Return a text with paths relative to the study's root, so that all machines give the same."""
     return text.replace(f"{context.root}/", "")
 
 

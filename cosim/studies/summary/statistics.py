@@ -33,7 +33,10 @@ class ConfidenceInterval(NamedTuple):
 
 
 def wilson_interval(successes: float, count: int) -> ConfidenceInterval:
-    """Return Wilson's score interval (95 %) of a rate (E. B. Wilson, J. Am. Stat. Assoc. 22 (1927), 209-212)."""
+    """Return Wilson's score interval (95 %) of a rate.
+
+    Source: E. B. Wilson, J. Am. Stat. Assoc. 22 (1927), 209-212.
+    """
     if count == 0:
         return ConfidenceInterval(0.0, 1.0)
     rate, z2 = successes / count, _Z_95 * _Z_95

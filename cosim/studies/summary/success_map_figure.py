@@ -304,7 +304,7 @@ class MapLayout:
 
     @cached_property
     def rotate_x_labels(self) -> bool:
-        """True if a word of the tick labels along x is wider than a cell, so that they must be rotated."""
+        """True if tick labels along x must be rotated: a word is wider than a cell."""
         return (
             _text_width("\n".join(self._wrapped_x_labels).split("\n"), TICK_FONT_SIZE)
             > self.cell[0] - _PAD
@@ -325,7 +325,10 @@ def _label_text(label: Any) -> str:
 def _wrap(
     text: str, width: float, size: float, weight: str = "normal", break_words: bool = False
 ) -> str:
-    """Break a text into lines of at most `width` between words, with `break_words` also between characters."""
+    """Break a text into lines of at most `width` between words.
+
+    `break_words` also breaks between characters.
+    """
     average = _text_width([text], size, weight) / max(1, len(text))
     longest = min(len(text), int(_WIDTH_VARIATION * width / average)) if average else 1
     lines = [text]
@@ -339,7 +342,7 @@ def _wrap(
 
 
 def _wrap_and_break(text: str, width: float, size: float, weight: str = "normal") -> str:
-    """Break a text into lines between words, and then every line that is still too wide between characters."""
+    """Break a text between words, and lines that are still too wide between characters."""
     lines = _wrap(text, width, size, weight).split("\n")
     return "\n".join(_wrap(line, width, size, weight, break_words=True) for line in lines)
 
@@ -359,6 +362,9 @@ def _line_width(line: str, size: float, weight: str) -> float:
 
 
 def _every_nth_label(texts: Sequence[str], space: float) -> dict[int, str]:
-    """Return every n-th text by index, with the smallest n for which lines of text `space` apart do not touch."""
+    """Return every n-th text by index.
+
+    n is the smallest number for which lines of text `space` apart do not touch.
+    """
     step = math.ceil(1.2 * TICK_FONT_SIZE / 72 / space)
     return dict(list(enumerate(texts))[::step])

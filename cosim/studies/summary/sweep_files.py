@@ -68,7 +68,9 @@ class SweepSummary:
 def write_sweep_files(
     sweep: Sweep, run_store: RunStore, folder: Path, parquet: bool
 ) -> SweepSummary:
-    """Write table.csv, aggregates.csv, success.csv, unsuccessful.csv, failures.csv and sweep.json, and return the summary.
+    """Write the tables of a sweep and sweep.json, and return the summary.
+
+    The tables are table.csv, aggregates.csv, success.csv, unsuccessful.csv and failures.csv.
 
     With `parquet`, table.parquet is written, too; else an older one is removed.
     """
