@@ -18,8 +18,7 @@ from typing import Any, ClassVar, Generic, Protocol, TypeVar
 import numpy as np
 
 from cosim.core.errors import InputError, abbreviate_names
-from cosim.core.unit_table import PREFIXED
-from cosim.core.units import KNOWN_UNITS, Unit, parse_unit
+from cosim.core.units import KNOWN_UNITS, PREFIXED, Unit, parse_unit
 
 from ...json_reader import JsonPath, JsonReader, Numbers
 from .shapes import BODY_UP, Body, Boxes, ConvexPiece, Shape, Vector, level_box

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import casadi as ca
 
-from cosim.export.equations.simd_sum import sum_over_rows
+from cosim.export.equations.c_code import sum_over_rows
 
 from .elementary_functions import sine_and_cosine
 from .interface import MAX_WAVE_COMPONENTS

@@ -42,8 +42,7 @@ from functools import cached_property
 
 import casadi as ca
 
-from cosim.export.equations.c_code import Callee
-from cosim.export.equations.simd_sum import sum_over_rows
+from cosim.export.equations.c_code import Callee, sum_over_rows
 
 from ..common import kinematics
 from ..common.elementary_functions import clamp
