@@ -8,7 +8,7 @@
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from .core.version import __version__
+from .core import __version__
 
 if TYPE_CHECKING:
     from .analysis.linearization import linearize

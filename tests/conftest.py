@@ -11,7 +11,7 @@ from plant_validation import MeasurementCheck, ValidationReport
 from probe_fmus import probe, probes
 from quick_compiler import compile_without_optimization
 
-from cosim.core.processors import available_processors
+from cosim.core.resources import available_processors
 from cosim.engine import EXECUTORS
 from cosim.engine import native_available as native_available
 

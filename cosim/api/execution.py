@@ -13,9 +13,14 @@ from ..engine import Termination
 from ..engine.plan_run import SimulationOutcome
 from ..process.float_mode import default_float_mode
 from ..results import Kpis, Result
-from ..results.checks import CheckOutcome, Number, evaluate_all_checks, evaluate_checks
+from ..results.checks import (
+    CheckOutcome,
+    Number,
+    evaluate_all_checks,
+    evaluate_checks,
+    warn_non_finite,
+)
 from ..results.kpi import NoValue, evaluate_kpis, kpi_notes, kpi_senses, kpi_units
-from ..results.non_finite import warn_non_finite
 from ..scenario import PreparedRun
 from ..scenario.input_limits import warn_exceeded_limits
 
@@ -87,7 +92,10 @@ def _evaluate_run(result: Result, prepared: PreparedRun) -> Result:
 def _signals_of_optional_kpis(
     prepared: PreparedRun, functions: Iterable[tuple[str, Any, Mapping[str, Any]]], result: Result
 ) -> Iterator[tuple[str, dict[str, str]]]:
-    """Yield name and signals by argument of each optional KPI, since a signal may have another meaning in a user's component."""
+    """Yield the name of each optional KPI, and its signals by argument.
+
+    A signal may have another meaning in a user's component.
+    """
     for name, _, arguments in functions:
         signals = {
             key: value

@@ -21,7 +21,6 @@ from ..components.fmi import (
 from ..components.input_table import InputTable, make_input_table, parse_cell, read_input_table
 from ..core import component_log
 from ..core.component import Component, Variable
-from ..core.csv_text import read_rows
 from ..core.errors import ComponentError, InputError, Problem, did_you_mean
 from ..core.system import Connection, Endpoint, System
 from ..core.time_grid import exact_divisor, exact_fraction
@@ -33,7 +32,8 @@ from ..export.foreign import add_binary
 from ..process.float_mode import default_float_mode
 from ..process.process_state import exclusive_process_state
 from ..results import Result
-from ..results.non_finite import warn_non_finite
+from ..results.checks import warn_non_finite
+from ..results.csv_files import read_rows
 from ..scenario.name_resolution import UnknownNameError, check_assignment
 from .arguments import check_names, expect
 
@@ -58,19 +58,27 @@ def simulate(
     solver_step_size: float | str | None = None,
     tolerance: float | None = None,
 ) -> Result:
-    """Simulate one FMU (Co-Simulation or Model Exchange of FMI 1.0, 2.0 or 3.0), from the start time of its default experiment.
+    """Simulate one FMU from the start time of its default experiment.
+
+    Co-Simulation or Model Exchange of FMI 1.0, 2.0 or 3.0.
 
     Args:
         fmu: Path of the FMU.
-        stop_time: Stop time (s), a number or a fraction such as "1/3"; None: that of the default experiment, else 1 s later.
-        step_size: Communication step size (s); None: that of the default experiment, else a hundredth of the duration.
-        input: Values of inputs over time: a CSV file, or columns by name as a dict, a pandas DataFrame or a structured array. The
-            column "time" is in s. Floating-point numbers are interpolated linearly, other values are held.
+        stop_time: Stop time (s), a number or a fraction such as "1/3"; None: that of the default
+            experiment, else 1 s later.
+        step_size: Communication step size (s); None: that of the default experiment, else a
+            hundredth of the duration.
+        input: Values of inputs over time: a CSV file, or columns by name as a dict, a pandas
+            DataFrame or a structured array. The
+            column "time" is in s. Floating-point numbers are interpolated linearly, other values
+            are held.
         start_values: Parameters and start values by the names of the variables.
         output: Names of the recorded variables; None: all outputs.
         isolation: "fmu" runs the FMU in a separate process.
-        solver: "euler", "rk4" or "cvode" simulates by Model Exchange; None: by Co-Simulation if the FMU has it, else with cvode.
-        solver_step_size: Largest step size (s) of euler and rk4; None: that of the default experiment, else `step_size`.
+        solver: "euler", "rk4" or "cvode" simulates by Model Exchange; None: by Co-Simulation if
+            the FMU has it, else with cvode.
+        solver_step_size: Largest step size (s) of euler and rk4; None: that of the default
+            experiment, else `step_size`.
         tolerance: Relative tolerance of the FMU and of cvode; None: that of the default experiment.
 
     Returns:
@@ -78,7 +86,8 @@ def simulate(
 
     Raises:
         InputError: The FMU cannot be simulated, or an argument is of a wrong type.
-        ComponentError: The FMU failed; the attribute `result` of the error holds what was recorded until then.
+        ComponentError: The FMU failed; the attribute `result` of the error holds what was
+            recorded until then.
     """
     expect("fmu", fmu, isinstance(fmu, str | os.PathLike), "the path of an FMU")
     check_names("start_values", start_values)
@@ -232,7 +241,10 @@ def _read_inputs(values: InputValues, component: Component) -> InputTable:
 
 
 def _column_names(values: Any) -> list[str]:
-    """Return the names of the columns after "time" of a dict, a pandas DataFrame or a structured array."""
+    """Return the names of the columns after "time".
+
+    `values` is a dict, a pandas DataFrame or a structured array.
+    """
     found = (
         values.dtype.names
         if isinstance(values, np.ndarray)

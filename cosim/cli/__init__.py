@@ -16,8 +16,8 @@ from typing import Any, TextIO
 
 import click
 
+from ..core import __version__
 from ..core.errors import CosimError, did_you_mean
-from ..core.version import __version__
 from ..process.standard_streams import open_closed_streams, protected_stream
 
 #: module in `commands`, ":" and its function unless that is `command`, and the description

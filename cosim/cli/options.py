@@ -84,7 +84,7 @@ def new_file_options(result: str = "file") -> Decorator:
 
 def _set_excel_safe(_context: click.Context, _option: click.Parameter, enabled: bool) -> None:
     if enabled:
-        from ..core.csv_text import set_excel_safe
+        from ..results.csv_files import set_excel_safe
 
         set_excel_safe(True)
 

@@ -179,7 +179,7 @@ def save_after_crash(outcome: SupervisedOutcome, options: RunOptions) -> None:
     """
     from ..process.run_files import read_metadata
     from ..results import Result
-    from ..results.non_finite import warn_non_finite
+    from ..results.checks import warn_non_finite
 
     folder = outcome.journal.folder
     if folder is not None:

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ..core.processors import available_processors
+from ..core.resources import available_processors
 from ..core.size_limits import MAX_RUNS
 from ..core.text import count_noun
 from . import current_command_line

@@ -9,7 +9,6 @@ from pathlib import Path
 from shutil import disk_usage
 from typing import TYPE_CHECKING
 
-from ..core.csv_text import BYTES_PER_NUMBER
 from ..core.errors import CosimError, InputError, OutputError
 from ..core.paths import resolve_path
 from ..core.text import count_noun
@@ -89,6 +88,8 @@ def how_to_recover(result: Result, folder: Path, shown: Path, error: CosimError)
 
     The remedy for an error, and the `cosim recover` command to call afterwards.
     """
+    from ..results.csv_files import BYTES_PER_NUMBER
+
     missing = len(result.time) * (len(result) + 1) * BYTES_PER_NUMBER - disk_usage(folder).free
     remedy = (
         f"free about {max(1, round(missing / 1e6))} MB"

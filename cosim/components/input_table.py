@@ -14,10 +14,10 @@ from typing import Any, Literal
 
 import numpy as np
 
-from ..core.binary_text import parse_binary
 from ..core.component import DTYPES, Component, Ports, Variable
-from ..core.csv_text import read_rows
 from ..core.errors import InputError, Problem, did_you_mean
+from ..core.json_values import parse_binary
+from ..results.csv_files import read_rows
 
 Interpolation = Literal["linear", "hold"]
 
@@ -78,18 +78,10 @@ class InputTable(Component):
 
     def bind(self, _inputs: Ports, outputs: Ports) -> None:
         """Write the columns of the bound outputs to their arrays from now on."""
-        filled = dict.fromkeys(outputs.arrays, 0)
-        cells = []
-        for variable in outputs.variables:
-            cells.append(
-                (
-                    outputs.arrays[variable.dtype],
-                    filled[variable.dtype],
-                    self._columns[variable.name],
-                )
-            )
-            filled[variable.dtype] += 1
-        self._cells = cells
+        self._cells = [
+            (array, part.start, self._columns[variable.name])
+            for variable, array, part in outputs.elements()
+        ]
 
     def set_inputs(self) -> None:
         """Do nothing: an input table has no inputs."""

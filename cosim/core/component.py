@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import product
@@ -206,6 +206,14 @@ class Ports(NamedTuple):
 
     variables: Sequence[Variable]
     arrays: Mapping[np.dtype[Any], np.ndarray]
+
+    def elements(self) -> Iterator[tuple[Variable, np.ndarray, slice]]:
+        """Yield each variable with its array and its part of the array."""
+        begins = dict.fromkeys(self.arrays, 0)
+        for variable in self.variables:
+            begin = begins[variable.dtype]
+            end = begins[variable.dtype] = begin + len(variable.scalar_names)
+            yield variable, self.arrays[variable.dtype], slice(begin, end)
 
 
 class Component(Protocol):

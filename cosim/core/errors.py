@@ -16,13 +16,12 @@ import re
 import traceback
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import lru_cache
+from functools import cache, lru_cache
 from pathlib import Path
 from typing import Any
 
 from .paths import resolve_path
 from .text import MAX_QUOTATION_LENGTH, count_noun, escape_control_characters, shorten
-from .user_code import innermost_user_line
 
 #: exceptions that are not a failure of the foreign code they pass through; all others are, even if
 #: not derived from Exception
@@ -323,3 +322,45 @@ def _close_matches(name: str, names: tuple[str, ...]) -> list[str]:
     return difflib.get_close_matches(name, siblings, n=1) or difflib.get_close_matches(
         name, names, n=1, cutoff=0.85
     )
+
+
+_PACKAGE = Path(__file__).resolve().parents[1]
+#: shipped vehicles and controllers of an installed cosim
+_BUNDLE = _PACKAGE / "_bundle"
+
+
+def innermost_user_line(frames: Iterable[tuple[str, int | None]]) -> str:
+    """Return "file:line" of the first frame in a file that belongs to no library, or "" if there is none.
+
+    The standard library, installed packages and cosim are libraries.
+
+    Args:
+        frames: File and line of each frame, innermost first.
+    """
+    return next((f"{Path(file).name}:{line}" for file, line in frames if _is_user_file(file)), "")
+
+
+def is_cosim_file(file: str) -> bool:
+    """Return whether a file belongs to the package `cosim`, without the shipped vehicles and controllers."""
+    return Path(file).is_relative_to(_PACKAGE) and not Path(file).is_relative_to(_BUNDLE)
+
+
+@cache
+def _is_user_file(file: str) -> bool:
+    path = Path(file)
+    if path.is_relative_to(_BUNDLE):
+        return True
+    # exported Python FMUs contain a copy of PythonFMU
+    is_library = path.parent.name == "pythonfmu" or any(
+        path.is_relative_to(folder) for folder in _library_folders()
+    )
+    return not (file.startswith("<") or is_library or is_cosim_file(file))
+
+
+@cache
+def _library_folders() -> set[Path]:
+    import sysconfig  # takes some milliseconds, and only failures need it
+
+    return {
+        Path(sysconfig.get_path(name)) for name in ("stdlib", "platstdlib", "purelib", "platlib")
+    }

@@ -1,4 +1,4 @@
-"""Conversion of values from and to JSON.
+"""Values as JSON and as text.
 
 Values that JSON does not have are written as others: bytes become {"bytes": hexadecimal digits},
 NumPy values become lists and numbers.
@@ -52,3 +52,15 @@ def copy_json(value: Any) -> Any:
 def is_number(value: Any) -> bool:
     """Return whether a value is a Boolean, a float, or an integer in the range of a double."""
     return isinstance(value, float) or (isinstance(value, int) and abs(value) <= sys.float_info.max)
+
+
+def parse_binary(text: str) -> bytes:
+    """Return the bytes of hexadecimal digits.
+
+    Raises:
+        ValueError: The text has another character or an odd number of digits.
+    """
+    try:
+        return bytes.fromhex(text)
+    except ValueError:
+        raise ValueError(f"found {text[:80]!r}, expected two hexadecimal digits per byte") from None

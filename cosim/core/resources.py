@@ -1,4 +1,7 @@
-"""Locations of the files that cosim ships (scenarios, FMUs, plant and controller sources) and of its cache."""
+"""Locations of the files that cosim ships and of its cache, and the number of processors.
+
+The shipped files are scenarios, FMUs, and sources of plant and controllers.
+"""
 
 from __future__ import annotations
 
@@ -32,3 +35,11 @@ def cache_directory() -> Path:
     """Return the cache folder of the user: XDG_CACHE_HOME/cosim, else ~/.cache/cosim."""
     base = os.environ.get("XDG_CACHE_HOME")
     return (Path(base) if base else Path.home() / ".cache") / "cosim"
+
+
+def available_processors() -> int:
+    """Return how many processors this process may use.
+
+    Its CPU affinity may exclude some of the machine's.
+    """
+    return len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1

@@ -114,7 +114,7 @@ typedef struct {
 
 typedef struct { const char *source; const Py_ssize_t *indices; Py_ssize_t count, item_size, position; } RowPart;
 
-/* Instructions of a stop condition; cosim/engine/condition_code.py describes them. */
+/* Instructions of a stop condition; cosim/engine/stop_conditions.py describes them. */
 typedef enum {
     PUSH, LOAD, ADD, SUBTRACT, MULTIPLY, DIVIDE, POWER, NEGATE, NOT, ABS, SQRT, EXP, LOG, MIN, MAX, LT, LE, GT, GE, EQ, NE, AND, OR,
     TRUTH

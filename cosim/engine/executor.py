@@ -12,16 +12,14 @@ import numpy as np
 from ..core.errors import ComponentError
 from ..process.float_mode import enabled_traps
 from ..process.journal import CALL_NUMBER, MARKER_SIZE, ROW_COUNT, STEP_COUNT
-from .finite_check import FiniteCheck
 from .initialization import initialize_components
 from .parallel import MEASURED_STEPS, ParallelSteps
 from .plan import Plan
 from .recorder import Recorder
 from .schedule import Schedule
-from .step_runner import StepRunner, Termination
+from .step_runner import FiniteCheck, StepRunner, Termination
 from .stop_conditions import StopConditions
-from .transfer_calls import DelayLine, TransferCall, compile_transfer
-from .transfer_plan import Transfer
+from .transfer_plan import DelayLine, Transfer, TransferCall, compile_transfer
 
 
 class ExecutorState(NamedTuple):

@@ -11,10 +11,9 @@ import numpy as np
 from ..core.component import NativeDoStep, NativeFlagCheck, NativeGetSet, PreparedCall
 from ..core.errors import InputError
 from ..process.journal import ROW_COUNT
-from .component_step import ScheduledStep
 from .executor import Executor
-from .transfer_calls import contiguous_views
-from .transfer_plan import Transfer
+from .plan import ScheduledStep
+from .transfer_plan import Transfer, contiguous_views
 
 try:
     from . import _native

@@ -1,10 +1,13 @@
-"""Pacing of a run to real time."""
+"""Wall time: pacing of a run to real time, and measurement of its parts."""
 
 from __future__ import annotations
 
 import time
 from array import array
+from collections.abc import Iterator
+from contextlib import contextmanager
 from fractions import Fraction
+from time import perf_counter
 from typing import Any, Literal
 
 import numpy as np
@@ -96,3 +99,23 @@ def _sleep_until(due: int) -> None:
     """Wait until a time of the monotonic clock (ns)."""
     while (ahead := due - time.monotonic_ns()) > 0:
         time.sleep(min(ahead, _LONGEST_SLEEP) * 1e-9)
+
+
+class Stopwatch:
+    """Accumulated wall time (s) by name of the measured part."""
+
+    def __init__(self) -> None:
+        self.seconds: dict[str, float] = {}
+
+    @contextmanager
+    def measure(self, part: str) -> Iterator[None]:
+        """Add the duration of the block to `part`, also if the block raises."""
+        began = perf_counter()
+        try:
+            yield
+        finally:
+            self.add(part, perf_counter() - began)
+
+    def add(self, part: str, seconds: float) -> None:
+        """Add a duration (s) to `part`."""
+        self.seconds[part] = self.seconds.get(part, 0.0) + seconds

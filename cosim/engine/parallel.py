@@ -8,18 +8,18 @@ for each other's interpreter lock.
 from __future__ import annotations
 
 from collections import defaultdict
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, NamedTuple
 
-from ..core.component import NativeDoStep, PreparedCall
+from ..core.component import SUCCESS_STATUSES, NativeDoStep, PreparedCall
 from ..core.errors import join_alternatives
-from ..core.processors import available_processors
+from ..core.resources import available_processors
 from ..core.system import Parallel
+from ..process import float_mode
 from ..process.journal import calling_several_components
-from .component_step import ScheduledStep, run_due
-from .plan import Phase, Step
+from .plan import Phase, ScheduledStep, Step
 from .schedule import Schedule
 from .step_runner import StepRunner
 
@@ -168,3 +168,35 @@ class ParallelSteps:
         """End the threads."""
         if self._threads:
             self._threads.close()
+
+
+class StepFailure(NamedTuple):
+    """Call `call_index` of a step that returned `status`.
+
+    A status None means that it changed the floating-point mode.
+    """
+
+    step: ScheduledStep
+    call_index: int
+    status: int | None
+
+    @property
+    def call(self) -> PreparedCall:
+        """The call that failed."""
+        return self.step.calls[self.call_index]
+
+
+def run_due(steps: Sequence[ScheduledStep], n: int) -> list[StepFailure]:
+    """Run the steps that are due in macro step `n`, in order, and return those that stopped early."""
+    return [failure for step in steps if n % step.step.divisor == 0 for failure in _run_calls(step)]
+
+
+def _run_calls(step: ScheduledStep) -> Iterator[StepFailure]:
+    for index, call in enumerate(step.calls):
+        status = call.function(*call.arguments)
+        if status not in SUCCESS_STATUSES:
+            yield StepFailure(step, index, status)
+            break
+    if float_mode.is_changed() or float_mode.enabled_traps():
+        float_mode.set_default()
+        yield StepFailure(step, -1, None)

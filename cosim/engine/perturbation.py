@@ -11,8 +11,7 @@ import numpy as np
 
 from ..core.errors import InputError
 from ..core.system import Endpoint, System
-from .component_step import ScheduledStep
-from .plan import Phase, Plan
+from .plan import Phase, Plan, ScheduledStep
 from .python_executor import PythonExecutor, _CompiledPhase
 from .recorder import Recorder
 

@@ -13,7 +13,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from typing import NamedTuple
 
-from ..core.component import Causality, Component, Variable
+from ..core.component import Causality, Component, PreparedCall, Variable
 from ..core.errors import abbreviate_names
 from ..core.system import (
     Connection,
@@ -50,6 +50,17 @@ class Phase:
     steps: tuple[Step, ...]
     parallel: Parallel = "auto"
     loop: Loop | None = None
+
+
+class ScheduledStep(NamedTuple):
+    """A component's step as calls that return an FMI status.
+
+    `first_call` is the number of the first call.
+    """
+
+    step: Step
+    calls: Sequence[PreparedCall]
+    first_call: int
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,6 @@ from ..core import component_log
 from ..core.component import Component
 from ..core.errors import ComponentError, InputError, Problem, join_alternatives
 from ..core.recording import Recording
-from ..core.stopwatch import Stopwatch
 from ..process.float_mode import default_float_mode, is_default
 from ..process.journal import (
     MARKER_SIZE,
@@ -36,10 +35,9 @@ from ..process.journal import (
 from ..process.process_state import call_restoring_process_state, restoring_process_state
 from . import Executor, Plan, Recorder, Termination, executor_class
 from .component_states import ComponentStates, SavedState
-from .disk_space import find_space_problems
 from .initialization import instantiate_components
-from .pacer import Pacer
-from .recorder import SavingRecorder
+from .pacer import Pacer, Stopwatch
+from .recorder import SavingRecorder, find_space_problems
 
 #: called with (completed macro steps, all macro steps); must not change the system
 Observer = Callable[[int, int], None]

@@ -14,12 +14,11 @@ import numpy as np
 from ..core.component import SUCCESS_STATUSES, NativeDoStep, PreparedCall
 from ..process import float_mode
 from ..process.journal import CALL_NUMBER, ROW_COUNT, STEP_COUNT
-from .component_step import ScheduledStep
 from .executor import Executor
 from .parallel import MEASURED_STEPS
-from .plan import Phase, Plan
+from .plan import Phase, Plan, ScheduledStep
 from .recorder import Recorder
-from .transfer_calls import TransferCall, contiguous_views
+from .transfer_plan import TransferCall, contiguous_views
 
 #: most macro steps whose times are computed at once
 MAX_STEPS_PER_CALL = 1 << 12

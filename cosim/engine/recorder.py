@@ -1,11 +1,12 @@
 """Recording of outputs: rows of a time and the present values.
 
 The executors record every `every`-th communication point. Further rows may lie between these, and
-several rows may have the same time.
+several rows may have the same time. A recording that does not fit on the disk is refused before.
 """
 
 from __future__ import annotations
 
+import shutil
 from collections.abc import Callable, Iterator, Sequence
 from itertools import groupby
 from pathlib import Path
@@ -13,12 +14,15 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
+from ..core.errors import Problem
 from ..core.recording import Recording
+from ..core.text import count_noun
 from ..process.row_store import MAX_MEMORY_BYTES, open_row_store
 from ..process.run_files import ROWS_FILE, SIGNALS, TIME, TIME_SIZE, Column, RowLayout, RowsFile
+from ..results.csv_files import BYTES_PER_NUMBER
 from .layout import ArrayPosition
 from .plan import Plan
-from .transfer_calls import MAX_SINGLE_COPIES
+from .transfer_plan import MAX_SINGLE_COPIES
 
 #: size of an output buffer from which copying all of it is faster than copying values one by one
 MIN_BUFFER_BYTES = 64
@@ -293,3 +297,32 @@ class SavingRecorder(Recorder):
         if changed:
             self._saved_strings |= changed
             self._file.write_texts(row, changed)
+
+
+#: size of a number in the rows (bytes), approximately
+_BYTES_PER_VALUE = 8
+#: size of the recording (bytes) from which the free disk space is checked
+_SIZE_CHECK_THRESHOLD = 1_000_000_000
+
+
+def find_space_problems(plan: Plan, folder: Path, csv: bool, replaced: int = 0) -> list[Problem]:
+    """Return a problem if the recording is larger than the free disk space; empty if it fits.
+
+    Args:
+        plan: the compiled system.
+        folder: folder of the rows.
+        csv: a CSV file is written there, too.
+        replaced: size of the files there that are removed before (bytes).
+    """
+    rows, columns = plan.row_count, len(plan.settings.columns)
+    size = rows * (columns + 1) * (_BYTES_PER_VALUE + csv * BYTES_PER_NUMBER)
+    if size < _SIZE_CHECK_THRESHOLD or size <= (free := shutil.disk_usage(folder).free + replaced):
+        return []
+    amount = f"{count_noun(rows, 'row')} of {count_noun(columns, 'signal')}"
+    text = f"{amount} take about {size / 1e9:.3g} GB, {free / 1e9:.3g} GB are free in {folder}"
+    return [
+        Problem(
+            f'{text}; make the step longer, or set "record": {{"interval": ...}}',
+            subject=("step_size",),
+        )
+    ]

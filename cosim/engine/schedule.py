@@ -7,12 +7,10 @@ from dataclasses import replace
 from types import MappingProxyType
 
 from ..core.component import PreparedCall
-from .component_step import ScheduledStep
 from .iteration import FixedPointIteration, IterationPhase
-from .plan import Loop, Phase, Plan, Step
+from .plan import Loop, Phase, Plan, ScheduledStep, Step
 from .step_runner import StepRunner
-from .transfer_calls import DelayLine, TransferCall, compile_transfer
-from .transfer_plan import Transfer
+from .transfer_plan import DelayLine, Transfer, TransferCall, compile_transfer
 
 
 class Schedule:

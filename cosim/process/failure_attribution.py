@@ -17,8 +17,7 @@ from collections.abc import Sequence
 from contextlib import suppress
 from itertools import takewhile
 
-from ..core.errors import ComponentError, join_alternatives
-from ..core.user_code import innermost_user_line, is_cosim_file
+from ..core.errors import ComponentError, innermost_user_line, is_cosim_file, join_alternatives
 from .journal import CALL_NUMBER, Journal, Phase
 from .run_files import RowsFile
 

@@ -5,13 +5,14 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
 from ..core.errors import InputError
 from ..results import Result
-from ..results.comparison import Comparison, Tolerance, Verdict
-from ..results.comparison.comparison import Comparer, match_tolerances
+from ..results.comparison import Comparer, Comparison, Verdict, match_tolerances
+from ..results.tolerance_tube import Tolerance
 
 WIDTH, HEIGHT = 7.16, 1.7  # in, of the figure and of each panel
 TUBE_COLOUR, OUTSIDE_COLOUR = "#0072B2", "#D55E00"
@@ -55,11 +56,10 @@ def draw_tubes(
         row[0].set_title(name, loc="left")
         row[1].set_title("result - reference", loc="left")
         row[0].set_ylabel(reference.units.get(name) or result.units.get(name) or "")
-    handles = {
-        label: handle
-        for axes in panels.flat
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
-    }
+    handles: dict[str, Artist] = {}
+    for axes in panels.flat:
+        found, labels = axes.get_legend_handles_labels()
+        handles |= dict(zip(labels, found, strict=True))
     figure.legend(handles.values(), handles, loc="outside upper right", ncols=4)
     for axes in panels[-1]:
         axes.set_xlabel("time (s)")

@@ -26,7 +26,7 @@ from typing import TYPE_CHECKING
 
 from ..components.python_import import load_object
 from ..core.errors import CosimError, InputError
-from ..core.processors import available_processors
+from ..core.resources import available_processors
 from ..results import Result
 from ..results.files import writing_atomically
 from ..scenario.component_schema import change_paths

@@ -1,4 +1,7 @@
-"""Parquet files of recordings, with the types of the signals and about a fifth of the size of CSV (extra `parquet`)."""
+"""Recordings for pandas: data frames (extra `dataframe`) and Parquet files (extra `parquet`).
+
+A Parquet file keeps the types of the signals and has about a fifth of the size of CSV.
+"""
 
 from __future__ import annotations
 
@@ -62,3 +65,28 @@ def write_parquet(recording: Recording, path: str | Path) -> None:
 
 def _arrow_type(pa: Any, values: np.ndarray) -> Any:
     return pa.string() if values.dtype == object else pa.from_numpy_dtype(values.dtype)
+
+
+def require_pandas() -> Any:
+    """Return the package pandas; InputError if it is not installed."""
+    try:
+        import pandas as pd
+    except ImportError:
+        raise InputError(
+            'data frames need the package pandas: pip install "fmi-cosim[dataframe]"'
+        ) from None
+    return pd
+
+
+def to_dataframe(recording: Recording) -> Any:
+    """Return a data frame with a column for each signal; the index is the time (s).
+
+    The attribute `attrs["units"]` holds the unit of each signal.
+
+    Raises:
+        InputError: The package pandas is not installed.
+    """
+    pd = require_pandas()
+    frame = pd.DataFrame(dict(recording.columns), index=pd.Index(recording.time, name="time"))
+    frame.attrs["units"] = dict(recording.units)
+    return frame

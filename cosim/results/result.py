@@ -207,7 +207,7 @@ class Result:
         Raises:
             InputError: The package pandas is not installed (extra `dataframe`).
         """
-        from .data_frame import to_dataframe
+        from .parquet_files import to_dataframe
 
         return to_dataframe(self.recording)
 

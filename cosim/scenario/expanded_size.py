@@ -1,4 +1,4 @@
-"""Size of a scenario after the expansion of its nested systems, computed from its files without expanding them."""
+"""Size of an expanded scenario, computed without expanding its nested systems."""
 
 from __future__ import annotations
 

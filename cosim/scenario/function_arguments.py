@@ -1,8 +1,12 @@
-"""Arguments of KPIs, figures and the scene that are taken from the system, including the values that the caller sets.
+"""Arguments of KPIs, figures and the scene that are taken from the system.
 
-- The argument {"from": NAME} is a parameter or start value ("usv.waypoint_x": a list for waypoint_x[1], waypoint_x[2], ...), or
+They include the values that the caller sets.
+
+- The argument {"from": NAME} is a parameter or start value ("usv.waypoint_x": a list for
+  waypoint_x[1], waypoint_x[2], ...), or
   with a JSON pointer ("/components/plant/arguments/platforms") an entry of the expanded scenario.
-- The key "from" of a function names components, prefixes of variables or JSON pointers of objects. Arguments that are not given
+- The key "from" of a function names components, prefixes of variables or JSON pointers of
+  objects. Arguments that are not given
   are taken from these by their names.
 """
 

@@ -13,10 +13,9 @@ from collections.abc import Iterable, Iterator, Mapping, Sequence, Set
 from functools import cached_property
 from typing import NamedTuple
 
-from ..core.compatibility import incompatibility
 from ..core.component import Component, Variable
 from ..core.errors import abbreviate_names
-from ..core.system import Endpoint, System
+from ..core.system import Endpoint, System, incompatibility
 from .nested_systems import Node
 from .system_builder import PROFILE_PREFIX
 
@@ -82,7 +81,7 @@ class OutputFinder:
                 yield output, variable
 
     def missing_connections(self, unconnected: VariablesByEndpoint) -> Iterator[MissingConnection]:
-        """Yield the connections that have outputs for unconnected inputs, the largest of each component first."""
+        """Yield connections for unconnected inputs, the largest of each component first."""
         ends: dict[Place, list[Endpoint]] = defaultdict(list)
         for end in unconnected:
             ends[self.place_of(end)].append(end)
@@ -193,7 +192,10 @@ def _port_of(node: Node, name: str) -> str:
 def _largest_first(
     pairs: Mapping[tuple[str, str], Sequence[Place]],
 ) -> Iterator[tuple[str, list[str], list[Place]]]:
-    """Yield (prefix of inputs, prefixes of outputs that feed the same inputs, these inputs) until no input is left."""
+    """Yield pairs of prefixes, those that feed the most inputs first, until no input is left.
+
+    Each is (prefix of inputs, prefixes of outputs that feed the same inputs, these inputs).
+    """
     left = {pair: list(pairs[pair]) for pair in sorted(pairs)}
     while left:
         (target, _), covered = max(left.items(), key=lambda item: len(item[1]))
@@ -214,7 +216,10 @@ def _largest_first(
 
 
 def _common_variable(ends: Sequence[str]) -> str:
-    """Return the name that ends of names have in common if they are one scalar, or elements of one array; else ""."""
+    """Return the variable that ends of names have in common, or "".
+
+    They are one scalar, or elements of one array.
+    """
     names = {end.partition("[")[0] for end in ends}
     if len(ends) == 1:
         return ends[0]
@@ -228,19 +233,24 @@ _MAX_NAMES = 4
 def find_missing_connections(
     root: Node, system: System, unconnected: VariablesByEndpoint
 ) -> Iterator[tuple[str, str]]:
-    """Yield (component, text) for each connection that is probably missing, and for components with other inputs that lack one.
+    """Yield (component, text) for each component that probably lacks a connection.
 
-    The component of a connection to ports is the nested system. A pair ("", text) names components of which no input is fed.
+    The component of a connection to ports is the nested system. A pair ("", text) names
+    components of which no input is fed.
 
-    An input probably lacks a connection if an output has its name, if outputs feed other elements of its vector, or if it is a
-    single number and half of the component's inputs or more (vectors count once) are fed or set. Vectors of which no element is
-    fed are often disturbances, a vertical component ("force.z") beside horizontal ones that are fed is often 0 on purpose, and
+    An input probably lacks a connection if an output has its name, if outputs feed other elements
+    of its vector, or if it is a
+    single number and half of the component's inputs or more (vectors count once) are fed or set.
+    Vectors of which no element is
+    fed are often disturbances, a vertical component ("force.z") beside horizontal ones that are
+    fed is often 0 on purpose, and
     Booleans are requests that nothing makes.
 
     Args:
         root: The scenario.
         system: Its system.
-        unconnected: Scalar inputs that no connection, start value or event sets, with their variables.
+        unconnected: Scalar inputs that no connection, start value or event sets, with their
+            variables.
     """
     if not unconnected:
         return
@@ -301,7 +311,7 @@ def _fed_vectors(system: System) -> set[Endpoint]:
 def _suspects(
     inputs: list[Endpoint], unfed: VariablesByEndpoint, fed_vectors: set[Endpoint]
 ) -> list[Endpoint]:
-    """Return the unfed inputs of a component that probably lack a connection, whatever the names of outputs are."""
+    """Return the unfed inputs that probably lack a connection, whatever the outputs are."""
     groups, unfed_groups = (
         {_vector(end.scalar) or end.scalar for end in ends} for ends in (inputs, unfed)
     )
@@ -340,7 +350,7 @@ def _hint(finder: OutputFinder, count: int, place: Place, variable: Variable) ->
 
 
 def _similar_output(finder: OutputFinder, place: Place, variable: Variable) -> Place | None:
-    """Return the output of another component with the most similar name, of those of the same quantity."""
+    """Return the output of the same quantity with the most similar name."""
     outputs = {
         output.scalar: output
         for output, other in finder.outputs_beside(place)

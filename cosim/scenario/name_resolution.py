@@ -164,9 +164,10 @@ def check_assignment(
     all_elements: bool = False,
     current: Callable[[str], Sequence[Any] | None] | None = None,
 ) -> dict[str, Any]:
-    """Check the assignment `text` = `value` to a component and return the checked values by variable name.
+    """Check the assignment `text` = `value` and return the checked values by variable name.
 
-    A list sets an array variable, the scalar variables text[1], text[2], ..., or a vector: text.x, text.y, ...
+    A list sets an array variable, the scalar variables text[1], text[2], ..., or a vector:
+    text.x, text.y, ...
     A scalar sets a variable or one element of an array variable.
 
     Args:
@@ -174,8 +175,10 @@ def check_assignment(
         variables: The component's variables by name.
         text: The name of a variable, or of a list of variables without their indices.
         value: The value from the scenario or from a Python caller.
-        all_elements: Refuse a list that is shorter than the array. By default the other elements keep their start values.
-        current: Returns the present elements of an array variable, which the assignment of one element keeps; None stands for
+        all_elements: Refuse a list that is shorter than the array. By default the other elements
+            keep their start values.
+        current: Returns the present elements of an array variable, which the assignment of one
+            element keeps; None stands for
             the start values. Without it, elements are refused (events).
 
     Raises:
@@ -236,7 +239,7 @@ def _with_element(
 
 
 def vector_names(variables: Mapping[str, Variable], prefix: str) -> list[str]:
-    """Return the scalar variables of a vector, such as prefix.x, prefix.y and prefix.z, in their order.
+    """Return the scalar variables of a vector (prefix.x, prefix.y, prefix.z) in their order.
 
     They have the same type, unit and causality. The list is empty if the prefix names no vector.
     """

@@ -105,15 +105,20 @@ def definition_problem(spec: CallSpec, folder: Path) -> str:
 
 
 def declared_arguments(spec: CallSpec, folder: Path) -> dict[str, bool]:
-    """Return the keyword arguments that a function declares, without the first one, and whether each is required."""
+    """Return the keyword arguments that a function declares, and whether each is required.
+
+    The first argument is left out.
+    """
     return _declared_arguments(function_definition(spec, folder).args)
 
 
 def signal_problems(root: Node, kind: str, signals: Collection[str]) -> Iterator[Problem]:
-    """Yield a problem for every argument of a KPI or figure that should name a recorded signal and does not.
+    """Yield a problem for every argument of a KPI or figure that names no recorded signal.
 
-    The parameters are recognized by their annotations: `Signal` is the name of a signal, `Prefix` that of a group of signals
-    (see `cosim.results.kpi`). Optional functions, and those for which `definition_problem` finds a problem, are skipped.
+    The parameters are recognized by their annotations: `Signal` is the name of a signal, `Prefix`
+    that of a group of signals
+    (see `cosim.results.kpi`). Optional functions, and those for which `definition_problem` finds
+    a problem, are skipped.
 
     Args:
         root: The scenario.
@@ -176,9 +181,10 @@ def _reason(value: str, root: Node, names: Collection[str]) -> str:
 
 
 def kpi_name_problem(kpi: str, kpis: Sequence[FunctionSpec], folder: Path) -> str:
-    """Return why a KPI value such as "landing.lateral_error" cannot result from `kpis`, or "" if it may.
+    """Return why a KPI value cannot result from `kpis`, or "" if it may.
 
-    The names of a function's values are known only if its `return` statements write them as literals.
+    The names of a function's values are known only if its `return` statements write them as
+    literals.
     """
     name, _, key = kpi.partition(".")
     values = {spec.name: _value_names(spec, folder) for spec in kpis}
@@ -221,7 +227,9 @@ def _signal_prefixes(signals: Collection[str]) -> list[str]:
 
 
 def load_function(reference: str, folder: Path) -> Callable[..., Any]:
-    """Import the function `file.py:function` (path relative to `folder`) or `package.module:function`.
+    """Import the function `file.py:function` or `package.module:function`.
+
+    The path of a file starts from `folder`.
 
     Raises:
         InputError: The file does not exist, cannot be imported, or does not define the function.

@@ -12,8 +12,8 @@ from importlib.metadata import PackageNotFoundError, version
 from types import MappingProxyType
 from typing import Any
 
+from ..core import __version__
 from ..core.system import Connection, Group, Stage, System
-from ..core.version import __version__
 from ..engine.transfer_plan import unit_conversion
 
 #: packages whose versions can change a result
@@ -52,7 +52,7 @@ def describe_system(
 
 
 def describe_software() -> dict[str, Any]:
-    """Return the versions of cosim, Python and the installed packages of `_PACKAGES`, and the kind of machine."""
+    """Return the versions of cosim, Python and `_PACKAGES`, and the kind of machine."""
     return {
         "versions": dict(_versions()),
         "machine": {"system": platform.system(), "machine": platform.machine()},

@@ -57,7 +57,7 @@ def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
 
 
 def _missing_connections(prepared: PreparedRun) -> Iterator[Problem]:
-    """Yield a warning for each connection that is probably missing, and for components with other inputs that lack one."""
+    """Yield a warning for each component that probably lacks a connection."""
     for name, text in find_missing_connections(
         prepared.root, prepared.system, unconnected_inputs(prepared)
     ):
@@ -69,7 +69,7 @@ def _missing_connections(prepared: PreparedRun) -> Iterator[Problem]:
 
 
 def _double_conversions(prepared: PreparedRun) -> Iterator[Problem]:
-    """Yield a warning for each connection whose gain is the factor between the units of its ends, which is applied anyway."""
+    """Yield a warning for each gain that repeats the conversion of units of its connection."""
     system = prepared.system
     for connection in system.connections:
         source, target = (
@@ -92,7 +92,7 @@ def _double_conversions(prepared: PreparedRun) -> Iterator[Problem]:
 
 
 def unconnected_inputs(prepared: PreparedRun) -> VariablesByEndpoint:
-    """Return the scalar inputs that no connection, start value or event sets, with their variables."""
+    """Return the inputs that no connection, start value or event sets, with their variables."""
     system = prepared.system
     connected = {connection.target for connection in system.connections}
     changes = [system.start_values, *(event.values for event in prepared.settings.events)]
@@ -110,7 +110,7 @@ def unconnected_inputs(prepared: PreparedRun) -> VariablesByEndpoint:
 
 
 def _large_steps(prepared: PreparedRun) -> Iterator[Problem]:
-    """Yield a warning for each step that is much longer than FMUs recommend (FMI: DefaultExperiment), with their components.
+    """Yield a warning for each step much longer than FMUs recommend (FMI: DefaultExperiment).
 
     FMUs for Model Exchange are left out, because their solver has a step of its own.
     """

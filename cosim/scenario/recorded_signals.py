@@ -55,7 +55,10 @@ class SignalSelector:
         self.problems: list[Problem] = []
 
     def select(self, patterns: Iterable[tuple[str, str]]) -> dict[str, Endpoint]:
-        """Return the signals that match (pattern, location in the file) pairs, in the order of components and variables."""
+        """Return the signals that match patterns, in the order of components and variables.
+
+        The patterns are pairs of (pattern, location in the file).
+        """
         selected: set[str] = set()
         for pattern, where in patterns:
             matches = _matching_names(pattern, self._output_index) or _matching_names(

@@ -145,7 +145,7 @@ class ConnectionSpec(Spec):
 
 
 class IterationSpec(Spec):
-    """Iteration: every macro step is repeated from the same state until the connected outputs converge."""
+    """Repetition of every macro step from the same state until the connected outputs converge."""
 
     method: IterationMethod = key(
         "fixed-point: the outputs of a repetition are the inputs of the next one; newton: "
@@ -214,7 +214,7 @@ class RecordSpec(Spec):
 
 
 class EventSpec(Spec):
-    """Values that variables are set to at a communication point, before the step that starts there."""
+    """Values that are set at a communication point, before the step that starts there."""
 
     time: Seconds = key("a communication point", 20.0, unit="s")
     values: dict[str, Value] = key(
@@ -317,7 +317,7 @@ class NestedSpec(SystemSpec):
 
 
 class ScenarioSpec(SystemSpec):
-    """A scenario: a system of components, its times, recorded signals, events, KPIs, checks and figures."""
+    """A system of components with times, recorded signals, events, KPIs, checks and figures."""
 
     name: Annotated[str, StringConstraints(pattern=SCENARIO_NAME)] = key(
         "name of the scenario and of its results folder", "demo1_box"

@@ -61,7 +61,7 @@ def _parse_time(value: Any) -> Fraction:
 
 
 def hint_at_quotes(value: Any, accepts: Callable[[Any], bool]) -> str:
-    """Return a hint at a text that is a value in quotes which `accepts` accepts without them, else ""."""
+    """Return a hint at a value in quotes that `accepts` accepts without them, else ""."""
     try:
         content = json.loads(value) if isinstance(value, str) else None
     except ValueError:
@@ -260,7 +260,11 @@ class Spec(BaseModel):
     """Base of all parts of a scenario; unknown keys and implicit type conversions are errors."""
 
     model_config = ConfigDict(
-        extra="forbid", strict=True, frozen=True, arbitrary_types_allowed=True
+        extra="forbid",
+        strict=True,
+        frozen=True,
+        arbitrary_types_allowed=True,
+        defer_build=True,  # a run builds only the models that it validates
     )
 
     @property

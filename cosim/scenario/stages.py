@@ -207,7 +207,7 @@ def _late_values(
 def _coupling(
     system: System, connections: Sequence[Connection], group: Sequence[str]
 ) -> Iterator[str]:
-    """Yield a line about components that depend on each other, if their coupling can be solved better."""
+    """Yield a line about mutually dependent components whose coupling can be solved better."""
     names = abbreviate_names(group)
     fixed = [
         name for name in group if not system.components[name].has_state or name in system.periods

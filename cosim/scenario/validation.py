@@ -154,7 +154,10 @@ def schema_problems(
 
 
 def _common_cause(path: tuple[str | int, ...], detail: Any) -> Any:
-    """Return a key that is equal for missing keys of one object, and for elements of one list that have the same wrong type."""
+    """Return a key that is equal for problems with one cause.
+
+    These are missing keys of one object, and elements of one list with the same wrong type.
+    """
     is_shared = detail["type"] == "missing" or (
         detail["type"].endswith("_type") and isinstance(path[-1], int)
     )

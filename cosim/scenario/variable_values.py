@@ -10,9 +10,9 @@ from typing import Any
 
 import numpy as np
 
-from ..core.binary_text import parse_binary
 from ..core.component import Variable
 from ..core.errors import did_you_mean
+from ..core.json_values import parse_binary
 from ..core.text import shorten, text_problem
 from .schema_types import hint_at_quotes
 

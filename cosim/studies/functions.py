@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Any
 
 from ..api.arguments import expect, is_integer
-from ..core.processors import available_processors
+from ..core.resources import available_processors
 from ..core.size_limits import MAX_RUNS
 from .execution.run_store import RunStore
 from .execution.worker_pool import LocalRunner
@@ -55,7 +55,7 @@ class SweepResult:
         Raises:
             InputError: The package pandas is not installed.
         """
-        from ..results.data_frame import require_pandas
+        from ..results.parquet_files import require_pandas
 
         rows = [
             {

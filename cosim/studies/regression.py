@@ -26,7 +26,8 @@ from ..scenario import find_scenario
 
 if TYPE_CHECKING:
     from ..results import Result
-    from ..results.comparison import Comparison, Tolerance
+    from ..results.comparison import Comparison
+    from ..results.tolerance_tube import Tolerance
 
 
 #: keys of a scenario that state expectations of its results
@@ -191,7 +192,7 @@ class Regression:
         )
 
     def _update_reference(self, run: _FinishedRun) -> RegressionOutcome:
-        from ..results.comparison.reference import write_reference
+        from ..results.reference import write_reference
 
         if failed := run.failed_checks():
             return RegressionOutcome(
@@ -273,7 +274,7 @@ class _FinishedRun:
 
     @cached_property
     def tolerances(self) -> dict[str, Tolerance]:
-        from ..results.comparison import Tolerance
+        from ..results.tolerance_tube import Tolerance
 
         return {
             pattern: Tolerance(**tolerance)
@@ -305,7 +306,7 @@ class _FinishedRun:
 
     def later_rows(self) -> Iterator[str]:
         """Yield a note if the run continues after the end of the reference."""
-        from ..results.comparison.tube import time_tolerance
+        from ..results.tolerance_tube import time_tolerance
 
         own, expected = self.result.time, self.reference.time
         if own.size and expected.size and own[-1] > expected[-1] + time_tolerance(expected):

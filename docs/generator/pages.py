@@ -14,8 +14,7 @@ from cosim.components.fmi import FmuFile
 from cosim.components.python_import import load_object
 from cosim.core import resources
 from cosim.core.component import Variable
-from cosim.core.unit_table import BASE_UNITS, PREFIXED, PREFIXES, UNPREFIXED
-from cosim.core.units import KNOWN_UNITS, multiply_units
+from cosim.core.units import BASE_UNITS, KNOWN_UNITS, PREFIXED, PREFIXES, UNPREFIXED, multiply_units
 
 #: public names that the package `cosim` does not contain
 OTHERS = ("cosim.core.component.StepResult", "cosim.core.units.parse_unit")

@@ -10,7 +10,8 @@ import pytest
 
 from cosim.core.recording import Recording
 from cosim.results import Result
-from cosim.results.comparison import Tolerance, compare
+from cosim.results.comparison import compare
+from cosim.results.tolerance_tube import Tolerance
 
 pytestmark = pytest.mark.benchmark
 

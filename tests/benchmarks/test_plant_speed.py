@@ -18,7 +18,7 @@ from cost_measurement import MedianCost, measure_rounds, print_heading, print_ro
 
 from cosim.core.component import Ports
 from cosim.engine.initialization import copy_start_values
-from plant_src.physics.client import pybullet
+from plant_src.physics.bullet import pybullet
 from plant_src.world import World
 
 pytestmark = [pytest.mark.benchmark, pytest.mark.timeout(1800)]

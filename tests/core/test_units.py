@@ -3,8 +3,17 @@ import re
 
 import pytest
 
-from cosim.core.unit_table import BASE_UNITS, PREFIXED, PREFIXES, UNPREFIXED, WORDS
-from cosim.core.units import Unit, multiply_units, named_unit, parse_unit
+from cosim.core.units import (
+    BASE_UNITS,
+    PREFIXED,
+    PREFIXES,
+    UNPREFIXED,
+    WORDS,
+    Unit,
+    multiply_units,
+    named_unit,
+    parse_unit,
+)
 
 
 @pytest.mark.parametrize(

@@ -11,10 +11,9 @@ from fakes import FakeComponent, inputs
 from systems import endpoint, make_system
 
 from cosim.components.fmi import FmuFile, Isolation, create_component
-from cosim.core.compatibility import FLOAT_TYPES, incompatibility
 from cosim.core.component import DTYPES, Variable
 from cosim.core.errors import ComponentError
-from cosim.core.system import Connection, Endpoint, Group, System
+from cosim.core.system import FLOAT_TYPES, Connection, Endpoint, Group, System, incompatibility
 from cosim.core.time_grid import exact_fraction
 from cosim.core.units import parse_unit
 from cosim.engine import EXECUTORS, native_available, parallel

@@ -10,7 +10,7 @@ from systems import make_system, run_system
 from cosim.core.errors import ComponentError
 from cosim.core.graph import ordered_groups
 from cosim.core.units import parse_unit
-from cosim.engine.initial_values import find_loops
+from cosim.engine.initialization import find_loops
 
 pytestmark = pytest.mark.usefixtures("executor")
 

@@ -23,8 +23,9 @@ from cosim.process.journal import JOURNAL_SIZE, Journal, set_current_journal
 from cosim.process.run_files import RowsFile
 from cosim.report.run_page import write_report
 from cosim.results import Result
-from cosim.results.comparison import Tolerance, compare
-from cosim.results.comparison.reference import decimate
+from cosim.results.comparison import compare
+from cosim.results.reference import decimate
+from cosim.results.tolerance_tube import Tolerance
 
 STEP = Fraction(3, 10)
 #: limits before and after an event at 0.6 s, thirds of two steps at 0.7 s and 1 s

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from cosim.core.recording import Recording
-from cosim.results.non_finite import warn_non_finite
+from cosim.results.checks import warn_non_finite
 
 NAN, INF = float("nan"), float("inf")
 

@@ -1,4 +1,4 @@
-"""Sums of outputs, elements and whole arrays, and integers and Booleans connected to real inputs."""
+"""Sums of outputs, elements and arrays, and integers and Booleans connected to real inputs."""
 
 import pytest
 from systems import connection

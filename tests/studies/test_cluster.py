@@ -96,7 +96,7 @@ def test_a_worker_with_another_cosim_is_refused(lag, tmp_path):
         tmp_path / "other" / "cosim",
         ignore=shutil.ignore_patterns("__pycache__", "_bundle"),
     )
-    with (tmp_path / "other/cosim/core/version.py").open("a") as file:
+    with (tmp_path / "other/cosim/core/__init__.py").open("a") as file:
         file.write('\n__version__ = "0.0.9"\n')
     with running_cluster(tmp_path, workers=0) as made:
         made.workers.append(made.start_worker(PYTHONPATH=str(tmp_path / "other")))

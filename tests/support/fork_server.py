@@ -44,7 +44,7 @@ PRELOADED = (
     "report.run_page",
     "report.run_page",
     "report.tables",
-    "results.comparison.reference",
+    "results.reference",
     "scenario.nested_systems",
     *(
         f"cli.commands.{name}"

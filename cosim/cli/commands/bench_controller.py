@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING, Any
 import click
 
 from ...core.errors import ComponentError, InputError
-from ...core.processors import available_processors
+from ...core.resources import available_processors
 from ...studies.regression import (
     EXIT_CODE_SEVERITY,
     check_unique_names,

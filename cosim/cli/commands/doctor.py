@@ -17,7 +17,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from ...core.errors import InputError
-from ...core.processors import available_processors
+from ...core.resources import available_processors
 from ..messages import print_json
 from ..options import json_option
 
@@ -66,8 +66,8 @@ def _print_findings(findings: Iterable[Finding]) -> None:
 
 
 def _host_findings() -> Iterator[Finding]:
+    from ...core import __version__
     from ...core.resources import cache_directory, package_folder
-    from ...core.version import __version__
 
     yield Finding("cosim", "cosim", f"{__version__} in {package_folder()}")
     yield Finding(

@@ -112,7 +112,7 @@ def report(result: Path, output_file: Path | None, reference: Path | None, open_
     """
     from ...api.comparison import ComparisonTask, is_scenario
     from ...report.run_page import Deviation, write_folder_report
-    from ...results.comparison import Tolerance
+    from ...results.tolerance_tube import Tolerance
     from ...studies.regression import accept_command
 
     print_log()

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 
 import click
 
-from ...core.processors import available_processors
+from ...core.resources import available_processors
 from ...core.text import count_noun
 from ..messages import print_json, print_outcome
 from ..options import complete_scenario, json_option
@@ -68,7 +68,7 @@ def compare(
     failures.
     """
     from ...api.comparison import ComparisonTask
-    from ...results.comparison import Tolerance
+    from ...results.tolerance_tube import Tolerance
 
     if plot and plot.suffix not in (".png", ".svg"):
         raise click.BadParameter(

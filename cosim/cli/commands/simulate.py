@@ -143,11 +143,11 @@ def _simulate(
     from ...api.single_fmu import compile_fmu, parse_solver
     from ...components.fmi import InstanceSettings
     from ...core.errors import InputError, Problem
-    from ...engine.disk_space import find_space_problems
+    from ...engine.recorder import find_space_problems
     from ...engine.run_loop import simulating
     from ...process.run_files import keeping_run_files, remove_run_files, run_folder
+    from ...results.checks import warn_non_finite
     from ...results.files import remove_files
-    from ...results.non_finite import warn_non_finite
     from ...results.result import describe_termination
     from ...scenario.settings import parse_settings
     from .. import messages
@@ -184,7 +184,7 @@ def _simulate(
 
 def _save_after_crash(outcome: SupervisedOutcome, output: _Output | None) -> None:
     """Write the rows of a child process that crashed, was killed or was interrupted."""
-    from ...results.non_finite import warn_non_finite
+    from ...results.checks import warn_non_finite
     from .. import messages
 
     messages.print_log()
@@ -206,22 +206,16 @@ def _write_recording(recording: Recording, output: _Output | None, unfinished: P
 
 def _print_final_values(recording: Recording, as_json: bool) -> None:
     """Print the last row: numbers with six significant digits, as JSON with all digits."""
-    time, last = (
-        recording.time.tolist()[-1],
-        {name: values.tolist()[-1] for name, values in recording.columns.items()},
-    )
+    time = recording.time.tolist()[-1]
+    last = {name: values.tolist()[-1] for name, values in recording.columns.items()}
     if as_json:
         print_json({"time": time, "values": last})
         return
     click.echo(f"time = {time:.6g} s")
     for name, value in last.items():
-        text = (
-            f"{value:.6g}"
-            if isinstance(value, float)
-            else value.hex()
-            if isinstance(value, bytes)
-            else repr(value)
-        )
+        text = value.hex() if isinstance(value, bytes) else repr(value)
+        if isinstance(value, float):
+            text = f"{value:.6g}"
         unit = "" if recording.units[name] == "1" else recording.units[name]
         print_line(f"{name} = {text} {unit}".rstrip())
 

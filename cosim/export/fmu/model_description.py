@@ -11,7 +11,7 @@ from zipfile import ZipFile
 
 from ...core import units
 from ...core.errors import InputError, Problem
-from ...core.unit_table import BASE_UNITS
+from ...core.units import BASE_UNITS
 from .block import Block, BlockVariable
 from .interface import TableRow, start_values, variable_table
 

@@ -16,8 +16,8 @@ from itertools import chain
 from pathlib import Path
 from typing import Any, NamedTuple
 
+from ...core import __version__
 from ...core.text import count_noun
-from ...core.version import __version__
 from ...report.pages import render_page
 from ...report.tables import format_number
 from ...results.checks import CheckOutcome, Number, evaluate_all_checks

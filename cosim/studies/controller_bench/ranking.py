@@ -10,8 +10,8 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any, Literal
 
+from ...core import __version__
 from ...core.json_values import is_number, parse_object
-from ...core.version import __version__
 from ...results.checks import CheckOutcome, Number, evaluate_all_checks, evaluate_checks
 from ...scenario.file_paths import path_in
 

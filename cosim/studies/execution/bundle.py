@@ -12,9 +12,8 @@ from pathlib import Path, PurePosixPath
 from typing import Any
 
 from ...components.python_import import package_files, package_root
-from ...core import paths, resources
+from ...core import __version__, paths, resources
 from ...core.errors import InputError, Problem
-from ...core.version import __version__
 from ...scenario import load_scenario
 from ...scenario.nested_systems import Node
 from ...scenario.sources import FmuSource, texts_in

@@ -15,7 +15,7 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-from ...core.version import __version__
+from ...core import __version__
 from ...report.figures import figure_to_svg, save_figure
 from ...report.pages import render_page, safe_markup
 from ...results.checks import evaluate_checks

@@ -12,7 +12,7 @@ from itertools import islice
 from pathlib import Path
 from typing import Any
 
-from ...core.csv_text import text_cell
+from ...results.csv_files import text_cell
 from ...results.files import writing_atomically
 from ..sweep import SweepRow
 

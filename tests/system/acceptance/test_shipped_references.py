@@ -6,7 +6,7 @@ import pytest
 
 from cosim.core import resources
 from cosim.results import Result
-from cosim.results.comparison.comparison import match_tolerances
+from cosim.results.comparison import match_tolerances
 from cosim.scenario.extension import read_system_document
 
 SHIPPED = sorted((resources.root() / "scenarios").glob("*.json"))

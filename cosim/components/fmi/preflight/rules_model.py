@@ -11,7 +11,7 @@ import re
 from collections.abc import Iterable, Iterator
 
 from ....core.size_limits import MAX_SCALARS
-from ....core.unit_table import BASE_UNITS
+from ....core.units import BASE_UNITS
 from .findings import DESCRIPTION_FILE, Finding, Rule
 from .model_description import (
     ModelDescription,

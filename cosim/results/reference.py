@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
-from ...core.errors import CheckError, pattern_hint
-from ...core.recording import Recording
-from .. import Result
-from ..files import write_json
+from ..core.errors import CheckError, pattern_hint
+from ..core.recording import Recording
+from . import Result
 from .comparison import Comparer, compare, match_tolerances
-from .tube import Tolerance
+from .files import write_json
+from .tolerance_tube import Tolerance
 
 #: largest distance between selected rows
 MAX_ROW_DISTANCE = 64

@@ -8,12 +8,13 @@ import pytest
 from cosim.core.errors import CheckError
 from cosim.core.recording import Recording
 from cosim.results import Result
-from cosim.results.comparison import Tolerance, compare
-from cosim.results.comparison.reference import (
+from cosim.results.comparison import compare
+from cosim.results.reference import (
     decimate,
     describe_provenance_changes,
     write_reference,
 )
+from cosim.results.tolerance_tube import Tolerance
 
 TIME = np.arange(2001) / 100
 SWITCH = TIME >= 7.77

@@ -5,7 +5,8 @@ import pytest
 
 from cosim.core.recording import Recording
 from cosim.results import Result
-from cosim.results.comparison import Tolerance, compare, needed_share
+from cosim.results.comparison import compare, needed_share
+from cosim.results.tolerance_tube import Tolerance
 
 TIME = np.arange(101) / 10
 EXACT = {"*": Tolerance()}

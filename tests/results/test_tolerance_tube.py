@@ -7,9 +7,8 @@ import pytest
 
 from cosim.core.recording import Recording
 from cosim.results import Result
-from cosim.results.comparison import Tolerance, compare
-from cosim.results.comparison.comparison import Comparer
-from cosim.results.comparison.tube import uniform_spacing
+from cosim.results.comparison import Comparer, compare
+from cosim.results.tolerance_tube import Tolerance, uniform_spacing
 
 
 def recorded(time, **columns):
