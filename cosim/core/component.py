@@ -132,6 +132,15 @@ def count_scalars(variables: Iterable[Variable]) -> int:
     return sum(math.prod(variable.shape) for variable in variables)
 
 
+def scalars_of(variables: Iterable[Variable], *causalities: str) -> dict[str, Variable]:
+    """Return the variables of these causalities, or all, by the names of their scalars."""
+    scalars: dict[str, Variable] = {}
+    for variable in variables:
+        if not causalities or variable.causality in causalities:
+            scalars |= dict.fromkeys(variable.scalar_names, variable)
+    return scalars
+
+
 class StepResult(NamedTuple):
     """Outcome of a step that ended early, needs event handling or requests termination.
 

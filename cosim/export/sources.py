@@ -95,6 +95,9 @@ def _load_vehicle(path: Path, _model: str | None, _options: ModelicaOptions | No
     return vehicle_block(path)
 
 
+#: equations of small models, a file for each FMU
+_FORCES = "plant_src/replica/forces/*.py"
+
 SOURCE_KINDS = (
     SourceKind("Modelica model", "controllers/modelica/*.mo", "rumoca", _load_modelica),
     SourceKind(
@@ -107,6 +110,7 @@ SOURCE_KINDS = (
         compiled=False,
     ),
     SourceKind("equations", "plant_src/**/equations.py", "casadi", _load_equations),
+    SourceKind("equations", _FORCES, "casadi", _load_equations),
     SourceKind(
         "vehicle file",
         "plant_src/vehicles/data/*.json",
@@ -196,12 +200,14 @@ def classify_source(path: Path, model: str | None = None) -> Source:
         return Source(path, SOURCE_KINDS[0], snake_case((model or path.stem).rpartition(".")[2]))
     if path.name == "equations.py" and not model:
         return Source(path, SOURCE_KINDS[2], path.resolve().parent.name)
+    if path.resolve().match(_FORCES) and not model:
+        return Source(path, SOURCE_KINDS[2], path.stem)
     if path.suffix == ".py":
         return Source(path, SOURCE_KINDS[1], snake_case(model or path.stem))
     if path.name == DESCRIPTION_FILE:
         return Source(path, SOURCE_KINDS[-1], path.resolve().parent.name)
     if path.suffix == ".json":
-        return Source(path, SOURCE_KINDS[3], path.stem)
+        return Source(path, SOURCE_KINDS[4], path.stem)
     raise InputError(
         Problem(
             (

@@ -61,7 +61,7 @@ class EventEvaluator(Evaluator):
                 if not fraction > SMALLEST_FRACTION:
                     break
                 continue
-            jacobian = [[float(self(item)) for item in row] for row in node.jacobian]
+            jacobian = [list(map(float, map(self, row))) for row in node.jacobian]
             values = [float(self(unknown)) for unknown in node.unknowns]
             scale = [_scale_of(row, values) for row in jacobian]
             merit, fraction = largest_ratio(residual, scale), 1.0
