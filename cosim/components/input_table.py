@@ -78,18 +78,10 @@ class InputTable(Component):
 
     def bind(self, _inputs: Ports, outputs: Ports) -> None:
         """Write the columns of the bound outputs to their arrays from now on."""
-        filled = dict.fromkeys(outputs.arrays, 0)
-        cells = []
-        for variable in outputs.variables:
-            cells.append(
-                (
-                    outputs.arrays[variable.dtype],
-                    filled[variable.dtype],
-                    self._columns[variable.name],
-                )
-            )
-            filled[variable.dtype] += 1
-        self._cells = cells
+        self._cells = [
+            (array, part.start, self._columns[variable.name])
+            for variable, array, part in outputs.elements()
+        ]
 
     def set_inputs(self) -> None:
         """Do nothing: an input table has no inputs."""

@@ -132,12 +132,18 @@ class PythonFmuComponent(Component):
     def bind(self, inputs: Ports, outputs: Ports) -> None:
         """Pair the slave's setters and getters with the elements of the bound arrays."""
         self._setters = [
-            (self._pythonfmu_variables[v.name].setter, *element)
-            for v, element in _array_elements(inputs)
+            (self._pythonfmu_variables[v.name].setter, array, part.start)
+            for v, array, part in inputs.elements()
         ]
         self._getters = [
-            (v.name, self._pythonfmu_variables[v.name].getter, *_OUTPUT_TYPES[v.type], *element)
-            for v, element in _array_elements(outputs)
+            (
+                v.name,
+                self._pythonfmu_variables[v.name].getter,
+                *_OUTPUT_TYPES[v.type],
+                array,
+                part.start,
+            )
+            for v, array, part in outputs.elements()
         ]
 
     def set_inputs(self) -> None:
@@ -242,16 +248,6 @@ def _start_value(registered: ScalarVariable) -> Any:
         raise InputError(
             f'the variable "{registered.name}" is registered, but has no value: {error}'
         ) from None
-
-
-def _array_elements(ports: Ports) -> list[tuple[Variable, tuple[np.ndarray, int]]]:
-    """Pair each scalar variable with its array and its index in it."""
-    next_index = dict.fromkeys(ports.arrays, 0)
-    elements = []
-    for variable in ports.variables:
-        elements.append((variable, (ports.arrays[variable.dtype], next_index[variable.dtype])))
-        next_index[variable.dtype] += 1
-    return elements
 
 
 def checked_units(

@@ -19,7 +19,7 @@ from __future__ import annotations
 
 import ctypes
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import lru_cache
 from itertools import product
@@ -131,6 +131,15 @@ def count_scalars(variables: Iterable[Variable]) -> int:
     return sum(math.prod(variable.shape) for variable in variables)
 
 
+def scalars_of(variables: Iterable[Variable], *causalities: str) -> dict[str, Variable]:
+    """Return the variables of these causalities, or all, by the names of their scalars."""
+    scalars: dict[str, Variable] = {}
+    for variable in variables:
+        if not causalities or variable.causality in causalities:
+            scalars |= dict.fromkeys(variable.scalar_names, variable)
+    return scalars
+
+
 class StepResult(NamedTuple):
     """Outcome of a step that ended early, needs event handling or requests termination.
 
@@ -208,6 +217,14 @@ class Ports(NamedTuple):
 
     variables: Sequence[Variable]
     arrays: Mapping[np.dtype[Any], np.ndarray]
+
+    def elements(self) -> Iterator[tuple[Variable, np.ndarray, slice]]:
+        """Yield each variable with its array and its part of the array."""
+        begins = dict.fromkeys(self.arrays, 0)
+        for variable in self.variables:
+            begin = begins[variable.dtype]
+            end = begins[variable.dtype] = begin + len(variable.scalar_names)
+            yield variable, self.arrays[variable.dtype], slice(begin, end)
 
 
 class Component(Protocol):

@@ -190,7 +190,8 @@ BAD_SOURCES = {
 @pytest.mark.parametrize("case", BAD_SOURCES)
 def test_bad_sources_are_one_problem(case, tmp_path):
     sources, message = BAD_SOURCES[case]
+    path = write_source_fmu(tmp_path / "ball.fmu", 3, sources)
     with pytest.raises(InputError, match=message) as refused:
-        open_fmu(write_source_fmu(tmp_path / "ball.fmu", 3, sources), None, add_binary)
+        open_fmu(path, None, add_binary).check_binary()
     assert len(str(refused.value).splitlines()) == 1
     assert [path.name for path in tmp_path.rglob("pwned")] == []

@@ -163,15 +163,11 @@ def prepare_negations(outputs: Ports, negated: Collection[str]) -> list[Prepared
         outputs: Bound variables and their arrays.
         negated: Names of the negated aliases, which only FMI 1.0 has and which are scalars.
     """
-    calls = []
-    begins = dict.fromkeys(outputs.arrays, 0)
-    for variable in outputs.variables:
-        index = begins[variable.dtype]
-        begins[variable.dtype] += len(variable.scalar_names)
-        if variable.name in negated:
-            arguments = (outputs.arrays[variable.dtype], index)
-            calls.append(PreparedCall(_negate_element, arguments, "negated alias"))
-    return calls
+    return [
+        PreparedCall(_negate_element, (array, part.start), "negated alias")
+        for variable, array, part in outputs.elements()
+        if variable.name in negated
+    ]
 
 
 def _negate_element(array: np.ndarray, index: int) -> int:

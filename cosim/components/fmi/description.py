@@ -11,7 +11,7 @@ from contextlib import suppress
 from dataclasses import dataclass, replace
 from fractions import Fraction
 from pathlib import Path
-from typing import Any, get_args
+from typing import Any, cast
 
 import numpy as np
 
@@ -27,16 +27,13 @@ from .preflight.model_description import (
     ModelDescription,
     ModelVariable,
     UnitDefinition,
+    is_true,
     parse_value,
 )
 from .preflight.rules_variables import dimension_size, read_limit
 
-#: valid causalities and variabilities by name, to convert text to their literal types
-_CAUSALITIES: Mapping[str, Causality] = {name: name for name in get_args(Causality)}
-_VARIABILITIES: Mapping[str, Variability] = {name: name for name in get_args(Variability)}
-_C_INT = np.dtype(np.int32)
-_TRUE = ("true", "1")
-_EXPERIMENT = ("startTime", "stopTime", "stepSize", "tolerance")
+#: types and FMI major versions whose values are C int
+_STORED_AS_C_INT = {("Enumeration", 1), ("Enumeration", 2), ("Boolean", 2)}
 #: standard names of the log categories of errors (FMI 2.0 section 2.2.4, FMI 3.0 section 2.4.5)
 _ERROR_CATEGORIES = ("logStatusError", "logStatusFatal")
 
@@ -159,21 +156,15 @@ class FmuDescription:
         }
         variables = []
         for variable in self.variables:
-            shape = tuple(
-                sizes[size] if isinstance(size, str) else size
-                for size in self.dimensions.get(variable.name, ())
-            )
+            dimensions = self.dimensions.get(variable.name, ())
+            shape = tuple(sizes[n] if isinstance(n, str) else n for n in dimensions)
             if shape and shape != variable.shape:
-                require_at_most(
-                    limits.max_array_size, math.prod(shape), f'elements of "{variable.name}"', ""
-                )
-                variables.append(replace(variable, shape=shape, start=None))
-            else:
-                variables.append(
-                    replace(variable, start=values[variable.name])
-                    if variable.name in values
-                    else variable
-                )
+                count, what = math.prod(shape), f'elements of "{variable.name}"'
+                require_at_most(limits.max_array_size, count, what, "")
+                variable = replace(variable, shape=shape, start=None)
+            elif variable.name in values:
+                variable = replace(variable, start=values[variable.name])
+            variables.append(variable)
         return replace(self, variables=variables)
 
 
@@ -200,17 +191,25 @@ def build_description(
             f'"{path}": has no interface for {selected}, only for '
             f"{join_alternatives(model.interfaces)}"
         )
-    attributes = model.interfaces[selected]
+    attributes, is_model_exchange = model.interfaces[selected], selected == "model-exchange"
     units = {unit.name: _build_unit(unit) for unit in model.units}
-    sources = [
-        (source, variable)
-        for source in model.variables
-        for variable in _build_variables(model, source, units)
-    ]
-    by_name = {
-        variable.name: (source, variable) for source, variable in reversed(sources)
-    }  # the first one of each name
-    variables = [variable for source, variable in sources if by_name[variable.name][1] is variable]
+    variables: dict[str, Variable] = {}
+    references: dict[str, int] = {}
+    dimensions: dict[str, Sequence[int | str]] = {}
+    negated = set()
+    for source in model.variables:
+        if source.attributes.get("alias") == "negatedAlias":
+            negated.add(source.name)
+        for variable in _build_variables(model, source, units):
+            dimensions[variable.name] = _read_sizes(model, source)
+            if variable.name not in variables:  # the first one of each name
+                variables[variable.name] = variable
+                references[variable.name] = int(source.attributes["valueReference"])
+    indicator_count = 0
+    if is_model_exchange and model.major < 3:
+        indicator_count = int(model.root.get("numberOfEventIndicators", 0))
+    dependencies = _read_dependencies(model, "Output")
+    slope_order = attributes.get("maxOutputDerivativeOrder", "")
     return FmuDescription(
         model.root["fmiVersion"],
         model.root.get("modelName", ""),
@@ -220,51 +219,31 @@ def build_description(
         model.root["instantiationToken" if model.major == 3 else "guid"],
         model.root.get("description", ""),
         model.root.get("generationTool", ""),
-        variables,
-        {
-            variable.name: int(by_name[variable.name][0].attributes["valueReference"])
-            for variable in variables
-        },
-        frozenset(
-            source.name
-            for source in model.variables
-            if source.attributes.get("alias") == "negatedAlias"
-        ),
+        list(variables.values()),
+        references,
+        frozenset(negated),
         _build_default_experiment(model.default_experiment),
         [name for name, value in attributes.items() if _is_set(name, value)],
-        any(
-            attributes.get(name) in _TRUE
-            for name in ("canGetAndSetFMUstate", "canGetAndSetFMUState")
-        ),
-        selected == "model-exchange"
-        or attributes.get("canHandleVariableCommunicationStepSize") in _TRUE,
-        attributes.get("canBeInstantiatedOnlyOncePerProcess") in _TRUE,
-        attributes.get("needsExecutionTool") in _TRUE,
+        is_true(attributes, "canGetAndSetFMUstate", "canGetAndSetFMUState"),
+        is_model_exchange or is_true(attributes, "canHandleVariableCommunicationStepSize"),
+        is_true(attributes, "canBeInstantiatedOnlyOncePerProcess"),
+        is_true(attributes, "needsExecutionTool"),
         _count_states(model, selected),
-        int(model.root.get("numberOfEventIndicators", 0))
-        if selected == "model-exchange" and model.major < 3
-        else 0,
-        _needs_completed_step(model.major, attributes),
+        indicator_count,
+        is_true(attributes, "needsCompletedIntegratorStep")
+        if model.major == 3
+        else not is_true(attributes, "completedIntegratorStepNotNeeded"),
         list_platforms(examination.members),
         [name for name in model.log_categories if name in _ERROR_CATEGORIES],
-        _read_dependencies(model, "Output"),
-        _read_dependencies(model, "Output") | _read_dependencies(model, "InitialUnknown"),
-        any(
-            attributes.get(name) in _TRUE
-            for name in ("providesDirectionalDerivative", "providesDirectionalDerivatives")
-        ),
+        dependencies,
+        dependencies | _read_dependencies(model, "InitialUnknown"),
+        is_true(attributes, "providesDirectionalDerivative", "providesDirectionalDerivatives"),
         _read_continuous_states(model),
-        selected == "model-exchange"
-        or (model.major < 3 and attributes.get("canInterpolateInputs") in _TRUE),
-        selected == "co-simulation"
-        and _is_set("maxOutputDerivativeOrder", attributes.get("maxOutputDerivativeOrder", "")),
-        selected == "co-simulation" and attributes.get("hasEventMode") in _TRUE,
-        selected == "co-simulation" and attributes.get("mightReturnEarlyFromDoStep") in _TRUE,
-        {
-            name: _read_sizes(model, source)
-            for source in model.variables
-            for name in _names_with_aliases(source)
-        },
+        is_model_exchange or (model.major < 3 and is_true(attributes, "canInterpolateInputs")),
+        not is_model_exchange and _is_set("maxOutputDerivativeOrder", slope_order),
+        not is_model_exchange and is_true(attributes, "hasEventMode"),
+        not is_model_exchange and is_true(attributes, "mightReturnEarlyFromDoStep"),
+        dimensions,
     )
 
 
@@ -273,33 +252,33 @@ def _read_sizes(model: ModelDescription, source: ModelVariable) -> Sequence[int 
 
     Empty if no parameter changes them.
     """
-    references = [dimension.get("valueReference") for dimension in source.dimensions]
-    if not any(references):
-        return ()
-    named = [model.by_reference[text.strip()].name if text else None for text in references]
-    return tuple(
-        name or dimension_size(model, size) or 0
-        for name, size in zip(named, source.dimensions, strict=True)
-    )
+    sizes: list[int | str] = []
+    for dimension in source.dimensions:
+        reference = dimension.get("valueReference")
+        if reference:
+            sizes.append(model.by_reference[reference.strip()].name)
+        else:
+            sizes.append(dimension_size(model, dimension) or 0)
+    return sizes if any(isinstance(size, str) for size in sizes) else ()
 
 
 def _read_dependencies(model: ModelDescription, element: str) -> dict[str, frozenset[str]]:
-    """Return the inputs on which each output depends, by name with aliases, from the elements that declare them."""
-    inputs = {
-        reference: _names_with_aliases(variable)
-        for reference, variable in model.by_reference.items()
-        if variable.causality == "input"
-    }
-    return {
-        name: frozenset(
-            each for reference in unknown.dependencies for each in inputs.get(reference, ())
-        )
-        for unknown in model.model_structure
-        if unknown.element == element
-        and unknown.dependencies is not None
-        and unknown.reference.strip() in model.by_reference
-        for name in _names_with_aliases(model.by_reference[unknown.reference.strip()])
-    }
+    """Return the inputs on which each output depends, as one kind of elements declares them.
+
+    All names include the aliases.
+    """
+    found: dict[str, frozenset[str]] = {}
+    for unknown in model.model_structure:
+        variable = model.by_reference.get(unknown.reference.strip())
+        if unknown.element != element or unknown.dependencies is None or variable is None:
+            continue
+        inputs: set[str] = set()
+        for reference in unknown.dependencies:
+            source = model.by_reference.get(reference)
+            if source and source.causality == "input":
+                inputs.update(_names_with_aliases(source))
+        found |= dict.fromkeys(_names_with_aliases(variable), frozenset(inputs))
+    return found
 
 
 def _read_continuous_states(model: ModelDescription) -> dict[str, str]:
@@ -307,32 +286,28 @@ def _read_continuous_states(model: ModelDescription) -> dict[str, str]:
     found = {}
     for unknown in model.model_structure:
         derivative = model.by_reference.get(unknown.reference.strip())
-        if (
-            unknown.element == "ContinuousStateDerivative"
-            and derivative
-            and not derivative.dimensions
-        ):
-            state = model.by_reference.get((derivative.attribute("derivative") or "").strip())
-            if state and not state.dimensions:
-                found[state.name] = derivative.name
+        if unknown.element != "ContinuousStateDerivative" or not derivative:
+            continue
+        state = model.by_reference.get((derivative.attribute("derivative") or "").strip())
+        if state and not (state.dimensions or derivative.dimensions):
+            found[state.name] = derivative.name
     return found
 
 
 def _is_set(name: str, value: str) -> bool:
-    """Return whether an attribute is a capability flag that is true, or an order of derivatives above zero."""
-    return value in _TRUE or (name.startswith("max") and value.strip().isdigit() and int(value) > 0)
+    """Return whether an attribute is a flag that is true, or an order of derivatives above zero."""
+    is_order = name.startswith("max") and value.strip().isdigit() and int(value) > 0
+    return is_order or is_true({name: value}, name)
 
 
 def _build_unit(definition: UnitDefinition) -> Unit:
     base = definition.base_unit
     if base is None:
-        return named_unit(
-            definition.name
-        )  # FMI does not define a unit without BaseUnit; its name usually does
+        # FMI does not define a unit without BaseUnit; its name usually does
+        return named_unit(definition.name)
     exponents = tuple(int(base.get(name, 0)) for name in BASE_UNITS)
-    return Unit(
-        definition.name, exponents, float(base.get("factor", 1)), float(base.get("offset", 0))
-    )
+    factor, offset = float(base.get("factor", 1)), float(base.get("offset", 0))
+    return Unit(definition.name, exponents, factor, offset)
 
 
 def _names_with_aliases(source: ModelVariable) -> list[str]:
@@ -343,99 +318,77 @@ def _build_variables(
     model: ModelDescription, source: ModelVariable, units: Mapping[str, Unit]
 ) -> list[Variable]:
     """Build a variable and its aliases."""
-    is_c_int = (source.kind == "Enumeration" and model.major < 3) or (
-        source.kind == "Boolean" and model.major == 2
+    kind, unit = source.kind, source.attribute("unit")
+    dtype = DTYPES[kind]
+    items: tuple[tuple[str, int], ...] = ()
+    if (kind, model.major) in _STORED_AS_C_INT:
+        dtype = np.dtype(np.int32)
+    if kind == "Enumeration" and source.declared_type:
+        items = tuple((name, int(text)) for name, text in source.declared_type.items)
+    # only floating-point variables can be continuous
+    is_discrete = source.variability == "continuous" and not source.is_float
+    variable = Variable(
+        source.name,
+        kind,
+        cast(Causality, source.causality),
+        "discrete" if is_discrete else cast(Variability, source.variability),
+        _parse_start(source),
+        (units.get(unit) or named_unit(unit)) if unit else None,
+        tuple(dimension_size(model, dimension) or 0 for dimension in source.dimensions),
+        source.attribute("description") or "",
+        *_finite_limits(source),
+        items,
+        source.attribute("relativeQuantity") in ("true", "1"),
+        dtype,
     )
-    descriptions = [
-        source.attribute("description"),
-        *(alias.get("description") for alias in source.aliases),
-    ]
-    return [
-        Variable(
-            name,
-            source.kind,
-            _CAUSALITIES[source.causality],
-            _variability(source),
-            _parse_start(source),
-            _find_unit(source, units),
-            tuple(dimension_size(model, dimension) or 0 for dimension in source.dimensions),
-            description or descriptions[0] or "",
-            *_finite_limits(source),
-            _enumeration_items(source),
-            source.attribute("relativeQuantity") in _TRUE,
-            _C_INT if is_c_int else DTYPES[source.kind],
-        )
-        for name, description in zip(_names_with_aliases(source), descriptions, strict=True)
-    ]
-
-
-def _find_unit(source: ModelVariable, units: Mapping[str, Unit]) -> Unit | None:
-    name = source.attribute("unit")
-    return (units.get(name) or named_unit(name)) if name else None
+    variables = [variable]
+    for alias in source.aliases:
+        text = alias.get("description") or variable.description
+        variables.append(replace(variable, name=alias["name"], description=text))
+    return variables
 
 
 def _parse_start(source: ModelVariable) -> Any:
     """Return the start value, a tuple in row-major order if there are several, or None."""
     if not source.start_words:
         return None
-    is_text = source.kind in ("String", "Binary", "Clock")
-    values = [word if is_text else parse_value(word, source.kind) for word in source.start_words]
+    values: Sequence[Any] = source.start_words
+    if source.kind not in ("String", "Binary", "Clock"):
+        values = [parse_value(word, source.kind) for word in values]
     return values[0] if len(values) == 1 else tuple(values)
 
 
-def _enumeration_items(source: ModelVariable) -> tuple[tuple[str, int], ...]:
-    if source.kind != "Enumeration" or source.declared_type is None:
-        return ()
-    return tuple((name, int(text)) for name, text in source.declared_type.items)
-
-
-def _variability(source: ModelVariable) -> Variability:
-    """Return the variability; only floating-point variables can be continuous."""
-    return _VARIABILITIES[
-        source.variability if source.is_float or source.variability != "continuous" else "discrete"
-    ]
-
-
 def _finite_limits(source: ModelVariable) -> tuple[float | None, float | None]:
-    """Return (min, max), None for each limit that is missing or invalid, and for both if min is above max."""
-    texts = (
-        None if source.kind == "Boolean" else source.attribute(name) for name in ("min", "max")
-    )
-    limits = [None if text is None else read_limit(text) for text in texts]
-    low, high = (limit if limit is not None and math.isfinite(limit) else None for limit in limits)
+    """Return (min, max).
+
+    None for each limit that is missing or invalid, and for both if min is above max.
+    """
+    limits: list[float | None] = []
+    for name in ("min", "max"):
+        text = None if source.kind == "Boolean" else source.attribute(name)
+        limit = None if text is None else read_limit(text)
+        limits.append(limit if limit is not None and math.isfinite(limit) else None)
+    low, high = limits
     return (None, None) if low is not None and high is not None and low > high else (low, high)
 
 
 def _build_default_experiment(experiment: Mapping[str, str]) -> DefaultExperiment:
-    numbers = [
-        None if (text := experiment.get(name)) is None else _parse_number(text)
-        for name in _EXPERIMENT
-    ]
-    start, stop, step, tolerance = numbers
-    positive_step = step if step and step > 0 else None
+    numbers: dict[str, Fraction] = {}
+    for name, text in experiment.items():
+        with suppress(ValueError):  # not a finite number
+            numbers[name] = exact_fraction(text)
+    step, tolerance = numbers.get("stepSize"), numbers.get("tolerance")
     return DefaultExperiment(
-        start, stop, positive_step, float(tolerance) if tolerance and tolerance > 0 else None
+        numbers.get("startTime"),
+        numbers.get("stopTime"),
+        step if step and step > 0 else None,
+        float(tolerance) if tolerance and tolerance > 0 else None,
     )
 
 
 def _count_states(model: ModelDescription, interface: str) -> int:
-    if model.major == 1:
-        return (
-            int(model.root.get("numberOfContinuousStates", 0))
-            if interface == "model-exchange"
-            else 0
-        )
-    return sum(unknown.element == "ContinuousStateDerivative" for unknown in model.model_structure)
-
-
-def _needs_completed_step(major: int, attributes: Mapping[str, str]) -> bool:
-    if major == 3:
-        return attributes.get("needsCompletedIntegratorStep") in _TRUE
-    return attributes.get("completedIntegratorStepNotNeeded") not in _TRUE
-
-
-def _parse_number(text: str) -> Fraction | None:
-    """Return an exact number, or None if the text is not a finite number."""
-    with suppress(ValueError):
-        return exact_fraction(text)
-    return None
+    if model.major > 1:
+        elements = [unknown.element for unknown in model.model_structure]
+        return elements.count("ContinuousStateDerivative")
+    is_declared = interface == "model-exchange"
+    return int(model.root.get("numberOfContinuousStates", 0)) if is_declared else 0

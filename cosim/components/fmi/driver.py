@@ -238,14 +238,9 @@ class EventMode:
         #: an input changes within a step, so that its value of the begin has to be set again
         self._interpolates = any(variable.derivative_of for variable in inputs.variables)
         #: array and elements of each discrete input
-        self._discrete_elements: list[tuple[np.ndarray, slice]] = []
-        begins = dict.fromkeys(inputs.arrays, 0)
-        for variable in inputs.variables:
-            begin = begins[variable.dtype]
-            end = begins[variable.dtype] = begin + len(variable.scalar_names)
-            if is_discrete(variable):
-                elements = inputs.arrays[variable.dtype], slice(begin, end)
-                self._discrete_elements.append(elements)
+        self._discrete_elements = [
+            (array, part) for variable, array, part in inputs.elements() if is_discrete(variable)
+        ]
 
     def handle(self, change: Callable[[], object] = lambda: None) -> None:
         """Handle an event at the present time; `change` sets variables in Event Mode."""
@@ -289,7 +284,7 @@ class EventMode:
 
     def apply_inputs(self) -> int:
         """Set the bound inputs that have changed since the last step; discrete ones at an event."""
-        discrete = [array[index].tolist() for array, index in self._discrete_elements]
+        discrete = [array[part].tolist() for array, part in self._discrete_elements]
         now = ([array.tolist() for array in self._inputs.arrays.values()], discrete)
         if now == self.last_inputs and not self._interpolates:
             return OK

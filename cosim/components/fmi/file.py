@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import ctypes
 import os
-from collections import OrderedDict
 from collections.abc import Callable
 from contextlib import suppress
 from copy import copy
@@ -12,7 +11,7 @@ from dataclasses import dataclass
 from functools import cached_property
 from hashlib import file_digest
 from pathlib import Path
-from typing import Any, Generic, NamedTuple, TypeVar
+from typing import Any, NamedTuple
 
 from ...core.errors import InputError
 from ...process.journal import current_journal, suspending_deadline
@@ -33,9 +32,6 @@ from .preflight.archive import Archive
 from .preflight.binary import WINDOWS, can_be_compiled
 from .preflight.platforms import current_platform
 
-K = TypeVar("K")
-V = TypeVar("V")
-
 #: largest number of FMU contents, and of extracted folders on the disk
 _MAX_CONTENTS, _MAX_FOLDERS = 256, 32
 
@@ -50,40 +46,6 @@ class FileKey(NamedTuple):
     sha256: str
 
 
-class RecentlyUsed(Generic[K, V]):
-    """Mapping that forgets the values that were not used for the longest time."""
-
-    def __init__(self, size: int):
-        self._size = size
-        self._values: OrderedDict[K, V] = OrderedDict()
-
-    def get(self, key: K) -> V | None:
-        """Return a value, None if there is none."""
-        with suppress(KeyError):
-            self._values.move_to_end(key)
-            return self._values[key]
-        return None
-
-    def put(self, key: K, value: V) -> V | None:
-        """Store a value; return the one that is forgotten."""
-        self._values[key] = value
-        return self.pop_oldest() if len(self._values) > self._size else None
-
-    def pop_oldest(self) -> V | None:
-        """Remove and return the value that was not used for the longest time, None if there is none."""
-        with suppress(KeyError):
-            return self._values.popitem(last=False)[1]
-        return None
-
-    def pop(self, key: K) -> V | None:
-        """Remove and return a value, None if there is none."""
-        return self._values.pop(key, None)
-
-    def clear(self) -> None:
-        """Forget all values."""
-        self._values.clear()
-
-
 class ExtractedFolder(NamedTuple):
     """Folder of an extracted FMU, and its files as they were extracted."""
 
@@ -91,16 +53,18 @@ class ExtractedFolder(NamedTuple):
     listing: Listing
 
 
-#: description and findings of the preflight check, by the content of the file
-_known_contents: RecentlyUsed[Any, Any] = RecentlyUsed(_MAX_CONTENTS)
+#: description and findings of the preflight check, by the content of the file; the last used one is
+#: the last one
+_known_contents: dict[Any, Any] = {}
 #: folders that no run uses; a run has a folder of its own, because a library that is loaded twice
 #: shares its static variables
-_idle_folders: RecentlyUsed[FileKey, ExtractedFolder] = RecentlyUsed(_MAX_FOLDERS)
+_idle_folders: dict[FileKey, ExtractedFolder] = {}
 
 
 def take_folder(key: FileKey) -> ExtractedFolder | None:
     """Return the folder of an FMU that was extracted for an earlier run, if its files are unchanged; else None."""
-    if not (extracted := _idle_folders.pop(key)):
+    extracted = _idle_folders.pop(key, None)
+    if extracted is None:
         return None
     with suppress(OSError):  # another program has removed the folder
         if list_files(extracted.folder.name) == extracted.listing:
@@ -111,25 +75,29 @@ def take_folder(key: FileKey) -> ExtractedFolder | None:
 
 def keep_folder(key: FileKey, extracted: ExtractedFolder, library: str) -> None:
     """Keep the folder for the next run, unless the operating system has kept the FMU's library with its static variables."""
-    if (
-        current_journal()
-    ):  # no other run follows in a supervised process, which ends without finalizers
+    # no other run follows in a supervised process, which ends without finalizers
+    if current_journal():
         extracted.folder.cleanup()
         return
     with suppress(OSError):
         ctypes.CDLL(library, mode=os.RTLD_NOLOAD | os.RTLD_NOW)
         extracted.folder.cleanup()
         return
-    other = _idle_folders.pop(key)
-    for surplus in (other, _idle_folders.put(key, extracted)):
-        if surplus:
-            surplus.folder.cleanup()
+    if key in _idle_folders:
+        _idle_folders.pop(key).folder.cleanup()
+    _idle_folders[key] = extracted
+    if len(_idle_folders) > _MAX_FOLDERS:
+        _remove_oldest_folder()
+
+
+def _remove_oldest_folder() -> None:
+    _idle_folders.pop(next(iter(_idle_folders))).folder.cleanup()
 
 
 def remove_idle_folders() -> None:
     """Remove the folders that are kept for further runs."""
-    while extracted := _idle_folders.pop_oldest():
-        extracted.folder.cleanup()
+    while _idle_folders:
+        _remove_oldest_folder()
 
 
 def list_files(folder: str) -> Listing:
@@ -212,12 +180,17 @@ class FmuFile:
 
     def _remember(self, part: str, read: Callable[[], Any]) -> Any:
         """Return what is read from the file, which is read again only if its content has changed."""
-        if not (key := self._key):
+        if not self._key:
             return read()
-        if (known := _known_contents.get((part, self.limits, key))) is None:
+        key = (part, self.limits, self._key)
+        known = _known_contents.pop(key, None)
+        if known is None:
             known = read()
-            if self._find_key() == key:  # else the file has changed meanwhile
-                _known_contents.put((part, self.limits, key), known)
+            if self._find_key() != self._key:  # the file has changed meanwhile
+                return known
+        _known_contents[key] = known
+        if len(_known_contents) > _MAX_CONTENTS:
+            del _known_contents[next(iter(_known_contents))]
         return known
 
     @cached_property

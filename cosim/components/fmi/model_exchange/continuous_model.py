@@ -90,14 +90,18 @@ class LinearInputs:
 
     def __init__(self, ports: Ports, value_references: Mapping[str, int]):
         """Find the inputs for which the ports contain slopes, which follow all other variables of type Float64."""
-        variables = [variable for variable in ports.variables if variable.dtype == _FLOAT64]
-        positions, count = {}, 0
-        for variable in variables:
-            positions[variable.name] = range(count, count := count + len(variable.scalar_names))
-        inputs = [variable.derivative_of for variable in variables if variable.derivative_of]
+        positions = {variable.name: part for variable, _, part in ports.elements()}
+        inputs = [
+            variable.derivative_of
+            for variable in ports.variables
+            if variable.derivative_of and variable.dtype == _FLOAT64
+        ]
+        indices: list[int] = []
+        for name in inputs:
+            indices += range(positions[name].start, positions[name].stop)
         self.begin = 0.0
         self.references = np.array([value_references[name] for name in inputs], np.uint32)
-        self.indices = np.array([index for name in inputs for index in positions[name]], np.int64)
+        self.indices = np.array(indices, np.int64)
         self.array = ports.arrays.get(_FLOAT64, np.zeros(0))
         self.slopes = self.array[len(self.array) - len(self.indices) :]
         self.values = np.zeros(len(self.indices))

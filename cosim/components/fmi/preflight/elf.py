@@ -11,7 +11,7 @@ import struct
 from collections.abc import Iterator, Mapping
 from typing import NamedTuple
 
-from .platforms import EXPECTED_TEXTS, InvalidLibraryError, SharedLibrary
+from .platforms import EXPECTED_TEXTS, InvalidLibraryError, SharedLibrary, check_end, unpack
 
 MAGIC = b"\x7fELF"
 #: (EI_CLASS, e_machine) of the supported architectures
@@ -108,12 +108,7 @@ class _ElfReader:
 
     def unpack(self, form: str, offset: int) -> tuple[int, ...]:
         """Unpack numbers at an offset in the file, in the format of `struct` without byte order."""
-        form = self.byte_order + form
-        if offset < 0 or offset + struct.calcsize(form) > len(self.content):
-            raise InvalidLibraryError(
-                f"is truncated: it refers to byte {offset}, but has {len(self.content)}"
-            )
-        return struct.unpack_from(form, self.content, offset)
+        return unpack(self.content, self.byte_order + form, offset)
 
     def _program_headers(self) -> Iterator[_ProgramHeader]:
         is_64_bit = self.bits == 64
@@ -124,10 +119,8 @@ class _ElfReader:
         for i in range(e_phnum):
             header = self._program_header(e_phoff + i * e_phentsize)
             end = header.p_offset + header.p_filesz
-            if header.p_type in (_PT_LOAD, _PT_DYNAMIC) and end > len(self.content):
-                raise InvalidLibraryError(
-                    f"is truncated: a segment ends at byte {end}, the file at {len(self.content)}"
-                )
+            if header.p_type in (_PT_LOAD, _PT_DYNAMIC):
+                check_end(self.content, end, "a segment")
             yield header
 
     def _program_header(self, offset: int) -> _ProgramHeader:
@@ -182,11 +175,7 @@ class _ElfReader:
 
     def _read_address(self, address: int, size: int) -> bytes:
         begin = self._file_offset(address)
-        if begin + size > len(self.content):
-            raise InvalidLibraryError(
-                f"is truncated: a table ends at byte {begin + size}, the file at "
-                f"{len(self.content)}"
-            )
+        check_end(self.content, begin + size, "a table")
         return self.content[begin : begin + size]
 
     def _constant_text(self, address: int) -> bytes | None:

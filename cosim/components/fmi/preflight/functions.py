@@ -2,9 +2,10 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterator, Mapping
 
-from .model_description import Interface, ModelDescription
+from ....core.component import DTYPES
+from .model_description import Interface, ModelDescription, is_true
 
 #: FMI 3.0 type names -> the part of fmi*Get..., fmi*Set... after Get and Set, by FMI major version
 _FMI2_ACCESSORS = {
@@ -14,201 +15,81 @@ _FMI2_ACCESSORS = {
     "Boolean": "Boolean",
     "String": "String",
 }
-_FMI3_TYPES = ("Binary", "Boolean", "Clock", "Float32", "Float64", "String")
-_FMI3_INTEGERS = tuple(f"{sign}Int{bits}" for sign in ("", "U") for bits in (8, 16, 32, 64))
 ACCESSORS: Mapping[int, Mapping[str, str]] = {
     1: _FMI2_ACCESSORS,
     2: _FMI2_ACCESSORS,
-    3: {name: name for name in (*_FMI3_TYPES, *_FMI3_INTEGERS)} | {"Enumeration": "Int64"},
+    3: {name: name for name in DTYPES} | {"Enumeration": "Int64"},
 }
 
-_COMMON = (
-    *(
-        "EnterInitializationMode",
-        "ExitInitializationMode",
-        "FreeInstance",
-        "GetDirectionalDerivative",
-        "GetVersion",
-        "Reset",
-    ),
-    *("SetDebugLogging", "Terminate"),
-)
-_STATE = {
-    2: (
-        "DeSerializeFMUstate",
-        "FreeFMUstate",
-        "GetFMUstate",
-        "SerializeFMUstate",
-        "SerializedFMUstateSize",
-        "SetFMUstate",
-    ),
-    3: (
-        "DeserializeFMUState",
-        "FreeFMUState",
-        "GetFMUState",
-        "SerializeFMUState",
-        "SerializedFMUStateSize",
-        "SetFMUState",
-    ),
+#: functions of FMI 2.0 and 3.0
+_COMMON = """
+    EnterInitializationMode ExitInitializationMode FreeInstance GetDirectionalDerivative
+    GetVersion Reset SetDebugLogging Terminate
+"""
+#: functions that save and restore states, and those that serialize them
+_STATE = {2: "FreeFMUstate GetFMUstate SetFMUstate", 3: "FreeFMUState GetFMUState SetFMUState"}
+_SERIALIZATION = {
+    2: "DeSerializeFMUstate SerializeFMUstate SerializedFMUstateSize",
+    3: "DeserializeFMUState SerializeFMUState SerializedFMUStateSize",
 }
-_FMI2_INTERFACES: Mapping[Interface, Sequence[str]] = {
-    "co-simulation": (
-        *(
-            "CancelStep",
-            "DoStep",
-            "GetBooleanStatus",
-            "GetIntegerStatus",
-            "GetRealOutputDerivatives",
-            "GetRealStatus",
-        ),
-        *("GetStatus", "GetStringStatus", "SetRealInputDerivatives"),
-    ),
-    "model-exchange": (
-        *(
-            "CompletedIntegratorStep",
-            "EnterContinuousTimeMode",
-            "EnterEventMode",
-            "GetContinuousStates",
-            "GetDerivatives",
-        ),
-        *(
-            "GetEventIndicators",
-            "GetNominalsOfContinuousStates",
-            "NewDiscreteStates",
-            "SetContinuousStates",
-            "SetTime",
-        ),
-    ),
+#: further functions of an interface, those of variables excepted
+_SPECIFIC: Mapping[tuple[int, Interface], str] = {
+    (1, "co-simulation"): """
+        CancelStep DoStep FreeSlaveInstance GetBooleanStatus GetIntegerStatus
+        GetRealOutputDerivatives GetRealStatus GetStatus GetStringStatus GetTypesPlatform
+        InitializeSlave InstantiateSlave ResetSlave SetRealInputDerivatives TerminateSlave
+    """,
+    (1, "model-exchange"): """
+        CompletedIntegratorStep EventUpdate FreeModelInstance GetContinuousStates GetDerivatives
+        GetEventIndicators GetModelTypesPlatform GetNominalContinuousStates
+        GetStateValueReferences Initialize InstantiateModel SetContinuousStates SetTime Terminate
+    """,
+    (2, "co-simulation"): """
+        GetTypesPlatform Instantiate SetupExperiment
+        CancelStep DoStep GetBooleanStatus GetIntegerStatus GetRealOutputDerivatives
+        GetRealStatus GetStatus GetStringStatus SetRealInputDerivatives
+    """,
+    (2, "model-exchange"): """
+        GetTypesPlatform Instantiate SetupExperiment
+        CompletedIntegratorStep EnterContinuousTimeMode EnterEventMode GetContinuousStates
+        GetDerivatives GetEventIndicators GetNominalsOfContinuousStates NewDiscreteStates
+        SetContinuousStates SetTime
+    """,
 }
-_FMI1_INTERFACES: Mapping[Interface, Sequence[str]] = {
-    "co-simulation": (
-        *(
-            "CancelStep",
-            "DoStep",
-            "FreeSlaveInstance",
-            "GetBooleanStatus",
-            "GetIntegerStatus",
-            "GetRealOutputDerivatives",
-        ),
-        *(
-            "GetRealStatus",
-            "GetStatus",
-            "GetStringStatus",
-            "GetTypesPlatform",
-            "InitializeSlave",
-            "InstantiateSlave",
-        ),
-        *("ResetSlave", "SetRealInputDerivatives", "TerminateSlave"),
-    ),
-    "model-exchange": (
-        *(
-            "CompletedIntegratorStep",
-            "EventUpdate",
-            "FreeModelInstance",
-            "GetContinuousStates",
-            "GetDerivatives",
-        ),
-        *(
-            "GetEventIndicators",
-            "GetModelTypesPlatform",
-            "GetNominalContinuousStates",
-            "GetStateValueReferences",
-        ),
-        *("Initialize", "InstantiateModel", "SetContinuousStates", "SetTime", "Terminate"),
-    ),
-}
-_FMI3_ONLY = (
-    *(
-        "ActivateModelPartition",
-        "CompletedIntegratorStep",
-        "DoStep",
-        "EnterConfigurationMode",
-        "EnterContinuousTimeMode",
-    ),
-    *(
-        "EnterEventMode",
-        "EnterStepMode",
-        "EvaluateDiscreteStates",
-        "ExitConfigurationMode",
-        "GetAdjointDerivative",
-    ),
-    *(
-        "GetContinuousStateDerivatives",
-        "GetContinuousStates",
-        "GetEventIndicators",
-        "GetIntervalDecimal",
-        "GetIntervalFraction",
-    ),
-    *("GetNominalsOfContinuousStates", "GetNumberOfContinuousStates", "GetNumberOfEventIndicators"),
-    *(
-        "GetNumberOfVariableDependencies",
-        "GetOutputDerivatives",
-        "GetShiftDecimal",
-        "GetShiftFraction",
-    ),
-    *(
-        "GetVariableDependencies",
-        "InstantiateCoSimulation",
-        "InstantiateModelExchange",
-        "InstantiateScheduledExecution",
-    ),
-    *(
-        "SetContinuousStates",
-        "SetIntervalDecimal",
-        "SetIntervalFraction",
-        "SetShiftDecimal",
-        "SetShiftFraction",
-        "SetTime",
-    ),
-    "UpdateDiscreteStates",
-)
-_INITIALIZATION = ("EnterInitializationMode", "ExitInitializationMode", "FreeInstance", "Terminate")
-_INTEGRATION = (
-    *(
-        "CompletedIntegratorStep",
-        "EnterContinuousTimeMode",
-        "EnterEventMode",
-        "GetContinuousStates",
-        "GetEventIndicators",
-    ),
-    *("SetContinuousStates", "SetTime"),
-)
+#: FMI 3.0 requires the functions of all interfaces
+_FMI3_SPECIFIC = """
+    ActivateModelPartition CompletedIntegratorStep DoStep EnterConfigurationMode
+    EnterContinuousTimeMode EnterEventMode EnterStepMode EvaluateDiscreteStates
+    ExitConfigurationMode GetAdjointDerivative GetContinuousStateDerivatives
+    GetContinuousStates GetEventIndicators GetIntervalDecimal GetIntervalFraction
+    GetNominalsOfContinuousStates GetNumberOfContinuousStates GetNumberOfEventIndicators
+    GetNumberOfVariableDependencies GetOutputDerivatives GetShiftDecimal GetShiftFraction
+    GetVariableDependencies InstantiateCoSimulation InstantiateModelExchange
+    InstantiateScheduledExecution SetContinuousStates SetIntervalDecimal SetIntervalFraction
+    SetShiftDecimal SetShiftFraction SetTime UpdateDiscreteStates
+"""
 #: functions that the importer calls, without those of variables and states
-_CALLED: Mapping[tuple[int, Interface], Sequence[str]] = {
-    (1, "co-simulation"): (
-        "DoStep",
-        "FreeSlaveInstance",
-        "InitializeSlave",
-        "InstantiateSlave",
-        "TerminateSlave",
-    ),
-    (1, "model-exchange"): (
-        *(
-            "CompletedIntegratorStep",
-            "EventUpdate",
-            "FreeModelInstance",
-            "GetContinuousStates",
-            "GetDerivatives",
-        ),
-        *(
-            "GetEventIndicators",
-            "Initialize",
-            "InstantiateModel",
-            "SetContinuousStates",
-            "SetTime",
-            "Terminate",
-        ),
-    ),
-    (2, "co-simulation"): ("Instantiate", "SetupExperiment", *_INITIALIZATION, "DoStep"),
-    (3, "co-simulation"): ("InstantiateCoSimulation", *_INITIALIZATION, "DoStep"),
-    (2, "model-exchange"): (
-        *("Instantiate", "SetupExperiment", *_INITIALIZATION, *_INTEGRATION),
-        *("GetDerivatives", "NewDiscreteStates"),
-    ),
-    (3, "model-exchange"): (
-        *("InstantiateModelExchange", *_INITIALIZATION, *_INTEGRATION),
-        *("GetContinuousStateDerivatives", "UpdateDiscreteStates"),
-    ),
+_INITIALIZATION = "EnterInitializationMode ExitInitializationMode FreeInstance Terminate "
+_INTEGRATION = (
+    "CompletedIntegratorStep EnterContinuousTimeMode EnterEventMode GetContinuousStates "
+    "GetEventIndicators SetContinuousStates SetTime "
+)
+_CALLED: Mapping[tuple[int, Interface], str] = {
+    (1, "co-simulation"): """
+        DoStep FreeSlaveInstance InitializeSlave InstantiateSlave TerminateSlave
+    """,
+    (1, "model-exchange"): """
+        CompletedIntegratorStep EventUpdate FreeModelInstance GetContinuousStates GetDerivatives
+        GetEventIndicators Initialize InstantiateModel SetContinuousStates SetTime Terminate
+    """,
+    (2, "co-simulation"): _INITIALIZATION + "Instantiate SetupExperiment DoStep",
+    (3, "co-simulation"): _INITIALIZATION + "InstantiateCoSimulation DoStep",
+    (2, "model-exchange"): _INITIALIZATION
+    + _INTEGRATION
+    + "Instantiate SetupExperiment GetDerivatives NewDiscreteStates",
+    (3, "model-exchange"): _INITIALIZATION
+    + _INTEGRATION
+    + "InstantiateModelExchange GetContinuousStateDerivatives UpdateDiscreteStates",
 }
 
 
@@ -228,23 +109,17 @@ def standard_functions(major: int, interface: Interface, identifier: str = "") -
         interface: Interface of the FMU.
         identifier: `modelIdentifier` of the FMU.
     """
-    accessors = (verb + name for verb in ("Get", "Set") for name in ACCESSORS[major].values())
-    prefix = function_prefix(major, identifier)
+    names = [
+        *(f"Get{name}" for name in ACCESSORS[major].values()),
+        *(f"Set{name}" for name in ACCESSORS[major].values()),
+        *_SPECIFIC.get((major, interface), _FMI3_SPECIFIC).split(),
+    ]
     if major == 1:
-        return frozenset(
-            prefix + name
-            for name in ("GetVersion", "SetDebugLogging", *_FMI1_INTERFACES[interface], *accessors)
-        )
-    if major == 2:
-        specific: Sequence[str] = (
-            "GetTypesPlatform",
-            "Instantiate",
-            "SetupExperiment",
-            *_FMI2_INTERFACES[interface],
-        )
+        names += ["GetVersion", "SetDebugLogging"]
     else:
-        specific = _FMI3_ONLY
-    return frozenset(prefix + name for name in (*_COMMON, *_STATE[major], *specific, *accessors))
+        names += [*_COMMON.split(), *_STATE[major].split(), *_SERIALIZATION[major].split()]
+    prefix = function_prefix(major, identifier)
+    return frozenset(prefix + name for name in names)
 
 
 def called_functions(model: ModelDescription, interface: Interface) -> frozenset[str]:
@@ -254,20 +129,17 @@ def called_functions(model: ModelDescription, interface: Interface) -> frozenset
         model: Model description of the FMU.
         interface: Interface through which it is simulated.
     """
-    names = {*_CALLED[model.major, interface], *_accessors_of_variables(model)}
     attributes = model.interfaces[interface]
-    if any(
-        attributes.get(flag) in ("true", "1")
-        for flag in ("canGetAndSetFMUstate", "canGetAndSetFMUState")
-    ):
-        names.update(name for name in _STATE[model.major] if "erialize" not in name)
+    names = {*_CALLED[model.major, interface].split(), *_accessors_of_variables(model)}
+    if is_true(attributes, "canGetAndSetFMUstate", "canGetAndSetFMUState"):
+        names.update(_STATE[model.major].split())
     prefix = function_prefix(model.major, attributes["modelIdentifier"])
     return frozenset(prefix + name for name in names)
 
 
 def _accessors_of_variables(model: ModelDescription) -> Iterator[str]:
-    accessors = ACCESSORS[model.major]
     for kind, causality in {(variable.kind, variable.causality) for variable in model.variables}:
-        yield f"Get{accessors[kind]}"
+        accessor = ACCESSORS[model.major][kind]
+        yield f"Get{accessor}"
         if causality in ("input", "parameter", "structuralParameter"):
-            yield f"Set{accessors[kind]}"
+            yield f"Set{accessor}"

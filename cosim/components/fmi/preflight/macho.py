@@ -8,7 +8,7 @@ from __future__ import annotations
 import struct
 from collections.abc import Iterator
 
-from .platforms import InvalidLibraryError, SharedLibrary
+from .platforms import InvalidLibraryError, SharedLibrary, check_end, unpack
 
 #: values of cputype by architecture
 MACHINES = {"x86_64": 0x01000007, "aarch64": 0x0100000C, "x86": 7}
@@ -43,7 +43,7 @@ def read_library(content: bytes, architecture: str) -> SharedLibrary:
         raise InvalidLibraryError(f"is built for 32 bit; this machine is {architecture}")
     if not content.startswith(_MH_MAGIC_64):
         raise InvalidLibraryError("is not a macOS library")
-    cputype, _, filetype, ncmds, sizeofcmds = _unpack(content, "<5L", 4)
+    cputype, _, filetype, ncmds, sizeofcmds = unpack(content, "<5L", 4)
     if cputype != MACHINES.get(architecture, cputype):
         raise InvalidLibraryError(
             f"is built for {_architecture_name(cputype)}; this machine is {architecture}"
@@ -62,20 +62,16 @@ def _select_architecture(content: bytes, architecture: str) -> bytes:
     form = _FAT_FORMATS.get(content[:4])
     if form is None:
         return content
-    (nfat_arch,) = _unpack(content, ">L", 4)
+    (nfat_arch,) = unpack(content, ">L", 4)
     if nfat_arch > _MAX_ENTRIES:
         raise InvalidLibraryError(f"is damaged: it claims {nfat_arch} architectures")
     names = []
     for i in range(nfat_arch):
-        cputype, _, offset, size, *_ = _unpack(
+        cputype, _, offset, size, *_ = unpack(
             content, form, _FAT_HEADER_SIZE + i * struct.calcsize(form)
         )
         if cputype == MACHINES.get(architecture):
-            if offset + size > len(content):
-                raise InvalidLibraryError(
-                    f"is truncated: the part for {architecture} ends at byte {offset + size}, the "
-                    f"file at {len(content)}"
-                )
+            check_end(content, offset + size, f"the part for {architecture}")
             return content[offset : offset + size]
         names.append(_architecture_name(cputype))
     raise InvalidLibraryError(
@@ -83,28 +79,20 @@ def _select_architecture(content: bytes, architecture: str) -> bytes:
     )
 
 
-def _unpack(content: bytes, form: str, offset: int) -> tuple[int, ...]:
-    if offset + struct.calcsize(form) > len(content):
-        raise InvalidLibraryError(
-            f"is truncated: it refers to byte {offset}, but has {len(content)}"
-        )
-    return struct.unpack_from(form, content, offset)
-
-
 def _exports(content: bytes, ncmds: int, end: int) -> Iterator[str]:
     """Yield the names in the tables that the load commands refer to."""
     offset = _MACH_HEADER_64_SIZE
     for _ in range(min(ncmds, _MAX_ENTRIES)):
-        cmd, cmdsize = _unpack(content, "<2L", offset)
+        cmd, cmdsize = unpack(content, "<2L", offset)
         if cmdsize < 8 or offset + cmdsize > end:
             raise InvalidLibraryError("has damaged load commands")
         if cmd == _LC_SEGMENT_64:
             _check_segment(content, offset)
         elif cmd == _LC_SYMTAB:
-            yield from _symbol_table_exports(content, *_unpack(content, "<4L", offset + 8))
+            yield from _symbol_table_exports(content, *unpack(content, "<4L", offset + 8))
         elif cmd in _EXPORT_TRIE_COMMANDS:
             yield from _trie_exports(
-                content, *_unpack(content, "<2L", offset + _EXPORT_TRIE_COMMANDS[cmd])
+                content, *unpack(content, "<2L", offset + _EXPORT_TRIE_COMMANDS[cmd])
             )
         offset += cmdsize
 
@@ -115,11 +103,7 @@ def _trie_exports(content: bytes, offset: int, size: int) -> Iterator[str]:
     A node is the size of its export information, that information, and its edges.
     """
     trie = content[offset : offset + size]
-    if len(trie) < size:
-        raise InvalidLibraryError(
-            f"is truncated: its export trie ends at byte {offset + size}, the file at "
-            f"{len(content)}"
-        )
+    check_end(content, offset + size, "its export trie")
     nodes, visited = [(0, b"")] if trie else [], set[int]()
     while nodes:
         node, name = nodes.pop()
@@ -134,7 +118,7 @@ def _trie_exports(content: bytes, offset: int, size: int) -> Iterator[str]:
 
 def _trie_children(trie: bytes, position: int, name: bytes) -> Iterator[tuple[int, bytes]]:
     """Yield (offset, name) of the child nodes, from the edges at a position."""
-    (count,) = _unpack(trie, "<B", position)
+    (count,) = unpack(trie, "<B", position)
     position += 1
     for _ in range(count):
         end = trie.find(b"\0", position)
@@ -149,7 +133,7 @@ def _read_uleb128(trie: bytes, position: int) -> tuple[int, int]:
     """Read a ULEB128 number; return it and the position after it."""
     value = 0
     for shift in range(0, 64, 7):
-        (byte,) = _unpack(trie, "<B", position)
+        (byte,) = unpack(trie, "<B", position)
         position += 1
         value |= (byte & 0x7F) << shift
         if byte < 0x80:
@@ -158,11 +142,8 @@ def _read_uleb128(trie: bytes, position: int) -> tuple[int, int]:
 
 
 def _check_segment(content: bytes, command: int) -> None:
-    fileoff, filesize = _unpack(content, "<2Q", command + 40)
-    if fileoff + filesize > len(content):
-        raise InvalidLibraryError(
-            f"is truncated: a segment ends at byte {fileoff + filesize}, the file at {len(content)}"
-        )
+    fileoff, filesize = unpack(content, "<2Q", command + 40)
+    check_end(content, fileoff + filesize, "a segment")
 
 
 def _symbol_table_exports(
@@ -175,7 +156,7 @@ def _symbol_table_exports(
             f"at {len(content)}"
         )
     for i in range(nsyms):
-        n_strx, n_type, _, _, _ = _unpack(content, "<L2BHQ", symoff + _NLIST_64_SIZE * i)
+        n_strx, n_type, _, _, _ = unpack(content, "<L2BHQ", symoff + _NLIST_64_SIZE * i)
         if n_type & _N_EXT and not n_type & _N_STAB and n_type & _N_TYPE and n_strx < strsize:
             end = content.find(b"\0", stroff + n_strx, stroff + strsize)
             name = content[stroff + n_strx : end if end >= 0 else stroff + strsize]

@@ -7,9 +7,18 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from typing import Literal
 
+import numpy as np
+
+from ....core.component import DTYPES
+
 _FLOAT = re.compile(r"[+-]?([0-9]+\.?[0-9]*|\.[0-9]+)([eE][+-]?[0-9]+)?|[+-]?INF|NaN")
 _INTEGER = re.compile(r"[+-]?[0-9]{1,20}")
 _BOOLEANS = {"true": True, "1": True, "false": False, "0": False}
+
+
+def is_true(attributes: Mapping[str, str], *names: str) -> bool:
+    """Return whether one of some XML attributes is true."""
+    return any(attributes.get(name) in ("true", "1") for name in names)
 
 
 def parse_value(word: str, kind: str) -> float | int | bool:
@@ -43,13 +52,10 @@ def parse_float(word: str) -> float:
 def _parse_integer(word: str, kind: str) -> int:
     if not _INTEGER.fullmatch(word.strip()):
         raise ValueError(word)
-    bits = 64 if kind == "Enumeration" else int(kind.removeprefix("U").removeprefix("Int"))
-    low, high = (
-        (0, 2**bits - 1) if kind.startswith("U") else (-(2 ** (bits - 1)), 2 ** (bits - 1) - 1)
-    )
-    if not low <= int(word) <= high:
+    limits, number = np.iinfo(DTYPES[kind]), int(word)
+    if not limits.min <= number <= limits.max:
         raise ValueError(word)
-    return int(word)
+    return number
 
 
 #: interface of an FMU through which it is simulated
@@ -129,10 +135,8 @@ class ModelVariable:
     @property
     def initial(self) -> str:
         """Value of `initial`, or the default for causality and variability, or "" if there is no default."""
-        return (
-            self.attributes.get("initial")
-            or ALLOWED_INITIAL.get((self.causality, self.variability), ("",))[0]
-        )
+        allowed = ALLOWED_INITIAL.get((self.causality, self.variability), ("",))
+        return self.attributes.get("initial") or allowed[0]
 
     @property
     def is_float(self) -> bool:
@@ -141,9 +145,8 @@ class ModelVariable:
 
     def attribute(self, name: str) -> str | None:
         """Return an XML attribute of the variable, or else of its declared type."""
-        return self.attributes.get(name) or (
-            self.declared_type.attributes.get(name) if self.declared_type else None
-        )
+        own, declared = self.attributes.get(name), self.declared_type
+        return own or (declared.attributes.get(name) if declared else None)
 
     def __str__(self) -> str:
         return f'variable "{self.name}"'

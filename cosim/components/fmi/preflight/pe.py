@@ -5,11 +5,10 @@ Format and field names: Microsoft PE/COFF specification, sections 3 to 6.
 
 from __future__ import annotations
 
-import struct
 from collections.abc import Iterator, Sequence
 from typing import NamedTuple
 
-from .platforms import InvalidLibraryError, SharedLibrary
+from .platforms import InvalidLibraryError, SharedLibrary, check_end, unpack
 
 #: values of Machine by architecture
 MACHINES = {"x86_64": 0x8664, "aarch64": 0xAA64, "x86": 0x14C}
@@ -39,10 +38,10 @@ def read_library(content: bytes, architecture: str) -> SharedLibrary:
     """
     if not content.startswith(b"MZ"):
         raise InvalidLibraryError("is not a Windows library")
-    (e_lfanew,) = _unpack(content, "<L", 0x3C)
+    (e_lfanew,) = unpack(content, "<L", 0x3C)
     if content[e_lfanew : e_lfanew + 4] != b"PE\0\0":
         raise InvalidLibraryError("has a damaged PE header")
-    machine, number_of_sections, _, _, _, optional_header_size, characteristics = _unpack(
+    machine, number_of_sections, _, _, _, optional_header_size, characteristics = unpack(
         content, "<2H3L2H", e_lfanew + 4
     )
     if machine != MACHINES.get(architecture, machine):
@@ -57,32 +56,22 @@ def read_library(content: bytes, architecture: str) -> SharedLibrary:
     )
 
 
-def _unpack(content: bytes, form: str, offset: int) -> tuple[int, ...]:
-    if offset + struct.calcsize(form) > len(content):
-        raise InvalidLibraryError(
-            f"is truncated: it refers to byte {offset}, but has {len(content)}"
-        )
-    return struct.unpack_from(form, content, offset)
-
-
 def _sections(content: bytes, section_table: int, count: int) -> Iterator[_Section]:
     for i in range(count):
-        _, address, size, pointer = _unpack(
+        _, address, size, pointer = unpack(
             content, "<4L", section_table + _SECTION_HEADER_SIZE * i + 8
         )
-        if size and pointer + size > len(content):
-            raise InvalidLibraryError(
-                f"is truncated: a section ends at byte {pointer + size}, the file at {len(content)}"
-            )
+        if size:
+            check_end(content, pointer + size, "a section")
         yield _Section(address, size, pointer)
 
 
 def _export_table_address(content: bytes, optional_header: int) -> int:
     """Return the address of the export table from the data directories, or 0 if there is none."""
-    (magic,) = _unpack(content, "<H", optional_header)
+    (magic,) = unpack(content, "<H", optional_header)
     if magic not in (_PE32, _PE32_PLUS):
         raise InvalidLibraryError("has a damaged PE header")
-    directory_count, address = _unpack(
+    directory_count, address = unpack(
         content, "<2L", optional_header + (108 if magic == _PE32_PLUS else 92)
     )
     return address if directory_count else 0
@@ -92,12 +81,10 @@ def _exports(content: bytes, export_table: int, sections: Sequence[_Section]) ->
     """Yield the names in the export name pointer table."""
     if export_table == 0:
         return
-    name_count, _, name_pointers = _unpack(
-        content, "<3L", _file_offset(export_table, sections) + 24
-    )
+    name_count, _, name_pointers = unpack(content, "<3L", _file_offset(export_table, sections) + 24)
     if name_count > _MAX_EXPORTS:
         raise InvalidLibraryError(f"is damaged: it claims {name_count} exports")
-    for address in _unpack(
+    for address in unpack(
         content, f"<{name_count}L", _file_offset(name_pointers, sections) if name_count else 0
     ):
         begin = _file_offset(address, sections)

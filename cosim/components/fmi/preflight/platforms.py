@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import platform
+import struct
 import sys
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -68,6 +69,23 @@ EXPECTED_TEXTS = {
 
 class InvalidLibraryError(Exception):
     """Reason why a file is not a shared library that the loader of a platform accepts."""
+
+
+def unpack(content: bytes, form: str, offset: int) -> tuple[int, ...]:
+    """Unpack numbers at an offset in a library, in the format of `struct`."""
+    if offset < 0 or offset + struct.calcsize(form) > len(content):
+        raise InvalidLibraryError(
+            f"is truncated: it refers to byte {offset}, but has {len(content)}"
+        )
+    return struct.unpack_from(form, content, offset)
+
+
+def check_end(content: bytes, end: int, part: str) -> None:
+    """Check that a part of a library ends within the file."""
+    if end > len(content):
+        raise InvalidLibraryError(
+            f"is truncated: {part} ends at byte {end}, the file at {len(content)}"
+        )
 
 
 @dataclass(frozen=True, slots=True)

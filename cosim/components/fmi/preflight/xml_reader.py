@@ -7,6 +7,7 @@ from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
+from ....core.component import DTYPES
 from .findings import DESCRIPTION_FILE, FatalFindingError, Finding, Rule
 from .model_description import (
     Interface,
@@ -86,29 +87,14 @@ VERSION = Rule("model.version", _ROOT)
 REPEATED = Rule("model.repeated", _ROOT)
 
 #: names of type elements -> FMI 3.0 type names, by FMI major version
-TYPE_NAMES = {
-    1: {
-        "Real": "Float64",
-        "Integer": "Int32",
-        "Boolean": "Boolean",
-        "String": "String",
-        "Enumeration": "Enumeration",
-    },
-    2: {
-        "Real": "Float64",
-        "Integer": "Int32",
-        "Boolean": "Boolean",
-        "String": "String",
-        "Enumeration": "Enumeration",
-    },
-    3: {
-        **{f"Float{bits}": f"Float{bits}" for bits in (32, 64)},
-        **{
-            f"{sign}Int{bits}": f"{sign}Int{bits}" for bits in (8, 16, 32, 64) for sign in ("", "U")
-        },
-        **{name: name for name in ("Boolean", "String", "Binary", "Enumeration", "Clock")},
-    },
+_FMI2_TYPES = {
+    "Real": "Float64",
+    "Integer": "Int32",
+    "Boolean": "Boolean",
+    "String": "String",
+    "Enumeration": "Enumeration",
 }
+TYPE_NAMES = {1: _FMI2_TYPES, 2: _FMI2_TYPES, 3: {name: name for name in DTYPES}}
 #: FMI 3.0 names of the elements of the model structure -> their path in it
 _FMI2_STRUCTURE = {
     "Output": "Outputs/Unknown",
@@ -154,14 +140,10 @@ def read_model(root: Any) -> ModelDescription:
         )
     version = root.get("fmiVersion")
     if version is None or not _SUPPORTED_VERSION.fullmatch(version):
-        pre_release = (
-            ", a pre-release, whose C functions differ" if version and "-" in version else ""
-        )
-        found = (
-            "lacks the attribute fmiVersion"
-            if version is None
-            else f"is an FMI {version} FMU{pre_release}"
-        )
+        found = "lacks the attribute fmiVersion"
+        if version is not None:
+            pre_release = ", a pre-release, whose C functions differ" if "-" in version else ""
+            found = f"is an FMI {version} FMU{pre_release}"
         raise FatalFindingError(
             VERSION(
                 f"{found}; FMI 1.0, 2.0 and 3.0 are supported", DESCRIPTION_FILE, root.sourceline
@@ -224,13 +206,11 @@ def _type_element(element: Any, major: int) -> Any:
 
     A child in FMI 2.0, the element itself in FMI 3.0.
     """
-    return (
-        element
-        if major == 3
-        else next(
-            (child for child in element if child.tag.removesuffix("Type") in TYPE_NAMES[2]), element
-        )
-    )
+    if major < 3:
+        for child in element:
+            if child.tag.removesuffix("Type") in _FMI2_TYPES:
+                return child
+    return element
 
 
 def _read_type(element: Any, major: int) -> TypeDefinition:
@@ -283,9 +263,9 @@ def _read_starts(element: Any, kind: str, text: str | None, major: int) -> Seque
     """
     if kind in ("String", "Binary") and major == 3:
         values = [child.get("value", "") for child in element.iterfind("Start")]
-        return values or (
-            None if text is None or kind == "Binary" else [text]
-        )  # Dymola 2023x writes an attribute
+        if not values and text is not None and kind == "String":
+            values = [text]  # Dymola 2023x writes an attribute
+        return values or None
     if text is None:
         return None
     return [text] if kind == "String" else text.split()
@@ -293,26 +273,22 @@ def _read_starts(element: Any, kind: str, text: str | None, major: int) -> Seque
 
 def _read_unit(element: Any) -> UnitDefinition:
     base = element.find("BaseUnit")
+    base_unit = None if base is None else dict(base.items())
     display = [child.get("name", "") for child in element.iterfind("DisplayUnit")]
-    return UnitDefinition(
-        element.get("name", ""),
-        None if base is None else _read_attributes(base),
-        display,
-        element.sourceline,
-    )
+    return UnitDefinition(element.get("name", ""), base_unit, display, element.sourceline)
 
 
 def _read_structure(root: Any, major: int) -> Iterator[Unknown]:
-    for name, path in (_FMI3_STRUCTURE if major == 3 else _FMI2_STRUCTURE).items():
+    paths, attribute = _FMI2_STRUCTURE, "index"
+    if major == 3:
+        paths, attribute = _FMI3_STRUCTURE, "valueReference"
+    for name, path in paths.items():
         for element in root.iterfind(f"ModelStructure/{path}"):
-            yield _read_unknown(element, name, "valueReference" if major == 3 else "index")
+            reference = element.get(attribute, "")
+            dependencies = _words(element.get("dependencies"))
+            kinds = _words(element.get("dependenciesKind"))
+            yield Unknown(name, reference, dependencies, kinds, element.sourceline)
 
 
-def _read_unknown(element: Any, name: str, reference_attribute: str) -> Unknown:
-    words = [
-        None if (text := element.get(key)) is None else text.split()
-        for key in ("dependencies", "dependenciesKind")
-    ]
-    return Unknown(
-        name, element.get(reference_attribute, ""), words[0], words[1], element.sourceline
-    )
+def _words(text: str | None) -> list[str] | None:
+    return None if text is None else text.split()
