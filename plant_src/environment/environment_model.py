@@ -159,7 +159,7 @@ class EnvironmentModel:
         self._highest_water[0] = abs(self._wave_gain[0]) * self._highest_elevation
 
     def water_level(self, x: float, y: float, time: float) -> float:
-        """Return the height of the water surface (m) at a position (m) and a time since the start (s)."""
+        """Return the height of the water (m) at a position (m) and a time since the start (s)."""
         return float(self._wave_gain[0] * self._elevation(x, y, time))
 
     def update(self, time: float) -> None:

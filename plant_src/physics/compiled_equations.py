@@ -162,7 +162,7 @@ def _rebuilding(binary: str) -> str:
 
 
 def library_path(model: str) -> Path:
-    """Return the path of the shared library of `fmus/MODEL.fmu`, unpacked to the user's cache directory.
+    """Unpack the shared library of `fmus/MODEL.fmu` to the cache and return its path.
 
     Raises:
         InputError: If the FMU cannot be read or has no binary for this platform.

@@ -79,7 +79,7 @@ class Failures:
         return min(limits)
 
     def _shares(self, pair: tuple[int, int]) -> list[tuple[int, float]]:
-        """Return the share of the relative velocity that a collision takes from each of two bodies."""
+        """Return the shares of the relative velocity that a collision takes from two bodies."""
         a, b = (self._masses.get(body, math.inf) for body in pair)
         share = 1.0 if math.isinf(b) else b / (a + b) if math.isfinite(a) else 0.0
         return [(pair[0], share), (pair[1], 1 - share)]
@@ -107,7 +107,7 @@ class Failures:
             self.alarm = True
 
     def examine(self, water_level: WaterLevel) -> list[str]:
-        """Find ditched and capsized vehicles, and return a message for each failure since the last call."""
+        """Find ditched and capsized vehicles; return a message per failure since the last call."""
         for vehicle, status in enumerate(self._step_status):
             if status >= MAY_FAIL:
                 self._examine(vehicle, water_level)

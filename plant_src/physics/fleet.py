@@ -89,7 +89,7 @@ class FleetState:
 
 
 class Fleet:
-    """Vehicles that move by their own equations, and contact between them and the platforms by Bullet.
+    """Vehicles that move by their own equations, with contact resolved by Bullet.
 
     Args:
         client: Number of the Bullet client.
@@ -160,7 +160,10 @@ class Fleet:
         self._set_active_bodies([True] * len(self.bodies))
 
     def _warm_up_inertia(self) -> None:
-        """Make one Bullet step without contact, because Bullet applies a changed inertia only from the next step on."""
+        """Make one Bullet step without contact.
+
+        Bullet applies a changed inertia only from the next step on.
+        """
         for active in (False, True):
             for body in self.bodies:
                 body.set_active(active)
@@ -191,7 +194,7 @@ class Fleet:
             self._publish_contacts(step_fraction)
 
     def _handle_step_status(self) -> None:
-        """Refuse an invalid state, report possible failures, and find the vehicles that are near something if necessary."""
+        """Refuse an invalid state, report possible failures, and find near vehicles if necessary."""
         statuses = self._step_status.tolist()
         if INVALID_STATE in statuses:
             raise InvalidStateError(
@@ -205,7 +208,7 @@ class Fleet:
         self._near_vehicles_outdated = False
 
     def _update_near_vehicles(self) -> None:
-        """Activate the bodies of the vehicles that are near something, and deactivate the others."""
+        """Activate the bodies of vehicles that are near something; deactivate the others."""
         near = self.clearance.find_near_vehicles()
         self._contact_memory.watch(self.clearance.near_pairs or ())
         if near != self._is_near:
@@ -296,7 +299,7 @@ class Fleet:
         self.contacts.has_contacts = bool(state.flags.any())
 
     def _remove_contact_points(self) -> None:
-        """Move all vehicles out of the reach of each other, so that Bullet has no contact points."""
+        """Move all vehicles apart, so that Bullet has no contact points."""
         for body in self._active_bodies:
             body.set_active(False)
         pybullet.performCollisionDetection(self._client)

@@ -62,7 +62,7 @@ class Vtol(ReplicaFmu):
 
 
 class PositionController(ReplicaFmu):
-    """Position and velocity loops with the outputs phi (rad, right side down) and theta (rad, nose up)."""
+    """Position and velocity loops to phi (rad, right side down) and theta (rad, nose up)."""
 
     description = "Position and velocity loops"
 

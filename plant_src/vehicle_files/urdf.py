@@ -278,7 +278,7 @@ def _edges(urdf: UrdfFile, shape: ET.Element) -> np.ndarray:
 
 
 def _drawn_shapes(urdf: UrdfFile, link: ET.Element, pose: Pose) -> Iterator[np.ndarray]:
-    """Yield the triangles of the visual shapes of a link, or else of its collision shapes, each of shape (n, 3, 3)."""
+    """Yield the triangles of the visual or else collision shapes of a link, shape (n, 3, 3)."""
     for element in link.findall("visual") or link.findall("collision"):
         yield (pose @ _origin(urdf, element)).transformed(
             _triangles(urdf, urdf.child(element, "geometry/*"))
@@ -319,7 +319,7 @@ def _mesh(urdf: UrdfFile, shape: ET.Element) -> Any:
 def _placed_elements(
     elements: list[Any], poses: Mapping[str, Pose], origin: np.ndarray, key: str
 ) -> list[Any]:
-    """Return rotors, thrusters or propellers with their positions relative to the origin of the vehicle file."""
+    """Return actuators with positions relative to the origin of the vehicle file."""
     used: dict[str, int] = {}
     for i, element in enumerate(elements):
         if isinstance(element, Mapping) and "link" in element:

@@ -1,4 +1,4 @@
-"""Flights that fail: they end soon after the crash, with exit code 3 and their cause on one line."""
+"""Flights that fail: they end soon after the crash, with exit code 3 and one line of cause."""
 
 from __future__ import annotations
 

@@ -69,18 +69,18 @@ class Callee:
     attributes: str = ""
 
     def __call__(self, *arguments: ca.SX) -> ca.SX:
-        """Return the result as an expression that remains a function call in the generated C code."""
+        """Return the result as an expression that stays a function call in the C code."""
         return call_in_c(self.function, *arguments)[0]
 
 
 def call_in_c(function: ca.Function, *arguments: ca.SX) -> list[ca.SX]:
-    """Return the results of a function as expressions that remain a function call in the generated C code (no inlining)."""
+    """Return the results of a function, which is called and not inlined in the C code."""
     results: list[ca.SX] = function.call(list(arguments), False, True)
     return results
 
 
 class ElementAccess(NamedTuple):
-    """C expressions for element j of argument i and element j of result i of a function, as functions of (i, j)."""
+    """C expressions of element j of argument i and of result i, as functions of (i, j)."""
 
     argument: Callable[[int, int], str]
     result: Callable[[int, int], str]
