@@ -220,9 +220,9 @@ class World(Component):
         self._check_overlaps(
             fixed.paths | {body.body_id: f"vehicles.{body.name}" for body in self._fleet.bodies}
         )
-        self.input_limits = {
-            name: limits for body in self._fleet.bodies for name, limits in input_limits(body)
-        }
+        self.input_limits = {}
+        for body in self._fleet.bodies:
+            self.input_limits |= dict(input_limits(body))
         self._environment = EnvironmentModel(
             settings.environment,
             settings.sea,
@@ -231,9 +231,9 @@ class World(Component):
             self._fleet.bodies,
         )
         self._has_environment = bool(self._environment.update_functions)
-        self.warnings = [
-            warning for vehicle in settings.vehicles for warning in placement_warnings(vehicle)
-        ]
+        self.warnings = []
+        for vehicle in settings.vehicles:
+            self.warnings += placement_warnings(vehicle)
         for name in self._environment.vessels_without_wave_motion:
             component_log.log_message(
                 self._name,
@@ -308,7 +308,9 @@ class World(Component):
         bound_inputs, bound_outputs = inputs.arrays[_FLOAT].data, outputs.arrays[_FLOAT].data
         # memoryviews: copying a few numbers is faster than with NumPy
         own_outputs = self._fleet.outputs.data
-        parts = [part for body in self._fleet.bodies for part in body.inputs]
+        parts: list[np.ndarray] = []
+        for body in self._fleet.bodies:
+            parts += body.inputs
         ends = list(accumulate(map(len, parts)))
         self._input_copies = [
             (part.data, bound_inputs[end - len(part) : end])

@@ -117,7 +117,7 @@ class Clearance:
         return max(a[0] - b[3], b[0] - a[3], a[1] - b[4], b[1] - a[4], a[2] - b[5], b[2] - a[5])
 
     def _swept_box(self, index: int) -> tuple[float, ...]:
-        """Return the corners (m, world frame) of the box that a vehicle sweeps, or of a platform."""
+        """Return the corners (m, world) of the box that a vehicle sweeps, or of a platform."""
         box = self._boxes[index]
         if index >= len(self._indices):
             return box

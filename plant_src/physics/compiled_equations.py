@@ -120,9 +120,10 @@ class CompiledEquations:
             _checked_arrays(function, arrays, side)
             for side in (signature.arguments, signature.results)
         ]
-        tables = [
-            (ctypes.c_void_p * len(side))(*(array.ctypes.data for array in side)) for side in sides
-        ]
+        tables = []
+        for side in sides:
+            addresses = [array.ctypes.data for array in side]
+            tables.append((ctypes.c_void_p * len(side))(*addresses))
         pointer = getattr(self._library, function)
         pointer.restype = None
         call = partial(pointer, *map(ctypes.byref, tables))

@@ -104,7 +104,8 @@ class Contacts:
             failures.permanent_flags.reshape(-1).data,
             flags[:, TOUCHING].data,
         )
-        self._force_indices = [end - 1 for end in accumulate(len(body.outputs) for body in bodies)]
+        ends = accumulate(map(len, (body.outputs for body in bodies)))
+        self._force_indices = [end - 1 for end in ends]
         self._bodies = {body.body_id: body for body in bodies}
         self._vehicle_indices = {body.body_id: k for k, body in enumerate(bodies)}
         self._vessels = {body.body_id for body in bodies if body.model.is_vessel}

@@ -81,7 +81,9 @@ class Failures:
     def _shares(self, pair: tuple[int, int]) -> list[tuple[int, float]]:
         """Return the shares of the relative velocity that a collision takes from two bodies."""
         a, b = (self._masses.get(body, math.inf) for body in pair)
-        share = 1.0 if math.isinf(b) else b / (a + b) if math.isfinite(a) else 0.0
+        share = b / (a + b) if math.isfinite(a) else 0.0
+        if math.isinf(b):
+            share = 1.0
         return [(pair[0], share), (pair[1], 1 - share)]
 
     def add_collision(self, pair: tuple[int, int], speed: float) -> None:

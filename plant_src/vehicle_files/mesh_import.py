@@ -25,10 +25,8 @@ _SIDES = 24  # of a cylinder or sphere
 
 def box_triangles(edges: Sequence[float]) -> np.ndarray:
     """Return the triangles of a box with these edges (m) around the origin, shape (12, 3, 3)."""
-    ring = [(1, 1), (-1, 1), (-1, -1), (1, -1)]
-    return _stacked(
-        np.array([[(x, y, z) for x, y in ring] for z in (-1, 1)]) * np.asarray(edges) / 2
-    )
+    bottom = np.array([(1, 1, -1), (-1, 1, -1), (-1, -1, -1), (1, -1, -1)])
+    return _stacked(np.stack([bottom, bottom * (1, 1, -1)]) * np.asarray(edges) / 2)
 
 
 def cylinder_triangles(radius: float, length: float) -> np.ndarray:

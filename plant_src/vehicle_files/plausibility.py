@@ -94,7 +94,9 @@ def _reach(model: Model) -> float:
 def _actuators(model: Model) -> Sequence[Rotor | Thruster | Propeller]:
     if model.airframe:
         return model.airframe.rotors
-    return model.craft.thrusters if model.craft else model.boat.propellers if model.boat else ()
+    if model.craft:
+        return model.craft.thrusters
+    return model.boat.propellers if model.boat else ()
 
 
 def _size_warnings(model: Model) -> Iterator[Problem]:

@@ -27,7 +27,15 @@ class Controller(Fmi2Slave):
             self.register_variable(Real(name, causality=Fmi2Causality.output, getter=speed))
         for name in ("vehicle.position.z", "target.position.z"):
             setter = lambda value: None
-            self.register_variable(Real(name, causality=Fmi2Causality.input, start=0.0, getter=lambda: 0.0, setter=setter))
+            self.register_variable(
+                Real(
+                    name,
+                    causality=Fmi2Causality.input,
+                    start=0.0,
+                    getter=lambda: 0.0,
+                    setter=setter,
+                )
+            )
         self.register_variable(Real("mode", causality=Fmi2Causality.output, getter=lambda: 0.0))
 
     def do_step(self, time, step_size):

@@ -295,10 +295,10 @@ def sum_over_rows(name: str, term: ca.Function, rows: int) -> Callee:
     """
     common, count = ca.SX.sym("common", term.size1_in(0)), ca.SX.sym("count")
     tables = [ca.SX.sym("table", rows, term.size1_in(i)) for i in range(1, term.n_in())]
-    terms = [
-        ca.if_else(count > k, term(common, *(table[k, :].T for table in tables)), 0)
-        for k in range(rows)
-    ]
+    terms = []
+    for k in range(rows):
+        row = [table[k, :].T for table in tables]
+        terms.append(ca.if_else(count > k, term(common, *row), 0))
     total = ca.Function(name, [common, count, *tables], [sum(terms)])
     access = ElementAccess(
         lambda i, j: f"in[{i + 1}][{rows * j} + first + k]" if i else f"common[{j}]",

@@ -108,12 +108,11 @@ class ContinuousModel:
 
     def elements(self, causality: str) -> list[Variable]:
         """Return the variables of a causality, each repeated for every element of its array."""
-        return [
-            variable
-            for variable in self.variables
-            if variable.causality == causality
-            for _ in variable.scalar_names
-        ]
+        elements: list[Variable] = []
+        for variable in self.variables:
+            if variable.causality == causality:
+                elements += [variable] * len(variable.scalar_names)
+        return elements
 
     def boolean_outputs(self) -> list[bool]:
         """Return for each element of the output vector whether it is Boolean."""
