@@ -161,9 +161,9 @@ def find_sources(root: Path) -> list[Source]:
 
 
 def vehicle_files(root: Path) -> dict[str, Path]:
-    """Return the shipped vehicle files by the names of their vehicles.
+    """Return the shipped vehicle files by name.
 
-    Vehicles with equations of their own have files too.
+    Vehicles with equations of their own are included.
     """
     templates = {
         path.stem: path
@@ -220,7 +220,7 @@ def classify_source(path: Path, model: str | None = None) -> Source:
 
 
 def split_reference(reference: str) -> tuple[Path, str | None]:
-    """Split "file.mo:Model" or "file.py:Class" into the file and the name in it, if any.
+    """Return the file, and the model or class of "file.mo:Model" or "file.py:Class".
 
     Raises:
         InputError: There is a colon without a name after it.
@@ -238,7 +238,7 @@ def split_reference(reference: str) -> tuple[Path, str | None]:
 
 
 def resolve_source_path(path: Path) -> Path:
-    """Return the model description of the folder of a C controller, else `path` itself."""
+    """Return the model description in the folder of a C controller, else `path` itself."""
     return path / DESCRIPTION_FILE if (path / DESCRIPTION_FILE).is_file() else path
 
 
