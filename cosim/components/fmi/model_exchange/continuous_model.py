@@ -137,13 +137,6 @@ class IntegrationError(Exception):
         self.function, self.status, self.reason = function, status, reason
 
 
-class StepCompletion(NamedTuple):
-    """Requests of fmi*CompletedIntegratorStep."""
-
-    event_needed: bool = False
-    terminate_requested: bool = False
-
-
 #: C type of a Boolean by FMI major version
 BOOLEAN: Mapping[int, type[Any]] = {1: ctypes.c_char, 2: ctypes.c_int, 3: ctypes.c_bool}
 
@@ -198,14 +191,10 @@ class ContinuousModel:
         boolean = BOOLEAN[major]
         self._flags = (boolean(), boolean())
         addresses = [as_pointer(ctypes.addressof(flag)) for flag in self._flags]
-        no_set_state = (
-            () if major == 1 else ((ctypes.c_int if major == 2 else ctypes.c_bool).from_param(1),)
-        )
-        self._completion_arguments = (
-            self._instance,
-            *no_set_state,
-            *addresses[: 1 if major == 1 else 2],
-        )
+        # FMI 1.0 has neither the argument noSetFMUStatePriorToCurrentPoint nor a termination
+        self._completion_arguments = (self._instance, boolean.from_param(1), *addresses)
+        if major == 1:
+            self._completion_arguments = (self._instance, addresses[0])
 
     def is_called(self, role: str) -> bool:
         """Return whether the function of a role is needed.
@@ -259,13 +248,16 @@ class ContinuousModel:
                 self.functions["get_indicators"], None, f"event indicator {number} is NaN"
             )
 
-    def complete_step(self) -> StepCompletion:
-        """Call fmi*CompletedIntegratorStep if the FMU requires it."""
+    def complete_step(self) -> EventKind:
+        """Call fmi*CompletedIntegratorStep if the FMU requires it, and return its requests."""
+        kind = EventKind(0)
         if not self.needs_completed_step:
-            return StepCompletion()
+            return kind
         name = self.functions["complete_step"]
         status = self.library[name](*self._completion_arguments)
         if status not in SUCCESS_STATUSES:
             raise IntegrationError(name, status)
-        event, terminate = (flag.value not in (0, b"\0") for flag in self._flags)
-        return StepCompletion(event, terminate)
+        for flag, request in zip(self._flags, (EventKind.STEP, EventKind.TERMINATION), strict=True):
+            if flag.value not in (0, b"\0"):
+                kind |= request
+        return kind
