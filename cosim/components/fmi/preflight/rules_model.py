@@ -63,13 +63,8 @@ def check_names(model: ModelDescription) -> Iterator[Finding]:
     if not model.interfaces:
         yield INTERFACE("offers neither Co-Simulation nor Model Exchange", DESCRIPTION_FILE, line)
     for name, attributes in model.interfaces.items():
-        line = model.lines[
-            ""
-            if model.major == 1
-            else "CoSimulation"
-            if name == "co-simulation"
-            else "ModelExchange"
-        ]
+        element = "CoSimulation" if name == "co-simulation" else "ModelExchange"
+        line = model.lines["" if model.major == 1 else element]
         identifier = attributes.get("modelIdentifier", "")
         if not identifier or not {"/", "\\"}.isdisjoint(identifier):
             yield LIBRARY_NAME(
