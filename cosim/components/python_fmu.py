@@ -196,7 +196,10 @@ class PythonFmuComponent(Component):
         """Do nothing: the slave is garbage-collected."""
 
     def _call_user_code(self, function: str, call: Callable[..., Any], *arguments: Any) -> Any:
-        """Call a method of the slave, convert its exceptions to ComponentError and forward its log messages."""
+        """Call a method of the slave.
+
+        Its exceptions become a ComponentError, and its log messages are forwarded.
+        """
         try:
             return call(*arguments)
         except (*PASS_THROUGH_EXCEPTIONS, ComponentError):

@@ -146,7 +146,7 @@ def _is_importable(package: Path) -> bool:
 
 
 def _unique_name(root: Path, parts: Sequence[str]) -> str:
-    """Return the name of a module below a namespace package that is named by the path of its root folder."""
+    """Return the name of a module below the namespace package of its root folder."""
     unique = f"{_NAMESPACE_PREFIX}{sha256(str(root).encode()).hexdigest()[:12]}"
     if unique not in sys.modules:
         namespace = ModuleType(unique)
@@ -158,7 +158,7 @@ def _unique_name(root: Path, parts: Sequence[str]) -> str:
 
 
 class _FolderFinder(MetaPathFinder):
-    """Finder of files in folders that are no packages, below the namespace packages of `_import_file`."""
+    """Finder of files in folders that are no packages, for `_import_file`."""
 
     def find_spec(
         self, name: str, path: Sequence[str] | None, _target: object = None

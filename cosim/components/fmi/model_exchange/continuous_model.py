@@ -77,7 +77,9 @@ _FLOAT64 = np.dtype(np.float64)
 
 
 class LinearInputs:
-    """Inputs with the value start + slope * (time - begin) in a communication step that begins at `begin` (s).
+    """Inputs that change linearly within a communication step.
+
+    Their values are start + slope * (time - begin) in a step that begins at `begin` (s).
 
     Attributes:
         begin: Begin of the communication step (s).
@@ -89,7 +91,7 @@ class LinearInputs:
     """
 
     def __init__(self, ports: Ports, value_references: Mapping[str, int]):
-        """Find the inputs for which the ports contain slopes, which follow all other variables of type Float64."""
+        """Find the inputs with slopes, which follow all other variables of type Float64."""
         positions = {variable.name: part for variable, _, part in ports.elements()}
         inputs = [
             variable.derivative_of
@@ -241,7 +243,7 @@ class ContinuousModel:
             raise IntegrationError(self.functions["set_inputs"], status)
 
     def check_indicators(self, indicators: np.ndarray) -> None:
-        """Raise an IntegrationError if an event indicator is NaN, because its events would be missed."""
+        """Raise an IntegrationError if an event indicator is NaN: its events would be missed."""
         if np.isnan(indicators).any():
             number = int(np.flatnonzero(np.isnan(indicators))[0]) + 1
             raise IntegrationError(

@@ -79,7 +79,10 @@ class FixedStepState(ctypes.Structure):
 
 
 class FixedStepIntegrator(Integrator):
-    """Integrator with fixed step size, in C if the extension was built, else in Python with the same results."""
+    """Integrator with fixed step size.
+
+    It is in C if the extension was built, else in Python with the same results.
+    """
 
     def __init__(self, model: ContinuousModel, method: Method, step_size: Fraction | None):
         """Prepare the integration.

@@ -162,7 +162,10 @@ class Cvode:
 
     @contextmanager
     def _raising_exceptions_of_callbacks(self) -> Iterator[None]:
-        """Raise the first exception of a callback after the block, where ctypes would print it and continue."""
+        """Raise the first exception of a callback after the block.
+
+        ctypes would print it and continue.
+        """
         hook, exceptions = sys.unraisablehook, []
         sys.unraisablehook = lambda failure: exceptions.append(failure.exc_value)
         try:
@@ -217,7 +220,7 @@ class VariableStepIntegrator(Integrator):
         self._get_indicators = self._transfer("get_indicators")
 
     def _transfer(self, role: str) -> Callable[[int], None]:
-        """Return a function that calls the FMU's function of a role with the array at an address."""
+        """Return a function that transfers the array at an address by the function of a role."""
         model = self._model
         if not model.is_called(role):
             return lambda _: None
@@ -327,9 +330,10 @@ class VariableStepIntegrator(Integrator):
         return OK
 
     def _integrate_to(self, target: float) -> StepEvent:
-        """Make one step of the solver up to `target` (s) at most, and return its event, of kind 0 if there is none.
+        """Make one step of the solver, up to `target` (s) at most.
 
-        A `target` in the past is a time event that the FMU announces too late: it takes place at once.
+        Return its event, of kind 0 if there is none. A `target` in the past is a time event that
+        the FMU announces too late: it takes place at once.
         """
         kind = EventKind(0)
         if target - self._time > _MIN_ULPS * math.ulp(target):
