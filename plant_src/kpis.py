@@ -20,11 +20,14 @@ from cosim.results.checks import Number
 from cosim.results.kpi import NoValue, Prefix, Signal, better, declared_units, no_value, units
 from cosim.results.signal_analysis import require, row_slice, values_in_unit
 
-from . import deck_frame
 from .recorded_motion import (
     MIN_FLIGHT_TIME,
     distance_from_line,
     horizontal_distance,
+    relative_position,
+    relative_tilt,
+    relative_velocity,
+    slide_distance,
     touchdown_row,
     used_waypoints,
 )
@@ -90,7 +93,7 @@ def landing(result: Result, vehicle: Prefix, deck: Prefix) -> dict[str, Number]:
         "lateral_error": float(distance[row]),
         "touchdown_speed": float(-w[row - 1]),
         "tangential_speed": math.hypot(u[row - 1], v[row - 1]),
-        "slide": deck_frame.slide_distance(result, vehicle, deck, row),
+        "slide": slide_distance(result, vehicle, deck, row),
         "bounces": int(np.count_nonzero(contact[row + 1 :] & ~contact[row:-1])),
         "landed_at_end": landed,
         "final_lateral_error": float(distance[-1])
@@ -161,8 +164,8 @@ def touchdown(result: Result, vehicle: Prefix, deck: Prefix, mass: float) -> dic
     if row is None:
         return dict.fromkeys(declared_units(touchdown), _no_touchdown(result, vehicle))
     vessel = deck.removesuffix(".deck")
-    forward, left, _ = deck_frame.relative_position(result, vehicle, deck)[row].tolist()
-    u, v, w = deck_frame.relative_velocity(result, vehicle, deck)[row - 1].tolist()
+    forward, left, _ = relative_position(result, vehicle, deck)[row].tolist()
+    u, v, w = relative_velocity(result, vehicle, deck)[row - 1].tolist()
     height = result[f"{deck}.position.z"]
     return {
         "forward_error": forward,
@@ -171,7 +174,7 @@ def touchdown(result: Result, vehicle: Prefix, deck: Prefix, mass: float) -> dic
         "normal_speed": -w,
         "tangential_speed": math.hypot(u, v),
         "kinetic_energy": mass / 2 * (u**2 + v**2 + w**2),
-        "tilt": float(deck_frame.relative_tilt(result, vehicle, deck)[row]),
+        "tilt": float(relative_tilt(result, vehicle, deck)[row]),
         "deck_roll": float(result[f"{vessel}.attitude.roll"][row]),
         "deck_pitch": float(result[f"{vessel}.attitude.pitch"][row]),
         "deck_heave": float((height[row] - height).mean()),
@@ -221,19 +224,6 @@ def _no_touchdown(result: Result, vehicle: str) -> NoValue:
     if np.diff(contacts).max(initial=0.0) < MIN_FLIGHT_TIME:
         return NoValue(f"{vehicle} never took off, it is in contact during the whole run")
     return NoValue(f"{vehicle} touches no vessel after a flight")
-
-
-__all__ = [
-    "cross_track",
-    "descent",
-    "failures",
-    "final",
-    "landing",
-    "motors",
-    "touchdown",
-    "tracking",
-    "waypoints",
-]
 
 
 @better(reached="higher", all_reached="higher", time="lower")

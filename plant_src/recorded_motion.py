@@ -1,4 +1,9 @@
-"""Quantities of a recorded mission that KPIs, figures and the scene share."""
+"""Quantities of a recorded mission that KPIs, figures and the scene share.
+
+The motion of a vehicle relative to a landing deck is given in the axes of the deck. These are those
+of the vessel: forward, left, and up along the normal of the deck. Arrays have one row per row of
+the result.
+"""
 
 from __future__ import annotations
 
@@ -64,3 +69,78 @@ def used_waypoints(
     )
     waypoints = list(zip(x, y, strict=True))
     return waypoints if count is None else waypoints[: int(count)]
+
+
+def rotation_matrix(result: Result, vehicle: str) -> np.ndarray:
+    """Return the rotation matrices Rz(yaw) Ry(pitch) Rx(roll) from body axes to world axes, shape (rows, 3, 3)."""
+    roll, pitch, yaw = (result[f"{vehicle}.attitude.{angle}"] for angle in ("roll", "pitch", "yaw"))
+    (cr, sr), (cp, sp), (cy, sy) = ((np.cos(angle), np.sin(angle)) for angle in (roll, pitch, yaw))
+    matrix = [
+        [cy * cp, cy * sp * sr - sy * cr, cy * sp * cr + sy * sr],
+        [sy * cp, sy * sp * sr + cy * cr, sy * sp * cr - cy * sr],
+        [-sp, cp * sr, cp * cr],
+    ]
+    return np.moveaxis(np.array(matrix, dtype=np.float64), 2, 0)
+
+
+def relative_position(result: Result, vehicle: str, deck: str) -> np.ndarray:
+    """Return the position of a vehicle's centre of mass relative to the deck centre (m), in deck axes, shape (rows, 3)."""
+    return _to_deck_axes(result, deck, _world_offset(result, vehicle, deck))
+
+
+def relative_velocity(result: Result, vehicle: str, deck: str) -> np.ndarray:
+    """Return the velocity of a vehicle relative to the point of the deck below it (m/s), in deck axes, shape (rows, 3)."""
+    vessel = deck.removesuffix(".deck")
+    rates_body = np.stack([result[f"{vessel}.rates.{axis}"] for axis in "pqr"], axis=1)
+    rates = np.einsum("nij,nj->ni", rotation_matrix(result, vessel), rates_body)
+    point = _vector_signal(result, f"{deck}.velocity") + np.cross(
+        rates, _world_offset(result, vehicle, deck)
+    )
+    return _to_deck_axes(result, deck, _vector_signal(result, f"{vehicle}.velocity") - point)
+
+
+def relative_tilt(result: Result, vehicle: str, deck: str) -> np.ndarray:
+    """Return the angle between the up axes of vehicle and deck (rad), shape (rows,)."""
+    up, normal = (
+        rotation_matrix(result, name)[:, :, 2] for name in (vehicle, deck.removesuffix(".deck"))
+    )
+    angle: np.ndarray = np.arctan2(
+        np.linalg.norm(np.cross(up, normal), axis=1), np.sum(up * normal, axis=1)
+    )
+    return angle
+
+
+def slide_distance(result: Result, vehicle: str, deck: str, row: int) -> float:
+    """Return the largest distance that a vehicle slides over a deck.
+
+    Args:
+        result: Recorded mission.
+        vehicle: Signal prefix of the vehicle ("plant.uav").
+        deck: Signal prefix of the landing deck ("plant.usv.deck").
+        row: Row of the touchdown.
+
+    Returns:
+        Largest distance in the plane of the deck from the position at `row`, over rows in contact
+        from then on (m).
+    """
+    position = relative_position(result, vehicle, deck)[row:, :2]
+    contact = result[f"{vehicle}.contact.vessel"].astype(bool)[row:]
+    return float(np.linalg.norm(position - position[0], axis=1)[contact].max())
+
+
+def _to_deck_axes(result: Result, deck: str, vectors: np.ndarray) -> np.ndarray:
+    rotated: np.ndarray = np.einsum(
+        "nji,nj->ni", rotation_matrix(result, deck.removesuffix(".deck")), vectors
+    )
+    return rotated
+
+
+def _world_offset(result: Result, vehicle: str, deck: str) -> np.ndarray:
+    offset: np.ndarray = _vector_signal(result, f"{vehicle}.position") - _vector_signal(
+        result, f"{deck}.position"
+    )
+    return offset
+
+
+def _vector_signal(result: Result, name: str) -> np.ndarray:
+    return np.stack([result[f"{name}.{axis}"] for axis in "xyz"], axis=1)

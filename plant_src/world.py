@@ -8,6 +8,7 @@ from __future__ import annotations
 import ctypes
 import math
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
 from functools import partial
 from itertools import accumulate
 from typing import TYPE_CHECKING, Any, NamedTuple
@@ -21,20 +22,77 @@ from cosim.core.errors import ComponentError, InputError, Problem, did_you_mean
 from . import world_settings
 from .catalogue import BINARIES
 from .environment.environment_model import EnvironmentModel
-from .physics.body import InvalidStateError
-from .physics.client import connect, preconnect, pybullet
+from .physics.body import ContactBody, InvalidStateError
+from .physics.bullet import connect, create_fixed_bodies, preconnect, pybullet
 from .physics.compiled_equations import library_path
 from .physics.contacts import overlap_depths
 from .physics.failures import FLAG_COUNT
-from .physics.fixed_bodies import create_fixed_bodies
 from .physics.fleet import Fleet, FleetState
 from .variable_views import recorded_others, variable_views, views_in_parts
-from .vehicle_constants import input_limits, vehicle_constants
 from .vehicle_files.plausibility import placement_warnings
-from .world_settings import WorldSettings
+from .vehicles.otter.parameters import MAX_PROPELLER_SPEED, MIN_PROPELLER_SPEED
+from .world_settings import INITIAL_PREFIX, WAVE_PREFIX, WorldSettings
 
 if TYPE_CHECKING:
     from cosim.results import Result
+
+#: command -> parameters with the magnitude of its lower limit ("": the limit is 0) and with its
+#: upper limit
+_PARAMETERS = {
+    "rotor_speed": ("", "max_rotor_speed"),
+    "thruster_speed": ("max_thruster_speed", "max_thruster_speed"),
+    "propeller_speed": ("max_reverse_speed", "max_propeller_speed"),
+    "azimuth": ("max_azimuth", "max_azimuth"),
+    "rudder_angle": ("max_rudder_angle", "max_rudder_angle"),
+}
+#: limits of commands for which a model has no parameter; a rudder beyond a right angle is in the
+#: wrong unit
+_FIXED = {
+    "propeller_speed": (MIN_PROPELLER_SPEED, MAX_PROPELLER_SPEED),
+    "rudder_angle": (-math.pi / 2, math.pi / 2),
+}
+
+
+def vehicle_constants(body: ContactBody, pointer: str) -> Iterator[tuple[Variable, np.ndarray]]:
+    """Yield the parameters of a vehicle, except those of initial state and waves, as constants that `pointer` sets."""
+    for variable, values in variable_views(
+        body.model.real_variables("parameter"), {DTYPES["Float64"]: body.parameters}
+    ):
+        if not variable.name.startswith((INITIAL_PREFIX, WAVE_PREFIX)):
+            value = values.tolist() if variable.shape else values.item()
+            name = f"{body.name}.{variable.name}"
+            text = f"{variable.description}; set by {pointer}/{variable.name}"
+            constant = replace(
+                variable,
+                name=name,
+                causality="local",
+                variability="constant",
+                start=value,
+                description=text,
+            )
+            yield constant, values
+
+
+def input_limits(body: ContactBody) -> Iterator[tuple[str, tuple[float, float]]]:
+    """Yield the name of each limited scalar input of a vehicle, and its lower and upper limit in the unit of the input.
+
+    Inputs without an actuator, such as the angle of a fixed rudder, are left out.
+    """
+    parameters = dict(zip(body.model.slots("parameter"), body.parameters.tolist(), strict=True))
+    for variable in body.model.real_variables("input"):
+        if variable.name in _PARAMETERS:
+            for scalar in variable.scalar_names:
+                low, high = _limits(variable.name, scalar.removeprefix(variable.name), parameters)
+                if low < high:
+                    yield f"{body.name}.{scalar}", (low, high)
+
+
+def _limits(command: str, subscript: str, parameters: Mapping[str, float]) -> tuple[float, float]:
+    lower, upper = (
+        parameters.get(name + subscript, parameters.get(name)) for name in _PARAMETERS[command]
+    )
+    return _FIXED[command] if upper is None else (0.0 - (lower or 0.0), upper)
+
 
 #: upper limit of a Bullet step (s); a longer `do_step` is split into equal steps
 MAX_BULLET_STEP = 0.01
@@ -72,7 +130,7 @@ class World(Component):
             optionally "friction", "restitution".
         environment: Object that `environment/settings.py` describes; waves and gusts start with the
             run.
-        obstacles: Name to object with the key "mesh" and those of `obstacles.py`.
+        obstacles: Name to object with the key "mesh" and those of `placement.py`.
 
     Raises:
         InputError: With all problems; their subjects are paths of the arguments.

@@ -19,8 +19,14 @@ from .environment import settings
 from .environment.sea import Sea
 from .environment.settings import EnvironmentSettings
 from .json_reader import JsonPath, JsonReader, Numbers
-from .obstacles import Obstacle, read_obstacles
-from .placement import ContactSurface, Platform, VehiclePlacement, read_surface
+from .placement import (
+    ContactSurface,
+    Obstacle,
+    Platform,
+    VehiclePlacement,
+    read_obstacles,
+    read_surface,
+)
 from .vehicles.common.shapes import Body
 from .vehicles.model import Model
 
@@ -68,7 +74,7 @@ def read_world_settings(
         vehicles: JSON object, name to vehicle.
         platforms: JSON object, name to platform.
         environment: JSON object, see `environment/settings.py`.
-        obstacles: JSON object, name to obstacle, see `obstacles.py`.
+        obstacles: JSON object, name to obstacle, see `placement.py`.
 
     Raises:
         InputError: With all problems; the subject of each is the path of the setting in the

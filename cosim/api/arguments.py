@@ -35,8 +35,8 @@ def expect(name: str, value: Any, accepted: bool, description: str) -> None:
 
 def check_names(name: str, value: Any) -> None:
     """Check that an argument is None or a mapping from texts; InputError otherwise."""
-    expect(name, value, value is None or (isinstance(value, Mapping) and all(isinstance(key, str) for key in value)),
-           "a dict from names to values")  # fmt: skip
+    has_names = isinstance(value, Mapping) and all(isinstance(key, str) for key in value)
+    expect(name, value, value is None or has_names, "a dict from names to values")
 
 
 def check_options(options: Mapping[str, Any], valid: Iterable[str]) -> None:

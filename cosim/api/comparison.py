@@ -1,4 +1,4 @@
-"""Comparison of results with references that are given as results, files, run folders or scenarios."""
+"""Comparison of results with references: results, files, run folders or scenarios."""
 
 from __future__ import annotations
 
@@ -93,7 +93,10 @@ class ComparisonTask(NamedTuple):
         return "comparison", draw_tubes, arguments
 
     def needed_share(self) -> float:
-        """Return the share of all tolerances (1) with which a comparison that passes would still pass; 0 if all are equal."""
+        """Return the smallest share (1) of all tolerances with which a comparison still passes.
+
+        It is 0 if all signals are equal. The comparison must pass.
+        """
         return needed_share(self.result, self.reference, self.tolerances)
 
 
@@ -154,7 +157,10 @@ def reference_changes(result: Result, reference: Path, folder: Path) -> str:
     """
 
     def shown(name: str) -> str:
-        """Return a file of the run, which metadata name from the scenario's folder, relative to the working directory."""
+        """Return a file of the run relative to the working directory.
+
+        Metadata name it from the scenario's folder.
+        """
         return (
             name
             if name.startswith(SHIPPED)
@@ -178,8 +184,8 @@ def _read_result(source: ResultSource) -> Result:
     if isinstance(source, Result):
         return source
     path = Path(source)
-    folder = path if path.is_dir() else path.parent if path.name == "result.csv" else None
-    if folder and (folder / "run.json").exists():
+    folder = path.parent if path.name == "result.csv" else path
+    if (folder / "run.json").exists():
         from ..report.runs import read_run  # its units: angles of a whole turn are equal
 
         return read_run(folder)
@@ -187,7 +193,10 @@ def _read_result(source: ResultSource) -> Result:
 
 
 def is_scenario(path: Path) -> bool:
-    """Return whether a path is a JSON file, or a name without a folder that is no existing file (a shipped scenario)."""
+    """Return whether a path names a scenario.
+
+    It is a JSON file, or the name of a shipped scenario: without a folder, and no existing file.
+    """
     return path.suffix == ".json" or (
         path.name == str(path) and not path.suffix and not path.exists()
     )

@@ -92,7 +92,10 @@ def _evaluate_run(result: Result, prepared: PreparedRun) -> Result:
 def _signals_of_optional_kpis(
     prepared: PreparedRun, functions: Iterable[tuple[str, Any, Mapping[str, Any]]], result: Result
 ) -> Iterator[tuple[str, dict[str, str]]]:
-    """Yield name and signals by argument of each optional KPI, since a signal may have another meaning in a user's component."""
+    """Yield the name of each optional KPI, and its signals by argument.
+
+    A signal may have another meaning in a user's component.
+    """
     for name, _, arguments in functions:
         signals = {
             key: value

@@ -97,7 +97,6 @@ class Simulation:
                 self._ends.pop()()
 
     # -- time
-    # ------------------------------------------------------------------------------------------------------------
 
     @property
     def time(self) -> float:
@@ -224,7 +223,6 @@ class Simulation:
             self._open({**settings, **(parameters or {})})
 
     # -- variables
-    # -------------------------------------------------------------------------------------------------------
 
     def get(self, name: str) -> Any:
         """Return the present value of a variable.
@@ -262,7 +260,6 @@ class Simulation:
             self._variables.set(name, value, self._running())
 
     # -- states
-    # ----------------------------------------------------------------------------------------------------------
 
     def save(self) -> SavedState:
         """Return the present state, for `restore`.
@@ -287,7 +284,6 @@ class Simulation:
             self._running().restore(state)
 
     # -- internal
-    # --------------------------------------------------------------------------------------------------------
 
     def _running(self, step_hook: StepHook | None = None) -> PlanRun:
         """Return the run with its components in step mode."""

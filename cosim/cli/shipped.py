@@ -63,11 +63,10 @@ def _list_models() -> Iterator[Entry]:
 
 def shipped_fmus() -> dict[str, Path]:
     """Return the shipped FMUs by name; of those with the same name the one for FMI 2.0."""
-    folders = ("fmus", "fmus/python", "fmus/c", "fmus/fmi3")
-    files = [
-        path for folder in folders for path in sorted((resources.root() / folder).glob("*.fmu"))
-    ]
-    return {path.stem: path for path in reversed(files)}
+    found: dict[str, Path] = {}
+    for folder in ("fmus/fmi3", "fmus/c", "fmus/python", "fmus"):
+        found |= {path.stem: path for path in sorted((resources.root() / folder).glob("*.fmu"))}
+    return found
 
 
 def _list_controllers() -> Iterator[Entry]:

@@ -65,11 +65,8 @@ class SandboxCommand(click.Command):
 
 def _with_explicit_kind(words: list[str]) -> Iterator[str]:
     for word, following in zip_longest(words, words[1:]):
-        yield (
-            f"--sandbox={SANDBOX_KINDS[0]}"
-            if word == "--sandbox" and following not in SANDBOX_KINDS
-            else word
-        )
+        is_bare = word == "--sandbox" and following not in SANDBOX_KINDS
+        yield f"--sandbox={SANDBOX_KINDS[0]}" if is_bare else word
 
 
 def must_rerun(sandbox: str | None) -> bool:
@@ -130,12 +127,10 @@ def rerun_in_bubblewrap(files: Iterable[Path], output: Path | None) -> int:
 
 def _named_folders(files: Iterable[Path]) -> list[Path]:
     """Return the existing folders of the files, also of link targets."""
-    paths = [
-        Path(path)
-        for file in files
-        for path in (os.path.abspath(file), os.path.realpath(file))  # noqa: PTH100
-    ]
-    return [path.parent for path in paths if path.parent.exists()]
+    folders: list[Path] = []
+    for file in files:
+        folders += [file.absolute().parent, file.resolve().parent]
+    return [folder for folder in folders if folder.exists()]
 
 
 def _refuse_home_folder(folders: Iterable[Path]) -> None:

@@ -95,6 +95,9 @@ def _load_vehicle(path: Path, _model: str | None, _options: ModelicaOptions | No
     return vehicle_block(path)
 
 
+#: equations of small models, a file for each FMU
+_FORCES = "plant_src/replica/forces/*.py"
+
 SOURCE_KINDS = (
     SourceKind("Modelica model", "controllers/modelica/*.mo", "rumoca", _load_modelica),
     SourceKind(
@@ -107,6 +110,7 @@ SOURCE_KINDS = (
         compiled=False,
     ),
     SourceKind("equations", "plant_src/**/equations.py", "casadi", _load_equations),
+    SourceKind("equations", _FORCES, "casadi", _load_equations),
     SourceKind(
         "vehicle file",
         "plant_src/vehicles/data/*.json",
@@ -157,7 +161,10 @@ def find_sources(root: Path) -> list[Source]:
 
 
 def vehicle_files(root: Path) -> dict[str, Path]:
-    """Return the shipped vehicle files by the names of their vehicles, also those of vehicles with equations of their own."""
+    """Return the shipped vehicle files by name.
+
+    Vehicles with equations of their own are included.
+    """
     templates = {
         path.stem: path
         for path in root.glob("plant_src/vehicles/*/*.json")
@@ -193,12 +200,14 @@ def classify_source(path: Path, model: str | None = None) -> Source:
         return Source(path, SOURCE_KINDS[0], snake_case((model or path.stem).rpartition(".")[2]))
     if path.name == "equations.py" and not model:
         return Source(path, SOURCE_KINDS[2], path.resolve().parent.name)
+    if path.resolve().match(_FORCES) and not model:
+        return Source(path, SOURCE_KINDS[2], path.stem)
     if path.suffix == ".py":
         return Source(path, SOURCE_KINDS[1], snake_case(model or path.stem))
     if path.name == DESCRIPTION_FILE:
         return Source(path, SOURCE_KINDS[-1], path.resolve().parent.name)
     if path.suffix == ".json":
-        return Source(path, SOURCE_KINDS[3], path.stem)
+        return Source(path, SOURCE_KINDS[4], path.stem)
     raise InputError(
         Problem(
             (
@@ -211,7 +220,7 @@ def classify_source(path: Path, model: str | None = None) -> Source:
 
 
 def split_reference(reference: str) -> tuple[Path, str | None]:
-    """Return the file of a source, and the model or class that "file.mo:Model" or "file.py:Class" names in it.
+    """Return the file, and the model or class of "file.mo:Model" or "file.py:Class".
 
     Raises:
         InputError: There is a colon without a name after it.
@@ -229,7 +238,7 @@ def split_reference(reference: str) -> tuple[Path, str | None]:
 
 
 def resolve_source_path(path: Path) -> Path:
-    """Return the model description if `path` is the folder of a C controller, else `path` itself."""
+    """Return the model description in the folder of a C controller, else `path` itself."""
     return path / DESCRIPTION_FILE if (path / DESCRIPTION_FILE).is_file() else path
 
 

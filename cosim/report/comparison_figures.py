@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Mapping, Sequence
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
@@ -55,11 +56,10 @@ def draw_tubes(
         row[0].set_title(name, loc="left")
         row[1].set_title("result - reference", loc="left")
         row[0].set_ylabel(reference.units.get(name) or result.units.get(name) or "")
-    handles = {
-        label: handle
-        for axes in panels.flat
-        for handle, label in zip(*axes.get_legend_handles_labels(), strict=True)
-    }
+    handles: dict[str, Artist] = {}
+    for axes in panels.flat:
+        found, labels = axes.get_legend_handles_labels()
+        handles |= dict(zip(labels, found, strict=True))
     figure.legend(handles.values(), handles, loc="outside upper right", ncols=4)
     for axes in panels[-1]:
         axes.set_xlabel("time (s)")

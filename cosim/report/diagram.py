@@ -99,9 +99,7 @@ class _GridLayout(NamedTuple):
 
 def _place_side_by_side(stages: Sequence[Sequence[Any]]) -> _GridLayout:
     """Lay out stages from left to right, each centred vertically."""
-    blocks = [
-        _place_below_each_other([_layout_member(member) for member in stage]) for stage in stages
-    ]
+    blocks = [_place_below_each_other(map(_layout_member, stage)) for stage in stages]
     rows = max((block.rows for block in blocks), default=0)
     positions: dict[str, tuple[float, float]] = {}
     columns = 0
@@ -111,14 +109,14 @@ def _place_side_by_side(stages: Sequence[Sequence[Any]]) -> _GridLayout:
     return _GridLayout(positions, columns, rows)
 
 
-def _place_below_each_other(blocks: Sequence[_GridLayout]) -> _GridLayout:
+def _place_below_each_other(blocks: Iterable[_GridLayout]) -> _GridLayout:
     """Lay out the members of a stage from top to bottom."""
     positions: dict[str, tuple[float, float]] = {}
-    rows = 0.0
+    columns, rows = 0, 0.0
     for block in blocks:
         positions |= _shifted(block, 0, rows)
-        rows += block.rows
-    return _GridLayout(positions, max((block.columns for block in blocks), default=0), rows)
+        columns, rows = max(columns, block.columns), rows + block.rows
+    return _GridLayout(positions, columns, rows)
 
 
 def _layout_member(member: Any) -> _GridLayout:

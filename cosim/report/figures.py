@@ -173,28 +173,31 @@ DataPoint = tuple[str, str, str | float, float]
 def write_figure_data(figure: Figure, path: Path) -> bool:
     """Write the points of all curves and the heights of all bars of `figure` to `path`, a row each.
 
-    The columns are the label of the y axis, the name of the curve, the x value (with the label of
-    the x axis as its header) and the y value. Returns False without writing a file if the figure
-    has neither curves nor bars.
+    Figure functions, also those of users, only return a matplotlib figure; reading it gives every
+    figure a CSV file. The columns are the label of the y axis, the name of the curve, the x value
+    (with the label of the x axis as its header) and the y value. Returns False without writing a
+    file if the figure has neither curves nor bars.
     """
-    rows = [row for axes in figure.axes for row in _curve_points(axes)]
-    if not rows:
+    points: list[DataPoint] = []
+    for axes in figure.axes:
+        points += [*_curve_points(axes), *_bar_points(axes)]
+    if not points:
         return False
-    header = ("panel", "curve", figure.axes[-1].get_xlabel() or "x", "value")
+    header = ("panel", "curve", text_cell(figure.axes[-1].get_xlabel() or "x"), "value")
     with (
         writing_atomically(path) as temporary,
         temporary.open("w", encoding="utf-8", newline="") as file,
     ):
-        lines = (
-            [text_cell(cell) if isinstance(cell, str) else cell for cell in row]
-            for row in (header, *rows)
-        )
-        csv.writer(file, lineterminator="\n").writerows(lines)
+        writer = csv.writer(file, lineterminator="\n")
+        writer.writerow(header)
+        for panel, curve, x, y in points:
+            x = text_cell(x) if isinstance(x, str) else x
+            writer.writerow((text_cell(panel), text_cell(curve), x, y))
     return True
 
 
 def _curve_points(axes: Axes) -> Iterator[DataPoint]:
-    """Yield the points of all curves and bars of a panel.
+    """Yield the points of all curves of a panel.
 
     Markers without a label and lines across the axes are left out.
     """
@@ -204,23 +207,18 @@ def _curve_points(axes: Axes) -> Iterator[DataPoint]:
         is_marker = name.startswith("_") and line.get_linestyle() == "None"
         if in_data_units and not is_marker:
             curve = "" if name.startswith("_") else name
-            points = zip(
-                np.asarray(line.get_xdata()).tolist(),
-                np.asarray(line.get_ydata()).tolist(),
-                strict=True,
-            )
-            yield from ((panel, curve, x, y) for x, y in points)
-    yield from _bar_points(axes, panel)
+            xs, ys = np.asarray(line.get_xdata()), np.asarray(line.get_ydata())
+            for x, y in zip(xs.tolist(), ys.tolist(), strict=True):
+                yield panel, curve, x, y
 
 
-def _bar_points(axes: Axes, panel: str) -> Iterator[DataPoint]:
+def _bar_points(axes: Axes) -> Iterator[DataPoint]:
+    """Yield the heights of all bars of a panel."""
     from matplotlib.container import BarContainer
 
+    panel = axes.get_ylabel().replace("\n", " ")
     for container in axes.containers:
         if isinstance(container, BarContainer):
             names = [label.get_text().replace("\n", " ") for label in axes.get_xticklabels()]
-            curve = str(container.get_label())
-            yield from (
-                (panel, curve, name, bar.get_height())
-                for name, bar in zip(names, container, strict=True)
-            )
+            for name, bar in zip(names, container, strict=True):
+                yield panel, str(container.get_label()), name, bar.get_height()

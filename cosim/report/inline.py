@@ -38,10 +38,9 @@ def result_as_html(result: Result) -> str:
         lines += [
             "<table><thead><tr><th>KPI</th><th>value</th><th>unit</th><th>check</th></tr></thead><tbody>"
         ]
-        lines += [
-            f"<tr>{''.join(f'<td>{html.escape(cell)}</td>' for cell in row)}</tr>"
-            for row in _kpi_rows(result)
-        ]
+        for row in _kpi_rows(result):
+            cells = "".join(f"<td>{html.escape(cell)}</td>" for cell in row)
+            lines.append(f"<tr>{cells}</tr>")
         lines += ["</tbody></table>"]
     if len(result.time):
         page = html.escape(render_report(result, result.checks, _figures(result)), quote=True)

@@ -73,11 +73,14 @@ def _checked_signals(result: Result) -> Iterable[str]:
     """Return the numeric signals in the arguments of those KPIs that are checked, each once."""
     scenario = result.metadata.get("scenario", {})
     checked = {check["kpi"].partition(".")[0] for check in scenario.get("checks", [])}
-    arguments = [
-        kpi.get("arguments", {}) for kpi in scenario.get("kpis", []) if kpi["name"] in checked
-    ]
-    texts = [value for each in arguments for value in each.values() if isinstance(value, str)]
-    return dict.fromkeys(name for name in texts if name in result and result[name].dtype != object)
+    found: dict[str, None] = {}
+    for kpi in scenario.get("kpis", []):
+        if kpi["name"] not in checked:
+            continue
+        for value in kpi.get("arguments", {}).values():
+            if isinstance(value, str) and value in result and result[value].dtype != object:
+                found[value] = None
+    return found
 
 
 def write_replay(runs: Sequence[Result], path: Path) -> None:
@@ -107,13 +110,9 @@ def write_judged_replay(result: Result, outcomes: Sequence[CheckOutcome], path: 
         or "; ".join(reasons)
     )
     data = {**replay_data([result]), "failure": failure and failure._asdict()}
-    verdict = (
-        f"Not successful: {cause.rstrip('.')}. {failure}"
-        if failure
-        else "Successful."
-        if outcomes
-        else _description(result)
-    )
+    verdict = "Successful." if outcomes else _description(result)
+    if failure:
+        verdict = f"Not successful: {cause.rstrip('.')}. {failure}"
     _write_page(
         path, str(result.metadata.get("name", "run")), verdict, data, failed=failure is not None
     )

@@ -96,12 +96,11 @@ class _System(_Part):
 
 
 def _member_names(stages: list[list[str | _Group]]) -> list[str]:
-    members = [member for stage in stages for member in stage]
-    return [
-        name
-        for member in members
-        for name in ([member] if isinstance(member, str) else _member_names(member.stages))
-    ]
+    names: list[str] = []
+    for stage in stages:
+        for member in stage:
+            names += [member] if isinstance(member, str) else _member_names(member.stages)
+    return names
 
 
 class _Termination(_Part):

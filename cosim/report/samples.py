@@ -27,14 +27,17 @@ def pack_run(result: Result) -> dict[str, Any]:
     3. zlib, then base64
     """
     numeric = {name: result[name] for name in result if result[name].dtype != object}
-    constants = {
-        name: _to_float32(values[0]) for name, values in numeric.items() if is_constant(values)
-    }
-    varying = {name: values for name, values in numeric.items() if name not in constants}
+    constants: dict[str, float] = {}
+    varying: dict[str, np.ndarray] = {}
+    for name, values in numeric.items():
+        if is_constant(values):
+            constants[name] = float(np.float32(values[0]))
+        else:
+            varying[name] = values
     max_rows = max(2, min(MAX_ROWS, MAX_VALUES // (len(varying) + 1)))
-    columns = {"time": downsample(result.time, max_rows)} | {
-        name: downsample_with_extremes(values, max_rows) for name, values in varying.items()
-    }
+    columns = {"time": downsample(result.time, max_rows)}
+    for name, values in varying.items():
+        columns[name] = downsample_with_extremes(values, max_rows)
     return {
         "name": str(result.metadata.get("name", "run")),
         "rows": len(columns["time"]),
@@ -50,20 +53,15 @@ def is_constant(values: np.ndarray) -> bool:
     return bool(len(values) and np.isfinite(values[0]) and (values == values[0]).all())
 
 
-def _to_float32(value: Any) -> float:
-    return float(np.float32(value))
-
-
 def _stride_blocks(values: np.ndarray, max_count: int) -> tuple[np.ndarray, int]:
     """Return the values in blocks, shape (blocks, 2 * stride), and the stride.
 
     The last block is padded with the last value.
     """
-    stride = -(-len(values) // max_count)
+    stride = -(-len(values) // max_count)  # rounded up
     count = -(-len(values) // (2 * stride))
-    return np.pad(values, (0, 2 * stride * count - len(values)), mode="edge").reshape(
-        count, -1
-    ), stride
+    padded = np.pad(values, (0, 2 * stride * count - len(values)), mode="edge")
+    return padded.reshape(count, -1), stride
 
 
 def downsample(values: np.ndarray, max_count: int) -> np.ndarray:
@@ -83,10 +81,15 @@ def downsample_with_extremes(values: np.ndarray, max_count: int) -> np.ndarray:
     Where the values vary strongly within two strides, their minimum and maximum, in the order of
     time, replace the two samples.
     """
-    samples = downsample(values.astype(np.float32), max_count)
+    values = values.astype(np.float32)
+    samples = downsample(values, max_count)
     if len(values) <= max_count:
         return samples
-    blocks, _ = _stride_blocks(values.astype(np.float32), max_count)
+    # A block spans two strides, so it has two samples: its first value and the one in its middle.
+    # Its extremes move in time by less than a block, which a page cannot show. They replace the
+    # samples only if the block varies more than the signal does from block to block: a slow signal
+    # keeps its equidistant samples, and a short peak or noise keeps its height.
+    blocks, _ = _stride_blocks(values, max_count)
     order = np.sort(np.stack([blocks.argmin(axis=1), blocks.argmax(axis=1)], axis=1), axis=1)
     change = np.abs(samples[2::2] - blocks[:, 0])  # from block to block
     has_peak = np.ptp(blocks, axis=1) > 4 * change
@@ -95,6 +98,8 @@ def downsample_with_extremes(values: np.ndarray, max_count: int) -> np.ndarray:
 
 
 def _encode_columns(columns: Mapping[str, np.ndarray]) -> str:
+    # Neighbouring rows of a smooth signal differ in their low bits only. Differences of the words
+    # are therefore small, and their high bytes, side by side, are runs of zeros that zlib packs.
     table = np.stack([values.astype("<f4") for values in columns.values()])
     changes = np.diff(table.view("<i4"), axis=1, prepend=np.zeros((len(table), 1), "<i4"))
     planes = changes.astype("<i4").view(np.uint8).reshape(*table.shape, 4).transpose(0, 2, 1)

@@ -76,8 +76,11 @@ def _join_cells(row: Sequence[str], widths: Sequence[int]) -> str:
 
 
 def _check_mark(passed: bool, plain: bool, coloured: bool) -> str:
-    word = ("ok" if plain else "✓") if passed else ("failed" if plain else "✗ failed")
-    return f"\x1b[{'32' if passed else '1;31'}m{word}\x1b[0m" if coloured else word
+    sign = "" if plain else "✗ "
+    word, colour = f"{sign}failed", "1;31"
+    if passed:
+        word, colour = "ok" if plain else "✓", "32"
+    return f"\x1b[{colour}m{word}\x1b[0m" if coloured else word
 
 
 def _has_colours(file: TextIO) -> bool:
@@ -130,4 +133,6 @@ def format_number(value: Number) -> str:
     """Return a value as text: four significant digits, "yes" or "no" for a Boolean, "-" for NaN."""
     if isinstance(value, bool):
         return "yes" if value else "no"
-    return "-" if math.isnan(value) else f"{value:.4g}" if isinstance(value, float) else str(value)
+    if math.isnan(value):
+        return "-"
+    return f"{value:.4g}" if isinstance(value, float) else str(value)

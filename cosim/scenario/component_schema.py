@@ -120,7 +120,7 @@ _OBJECTS: Mapping[str, type[Spec]] = {"scene": CallSpec, "reference": ReferenceS
 
 
 def change_paths(system: Mapping[str, Any], change: PathChange) -> dict[str, Any]:
-    """Return a copy of a scenario or nested system, or of a part of one, in which every path is changed.
+    """Return a copy of a scenario or nested system, or of a part, with changed paths.
 
     Texts in `arguments` and `parameters` are not paths for cosim and stay as they are.
     """

@@ -100,7 +100,7 @@ class ToleranceSpec(Spec):
 
 
 class ReferenceSpec(Spec):
-    """A recorded reference trajectory that `cosim compare` and `cosim regress` compare the result with."""
+    """A recorded trajectory with which `cosim compare` and `cosim regress` compare the result."""
 
     file: FilePath = key("path of a CSV file with recorded signals", "references/demo1_box.csv")
     tolerances: dict[str, ToleranceSpec] = key(

@@ -65,7 +65,7 @@ def nested_content(entry: Mapping[str, Any], folder: Path) -> tuple[dict[str, An
 
 
 def expand_document(document: Document, extending: tuple[Path, ...] = ()) -> Document:
-    """Include the files that arguments name, resolve the paths of shipped files, and merge the document with its bases.
+    """Include files, resolve the paths of shipped files, and merge a document with its bases.
 
     Args:
         document: A scenario or nested system.
@@ -191,7 +191,7 @@ def _inherited(base: Document, folder: Path) -> dict[str, Any]:
 def _removals_with_components(
     inherited: Mapping[str, Any], changes: Mapping[str, Any]
 ) -> dict[str, Any]:
-    """Return the changes, each with its key, that remove what belongs to the components that `changes` remove by `null`.
+    """Return changes that remove the entries of the components that `changes` remove by `null`.
 
     What the extending file replaces itself is not among them.
     """
@@ -206,16 +206,12 @@ def _removals_with_components(
     result: dict[str, Any] = {}
     connections, own = inherited.get("connections"), changes.get("connections", {})
     if isinstance(connections, list) and isinstance(own, dict):
-        ends = [
-            each
-            for each in connections
-            if isinstance(each, dict) and isinstance(each.get("to"), str)
-        ]
-        gone = {
-            each["to"]: change
-            for each in ends
-            if (change := _without_sources(each, removed)) != each
-        }
+        gone: dict[str, Any] = {}
+        for each in connections:
+            if isinstance(each, dict) and isinstance(each.get("to"), str):
+                change = _without_sources(each, removed)
+                if change != each:
+                    gone[each["to"]] = change
         result["connections"] = {**gone, **own}
     for key, entry in (("algorithm", "stages"), ("record", "signals")):
         old, own = inherited.get(key), changes.get(key, {})
@@ -230,7 +226,7 @@ def _removals_with_components(
 
 
 def _without_sources(connection: Mapping[str, Any], removed: Set[str]) -> Mapping[str, Any] | None:
-    """Return a connection without the outputs of removed components, or None if nothing remains that is connected."""
+    """Return a connection without outputs of removed components; None if nothing remains."""
     sources, gain = connection.get("from"), connection.get("gain")
     names = sources if isinstance(sources, list) else [sources]
     kept = [i for i, name in enumerate(names) if _component_of(name) not in removed]
@@ -247,7 +243,10 @@ def _without_sources(connection: Mapping[str, Any], removed: Set[str]) -> Mappin
 
 
 def _without_components(names: Sequence[Any], removed: Set[str]) -> list[Any]:
-    """Return a list of names, or of lists of names, without those of removed components and without lists that become empty."""
+    """Return a list of names, or of lists of names, without those of removed components.
+
+    Lists that become empty are left out.
+    """
     kept = [
         _without_components(each, removed) if isinstance(each, list) else each for each in names
     ]
@@ -266,7 +265,7 @@ def _new_entry(kind: str) -> tuple[str, tuple[str, ...]]:
 
 
 def _is_change_of_nothing(kind: str, new: Any) -> bool:
-    """Return True if an entry that the base lacks adds nothing, because it has no key that makes it new, misspelt or not."""
+    """Return True if an entry that the base lacks has no key that makes it new, even misspelt."""
     _, keys = _new_entry(kind)
     return (
         isinstance(new, dict)

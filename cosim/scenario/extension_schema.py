@@ -1,6 +1,7 @@
-"""JSON Schema of scenarios and nested systems for editors, with that of files that extend another one.
+"""JSON Schema of scenarios and nested systems for editors, with and without "extends".
 
-In such a file no key is required, every key may be `null`, and lists with named elements may be changed by an object. Rules that
+In such a file no key is required, every key may be `null`, and lists with named elements may be
+changed by an object. Rules that
 concern several keys hold for the merged file alone and are left out.
 """
 
@@ -59,7 +60,7 @@ def _with_or_without(name: str) -> Schema:
 
 
 def with_arguments(schema: Schema, file_and_class: str, arguments: Schema) -> Schema:
-    """Return the schema of scenarios or nested systems with that of the arguments of a component class in Python.
+    """Return a schema with that of the arguments of a component class in Python.
 
     It applies to components in files that extend no other file.
 

@@ -18,10 +18,13 @@ SHIPPED = "cosim:"
 
 
 def find_scenario(scenario: str | Path) -> Path:
-    """Return the path of a scenario file, given by its path (also "cosim:...") with or without ".json", or by a shipped name.
+    """Return the path of a scenario file.
+
+    It is given by its path (also "cosim:...") with or without ".json", or by a shipped name.
 
     Raises:
-        InputError: There is neither such a file nor a shipped scenario of this name, or it is an FMU or a Python file.
+        InputError: There is neither such a file nor a shipped scenario of this name, or it is an
+            FMU or a Python file.
     """
     path = path_in(Path(), str(scenario))
     if path.suffix == ".fmu":
@@ -59,7 +62,7 @@ def path_in(folder: Path, text: str) -> Path:
 
 
 def relocating(old_folder: Path, new_folder: Path | None) -> PathChange:
-    """Return a function that changes paths relative to one folder into paths relative to another one; None: absolute paths."""
+    """Return a function that changes paths from one folder to another one; None: absolute paths."""
 
     def change(text: str) -> str:
         path = path_in(old, text)
@@ -72,7 +75,7 @@ def relocating(old_folder: Path, new_folder: Path | None) -> PathChange:
 
 
 def resolve_shipped_paths(system: Mapping[str, Any], folder: Path) -> dict[str, Any]:
-    """Return a copy of a scenario or nested system in `folder` with the paths of shipped files ("cosim:...") relative to it."""
+    """Return a copy of a system in `folder` with relative paths of shipped files ("cosim:...")."""
     change = relocating(folder, folder)
     return change_paths(system, lambda text: change(text) if text.startswith(SHIPPED) else text)
 

@@ -1,8 +1,12 @@
-"""Arguments of KPIs, figures and the scene that are taken from the system, including the values that the caller sets.
+"""Arguments of KPIs, figures and the scene that are taken from the system.
 
-- The argument {"from": NAME} is a parameter or start value ("usv.waypoint_x": a list for waypoint_x[1], waypoint_x[2], ...), or
+They include the values that the caller sets.
+
+- The argument {"from": NAME} is a parameter or start value ("usv.waypoint_x": a list for
+  waypoint_x[1], waypoint_x[2], ...), or
   with a JSON pointer ("/components/plant/arguments/platforms") an entry of the expanded scenario.
-- The key "from" of a function names components, prefixes of variables or JSON pointers of objects. Arguments that are not given
+- The key "from" of a function names components, prefixes of variables or JSON pointers of
+  objects. Arguments that are not given
   are taken from these by their names.
 """
 
@@ -58,15 +62,13 @@ class FunctionResolver:
         Functions with problems, and optional functions that lack a signal or value, are replaced by
         placeholders.
         """
-        functions = {
-            kind: [
-                self._resolve_function(kind, i, each) if each is not INVALID else INVALID
-                for i, each in enumerate(specs)
-            ]
-            for kind, specs in (("kpis", spec.kpis), ("figures", spec.figures))
-        }
+        resolved: dict[str, Any] = {}
+        for kind in ("kpis", "figures"):
+            functions = resolved[kind] = list(getattr(spec, kind))
+            for i, function in accepted(functions):
+                functions[i] = self._resolve_function(kind, i, function)
         scene = spec.scene and self._resolve_arguments(spec.scene, self.problems, "scene")
-        return spec.model_copy(update={**functions, "scene": scene})
+        return spec.model_copy(update={**resolved, "scene": scene})
 
     def _resolve_function(self, kind: str, i: int, spec: FunctionSpec) -> Any:
         if definition_problem(spec, self.root.folder):
@@ -209,9 +211,6 @@ class FunctionResolver:
 
 def without_placeholders(spec: ScenarioSpec) -> ScenarioSpec:
     """Return a resolved scenario without the placeholders of functions."""
-    return spec.model_copy(
-        update={
-            kind: [each for _, each in accepted(getattr(spec, kind))]
-            for kind in ("kpis", "figures")
-        }
-    )
+    kpis = [each for _, each in accepted(spec.kpis)]
+    figures = [each for _, each in accepted(spec.figures)]
+    return spec.model_copy(update={"kpis": kpis, "figures": figures})

@@ -10,6 +10,7 @@ import json
 from collections.abc import Iterator, Mapping, Sequence
 from functools import lru_cache
 from importlib.util import find_spec
+from itertools import chain
 from numbers import Integral, Real
 from pathlib import Path
 from typing import Any, NamedTuple
@@ -24,15 +25,17 @@ class _Source(NamedTuple):
 
     Attributes:
         functions: Definitions by name.
-        imported: Module beside the file, and name in it, of each imported name.
+        imported: Modules beside the file: the names in them by the imported names.
     """
 
     functions: Mapping[str, ast.FunctionDef]
-    imported: Mapping[str, tuple[str, str]]
+    imported: Mapping[str, Mapping[str, str]]
 
 
 def source_path(file: str, folder: Path) -> Path | None:
-    """Return the source file of a Python file, whose path starts from `folder`, or of an importable module; None without one.
+    """Return the source file of a Python file or of an importable module; None without one.
+
+    The path of a file starts from `folder`.
 
     The parent packages of a module are imported.
     """
@@ -46,7 +49,10 @@ def source_path(file: str, folder: Path) -> Path | None:
 
 
 def function_definition(spec: CallSpec, folder: Path) -> ast.FunctionDef:
-    """Return the definition of a function that exists (see `named_functions.definition_problem`)."""
+    """Return the definition of a function that exists.
+
+    See `named_functions.definition_problem`.
+    """
     file, _, name = spec.python.rpartition(":")
     path = source_path(file, folder)
     assert path is not None
@@ -54,50 +60,49 @@ def function_definition(spec: CallSpec, folder: Path) -> ast.FunctionDef:
 
 
 def function_definitions(path: Path) -> dict[str, ast.FunctionDef]:
-    """Return the functions that a file defines at its top level, and those that it imports from files beside it, by name.
+    """Return the functions at the top level of a file, and those from files beside it, by name.
 
     Raises:
         SyntaxError: The file is not valid Python.
     """
-    source, found = _parse(path.read_bytes()), {}
-    for name, (module, original) in source.imported.items():
+    source = _parse(path.read_bytes())
+    found: dict[str, ast.FunctionDef] = {}
+    for module, names in source.imported.items():
         file = path.with_name(f"{module}.py")
-        if is_file(file) and (definition := _parse(file.read_bytes()).functions.get(original)):
-            found[name] = definition
+        functions = _parse(file.read_bytes()).functions if is_file(file) else {}
+        found |= {own: functions[name] for own, name in names.items() if name in functions}
     return {**found, **source.functions}
 
 
 @lru_cache(16)  # a file often has several functions, and sweeps load the same scenario many times
 def _parse(source: bytes) -> _Source:
-    body = ast.parse(source).body
-    imports = [
-        node
-        for node in body
-        if isinstance(node, ast.ImportFrom) and node.level <= 1 and node.module
-    ]
-    imported = {
-        alias.asname or alias.name: (str(node.module), alias.name)
-        for node in imports
-        for alias in node.names
-    }
-    return _Source(
-        {node.name: node for node in body if isinstance(node, ast.FunctionDef)}, imported
-    )
+    functions: dict[str, ast.FunctionDef] = {}
+    imported: dict[str, dict[str, str]] = {}
+    for node in ast.parse(source).body:
+        if isinstance(node, ast.FunctionDef):
+            functions[node.name] = node
+        elif isinstance(node, ast.ImportFrom) and node.level <= 1 and node.module:
+            names = imported.setdefault(node.module, {})
+            names |= {alias.asname or alias.name: alias.name for alias in node.names}
+    return _Source(functions, imported)
 
 
 @lru_cache(64)  # definitions are cached, so that equal ones are identical
 def kpi_value_names(function: ast.FunctionDef) -> list[str]:
-    """Return the names of a KPI's values without indices, or nothing if its last `return` does not write them as literals.
+    """Return the names of a KPI's values without indices.
+
+    The list is empty if the last `return` does not write them as literals.
 
     Names in earlier `return` statements, such as those for runs without a landing, are included.
     """
     returned = [list(_dict_keys(value)) for value in _returned_expressions(function)]
-    known = returned and "" not in returned[-1]
-    return list(dict.fromkeys(key for keys in returned for key in keys if key)) if known else []
+    if not returned or "" in returned[-1]:
+        return []
+    return list(filter(None, dict.fromkeys(chain.from_iterable(returned))))
 
 
 def _returned_expressions(node: ast.AST) -> Iterator[ast.expr | None]:
-    """Yield the expressions of all `return` statements of a function, except those of functions inside it."""
+    """Yield the expressions of all `return` statements, without those of inner functions."""
     for child in ast.iter_child_nodes(node):
         if isinstance(child, ast.Return):
             yield child.value
@@ -225,13 +230,9 @@ def _describe(annotation: ast.expr) -> str:
         case ast.Subscript(kind):
             return _describe(kind)
     name = _name(annotation)
-    return (
-        "a list"
-        if name in _LISTS
-        else "an object"
-        if name in _OBJECTS
-        else _DESCRIPTIONS.get(name, name)
-    )
+    if name in _LISTS:
+        return "a list"
+    return "an object" if name in _OBJECTS else _DESCRIPTIONS.get(name, name)
 
 
 def _name(annotation: ast.expr) -> str:

@@ -21,9 +21,10 @@ SUFFIX = ".json"
 
 
 def include_files(document: Document) -> Document:
-    """Replace the names of JSON files in the arguments of all components and of the scene by the contents of these files.
+    """Replace the names of files in arguments of components and the scene by their contents.
 
-    Problems of an included value name the file and line in which it was written. A file that cannot be read is a problem of the
+    Problems of an included value name the file and line in which it was written. A file that
+    cannot be read is a problem of the
     result.
     """
     value = document.value if isinstance(document.value, dict) else {}
@@ -51,7 +52,7 @@ def include_files(document: Document) -> Document:
 def include_in_setting(
     keys: Sequence[str], value: Any, folder: Path
 ) -> tuple[Any, list[Path], dict[JsonPath, Document]]:
-    """Return the value of a setting in which the contents of files replace their names, these files, and JSON files by path.
+    """Return the value of a setting with the contents of files; the files; JSON files by path.
 
     Args:
         keys: Keys of the JSON pointer that is set.
@@ -84,7 +85,7 @@ def include_in_setting(
 
 
 def _replace_names(value: Any, path: JsonPath, content: Callable[[str, JsonPath], Any]) -> Any:
-    """Return a value in which each name of a file is replaced by content(name, path of the name)."""
+    """Replace each name of a file in a value by content(name, path of the name)."""
     if isinstance(value, dict):
         return {key: _replace_names(each, (*path, key), content) for key, each in value.items()}
     if isinstance(value, list):
@@ -113,7 +114,7 @@ class _Inclusion:
         self.invalid_paths: list[JsonPath] = []
 
     def include_in(self, value: Any, *path: str) -> Any:
-        """Return the component or scene at `path` with arguments that contain the included files."""
+        """Return the component or scene at `path` with the included files in its arguments."""
         if not isinstance(value, dict) or "arguments" not in value:
             return value
         return {

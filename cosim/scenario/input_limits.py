@@ -39,7 +39,7 @@ _MAX_PART = 1.2
 
 
 def outside(values: np.ndarray, limits: tuple[float, float]) -> np.ndarray:
-    """Return the elements of `values` that are outside the limits by more than 1 %, as a Boolean array."""
+    """Return a mask of the values that are outside the limits by more than 1 %."""
     low, high = limits
     result: np.ndarray = (values < low - _MARGIN * abs(low)) | (values > high + _MARGIN * abs(high))
     return result
@@ -64,21 +64,21 @@ def probable_cause(value: float, limits: tuple[float, float], unit: str, other: 
 
 
 def set_excesses(prepared: PreparedRun) -> dict[tuple[str, str], Problem]:
-    """Return a warning for each input without a connection that parameters, settings or events set beyond its limits.
+    """Return a warning for each unconnected input that is set beyond its limits.
 
-    The keys are component and variable. Only the first value of a variable that is outside is described.
+    Parameters, settings and events set inputs.
+
+    The keys are component and variable. Only the first value of a variable that is outside is
+    described.
     """
     found: dict[tuple[str, str], Problem] = {}
     places: dict[tuple[str, str], int] = {}
     if not any(component.input_limits for component in prepared.system.components.values()):
         return found
-    connected = {
-        (end.component, end.scalar)
-        for end in (connection.target for connection in prepared.system.connections)
-    }
+    connected = {connection.target for connection in prepared.system.connections}
     for name, variable, value, where in _set_values(prepared):
         limits = prepared.system.components[name].input_limits
-        scalars = [scalar for scalar in variable.scalar_names if (name, scalar) not in connected]
+        scalars = [each for each in variable.scalar_names if (name, each) not in connected]
         given = dict(zip(variable.scalar_names, np.ravel(value).tolist(), strict=False))
         excesses = [
             each
@@ -100,7 +100,10 @@ def _with_count(problem: Problem, further: int) -> Problem:
 
 
 def _set_values(prepared: PreparedRun) -> Iterator[tuple[str, Variable, Any, str]]:
-    """Yield component, variable, value and place of everything that parameters, settings and events set."""
+    """Yield component, variable, value and place of all values that are set.
+
+    Parameters, settings and events set them.
+    """
     places = _assigned_places(prepared)
     changes = [
         (prepared.system.start_values, ""),
@@ -171,9 +174,12 @@ class _Excess(NamedTuple):
 
 
 def warn_exceeded_limits(prepared: PreparedRun, recording: Recording) -> None:
-    """Log a warning for every input that was set beyond its limits, or was outside them in at least a quarter of the rows.
+    """Log a warning for every input that was outside its limits.
 
-    The limits are those of `Component.input_limits`. Without having been set, an input is known if it is recorded, or all outputs
+    It was set beyond them, or outside them in at least a quarter of the rows.
+
+    The limits are those of `Component.input_limits`. Without having been set, an input is known
+    if it is recorded, or all outputs
     that feed it are.
     """
     if not len(recording.time):
@@ -193,13 +199,15 @@ def warn_exceeded_limits(prepared: PreparedRun, recording: Recording) -> None:
 def _find_excesses(
     prepared: PreparedRun, recording: Recording, known: Collection[tuple[str, str]]
 ) -> Iterator[_Excess]:
-    """Yield the elements outside their limits, without unconnected inputs that are `known` by component and variable."""
+    """Yield the elements outside their limits.
+
+    Unconnected inputs that are `known` by component and variable are left out.
+    """
     system = prepared.system
-    limits = {
-        Endpoint(name, scalar): each
-        for name, component in system.components.items()
-        for scalar, each in component.input_limits.items()
-    }
+    limits: dict[Endpoint, tuple[float, float]] = {}
+    for name, component in system.components.items():
+        for scalar, each in component.input_limits.items():
+            limits[Endpoint(name, scalar)] = each
     if not limits:
         return
     recorded = {
@@ -246,7 +254,7 @@ def _fed_values(
 
 
 def _describe_share(elements: list[_Excess]) -> str:
-    """Return the warning about one input, with the numbers of the element that is outside its limits for the longest time."""
+    """Return the warning about one input, with the element that is outside for the longest time."""
     worst = max(elements, key=lambda excess: excess.share)
     unit = worst.variable.unit.name if worst.variable.unit else ""
     low, high = worst.limits

@@ -62,10 +62,11 @@ class Document:
     is_dict: bool = False
 
     def where(self, path: JsonPath) -> str:
-        """Return "file:line:column: $.json.path", with the position of the deepest part of `path` that exists.
+        """Return "file:line:column: $.json.path" of the deepest part of `path` that exists.
 
         A text such as "0" is taken as an index where the value is a list.
-        File and JSON path are those in which the value was written. For a value that the caller has set it is its JSON pointer.
+        File and JSON path are those in which the value was written. For a value that the caller
+        has set it is its JSON pointer.
         """
         known = path = path if path in self.offsets else self._with_indices(path)
         if setting := next(
@@ -103,7 +104,7 @@ class Document:
         return tuple(keys)
 
     def refuse_objects(self, reason: str, classes: bool) -> None:
-        """Raise InputError with this reason if components are Python objects, or (if `classes`) Python classes."""
+        """Raise InputError if components are Python objects, or (if `classes`) Python classes."""
         for path, target in self.objects.items():
             if classes or not callable(target):
                 kind = "class or object" if classes else "object"
@@ -176,7 +177,7 @@ def path_in_system(path: Sequence[T]) -> Sequence[T]:
 
 
 def json_path(path: Sequence[str | int]) -> str:
-    """Return a sequence of keys and indices as text, such as "$.components.uav" or "$.stages[0]"."""
+    """Return keys and indices as text, such as "$.components.uav" or "$.stages[0]"."""
     return "$" + "".join(_format_key(key) for key in path)
 
 
@@ -371,7 +372,7 @@ def find_value(value: Any, keys: Sequence[str]) -> tuple[Any, int]:
 
 
 def missing_value(document: Any, pointer: str) -> str:
-    """Return the message about a JSON pointer to no value, with the keys at the deepest place that exists.
+    """Return the message about a JSON pointer to no value, with the keys of the deepest place.
 
     >>> missing_value({"environment": {"sea_state": 2, "seed": 1}}, "/environment/waves/direction")
     'the scenario has no "/environment/waves"; "environment" has: sea_state, seed'
@@ -426,7 +427,7 @@ def set_value(document: Any, pointer: str, value: Any) -> str:
 
 
 def value_path(document: Any, pointer: str) -> tuple[str | int, ...]:
-    """Return the keys and indices that lead to an existing value, with indices of lists as integers."""
+    """Return the path of an existing value, with indices of lists as integers."""
     path: list[str | int] = []
     for key in pointer_keys(pointer):
         path.append(int(key) if isinstance(document, list) else key)

@@ -105,15 +105,20 @@ def definition_problem(spec: CallSpec, folder: Path) -> str:
 
 
 def declared_arguments(spec: CallSpec, folder: Path) -> dict[str, bool]:
-    """Return the keyword arguments that a function declares, without the first one, and whether each is required."""
+    """Return the keyword arguments that a function declares, and whether each is required.
+
+    The first argument is left out.
+    """
     return _declared_arguments(function_definition(spec, folder).args)
 
 
 def signal_problems(root: Node, kind: str, signals: Collection[str]) -> Iterator[Problem]:
-    """Yield a problem for every argument of a KPI or figure that should name a recorded signal and does not.
+    """Yield a problem for every argument of a KPI or figure that names no recorded signal.
 
-    The parameters are recognized by their annotations: `Signal` is the name of a signal, `Prefix` that of a group of signals
-    (see `cosim.results.kpi`). Optional functions, and those for which `definition_problem` finds a problem, are skipped.
+    The parameters are recognized by their annotations: `Signal` is the name of a signal, `Prefix`
+    that of a group of signals
+    (see `cosim.results.kpi`). Optional functions, and those for which `definition_problem` finds
+    a problem, are skipped.
 
     Args:
         root: The scenario.
@@ -176,20 +181,19 @@ def _reason(value: str, root: Node, names: Collection[str]) -> str:
 
 
 def kpi_name_problem(kpi: str, kpis: Sequence[FunctionSpec], folder: Path) -> str:
-    """Return why a KPI value such as "landing.lateral_error" cannot result from `kpis`, or "" if it may.
+    """Return why a KPI value cannot result from `kpis`, or "" if it may.
 
-    The names of a function's values are known only if its `return` statements write them as literals.
+    The names of a function's values are known only if its `return` statements write them as
+    literals.
     """
     name, _, key = kpi.partition(".")
     values = {spec.name: _value_names(spec, folder) for spec in kpis}
     if name in values and (not values[name] or key.partition("[")[0] in values[name]):
         return ""
     own = {name: values[name]} if name in values else values
-    known = (
-        f"{each}.{value}" if value else each
-        for each, names in own.items()
-        for value in names or [""]
-    )
+    known: list[str] = []
+    for each, names in own.items():
+        known += [f"{each}.{value}" for value in names] or [each]
     return f'no KPI "{kpi}"{kpi_hint(kpi.partition("[")[0], known)}'
 
 
@@ -213,15 +217,17 @@ def _annotation_names(annotation: ast.expr | None) -> set[str]:
 
 def _signal_prefixes(signals: Collection[str]) -> list[str]:
     """Return all names that are prefixes of signals."""
-    return list(
-        dict.fromkeys(
-            name[: match.start()] for name in signals for match in re.finditer(r"[.\[]", name)
-        )
-    )
+    prefixes: dict[str, None] = {}
+    for name in signals:
+        for match in re.finditer(r"[.\[]", name):
+            prefixes[name[: match.start()]] = None
+    return list(prefixes)
 
 
 def load_function(reference: str, folder: Path) -> Callable[..., Any]:
-    """Import the function `file.py:function` (path relative to `folder`) or `package.module:function`.
+    """Import the function `file.py:function` or `package.module:function`.
+
+    The path of a file starts from `folder`.
 
     Raises:
         InputError: The file does not exist, cannot be imported, or does not define the function.

@@ -57,7 +57,10 @@ class Node:
 
     @property
     def has_wrong_names(self) -> bool:
-        """True if names of components are illegal or occur twice, so that an unknown name may mean one of them."""
+        """True if names of components are illegal or occur twice.
+
+        Then an unknown name may mean one of them.
+        """
         repeated = any(
             path[:1] == ("components",) and len(path) == 2 for path in self.document.invalid_paths
         )
@@ -91,7 +94,7 @@ class Node:
         return (node, name) if name in node.spec.components else None
 
     def leaves(self) -> Iterator[tuple[Node, str]]:
-        """Yield (system, name) of every valid component that is not a nested system, in the order of the files."""
+        """Yield (system, name) of every valid component, without nested systems, in file order."""
         for name in self.spec.components:
             if name in self.children:
                 yield from self.children[name].leaves()
@@ -115,7 +118,10 @@ class Scenario:
         return self.root.spec
 
     def expanded(self) -> dict[str, Any]:
-        """Return the scenario as one JSON object without "extends", with the values of the caller and absolute paths."""
+        """Return the scenario as one JSON object without "extends".
+
+        It contains the values of the caller, and absolute paths.
+        """
         value: dict[str, Any] = copy_json(self.root.document.value)
         for name, setting in self.assignments.items():
             component, _, variable = name.partition(".")
@@ -209,7 +215,10 @@ def _refuse_study(document: Document) -> None:
 def _find_seed_problems(
     document: Document, spec: SystemSpec, invalid_keys: Set[str]
 ) -> Iterator[Problem]:
-    """Yield a problem for each JSON pointer of "seeds" that no value can be set at, except those below invalid keys."""
+    """Yield a problem for each JSON pointer of "seeds" that no value can be set at.
+
+    Those below invalid keys are left out.
+    """
     for i, pointer in enumerate(spec.seeds if isinstance(spec, ScenarioSpec) else ()):
         if not pointer.startswith("/"):
             yield Problem(

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 from ..components.fmi import FmuDescription
 from ..components.fmi.changed_sources import changed_sources_warning
+from ..core.component import scalars_of
 from ..core.errors import Problem, abbreviate_names
 from ..core.paths import is_file
 from ..core.system import Endpoint
@@ -57,7 +58,7 @@ def find_run_warnings(prepared: PreparedRun) -> Iterator[Problem]:
 
 
 def _missing_connections(prepared: PreparedRun) -> Iterator[Problem]:
-    """Yield a warning for each connection that is probably missing, and for components with other inputs that lack one."""
+    """Yield a warning for each component that probably lacks a connection."""
     for name, text in find_missing_connections(
         prepared.root, prepared.system, unconnected_inputs(prepared)
     ):
@@ -69,7 +70,7 @@ def _missing_connections(prepared: PreparedRun) -> Iterator[Problem]:
 
 
 def _double_conversions(prepared: PreparedRun) -> Iterator[Problem]:
-    """Yield a warning for each connection whose gain is the factor between the units of its ends, which is applied anyway."""
+    """Yield a warning for each gain that repeats the conversion of units of its connection."""
     system = prepared.system
     for connection in system.connections:
         source, target = (
@@ -92,25 +93,25 @@ def _double_conversions(prepared: PreparedRun) -> Iterator[Problem]:
 
 
 def unconnected_inputs(prepared: PreparedRun) -> VariablesByEndpoint:
-    """Return the scalar inputs that no connection, start value or event sets, with their variables."""
+    """Return the inputs that no connection, start value or event sets, with their variables."""
     system = prepared.system
     connected = {connection.target for connection in system.connections}
     changes = [system.start_values, *(event.values for event in prepared.settings.events)]
-    assigned = {
-        (component, name) for values in changes for component, own in values.items() for name in own
-    }
-    return {
-        end: variable
-        for name, component in system.components.items()
-        for variable in component.variables
-        if variable.causality == "input" and (name, variable.name) not in assigned
-        for slot in variable.scalar_names
-        if (end := Endpoint(name, slot)) not in connected
-    }
+    assigned: set[tuple[str, str]] = set()
+    for values in changes:
+        for component, own in values.items():
+            assigned.update((component, name) for name in own)
+    unconnected: VariablesByEndpoint = {}
+    for name, each in system.components.items():
+        for scalar, variable in scalars_of(each.variables, "input").items():
+            end = Endpoint(name, scalar)
+            if end not in connected and (name, variable.name) not in assigned:
+                unconnected[end] = variable
+    return unconnected
 
 
 def _large_steps(prepared: PreparedRun) -> Iterator[Problem]:
-    """Yield a warning for each step that is much longer than FMUs recommend (FMI: DefaultExperiment), with their components.
+    """Yield a warning for each step much longer than FMUs recommend (FMI: DefaultExperiment).
 
     FMUs for Model Exchange are left out, because their solver has a step of its own.
     """

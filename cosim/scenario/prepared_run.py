@@ -146,7 +146,7 @@ class PreparedRun:
 
     @property
     def origin(self) -> dict[str, Any]:
-        """Name, content and file of the scenario, and the values of variables that the caller sets."""
+        """Name, content and file of the scenario, and the caller's values of variables."""
         return {
             "name": self.spec.name,
             "scenario": self._resolved_document(),
@@ -155,7 +155,10 @@ class PreparedRun:
         }
 
     def _resolved_document(self) -> dict[str, Any]:
-        """Return the expanded scenario with the values of all arguments, without the functions that are left out."""
+        """Return the expanded scenario with the values of all arguments.
+
+        Functions that are left out do not appear.
+        """
         functions = self.spec.model_dump(
             include={"kpis", "figures", "scene"}, exclude_defaults=True, by_alias=True
         )
@@ -163,11 +166,13 @@ class PreparedRun:
         return {key: functions.get(key, item) for key, item in value.items()}
 
     def files(self) -> dict[str, Path]:
-        """Return all files that the run depends on, by their path relative to the scenario's folder.
+        """Return all files that the run depends on, by their path from the scenario's folder.
 
-        Files that cosim ships have names such as "cosim:fmus/mixer.fmu", except for those of shipped scenarios.
+        Files that cosim ships have names such as "cosim:fmus/mixer.fmu", except for those of
+        shipped scenarios.
 
-        These are the scenario and its nested systems, FMUs, Python and Modelica sources, and input profiles.
+        These are the scenario and its nested systems, FMUs, Python and Modelica sources, and
+        input profiles.
         """
         folder, shipped = str(self.root.folder.resolve()), _shipped()
         files = {file.resolve() for file in files_of_system(self.root, self.spec, is_loaded=True)}

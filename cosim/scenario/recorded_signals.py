@@ -5,7 +5,7 @@ from __future__ import annotations
 import re
 from collections.abc import Iterable, Mapping, Sequence
 
-from ..core.component import Component
+from ..core.component import Component, scalars_of
 from ..core.errors import Problem, pattern_hint
 from ..core.expressions import parse_condition
 from ..core.system import Endpoint
@@ -55,7 +55,10 @@ class SignalSelector:
         self.problems: list[Problem] = []
 
     def select(self, patterns: Iterable[tuple[str, str]]) -> dict[str, Endpoint]:
-        """Return the signals that match (pattern, location in the file) pairs, in the order of components and variables."""
+        """Return the signals that match patterns, in the order of components and variables.
+
+        The patterns are pairs of (pattern, location in the file).
+        """
         selected: set[str] = set()
         for pattern, where in patterns:
             matches = _matching_names(pattern, self._output_index) or _matching_names(
@@ -79,13 +82,11 @@ class SignalSelector:
 def _signal_endpoints(
     components: Mapping[str, Component], causalities: Sequence[str]
 ) -> dict[str, Endpoint]:
-    return {
-        f"{name}.{slot}": Endpoint(name, slot)
-        for name, component in components.items()
-        for variable in component.variables
-        if variable.causality in causalities
-        for slot in variable.scalar_names
-    }
+    ends = {}
+    for name, component in components.items():
+        for scalar in scalars_of(component.variables, *causalities):
+            ends[f"{name}.{scalar}"] = Endpoint(name, scalar)
+    return ends
 
 
 def _matching_names(pattern: str, names: PrefixIndex) -> list[str]:

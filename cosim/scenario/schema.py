@@ -49,15 +49,15 @@ KEYED_LISTS = {
 NOT_INHERITED = ("$schema", "name", "description", "reference")
 
 
+def _names_like(pattern: str) -> dict[str, Any]:
+    """Return the JSON Schema of one or more names."""
+    return {"pattern": pattern, "items": {"pattern": pattern}, "minItems": 1}
+
+
 #: the rules of the validators below that JSON Schema can express
 _CONNECTION_RULES: dict[str, Any] = {
     "anyOf": [
-        {
-            "properties": {
-                end: {"pattern": pattern, "items": {"pattern": pattern}, "minItems": 1}
-                for end in ("from", "to")
-            }
-        }
+        {"properties": dict.fromkeys(("from", "to"), _names_like(pattern))}
         for pattern in (r"^[^*]*$", r"^[^*]*\*[^*]*$")
     ]
 }
@@ -145,7 +145,7 @@ class ConnectionSpec(Spec):
 
 
 class IterationSpec(Spec):
-    """Iteration: every macro step is repeated from the same state until the connected outputs converge."""
+    """Repetition of every macro step from the same state until the connected outputs converge."""
 
     method: IterationMethod = key(
         "fixed-point: the outputs of a repetition are the inputs of the next one; newton: "
@@ -214,7 +214,7 @@ class RecordSpec(Spec):
 
 
 class EventSpec(Spec):
-    """Values that variables are set to at a communication point, before the step that starts there."""
+    """Values that are set at a communication point, before the step that starts there."""
 
     time: Seconds = key("a communication point", 20.0, unit="s")
     values: dict[str, Value] = key(
@@ -317,7 +317,7 @@ class NestedSpec(SystemSpec):
 
 
 class ScenarioSpec(SystemSpec):
-    """A scenario: a system of components, its times, recorded signals, events, KPIs, checks and figures."""
+    """A system of components with times, recorded signals, events, KPIs, checks and figures."""
 
     name: Annotated[str, StringConstraints(pattern=SCENARIO_NAME)] = key(
         "name of the scenario and of its results folder", "demo1_box"

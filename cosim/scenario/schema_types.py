@@ -61,7 +61,7 @@ def _parse_time(value: Any) -> Fraction:
 
 
 def hint_at_quotes(value: Any, accepts: Callable[[Any], bool]) -> str:
-    """Return a hint at a text that is a value in quotes which `accepts` accepts without them, else ""."""
+    """Return a hint at a value in quotes that `accepts` accepts without them, else ""."""
     try:
         content = json.loads(value) if isinstance(value, str) else None
     except ValueError:
@@ -86,8 +86,9 @@ def _check_not_negative(value: Fraction) -> Fraction:
 
 
 def _check_value(value: Any) -> Any:
-    rows = value if isinstance(value, list) else [value]
-    values = [v for row in rows for v in (row if isinstance(row, list) and row else [row])]
+    values: list[Any] = []
+    for row in value if isinstance(value, list) else [value]:
+        values += row if isinstance(row, list) and row else [row]
     if not values or not all(isinstance(v, bool | int | float | str) for v in values):
         raise ValueError("expected a number, true, false, a text, or a list of these")
     return value
@@ -260,7 +261,11 @@ class Spec(BaseModel):
     """Base of all parts of a scenario; unknown keys and implicit type conversions are errors."""
 
     model_config = ConfigDict(
-        extra="forbid", strict=True, frozen=True, arbitrary_types_allowed=True
+        extra="forbid",
+        strict=True,
+        frozen=True,
+        arbitrary_types_allowed=True,
+        defer_build=True,  # a run builds only the models that it validates
     )
 
     @property

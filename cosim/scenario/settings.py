@@ -171,10 +171,11 @@ def document_of_dict(scenario: Mapping[str, Any]) -> Document:
 
 
 def move_objects(document: Document, path: Sequence[str], value: Any) -> Any:
-    """Move the Python class or object in the new value of a component, or of its key "python", to the objects of a document.
+    """Move the Python classes and objects of a new value to the objects of a document.
 
     Args:
-        document: The scenario in which the value will be set; an object of the component that it replaces is forgotten.
+        document: The scenario in which the value will be set; an object of the component that it
+            replaces is forgotten.
         path: Keys of the value.
         value: The value that a caller sets.
 

@@ -349,7 +349,7 @@ class ModelicaSource(_FmuBased):
     )
 
     def create(self, creation: Creation) -> Component:
-        """Create an instance of the FMU in the user's cache, which is built if it is out of date."""
+        """Create an instance of the FMU in the user's cache, built again if it is out of date."""
         from ..export.build import cached_fmu
 
         file, _, model = self.modelica.rpartition(":")

@@ -57,7 +57,7 @@ class SystemBuilder:
         self.left_out: Sequence[Problem] = ()
 
     def build_plan(self, real_time: float | None, late: LatePolicy) -> Plan:
-        """Set start values, connections, stages, recorded signals, events and arguments of functions, and compile the result.
+        """Complete the system and its settings, and compile them.
 
         Args:
             real_time: See `Settings`.
@@ -120,7 +120,7 @@ class SystemBuilder:
         )
 
     def make_components(self) -> None:
-        """Create the components of the scenario and its nested systems, and the tables of its input profiles.
+        """Create all components, and the tables of the input profiles.
 
         Raises:
             InputError: The components have too many scalars.
@@ -217,13 +217,10 @@ class SystemBuilder:
         return self._variables_by_component[name]
 
     def _connections(self) -> Iterator[Connection]:
-        inputs_with_values = {
-            Endpoint(name, slot)
-            for name, values in self.start_values.items()
-            for variable in self.components[name].variables
-            if variable.name in values
-            for slot in variable.scalar_names
-        }
+        inputs_with_values: set[Endpoint] = set()
+        for name, values in self.start_values.items():
+            for variable in map(self._variables(name).__getitem__, values):
+                inputs_with_values |= {Endpoint(name, slot) for slot in variable.scalar_names}
         wiring = Wiring(self.components, inputs_with_values)
         for node in self.root.walk():
             wiring.connect(node)
@@ -248,7 +245,7 @@ class SystemBuilder:
     def _periods(
         self, node: Node, inherited: Fraction | None = None
     ) -> Iterator[tuple[str, Fraction]]:
-        """Yield (full name, period in s) of all components that have a period themselves or through an enclosing system."""
+        """Yield (full name, period in s) of all components with an own or inherited period."""
         for name, spec in node.spec.components.items():
             period = spec.period or inherited
             if name in node.children:
@@ -363,7 +360,9 @@ _TIMED_SETTINGS = (("stop_time",), ("record",), ("events",))
 
 
 def located_problems(root: Node, problems: Iterable[Problem]) -> Iterator[Problem]:
-    """Yield the problems of a system with the locations of their subjects, without those that follow from invalid times.
+    """Yield the problems of a system with their locations.
+
+    Those that follow from invalid times are left out.
 
     Args:
         root: The scenario.
@@ -375,7 +374,7 @@ def located_problems(root: Node, problems: Iterable[Problem]) -> Iterator[Proble
 
 
 def _is_consequence(root: Node, problem: Problem) -> bool:
-    """Return True if a problem with times only follows from an invalid start time, stop time or step size."""
+    """Return True if a problem only follows from an invalid start time, stop time or step size."""
     times = {"stop_time", "step_size", "start_time"} & root.invalid_keys
     return bool(times) and (
         problem.subject[:1] in _TIMED_SETTINGS

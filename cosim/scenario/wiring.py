@@ -6,9 +6,10 @@ import re
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import suppress
 from functools import cached_property
+from itertools import chain
 from typing import NamedTuple
 
-from ..core.component import Component, Variable
+from ..core.component import Component, Variable, scalars_of
 from ..core.errors import Problem, abbreviate_names, did_you_mean
 from ..core.size_limits import MAX_CONNECTIONS, require_at_most
 from ..core.system import Connection, Endpoint, incompatibility
@@ -24,7 +25,10 @@ _MAX_PAIRS = 4
 
 
 class _Candidate(NamedTuple):
-    """Connections to an input, several for a sum, and whether the scenario names their variables instead of prefixes."""
+    """Connections to an input, several for a sum.
+
+    `is_variable`: the scenario names their variables instead of prefixes.
+    """
 
     connections: Sequence[Connection]
     is_variable: bool
@@ -48,7 +52,7 @@ def _unmatched(end: Endpoint, source: _Source, rest: str, hint: str, where: str)
 
 
 def _kind_of_names(names: Iterable[str]) -> str:
-    """Return "array" for the elements of an array ("[1]"), "vector" for components of a vector (".x"), else ""."""
+    """Return the kind of names: "array" ("[1]"), "vector" (".x"), or ""."""
     kinds = {"array": re.compile(r"\[\d+\]"), "vector": re.compile(r"\.\w+")}
     names = list(names)
     return next(
@@ -102,7 +106,7 @@ class Wiring:
             self._add(_Candidate([Connection(output, Endpoint(*target), 0, where)], True))
 
     def excuse(self, node: Node, name: str) -> None:
-        """Do not report missing outputs for the inputs that a name refers to, because another problem is the reason."""
+        """Do not report missing outputs for inputs whose reason is another problem."""
         with suppress(UnknownNameError):
             for target in resolve_name(node, name, ("inputs",), include_inner=True):
                 if target.component in self._components:
@@ -117,11 +121,7 @@ class Wiring:
                 problem for end, problem in self._unmatched_inputs.items() if end not in explained
             )
             self.problems += dict.fromkeys(unmatched)
-        return (
-            connection
-            for candidate in self._by_input.values()
-            for connection in candidate.connections
-        )
+        return chain.from_iterable(each.connections for each in self._by_input.values())
 
     def _expand(self, node: Node, i: int, spec: ConnectionSpec) -> None:
         path, where_to = ("connections", i, "from"), node.where("connections", i, "to")
@@ -152,7 +152,10 @@ class Wiring:
     def _match(
         self, sources: Sequence[_Source], end: Endpoint, rest: str, spec: ConnectionSpec, where: str
     ) -> None:
-        """Connect an input to the output of each source with the same name after the prefix, or at the "*" of a pattern."""
+        """Connect an input to the matching output of each source.
+
+        Its name is the same after the prefix, or at the "*" of a pattern.
+        """
         unmatched = [source for source in sources if rest not in source.outputs]
         if unmatched and end not in self._inputs_with_values:
             self._unmatched_inputs[end] = _unmatched(
@@ -179,7 +182,10 @@ class Wiring:
     def _join_problems_of_elements(
         self, source: _Source, ends: Mapping[str, Endpoint], where: str
     ) -> None:
-        """Report inputs once, with the connections to write, if they and the outputs are an array and components of a vector."""
+        """Report inputs once if they and the outputs are an array and components of a vector.
+
+        The problem names the connections to write.
+        """
         outputs = [Endpoint(source.target.component, slot) for slot in source.outputs.values()]
         kinds = {_kind_of_names(source.outputs), _kind_of_names(ends)}
         unmatched = {rest: end for rest, end in ends.items() if end in self._unmatched_inputs}
@@ -223,14 +229,11 @@ class Wiring:
     @cached_property
     def _variables(self) -> Mapping[Endpoint, Variable]:
         """Variables of all components by their scalars."""
-        variables = (
-            (name, variable) for name, c in self._components.items() for variable in c.variables
-        )
-        return {
-            Endpoint(name, slot): variable
-            for name, variable in variables
-            for slot in variable.scalar_names
-        }
+        variables = {}
+        for name, component in self._components.items():
+            for scalar, variable in scalars_of(component.variables).items():
+                variables[Endpoint(name, scalar)] = variable
+        return variables
 
     def _add(self, new: _Candidate) -> None:
         first = new.connections[0]

@@ -1,4 +1,6 @@
-"""Coloured noise on a fixed time grid, as a pure function of seed, name and grid index.
+"""Random generators by seed and name, and coloured noise on a fixed time grid.
+
+The noise is a pure function of seed, name and grid index.
 
 A channel is white noise filtered by (1 + b T s) / (1 + T s)^2, or 1 / (1 + T s), discretised
 exactly: on the grid it has the variance, autocorrelation and joint distribution of the continuous
@@ -17,7 +19,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .random_generator import generator
+
+def generator(seed: int, *names: str) -> np.random.Generator:
+    """Return the random number generator of `seed` and `names`.
+
+    Other seeds and names give statistically independent numbers. PCG64 and its seeding are fixed,
+    so equal arguments give equal numbers on all machines.
+    """
+    key = int.from_bytes("/".join(names).encode(), "big")
+    return np.random.Generator(np.random.PCG64(np.random.SeedSequence([seed, key])))
+
 
 #: time step of the grid, over which a value is constant (s)
 GRID_STEP = 0.01

@@ -14,7 +14,7 @@ import numpy as np
 
 from cosim.core.component import Variable
 
-from ..physics.vessel_bodies import FloatingBody
+from ..physics.body import FloatingBody
 from ..vehicles.common.interface import (
     CURRENT_INPUTS,
     WAVE_GAIN_INPUT,
@@ -23,8 +23,14 @@ from ..vehicles.common.interface import (
 )
 from .sea import Sea
 from .settings import EnvironmentSettings
-from .surfaces import SurfaceTable
-from .updates import CurrentUpdate, SurroundingsUpdate, WaterLevelUpdate, WindUpdate, input_data
+from .updates import (
+    CurrentUpdate,
+    SurfaceTable,
+    SurroundingsUpdate,
+    WaterLevelUpdate,
+    WindUpdate,
+    input_data,
+)
 
 if TYPE_CHECKING:
     from ..physics.body import ContactBody

@@ -1,4 +1,4 @@
-"""Realisation of an irregular sea by long-crested components in deep water, w^2 = g k.
+"""Wave spectra, and irregular seas of long-crested components in deep water, w^2 = g k.
 
     elevation(x, y, t) = sum a cos(k (x cos d + y sin d) - w t + phase)
 
@@ -15,14 +15,79 @@ from __future__ import annotations
 
 import math
 import struct
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
 
-from .random_generator import generator
-from .spectrum import GRAVITY, SPECTRA
+from .coloured_noise import generator
+
+GRAVITY = 9.81  # m/s2
+
+#: Hs (m) of the sea states of WMO code table 3700 (Douglas sea scale): middle of each range, for
+#: "phenomenal" (9) its lower end
+SIGNIFICANT_HEIGHTS = (0.0, 0.05, 0.3, 0.875, 1.875, 3.25, 5.0, 7.5, 11.5, 14.0)
+
+#: peak enhancement factor: mean JONSWAP sea, and range in which the normalising factor is valid
+GAMMA, MIN_GAMMA, MAX_GAMMA = 3.3, 1.0, 7.0
+
+#: function of frequencies (rad/s), Hs (m), Tp (s) and gamma
+Spectrum = Callable[[np.ndarray, float, float, float], np.ndarray]
+
+
+def pierson_moskowitz(
+    frequency: np.ndarray, significant_height: float, peak_period: float, _gamma: float = 1.0
+) -> np.ndarray:
+    """Return the Pierson-Moskowitz spectrum.
+
+    Args:
+        frequency: Angular frequencies > 0 (rad/s).
+        significant_height: Hs (m).
+        peak_period: Tp (s).
+        _gamma: Unused; all spectra have the same arguments.
+
+    Returns:
+        S (m2 s), with the shape of `frequency`.
+    """
+    ratio = (2 * math.pi / peak_period / frequency) ** 4
+    spectrum: np.ndarray = (
+        5 / 16 * significant_height**2 * ratio / frequency * np.exp(-5 / 4 * ratio)
+    )
+    return spectrum
+
+
+def jonswap(
+    frequency: np.ndarray, significant_height: float, peak_period: float, gamma: float = GAMMA
+) -> np.ndarray:
+    """Return the JONSWAP spectrum.
+
+    Args:
+        frequency: Angular frequencies > 0 (rad/s).
+        significant_height: Hs (m).
+        peak_period: Tp (s).
+        gamma: Peak enhancement factor.
+
+    Returns:
+        S (m2 s), with the shape of `frequency`.
+    """
+    peak = 2 * math.pi / peak_period
+    width = np.where(frequency <= peak, 0.07, 0.09)
+    enhancement = gamma ** np.exp(-(((frequency - peak) / (width * peak)) ** 2) / 2)
+    factor = 1 - 0.287 * math.log(gamma)
+    return factor * pierson_moskowitz(frequency, significant_height, peak_period) * enhancement
+
+
+SPECTRA: Mapping[str, Spectrum] = {"pierson_moskowitz": pierson_moskowitz, "jonswap": jonswap}
+
+
+def fully_developed_period(significant_height: float) -> float:
+    """Return the peak period (s) of a fully developed sea with a height Hs (m).
+
+    Wp = 0.4 sqrt(g / Hs) (Fossen 2021, 10.2.1).
+    """
+    return 2 * math.pi / 0.4 * math.sqrt(significant_height / GRAVITY)
+
 
 #: range of frequencies of the components over the peak frequency
 MIN_FREQUENCY_RATIO, MAX_FREQUENCY_RATIO = 0.5, 4.0

@@ -24,20 +24,26 @@ from dataclasses import dataclass
 from typing import Any
 
 from ..json_reader import JsonPath, JsonReader, Numbers
-from .current import Current, Ramp, Variation
-from .sea import CALM, MAX_COMPONENTS, Sea, Waves, realise_sea
-from .spectrum import (
+from .sea import (
+    CALM,
     GAMMA,
+    MAX_COMPONENTS,
     MAX_GAMMA,
     MIN_GAMMA,
     SIGNIFICANT_HEIGHTS,
     SPECTRA,
+    Sea,
+    Waves,
     fully_developed_period,
+    realise_sea,
 )
-from .wind import (
+from .wind_and_current import (
     MAX_HEIGHT,
     MIN_HEIGHT,
+    Current,
+    Ramp,
     Turbulence,
+    Variation,
     Wind,
     WindProfile,
     logarithmic_profile,

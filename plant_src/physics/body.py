@@ -1,34 +1,38 @@
-"""Contact bodies: vehicles that move by their own compiled equations, with contact resolved by Bullet.
+"""Contact bodies: vehicles that move by their own equations, with contact resolved by Bullet.
 
 A step of the world has three parts:
 
-1. `predict`: the equations integrate each vehicle over the step without contact. Bullet receives the constant velocity and
-   angular velocity that lead a rigid body to the predicted pose.
+1. `predict`: the equations integrate each vehicle over the step without contact. Bullet receives
+   the constant velocity and angular velocity that lead a rigid body to the predicted pose.
 2. Bullet makes one step. Contact changes the velocities.
-3. `correct`: the change of velocity times Bullet's mass and inertia is the contact impulse. The equations apply it to the
-   predicted velocity and take over the pose to which Bullet's motion leads.
+3. `correct`: the change of velocity times Bullet's mass and inertia is the contact impulse. The
+   equations apply it to the predicted velocity and take over the pose to which Bullet's motion
+   leads.
 
-Gravity is part of the equations and zero in Bullet. A vehicle far from everything else needs no contact solution, and its motion
-is known without Bullet: Bullet steps only bodies that are near something (`clearance.py`). Inactive bodies wait in a remote row.
+Gravity is part of the equations and zero in Bullet. A vehicle far from everything else needs no
+contact solution, and its motion is known without Bullet: Bullet steps only bodies that are near
+something (`clearance.py`). Inactive bodies wait in a remote row.
+
+Vessels float in six degrees of freedom, or move in the horizontal plane.
 """
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+import struct
+from collections.abc import Callable, Mapping
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..placement import DRY, ContactSurface
 from ..vehicles.common.interface import MAX_STATE_NORM
-from ..vehicles.common.shapes import Body, Box, ConvexPiece, Shape
+from ..vehicles.common.shapes import Body
+from .bullet import create_compound_shape, pybullet, set_dynamics
 from .clearance import BoundingBox
-from .client import pybullet
-from .convex_pieces import mesh_file
 
 if TYPE_CHECKING:
-    from ..placement import Platform, VehiclePlacement
+    from ..placement import VehiclePlacement
     from ..vehicles.model import Model
     from .compiled_equations import CompiledEquations
 
@@ -37,7 +41,6 @@ if TYPE_CHECKING:
 INACTIVE_POSITION, INACTIVE_SPACING = 2 * MAX_STATE_NORM, 100.0
 IDENTITY_QUATERNION = (0.0, 0.0, 0.0, 1.0)
 
-_MAX_VELOCITY = 1e6  # m/s, rad/s; Bullet silently limits velocities to 100 by default
 
 #: arrays of the compiled equations that are no state of a vehicle, or a part of another array
 _FIXED_ARRAYS = ("constants", "principal_axes", "step_size", "motion")
@@ -185,51 +188,107 @@ def state_sizes(model: Model, equations: CompiledEquations) -> dict[str, int]:
     return own | {"outputs": len(model.slots("output"))}
 
 
-def create_compound_shape(boxes: Sequence[Shape], client: int) -> int:
-    """Create a collision shape of boxes and convex pieces in Bullet and return its number."""
-    is_piece = [isinstance(box, ConvexPiece) for box in boxes]
-    centred = [
-        (0.0, 0.0, 0.0) if piece else box.position
-        for box, piece in zip(boxes, is_piece, strict=True)
-    ]
-    names = [mesh_file(box) if isinstance(box, ConvexPiece) else "" for box in boxes]
-    number = pybullet.createCollisionShapeArray(
-        [pybullet.GEOM_MESH if piece else pybullet.GEOM_BOX for piece in is_piece],
-        halfExtents=[box.half_extents for box in boxes],
-        collisionFramePositions=centred,
-        collisionFrameOrientations=[box.orientation for box in boxes],
-        **({"fileNames": names, "meshScales": [[1.0] * 3] * len(boxes)} if any(is_piece) else {}),
-        physicsClientId=client,
-    )
-    return int(number)
+#: tolerated vertical speed of a planar vessel in Bullet (m/s), and tolerated change of its height
+#: before a reset (m)
+MAX_SINK_RATE, MAX_HEAVE = 1e-4, 1e-9
+
+_VERTICAL_VELOCITY = 2  # index in a twist
+_MIN_SLOPE = 0.01  # of sink rate over lift: M / (m + M) for a load of mass m on a vessel of mass M
+_pack_vector = struct.Struct("3d").pack_into
 
 
-def create_platform(client: int, platform: Platform) -> int:
-    """Create a fixed box in Bullet and return the number of its body."""
-    x, y, z = platform.size
-    shape = create_compound_shape([Box((x / 2, y / 2, z / 2), (0.0, 0.0, 0.0))], client)
-    number = pybullet.createMultiBody(0, shape, -1, platform.position, physicsClientId=client)
-    set_dynamics(client, number, -1, platform.surface)
-    return int(number)
+class FloatingBody(ContactBody):
+    """A vessel in six degrees of freedom.
+
+    Its equations predict with the contact impulse of the previous step.
+    """
+
+    def elevation_function(self, wave_count: int, waves: np.ndarray) -> Callable[[float], float]:
+        """Return a function of time (s) for the water elevation (m, above still water) at the vessel.
+
+        Args:
+            wave_count: Number of wave components.
+            waves: Table of the components, see `environment.sea.Sea.component_table`.
+        """
+        place_and_time, result = np.zeros(3), np.zeros(1)
+        arrays = {
+            "place_and_time": place_and_time,
+            "wave_count": np.full(1, float(wave_count)),
+            "waves": waves,
+            "elevation": result,
+        }
+        call = self.equations.bind("water_elevation", arrays)
+        arguments, elevations, outputs = place_and_time.data, result.data, self.outputs.data
+
+        def elevation(time: float) -> float:
+            _pack_vector(arguments, 0, outputs[0], outputs[1], time)
+            call()
+            return elevations[0]
+
+        return elevation
 
 
-def set_dynamics(
-    client: int, number: int, link: int, surface: ContactSurface = DRY, body: Body | None = None
-) -> None:
-    """Set mass and inertia of `body`, friction and restitution, no damping and no sleeping for a Bullet body."""
-    pybullet.changeDynamics(
-        number,
-        link,
-        lateralFriction=surface.friction,
-        restitution=surface.restitution,
-        linearDamping=0,
-        angularDamping=0,
-        maxJointVelocity=_MAX_VELOCITY,
-        activationState=pybullet.ACTIVATION_STATE_DISABLE_SLEEPING,
-        physicsClientId=client,
-    )
-    if body:  # in two calls: setting the mass overwrites the inertia
-        pybullet.changeDynamics(number, link, mass=body.mass, physicsClientId=client)
-        pybullet.changeDynamics(
-            number, link, localInertiaDiagonal=body.inertia, physicsClientId=client
+class PlanarBody(ContactBody):
+    """A vessel in the horizontal plane: heave, roll and pitch are zero under any load.
+
+    Infinite moments of inertia lock roll and pitch in Bullet. Heave cannot be locked: the body
+    receives a lift velocity that cancels the sink rate due to the load on the deck. The lift is
+    predicted from the previous steps. If Bullet's body still sinks, the step is repeated with a
+    lift improved by the secant method.
+    """
+
+    USE_MAXIMAL_COORDINATES = True  # the inertia about the world's z axis is constant
+
+    @staticmethod
+    def bounding_box(body: Body) -> BoundingBox:
+        """Return a box around the centre of mass that contains the body at every yaw angle."""
+        corners = np.concatenate([box.corners() for box in body.boxes])
+        radius = float(np.hypot(corners[:, 0], corners[:, 1]).max())
+        low, high = float(corners[:, 2].min()), float(corners[:, 2].max())
+        return BoundingBox((-radius, -radius, low), (radius, radius, high))
+
+    def _create_body(self, vehicle: VehiclePlacement) -> int:
+        self._previous_vertical_load: Any = self._arrays["previous_vertical_load"].data
+        #: lift and sink rate (m/s) of the previous attempt
+        self._last_attempt = 0.0, 0.0
+        infinite = 0.0  # Bullet's convention for an infinite moment of inertia
+        body = vehicle.body._replace(inertia=(infinite, infinite, vehicle.body.inertia[2]))
+        return super()._create_body(replace(vehicle, body=body))
+
+    def height_converged(self, repeats: int) -> bool:
+        """Return whether the vessel keeps its height in Bullet's step.
+
+        If not, improve the lift for the next attempt.
+
+        Args:
+            repeats: Number of attempts before this one.
+        """
+        lift, sink_rate = (
+            self.commanded_twist[_VERTICAL_VELOCITY],
+            -self.bullet_twist[_VERTICAL_VELOCITY],
         )
+        (last_lift, last_sink_rate), self._last_attempt = self._last_attempt, (lift, sink_rate)
+        if not MAX_SINK_RATE < abs(sink_rate) < math.inf:
+            return True
+        slope = (
+            (last_sink_rate - sink_rate) / (lift - last_lift)
+            if repeats and lift != last_lift
+            else 1.0
+        )
+        self.commanded_twist[_VERTICAL_VELOCITY] = lift + sink_rate / min(
+            max(slope, _MIN_SLOPE), 1.0
+        )
+        return False
+
+    def reset_height(self) -> None:
+        """Remove the heave that has accumulated in Bullet over the previous steps."""
+        if abs(self._previous_vertical_load[1]) > MAX_HEAVE:
+            self.reset_pose()
+            self._previous_vertical_load[1] = 0.0
+
+
+def body_class(model: Model) -> type[ContactBody]:
+    """Return the contact body class for the motion of `model`."""
+    if model.motion == "planar":
+        return PlanarBody
+    return FloatingBody if model.is_vessel else ContactBody

@@ -12,10 +12,8 @@ import numpy as np
 
 from ..catalogue import MODELS
 from ..json_reader import Numbers
-from ..physics.body import create_compound_shape, set_dynamics
-from ..physics.client import pybullet
-from ..vehicles.common.inertia import principal_axes
-from ..vehicles.common.shapes import quaternion_from_matrix
+from ..physics.bullet import create_compound_shape, pybullet, set_dynamics
+from ..vehicles.common.shapes import principal_axes, quaternion_from_matrix
 from ..vehicles.strider import parameters as strider
 from ..vehicles.strider.parameters import RUDDER_ARM
 

@@ -11,9 +11,8 @@ from typing import Any
 
 import numpy as np
 
-from .fmu_base import ReplicaFmu
-from .forces.rotor_map.equations import THRUST_COEFFICIENT
-from .pid import Pid
+from .bus import THRUST_COEFFICIENT
+from .fmu_base import Pid, ReplicaFmu
 
 MASS = 0.441  # kg, assumed by the controller
 MAX_SPEED = 5000.0  # 1/min

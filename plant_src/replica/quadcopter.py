@@ -1,6 +1,6 @@
 """Published cascaded controller of the quadcopter, one class per block.
 
-Signals have the conventions of `interface.py`. Angles between blocks are in rad and throttles in %;
+Signals have the conventions of `bus.py`. Angles between blocks are in rad and throttles in %;
 inside the loops angles are in degrees, as the published gains require. Two published errors are
 kept: world velocities are used as forward and left velocities, and the yaw error is not wrapped.
 """
@@ -10,9 +10,8 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from .fmu_base import ReplicaFmu
-from .interface import ROTORS
-from .pid import Pid
+from .bus import ROTORS
+from .fmu_base import Pid, ReplicaFmu
 
 POSITION_INPUTS = ("vehicle.position.x", "vehicle.position.y")
 TARGET_INPUTS = ("target.position.x", "target.position.y")

@@ -5,8 +5,7 @@ from __future__ import annotations
 import math
 from typing import Any
 
-from .fmu_base import ReplicaFmu
-from .pid import Pid
+from .fmu_base import Pid, ReplicaFmu
 
 MAX_WAYPOINTS = 32
 

@@ -18,15 +18,14 @@ from cosim.core.component import Component, Ports, Variable
 from cosim.core.errors import ComponentError, InputError, Problem, did_you_mean
 
 from .. import world_settings
-from ..physics.body import create_compound_shape, set_dynamics
-from ..physics.client import connect, pybullet
+from ..physics.bullet import connect, create_compound_shape, pybullet, set_dynamics
 from ..placement import Platform, VehiclePlacement
 from ..scene import replay
 from ..variable_views import recorded_others
 from ..vehicles.common.interface import MAX_STATE_NORM
 from ..vehicles.common.shapes import Box
 from .bodies import Quadcopter, Vessel
-from .interface import INPUTS, OUTPUTS
+from .bus import INPUTS, OUTPUTS
 
 VEHICLE_MODELS = {"uav": "ar_drone", "usv": "strider"}
 
@@ -52,7 +51,7 @@ class ReplicaState:
 class World(Component):
     """Quadcopter `uav`, vessel `usv` and fixed platforms in one PyBullet client.
 
-    14 inputs, 22 outputs (`interface.py`).
+    14 inputs, 22 outputs (`bus.py`).
 
     Args:
         instance_name: Name of the component.

@@ -13,7 +13,7 @@ from cosim.core.errors import InputError
 from cosim.results import Result
 
 from ..catalogue import default_model
-from ..obstacles import Obstacle, obstacles_of
+from ..placement import Obstacle, obstacles_of
 from ..recorded_motion import touchdown_row
 from ..vehicles.common.shapes import BODY_UP, Quaternion
 from .solid_renderer import View

@@ -14,7 +14,7 @@ from typing import Any, Literal, NamedTuple
 import numpy as np
 
 from ..catalogue import default_model
-from ..obstacles import Obstacle
+from ..placement import Obstacle
 from ..vehicles.common.shapes import Body, Quaternion, Shape, Vector
 from ..vehicles.model import Model
 from ..vehicles.multirotor.airframe import Airframe, Rotor

@@ -15,7 +15,7 @@ import numpy as np
 from ..catalogue import default_model
 from ..environment import sea
 from ..environment.sea import Sea
-from ..obstacles import obstacles_of
+from ..placement import obstacles_of
 from .parts import static_parts, vehicle_parts
 
 Scene = dict[str, Any]

@@ -16,7 +16,7 @@ from typing import NamedTuple, Self
 
 import numpy as np
 
-from ..physics.client import pybullet
+from ..physics.bullet import pybullet
 from ..vehicles.common.shapes import BODY_UP, Quaternion, Vector
 from .parts import Part
 

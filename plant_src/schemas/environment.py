@@ -5,15 +5,21 @@
 
 from __future__ import annotations
 
-from ..environment.sea import MAX_COMPONENTS
+from ..environment.sea import (
+    GAMMA,
+    MAX_COMPONENTS,
+    MAX_GAMMA,
+    MIN_GAMMA,
+    SIGNIFICANT_HEIGHTS,
+    SPECTRA,
+)
 from ..environment.settings import (
     MAX_SIGNIFICANT_HEIGHT,
     MAX_SPREADING,
     REFERENCE_HEIGHT,
     TURBULENCE_HEIGHT,
 )
-from ..environment.spectrum import GAMMA, MAX_GAMMA, MIN_GAMMA, SIGNIFICANT_HEIGHTS, SPECTRA
-from ..environment.wind import MAX_HEIGHT, MIN_HEIGHT
+from ..environment.wind_and_current import MAX_HEIGHT, MIN_HEIGHT
 from .parts import (
     AT_LEAST_0,
     NUMBER,

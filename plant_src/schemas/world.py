@@ -7,8 +7,7 @@ Defaults, limits and lists of names are those of the readers.
 
 from __future__ import annotations
 
-from ..obstacles import CONCRETE
-from ..placement import DRY
+from ..placement import CONCRETE, DRY
 from .environment import environment_schemas
 from .parts import (
     AT_LEAST_0,

@@ -9,8 +9,7 @@ from typing import Any
 
 from ..catalogue import VEHICLE_MODELS
 from ..json_reader import JsonReader
-from ..physics.body import create_compound_shape
-from ..physics.client import pybullet
+from ..physics.bullet import create_compound_shape, pybullet
 from ..vehicles.common.shapes import Box, Shape
 from .rotations import Vector, add_scaled, to_world
 from .signal_component import Measurement, SampledSensor, timing_variables

@@ -1,4 +1,4 @@
-"""Warnings about inputs that were outside the limits of their component for a long part of a run."""
+"""Warnings about inputs that were outside their limits for a long part of a run."""
 
 import json
 import math

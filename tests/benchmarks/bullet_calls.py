@@ -13,7 +13,7 @@ from typing import Any, NamedTuple
 import pytest
 
 from cosim.engine.run_loop import simulate
-from plant_src.physics.client import pybullet
+from plant_src.physics.bullet import pybullet
 
 
 class BulletCall(NamedTuple):

@@ -69,9 +69,9 @@ def test_a_file_of_a_package_is_not_changed(tmp_path):
 
 
 def test_the_shipped_plant_is_the_package_that_users_import():
-    from plant_src.obstacles import read_obstacles
+    from plant_src.placement import read_obstacles
 
-    file = "plant_src/obstacles.py:read_obstacles"
+    file = "plant_src/placement.py:read_obstacles"
     assert load_object(file, resources.root()) is read_obstacles
     assert load_object(f"../{file}", resources.root() / "scenarios") is read_obstacles
 

@@ -13,10 +13,9 @@ import pytest
 from test_equations import Compiled
 
 from cosim.core.component import Variable
-from cosim.export.equations.c_code import Callee, call_in_c, function_body
+from cosim.export.equations.c_code import Callee, call_in_c, function_body, sum_over_rows
 from cosim.export.equations.fmu_code import as_block
 from cosim.export.equations.model import ContinuousModel
-from cosim.export.equations.simd_sum import sum_over_rows
 
 ROWS = 16
 

@@ -15,7 +15,7 @@ from world_harness import WorldHarness, quadcopter_settings, vessel_settings
 import cosim
 from cosim.core import resources
 from cosim.core.errors import InputError
-from plant_src.obstacles import obstacles_of
+from plant_src.placement import obstacles_of
 from plant_src.scene.replay import world_scene
 
 HARBOUR = json.loads((resources.root() / "scenarios/meshes/harbour.json").read_text())

@@ -64,7 +64,7 @@ class Plant(Block):
 
 
 class Controller(Block):
-    """Controller with motor[i] = gain[i] + offset, and an input for the x position of its vehicle."""
+    """Controller with motor[i] = gain[i] + offset, and an input for the position of its vehicle."""
 
     def __init__(self, **arguments):
         super().__init__(**arguments)

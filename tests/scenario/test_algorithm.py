@@ -77,7 +77,10 @@ class {name}(Component):
     binds_everything, has_state = False, False
 
     def __init__(self, instance_name):
-        self.variables = [Variable("u", causality="input", start=0.0), Variable("y", causality="output")]
+        self.variables = [
+            Variable("u", causality="input", start=0.0),
+            Variable("y", causality="output"),
+        ]
         self.dependencies = {{"y": frozenset({direct})}}
 
     def bind(self, inputs, outputs): ...

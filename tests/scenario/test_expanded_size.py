@@ -42,7 +42,7 @@ def refusal(scenario):
 
 
 def chain(folder, levels, width, last, **more):
-    """Write `levels` nested systems of `width` components each; the last one has components `last`."""
+    """Write `levels` nested systems of `width` components each, the last one of `last`."""
     for level in range(levels):
         inner = {"system": f"level{level + 1}.json"} if level < levels - 1 else last
         content = {"components": {f"c{i}": inner for i in range(width)}} | more
@@ -115,7 +115,7 @@ def test_deeply_nested_systems_are_refused_at_the_level_that_is_too_deep(folder)
 
 
 def fan(folder, levels, kind, names, **root):
-    """Write nested systems, each of whose ports "p" and "q" refers to both ports of the next one."""
+    """Write nested systems whose ports "p" and "q" both refer to both ports of the next one."""
     for level in range(levels):
         last = level == levels - 1
         inner = folder.block("Gain") if last else {"system": f"level{level + 1}.json"}

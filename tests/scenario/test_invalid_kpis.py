@@ -76,8 +76,9 @@ TYPED = """
 from collections.abc import Sequence
 from cosim.results.kpi import Prefix, Signal
 
-def typed(result, signal: Signal = "a.y", start: float = 0.0, count: int = 1, target: Signal | float | None = None,
-          x: Sequence[float] = (), point: tuple[float, float] = (0, 0), plain: bool = False, free=None): ...
+def typed(result, signal: Signal = "a.y", start: float = 0.0, count: int = 1,
+          target: Signal | float | None = None, x: Sequence[float] = (),
+          point: tuple[float, float] = (0, 0), plain: bool = False, free=None): ...
 """
 
 

@@ -14,7 +14,8 @@ from cosim.scenario import load
 def test_all_problems_are_reported_at_once(folder):
     gain = folder.block("Gain")["python"]
     file = folder.write(
-        f"""{{"name": "bad", "stop_time": 3.5, "description": "", "description": "", "step_size": 1, "colour": "red",
+        f"""{{"name": "bad", "stop_time": 3.5, "description": "", "description": "", \
+"step_size": 1, "colour": "red",
  "components": {{
   "a": {{"parameters": {{"kk": 1, "k": "x", "u": NaN}}, "python": "{gain}"}},
   "b": {{"python": "{gain}"}},

@@ -7,7 +7,7 @@ from cosim.components.fmi import api, file
 
 
 def ring(folder, probe, size):
-    """Write a scenario of `size` instances of one FMU in a ring, each connected to the one before."""
+    """Write a scenario of `size` instances of one FMU in a ring."""
     names = [f"p{i}" for i in range(size)]
     scenario = folder / "ring.json"
     document = {

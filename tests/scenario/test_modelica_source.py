@@ -1,4 +1,4 @@
-"""A component with a Modelica source is built when it is needed, and kept until the source changes."""
+"""A component with a Modelica source is built when it is needed, and kept until it changes."""
 
 import pytest
 

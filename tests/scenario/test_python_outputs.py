@@ -1,4 +1,4 @@
-"""Outputs of a PythonFMU class must have the type of the variable, or convert to it without loss."""
+"""Outputs of a PythonFMU class have the type of the variable, or convert to it without loss."""
 
 import numpy as np
 import pytest

@@ -31,8 +31,9 @@ class Reader(Fmi2Slave):
     def __init__(self, **options):
         super().__init__(**options)
         self.text, self.copy, self.spoil = "", "", False
-        self.register_variable(String("text", causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable))
-        self.register_variable(Boolean("spoil", causality=Fmi2Causality.parameter, variability=Fmi2Variability.tunable))
+        tunable = {"causality": Fmi2Causality.parameter, "variability": Fmi2Variability.tunable}
+        self.register_variable(String("text", **tunable))
+        self.register_variable(Boolean("spoil", **tunable))
         self.register_variable(String("copy", causality=Fmi2Causality.output))
 
     def do_step(self, time, step_size):

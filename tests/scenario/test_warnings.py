@@ -104,7 +104,8 @@ KEEPS = 'it keeps its start value until a connection feeds or "parameters" set i
 OWN_BLOCK = """
 from pythonfmu import Boolean, Fmi2Causality, Fmi2Slave, Real
 
-INPUTS = ("position.x", "position.y", "altitude", "speed", "rotor_speeed", "gust.x", "gust.y", "gust.z")
+INPUTS = ("position.x", "position.y", "altitude", "speed", "rotor_speeed",
+          "gust.x", "gust.y", "gust.z")
 
 
 class Own(Fmi2Slave):
@@ -112,8 +113,11 @@ class Own(Fmi2Slave):
         super().__init__(**arguments)
         self.values = dict.fromkeys(INPUTS, 0.0)
         for name in INPUTS:
-            getter, setter = (lambda n=name: self.values[n]), (lambda v, n=name: self.values.update({n: v}))
-            self.register_variable(Real(name, causality=Fmi2Causality.input, getter=getter, setter=setter))
+            access = {
+                "getter": lambda n=name: self.values[n],
+                "setter": lambda v, n=name: self.values.update({n: v}),
+            }
+            self.register_variable(Real(name, causality=Fmi2Causality.input, **access))
         self.reset = False
         self.register_variable(Boolean("reset", causality=Fmi2Causality.input))
         self.rotor_speed = self.height = 0.0
@@ -137,7 +141,7 @@ def own_pair(folder, connections, **more):
     )
 
 
-def test_a_forgotten_number_of_a_component_with_mostly_fed_inputs_is_named_with_the_most_similar_output(
+def test_a_forgotten_number_beside_fed_inputs_is_named_with_the_most_similar_output(
     folder,
 ):
     fed = ["position.x", "position.y", "altitude", "speed"]

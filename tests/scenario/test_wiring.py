@@ -15,7 +15,8 @@ class Whole(Fmi2Slave):
     def __init__(self, **arguments):
         super().__init__(**arguments)
         self.x = 0.0
-        self.register_variable(Real("position.x", causality=Fmi2Causality.output, getter=lambda: self.x), nested=False)
+        x = Real("position.x", causality=Fmi2Causality.output, getter=lambda: self.x)
+        self.register_variable(x, nested=False)
 
     def do_step(self, current_time, step_size):
         return True

@@ -126,13 +126,13 @@ def _print_components(prepared: PreparedRun) -> None:
     click.echo("components")
     width, sources = max(map(len, prepared.system.components)), prepared.sources
     for name, component in prepared.system.components.items():
-        counts = {
-            kind: sum(len(v.scalar_names) for v in component.variables if v.causality == kind)
-            for kind in ("input", "output")
-        }
+        counts = {"input": 0, "output": 0}
+        for variable in component.variables:
+            if variable.causality in counts:
+                counts[variable.causality] += len(variable.scalar_names)
         period = prepared.system.periods.get(name)
         every = f", every {float(period):g} s" if period else ""
-        sizes = ", ".join(count_noun(counts[kind], kind) for kind in ("input", "output"))
+        sizes = ", ".join(count_noun(count, kind) for kind, count in counts.items())
         click.echo(f"  {name:{width}}  {sources[name]}, {sizes}{every}")
 
 
@@ -216,13 +216,9 @@ def _start_text(variable: Variable) -> str:
     start = variable.start
     if isinstance(start, bool):
         return str(start).lower()
-    return (
-        f"{start:g}"
-        if isinstance(start, int | float)
-        else "value of the component"
-        if start is None
-        else str(start)
-    )
+    if start is None:
+        return "value of the component"
+    return f"{start:g}" if isinstance(start, int | float) else str(start)
 
 
 def _unconnected_inputs(prepared: PreparedRun) -> dict[str, list[str]]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
+from itertools import chain
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -29,6 +30,16 @@ _START_WIDTH = 14
 
 #: length to which start values are shortened in the table (characters)
 _MAX_START_LENGTH = 40
+
+#: listed variables, in this order; the last kind only with --locals
+_CAUSALITIES = (
+    "input",
+    "output",
+    "structuralParameter",
+    "parameter",
+    "calculatedParameter",
+    "local",
+)
 
 _INTERFACE_NAMES: Mapping[str, str] = {
     "co-simulation": "Co-Simulation",
@@ -72,18 +83,14 @@ def command(fmu: str, with_locals: bool, as_json: bool) -> None:
     or file.mo:Model, which is compiled.
     """
     found, all_variables = _describe(fmu)
-    groups = [
-        "input",
-        "output",
-        "structuralParameter",
-        "parameter",
-        "calculatedParameter",
-        *(["local"] if with_locals else []),
-    ]
-    variables = {kind: [v for v in all_variables if v.causality == kind] for kind in groups}
+    causalities = _CAUSALITIES if with_locals else _CAUSALITIES[:-1]
+    variables: dict[str, list[Variable]] = {causality: [] for causality in causalities}
+    for variable in all_variables:
+        if variable.causality in variables:
+            variables[variable.causality].append(variable)
     properties = {name: value for name, value in found.items() if value}
     if as_json:
-        listed = [_variable_as_json(variable) for group in variables.values() for variable in group]
+        listed = [_variable_as_json(variable) for variable in chain(*variables.values())]
         print_json({"properties": properties, "variables": listed})
         return
     for name, value in properties.items():

@@ -15,7 +15,6 @@ import click
 from ...core import __version__, resources
 from ...core.errors import InputError, Problem, abbreviate_names
 from ...studies.regression import Regression
-from ..forked_commands import forked_commands
 
 _TEMPLATES = Path(__file__).parents[1] / "templates"
 #: template of each file of a new project
@@ -50,10 +49,8 @@ def command(directory: Path, force: bool) -> int:
     _write_project(directory)
     if untouched:
         click.echo(f"left as they are: {abbreviate_names(untouched)}")
-    with forked_commands(1) as run_command:
-        outcome = Regression(
-            directory / "scenarios/course.json", directory / "runs/course", True, run_command
-        ).run()
+    scenario = directory / "scenarios/course.json"
+    outcome = Regression(scenario, directory / "runs/course", update=True).run()
     for folder in {(directory / name).parent for name in _PROJECT_FILES}:
         shutil.rmtree(folder / "__pycache__", ignore_errors=True)
     if outcome.code:
@@ -73,15 +70,18 @@ def command(directory: Path, force: bool) -> int:
 def _other_entries(directory: Path) -> list[str]:
     """Return the files and folders beside those of the project, in the same folders."""
     own = {Path(name) for name in (*_PROJECT_FILES, _PLANT)}
-    folders = {parent for path in own for parent in path.parents}
-    found = [
-        path
-        for folder in sorted(folders)
-        if (directory / folder).is_dir()
-        for path in sorted((directory / folder).iterdir())
-    ]
-    names = [(path.relative_to(directory), "/" if path.is_dir() else "") for path in found]
-    return [f"{name.as_posix()}{end}" for name, end in names if name not in own | folders]
+    folders: set[Path] = set()
+    for path in own:
+        folders.update(path.parents)
+    others = []
+    for folder in sorted(folders):
+        if not (directory / folder).is_dir():
+            continue
+        for path in sorted((directory / folder).iterdir()):
+            name = path.relative_to(directory)
+            if name not in own | folders:
+                others.append(f"{name.as_posix()}{'/' if path.is_dir() else ''}")
+    return others
 
 
 def _write_project(directory: Path) -> None:

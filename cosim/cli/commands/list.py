@@ -31,7 +31,7 @@ def list_shipped(kinds: tuple[str, ...], as_json: bool) -> None:
     """
     entries = {kind: list(CATALOGUE[kind]()) for kind in kinds or CATALOGUE}
     if as_json:
-        print_json({kind: [asdict(entry) for entry in found] for kind, found in entries.items()})
+        print_json({kind: list(map(asdict, found)) for kind, found in entries.items()})
         return
     for i, (kind, found) in enumerate(entries.items()):
         if len(entries) > 1:

@@ -173,9 +173,7 @@ def _controller_names(name: str, template: Role, texts: Iterable[str]) -> dict[s
         )
     snake = snake_case(name)
     camel = "".join(word[:1].upper() + word[1:] for word in snake.split("_"))
-    taken = {*_MODELICA_TYPES, *(word for text in texts for word in re.findall(r"\w+", text))} - {
-        template.camel
-    }
+    taken = {*_MODELICA_TYPES, *re.findall(r"\w+", "\n".join(texts))} - {template.camel}
     modules = {*sys.stdlib_module_names, "pythonfmu", Path(_FIGURES_FILE).stem}
     if camel in taken or snake in modules or keyword.iskeyword(snake) or keyword.iskeyword(camel):
         raise InputError(f'"{name}" is already used for something else; choose another name')

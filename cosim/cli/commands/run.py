@@ -213,22 +213,14 @@ def _prepare_folder(prepared: PreparedRun, options: RunOptions, locks: LockKeepe
     check_writable(folder)
     locks.lock(OutputFiles.of_folder(folder).lock, shown)
     warn_overwriting(shown, "run.json", "scenario", prepared.document.file.resolve())
-    replaced = sum(
-        (folder / name).stat().st_size for name in RESULT_FILES if (folder / name).is_file()
-    )
+    former = [folder / name for name in RESULT_FILES]
+    replaced = sum(file.stat().st_size for file in former if file.is_file())
     if problems := find_space_problems(prepared.plan, folder, csv=True, replaced=replaced):
-        raise InputError(
-            [
-                Problem(problem.message, prepared.root.where(*problem.subject))
-                for problem in problems
-            ]
-        )
-    figures = (
-        f"{figure.name}{suffix}"
-        for figure in prepared.spec.figures
-        for suffix in (".png", ".svg", ".csv")
-    )
-    remove_files(folder, *RESULT_FILES, *figures)
+        where = prepared.root.where
+        raise InputError([Problem(each.message, where(*each.subject)) for each in problems])
+    remove_files(folder, *RESULT_FILES)
+    for figure in prepared.spec.figures:
+        remove_files(folder, *(f"{figure.name}{suffix}" for suffix in (".png", ".svg", ".csv")))
 
 
 @contextmanager

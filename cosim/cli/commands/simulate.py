@@ -206,22 +206,16 @@ def _write_recording(recording: Recording, output: _Output | None, unfinished: P
 
 def _print_final_values(recording: Recording, as_json: bool) -> None:
     """Print the last row: numbers with six significant digits, as JSON with all digits."""
-    time, last = (
-        recording.time.tolist()[-1],
-        {name: values.tolist()[-1] for name, values in recording.columns.items()},
-    )
+    time = recording.time.tolist()[-1]
+    last = {name: values.tolist()[-1] for name, values in recording.columns.items()}
     if as_json:
         print_json({"time": time, "values": last})
         return
     click.echo(f"time = {time:.6g} s")
     for name, value in last.items():
-        text = (
-            f"{value:.6g}"
-            if isinstance(value, float)
-            else value.hex()
-            if isinstance(value, bytes)
-            else repr(value)
-        )
+        text = value.hex() if isinstance(value, bytes) else repr(value)
+        if isinstance(value, float):
+            text = f"{value:.6g}"
         unit = "" if recording.units[name] == "1" else recording.units[name]
         print_line(f"{name} = {text} {unit}".rstrip())
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import time
 from collections.abc import Iterator, Sequence
+from operator import itemgetter
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
@@ -139,16 +140,13 @@ def _write_maps_and_page(
     maps = success_maps(sweep, sweep.rows(run_store))
     remove_foreign_replays(sweep, folder)
     if replays:
-        runs = [
-            cell.representative_run.number
-            for each in maps
-            for cell in each.cells.values()
-            if cell.representative_run
-        ]
-        for run, cause in write_replays(
-            sweep, runs, folder, workers or available_processors()
-        ).items():
-            click.echo(f"no replay of run {run}: {cause}", err=True)
+        shown = []
+        for each in maps:
+            found = [cell.representative_run for cell in each.cells.values()]
+            shown += [run.number for run in found if run]
+        failed = write_replays(sweep, shown, folder, workers or available_processors())
+        for number, cause in failed.items():
+            click.echo(f"no replay of run {number}: {cause}", err=True)
     write_sweep_page(sweep, sweep.rows(run_store), summary, maps, folder)
 
 
@@ -157,12 +155,10 @@ def _print_summary(sweep: Sweep, summary: SweepSummary) -> None:
         return
     numbers = summary.groups[0].shown_statistics()
     columns = ("mean", "std", "min", "median", "max")
-    kpis = [
-        [name, summary.units.get(name, ""), *(found[key] for key in columns)]
-        for name, found in numbers
-    ]
-    if kpis:
-        print_table(["KPI", "unit", *columns], kpis)
+    if numbers:
+        select = itemgetter(*columns)
+        rows = [[name, summary.units.get(name, ""), *select(found)] for name, found in numbers]
+        print_table(["KPI", "unit", *columns], rows)
     if sweep.criteria or summary.failed:
         print_table(
             ["runs", "n", "success", "95 % interval"],

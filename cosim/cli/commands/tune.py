@@ -88,7 +88,9 @@ def _run_tuning(
         print_json({**describe_best(tuning, best), "failure": failure})
     else:
         _print_best(tuning, best, folder, failure)
-    return 0 if best.feasible else 1 if best.failure else 3
+    if best.feasible:
+        return 0
+    return 1 if best.failure else 3
 
 
 def _find_worst(
@@ -123,12 +125,11 @@ def _find_worst(
 
 def _print_worst(search: WorstCase, files: list[Path]) -> None:
     shown = search.counterexamples or [search.worst]
-    names = list(shown[0].parameters)
-    rows = [
-        [f"{each.severity:.3g}", *(f"{each.parameters[name]:.6g}" for name in names)]
-        for each in shown
-    ]
-    print_table(["severity", *names], rows)
+    rows = []
+    for each in shown:
+        values = [f"{value:.6g}" for value in each.parameters.values()]
+        rows.append([f"{each.severity:.3g}", *values])
+    print_table(["severity", *shown[0].parameters], rows)
     for each, file in zip(shown, files, strict=False):
         click.echo(f"{each.reason}\n  cosim run {file}")
     broken = sum(not each.passed for each in search.attempts)

@@ -27,13 +27,10 @@ def command(fmus: tuple[Path, ...], as_json: bool) -> int:
     """
     findings = {path: _validate_fmu(path) for path in fmus}
     if as_json:
-        print_json(
-            [
-                _finding_as_json(path, finding)
-                for path, found in findings.items()
-                for finding in found
-            ]
-        )
+        listed = []
+        for path, found in findings.items():
+            listed += [_finding_as_json(path, finding) for finding in found]
+        print_json(listed)
     else:
         _print_findings(findings)
     return 2 if any(findings.values()) else 0

@@ -61,7 +61,7 @@ def find_windows_compiler() -> list[str]:
 
 
 def windows_fmu(file: FmuFile) -> Path:
-    """Return a copy of an FMU with a library that runs its DLL under Wine.
+    """Return a copy of an FMU with a library for this machine that runs its DLL under Wine.
 
     Args:
         file: The FMU, which has a DLL for 64-bit Windows.

@@ -12,6 +12,7 @@ import errno
 import os
 import sys
 from collections.abc import Iterator, Sequence
+from itertools import chain
 from typing import NamedTuple
 
 #: refused calls by the resource that they reach: name, number on x86_64, number on aarch64 ("-":
@@ -156,6 +157,8 @@ def filter_program(machine: str, process: int) -> list[Instruction]:
         process: Process id of the process, which may send signals to itself.
     """
     architecture, column = _ARCHITECTURES[machine]
+    # A program of BPF is a list without loops: each call number is compared in turn. A comparison
+    # skips `if_true` or `if_false` instructions, and the first "return" that is reached decides.
     program = [
         Instruction(_LOAD, 0, 0, _ARCHITECTURE_OFFSET),
         Instruction(_EQUAL, 1, 0, architecture),
@@ -170,8 +173,8 @@ def filter_program(machine: str, process: int) -> list[Instruction]:
         program += [Instruction(_EQUAL, 0, 1, number), _refuse(errno.ENOSYS)]
     for call, conditions in _conditional_calls(process).items():
         for number in _numbers(call, column):
-            block = [instruction for condition in conditions for instruction in _check(condition)]
-            block.append(Instruction(_RETURN, 0, 0, _ALLOW))
+            checks = chain.from_iterable(map(_check, conditions))
+            block = [*checks, Instruction(_RETURN, 0, 0, _ALLOW)]
             program += [Instruction(_EQUAL, 0, len(block), number), *block]
     return [*program, Instruction(_RETURN, 0, 0, _ALLOW)]
 

@@ -16,7 +16,7 @@ from collections.abc import Sequence
 
 import casadi as ca
 
-from cosim.export.equations.simd_sum import sum_over_rows
+from cosim.export.equations.c_code import sum_over_rows
 
 from ..common.elementary_functions import arctangent, sine_and_cosine, sine_of_right_angle_share
 from ..common.named_values import NamedValues, vector_rows

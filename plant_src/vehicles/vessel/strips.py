@@ -26,7 +26,7 @@ from dataclasses import dataclass
 
 import casadi as ca
 
-from cosim.export.equations.simd_sum import sum_over_rows
+from cosim.export.equations.c_code import sum_over_rows
 
 from ..common.elementary_functions import sine_and_cosine
 from ..common.interface import MAX_WAVE_COMPONENTS

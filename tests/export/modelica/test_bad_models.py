@@ -350,6 +350,14 @@ BAD = {
         in_model("Integer a;\n  Integer b;", "a = b + 1;\n  b = 2*a;\n  y = a;"),
         "M.mo:7: invalid Appendix B discrete solved form: `a` participates ",
     ),
+    "sizes in a condition inside a branch": (
+        in_model(
+            "Boolean b;",
+            "y = u;\nalgorithm\n  if u > 0 then\n    b := u > 1;\n"
+            "    b := fill(u, 2)*fill(u, 3) > 0;\n  else\n    b := false;\n  end if;",
+        ),
+        "M.mo:10: expression shape mismatch: the sizes of the operands differ",
+    ),
     "different variables in branches": (
         in_model(
             "Real a;\n  Real b;",

@@ -295,3 +295,18 @@ def test_the_derivative_of_an_input_is_refused_by_its_name(write_model):
         InputError, match=r"M.mo:2: the derivative of the input u is needed; filter the input"
     ):
         load_block(path)
+
+
+def test_a_division_by_a_constant_of_zero_is_not_simplified_to_zero(compile_both):
+    """The solution of y + y/0 = u for y divides zero by zero: the step fails, y is not zero."""
+    model = compile_both("""model M
+  constant Real k = 0;
+  input Real u;
+  output Real y;
+equation
+  y + y/k = u;
+end M;""")
+    model.set(u=1.0)
+    assert model.c.step(0.0, 0.01) == "y is not a finite number"
+    with pytest.raises(ComponentError, match="y is not a finite number"):
+        model.python.step(0.0, 0.01)

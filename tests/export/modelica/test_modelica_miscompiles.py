@@ -102,6 +102,46 @@ def test_other_if_equations_on_parameters_are_accepted(write_model, equations):
     assert load_block(write_model(FOLDED.format(equations))).identifier == "M"
 
 
+NESTED = """model M
+  parameter Boolean p = true;
+  parameter Boolean q = true;
+  parameter Boolean r = true;
+  input Real u;
+  output Real y;
+equation
+  {}
+end M;"""
+LOOP = 'for i in 1:2 loop if {} then assert(u < i, "large"); end if; end for;'
+IN_WHEN = "when sample(0, 0.01) then {} y = u; end when;"
+
+
+@pytest.mark.parametrize(
+    ("equations", "constant"),
+    [
+        (IN_WHEN.format(LOOP.format("p")), {"p"}),
+        (IN_WHEN.format("if u > 1 and q then " + LOOP.format("p") + " end if;"), {"p"}),
+        (IN_WHEN.format("if u > 1 and q then " + LOOP.format("u > 2 and p") + " end if;"), set()),
+        (
+            'for i in 1:2 loop when sample(0, 0.01) then if p then assert(u < i, "large"); '
+            "end if; end when; end for; " + IN_WHEN.format(""),
+            {"p"},
+        ),
+        (
+            "if r then "
+            + IN_WHEN.format('if u > 2 and p then assert(u < 3, ""); end if;')
+            + " end if;",
+            {"r"},
+        ),
+    ],
+    ids=["loop", "loop in a branch", "nothing folded in a loop", "clause in a loop", "outside"],
+)
+def test_only_the_parameter_of_a_folded_condition_is_a_constant_also_in_nested_equations(
+    write_model, equations, constant
+):
+    variables = load_block(write_model(NESTED.format(equations))).variables
+    assert {v.name for v in variables if v.variability == "constant"} == constant
+
+
 def test_an_if_equation_on_a_constant_may_be_folded(compile_both):
     text = FOLDED.replace("parameter Boolean hold = false", "constant Boolean hold = true")
     model = compile_both(text.format("if hold then y = 2*x; else y = x; end if;"))

@@ -10,7 +10,7 @@ from plant_validation import MeasurementCheck
 from scipy.signal import welch
 
 from plant_src.environment.coloured_noise import GRID_STEP, Channel, ColouredNoise
-from plant_src.environment.wind import (
+from plant_src.environment.wind_and_current import (
     DrydenGusts,
     Turbulence,
     Wind,

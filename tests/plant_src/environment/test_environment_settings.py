@@ -10,7 +10,7 @@ import pytest
 from cosim.core.errors import InputError
 from plant_src.environment import sea
 from plant_src.environment.settings import EnvironmentSettings, read_environment
-from plant_src.environment.wind import turbulence_intensities
+from plant_src.environment.wind_and_current import turbulence_intensities
 from plant_src.json_reader import JsonReader
 
 WIND = {"speed": 5.0, "direction": 1.0}

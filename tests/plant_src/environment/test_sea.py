@@ -11,7 +11,7 @@ from plant_validation import MeasurementCheck
 from scipy.integrate import quad
 
 from plant_src.environment import sea
-from plant_src.environment.spectrum import (
+from plant_src.environment.sea import (
     SIGNIFICANT_HEIGHTS,
     fully_developed_period,
     jonswap,

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from plant_src.catalogue import MODELS
 from plant_src.environment import sea
 from plant_src.environment.sea import CALM, Sea
-from plant_src.environment.surfaces import SurfaceTable
+from plant_src.environment.updates import SurfaceTable
 from plant_src.physics.compiled_equations import CompiledEquations
 from plant_src.placement import Platform
 from plant_src.vehicles.multirotor.surroundings import (

@@ -22,7 +22,7 @@ from world_harness import (
 import cosim
 from cosim.results import Result
 from plant_src.physics import clearance
-from plant_src.physics.vessel_bodies import MAX_HEAVE
+from plant_src.physics.body import MAX_HEAVE
 
 EVERYWHERE = 1e9  # m; with this near distance all vehicles are near each other
 

@@ -17,13 +17,13 @@ from world_harness import (
     vessel_settings,
 )
 
-from plant_src.physics import client
+from plant_src.physics import bullet
 from plant_src.replica.world import World as Replica
 
 
 @pytest.fixture(autouse=True)
 def only_new_clients(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(client, "_spare_clients", [])
+    monkeypatch.setattr(bullet, "_spare_clients", [])
 
 
 def landing() -> bytes:
@@ -61,11 +61,11 @@ def test_a_landing_in_a_used_client_has_the_bytes_of_one_in_a_new_client(
     leave: Callable[[], object],
 ) -> None:
     in_new_client = landing()
-    client._spare_clients.clear()
+    bullet._spare_clients.clear()
     leave()
-    (kept,) = client._spare_clients
+    (kept,) = bullet._spare_clients
     assert landing() == in_new_client
-    assert client._spare_clients == [kept]
+    assert bullet._spare_clients == [kept]
 
 
 def test_one_client_is_kept_and_the_others_are_disconnected() -> None:
@@ -74,11 +74,11 @@ def test_one_client_is_kept_and_the_others_are_disconnected() -> None:
     assert len(set(numbers)) == 3
     for world in worlds:
         world.free()
-    assert [client.pybullet.isConnected(number) for number in numbers] == [True, False, False]
+    assert [bullet.pybullet.isConnected(number) for number in numbers] == [True, False, False]
 
 
 def test_a_world_that_is_freed_twice_releases_its_client_once() -> None:
     world = WorldHarness({"uav": quadcopter_settings([0.0, 0.0, 5.0])}).world
     world.free()
     world.free()
-    assert len(client._spare_clients) == 1
+    assert len(bullet._spare_clients) == 1

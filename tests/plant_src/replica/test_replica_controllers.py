@@ -7,8 +7,7 @@ import math
 import pytest
 
 from plant_src.replica.bus import Bus
-from plant_src.replica.fmu_base import ReplicaFmu
-from plant_src.replica.pid import Pid
+from plant_src.replica.fmu_base import Pid, ReplicaFmu
 from plant_src.replica.quadcopter import AttitudeController, Mixer, PositionController, Vtol
 from plant_src.replica.vessel import Autopilot, Waypoints
 

@@ -8,7 +8,7 @@ from scene_recording import scene_mission
 
 from cosim.core.errors import InputError
 from plant_src.catalogue import VEHICLE_MODELS
-from plant_src.physics.client import pybullet
+from plant_src.physics.bullet import pybullet
 from plant_src.scene.landscape import add_land, bank, pixel_rays, water_distance
 from plant_src.scene.mission import CAMERAS, mission_of_result
 from plant_src.scene.parts import Part, vehicle_parts

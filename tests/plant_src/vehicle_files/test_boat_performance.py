@@ -10,7 +10,7 @@ import pytest
 import cosim
 from cosim.core import resources
 from plant_src.catalogue import model_from_data
-from plant_src.vehicle_files.boat_performance import boat_properties, top_speed, turning_lever
+from plant_src.vehicle_files.summary import boat_properties, top_speed, turning_lever
 from plant_src.vehicles.vessel.boat import Boat
 
 

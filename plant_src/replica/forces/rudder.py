@@ -15,9 +15,9 @@ import casadi as ca
 
 from cosim.export.fmu.block import Block
 
-from ....vehicles.common.interface import scalar_variable, vector_variables
-from ....vehicles.strider import parameters as p
-from ..force_model import VESSEL_INPUTS, force_model, planar_velocity, tunable_parameter
+from ...vehicles.common.interface import scalar_variable, vector_variables
+from ...vehicles.strider import parameters as p
+from . import VESSEL_INPUTS, force_model, planar_velocity, tunable_parameter
 
 VARIABLES = (
     *VESSEL_INPUTS,

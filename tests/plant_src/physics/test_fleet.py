@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from plant_src.physics.vehicle_arrays import VehicleArrays
+from plant_src.physics.fleet import VehicleArrays
 
 
 def test_an_array_holds_the_numbers_of_all_vehicles_in_order() -> None:

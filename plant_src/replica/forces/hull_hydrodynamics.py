@@ -9,8 +9,8 @@ import casadi as ca
 
 from cosim.export.fmu.block import Block
 
-from ....vehicles.strider import parameters as p
-from ..force_model import (
+from ...vehicles.strider import parameters as p
+from . import (
     VESSEL_INPUTS,
     force_model,
     load_outputs,

@@ -1,4 +1,4 @@
-"""Wind: mean velocity, profile over the height, and Dryden turbulence.
+"""Wind and current: mean velocities, wind profile, Dryden turbulence, changes of the current.
 
 The turbulence is the low-altitude model of MIL-F-8785C, 3.7.3, with the height h (ft), the wind
 speed W20 at 20 ft and the speed V at which the frozen turbulence field passes:
@@ -106,3 +106,49 @@ class DrydenGusts(ColouredNoise):
         u, v, w = values[0::3], values[1::3], values[2::3]
         x, y = self._cos * u - self._sin * v, self._sin * u + self._cos * v
         return np.stack([x, y, w], axis=1).reshape(values.shape)
+
+
+@dataclass(frozen=True)
+class Ramp:
+    """A linear change of the current.
+
+    Attributes:
+        change: Final change of the velocity (m/s, world frame).
+        start: Time at which the change starts (s).
+        duration: Duration of the change (s).
+    """
+
+    change: tuple[float, float]
+    start: float
+    duration: float
+
+    def change_at(self, time: float) -> tuple[float, float]:
+        """Return the change (m/s, world frame) at a time (s)."""
+        fraction = min(max((time - self.start) / self.duration, 0.0), 1.0)
+        return fraction * self.change[0], fraction * self.change[1]
+
+
+@dataclass(frozen=True)
+class Variation:
+    """Independent first-order Gauss-Markov processes in x and y.
+
+    Standard deviation (m/s) and time constant (s).
+    """
+
+    standard_deviation: float
+    time_constant: float
+
+    def create_noise(self, seed: int) -> ColouredNoise:
+        """Return the variation of the current, which is the same for all vessels."""
+        return ColouredNoise(
+            seed, ["current"], [Channel(self.standard_deviation, self.time_constant)] * 2
+        )
+
+
+@dataclass(frozen=True)
+class Current:
+    """Mean velocity of the water (m/s, world frame), and its changes in time."""
+
+    velocity: tuple[float, float]
+    ramp: Ramp | None = None
+    variation: Variation | None = None

@@ -8,12 +8,12 @@ from cosim.core.component import Variable
 from cosim.core.units import parse_unit
 from cosim.export.fmu.block import Block
 
-from ..force_model import force_model, tunable_parameter
+from ..bus import THRUST_COEFFICIENT
+from . import force_model, tunable_parameter
 
-#: thrust and torque of a rotor over its squared speed as in the published model (N s2/rad2, N m
-#: s2/rad2); Table 2 of the paper misprints the power of the first one, and its 2.38e-9 for the
-#: second one cannot turn the vehicle
-THRUST_COEFFICIENT, TORQUE_COEFFICIENT = 9.148e-6, 2.38e-7
+#: torque of a rotor over its squared speed as in the published model (N m s2/rad2); 2.38e-9 of
+#: Table 2 of the paper cannot turn the vehicle
+TORQUE_COEFFICIENT = 2.38e-7
 
 MAX_SPEED = 5000 * 0.10471976  # rad/s; the factor from 1/min is rounded as published
 

@@ -1,1 +1,0 @@
-"""Drag of the air on the vessel."""

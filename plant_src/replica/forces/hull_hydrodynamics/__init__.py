@@ -1,1 +1,0 @@
-"""Loads of the water on the hulls."""

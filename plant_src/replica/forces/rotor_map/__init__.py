@@ -1,1 +1,0 @@
-"""Thrusts and torques of the four rotors."""

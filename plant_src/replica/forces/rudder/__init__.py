@@ -1,1 +1,0 @@
-"""Force of the rudder."""
